@@ -1,0 +1,52 @@
+# Two commands matter: `make demo` and `make test`. Both set up what they need.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
+RUNTIME := $(VENV)/.runtime
+DEV := $(VENV)/.dev
+DEMO := results/req-rep-vs-pub-sub
+
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test check bench clean
+
+help:  ## say what can be made
+	@grep -E '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /make \1\t/' | expand -t 14
+
+setup: $(DEV)  ## the development environment, in .venv
+
+demo: $(RUNTIME)  ## run the main study and write its report
+	@$(BIN)/dva-sim run req-rep-vs-pub-sub -o $(DEMO)
+
+test: $(DEV)  ## all tests
+	@echo "Running the tests ..."
+	@$(BIN)/python -m pytest
+
+check: $(DEV)  ## lint, format, types, import contracts
+	@echo "Checking style, types and import contracts ..."
+	@$(BIN)/ruff check .
+	@$(BIN)/ruff format --check .
+	@$(BIN)/mypy
+	@$(BIN)/lint-imports --no-logo 2>/dev/null || $(BIN)/lint-imports
+
+bench: $(DEV)  ## the ratios that performance work is judged by
+	@$(BIN)/python -m pytest tests/benchmarks --benchmark-only --benchmark-disable-gc -p no:cacheprovider
+
+clean:  ## remove the environment and all caches, keep results
+	@rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+
+$(VENV):
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
+	  || { echo "dva-sim needs Python 3.11 or newer; try: make PYTHON=python3.12 ..."; exit 1; }
+	@echo "Creating an environment in $(VENV) ..."
+	@$(PYTHON) -m venv $(VENV)
+
+$(RUNTIME): pyproject.toml constraints.txt | $(VENV)
+	@echo "Installing dva-sim (about a minute the first time) ..."
+	@$(PIP) install -c constraints.txt -e .
+	@touch $@
+
+$(DEV): pyproject.toml constraints.txt | $(VENV)
+	@echo "Installing dva-sim and its development tools (about a minute the first time) ..."
+	@$(PIP) install -c constraints.txt -e '.[dev]'
+	@touch $@ $(RUNTIME)

@@ -1,0 +1,186 @@
+"""Read YAML 1.2 and check it against a pydantic model; mistakes are told by line and column."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+from ruamel.yaml import YAML
+from ruamel.yaml.comments import CommentedMap, CommentedSeq
+from ruamel.yaml.error import MarkedYAMLError, YAMLError
+
+from dva_sim.errors import ConfigError
+
+Path_ = tuple[str | int, ...]
+M = TypeVar("M", bound=BaseModel)
+
+
+class Config(BaseModel):
+    """Base of all configuration: unknown keys are mistakes, values do not change."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+@dataclass(frozen=True)
+class Document:
+    """A parsed file: plain data, and the place of every key.
+
+    Attributes:
+        data: Plain dictionaries, lists and scalars.
+        file: Where it was read.
+        places: Line and column (from 1) of each key path.
+    """
+
+    data: dict[str, Any]
+    file: Path
+    places: Mapping[Path_, tuple[int, int]] = field(default_factory=dict)
+
+    def error(self, problem: str, path: Path_ = ()) -> ConfigError:
+        """The mistake at `path`, or at its nearest ancestor with a known place."""
+        while path and path not in self.places:
+            path = path[:-1]
+        line, column = self.places.get(path, (None, None))
+        return ConfigError(problem, self.file, line, column)
+
+
+def load_yaml(path: str | Path) -> Document:
+    """Read a mapping from a YAML file.
+
+    Raises:
+        ConfigError: unreadable, not YAML, a key twice, or not a mapping.
+    """
+    path = Path(path)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise ConfigError(f"cannot be read: {error.strerror}", path) from error
+    except UnicodeDecodeError as error:
+        raise ConfigError("is not text in UTF-8", path) from error
+    try:
+        tree = YAML(typ="rt", pure=True).load(text)
+    except MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        problem = (error.problem or "is not valid YAML").split("\n")[0]
+        line, column = (mark.line + 1, mark.column + 1) if mark else (None, None)
+        raise ConfigError(problem, path, line, column) from error
+    except YAMLError as error:
+        raise ConfigError(f"is not valid YAML: {str(error).splitlines()[0]}", path) from error
+    if not isinstance(tree, CommentedMap):
+        raise ConfigError("should be a mapping of keys to values", path, 1, 1)
+    places: dict[Path_, tuple[int, int]] = {(): (1, 1)}
+    data = _plain(tree, (), places)
+    assert isinstance(data, dict)
+    return Document(data, path, places)
+
+
+def _plain(node: Any, path: Path_, places: dict[Path_, tuple[int, int]]) -> Any:
+    """Plain data without ruamel's types; records the place of every key on the way."""
+    if isinstance(node, CommentedMap):
+        out = {}
+        for key, value in node.items():
+            line, column = node.lc.key(key)
+            places[(*path, str(key))] = (line + 1, column + 1)
+            out[str(key)] = _plain(value, (*path, str(key)), places)
+        return out
+    if isinstance(node, CommentedSeq):
+        for index in range(len(node)):
+            line, column = node.lc.item(index)
+            places[(*path, index)] = (line + 1, column + 1)
+        return [_plain(value, (*path, index), places) for index, value in enumerate(node)]
+    if isinstance(node, bool) or node is None:
+        return node
+    for kind in (int, float, str):
+        if isinstance(node, kind):
+            return kind(node)
+    return node
+
+
+def parse_scalar(text: str) -> Any:
+    """What `text` would be as a value in YAML: `--set seed=3` gives the number 3."""
+    try:
+        return _plain(YAML(typ="safe", pure=True).load(text), (), {})
+    except YAMLError as error:
+        raise ConfigError(f"value {text!r} is not valid YAML") from error
+
+
+def validate(
+    model: type[M],
+    data: Mapping[str, Any],
+    error: Callable[[str, Path_], ConfigError] | None = None,
+) -> M:
+    """Build `model` from `data`.
+
+    Args:
+        model: The pydantic model.
+        data: Plain data.
+        error: Makes the error for a problem at a key path; normally `Document.error`.
+
+    Raises:
+        ConfigError: the first mistake, with the key and what would be right.
+    """
+    try:
+        return model.model_validate(data)
+    except ValidationError as problems:
+        first = problems.errors(include_url=False)[0]
+        path = tuple(p for p in first["loc"] if not _is_tag(p, data, first["loc"]))
+        text = _explain(model, first, path)
+        raise (error or _unplaced)(text, path) from None
+
+
+def _unplaced(problem: str, path: Path_) -> ConfigError:
+    return ConfigError(problem)
+
+
+def _is_tag(part: str | int, data: Any, loc: Sequence[str | int]) -> bool:
+    """Whether `part` of an error location names a union member rather than a key."""
+    for step in loc:
+        inside = isinstance(data, Mapping) and step in data
+        inside = inside or (isinstance(data, list) and isinstance(step, int) and step < len(data))
+        if step == part:
+            return not inside and step != loc[-1] and isinstance(step, str)
+        if inside:
+            data = data[step]
+    return False
+
+
+def _explain(model: type[BaseModel], problem: Any, path: Path_) -> str:
+    key = ".".join(str(p) for p in path)
+    if problem["type"] == "extra_forbidden":
+        known = _fields_at(model, path[:-1])
+        near = difflib.get_close_matches(str(path[-1]), known, n=1)
+        hint = f"did you mean {near[0]!r}?" if near else f"known here: {', '.join(sorted(known))}"
+        return f"unknown key {key!r}; {hint}" if known else f"unknown key {key!r}"
+    if problem["type"] == "missing":
+        return f"missing key {key!r}"
+    message = problem["msg"].removeprefix("Value error, ")
+    message = message[0].lower() + message[1:]
+    given = problem["input"]
+    shown = f", not {given!r}" if isinstance(given, str | int | float | bool) else ""
+    return f"{key}: {message}{shown}" if key else f"{message}"
+
+
+def _fields_at(model: Any, path: Path_) -> list[str]:
+    """Names of the fields of the model that stands at `path` inside `model`."""
+    for step in path:
+        if isinstance(step, int):
+            continue
+        info = getattr(model, "model_fields", {}).get(step)
+        if info is None:
+            return []
+        model = _model_in(info.annotation)
+    return list(getattr(model, "model_fields", {}))
+
+
+def _model_in(annotation: Any) -> Any:
+    """The first pydantic model inside an annotation such as `tuple[Event, ...] | None`."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    for inner in getattr(annotation, "__args__", ()):
+        found = _model_in(inner)
+        if found is not None:
+            return found
+    return None

@@ -1,0 +1,40 @@
+"""Errors that a caller may handle; everything else is a bug and keeps its traceback."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+
+class DvaSimError(Exception):
+    """Base of all errors a user can cause and mend."""
+
+
+class ConfigError(DvaSimError):
+    """Bad input: one line that says where, what, and what would be right.
+
+    Args:
+        problem: What is wrong and what would be right, without a trailing full stop.
+        file: The file that holds the mistake, if one does.
+        line: Line in that file, counted from 1.
+        column: Column in that line, counted from 1.
+    """
+
+    def __init__(
+        self,
+        problem: str,
+        file: str | Path | None = None,
+        line: int | None = None,
+        column: int | None = None,
+    ) -> None:
+        self.problem = problem
+        self.file = None if file is None else str(file)
+        self.line = line
+        self.column = column
+        super().__init__(problem)
+
+    def __str__(self) -> str:
+        place = ":".join(str(p) for p in (self.file, self.line, self.column) if p is not None)
+        return f"{place}: {self.problem}" if place else self.problem
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return type(self), (self.problem, self.file, self.line, self.column)
