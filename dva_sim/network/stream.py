@@ -1,0 +1,175 @@
+"""A reliable ordered stream over a link, message by message: what TCP does to an application.
+
+A lost packet holds up everything behind it until it is sent again. This is the
+message-level model: exact without loss and below the link's rate, good with little loss;
+it has no congestion window and no segments.
+
+References:
+    RFC 6298 (retransmission time-out), RFC 8985 section 7 (tail-loss probe).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from dva_sim.clock import Clock
+from dva_sim.network.link import Link
+
+MSS = 1448  # payload of a full Ethernet segment with TCP time stamps [B]
+HEADERS = 52  # IPv4 + TCP with time stamps [B]
+MIN_RTO, FIRST_RTO, MAX_RTO = 0.2, 1.0, 60.0
+MAX_IN_FLIGHT = 1000  # ZeroMQ's default high-water mark, in messages
+
+Deliver = Callable[[Any], object]
+
+
+class Stream:
+    """One direction of a connection.
+
+    Args:
+        clock: The run's clock.
+        forward: Carries the data.
+        backward: Carries the acknowledgements (their size is neglected).
+        deliver: Takes each payload, once and in order.
+    """
+
+    def __init__(self, clock: Clock, forward: Link, backward: Link, deliver: Deliver) -> None:
+        self._clock, self._forward, self._backward = clock, forward, backward
+        self._deliver = deliver
+        self._next_seq = self._next_delivered = 0
+        self._waiting: dict[int, Any] = {}
+        self._last_arrival = 0.0
+        self._srtt: float | None = None
+        self._rttvar = 0.0
+        self.retransmitted = 0
+        self.closed = False
+
+    @property
+    def in_flight(self) -> int:
+        """Messages sent and not yet delivered."""
+        return self._next_seq - self._next_delivered
+
+    def send(self, payload: Any, size: int) -> bool:
+        """Send a message of `size` bytes [B].
+
+        Returns:
+            False if the stream is closed or its send queue is full; nothing is sent then.
+        """
+        if self.closed or self.in_flight >= MAX_IN_FLIGHT:
+            return False
+        seq = self._next_seq
+        self._next_seq += 1
+        self._transmit(seq, payload, size, 0)
+        return True
+
+    def close(self) -> None:
+        """Forget what is under way: nothing more is delivered."""
+        self.closed = True
+        self._waiting.clear()
+
+    def _transmit(self, seq: int, payload: Any, size: int, tries: int) -> None:
+        """Offer the message's packets to the link; those lost are offered again later."""
+        if self.closed:
+            return
+        now = self._clock.now
+        arrival, missing = 0.0, 0
+        while size > 0:
+            part = min(size, MSS)
+            size -= part
+            at = self._forward.carry(now, part + HEADERS)
+            if at is None:
+                missing += part
+            elif at > arrival:
+                arrival = at
+        if missing:
+            self.retransmitted += 1
+            wait = self._recovery_time(tries)
+            self._clock.call_at(now + wait, self._transmit, seq, payload, missing, tries + 1)
+            return
+        if tries == 0:
+            self._measure(arrival - now + self._backward.delay)
+        # A remnant sent again may arrive before what had been lost around it: in order only.
+        self._last_arrival = max(self._last_arrival, arrival)
+        self._clock.call_at(
+            self._last_arrival if tries == 0 else arrival, self._arrive, seq, payload
+        )
+
+    def _arrive(self, seq: int, payload: Any) -> None:
+        if self.closed:
+            return
+        self._waiting[seq] = payload
+        while self._next_delivered in self._waiting:
+            ready = self._waiting.pop(self._next_delivered)
+            self._next_delivered += 1
+            self._deliver(ready)
+
+    def _measure(self, rtt: float) -> None:
+        """RFC 6298, equations 2.2 and 2.3."""
+        if self._srtt is None:
+            self._srtt, self._rttvar = rtt, rtt / 2
+            return
+        self._rttvar += (abs(self._srtt - rtt) - self._rttvar) / 4
+        self._srtt += (rtt - self._srtt) / 8
+
+    def _recovery_time(self, tries: int) -> float:
+        """When a loss is mended: by the tail-loss probe first, then by the time-out, doubling."""
+        if self._srtt is None:
+            return min(MAX_RTO, FIRST_RTO * 2.0**tries)
+        rto = self._srtt + max(MIN_RTO, 4 * self._rttvar)
+        if tries == 0:
+            return min(rto, 2 * self._srtt + 0.01)
+        return float(min(MAX_RTO, rto * 2.0 ** (tries - 1)))
+
+
+class Connection:
+    """Two streams between two nodes, opened by a handshake of three round trips.
+
+    The round trips are TCP's one and the two of ZeroMQ's greeting and security handshake.
+
+    Args:
+        clock: The run's clock.
+        out: The link from the opener.
+        back: The link to the opener.
+        at_peer: Takes what the opener sends.
+        at_opener: Takes what the peer sends.
+    """
+
+    HANDSHAKE_ROUND_TRIPS = 3
+    HANDSHAKE_BYTES = 64
+
+    def __init__(
+        self, clock: Clock, out: Link, back: Link, at_peer: Deliver, at_opener: Deliver
+    ) -> None:
+        self._at_peer, self._at_opener = at_peer, at_opener
+        self._then: Callable[[], object] = lambda: None
+        self._hops_left = 2 * self.HANDSHAKE_ROUND_TRIPS
+        self.to_peer = Stream(clock, out, back, self._peer_gets)
+        self.to_opener = Stream(clock, back, out, self._opener_gets)
+
+    def open(self, then: Callable[[], object]) -> None:
+        """Shake hands, then call `then()`."""
+        self._then = then
+        self.to_peer.send(None, self.HANDSHAKE_BYTES)
+
+    def close(self) -> None:
+        """Drop everything under way in both directions."""
+        self.to_peer.close()
+        self.to_opener.close()
+
+    def _peer_gets(self, payload: Any) -> None:
+        if self._hops_left > 0:
+            self._hops_left -= 1
+            self.to_opener.send(None, self.HANDSHAKE_BYTES)
+        else:
+            self._at_peer(payload)
+
+    def _opener_gets(self, payload: Any) -> None:
+        if self._hops_left > 0:
+            self._hops_left -= 1
+            if self._hops_left:
+                self.to_peer.send(None, self.HANDSHAKE_BYTES)
+            else:
+                self._then()
+        else:
+            self._at_opener(payload)
