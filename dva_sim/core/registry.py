@@ -1,0 +1,77 @@
+"""Who is registered, when each was last heard, and what each is doing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from dva_sim.protocol.messages import Device, Position, Registration
+
+ROBOT, GUARD, OPERATOR, DETECTOR = "Robot", "Guard", "TeleOp", "Sensor"
+MAX_DEVICES = 20_000
+
+
+@dataclass
+class Entry:
+    """One registered device.
+
+    Attributes:
+        device: As it stands on the device list.
+        last_heard: Time of its last message of any kind [s].
+        position: Where it was last known to be.
+        mode: Last known mode of a robot.
+        order: Event that it is working on.
+        silent: Whether it has been quiet for longer than the time-out.
+    """
+
+    device: Device
+    last_heard: float
+    position: Position | None = None
+    mode: str = "Idle"
+    order: int | None = None
+    silent: bool = False
+
+
+@dataclass
+class Registry:
+    """All devices by id.
+
+    Attributes:
+        silent_after: How long a device may be quiet before it counts as gone [s].
+    """
+
+    silent_after: float = 10.0
+    entries: dict[str, Entry] = field(default_factory=dict)
+
+    def register(self, id_tag: str, request: Registration, now: float) -> Entry | None:
+        """Enter a device, or renew its entry; None if the registry is full."""
+        device = Device(id_tag, request.label, request.device_type, request.address)
+        known = self.entries.get(id_tag)
+        if known is not None:
+            known.device = device
+            self.heard(id_tag, now)
+            return known
+        if len(self.entries) >= MAX_DEVICES:
+            return None
+        entry = self.entries[id_tag] = Entry(device, now)
+        return entry
+
+    def heard(self, id_tag: str, now: float) -> Entry | None:
+        """Note a sign of life; None if the device is not registered."""
+        entry = self.entries.get(id_tag)
+        if entry is not None:
+            entry.last_heard, entry.silent = now, False
+        return entry
+
+    def fallen_silent(self, now: float) -> list[Entry]:
+        """Devices that have been quiet for longer than the time-out since the last call."""
+        limit = now - self.silent_after
+        gone = [e for e in self.entries.values() if not e.silent and e.last_heard < limit]
+        for entry in gone:
+            entry.silent = True
+        return gone
+
+    def of_type(self, device_type: str) -> list[Entry]:
+        """Registered devices of a type that are not silent, in order of registration."""
+        return [
+            e for e in self.entries.values() if e.device.device_type == device_type and not e.silent
+        ]

@@ -1,0 +1,259 @@
+"""The DVA's desk: takes each message with the time, returns the reply and what else to send."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from dva_sim.core.dispatch import Policy, Responder, Situation
+from dva_sim.core.events import Event, EventBook, State
+from dva_sim.core.permissions import Permissions
+from dva_sim.core.registry import DETECTOR, GUARD, OPERATOR, ROBOT, Entry, Registry
+from dva_sim.protocol import messages as m
+
+MAX_ATTEMPTS = 4  # orders given for one event before it is escalated
+
+
+@dataclass(frozen=True, slots=True)
+class Send:
+    """A message that the DVA wants delivered: to whom, and what."""
+
+    to: str
+    body: m.Body
+
+
+@dataclass(frozen=True)
+class Pace:
+    """What the DVA expects of a kind of responder: travel speed [m/s], mobilisation [s]."""
+
+    speed: float
+    mobilisation: float
+
+
+@dataclass
+class Desk:
+    """The DVA core.
+
+    Attributes:
+        policy: Advises who goes where.
+        distance: Path length between two positions [m]; infinite if there is no way.
+        paces: Expected pace of `guard` and `robot`.
+        escalate_after: An event nobody has been sent to by then is escalated [s].
+        rng: Luck of policies that use it.
+    """
+
+    policy: Policy
+    distance: Callable[[m.Position, m.Position], float]
+    paces: dict[str, Pace]
+    escalate_after: float
+    rng: np.random.Generator
+    registry: Registry = field(default_factory=Registry)
+    permissions: Permissions = field(default_factory=Permissions)
+    book: EventBook = field(default_factory=EventBook)
+    refused: int = 0
+
+    def handle(self, message: m.Message, now: float) -> tuple[m.Reply, list[Send]]:
+        """Take a request; the reply goes to the sender, the rest where it says."""
+        body, source = message.body, message.source
+        if isinstance(body, m.Registration):
+            return self._register(message, body, now)
+        entry = self.registry.heard(source, now)
+        if entry is None:
+            text = f"device {source} is not registered"
+            return self._refuse(message, m.NOT_REGISTERED, text)
+        match body:
+            case m.PermissionRequest():
+                return self._permission(message, body)
+            case m.EventReport():
+                return self._report(message, body, now)
+            case m.OrderProgress():
+                return self._progress(message, entry, body, now)
+            case m.GetDeviceList():
+                return self._device_list(message)
+            case _:
+                name = type(body).__name__
+                return self._refuse(message, m.NOT_SUPPORTED, f"{name} is not for the DVA")
+
+    def note(self, message: m.Message, now: float) -> None:
+        """Take a published message: heartbeat or status; nobody waits for an answer."""
+        entry = self.registry.heard(message.source, now)
+        if entry is None:
+            self.refused += 1
+        elif isinstance(message.body, m.RobotStatus):
+            entry.position, entry.mode = message.body.position, message.body.mode
+
+    def tick(self, now: float) -> list[Send]:
+        """What time brings: silent devices, deadlines, and another look at who is free."""
+        for entry in self.registry.fallen_silent(now):
+            self._abandon(entry.device.id_tag, now)
+        for event in list(self.book.in_state(State.PENDING)):
+            if now - event.times["detected"] >= self.escalate_after:
+                self.book.move(event, State.ESCALATED, now)
+        return self._assign(now)
+
+    def undelivered(self, send: Send, now: float) -> list[Send]:
+        """An order did not arrive or was declined: the event is open to others."""
+        if not isinstance(send.body, m.Order):
+            return []
+        event = self.book.events[send.body.event_id]
+        self._release(send.to, event)
+        if event.state in (State.ASSIGNED, State.ON_SCENE):
+            self._reopen(event, now)
+        return []
+
+    def place(self, device: str, position: m.Position) -> None:
+        """Note where a registered device stands, when that is known without a message."""
+        self.registry.entries[device].position = position
+
+    def _register(
+        self, message: m.Message, body: m.Registration, now: float
+    ) -> tuple[m.Reply, list[Send]]:
+        if self.registry.register(message.source, body, now) is None:
+            return self._refuse(message, m.BUSY, "the registry is full")
+        return m.Reply(message.message_id, m.OK, ""), []
+
+    def _permission(
+        self, message: m.Message, body: m.PermissionRequest
+    ) -> tuple[m.Reply, list[Send]]:
+        robot = self.registry.entries.get(body.device)
+        if robot is None or robot.device.device_type != ROBOT:
+            return self._refuse(message, m.UNKNOWN_DEVICE, f"no robot {body.device}")
+        grant = self.permissions.request(body.device, message.source, body.level)
+        if grant is None:
+            return self._refuse(message, m.BUSY, f"robot {body.device} is held by another")
+        content = m.Permission(body.device, grant.level, grant.session)
+        told = Send(body.device, m.PermissionGrant(grant.holder, grant.level, grant.session))
+        return m.Reply(message.message_id, m.OK, "", content), [told]
+
+    def _report(
+        self, message: m.Message, body: m.EventReport, now: float
+    ) -> tuple[m.Reply, list[Send]]:
+        if body.event_id is None:
+            self.book.report(body.kind, body.position, body.severity, now)
+            return m.Reply(message.message_id, m.OK, ""), self._assign(now)
+        event = self.book.events.get(body.event_id)
+        if event is None:
+            return self._refuse(message, m.UNKNOWN_EVENT, f"no event {body.event_id}")
+        if event.open and body.finding == "confirmed":
+            self._arrived(event, now)
+            self.book.move(event, State.CONFIRMED, now)
+        elif body.finding == "refuted" and event.state in (State.ASSIGNED, State.ON_SCENE):
+            self._arrived(event, now)
+            self.book.move(event, State.REFUTED, now)
+        return m.Reply(message.message_id, m.OK, ""), []
+
+    def _progress(
+        self, message: m.Message, entry: Entry, body: m.OrderProgress, now: float
+    ) -> tuple[m.Reply, list[Send]]:
+        event = self.book.events.get(body.event_id)
+        if event is None or entry.order != body.event_id:
+            text = f"device {message.source} has no order for event {body.event_id}"
+            return self._refuse(message, m.UNKNOWN_EVENT, text)
+        send: list[Send] = []
+        if body.state == "departed":
+            event.times.setdefault("departed", now)
+        elif body.state == "arrived" and event.open:
+            self._arrived(event, now)
+        elif body.state in ("done", "failed", "declined"):
+            send = self._order_ends(event, entry, body.state, now)
+        return m.Reply(message.message_id, m.OK, ""), send
+
+    def _arrived(self, event: Event, now: float) -> None:
+        if event.state is State.ASSIGNED:
+            event.times.setdefault("departed", now)
+            event.times["arrived"] = now
+            self.book.move(event, State.ON_SCENE, now)
+        if event.responder is not None:
+            self.registry.entries[event.responder].position = event.position
+
+    def _order_ends(self, event: Event, entry: Entry, state: str, now: float) -> list[Send]:
+        """The responder is free again; an event it could not settle is open to others."""
+        self._release(entry.device.id_tag, event)
+        if state != "done" and event.state in (State.ASSIGNED, State.ON_SCENE):
+            self._reopen(event, now)
+        return self._assign(now)
+
+    def _release(self, device: str, event: Event) -> None:
+        self.permissions.release(device)
+        for name in (device, event.responder, event.operator):
+            if name is not None and self.registry.entries[name].order == event.number:
+                self.registry.entries[name].order = None
+
+    def _reopen(self, event: Event, now: float) -> None:
+        out_of_tries = event.attempts >= MAX_ATTEMPTS
+        self.book.move(event, State.ESCALATED if out_of_tries else State.PENDING, now)
+
+    def _abandon(self, device: str, now: float) -> None:
+        """A device has fallen silent: what it was doing is open to others."""
+        for event in self.book.in_state(State.ASSIGNED, State.ON_SCENE):
+            if device in (event.responder, event.operator):
+                self._release(event.operator or device, event)
+                self._reopen(event, now)
+                return
+
+    def _assign(self, now: float) -> list[Send]:
+        """Ask the policy, keep what the rules allow, and give the orders."""
+        pending = tuple(self.book.in_state(State.PENDING))
+        operators = [e for e in self.registry.of_type(OPERATOR) if e.order is None]
+        responders = self._idle_responders(bool(operators))
+        if not pending or not responders:
+            return []
+        situation = self._situation(pending, responders)
+        orders: list[Send] = []
+        taken: set[str] = set()
+        for choice in self.policy.assign(situation, self.rng):
+            if not (0 <= choice.event < len(pending) and 0 <= choice.responder < len(responders)):
+                continue
+            event, responder = pending[choice.event], responders[choice.responder]
+            if event.state is not State.PENDING or responder.device in taken:
+                continue
+            if responder.kind == "robot" and not operators:
+                continue
+            taken.add(responder.device)
+            operator = operators.pop(0).device.id_tag if responder.kind == "robot" else None
+            orders.append(self._order(event, responder.device, operator, now))
+        return orders
+
+    def _order(self, event: Event, responder: str, operator: str | None, now: float) -> Send:
+        self.book.move(event, State.ASSIGNED, now)
+        event.responder, event.operator = responder, operator
+        self.registry.entries[responder].order = event.number
+        body = m.Order(event.number, event.kind, event.position, responder if operator else None)
+        if operator is None:
+            return Send(responder, body)
+        self.registry.entries[operator].order = event.number
+        return Send(operator, body)
+
+    def _idle_responders(self, operator_free: bool) -> tuple[Responder, ...]:
+        guards = [Responder(e.device.id_tag, "guard") for e in self._idle(GUARD)]
+        robots = [Responder(e.device.id_tag, "robot") for e in self._idle(ROBOT)]
+        return tuple(guards + robots) if operator_free else tuple(guards)
+
+    def _idle(self, device_type: str) -> list[Entry]:
+        entries = self.registry.of_type(device_type)
+        return [e for e in entries if e.order is None and e.position is not None]
+
+    def _situation(
+        self, pending: tuple[Event, ...], responders: tuple[Responder, ...]
+    ) -> Situation:
+        distance = np.full((len(pending), len(responders)), np.inf)
+        eta = distance.copy()
+        for column, responder in enumerate(responders):
+            where = self.registry.entries[responder.device].position
+            pace = self.paces[responder.kind]
+            for row, event in enumerate(pending):
+                assert where is not None
+                distance[row, column] = self.distance(where, event.position)
+                eta[row, column] = pace.mobilisation + distance[row, column] / pace.speed
+        return Situation(pending, responders, distance, eta)
+
+    def _device_list(self, message: m.Message) -> tuple[m.Reply, list[Send]]:
+        devices = [e.device for e in self.registry.entries.values()]
+        shown = tuple(d for d in devices if d.device_type != DETECTOR)[:32]
+        return m.Reply(message.message_id, m.OK, "", m.DeviceList(shown)), []
+
+    def _refuse(self, message: m.Message, code: int, text: str) -> tuple[m.Reply, list[Send]]:
+        self.refused += 1
+        return m.Reply(message.message_id, code, text), []

@@ -1,0 +1,217 @@
+"""The DVA's desk: registration, permissions, events, dispatch."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dva_sim.core.dispatch import POLICIES, Assignment, MinEta, Policy, Situation
+from dva_sim.core.events import Event, EventBook, State
+from dva_sim.core.service import MAX_ATTEMPTS, Desk, Pace, Send
+from dva_sim.protocol import messages as m
+
+DVA = "02:00:00:00:00:01"
+ROBOT, OTHER_ROBOT = "02:00:00:01:00:01", "02:00:00:01:00:02"
+GUARD, OPERATOR, OTHER_OPERATOR = "02:00:00:02:00:01", "02:00:00:03:00:01", "02:00:00:03:00:02"
+DETECTOR = "02:00:00:04:00:01"
+HERE = m.Position(38.6612, -9.2058)
+
+
+def east(metres: float) -> m.Position:
+    return m.Position(HERE.latitude, HERE.longitude + metres / 87_000)
+
+
+def crow(a: m.Position, b: m.Position) -> float:
+    return abs(a.longitude - b.longitude) * 87_000
+
+
+class Office:
+    """A desk with a guard at 0 m, a robot at 10 m, an operator and a detector."""
+
+    def __init__(self, policy: Policy | None = None) -> None:
+        paces = {"guard": Pace(1.3, 20.0), "robot": Pace(0.35, 4.0)}
+        rng = np.random.default_rng(1)
+        self.desk = Desk(policy or MinEta(), crow, paces, 60.0, rng)
+        self.number = 0
+        team = {GUARD: "Guard", ROBOT: "Robot", OPERATOR: "TeleOp", DETECTOR: "Sensor"}
+        for id_tag, kind in team.items():
+            self.say(id_tag, m.Registration(kind.lower(), kind, "192.168.1.9"))
+        self.desk.place(GUARD, east(0))
+        self.status(ROBOT, 10)
+
+    def say(self, source: str, body: m.Body, now: float = 0.0) -> tuple[m.Reply, list[Send]]:
+        self.number += 1
+        session = None if isinstance(body, m.Heartbeat) else 0
+        message = m.Message(DVA, self.number, source, "12:00:00", session, body)
+        return self.desk.handle(message, now)
+
+    def status(self, robot: str, metres: float, now: float = 0.0) -> None:
+        body = m.RobotStatus("Idle", east(metres), 0.0, 0.0, 0.0, 5)
+        self.desk.note(m.Message(DVA, 1, robot, "12:00:00", 0, body), now)
+
+    def fire(self, metres: float, now: float = 0.0, kind: str = "fire") -> list[Send]:
+        body = m.EventReport(None, kind, east(metres), 0.5, 0.9, "detected")
+        return self.say(DETECTOR, body, now)[1]
+
+    def event(self, number: int = 1) -> Event:
+        return self.desk.book.events[number]
+
+
+@pytest.fixture
+def office() -> Office:
+    return Office()
+
+
+def test_who_is_not_registered_is_refused_and_counted(office: Office) -> None:
+    reply, sends = office.say("02:00:00:09:00:09", m.GetDeviceList())
+    assert (reply.code, sends) == (m.NOT_REGISTERED, [])
+    assert office.desk.refused == 1
+
+
+def test_the_device_list_shows_everybody_but_detectors(office: Office) -> None:
+    content = office.say(OPERATOR, m.GetDeviceList())[0].content
+    assert isinstance(content, m.DeviceList)
+    assert [d.device_type for d in content.devices] == ["Guard", "Robot", "TeleOp"]
+
+
+def test_a_robot_is_held_by_one_and_the_robot_is_told(office: Office) -> None:
+    office.say(OTHER_OPERATOR, m.Registration("second", "TeleOp", "192.168.1.10"))
+    reply, sends = office.say(OPERATOR, m.PermissionRequest(ROBOT, "teleoperation"))
+    assert isinstance(reply.content, m.Permission)
+    told = m.PermissionGrant(OPERATOR, "teleoperation", reply.content.session)
+    assert sends == [Send(ROBOT, told)]
+    other = office.say(OTHER_OPERATOR, m.PermissionRequest(ROBOT, "teleoperation"))[0]
+    assert other.code == m.BUSY
+
+
+def test_sessions_only_grow(office: Office) -> None:
+    sessions = []
+    for _ in range(3):
+        content = office.say(OPERATOR, m.PermissionRequest(ROBOT, "teleoperation"))[0].content
+        assert isinstance(content, m.Permission)
+        sessions.append(content.session)
+        office.desk.permissions.release(OPERATOR)
+    assert sessions == sorted(set(sessions))
+
+
+def test_the_earliest_expected_arrival_goes(office: Office) -> None:
+    near_robot = office.fire(12)
+    assert near_robot == [Send(OPERATOR, m.Order(1, "fire", east(12), ROBOT))]
+    far = office.fire(40, kind="gas_leak")
+    assert far == [Send(GUARD, m.Order(2, "gas_leak", east(40), None))]
+
+
+def test_reports_of_one_kind_near_each_other_are_one_event(office: Office) -> None:
+    office.fire(12)
+    office.fire(15)
+    office.fire(12, kind="gas_leak")
+    assert {e.number: e.reports for e in office.desk.book.events.values()} == {1: 2, 2: 1}
+
+
+def test_a_robot_goes_only_with_a_free_operator(office: Office) -> None:
+    office.say(OTHER_ROBOT, m.Registration("second", "Robot", "192.168.1.11"))
+    office.status(OTHER_ROBOT, 10)
+    first, second = office.fire(12), office.fire(12, kind="gas_leak")
+    assert [s.to for s in first + second] == [OPERATOR, GUARD]
+
+
+def test_an_event_runs_its_course_with_its_times_in_order(office: Office) -> None:
+    office.fire(12, now=1.0)
+    office.say(OPERATOR, m.OrderProgress(1, "departed"), 3.0)
+    office.say(OPERATOR, m.OrderProgress(1, "arrived"), 9.0)
+    assert office.event().state is State.ON_SCENE
+    office.say(OPERATOR, m.EventReport(1, "fire", east(12), 0.5, 0.9, "confirmed"), 12.0)
+    assert office.event().state is State.CONFIRMED
+    office.say(OPERATOR, m.OrderProgress(1, "done"), 13.0)
+    assert office.event().times == {
+        "detected": 1.0,
+        "assigned": 1.0,
+        "departed": 3.0,
+        "arrived": 9.0,
+        "confirmed": 12.0,
+        "closed": 12.0,
+    }
+    assert office.desk.registry.entries[ROBOT].order is None
+    assert office.desk.registry.entries[OPERATOR].order is None
+
+
+def test_a_responder_that_fails_is_replaced(office: Office) -> None:
+    office.fire(12)
+    sends = office.say(OPERATOR, m.OrderProgress(1, "failed"), 5.0)[1]
+    assert len(sends) == 1
+    assert office.event().state is State.ASSIGNED
+
+
+def test_an_event_that_nobody_settles_is_escalated_after_its_attempts(office: Office) -> None:
+    orders = office.fire(12)
+    for _ in range(MAX_ATTEMPTS + 2):
+        if orders:
+            orders = office.say(orders[0].to, m.OrderProgress(1, "failed"), 1.0)[1]
+    assert office.event().attempts == MAX_ATTEMPTS
+    assert office.event().state is State.ESCALATED
+
+
+def test_pending_beyond_its_deadline_means_escalated(office: Office) -> None:
+    for entry in office.desk.registry.entries.values():
+        entry.order = 99
+    office.fire(12, now=0.0)
+    office.desk.registry.silent_after = 1e9
+    office.desk.tick(59.9)
+    assert office.event().state is State.PENDING
+    office.desk.tick(60.0)
+    assert office.event().state is State.ESCALATED
+
+
+def test_a_device_is_silent_only_after_its_timeout_has_passed(office: Office) -> None:
+    office.fire(12)
+    office.desk.tick(10.0)
+    assert office.event().operator == OPERATOR
+    office.say(GUARD, m.GetDeviceList(), 10.0)
+    office.desk.tick(10.1)
+    assert office.event().responder == GUARD
+
+
+def test_an_order_that_is_not_delivered_leaves_the_event_open_to_others(office: Office) -> None:
+    orders = office.fire(12)
+    office.desk.undelivered(orders[0], 5.0)
+    assert office.event().state is State.PENDING
+    assert office.event().responder is None
+
+
+@pytest.mark.parametrize("name", sorted(POLICIES))
+def test_every_policy_uses_each_responder_once(name: str) -> None:
+    rng = np.random.default_rng(2)
+    for _ in range(50):
+        cost = rng.uniform(1, 100, (4, 3))
+        cost[rng.random((4, 3)) < 0.2] = np.inf
+        events = tuple(Event(i, "fire", HERE, 0.5) for i in range(4))
+        situation = Situation(events, tuple("abc"), cost, cost)  # type: ignore[arg-type]
+        chosen = POLICIES[name]().assign(situation, rng)
+        assert len({c.responder for c in chosen}) == len(chosen) == len({c.event for c in chosen})
+        assert all(np.isfinite(cost[c.event, c.responder]) for c in chosen)
+
+
+class Nonsense:
+    """Sends the same responder everywhere, and some that do not exist."""
+
+    def assign(self, situation: Situation, rng: np.random.Generator) -> list[Assignment]:
+        every = range(-1, len(situation.events) + 1)
+        return [Assignment(e, r) for e in every for r in (0, 0, 99, -1)]
+
+
+def test_the_desk_enforces_the_rules_whatever_a_policy_returns() -> None:
+    office = Office(Nonsense())
+    office.fire(12)
+    office.fire(12, kind="gas_leak")
+    office.fire(12, kind="flood")
+    held = [e.responder for e in office.desk.book.in_state(State.ASSIGNED)]
+    assert len(held) == len(set(held)) == 2
+    assert sum(office.desk.book.counts().values()) == 3
+
+
+def test_a_step_that_does_not_exist_is_refused() -> None:
+    book = EventBook()
+    event = book.report("fire", HERE, 0.5, 0.0)
+    book.move(event, State.ESCALATED, 1.0)
+    with pytest.raises(ValueError, match="cannot go from escalated to confirmed"):
+        book.move(event, State.CONFIRMED, 2.0)
