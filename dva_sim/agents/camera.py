@@ -1,0 +1,93 @@
+"""What a robot's camera shows: the only thing an operator ever sees of the world."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+from dva_sim.agents.steering import wrap
+
+
+@dataclass(frozen=True, slots=True)
+class SeenHazard:
+    """A hazard in the picture: kind, place [m] and distance from the camera [m]."""
+
+    kind: str
+    x: float
+    y: float
+    distance: float
+
+
+@dataclass(frozen=True, slots=True)
+class Observation:
+    """One frame, as far as a person makes use of it.
+
+    Attributes:
+        tick: The robot's own clock when it was taken [ms]; it agrees with no other clock.
+        x: Where the robot is, judged from the picture and the map [m].
+        y: The same to the north [m].
+        heading: Where it points [rad].
+        speed: How fast the picture says it goes [m/s].
+        turn_rate: How fast the picture says it turns [rad/s].
+        hazards: What burns, leaks or floods in view.
+    """
+
+    tick: int
+    x: float
+    y: float
+    heading: float
+    speed: float
+    turn_rate: float
+    hazards: tuple[SeenHazard, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """An observation on its way; `captured` [s] is for the recorder, not for the operator."""
+
+    observation: Observation
+    captured: float
+
+
+@dataclass(frozen=True, slots=True)
+class HazardSpot:
+    """A hazard as the camera may see it: kind, place and radius [m]."""
+
+    kind: str
+    x: float
+    y: float
+    radius: float
+
+
+@dataclass(frozen=True)
+class View:
+    """Field of view and range of a camera.
+
+    Attributes:
+        angle: Whole angle of view [rad].
+        range: How far a hazard can be recognised [m].
+        line_of_sight: Whether nothing stands between two places.
+    """
+
+    angle: float
+    range: float
+    line_of_sight: Callable[[tuple[float, float], tuple[float, float]], bool]
+
+    def look(
+        self, x: float, y: float, heading: float, hazards: Iterable[HazardSpot]
+    ) -> tuple[SeenHazard, ...]:
+        """Which hazards are in the picture taken from a pose [m, rad]."""
+        seen = []
+        for hazard in hazards:
+            dx, dy = hazard.x - x, hazard.y - y
+            distance = math.hypot(dx, dy)
+            if distance - hazard.radius > self.range:
+                continue
+            bearing = wrap(math.atan2(dy, dx) - heading)
+            half_width = math.atan2(hazard.radius, distance)
+            if abs(bearing) - half_width > self.angle / 2:
+                continue
+            if self.line_of_sight((x, y), (hazard.x, hazard.y)):
+                seen.append(SeenHazard(hazard.kind, hazard.x, hazard.y, distance))
+        return tuple(seen)

@@ -1,0 +1,130 @@
+"""How the phone's app sends SetTeleOp: by request/reply or by publishing. Nothing else differs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from dva_sim.agents.tilt import Phone, TiltCommand
+from dva_sim.network.patterns import Network, Requester
+from dva_sim.protocol.exchange import Outbox
+from dva_sim.protocol.messages import SetTeleOp
+from dva_sim.recorder import DriveLog, Recorder
+
+SERVICE = "commands"
+
+
+def topic_of(robot: str) -> str:
+    """Topic of the commands for a robot; the bar ends it, so that no topic begins another."""
+    return f"{robot}|"
+
+
+class CommandSender:
+    """Looks at the phone whenever it is time and sends what it says.
+
+    Args:
+        network: Where messages travel.
+        outbox: Headers of the operator's messages.
+        drive: Log of this drive; names the robot.
+        session: Session of this drive.
+        phone: The tilt phone.
+        rate_hz: Wanted commands per second.
+        recorder: Told of each command.
+        seen_tick: The newest robot tick on the screen [ms], if there is any.
+    """
+
+    def __init__(
+        self,
+        network: Network,
+        outbox: Outbox,
+        drive: DriveLog,
+        session: int,
+        phone: Phone,
+        rate_hz: float,
+        recorder: Recorder,
+        seen_tick: Callable[[], int | None],
+    ) -> None:
+        self._network, self._clock, self._outbox = network, network.clock, outbox
+        self._drive, self._session, self._phone = drive, session, phone
+        self._rate, self._recorder, self._seen_tick = rate_hz, recorder, seen_tick
+        self._on = False
+
+    def start(self) -> None:
+        """Begin to send."""
+        self._on = True
+        self._phone.pick_up(self._clock.now)
+        self._look()
+
+    def stop(self) -> None:
+        """Send nothing more."""
+        self._on = False
+
+    def _look(self) -> None:
+        if not self._on:
+            return
+        now = self._clock.now
+        command = self._phone.look(now)
+        if command is not None:
+            self._offer(command)
+        self._clock.call_at(self._phone.next_look(now, self._rate), self._look)
+
+    def _offer(self, command: TiltCommand) -> None:
+        raise NotImplementedError
+
+    def _encode(self, command: TiltCommand) -> bytes:
+        """The bytes of a command that is issued now."""
+        now = self._clock.now
+        body = SetTeleOp(command.speed, command.turn_rate, self._seen_tick())
+        message = self._outbox.message(self._drive.robot, body, now, self._session)
+        self._recorder.command_issued(message.source, message.message_id, now, command.sample_age)
+        self._drive.sent += 1
+        return self._outbox.encoded(message)
+
+
+class PublishedCommands(CommandSender):
+    """Publish/subscribe: send and forget."""
+
+    def _offer(self, command: TiltCommand) -> None:
+        data = self._encode(command)
+        publisher = self._network.publisher(self._outbox.source, SERVICE)
+        publisher.publish(topic_of(self._drive.robot), data, len(data))
+
+
+class RequestedCommands(CommandSender):
+    """Request/reply: the next command goes when the last one is answered.
+
+    What the phone says meanwhile is overtaken by what it says last. After the last attempt
+    without an answer the app alerts: the link is lost.
+    """
+
+    def connect(self, requester: Requester, on_alert: Callable[[], object]) -> None:
+        """Give it its REQ socket, and say what to do when the link is lost."""
+        self._requester, self._on_alert = requester, on_alert
+        self._pending: TiltCommand | None = None
+
+    def stop(self) -> None:
+        """Send nothing more and close the socket."""
+        super().stop()
+        self._drive.round_trips = self._requester.round_trips
+        self._drive.timeouts = self._requester.timeouts
+        self._requester.close()
+
+    def _offer(self, command: TiltCommand) -> None:
+        if self._requester.busy:
+            if self._pending is not None:
+                self._drive.superseded += 1
+            self._pending = command
+            return
+        self._requester.request(self._encode(command), self._answered, self._failed)
+
+    def _answered(self, _: bytes) -> None:
+        """A command that waited goes now: the newest value if the app keeps sending anyway."""
+        pending, self._pending = self._pending, None
+        if pending is None or not self._on:
+            return
+        if self._phone.keeps_alive:
+            pending = self._phone.look(self._clock.now) or pending
+        self._offer(pending)
+
+    def _failed(self) -> None:
+        self._drive.alerts += 1
+        self._on_alert()

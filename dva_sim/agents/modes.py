@@ -1,0 +1,233 @@
+"""What a robot obeys: modes, sessions, order and age of commands, watchdog, emergency.
+
+Pure: it takes messages with their times and returns what to answer and how to move.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from dva_sim.protocol import messages as m
+
+LEASE_S = 30.0  # teleoperation without a valid command ends by itself after this
+
+
+class Mode(StrEnum):
+    """What a robot is doing."""
+
+    IDLE = "Idle"
+    MISSION = "Mission"
+    TELEOPERATION = "Teleoperation"
+
+
+@dataclass(frozen=True, slots=True)
+class SetPoint:
+    """How to move, and until when at the latest: speed [m/s], turn rate [rad/s], time [s]."""
+
+    speed: float
+    turn_rate: float
+    until: float
+
+
+STAND = SetPoint(0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """What follows from a message.
+
+    Attributes:
+        code: Reply code; anything but OK means that nothing has changed.
+        text: Why, for people.
+        set_point: The new set point, or None to leave it.
+        content: Content of the reply.
+    """
+
+    code: int
+    text: str = ""
+    set_point: SetPoint | None = None
+    content: m.SensorInfo | None = None
+
+
+@dataclass(frozen=True)
+class Limits:
+    """How long a robot trusts what it was told.
+
+    Attributes:
+        watchdog: A command is in force for at most this long after its reception [s].
+        max_age: And for at most this long after the newest tick its sender had seen [s].
+    """
+
+    watchdog: float
+    max_age: float
+
+
+@dataclass
+class RobotController:
+    """The decider of one robot.
+
+    Attributes:
+        id_tag: The robot.
+        dva: Id of the DVA: the only one whose grants count.
+        limits: Watchdog and age limit.
+        camera_url: Told to whoever asks for the sensors.
+        clock_offset: What the robot's own clock shows at the run's start [s]; no other
+            clock agrees with it.
+    """
+
+    id_tag: str
+    dva: str
+    limits: Limits
+    camera_url: str = "http://192.168.1.20:8080/camera"
+    clock_offset: float = 0.0
+    mode: Mode = Mode.IDLE
+    owner: str | None = None
+    grant: m.PermissionGrant | None = None
+    mission: tuple[m.Position, ...] = ()
+    last_set_id: int = 0
+    last_valid: float = 0.0
+    emergency_at: float = -1.0
+    without_tick: int = 0
+
+    def tick(self, now: float) -> int:
+        """The robot's own clock [ms]."""
+        return round((now + self.clock_offset) * 1000)
+
+    def handle(self, message: m.Message, arrived: float, now: float, moving: bool) -> Decision:
+        """Decide on a message.
+
+        Args:
+            message: What was received and validated.
+            arrived: When it reached the robot [s]; it may have waited since.
+            now: Time [s].
+            moving: Whether the robot's wheels still turn.
+        """
+        body = message.body
+        match body:
+            case m.SetTeleOp():
+                return self._set(message, body, arrived, now)
+            case m.Emergency():
+                return self._emergency(now)
+            case m.PermissionGrant():
+                return self._granted(message, body)
+            case m.StartTeleOp():
+                return self._start(message, arrived, now, moving)
+            case m.StopTeleOp():
+                return self._stop(message)
+            case m.GoTo() | m.CancelMission():
+                return self._mission(message, arrived, moving)
+            case m.GetSensorInfo():
+                return Decision(m.OK, content=m.SensorInfo(self.camera_url))
+            case _:
+                return Decision(m.NOT_SUPPORTED, f"a robot does not take {type(body).__name__}")
+
+    def expire(self, now: float) -> bool:
+        """End a teleoperation whose operator has long said nothing; True if it did."""
+        if self.mode is Mode.TELEOPERATION and now - self.last_valid > LEASE_S:
+            self._idle()
+            return True
+        return False
+
+    def mission_done(self) -> None:
+        """The last waypoint is reached."""
+        self._idle()
+
+    def _idle(self) -> None:
+        self.mode, self.owner, self.mission = Mode.IDLE, None, ()
+
+    def _emergency(self, now: float) -> Decision:
+        """Stop and stand idle; whatever was received before this moment moves nothing (S3)."""
+        self._idle()
+        self.emergency_at = now
+        return Decision(m.OK, "stopped", STAND)
+
+    def _granted(self, message: m.Message, body: m.PermissionGrant) -> Decision:
+        if message.source != self.dva:
+            return Decision(m.NOT_PERMITTED, "only the DVA grants permissions")
+        if self.grant is not None and body.session <= self.grant.session:
+            old = body == self.grant
+            return Decision(m.OK if old else m.BAD_SESSION, "" if old else "that session is over")
+        self.grant = body
+        if self.owner is not None:
+            self._idle()
+            return Decision(m.OK, set_point=STAND)
+        return Decision(m.OK)
+
+    def _refusal(self, message: m.Message, level: str) -> Decision | None:
+        """Why a source may not act now, or None (S5)."""
+        grant = self.grant
+        if grant is None or grant.holder != message.source:
+            return Decision(m.NOT_PERMITTED, f"{message.source} holds no permission here")
+        if message.session != grant.session:
+            return Decision(m.BAD_SESSION, f"session {message.session} is not the current one")
+        if grant.level not in (level, "both"):
+            return Decision(m.NOT_PERMITTED, f"permission is for {grant.level}, not {level}")
+        return None
+
+    def _begin(self, message: m.Message, arrived: float, moving: bool) -> Decision | None:
+        """Why no new activity may begin now, or None."""
+        if arrived <= self.emergency_at:
+            return Decision(m.STALE, "sent before the emergency")
+        if self.mode is not Mode.IDLE:
+            return Decision(m.BUSY, f"in mode {self.mode}")
+        if moving:
+            return Decision(m.BUSY, "not at a standstill yet")
+        return None
+
+    def _start(self, message: m.Message, arrived: float, now: float, moving: bool) -> Decision:
+        refusal = self._refusal(message, "teleoperation")
+        if refusal is not None:
+            return refusal
+        if self.mode is Mode.TELEOPERATION and self.owner == message.source:
+            return Decision(m.OK, "already started")
+        refusal = self._begin(message, arrived, moving)
+        if refusal is not None:
+            return refusal
+        self.mode, self.owner = Mode.TELEOPERATION, message.source
+        self.last_set_id, self.last_valid = message.message_id, now
+        return Decision(m.OK, set_point=STAND)
+
+    def _set(self, message: m.Message, body: m.SetTeleOp, arrived: float, now: float) -> Decision:
+        if self.mode is not Mode.TELEOPERATION or self.owner != message.source:
+            return Decision(m.WRONG_MODE, f"in mode {self.mode}, not driven by {message.source}")
+        refusal = self._refusal(message, "teleoperation")
+        if refusal is not None:
+            return refusal
+        if message.message_id <= self.last_set_id:
+            return Decision(m.OUT_OF_ORDER, "a newer command was received before")
+        self.last_set_id = message.message_id
+        until = arrived + self.limits.watchdog
+        if body.seen_tick is None:
+            self.without_tick += 1
+        else:
+            seen_at = body.seen_tick / 1000 - self.clock_offset
+            until = min(until, seen_at + self.limits.max_age)
+        if until <= now:
+            return Decision(m.STALE, "too old to obey")
+        self.last_valid = now
+        return Decision(m.OK, set_point=SetPoint(body.speed, body.turn_rate, until))
+
+    def _stop(self, message: m.Message) -> Decision:
+        refusal = self._refusal(message, "teleoperation")
+        if refusal is not None:
+            return refusal
+        if self.mode is not Mode.TELEOPERATION:
+            return Decision(m.OK, "not in teleoperation")
+        self._idle()
+        return Decision(m.OK, set_point=STAND)
+
+    def _mission(self, message: m.Message, arrived: float, moving: bool) -> Decision:
+        refusal = self._refusal(message, "missions")
+        if refusal is not None:
+            return refusal
+        if isinstance(message.body, m.CancelMission):
+            if self.mode is Mode.MISSION:
+                self._idle()
+            return Decision(m.OK, set_point=STAND)
+        refusal = self._begin(message, arrived, moving)
+        if refusal is not None:
+            return refusal
+        assert isinstance(message.body, m.GoTo)
+        self.mode, self.owner, self.mission = Mode.MISSION, message.source, message.body.waypoints
+        return Decision(m.OK)

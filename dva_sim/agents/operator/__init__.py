@@ -1,0 +1,1 @@
+"""Operators: persons with a phone, who see delayed frames and tilt."""

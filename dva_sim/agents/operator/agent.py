@@ -1,0 +1,127 @@
+"""An operator at work: takes an order, gets permission, drives, reports, is free again."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dva_sim.agents.device import Device
+from dva_sim.agents.operator.delay import DelayEstimate
+from dva_sim.agents.operator.drive import Drive, DriverSeat, OperatorSetup
+from dva_sim.agents.operator.person import Person
+from dva_sim.agents.operator.strategies import Oracle, Pursuit
+from dva_sim.agents.tilt import Phone
+from dva_sim.network.patterns import Subscription
+from dva_sim.protocol import messages as m
+from dva_sim.recorder import DriveLog
+from dva_sim.worlds.planning import Planner
+
+FIRST_GUESS = 0.6  # delay a person expects before having seen any [s]
+ASK_AGAIN = 2.0  # when the robot is held by somebody else [s]
+START_AGAIN = 1.0  # when the grant may still be on its way to the robot [s]
+
+
+class OperatorAgent:
+    """A person with a phone in the control room.
+
+    Args:
+        device: Identity and ways to talk.
+        person: Who it is.
+        phone: The phone in the hand.
+        strategy: How the person drives.
+        planner: The person knows the building.
+        setup: Pattern, rate, time-outs.
+        rng: Luck of this person's judgement.
+    """
+
+    def __init__(
+        self,
+        device: Device,
+        person: Person,
+        phone: Phone,
+        strategy: Pursuit | Oracle,
+        planner: Planner,
+        setup: OperatorSetup,
+        rng: np.random.Generator,
+    ) -> None:
+        self.device = device
+        self._seat = DriverSeat(
+            device, person, phone, strategy, planner, setup, DelayEstimate(0.0, FIRST_GUESS), rng
+        )
+        self._drive: Drive | None = None
+        device.serve(self._on_order)
+
+    def _on_order(self, message: m.Message) -> m.Reply:
+        order, device = message.body, self.device
+        if not isinstance(order, m.Order) or order.device is None:
+            return m.Reply(message.message_id, m.NOT_SUPPORTED, "an operator drives robots")
+        if self._drive is not None:
+            return m.Reply(message.message_id, m.BUSY, "driving already")
+        now = device.clock.now
+        log = DriveLog(order.device, device.id_tag, order.event_id, now)
+        log.human_delay = self._seat.person.perceptual_delay + self._seat.person.hand_lag
+        device.recorder.drives.append(log)
+        drive = self._drive = Drive(self._seat, order, log, self._finish)
+        robot = device.label_of(order.device)
+        device.tell(f"shall drive {robot} to event {order.event_id}", "order")
+        device.clock.call_after(self._seat.person.reading, self._ask_permission, drive)
+        return m.Reply(message.message_id, m.OK, "")
+
+    def _ask_permission(self, drive: Drive) -> None:
+        def answered(reply: m.Reply) -> None:
+            if isinstance(reply.content, m.Permission):
+                drive.session = reply.content.session
+                self._turn_on_picture(drive)
+                self._start(drive)
+            elif reply.code == m.BUSY:
+                self.device.clock.call_after(ASK_AGAIN, self._ask_permission, drive)
+            else:
+                drive.end("gave up", reply.text)
+
+        body = m.PermissionRequest(drive.robot, "teleoperation")
+        unreachable = lambda: drive.end("lost link", "the DVA does not answer")  # noqa: E731
+        self.device.ask(self.device.dva, body, answered, unreachable)
+
+    def _turn_on_picture(self, drive: Drive) -> None:
+        publisher = self.device.network.publisher(drive.robot, "camera")
+        drive.picture = Subscription(
+            self.device.network, self.device.id_tag, publisher, "frame|", drive.on_frame
+        )
+
+    def _start(self, drive: Drive) -> None:
+        def answered(reply: m.Reply) -> None:
+            if drive.over:
+                return
+            if reply.code == m.OK:
+                self.device.progress(drive.order.event_id, "departed")
+                self.device.tell(f"drives {self.device.label_of(drive.robot)}", "drive")
+                drive.begin()
+            elif reply.code in (m.BUSY, m.NOT_PERMITTED, m.BAD_SESSION):
+                self.device.clock.call_after(START_AGAIN, self._start, drive)
+            else:
+                drive.end("gave up", reply.text)
+
+        if not drive.over:
+            body = m.StartTeleOp()
+            self.device.ask(drive.robot, body, answered, drive.link_lost, drive.session)
+
+    def _finish(self, drive: Drive, outcome: str, why: str) -> None:
+        """A drive is over: stop the robot, tell the DVA, be free again."""
+        device, order = self.device, drive.order
+        device.tell(f"{outcome}{': ' + why if why else ''}", "drive")
+        found = outcome in ("confirmed", "refuted")
+        if found:
+            body = m.EventReport(order.event_id, order.kind, order.position, 0.5, 0.95, outcome)
+            device.ask(device.dva, body)
+
+        def give_back(_: object = None) -> None:
+            device.progress(order.event_id, "done" if found else "failed")
+            self._drive = None
+
+        if outcome == "lost link":
+            # Whatever still gets through shall stop the robot; nobody waits for the answer.
+            device.ask(drive.robot, m.Emergency(), session=drive.session)
+            give_back()
+        elif drive.log.started is None:
+            give_back()
+        else:
+            device.ask(drive.robot, m.StopTeleOp(), give_back, give_back, drive.session)

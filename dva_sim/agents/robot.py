@@ -1,0 +1,294 @@
+"""A robot on site: body, computer, camera, heartbeat; and the driver of its missions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Annotated
+
+from pydantic import Field
+
+from dva_sim.agents.camera import Frame, HazardSpot, Observation, View
+from dva_sim.agents.commands import SERVICE, topic_of
+from dva_sim.agents.device import CONTROL, Device
+from dva_sim.agents.inbox import Inbox, Letter
+from dva_sim.agents.modes import Decision, Mode, RobotController, SetPoint
+from dva_sim.agents.operator.person import Person
+from dva_sim.agents.operator.strategies import Intent, Pursuit, Reach
+from dva_sim.agents.steering import Route
+from dva_sim.config import Config
+from dva_sim.network.patterns import Answer, Subscription
+from dva_sim.protocol import messages as m
+from dva_sim.recorder import DriveLog
+from dva_sim.worlds.physics import DriveSpec, RobotBody, World
+from dva_sim.worlds.planning import Planner
+
+STATUS = "status"
+STATUS_PERIOD = 1.0  # [s]
+MISSION_PERIOD = 0.1  # [s]
+MOVING = 0.05  # above this a robot is going somewhere [m/s]
+STANDING = 0.02  # below this the wheels count as still [m/s, rad/s]
+
+Positive = Annotated[float, Field(gt=0)]
+
+
+class RobotProfile(Config):
+    """Body and motors of a kind of robot."""
+
+    description: str = ""
+    mass_kg: Positive = 60.0
+    radius_m: Positive = 0.30
+    max_speed_mps: Positive = 0.5
+    max_turn_rate_rad_s: Positive = 0.5235987755982988
+    max_acceleration_mps2: Positive = 0.5
+    max_deceleration_mps2: Positive = 1.0
+    max_turn_acceleration_rad_s2: Positive = 1.5
+    motor_time_constant_s: Positive = 0.15
+
+    def drive_spec(self) -> DriveSpec:
+        """The same for the physics."""
+        return DriveSpec(
+            mass=self.mass_kg,
+            radius=self.radius_m,
+            max_speed=self.max_speed_mps,
+            max_turn_rate=self.max_turn_rate_rad_s,
+            max_acceleration=self.max_acceleration_mps2,
+            max_deceleration=self.max_deceleration_mps2,
+            max_turn_acceleration=self.max_turn_acceleration_rad_s2,
+            motor_time_constant=self.motor_time_constant_s,
+        )
+
+
+@dataclass(frozen=True)
+class RobotSetup:
+    """How a robot is connected.
+
+    Attributes:
+        pattern: How SetTeleOp reaches it.
+        processing: Time that one message takes its computer [s].
+        frame_rate: Of the camera [1/s].
+        frame_bytes: Size of a frame [B].
+        view: What the camera sees.
+        hazards: What is there to be seen, at a time [s].
+    """
+
+    pattern: str
+    processing: float
+    frame_rate: float
+    frame_bytes: int
+    view: View
+    hazards: Callable[[float], list[HazardSpot]]
+
+
+class RobotAgent:
+    """A robot: obeys its controller, moves its body, publishes frames, status, heartbeats.
+
+    Args:
+        device: Identity and ways to talk.
+        controller: What decides.
+        world: The physics that it is part of.
+        body: Its own body there.
+        planner: Its map, for missions.
+        setup: Pattern, processing time, camera.
+        drive_of: The log of the drive that a robot is in, if any.
+    """
+
+    def __init__(
+        self,
+        device: Device,
+        controller: RobotController,
+        world: World,
+        body: RobotBody,
+        planner: Planner,
+        setup: RobotSetup,
+        drive_of: Callable[[str], DriveLog | None],
+    ) -> None:
+        self.device, self.controller = device, controller
+        self.body, self._world, self._planner, self._setup = body, world, planner, setup
+        self._drive_of = drive_of
+        self.inbox = Inbox(
+            device.clock, setup.processing, self._handle, setup.pattern == "latest-wins"
+        )
+        self._commands: Subscription | None = None
+        self._stopped_since: float | None = None
+        self._until = 0.0
+        device.network.serve(device.id_tag, CONTROL, self._on_control)
+        device.network.serve(device.id_tag, SERVICE, self.inbox.command)
+
+    def start(self) -> None:
+        """Begin to publish frames, status and mode changes."""
+        clock = self.device.clock
+        clock.every(1.0 / self._setup.frame_rate, self._take_frame)
+        clock.every(STATUS_PERIOD, self._publish_status)
+
+    def observe(self) -> Observation:
+        """What the camera sees now."""
+        now = self.device.clock.now
+        self._world.advance_to(now)
+        pose = self.body.pose()
+        hazards = self._setup.view.look(pose.x, pose.y, pose.heading, self._setup.hazards(now))
+        speed, turn_rate = self.body.speed, self.body.turn_rate
+        tick = self.controller.tick(now)
+        return Observation(tick, pose.x, pose.y, pose.heading, speed, turn_rate, hazards)
+
+    def broken_rules(self, now: float) -> Iterator[tuple[str, str]]:
+        """Safety rules that do not hold now, each with what was seen; there should be none."""
+        spec, speed = self.body.spec, abs(self.body.speed)
+        stopping = spec.max_speed / spec.max_deceleration + 4 * spec.motor_time_constant
+        if speed > MOVING and now > self._until + stopping and not self.body.in_contact:
+            yield "S1", f"moves at {speed:.2f} m/s without a valid command"
+        if (self.controller.owner is None) != (self.controller.mode is Mode.IDLE):
+            yield "S2", f"mode {self.controller.mode} with owner {self.controller.owner}"
+        if speed > spec.max_speed * 1.02 and not self.body.in_contact:
+            yield "S4", f"moves at {speed:.2f} m/s"
+
+    # --- messages ----------------------------------------------------------------------
+
+    def _on_control(self, data: bytes, answer: Answer) -> None:
+        # Only the kind of message is looked at here; it is validated when its turn comes.
+        urgent = b"<EmergencyMsg>" in data
+        (self.inbox.emergency if urgent else self.inbox.control)(data, answer)
+
+    def _handle(self, letter: Letter) -> None:
+        """A letter's processing is done."""
+        if letter.answer is None:
+            message = self.device.read(letter.data)
+            if message is not None:
+                self._decide(message, letter.arrived)
+            return
+
+        def decide(message: m.Message) -> m.Reply:
+            decision = self._decide(message, letter.arrived)
+            return m.Reply(message.message_id, decision.code, decision.text, decision.content)
+
+        letter.answer(self.device.answer(letter.data, decide))
+
+    def _decide(self, message: m.Message, arrived: float) -> Decision:
+        now = self.device.clock.now
+        self._world.advance_to(now)
+        before = self.controller.mode
+        moving = abs(self.body.speed) > STANDING or abs(self.body.turn_rate) > STANDING
+        decision = self.controller.handle(message, arrived, now, moving)
+        if decision.set_point is not None:
+            self._move(decision.set_point, now)
+        if decision.code != m.OK:
+            name = m.CODE_NAMES[decision.code]
+            self.device.recorder.counters[f"robot refused: {name}"] += 1
+        elif isinstance(message.body, m.SetTeleOp):
+            self._log_command(message, arrived, now)
+        if self.controller.mode is not before:
+            self._mode_changed(message.source)
+        return decision
+
+    def _log_command(self, message: m.Message, arrived: float, now: float) -> None:
+        drive = self._drive_of(self.device.id_tag)
+        if drive is not None:
+            recorder = self.device.recorder
+            age = recorder.command_applied(drive, message.source, message.message_id, arrived, now)
+            if age > self.controller.limits.max_age:
+                recorder.violated("S1", now, self.device.label, f"obeys a command {age:.1f} s old")
+
+    def _move(self, set_point: SetPoint, now: float) -> None:
+        """Hand a set point to the motors; the time without one is time in safe stop."""
+        if self._stopped_since is not None and now > self._stopped_since:
+            drive = self._drive_of(self.device.id_tag)
+            if drive is not None:
+                drive.safe_stop += now - self._stopped_since
+        in_force = self.controller.mode is not Mode.IDLE
+        self._stopped_since = set_point.until if in_force and set_point.until > now else None
+        self._until = max(now, set_point.until)
+        self.body.drive(set_point.speed, set_point.turn_rate, set_point.until)
+
+    def _mode_changed(self, source: str) -> None:
+        mode = self.controller.mode
+        self.device.tell(f"is now in mode {mode}", "mode")
+        if self._commands is not None:
+            self._commands.close()
+            self._commands = None
+            self.inbox.forget_commands()
+        if mode is Mode.TELEOPERATION and self._setup.pattern != "req-rep":
+            publisher = self.device.network.publisher(source, SERVICE)
+            topic = topic_of(self.device.id_tag)
+            self._commands = Subscription(
+                self.device.network, self.device.id_tag, publisher, topic, self.inbox.command
+            )
+        if mode is Mode.MISSION:
+            self._begin_mission()
+
+    # --- what it does by itself --------------------------------------------------------
+
+    def _take_frame(self) -> None:
+        """Film for whoever watches; a frame is left out while the last one still waits."""
+        network, size = self.device.network, self._setup.frame_bytes
+        publisher = network.publisher(self.device.id_tag, "camera")
+        if not publisher.subscribers:
+            return
+        downlink, _ = network.links(self.device.id_tag, publisher.subscribers[0].node)
+        if downlink.backlog_bytes(self.device.clock.now) >= size:
+            self.device.recorder.counters["frames left out"] += 1
+            return
+        frame = Frame(self.observe(), self.device.clock.now)
+        publisher.publish("frame|", frame, size)
+
+    def _publish_status(self) -> None:
+        now = self.device.clock.now
+        self._world.advance_to(now)
+        if self.controller.expire(now):
+            self._mode_changed("")
+        pose = self.body.pose()
+        body = m.RobotStatus(
+            self.controller.mode.value,
+            m.Position(*self.device.frame.to_latlon(pose.x, pose.y)),
+            pose.heading,
+            self.body.speed,
+            self.body.turn_rate,
+            self.controller.tick(now),
+        )
+        self.device.publish(STATUS, "status|", body)
+
+    def _begin_mission(self) -> None:
+        """Drive to the waypoints one by one, by the robot's own map."""
+        goals = [self.device.frame.to_xy(p.latitude, p.longitude) for p in self.controller.mission]
+        # The robot's own loop has no delay to speak of: a brisk, steady driver.
+        driver = Pursuit(AUTOPILOT, Reach(self.body.spec.max_speed, self.body.spec.max_turn_rate))
+        route: list[Route] = []
+
+        def step() -> bool:
+            if self.controller.mode is not Mode.MISSION:
+                return False
+            seen = self.observe()
+            if not route:
+                points = self._planner.path((seen.x, seen.y), goals[0]) if goals else None
+                if points is None:
+                    self.controller.mission_done()
+                    self._mode_changed("")
+                    return False
+                route.append(Route(points))
+            left = route[0].ahead(seen.x, seen.y, seen.heading, 0.5).remaining
+            if left < MISSION_NEAR:
+                goals.pop(0)
+                route.clear()
+                return True
+            self._obey(driver.drive(route[0], seen, MISSION_PERIOD, MISSION_NEAR))
+            return True
+
+        self.device.clock.every(MISSION_PERIOD, step)
+
+    def _obey(self, intent: Intent) -> None:
+        now = self.device.clock.now
+        until = now + 2 * MISSION_PERIOD
+        self._move(SetPoint(intent.speed, intent.turn_rate, until), now)
+
+
+MISSION_NEAR = 0.3  # a waypoint counts as reached from here [m]
+AUTOPILOT = Person(
+    perceptual_delay=0.0,
+    hand_lag=0.0,
+    crossover=2.0,
+    caution=0.3,
+    pace=1.0,
+    confirm_look=0.0,
+    reading=0.0,
+    position_error=0.0,
+    heading_error=0.0,
+)

@@ -1,0 +1,145 @@
+"""What happened in a run: a timeline for people, numbers for measures, broken rules counted."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """One line of the timeline.
+
+    Attributes:
+        time: When [s].
+        who: The agent it is about.
+        what: In words.
+        kind: `event`, `order`, `drive`, `mode`, `link` or `safety`.
+    """
+
+    time: float
+    who: str
+    what: str
+    kind: str
+
+
+@dataclass(frozen=True, slots=True)
+class TrackPoint:
+    """Where an agent was [m, rad], and what it was doing."""
+
+    time: float
+    x: float
+    y: float
+    heading: float
+    mode: str
+
+
+@dataclass(slots=True)
+class Issued:
+    """A command on its way: when it was issued [s], and the mean age of its samples [s]."""
+
+    time: float
+    sample_age: float
+
+
+@dataclass(slots=True)
+class Applied:
+    """A command that took effect at the robot; times in [s].
+
+    Attributes:
+        issued: When the operator's phone sent it.
+        arrived: When it reached the robot.
+        time: When it took effect.
+        sample_age: Mean age of the tilt samples behind it when it was issued.
+    """
+
+    issued: float
+    arrived: float
+    time: float
+    sample_age: float
+
+
+@dataclass
+class DriveLog:
+    """One drive of one robot by one operator.
+
+    Attributes:
+        ordered: When the operator got the order [s].
+        started: When the robot said that teleoperation had started [s].
+        ended: When the drive was over [s].
+        outcome: `confirmed`, `refuted`, `gave up`, `lost link` or `timeout`.
+        applied: Commands in the order they took effect.
+        frame_times: (captured, arrived) of each frame shown [s].
+    """
+
+    robot: str
+    operator: str
+    event: int
+    ordered: float
+    started: float | None = None
+    ended: float | None = None
+    outcome: str = "timeout"
+    sent: int = 0
+    superseded: int = 0
+    human_delay: float = 0.0
+    timeouts: int = 0
+    alerts: int = 0
+    round_trips: list[float] = field(default_factory=list)
+    applied: list[Applied] = field(default_factory=list)
+    frame_times: list[tuple[float, float]] = field(default_factory=list)
+    safe_stop: float = 0.0
+
+
+class Recorder:
+    """Collects; decides nothing.
+
+    Args:
+        keep_traffic: Also keep each message sent, for pictures.
+    """
+
+    def __init__(self, keep_traffic: bool = False) -> None:
+        self.timeline: list[Moment] = []
+        self.tracks: dict[str, list[TrackPoint]] = defaultdict(list)
+        self.counters: Counter[str] = Counter()
+        self.violations: Counter[str] = Counter()
+        self.drives: list[DriveLog] = []
+        self.views: dict[str, list[TrackPoint]] = defaultdict(list)
+        self.traffic: list[tuple[float, str, str, int]] | None = [] if keep_traffic else None
+        self.exposure: dict[str, float] = defaultdict(float)
+        self._issued: dict[tuple[str, int], Issued] = {}
+
+    def tell(self, time: float, who: str, what: str, kind: str = "event") -> None:
+        """Add a line to the timeline."""
+        self.timeline.append(Moment(time, who, what, kind))
+
+    def view(self, time: float, robot: str, x: float, y: float, heading: float) -> None:
+        """Where an operator believes a robot to be, if pictures are wanted."""
+        if self.traffic is not None:
+            self.views[robot].append(TrackPoint(time, x, y, heading, "seen"))
+
+    def message_sent(self, time: float, source: str, destination: str, size: int) -> None:
+        """Count a message, and keep it if pictures are wanted."""
+        self.counters["messages"] += 1
+        self.counters["bytes"] += size
+        if self.traffic is not None:
+            self.traffic.append((time, source, destination, size))
+
+    def command_issued(self, source: str, message_id: int, time: float, sample_age: float) -> None:
+        """A command leaves the phone."""
+        self._issued[source, message_id] = Issued(time, sample_age)
+
+    def command_applied(
+        self, drive: DriveLog, source: str, message_id: int, arrived: float, now: float
+    ) -> float:
+        """A command takes effect; returns its true age [s]."""
+        issued = self._issued.pop((source, message_id), None)
+        if issued is None:
+            return 0.0
+        drive.applied.append(Applied(issued.time, arrived, now, issued.sample_age))
+        return now - issued.time
+
+    def violated(self, rule: str, time: float, who: str, what: str) -> None:
+        """A safety rule was broken: counted always, told once per rule and agent."""
+        if not self.violations[rule]:
+            self.tell(time, who, f"{rule} broken: {what}", "safety")
+        self.violations[rule] += 1

@@ -1,0 +1,164 @@
+"""What a robot obeys, and what it refuses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from dva_sim.agents.modes import LEASE_S, STAND, Decision, Limits, Mode, RobotController
+from dva_sim.protocol import messages as m
+
+DVA, ROBOT, ANA, RUI = (f"02:00:00:00:00:0{i}" for i in range(1, 5))
+
+
+class Bench:
+    """A controller, and messages that arrive when they are decided on."""
+
+    def __init__(self) -> None:
+        self.robot = RobotController(ROBOT, DVA, Limits(watchdog=3.0, max_age=6.0))
+        self.number = 0
+
+    def say(
+        self,
+        source: str,
+        body: m.Body,
+        now: float = 0.0,
+        session: int = 7,
+        arrived: float | None = None,
+        number: int | None = None,
+        moving: bool = False,
+    ) -> Decision:
+        self.number += 1
+        number = self.number if number is None else number
+        message = m.Message(ROBOT, number, source, "12:00:00", session, body)
+        return self.robot.handle(message, now if arrived is None else arrived, now, moving)
+
+
+@pytest.fixture
+def bench() -> Bench:
+    return Bench()
+
+
+@pytest.fixture
+def driven(bench: Bench) -> Bench:
+    """Ana holds session 7 and has started at time 0."""
+    bench.say(DVA, m.PermissionGrant(ANA, "teleoperation", 7))
+    assert bench.say(ANA, m.StartTeleOp()).code == m.OK
+    return bench
+
+
+def test_without_permission_nothing_starts(bench: Bench) -> None:
+    assert bench.say(ANA, m.StartTeleOp()).code == m.NOT_PERMITTED
+    bench.say(DVA, m.PermissionGrant(ANA, "missions", 7))
+    assert bench.say(ANA, m.StartTeleOp()).code == m.NOT_PERMITTED
+    assert bench.robot.mode is Mode.IDLE
+
+
+def test_only_the_dva_grants(bench: Bench) -> None:
+    assert bench.say(RUI, m.PermissionGrant(RUI, "both", 9)).code == m.NOT_PERMITTED
+    assert bench.robot.grant is None
+
+
+def test_a_command_is_in_force_until_the_watchdog_counted_from_its_arrival(driven: Bench) -> None:
+    decision = driven.say(ANA, m.SetTeleOp(0.4, 0.1), now=2.0, arrived=1.5)
+    assert decision.set_point is not None
+    assert decision.set_point.until == 4.5
+
+
+def test_the_seen_tick_bounds_the_age_without_a_shared_clock(driven: Bench) -> None:
+    driven.robot.clock_offset = 5000.0
+    seen = driven.robot.tick(1.0)
+    decision = driven.say(ANA, m.SetTeleOp(0.4, 0.1, seen), now=6.5)
+    assert decision.set_point is not None
+    assert decision.set_point.until == pytest.approx(7.0)
+    assert driven.say(ANA, m.SetTeleOp(0.4, 0.1, seen), now=7.1).code == m.STALE
+
+
+def test_a_command_without_a_tick_is_counted(driven: Bench) -> None:
+    driven.say(ANA, m.SetTeleOp(0.4, 0.1), now=1.0)
+    assert driven.robot.without_tick == 1
+
+
+def test_a_command_that_waited_longer_than_the_watchdog_is_stale(driven: Bench) -> None:
+    assert driven.say(ANA, m.SetTeleOp(0.4, 0.1), now=5.0, arrived=1.9).code == m.STALE
+
+
+def test_an_older_command_never_follows_a_newer_one(driven: Bench) -> None:
+    assert driven.say(ANA, m.SetTeleOp(0.4, 0.0), number=50).code == m.OK
+    assert driven.say(ANA, m.SetTeleOp(0.1, 0.0), number=49).code == m.OUT_OF_ORDER
+    assert driven.say(ANA, m.SetTeleOp(0.4, 0.0), number=50).code == m.OUT_OF_ORDER
+
+
+def test_commands_of_others_and_of_old_sessions_never_act(driven: Bench) -> None:
+    assert driven.say(RUI, m.SetTeleOp(0.4, 0.0)).code == m.WRONG_MODE
+    assert driven.say(ANA, m.SetTeleOp(0.4, 0.0), session=6).code == m.BAD_SESSION
+
+
+def test_a_new_grant_stops_the_robot_and_fences_the_old_holder(driven: Bench) -> None:
+    assert driven.say(DVA, m.PermissionGrant(RUI, "teleoperation", 8)).set_point == STAND
+    assert driven.say(ANA, m.SetTeleOp(0.4, 0.0)).code == m.WRONG_MODE
+    assert driven.say(RUI, m.StartTeleOp(), session=8, moving=True).code == m.BUSY
+    assert driven.say(RUI, m.StartTeleOp(), session=8).code == m.OK
+
+
+def test_an_old_grant_that_comes_late_changes_nothing(driven: Bench) -> None:
+    assert driven.say(DVA, m.PermissionGrant(RUI, "both", 5)).code == m.BAD_SESSION
+    assert driven.robot.owner == ANA
+
+
+@pytest.mark.parametrize("source", [ANA, RUI, DVA])
+def test_an_emergency_stops_whoever_sends_it_and_nothing_earlier_moves_it(
+    driven: Bench, source: str
+) -> None:
+    driven.say(ANA, m.SetTeleOp(0.5, 0.0), now=1.0)
+    stop = driven.say(source, m.Emergency(), now=2.0, session=0)
+    assert (stop.code, stop.set_point) == (m.OK, STAND)
+    assert driven.say(ANA, m.SetTeleOp(0.5, 0.0), now=2.1).code == m.WRONG_MODE
+    assert driven.say(ANA, m.StartTeleOp(), now=2.2, arrived=1.9).code == m.STALE
+    assert driven.say(ANA, m.StartTeleOp(), now=2.4, arrived=2.3).code == m.OK
+
+
+def test_stop_and_start_again_are_idempotent(driven: Bench) -> None:
+    assert driven.say(ANA, m.StartTeleOp()).text == "already started"
+    assert driven.say(ANA, m.StopTeleOp()).set_point == STAND
+    assert driven.say(ANA, m.StopTeleOp()).code == m.OK
+    assert driven.robot.mode is Mode.IDLE
+
+
+def test_teleoperation_ends_by_itself_when_the_operator_is_gone(driven: Bench) -> None:
+    driven.say(ANA, m.SetTeleOp(0.5, 0.0), now=1.0)
+    assert not driven.robot.expire(1.0 + LEASE_S)
+    assert driven.robot.expire(1.1 + LEASE_S)
+    assert driven.robot.mode is Mode.IDLE
+
+
+def test_a_mission_needs_its_own_permission_and_an_idle_robot(bench: Bench) -> None:
+    there = m.GoTo((m.Position(38.66, -9.2),))
+    bench.say(DVA, m.PermissionGrant(ANA, "teleoperation", 7))
+    assert bench.say(ANA, there).code == m.NOT_PERMITTED
+    bench.say(DVA, m.PermissionGrant(ANA, "both", 8))
+    assert bench.say(ANA, there, session=8).code == m.OK
+    assert bench.robot.mode is Mode.MISSION
+    assert bench.say(ANA, m.StartTeleOp(), session=8).code == m.BUSY
+    assert bench.say(ANA, m.CancelMission(), session=8).set_point == STAND
+    assert bench.robot.mode is Mode.IDLE
+
+
+@pytest.mark.parametrize(
+    "refused",
+    [
+        lambda b: b.say(ANA, m.SetTeleOp(0.5, 0.0), session=6),
+        lambda b: b.say(RUI, m.StartTeleOp()),
+        lambda b: b.say(RUI, m.StopTeleOp()),
+        lambda b: b.say(ANA, m.GetDeviceList()),
+    ],
+)
+def test_a_refused_message_changes_nothing(
+    driven: Bench, refused: Callable[[Bench], Decision]
+) -> None:
+    before = vars(driven.robot).copy()
+    decision = refused(driven)
+    assert decision.code != m.OK
+    assert decision.text
+    assert vars(driven.robot) == before
