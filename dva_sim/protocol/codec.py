@@ -1,0 +1,126 @@
+"""Messages to bytes and back, by `protocol/dva.xsd`.
+
+What `encode` returns is valid by construction. `decode` trusts nobody: libxml2 validates every
+message while parsing it, and what a schema cannot forbid is refused before.
+"""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from pathlib import Path
+from typing import Final
+
+from lxml import etree
+
+from dva_sim.protocol.errors import ProtocolError
+from dva_sim.protocol.messages import BAD_MESSAGE, Message
+from dva_sim.protocol.readers import read
+from dva_sim.protocol.writers import DECLARATION, write
+from dva_sim.resources import roots
+
+MAX_BYTES: Final = 8192
+"""No message is longer."""
+
+_OUR_DECLARATION = DECLARATION.encode()
+_DECLARATION = re.compile(
+    rb"""<\?xml\s+version\s*=\s*(["'])1\.0\1"""
+    rb"""(?:\s+encoding\s*=\s*(["'])utf-8\2)?"""
+    rb"""(?:\s+standalone\s*=\s*(["'])(?:yes|no)\3)?\s*\?>""",
+    re.IGNORECASE,
+)
+# Every `<` has to begin `<name>`, `</name>` or `<name/>`.
+_OTHER_MARKUP = re.compile(rb"<(?!/?\w++\s*+/?>)")
+
+
+def timestamp(seconds_of_day: float) -> str:
+    """Time of day as `HH:MM:SS`; fractions are dropped, midnight wraps."""
+    minutes, seconds = divmod(int(seconds_of_day // 1) % 86_400, 60)
+    return f"{minutes // 60:02}:{minutes % 60:02}:{seconds:02}"
+
+
+def encode(message: Message) -> bytes:
+    """The message as UTF-8 XML, valid by the schema.
+
+    Raises:
+        ProtocolError: a value that the schema cannot hold (nan, an unknown mode, a bad id, ...),
+            or a message of more than `MAX_BYTES`.
+    """
+    data = write(message).encode()
+    if len(data) > MAX_BYTES:
+        raise ProtocolError(BAD_MESSAGE, f"{len(data)} bytes; a message has at most {MAX_BYTES}")
+    return data
+
+
+def decode(data: bytes) -> Message:
+    """The message in `data`; whatever the bytes, a message or a `ProtocolError`.
+
+    Raises:
+        ProtocolError: not a message by the specification; the reason fits into a reply.
+    """
+    _refuse_by_sight(data)
+    try:
+        root = etree.fromstring(data, _parser())
+    except etree.XMLSyntaxError as error:
+        raise ProtocolError(BAD_MESSAGE, _one_line(error)) from None
+    return read(root)
+
+
+def _refuse_by_sight(data: bytes) -> None:
+    """Refuse what no schema can: size, encodings, and markup other than plain elements.
+
+    The markup matters: a DOCTYPE brings entities, `xsi:schemaLocation` makes libxml2 open files,
+    a comment inside a value hides half of it from careless readers, and a schema does not see
+    prefixes that were never declared.
+    """
+    if len(data) > MAX_BYTES:
+        raise ProtocolError(BAD_MESSAGE, f"{len(data)} bytes; a message has at most {MAX_BYTES}")
+    rest = data[_end_of_declaration(data) :]
+    if 0 in rest or not rest.lstrip().startswith(b"<"):
+        raise ProtocolError(BAD_MESSAGE, "not XML in UTF-8 without byte order mark")
+    if _OTHER_MARKUP.search(rest):
+        raise ProtocolError(
+            BAD_MESSAGE, "markup other than plain elements, which have no attribute or namespace"
+        )
+
+
+def _end_of_declaration(data: bytes) -> int:
+    if data.startswith(_OUR_DECLARATION):
+        return len(_OUR_DECLARATION)
+    if not data.startswith(b"<?xml"):
+        return 0
+    declaration = _DECLARATION.match(data)
+    if declaration is None:
+        raise ProtocolError(
+            BAD_MESSAGE, "the XML declaration is broken, or names another encoding than UTF-8"
+        )
+    return declaration.end()
+
+
+@cache
+def _parser() -> etree.XMLParser:
+    """The one parser, with the schema attached; lxml locks it for each document."""
+    # An encoding given here wins over what the document says, which has been checked by sight.
+    return etree.XMLParser(
+        schema=etree.XMLSchema(file=str(_schema_path())),
+        encoding="UTF-8",
+        resolve_entities=False,
+        no_network=True,
+        load_dtd=False,
+        huge_tree=False,
+        remove_comments=True,
+        remove_pis=True,
+    )
+
+
+def _schema_path() -> Path:
+    """The schema that came with the program: one in the working folder must not replace it."""
+    program = roots()[1:]
+    return next(p for root in program if (p := root / "protocol" / "dva.xsd").is_file())
+
+
+def _one_line(error: etree.XMLSyntaxError) -> str:
+    """What libxml2 says, as text that fits into a reply."""
+    # lxml spells some messages as the repr of their bytes.
+    said = re.sub(r"""^line \d+: b(["'])(.*)\1$""", r"not well-formed: \2", str(error.msg))
+    return "".join(c if c.isprintable() else " " for c in said)[:200]

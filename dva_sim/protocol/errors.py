@@ -1,0 +1,22 @@
+"""What goes wrong between bytes and messages."""
+
+from __future__ import annotations
+
+from dva_sim.errors import DvaSimError
+
+
+class ProtocolError(DvaSimError):
+    """Bytes that are no message, or values that no message can hold.
+
+    Args:
+        code: The reply code that tells the sender; see `dva_sim.protocol.messages`.
+        reason: One line for people; what `decode` gives fits into the text of a reply.
+    """
+
+    def __init__(self, code: int, reason: str) -> None:
+        self.code = code
+        self.reason = reason
+        super().__init__(code, reason)
+
+    def __str__(self) -> str:
+        return self.reason

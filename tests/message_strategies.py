@@ -1,0 +1,97 @@
+"""One strategy per body: everything the protocol can say, at its bounds too."""
+
+from __future__ import annotations
+
+from hypothesis import strategies as st
+
+from dva_sim.protocol import messages as m
+
+UINT32 = 2**32 - 1
+ROBOT, TABLET = "70:1A:04:F9:81:D6", "56:2B:04:E4:56:D8"
+
+
+def real(low: float, high: float) -> st.SearchStrategy[float]:
+    return st.floats(low, high)
+
+
+def characters(least: int, most: int) -> st.SearchStrategy[str]:
+    # The two non-characters are not allowed in XML at all.
+    allowed = st.characters(exclude_categories=["Cc", "Cs"], exclude_characters="\ufffe\uffff")
+    return st.text(allowed, min_size=least, max_size=most)
+
+
+ids = st.from_regex(r"\A[0-9A-F]{2}(:[0-9A-F]{2}){5}\Z")
+clocks = st.from_regex(r"\A([01][0-9]|2[0-3])(:[0-5][0-9]){2}(\.[0-9]{1,9})?\Z")
+addresses = st.ip_addresses(v=4).map(str) | st.ip_addresses(v=4).map("{}:5556".format)
+urls = st.text(st.characters(min_codepoint=0x21, max_codepoint=0x7E), min_size=1, max_size=256)
+names = characters(1, 64)
+numbers = st.integers(1, UINT32)
+ticks = st.integers(0, 2**53 - 1)
+positions = st.builds(m.Position, real(-90, 90), real(-180, 180))
+speeds = turn_rates = real(-100, 100)
+shares = real(0, 1)
+kinds = st.sampled_from(["fire", "gas_leak", "flood"])
+levels = st.sampled_from(["teleoperation", "missions", "both"])
+
+devices = st.builds(m.Device, ids, names, names, addresses)
+contents = st.one_of(
+    st.none(),
+    st.builds(m.DeviceList, st.lists(devices, max_size=6).map(tuple)),
+    st.builds(m.SensorInfo, urls),
+    st.builds(m.Permission, ids, levels, numbers),
+)
+BODIES: dict[type, st.SearchStrategy[m.Body]] = {
+    m.Emergency: st.builds(m.Emergency),
+    m.Heartbeat: st.builds(m.Heartbeat),
+    m.Registration: st.builds(m.Registration, names, names, addresses),
+    m.StartTeleOp: st.builds(m.StartTeleOp),
+    m.SetTeleOp: st.builds(m.SetTeleOp, speeds, turn_rates, st.none() | ticks),
+    m.StopTeleOp: st.builds(m.StopTeleOp),
+    m.RobotStatus: st.builds(
+        m.RobotStatus,
+        st.sampled_from(["Idle", "Mission", "Teleoperation"]),
+        positions,
+        real(-1e6, 1e6),
+        speeds,
+        turn_rates,
+        ticks,
+    ),
+    m.GoTo: st.builds(m.GoTo, st.lists(positions, min_size=1, max_size=40).map(tuple)),
+    m.CancelMission: st.builds(m.CancelMission),
+    m.GetSensorInfo: st.builds(m.GetSensorInfo),
+    m.GetDeviceList: st.builds(m.GetDeviceList),
+    m.DevSub: st.builds(m.DevSub, names, real(0.001, 1000)),
+    m.PermissionRequest: st.builds(m.PermissionRequest, ids, levels),
+    m.PermissionGrant: st.builds(m.PermissionGrant, ids, levels, numbers),
+    m.EventReport: st.builds(
+        m.EventReport,
+        st.none() | numbers,
+        kinds,
+        positions,
+        shares,
+        shares,
+        st.sampled_from(["detected", "confirmed", "refuted"]),
+    ),
+    m.Order: st.builds(m.Order, numbers, kinds, positions, st.none() | ids),
+    m.OrderProgress: st.builds(
+        m.OrderProgress,
+        numbers,
+        st.sampled_from(["accepted", "declined", "departed", "arrived", "failed", "done"]),
+    ),
+    m.Reply: st.builds(
+        m.Reply, st.integers(0, UINT32), st.integers(0, 999), characters(0, 256), contents
+    ),
+}
+
+
+def with_header(body: m.Body) -> st.SearchStrategy[m.Message]:
+    session = st.none() if isinstance(body, m.Heartbeat) else st.integers(0, UINT32)
+    return st.builds(m.Message, ids, numbers, ids, clocks, session, st.just(body))
+
+
+messages = st.one_of(*BODIES.values()).flatmap(with_header)
+
+
+def message(body: m.Body, session: int | None = 1425) -> m.Message:
+    """A message with the header of the one printed in the specification."""
+    return m.Message(ROBOT, 124, TABLET, "12:30:56", session, body)

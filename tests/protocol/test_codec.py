@@ -1,0 +1,178 @@
+import math
+from pathlib import Path
+from typing import get_args
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from lxml import etree
+from message_strategies import BODIES, ROBOT, TABLET, message, messages
+
+from dva_sim.protocol import messages as m
+from dva_sim.protocol.codec import MAX_BYTES, decode, encode, timestamp
+from dva_sim.protocol.errors import ProtocolError
+
+SCHEMA = etree.XMLSchema(file=str(Path(__file__).parents[2] / "protocol" / "dva.xsd"))
+
+
+def test_every_body_has_a_strategy():
+    assert set(BODIES) == set(get_args(m.Body))
+
+
+@settings(deadline=None)
+@given(messages)
+def test_what_is_encoded_is_valid_and_decodes_to_the_same_message(sent):
+    data = encode(sent)
+    SCHEMA.assertValid(etree.fromstring(data))
+    assert decode(data) == sent
+
+
+@pytest.mark.parametrize(
+    ("element", "low", "high", "body"),
+    [
+        ("Speed", -100.0, 100.0, lambda x: m.SetTeleOp(x, 0.0)),
+        ("TurnRate", -100.0, 100.0, lambda x: m.SetTeleOp(0.0, x)),
+        ("Latitude", -90.0, 90.0, lambda x: m.GoTo((m.Position(x, 0.0),))),
+        ("Longitude", -180.0, 180.0, lambda x: m.GoTo((m.Position(0.0, x),))),
+        ("Heading", -1e6, 1e6, lambda x: m.RobotStatus("Idle", m.Position(0, 0), x, 0, 0, 0)),
+        ("Frequency", 0.001, 1000.0, lambda x: m.DevSub("smoke", x)),
+        ("Severity", 0.0, 1.0, lambda x: report(x, 0.5)),
+        ("Confidence", 0.0, 1.0, lambda x: report(0.5, x)),
+    ],
+)
+def test_codec_and_schema_agree_on_the_bounds_of_numbers(element, low, high, body):
+    middle = encode(message(body((low + high) / 2)))
+    for bound, beyond in ((low, -math.inf), (high, math.inf)):
+        assert decode(encode(message(body(bound)))).body == body(bound)
+        outside = math.nextafter(bound, beyond)
+        with pytest.raises(ProtocolError, match="must be within"):
+            encode(message(body(outside)))
+        with pytest.raises(ProtocolError, match=element):
+            decode(replace_text(middle, element, repr(outside)))
+
+
+@pytest.mark.parametrize(
+    ("element", "low", "high", "build"),
+    [
+        ("MessageID", 1, 2**32 - 1, lambda n: m.Message(ROBOT, n, TABLET, "12:00:00", 0, STOP)),
+        ("SessionID", 0, 2**32 - 1, lambda n: message(STOP, n)),
+        ("Answers", 0, 2**32 - 1, lambda n: message(m.Reply(n, m.OK, ""))),
+        ("Code", 0, 999, lambda n: message(m.Reply(1, n, ""))),
+        ("EventID", 1, 2**32 - 1, lambda n: message(m.OrderProgress(n, "done"))),
+        ("Session", 1, 2**32 - 1, lambda n: message(m.PermissionGrant(TABLET, "both", n))),
+        ("SeenTick", 0, 2**53 - 1, lambda n: message(m.SetTeleOp(0.0, 0.0, n))),
+    ],
+)
+def test_codec_and_schema_agree_on_the_bounds_of_integers(element, low, high, build):
+    for bound, outside in ((low, low - 1), (high, high + 1)):
+        assert decode(encode(build(bound))) == build(bound)
+        with pytest.raises(ProtocolError, match="must be within"):
+            encode(build(outside))
+        with pytest.raises(ProtocolError, match=element):
+            decode(replace_text(encode(build(low)), element, str(outside)))
+
+
+STOP = m.StopTeleOp()
+
+
+def report(severity, confidence):
+    return m.EventReport(None, "fire", m.Position(0, 0), severity, confidence, "detected")
+
+
+def replace_text(data, element, text):
+    tree = etree.fromstring(data)
+    tree.find(f".//{element}").text = text
+    return etree.tostring(tree)
+
+
+@pytest.mark.parametrize("speed", [math.nan, math.inf, -math.inf, 1e300, "fast", None])
+def test_a_speed_that_is_no_bounded_number_is_not_encoded(speed):
+    with pytest.raises(ProtocolError):
+        encode(message(m.SetTeleOp(speed, 0.0)))
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        m.Registration("", "TeleOp", "192.168.1.48"),
+        m.Registration("x" * 65, "TeleOp", "192.168.1.48"),
+        m.Registration("two\nlines", "TeleOp", "192.168.1.48"),
+        m.Registration("\ud800", "TeleOp", "192.168.1.48"),
+        m.Registration("\ufffe", "TeleOp", "192.168.1.48"),
+        m.Registration("tablet", "TeleOp", "192.168.1.256"),
+        m.Registration("tablet", "TeleOp", "192.168.1.48\n"),
+        m.GoTo(()),
+        m.GoTo((m.Position(0.0, 0.0),) * 65),
+        m.PermissionRequest(ROBOT.lower(), "both"),
+        m.PermissionRequest(ROBOT, "everything"),
+        m.OrderProgress(7.5, "done"),
+        m.Reply(1, m.OK, "", m.SensorInfo("http://a b")),
+        m.Reply(1, m.OK, "", "content"),
+        "body",
+    ],
+)
+def test_a_value_the_schema_cannot_hold_is_not_encoded(body):
+    with pytest.raises(ProtocolError) as refused:
+        encode(message(body))
+    assert refused.value.code == m.BAD_MESSAGE
+
+
+def test_a_heartbeat_has_no_session_and_everything_else_has_one():
+    with pytest.raises(ProtocolError, match="heartbeat"):
+        encode(message(m.Heartbeat(), session=0))
+    with pytest.raises(ProtocolError, match="heartbeat"):
+        encode(message(m.Emergency(), session=None))
+
+
+def test_a_device_list_longer_than_a_message_is_not_encoded():
+    device = m.Device(ROBOT, "ü" * 64, "Robot", "192.168.1.20")
+    fits = m.Reply(1, m.OK, "", m.DeviceList((device,) * 20))
+    assert decode(encode(message(fits))).body == fits
+    with pytest.raises(ProtocolError, match=str(MAX_BYTES)):
+        encode(message(m.Reply(1, m.OK, "", m.DeviceList((device,) * 64))))
+
+
+def test_markup_in_a_label_arrives_as_it_was():
+    label = "<Tablet> & \"co\" ]]> = 'x' <!-- ? -->"
+    sent = message(m.Registration(label, "TeleOp", "10.0.0.1"), session=0)
+    assert decode(encode(sent)) == sent
+
+
+def test_numbers_of_numpy_are_numbers():
+    sent = m.SetTeleOp(np.float64(0.5), np.float32(-0.25), np.int64(86320))
+    assert decode(encode(message(sent))).body == m.SetTeleOp(0.5, -0.25, 86320)
+
+
+def test_the_turn_rate_printed_in_the_dissertation_is_valid_though_above_the_robots_limit():
+    assert decode(encode(message(m.SetTeleOp(0.5, 0.56)))).body == m.SetTeleOp(0.5, 0.56)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [
+        (0, "00:00:00"),
+        (45_056, "12:30:56"),
+        (45_056.999, "12:30:56"),
+        (86_399.9, "23:59:59"),
+        (86_400, "00:00:00"),
+        (86_461.5, "00:01:01"),
+        (-1, "23:59:59"),
+    ],
+)
+def test_a_timestamp_has_whole_seconds_and_wraps_at_midnight(seconds, text):
+    assert timestamp(seconds) == text
+
+
+def test_every_reply_code_has_a_name_of_its_own():
+    codes = [value for name, value in vars(m).items() if name.isupper() and isinstance(value, int)]
+    assert sorted(codes) == sorted(m.CODE_NAMES)
+    assert len(set(m.CODE_NAMES.values())) == len(codes) == 13
+
+
+def test_a_schema_in_the_working_folder_does_not_replace_the_programs(tmp_path, monkeypatch):
+    from dva_sim.protocol.codec import _schema_path
+
+    (tmp_path / "protocol").mkdir()
+    (tmp_path / "protocol" / "dva.xsd").write_text("<anything/>")
+    monkeypatch.chdir(tmp_path)
+    assert tmp_path not in _schema_path().parents

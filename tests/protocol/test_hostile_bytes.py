@@ -1,0 +1,258 @@
+"""Whatever the bytes, decode gives a message or a ProtocolError, and works as before after it."""
+
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from message_strategies import message
+
+from dva_sim.protocol import messages as m
+from dva_sim.protocol.codec import MAX_BYTES, decode, encode
+from dva_sim.protocol.errors import ProtocolError
+
+GOOD = encode(message(m.SetTeleOp(0.5, 0.56, 86320)))
+REPLY = encode(message(m.Reply(124, m.BUSY, "é & <ü>", m.SensorInfo("http://10.0.0.1/?a=b"))))
+
+
+def decode_or_refuse(data):
+    """What decode gives; fails the test on any other exception than a ProtocolError."""
+    try:
+        return decode(data)
+    except ProtocolError as error:
+        text = m.Reply(0, error.code, error.reason)
+        assert decode(encode(message(text))).body == text, "the reason fits into a reply"
+        return None
+
+
+def refused(old, new, data=GOOD):
+    assert old in data
+    with pytest.raises(ProtocolError) as caught:
+        decode(data.replace(old, new))
+    return caught.value.reason
+
+
+@pytest.mark.parametrize("data", [GOOD, REPLY], ids=["command", "reply"])
+def test_a_message_cut_off_anywhere_is_refused(data):
+    for end in range(len(data)):
+        with pytest.raises(ProtocolError):
+            decode(data[:end])
+
+
+@pytest.mark.parametrize("data", [GOOD, REPLY], ids=["command", "reply"])
+def test_a_flipped_bit_gives_a_message_or_a_refusal(data):
+    for index in range(len(data)):
+        for bit in range(8):
+            damaged = bytearray(data)
+            damaged[index] ^= 1 << bit
+            decode_or_refuse(bytes(damaged))
+
+
+@settings(deadline=None)
+@given(st.binary(max_size=300))
+@example(b"")
+@example(b"<")
+@example(b"<?xml")
+@example(b" \n ")
+@example(b"<msg>\xff</msg>")
+@example(b"<msg>&#xD800;</msg>")
+@example(b"<msg>\x01</msg>")
+def test_any_bytes_are_refused(data):
+    assert decode_or_refuse(data) is None
+
+
+@settings(deadline=None)
+@given(st.integers(55, len(REPLY)), st.integers(0, 12), st.binary(max_size=12))
+def test_a_message_with_any_bytes_in_it_gives_a_message_or_a_refusal(at, width, inserted):
+    decode_or_refuse(REPLY[:at] + inserted + REPLY[at + width :])
+
+
+@pytest.mark.parametrize(
+    "doctype",
+    [
+        b"<!DOCTYPE msg>",
+        b'<!DOCTYPE msg [<!ENTITY half "0.5">]>',
+        b'<!DOCTYPE msg SYSTEM "file:///etc/passwd">',
+        b'<!DOCTYPE msg [<!ENTITY a "aaaaaaaa"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;">]>',
+    ],
+)
+def test_a_doctype_is_refused_with_or_without_its_entities(doctype):
+    assert "other than plain elements" in refused(b"<msg>", doctype + b"<msg>")
+    data = GOOD.replace(b">0.5<", b">&half;<")
+    assert "other than plain elements" in refused(b"<msg>", doctype + b"<msg>", data)
+
+
+@pytest.mark.parametrize(
+    "value",
+    [b"0.<!-- -->56", b"<!-- 0.5 -->0.56", b"<![CDATA[0.56]]>", b"0.<?stop?>56"],
+)
+def test_a_value_is_never_half_hidden_by_markup(value):
+    assert "other than plain elements" in refused(b"0.56", value)
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        b"nan",
+        b"NaN",
+        b"INF",
+        b"-INF",
+        b"inf",
+        b"1e999",
+        b"-1e999",
+        b"1_0.5",
+        b"0x1p3",
+        b"+0.5",
+        b".5",
+        b"5.",
+        b"1,5",
+        b"0.5 0.5",
+        b"",
+        b" ",
+        "٠.٥".encode(),
+        "０.５".encode(),
+        "\u00a00.5".encode(),
+        b"9" * 5000,
+        b"0." + b"0" * 5000,
+        b"&half;",
+        b"<Speed>0.5</Speed>",
+    ],
+)
+def test_what_is_no_plain_finite_number_is_no_turn_rate(value):
+    refused(b"0.56", value)
+
+
+@pytest.mark.parametrize(
+    "value",
+    [b"9" * 5000, b"0" * 5000 + b"1", b"-0", b"+1", b"1.0", b"1e3", b"1_0", "١".encode(), b"0x1"],
+)
+def test_what_is_no_plain_integer_is_no_message_id(value):
+    assert "MessageID" in refused(b">124<", b">" + value + b"<")
+
+
+def test_space_around_a_number_means_nothing_and_inside_a_string_is_refused():
+    assert decode(GOOD.replace(b"0.56", b" 0.56\n")) == decode(GOOD)
+    assert "Timestamp" in refused(b"12:30:56", b" 12:30:56")
+    assert "SourceID" in refused(b"56:2B:04:E4:56:D8", b"56:2B:04:E4:56:D8\n")
+
+
+def test_a_character_reference_is_the_character():
+    assert decode(GOOD.replace(b"0.56", b"&#48;&#46;&#x35;6")) == decode(GOOD)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [b"\xe9", b"\xc3", b"\xa9", b"\xc0\xaf", b"\xed\xa0\x80", b"\xf4\x90\x80\x80", b"\xff\xfe"],
+    ids=["latin-1", "cut", "continuation", "overlong", "surrogate", "too-large", "mark"],
+)
+def test_text_that_is_not_utf_8_is_refused(text):
+    refused("é".encode(), text, REPLY)
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be", "utf-32"])
+@pytest.mark.parametrize("declared", ["UTF-8", "UTF-16", None])
+def test_utf_16_and_utf_32_are_refused_whatever_they_declare(encoding, declared):
+    text = GOOD.decode()
+    start = f'<?xml version="1.0" encoding="{declared}"?>' if declared else ""
+    data = (start + text[text.index("<msg>") :]).encode(encoding)
+    with pytest.raises(ProtocolError):
+        decode(data)
+
+
+@pytest.mark.parametrize(
+    "declaration",
+    [
+        b'<?xml version="1.0" encoding="ISO-8859-1"?>',
+        b'<?xml version="1.0" encoding="UTF-7"?>',
+        b'<?xml version="1.0" encoding="UTF-8?>',
+        b'<?xml version="1.0" encoding="UTF-8"?',
+        b'<?xml version="1.1" encoding="UTF-8"?>',
+        b'<?xml encoding="UTF-8"?>',
+        b"<?xml?>",
+    ],
+)
+def test_a_declaration_of_anything_but_xml_in_utf_8_is_refused(declaration):
+    assert "declaration" in refused(GOOD[: GOOD.index(b"<msg>")], declaration)
+
+
+@pytest.mark.parametrize(
+    "declaration",
+    [
+        b"",
+        b"\n",
+        b'<?xml version="1.0"?>',
+        b"<?xml version='1.0' encoding='utf-8' ?>\n",
+        b'<?xml version = "1.0"  encoding = "UTF-8" standalone="no"?>\r\n',
+    ],
+)
+def test_other_ways_to_declare_utf_8_are_accepted(declaration):
+    assert decode(GOOD.replace(GOOD[: GOOD.index(b"<msg>")], declaration)) == decode(GOOD)
+
+
+def test_a_byte_order_mark_is_refused():
+    with pytest.raises(ProtocolError, match="byte order mark"):
+        decode(b"\xef\xbb\xbf" + GOOD)
+
+
+@pytest.mark.parametrize(
+    "root",
+    [
+        b'<msg xmlns="http://example.org">',
+        b'<msg xmlns:x="http://example.org">',
+        b'<msg xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance" xsi:nil="true">',
+        b"<msg id='1'>",
+        b'<msg\nid\n=\n"1">',
+        b'<msg id="a>b">',
+    ],
+)
+def test_attributes_and_namespaces_are_refused(root):
+    assert "other than plain elements" in refused(b"<msg>", root)
+
+
+def test_a_schema_named_in_the_message_is_never_opened(tmp_path):
+    other = tmp_path / "other.xsd"
+    other.write_text("<not a schema")
+    location = f'xsi:noNamespaceSchemaLocation="{other}"'.encode()
+    root = b'<msg xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance" ' + location + b">"
+    assert "other than plain elements" in refused(b"<msg>", root)
+
+
+@pytest.mark.parametrize("name", [b"msg>", b"SimpleMsg>", b"TeleOp>", b"Speed>"])
+def test_a_prefix_that_was_never_declared_is_refused(name):
+    data = GOOD.replace(b"<" + name, b"<x:" + name).replace(b"</" + name, b"</x:" + name)
+    with pytest.raises(ProtocolError, match="other than plain elements"):
+        decode(data)
+
+
+def test_space_in_tags_and_short_empty_elements_mean_nothing():
+    stop = encode(message(m.StopTeleOp()))
+    for empty in (b"<StopTeleOp/>", b"<StopTeleOp />", b"<StopTeleOp\n></StopTeleOp >"):
+        assert decode(stop.replace(b"<StopTeleOp></StopTeleOp>", empty)) == decode(stop)
+
+
+@pytest.mark.parametrize("tag", [b"<msg>", b"<TeleOp>", b"<a>"])
+def test_deep_nesting_is_refused(tag):
+    depth = MAX_BYTES // (2 * len(tag) + 1)
+    with pytest.raises(ProtocolError):
+        decode(tag * depth + tag.replace(b"<", b"</") * depth)
+
+
+def test_a_message_has_at_most_8192_bytes():
+    padded = GOOD.replace(b"<msg>", b"<msg>" + b" " * (MAX_BYTES - len(GOOD)))
+    assert len(padded) == 8192
+    assert decode(padded) == decode(GOOD)
+    assert "8193 bytes" in refused(b"<msg>", b"<msg> ", padded)
+
+
+def test_a_refusal_leaves_no_trace_in_the_next_message():
+    for bad in (b"<msg>", GOOD[:-1], GOOD.replace(b"0.56", b"nan"), b"<a><b></a>"):
+        with pytest.raises(ProtocolError):
+            decode(bad)
+        assert decode(GOOD).body == m.SetTeleOp(0.5, 0.56, 86320)
+
+
+def test_threads_share_the_parser():
+    bad = GOOD.replace(b"0.56", b"nan")
+    with ThreadPoolExecutor(4) as pool:
+        got = list(pool.map(decode_or_refuse, [GOOD, bad, REPLY] * 200))
+    assert got == [decode(GOOD), None, decode(REPLY)] * 200

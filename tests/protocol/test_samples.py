@@ -1,0 +1,109 @@
+"""The samples and the specification, read as someone writing another implementation would."""
+
+import re
+from pathlib import Path
+from typing import get_args
+
+import pytest
+from lxml import etree
+from message_strategies import ROBOT, TABLET
+
+from dva_sim.protocol import messages as m
+from dva_sim.protocol.codec import decode, encode
+from dva_sim.protocol.errors import ProtocolError
+
+PROTOCOL = Path(__file__).parents[2] / "protocol"
+SCHEMA = etree.XMLSchema(file=str(PROTOCOL / "dva.xsd"))
+VALID = sorted((PROTOCOL / "samples" / "valid").glob("*.xml"))
+INVALID = sorted((PROTOCOL / "samples" / "invalid").glob("*.xml"))
+ROW = re.compile(r"^\| `([\w-]+\.xml)` \| (.+) \| (XML|schema|rule) \|$", re.MULTILINE)
+FOUND_BY = {name: by for name, _, by in ROW.findall((PROTOCOL / "samples/README.md").read_text())}
+
+
+def stem(path):
+    return path.stem
+
+
+@pytest.mark.parametrize("path", VALID, ids=stem)
+def test_a_valid_sample_is_accepted_and_survives_a_round_trip(path):
+    data = path.read_bytes()
+    SCHEMA.assertValid(etree.fromstring(data))
+    assert decode(encode(decode(data))) == decode(data)
+
+
+def test_there_is_a_valid_sample_of_every_body_and_content():
+    bodies = [decode(path.read_bytes()).body for path in VALID]
+    contents = {type(body.content) for body in bodies if isinstance(body, m.Reply)}
+    assert {type(body) for body in bodies} == set(get_args(m.Body))
+    assert contents == {type(None), m.DeviceList, m.SensorInfo, m.Permission}
+
+
+def test_every_invalid_sample_is_explained():
+    assert [path.name for path in INVALID] == sorted(FOUND_BY)
+
+
+def who_finds(data):
+    """The first of XML, schema and rule that refuses."""
+    try:
+        tree = etree.fromstring(data)
+    except etree.XMLSyntaxError:
+        return "XML"
+    return "rule" if SCHEMA.validate(tree) else "schema"
+
+
+@pytest.mark.parametrize("path", INVALID, ids=stem)
+def test_an_invalid_sample_is_refused_for_the_reason_given(path):
+    data = path.read_bytes()
+    assert who_finds(data) == FOUND_BY[path.name]
+    with pytest.raises(ProtocolError) as refused:
+        decode(data)
+    assert refused.value.code == m.BAD_MESSAGE
+
+
+def test_the_command_printed_in_the_dissertation_decodes_right():
+    data = (PROTOCOL / "samples/valid/set-teleop.xml").read_bytes()
+    assert decode(data) == m.Message(
+        destination="70:1A:04:F9:81:D6",
+        message_id=124,
+        source="56:2B:04:E4:56:D8",
+        timestamp="12:30:56",
+        session=1425,
+        body=m.SetTeleOp(speed=0.5, turn_rate=0.56),
+    )
+
+
+def test_the_registration_printed_in_the_dissertation_is_accepted_once_mended():
+    mended = (PROTOCOL / "samples/valid/registration.xml").read_text()
+    body = m.Registration("Tablet BQ Curie 2", "TeleOp", "192.168.1.48")
+    assert decode(mended.encode()).body == body
+    as_printed = mended.replace('encoding="UTF-8" standalone="yes"?>', 'encoding="UTF-8"?')
+    assert as_printed != mended
+    with pytest.raises(ProtocolError, match="the XML declaration is broken"):
+        decode(as_printed.encode())
+
+
+def test_the_message_in_the_specification_is_the_sample():
+    printed = re.search(r"```xml\n(.*?)```", (PROTOCOL / "README.md").read_text(), re.DOTALL)
+    assert printed[1] == (PROTOCOL / "samples/valid/set-teleop.xml").read_text()
+
+
+def test_the_client_in_the_specification_works():
+    code = re.search(r"```python\n(.*?)```", (PROTOCOL / "README.md").read_text(), re.DOTALL)
+    names = {}
+    exec(code[1], names)
+    data = names["set_teleop"](ROBOT, TABLET, 7, 1425, "12:30:56", 0.5, -0.1)
+    assert decode(data) == m.Message(ROBOT, 7, TABLET, "12:30:56", 1425, m.SetTeleOp(0.5, -0.1))
+
+
+def test_the_reply_codes_of_the_specification_are_those_of_the_program():
+    rows = re.findall(
+        r"^\| (\d+) \| `(\w+)` \|", (PROTOCOL / "README.md").read_text(), re.MULTILINE
+    )
+    assert {int(code): name.lower().replace("_", " ") for code, name in rows} == m.CODE_NAMES
+
+
+def test_the_specification_names_every_element():
+    text = (PROTOCOL / "README.md").read_text()
+    schema = etree.parse(PROTOCOL / "dva.xsd")
+    elements = {e.get("name") for e in schema.iter("{http://www.w3.org/2001/XMLSchema}element")}
+    assert {name for name in elements if f"`{name}`" not in text} - {"SimpleMsg", "msg"} == set()
