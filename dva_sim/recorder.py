@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 
-@dataclass(frozen=True, slots=True)
-class Moment:
+class Moment(NamedTuple):
     """One line of the timeline.
 
     Attributes:
@@ -23,8 +23,7 @@ class Moment:
     kind: str
 
 
-@dataclass(frozen=True, slots=True)
-class TrackPoint:
+class TrackPoint(NamedTuple):
     """Where an agent was [m, rad], and what it was doing."""
 
     time: float
@@ -34,16 +33,14 @@ class TrackPoint:
     mode: str
 
 
-@dataclass(slots=True)
-class Issued:
+class Issued(NamedTuple):
     """A command on its way: when it was issued [s], and the mean age of its samples [s]."""
 
     time: float
     sample_age: float
 
 
-@dataclass(slots=True)
-class Applied:
+class Applied(NamedTuple):
     """A command that took effect at the robot; times in [s].
 
     Attributes:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from dva_sim.agents.steering import wrap
 
 
-@dataclass(frozen=True, slots=True)
-class SeenHazard:
+class SeenHazard(NamedTuple):
     """A hazard in the picture: kind, place [m] and distance from the camera [m]."""
 
     kind: str
@@ -19,8 +19,7 @@ class SeenHazard:
     distance: float
 
 
-@dataclass(frozen=True, slots=True)
-class Observation:
+class Observation(NamedTuple):
     """One frame, as far as a person makes use of it.
 
     Attributes:
@@ -42,16 +41,14 @@ class Observation:
     hazards: tuple[SeenHazard, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Frame:
+class Frame(NamedTuple):
     """An observation on its way; `captured` [s] is for the recorder, not for the operator."""
 
     observation: Observation
     captured: float
 
 
-@dataclass(frozen=True, slots=True)
-class HazardSpot:
+class HazardSpot(NamedTuple):
     """A hazard as the camera may see it: kind, place and radius [m]."""
 
     kind: str

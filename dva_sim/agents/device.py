@@ -16,7 +16,7 @@ from dva_sim.worlds.geo import GeoFrame
 
 CONTROL = "control"  # the acknowledged channel: everything but SetTeleOp
 HEARTBEATS = "heartbeats"
-HEARTBEAT_PERIOD = 1.0  # [s]
+HEARTBEAT_PERIOD = 2.0  # [s]
 
 Handler = Callable[[m.Message], m.Reply]
 

@@ -33,13 +33,13 @@ class GuardProfile(Config):
 
     References:
         Walking speed 1.34 m/s (SD 0.26): U. Weidmann, Transporttechnik der Fussgaenger,
-        ETH Zuerich, 1993.
+        ETH Zuerich, 1993. Turnout within 80 s in 90 % of all cases: NFPA 1710.
     """
 
     description: str = ""
     walking_mean_mps: Annotated[float, Field(gt=0)] = 1.34
     walking_sd_mps: Annotated[float, Field(ge=0)] = 0.26
-    mobilisation_s: Trait = Trait(median=20.0, spread=0.3)
+    mobilisation_s: Trait = Trait(median=45.0, spread=0.45)
     confirm_look_s: Trait = Trait(median=3.0, spread=0.3)
 
 

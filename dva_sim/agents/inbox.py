@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from dva_sim.clock import Clock
 from dva_sim.network.patterns import Answer
@@ -12,8 +12,7 @@ from dva_sim.network.patterns import Answer
 LIMIT = 1000  # ZeroMQ's default high-water mark: a full subscriber keeps the oldest
 
 
-@dataclass(frozen=True, slots=True)
-class Letter:
+class Letter(NamedTuple):
     """A message that has arrived: its bytes, when [s], and how to answer it."""
 
     data: bytes

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import NamedTuple
 
 from dva_sim.protocol import messages as m
 
@@ -21,8 +22,7 @@ class Mode(StrEnum):
     TELEOPERATION = "Teleoperation"
 
 
-@dataclass(frozen=True, slots=True)
-class SetPoint:
+class SetPoint(NamedTuple):
     """How to move, and until when at the latest: speed [m/s], turn rate [rad/s], time [s]."""
 
     speed: float
@@ -33,8 +33,7 @@ class SetPoint:
 STAND = SetPoint(0.0, 0.0, 0.0)
 
 
-@dataclass(frozen=True, slots=True)
-class Decision:
+class Decision(NamedTuple):
     """What follows from a message.
 
     Attributes:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +20,7 @@ def wrap(angle: float) -> float:
     return math.remainder(angle, 2.0 * math.pi)
 
 
-@dataclass(frozen=True, slots=True)
-class Ahead:
+class Ahead(NamedTuple):
     """The target on the route as seen from a pose.
 
     Attributes:
@@ -47,7 +46,7 @@ class Route:
     def __init__(self, points: NDArray[np.float64]) -> None:
         self._points = [(float(x), float(y)) for x, y in points]
         steps = np.hypot(*np.diff(points, axis=0).T)
-        self._at = [0.0, *np.cumsum(steps).tolist()]
+        self._at: list[float] = [0.0, *np.cumsum(steps).tolist()]
         self._segment = 0
         self.points = points
 

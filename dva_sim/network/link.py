@@ -202,6 +202,26 @@ class Link:
             self._last_arrival = arrival
         return arrival
 
+    def carry_train(self, now: float, packets: int, size: int) -> float | None:
+        """Send packets back to back as one, where that makes no difference.
+
+        Args:
+            now: When they are offered [s].
+            packets: How many.
+            size: Of all together, with all headers [B].
+
+        Returns:
+            When the last of them arrives [s]; None, and nothing is sent, where each must
+            be looked at by itself: with loss, jitter, or a queue that they do not fit into.
+        """
+        if self._loss or self._jitter:
+            return None
+        if self._serialiser.backlog_bytes(now) + size > self._room:
+            return None
+        self.offered += packets
+        self.bytes += size
+        return self._serialiser.depart(now, size) + self.delay
+
     def backlog_bytes(self, now: float) -> float:
         """Bytes that wait before the link at `now` [B]."""
         return self._serialiser.backlog_bytes(now)

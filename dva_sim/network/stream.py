@@ -73,15 +73,7 @@ class Stream:
         if self.closed:
             return
         now = self._clock.now
-        arrival, missing = 0.0, 0
-        while size > 0:
-            part = min(size, MSS)
-            size -= part
-            at = self._forward.carry(now, part + HEADERS)
-            if at is None:
-                missing += part
-            elif at > arrival:
-                arrival = at
+        arrival, missing = self._offer(now, size)
         if missing:
             self.retransmitted += 1
             wait = self._recovery_time(tries)
@@ -94,6 +86,23 @@ class Stream:
         self._clock.call_at(
             self._last_arrival if tries == 0 else arrival, self._arrive, seq, payload
         )
+
+    def _offer(self, now: float, size: int) -> tuple[float, int]:
+        """Offer a message's packets: when the last one arrives [s], and the bytes lost."""
+        packets = -(-size // MSS)
+        together = self._forward.carry_train(now, packets, size + packets * HEADERS)
+        if together is not None:
+            return together, 0
+        arrival, missing = 0.0, 0
+        while size > 0:
+            part = min(size, MSS)
+            size -= part
+            at = self._forward.carry(now, part + HEADERS)
+            if at is None:
+                missing += part
+            elif at > arrival:
+                arrival = at
+        return arrival, missing
 
     def _arrive(self, seq: int, payload: Any) -> None:
         if self.closed:

@@ -67,7 +67,11 @@ def test_derived_seeds_tell_parts_apart() -> None:
 @pytest.mark.parametrize(
     ("text", "place", "words"),
     [
-        ("name: a\ninner:\n  delay_ms: 3\n", "3:3", "unknown key 'inner.delay_ms'; did you mean 'delay_s'?"),
+        (
+            "name: a\ninner:\n  delay_ms: 3\n",
+            "3:3",
+            "unknown key 'inner.delay_ms'; did you mean 'delay_s'?",
+        ),
         ("name: a\ninner: {delay_s: fast}\n", "2:9", "inner.delay_s"),
         ("inner: {}\n", "1:1", "missing key 'name'"),
         ("name: a\nname: b\n", "2:1", "duplicate key"),

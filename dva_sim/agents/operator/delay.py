@@ -6,7 +6,8 @@ import numpy as np
 
 STEP = 0.1  # resolution of the memory and of the guess [s]
 LONGEST = 8.0  # [s]
-MEMORY = 0.98  # share of the old evidence kept per frame: about 5 s at 10 frames/s
+LOOKS = 0.2  # how often the guess is looked at [s]
+MEMORY = 0.96  # share of the old evidence kept at each look: it fades in about 5 s
 
 
 class DelayEstimate:
@@ -22,11 +23,10 @@ class DelayEstimate:
     """
 
     def __init__(self, start: float, guess: float) -> None:
-        self._start = start
+        self._start = self._next_look = start
         self._lags = np.arange(1, round(LONGEST / STEP) + 1) * STEP
-        self._asked = np.zeros((4096, 2))
-        self._offset = len(self._lags)
-        self._filled = self._offset
+        self._offset = self._filled = len(self._lags)
+        self._speeds, self._turns = np.zeros(4096), np.zeros(4096)
         self._intent = (0.0, 0.0)
         self._misfit = 0.02 * np.abs(self._lags - guess)
         self.value = guess
@@ -38,19 +38,28 @@ class DelayEstimate:
 
     def see(self, now: float, speed: float, turn_rate: float) -> None:
         """The picture shows this motion at `now` [s]."""
+        if now < self._next_look:
+            return
+        self._next_look = now + LOOKS
         self._remember(now)
         newest = self._filled
-        past = self._asked[newest - len(self._lags) : newest][::-1]
-        error = np.abs(past[:, 0] - speed) * 2.0 + np.abs(past[:, 1] - turn_rate)
-        self._misfit *= MEMORY
-        self._misfit += np.minimum(error, 0.5)
-        self.value = float(self._lags[int(np.argmin(self._misfit))])
+        past = slice(newest - len(self._lags), newest)
+        error = np.abs(self._speeds[past] - speed)
+        error *= 2.0
+        error += np.abs(self._turns[past] - turn_rate)
+        np.minimum(error, 0.5, out=error)
+        misfit = self._misfit
+        misfit *= MEMORY
+        misfit += error[::-1]
+        self.value = float(self._lags[misfit.argmin()])
 
     def _remember(self, now: float) -> None:
         """Fill the memory with the standing intent up to `now`."""
         due = self._offset + int((now - self._start) / STEP + 1e-6)
-        while due >= len(self._asked):
-            self._asked = np.vstack([self._asked, np.zeros_like(self._asked)])
-        if due > self._filled:
-            self._asked[self._filled : due] = self._intent
-            self._filled = due
+        if due <= self._filled:
+            return
+        while due >= len(self._speeds):
+            self._speeds = np.append(self._speeds, np.zeros_like(self._speeds))
+            self._turns = np.append(self._turns, np.zeros_like(self._turns))
+        self._speeds[self._filled : due], self._turns[self._filled : due] = self._intent
+        self._filled = due

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from dva_sim.worlds.planning import Planner
 
 BLIND_AFTER = 20.0  # without a frame for so long, the link counts as lost [s]
 STUCK_AFTER = 4.0  # standing for so long though asked to drive, a person plans anew [s]
+LET_GO_FOR = 1.0  # one who sees no effect levels the phone for so long, and tilts again [s]
 SEARCH_FOR = 25.0  # looking around at the place for so long, a person says there is nothing [s]
 AT_PLACE = 1.5  # nearer than this one is at the place [m]
 MATCH_WITHIN = 4.0  # a hazard so near the reported place is the one reported [m]
@@ -79,11 +80,14 @@ class DriverSeat:
     def judge(self, seen: Observation) -> Observation:
         """A frame as the person takes it: place and heading with an error."""
         person, error = self.person, self._errors
-        return replace(
-            seen,
-            x=seen.x + person.position_error * next(error),
-            y=seen.y + person.position_error * next(error),
-            heading=seen.heading + person.heading_error * next(error),
+        return Observation(
+            seen.tick,
+            seen.x + person.position_error * next(error),
+            seen.y + person.position_error * next(error),
+            seen.heading + person.heading_error * next(error),
+            seen.speed,
+            seen.turn_rate,
+            seen.hazards,
         )
 
 
@@ -120,6 +124,7 @@ class Drive:
         self._standing_since: float | None = None
         self._at_place_since: float | None = None
         self._arrived = False
+        self._let_go_until = 0.0
 
     def begin(self) -> None:
         """The robot has agreed to be driven: look, and tilt."""
@@ -257,6 +262,7 @@ class Drive:
         """The way to the goal; planned anew when the robot does not get on."""
         if self._is_stuck(seen):
             self._route, self._standing_since = None, None
+            self._let_go_until = self._clock.now + LET_GO_FOR
             self._device.recorder.counters["replans"] += 1
         if self._route is None:
             points = self._seat.planner.path((seen.x, seen.y), self._goal)
@@ -277,6 +283,8 @@ class Drive:
 
     def _intend(self, intent: Intent) -> None:
         now = self._clock.now
+        if now < self._let_go_until:
+            intent = Intent(0.0, 0.0)
         self._intent = intent
         self._seat.phone.ask(now, intent.speed, intent.turn_rate)
         self._seat.delay.intend(now, intent.speed, intent.turn_rate)

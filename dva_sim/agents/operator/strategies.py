@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from dva_sim.agents.camera import Observation
 from dva_sim.agents.operator.person import Person
@@ -28,8 +28,7 @@ class Truth:
     state: Observation
 
 
-@dataclass(frozen=True, slots=True)
-class Intent:
+class Intent(NamedTuple):
     """What an operator wants the robot to do now: speed [m/s], turn rate [rad/s]."""
 
     speed: float

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -55,8 +54,7 @@ class PhoneProfile(Config):
     ideal: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class TiltCommand:
+class TiltCommand(NamedTuple):
     """What the phone sends.
 
     Attributes:

@@ -1,0 +1,96 @@
+"""The words on the command line: what to run, where to write, what to show. No logic."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from dva_sim.errors import DvaSimError
+
+app = typer.Typer(
+    help="A test bench for surveillance teams of people and teleoperated robots.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+Sets = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="Change one key; may be given again."),
+]
+
+
+@app.command()
+def run(
+    study: Annotated[str, typer.Argument(help="A study by name or path.")],
+    out: Annotated[Path | None, typer.Option("-o", "--out", help="Results folder.")] = None,
+    set_: Sets = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of the whole study.")] = None,
+    jobs: Annotated[int | None, typer.Option(help="Processes; default: all cores.")] = None,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Only say what would run.")] = False,
+) -> None:
+    """Run a study, or go on with one that was interrupted, and write its report."""
+    from dva_sim.experiments import console
+
+    changes = [*(set_ or []), *([f"seed={seed}"] if seed is not None else [])]
+    if dry_run:
+        console.plan(study, changes, out, jobs)
+        return
+    raise typer.Exit(console.run(study, changes, out, jobs))
+
+
+@app.command()
+def report(folder: Annotated[Path, typer.Argument(help="A results folder.")]) -> None:
+    """Make the report of a results folder again."""
+    from dva_sim.experiments.report import write_report
+
+    typer.echo(f"Report: {write_report(folder)}")
+
+
+@app.command()
+def episode(
+    scenario: Annotated[str, typer.Argument(help="A scenario by name or path.")],
+    seed: Annotated[int, typer.Option(help="Seed of the run.")] = 1,
+    set_: Sets = None,
+    video: Annotated[Path | None, typer.Option(help="Write a .gif or .mp4.")] = None,
+    side_by_side: Annotated[
+        str | None,
+        typer.Option(metavar="PATTERN,PATTERN", help="Show the same seed under two patterns."),
+    ] = None,
+) -> None:
+    """Run one scenario and tell its story."""
+    from dva_sim.experiments import console
+
+    console.episode(scenario, seed, set_ or [], video, side_by_side)
+
+
+@app.command(name="list")
+def list_() -> None:
+    """Name the studies, scenarios, sites, agents, policies and operators there are."""
+    from dva_sim.experiments import console
+
+    console.list_all()
+
+
+@app.command(hidden=True)
+def version() -> None:
+    """Print the version."""
+    from dva_sim import __version__
+
+    typer.echo(__version__)
+
+
+def main() -> None:
+    """Entry point: user mistakes end in one line and exit code 2, Ctrl-C in 130."""
+    try:
+        app(standalone_mode=True)
+    except DvaSimError as error:
+        print(f"dva-sim: {error}", file=sys.stderr)
+        sys.exit(2)
+
+
+if __name__ == "__main__":
+    main()

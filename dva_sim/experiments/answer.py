@@ -1,0 +1,278 @@
+"""The answer to a study's question, in sentences that claim no more than the runs support."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dva_sim.experiments.labels import (
+    Level,
+    factor_name,
+    level_name,
+    listing,
+    measure_name,
+    number,
+    percent,
+    quantity,
+    setting,
+    unit_of,
+)
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Missed:
+    """Runs without confirmation under one level, at the hardest condition."""
+
+    line: Level
+    missed: int
+    runs: int
+
+    @property
+    def share(self) -> float:
+        """Missed runs as a share of all runs."""
+        return self.missed / self.runs if self.runs else float("nan")
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A declared contrast as measured: all that the sentences are made from.
+
+    Attributes:
+        measure: Column compared; in excess of the reference if `in_excess`.
+        factor: Factor whose levels `first` and `second` are compared.
+        over: Factor along which the difference is followed, with its `levels` `(k,)`.
+        within: Levels of the other factors.
+        mean: First minus second, at each level `(k,)`; nan where there is no pair.
+        low: Lower edge of the simultaneous 95 % band `(k,)`; nan if none can be given.
+        high: Its upper edge `(k,)`.
+        persons: How many persons (clusters) the band rests on.
+        smallest_effect: Smallest difference declared to matter, in the measure's unit.
+        missed: Runs without confirmation at the last level, per level of `factor`.
+        horizon: What such a run counts with [s].
+    """
+
+    measure: str
+    in_excess: bool
+    factor: str
+    first: Level
+    second: Level
+    over: str
+    levels: tuple[Level, ...]
+    within: dict[str, Level]
+    mean: Floats
+    low: Floats
+    high: Floats
+    persons: int
+    smallest_effect: float | None = None
+    missed: tuple[Missed, ...] = ()
+    horizon: float | None = None
+
+    @property
+    def unit(self) -> str:
+        """Unit of the measure."""
+        return unit_of(self.measure)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a reader should take home.
+
+    Attributes:
+        lead: The answer in one to three sentences.
+        notes: What must be known to read it fairly.
+    """
+
+    lead: str
+    notes: list[str] = field(default_factory=list)
+
+
+def answer(finding: Finding) -> Answer:
+    """Say where the difference can be told from zero, how large it is, and what is ruled out."""
+    if not np.isfinite(finding.low).any():
+        return Answer(_without_band(finding), [*_misses(finding), _what_is_measured(finding)])
+    sentences = [*_tellable(finding), *_ruled_out(finding), *_unpaired(finding)]
+    notes = [*_misses(finding), f"{_what_is_measured(finding)} {_what_the_band_is(finding)}"]
+    return Answer(" ".join(sentences), notes)
+
+
+def _tellable(f: Finding) -> list[str]:
+    """Size and reach of the effect, for each direction in which a level differs from zero."""
+    sentences: list[str] = []
+    for chosen in (f.low > 0, f.high < 0):
+        where = np.flatnonzero(chosen)
+        if len(where):
+            head = "Elsewhere it turns round: " if sentences else _condition(f)
+            sentences.append(f"{head}{_effect(f, where)}")
+    return sentences
+
+
+def _effect(f: Finding, where: NDArray[np.intp]) -> str:
+    """`A takes 4.5 s longer than B at ... (band). The difference can be told from zero ...`."""
+    at = _telling_level(f, where)
+    band = f"{number(f.low[at])} to {quantity(f.high[at], f.unit)}"
+    reach = "only there" if len(where) == 1 < len(f.levels) else _places(f, where)
+    return (
+        f"{_comparison(f, f.mean[at])} {_at(f, [at])} (95 % Monte Carlo band, given the model: "
+        f"{band}). The difference can be told from zero {reach}{_remark_on_size(f, where)}."
+    )
+
+
+def _remark_on_size(f: Finding, where: NDArray[np.intp]) -> str:
+    """Real is not yet relevant: say so where the whole band is below what matters."""
+    bound = float(np.maximum(abs(f.low[where]), abs(f.high[where])).max())
+    if f.smallest_effect is None or bound >= f.smallest_effect:
+        return ""
+    return f", but stays below the {_declared(f)} declared to matter"
+
+
+def _ruled_out(f: Finding) -> list[str]:
+    """What the runs say where the band holds zero: settled, or still open."""
+    where = np.flatnonzero((f.low <= 0) & (f.high >= 0))
+    bounds = np.maximum(-f.low, f.high)
+    limit = np.inf if f.smallest_effect is None else f.smallest_effect
+    settled, undecided = where[bounds[where] <= limit], where[bounds[where] > limit]
+    nowhere = len(where) == np.isfinite(f.low).sum()
+    sentences = [_no_difference(f)] if nowhere else []
+    if len(settled):
+        places = _places(f, settled)
+        size = quantity(float(bounds[settled].max()), f.unit)
+        verdict = f"an effect above {size} either way is ruled out"
+        matters = (
+            f", and with it the {_declared(f)} declared to matter" if f.smallest_effect else ""
+        )
+        sentences.append(
+            f"{verdict[:1].upper()}{verdict[1:]} {places}{matters}."
+            if nowhere
+            else f"It cannot be told from zero {places}, where {verdict}{matters}."
+        )
+    if len(undecided):
+        size = quantity(float(bounds[undecided].max()), f.unit)
+        sentences.append(
+            f"The question stays open {_places(f, undecided)}: an effect as large as {size} is "
+            "not ruled out, so more persons are needed."
+        )
+    return sentences
+
+
+def _no_difference(f: Finding) -> str:
+    first, second = level_name(f.factor, f.first), level_name(f.factor, f.second)
+    anywhere = f" at any {factor_name(f.over)} tried" if f.over else ""
+    return (
+        f"{_condition(f)}no difference between {first} and {second} can be told from zero"
+        f"{anywhere} (95 % Monte Carlo band, given the model)."
+    )
+
+
+def _declared(f: Finding) -> str:
+    return level_name(f.measure, f.smallest_effect)
+
+
+def _unpaired(f: Finding) -> list[str]:
+    missing = [int(i) for i in np.flatnonzero(~np.isfinite(f.low))]
+    return [f"Nothing can be said {_at(f, missing)}: runs are missing."] if missing else []
+
+
+def _without_band(f: Finding) -> str:
+    """Without a band: the plain mean of these runs, and no claim beyond them."""
+    there = np.flatnonzero(np.isfinite(f.mean))
+    if not len(there):
+        return "No pair of runs is complete, so the question stays open."
+    at = int(there[-1])
+    if f.persons < 2:
+        why = "Too few persons to answer: an interval needs at least two, here is one."
+    else:
+        why = "The difference is the same for every person, so that no interval can be given."
+    seen = f"{_condition(f, inside=True)}{_comparison(f, f.mean[at])} {_at(f, [at])}"
+    return f"{why} In the runs that were made, {seen}."
+
+
+def _misses(f: Finding) -> list[str]:
+    """Misses are a result of their own: the mean alone would hide them behind the horizon."""
+    if not f.missed:
+        return []
+    where = _at(f, [len(f.levels) - 1])
+    if not any(m.missed for m in f.missed):
+        return [f"Every event was confirmed {where}, under each {factor_name(f.factor)}."]
+    shares = [
+        f"{level_name(f.factor, m.line)} {percent(m.share)} ({m.missed} of {m.runs})"
+        for m in f.missed
+    ]
+    horizon = f" of {quantity(f.horizon, 's')}" if f.horizon is not None else ""
+    return [
+        f"Not confirmed {where}: {listing(shares)}. Such a run counts with the whole "
+        f"horizon{horizon}, which says less than that the event was missed."
+    ]
+
+
+def _what_is_measured(f: Finding) -> str:
+    excess = ", in excess of the reference run of the same person and trial" if f.in_excess else ""
+    return f"Compared is the {measure_name(f.measure)}{excess}, over {_persons(f)}."
+
+
+def _what_the_band_is(f: Finding) -> str:
+    return (
+        f"The band covers every {factor_name(f.over) if f.over else 'level'} at once; "
+        "more runs narrow it, but do not make the model truer."
+    )
+
+
+def _persons(f: Finding) -> str:
+    return "one simulated person" if f.persons == 1 else f"{f.persons} simulated persons"
+
+
+def _condition(f: Finding, inside: bool = False) -> str:
+    if not f.within:
+        return ""
+    return f"{'with' if inside else 'With'} {setting(f.within)}, "
+
+
+def _comparison(f: Finding, difference: float) -> str:
+    first, second = level_name(f.factor, f.first), level_name(f.factor, f.second)
+    if difference == 0:
+        return f"{first} equals {second}"
+    size = quantity(abs(difference), f.unit)
+    if f.unit == "s" and f.measure == "drive_time_s":
+        return f"{first} takes {size} {'longer' if difference > 0 else 'less'} than {second}"
+    side = "above" if difference > 0 else "below"
+    return f"{first} lies {size} {side} {second}"
+
+
+def _telling_level(f: Finding, where: NDArray[np.intp]) -> int:
+    """The last level of a quantity, for that is the question; else the largest difference."""
+    return int(where[-1] if _is_ordered(f) else where[np.argmax(abs(f.mean[where]))])
+
+
+def _is_ordered(f: Finding) -> bool:
+    values = [v for v in f.levels if isinstance(v, int | float)]
+    return len(values) == len(f.levels) and values == sorted(values)
+
+
+def _at(f: Finding, where: Sequence[int]) -> str:
+    if not f.over:
+        return "throughout"
+    names = listing([level_name(f.over, f.levels[i]) for i in where])
+    return f"at {'a ' if len(where) == 1 else ''}{factor_name(f.over)} {_of(f)}{names}"
+
+
+def _of(f: Finding) -> str:
+    return "of " if unit_of(f.over) or _is_ordered(f) else ""
+
+
+def _places(f: Finding, where: NDArray[np.intp]) -> str:
+    """`from 250 ms on`, `up to 100 ms`, `at every delay`, or the levels one by one."""
+    if not f.over:
+        return "throughout"
+    names = [level_name(f.over, f.levels[int(i)]) for i in where]
+    solid = len(where) > 1 and bool((np.diff(where) == 1).all()) and _is_ordered(f)
+    if len(where) == len(f.levels) > 1:
+        return f"at every {factor_name(f.over)} tried"
+    if solid and where[-1] == len(f.levels) - 1:
+        return f"from {names[0]} on"
+    if solid and where[0] == 0:
+        return f"up to {names[-1]}"
+    return f"at {listing(names)}"

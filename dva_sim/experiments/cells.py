@@ -1,0 +1,118 @@
+"""The table of every cell: nothing that was run is left out of the report."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from dva_sim.experiments.effects import Floats, Part, Setting, present
+from dva_sim.experiments.labels import (
+    factor_name,
+    level_name,
+    measure_name,
+    number,
+    percent,
+    unit_of,
+)
+from dva_sim.experiments.statistics import mean_interval
+
+
+@dataclass(frozen=True)
+class CellTable:
+    """A table ready to print.
+
+    Attributes:
+        part: Part of the study.
+        heads: Column heads.
+        labels: How many leading columns name the cell.
+        rows: Printed values.
+        empty: How many cells have no run.
+    """
+
+    part: str
+    heads: list[str]
+    labels: int
+    rows: list[list[str]]
+    empty: int
+
+
+# column of the runs, head, how the runs of a cell become one number, how it is printed
+_Summarise = Callable[[Floats], Any]
+_SUMMARIES: tuple[tuple[str, str, _Summarise, Callable[[float], str]], ...] = (
+    ("command_age_p50_s", "command age, median [s]", np.mean, number),
+    ("command_rate_hz", "applied commands [Hz]", np.mean, number),
+    ("stop_share", "in safe stop", np.mean, percent),
+    ("contacts", "contacts per run", np.mean, number),
+    ("violations", "violations", np.sum, number),
+)
+
+
+def cell_table(part: Part, measure: str) -> CellTable:
+    """Every cell of a part: size, confirmed share, the measure with its interval, and the rest."""
+    settings = list(part.settings())
+    columns = [_counts(part), _confirmed(part), *_measure(part, measure), *_others(part)]
+    there = [c for c in columns if c is not None]
+    names = [factor_name(f.name) for f in part.factors]
+    rows = [
+        [*_cell_name(setting), *(values[i] for _, values in there)]
+        for i, setting in enumerate(settings)
+    ]
+    empty = sum(1 for values in _cells(part, "seed") if not len(values))
+    return CellTable(part.name, [*names, *(h for h, _ in there)], len(names), rows, empty)
+
+
+_Column = tuple[str, list[str]]
+
+
+def _cells(part: Part, column: str) -> list[Floats]:
+    """The finite values of every cell, in the order of `Part.settings`."""
+    return [present(cell) for cell in _by_cell(part, part.grid(column))]
+
+
+def _by_cell(part: Part, grid: Floats) -> Floats:
+    return grid.reshape(-1, len(part.persons), len(part.trials))
+
+
+def _cell_name(setting: Setting) -> list[str]:
+    return [level_name(factor, level) for factor, level in setting.items()]
+
+
+def _counts(part: Part) -> _Column:
+    return "runs", [str(len(values)) for values in _cells(part, "seed")]
+
+
+def _confirmed(part: Part) -> _Column | None:
+    if not part.has("confirmed"):
+        return None
+    return "confirmed", [_text(np.mean, cell, percent) for cell in _cells(part, "confirmed")]
+
+
+def _measure(part: Part, measure: str) -> list[_Column]:
+    """Median and mean with its 95 % interval, in excess of the reference where there is one."""
+    if not part.has(measure):
+        return []
+    excess = part.has_reference(measure)
+    grid = _by_cell(part, part.excess(measure) if excess else part.grid(measure))
+    person = np.repeat(part.persons, len(part.trials))
+    medians = [_text(np.median, present(cell), number) for cell in grid]
+    intervals = [mean_interval(cell.ravel(), person) for cell in grid]
+    means = [f"{number(i.mean)} ({number(i.low)} to {number(i.high)})" for i in intervals]
+    name = "excess time" if excess and unit_of(measure) == "s" else measure_name(measure)
+    unit = f" [{unit_of(measure)}]" if unit_of(measure) else ""
+    return [(f"{name}, median{unit}", medians), (f"its mean (95 % interval){unit}", means)]
+
+
+def _others(part: Part) -> list[_Column]:
+    return [
+        (head, [_text(summary, cell, text) for cell in _cells(part, column)])
+        for column, head, summary, text in _SUMMARIES
+        if part.has(column)
+    ]
+
+
+def _text(summary: _Summarise, cell: Floats, text: Callable[[float], str]) -> str:
+    """The runs of a cell as one printed number; a dash where there are none."""
+    return text(float(summary(cell))) if len(cell) else "–"

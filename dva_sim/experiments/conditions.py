@@ -1,0 +1,95 @@
+"""The conditions of a study: what was the same for everything that is compared."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from dva_sim.experiments.effects import Factor
+from dva_sim.experiments.labels import level_name
+
+_VARIED = "varied"
+_CONDITIONS = {
+    "processing time of a command at the robot": "robot.processing_s",
+    "time-out of a request": "command.timeout_s",
+    "attempts": "command.attempts",
+    "watchdog of the robot": "robot.watchdog_s",
+    "age limit of a command": "robot.max_age_s",
+    "wanted command rate": "command.rate_hz",
+    "one-way delay": "link.delay_s",
+    "jitter (half-width)": "link.jitter_s",
+    "packet loss, each way": "link.loss",
+    "link rate": "link.rate_bps",
+    "queue before the link": "link.queue_bytes",
+    "recorded link, towards the robot": "link.trace_up",
+    "recorded link, from the robot": "link.trace_down",
+    "camera rate": "camera.rate_hz",
+    "size of a frame": "camera.frame_bytes",
+    "field of view": "camera.field_of_view_deg",
+    "operator strategy": "operator.strategy",
+    "robots": "robot.count",
+    "guards": "guard.count",
+    "operators": "operator.count",
+    "dispatch policy": "dispatch.policy",
+    "horizon of a run": "horizon_s",
+}
+_SAFE_ROUND_TRIPS = 4
+
+
+def conditions(
+    scenarios: Mapping[str, Mapping[str, Any]], factors: Sequence[Factor]
+) -> list[tuple[str, list[str]]]:
+    """Each condition with its value in every part, and `varied` where it is a factor."""
+    if not scenarios:
+        return []
+    varied = {factor.name for factor in factors}
+    rows = [("site", [_site(s) for s in scenarios.values()])]
+    for name, key in _CONDITIONS.items():
+        values = [get(s, key) for s in scenarios.values()]
+        if key in varied:
+            rows.append((name, [_VARIED] * len(values)))
+        elif any(v is not None for v in values):
+            rows.append((name, [_text(key, v) for v in values]))
+    return rows
+
+
+def get(scenario: Mapping[str, Any], key: str) -> Any:
+    """The value at a dotted key; None where there is none."""
+    value: Any = scenario
+    for name in key.split("."):
+        value = value.get(name) if isinstance(value, Mapping) else None
+    return value
+
+
+def timeout_remark(scenario: Mapping[str, Any], factors: Sequence[Factor]) -> str:
+    """Whether the time-out leaves request/reply a fair chance at the largest delay."""
+    timeout, processing = get(scenario, "command.timeout_s"), get(scenario, "robot.processing_s")
+    varied = next((f.levels for f in factors if f.name == "link.delay_s"), ())
+    delays = [float(d) for d in (get(scenario, "link.delay_s"), *varied) if d is not None]
+    if timeout is None or processing is None or not delays:
+        return ""
+    needed = _SAFE_ROUND_TRIPS * 2 * max(delays) + processing
+    verdict = "is above" if timeout > needed else "is not above"
+    return (
+        f"The time-out {verdict} four round trips and the processing time at the largest delay "
+        f"({level_name('command.timeout_s', needed)})."
+    )
+
+
+def _site(scenario: Mapping[str, Any]) -> str:
+    chosen = get(scenario, "site.map") or get(scenario, "site.name")
+    return str(chosen).rpartition("/")[2] if chosen else "–"
+
+
+def _text(key: str, value: Any) -> str:
+    if value is None:
+        return "–"
+    if key == "link.loss":
+        return f"{100 * value:g} %"
+    if key == "link.rate_bps":
+        return f"{value / 1e6:g} Mbit/s"
+    if key.endswith("_bytes"):
+        return f"{value / 1000:g} kB"
+    if isinstance(value, str):
+        return value.rpartition("/")[2]
+    return level_name(key, value)

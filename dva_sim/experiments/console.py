@@ -1,0 +1,220 @@
+"""What the command line does with the parts: run, show progress, tell stories, list names."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    ProgressColumn,
+    Task,
+    TextColumn,
+    TimeRemainingColumn,
+)
+from rich.table import Table
+
+from dva_sim import resources
+from dva_sim import scenario as scenarios
+from dva_sim.config import parse_scalar
+from dva_sim.errors import ConfigError
+from dva_sim.scenario import Scenario
+from dva_sim.simulation import Recording, simulate
+
+PATTERNS = ("req-rep", "pub-sub", "latest-wins")
+STYLES = {"safety": "bold red", "mode": "dim", "order": "cyan", "drive": "cyan", "link": "yellow"}
+
+console = Console(highlight=False)
+
+
+def parse_changes(pairs: list[str]) -> dict[str, Any]:
+    """`key=value` pairs as a mapping; values are read as YAML.
+
+    Raises:
+        ConfigError: a pair without `=`.
+    """
+    changes = {}
+    for pair in pairs:
+        key, equals, value = pair.partition("=")
+        if not equals or not key.strip():
+            raise ConfigError(f"--set {pair!r} should look like key=value")
+        changes[key.strip()] = parse_scalar(value)
+    return changes
+
+
+# --- episodes --------------------------------------------------------------------------
+
+
+def episode(
+    name: str, seed: int, pairs: list[str], video: Path | None, side_by_side: str | None
+) -> None:
+    """Run one scenario, tell its timeline, and film it if asked to."""
+    document = scenarios.load(name)
+    changes = parse_changes(pairs)
+    settings: list[dict[str, Any]] = [changes]
+    if side_by_side is not None:
+        settings = [changes | {"pattern": p} for p in _two_patterns(side_by_side)]
+    runs = []
+    for setting in settings:
+        runs.append(_tell(scenarios.build(document, setting), seed, video is not None))
+    if video is not None:
+        from dva_sim.experiments.film import write_film
+
+        with console.status(f"Filming {video} ..."):
+            write_film(runs, video)
+        console.print(f"Video: {video}")
+
+
+def _two_patterns(text: str) -> list[str]:
+    patterns = [p.strip() for p in text.split(",")]
+    wrong = [p for p in patterns if p not in PATTERNS]
+    if len(patterns) != 2 or wrong:
+        raise ConfigError(
+            f"--side-by-side {text!r} should name two of {', '.join(PATTERNS)}, as in "
+            "req-rep,latest-wins"
+        )
+    return patterns
+
+
+def _tell(scenario: Scenario, seed: int, keep_traffic: bool) -> Recording:
+    started = time.perf_counter()
+    recording = simulate(scenario, seed, keep_traffic)
+    took = time.perf_counter() - started
+    delay = scenario.link.delay_s * 1000
+    console.rule(
+        f"{scenario.pattern}, {delay:g} ms each way, profile {scenario.profile}, seed {seed}"
+    )
+    table = Table(box=None, pad_edge=False)
+    for heading in ("time", "who", "what"):
+        table.add_column(heading, justify="right" if heading == "time" else "left", style="")
+    for moment in recording.recorder.timeline:
+        style = STYLES.get(moment.kind, "")
+        table.add_row(f"{moment.time:7.1f} s", moment.who, escape(moment.what), style=style)
+    console.print(table)
+    _summarise(recording, took)
+    return recording
+
+
+def _summarise(recording: Recording, took: float) -> None:
+    from dva_sim.experiments.metrics import drive_measures, event_rows
+
+    console.print()
+    for row in event_rows(recording):
+        response = f", on scene {row['response_s']:.1f} s after detection"
+        known = row["response_s"] == row["response_s"]
+        who = f" by {row['responder']}" if row["responder"] else ""
+        console.print(f"{row['kind']}: {row['outcome']}{who}{response if known else ''}")
+    for drive in recording.recorder.drives:
+        row = drive_measures(drive, recording)
+        console.print(
+            f"{recording.labels[drive.robot]}: {drive.outcome}, "
+            f"{row['commands_applied']} of {row['commands_sent']} commands applied, "
+            f"median age {row['command_age_p50_s']:.2f} s, {row['command_rate_hz']:.1f} per s, "
+            f"{row['contacts']} contacts"
+        )
+    broken = sum(recording.recorder.violations.values())
+    console.print(
+        f"{recording.duration:.0f} s simulated in {took:.2f} s, "
+        f"{recording.recorder.counters['messages']} messages, {broken} safety rules broken"
+    )
+
+
+# --- studies ---------------------------------------------------------------------------
+
+
+def run(name: str, pairs: list[str], out: Path | None, jobs: int | None) -> int:
+    """Run a study with a progress bar, then write its report; the exit code."""
+    from dva_sim.experiments.report import write_report
+    from dva_sim.experiments.results import Results
+    from dva_sim.experiments.runner import dry_run, run_study
+    from dva_sim.experiments.study import load_study
+
+    study, folder = load_study(name, pairs), _folder(name, out)
+    console.print(f"[bold]{escape(study.question)}[/bold]")
+    before = dry_run(study, folder)
+    _say_plan(before, folder)
+    with _bar() as bar:
+        task = bar.add_task("running", total=before.runs)
+        run_study(
+            study, folder, jobs=jobs, progress=lambda n, of: bar.update(task, completed=n, total=of)
+        )
+    failures = Results.load(folder).failures
+    with console.status("Writing the report ..."):
+        report = write_report(folder)
+    for failure in failures[:5]:
+        console.print(f"[red]failed:[/red] {escape(str(failure))}")
+    if failures:
+        console.print(f"[red]{len(failures)} runs failed[/red]; the same command tries them again")
+    console.print(f"Report: {report}")
+    return 1 if failures else 0
+
+
+def plan(name: str, pairs: list[str], out: Path | None, jobs: int | None) -> None:
+    """Say what `run` would do."""
+    from dva_sim.experiments.runner import dry_run
+    from dva_sim.experiments.study import load_study
+
+    folder = _folder(name, out)
+    _say_plan(dry_run(load_study(name, pairs), folder, jobs=jobs), folder)
+
+
+def _folder(name: str, out: Path | None) -> Path:
+    return out if out is not None else Path("results") / Path(name).stem
+
+
+def _say_plan(plan: Any, folder: Path) -> None:
+    done = f", {plan.done} of them done already" if plan.done else ""
+    about = "" if plan.estimate_s is None else f", about {plan.estimate_s:.0f} s to go"
+    console.print(f"{plan.runs} runs in {plan.cells} configurations{done}{about}; into {folder}")
+
+
+def _bar() -> Progress:
+    return Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        _Rate(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+        console=console,
+    )
+
+
+class _Rate(ProgressColumn):
+    """Runs per second."""
+
+    def render(self, task: Task) -> str:
+        speed = task.finished_speed or task.speed
+        return "" if speed is None else f"{speed:.1f} runs/s"
+
+
+# --- names -----------------------------------------------------------------------------
+
+
+def list_all() -> None:
+    """Everything that can be named in a configuration."""
+    from dva_sim.agents.operator.strategies import STRATEGIES
+    from dva_sim.agents.tilt import FILTERS
+    from dva_sim.core.dispatch import POLICIES
+
+    from_files = {
+        "studies": "experiments",
+        "scenarios": "experiments/scenarios",
+        "sites": "worlds",
+        "phones (profile)": "agents/phones",
+        "robots": "agents/robots",
+        "people": "agents/people",
+    }
+    table = Table(box=None, pad_edge=False, show_header=False)
+    for title, folder in from_files.items():
+        table.add_row(title, ", ".join(sorted(resources.available(folder))))
+    table.add_row("patterns", ", ".join(PATTERNS))
+    table.add_row("operators", ", ".join(sorted(STRATEGIES)))
+    table.add_row("filters", ", ".join(sorted(FILTERS)))
+    table.add_row("policies", ", ".join(sorted(POLICIES)))
+    console.print(table)

@@ -1,0 +1,220 @@
+"""From the table of runs to paired effects: who is compared with whom, and along what.
+
+The runs of a part are laid out as a grid: one axis per factor, then person, then trial.
+Subtracting two slices of it pairs them by person and trial, which is the whole method.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dva_sim.experiments.labels import Level
+
+Table = Mapping[str, NDArray[Any]]
+Floats = NDArray[np.float64]
+Setting = dict[str, Level]
+
+MOST_PANELS = 4
+
+
+@dataclass(frozen=True)
+class Factor:
+    """What a study varies, and the levels it takes, in the order declared."""
+
+    name: str
+    levels: tuple[Level, ...]
+
+    @property
+    def is_numeric(self) -> bool:
+        """Whether its levels are quantities, so that "from ... on" makes sense."""
+        return all(isinstance(v, int | float) and not isinstance(v, bool) for v in self.levels)
+
+
+class Part:
+    """The runs of one part of a study, as a grid.
+
+    Args:
+        table: Columns of the table `runs`, or of another with the same leading columns.
+        name: Which part.
+        factors: What the study varies; those that the table does not know are left out.
+    """
+
+    def __init__(self, table: Table, name: str, factors: Sequence[Factor]) -> None:
+        self.name = name
+        self.factors = tuple(f for f in factors if f.name in table)
+        here = np.asarray(table["part"]) == name
+        aside = np.asarray(table["is_reference"]).astype(bool)
+        self.persons = np.unique(np.asarray(table["person"])[here])
+        self.trials = np.unique(np.asarray(table["trial"])[here])
+        self.treated = {key: np.asarray(values)[here & ~aside] for key, values in table.items()}
+        self.references = {key: np.asarray(values)[here & aside] for key, values in table.items()}
+        codes = [codes_of(self.treated, f) for f in self.factors]
+        known = np.all([c >= 0 for c in codes], axis=0) if codes else np.True_
+        self._known = np.broadcast_to(known, len(self.treated["person"]))
+        self._index = (*codes, *self._who(self.treated))
+
+    def _who(self, rows: Table) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        return (
+            np.searchsorted(self.persons, rows["person"]),
+            np.searchsorted(self.trials, rows["trial"]),
+        )
+
+    def __len__(self) -> int:
+        return int(self._known.sum())
+
+    def has(self, column: str) -> bool:
+        """Whether at least one run gives a number for this column."""
+        values = self.treated.get(column)
+        return values is not None and bool(np.isfinite(as_floats(values)).any())
+
+    def grid(self, column: str) -> Floats:
+        """One column as `(levels of factor 1, ..., persons, trials)`; nan where no run is."""
+        shape = (*(len(f.levels) for f in self.factors), len(self.persons), len(self.trials))
+        values = np.full(shape, np.nan)
+        if column in self.treated:
+            index = tuple(i[self._known] for i in self._index)
+            values[index] = as_floats(self.treated[column])[self._known]
+        return values
+
+    def reference(self, column: str) -> Floats:
+        """One column of the reference runs as `(persons, trials)`."""
+        values = np.full((len(self.persons), len(self.trials)), np.nan)
+        if column in self.references:
+            values[self._who(self.references)] = as_floats(self.references[column])
+        return values
+
+    def excess(self, column: str) -> Floats:
+        """The grid of a column in excess of the reference run of the same person and trial."""
+        return np.asarray(self.grid(column) - self.reference(column))
+
+    def has_reference(self, column: str) -> bool:
+        """Whether an excess can be taken at all."""
+        return bool(np.isfinite(self.reference(column)).any())
+
+    def where(self, grid: Floats, setting: Mapping[str, Level]) -> Floats:
+        """The part of a grid at some levels; the axes of the other factors stay."""
+        index = tuple(
+            f.levels.index(setting[f.name]) if f.name in setting else slice(None)
+            for f in self.factors
+        )
+        return grid[index]
+
+    def settings(self, but: Sequence[str] = ()) -> Iterator[Setting]:
+        """Every combination of levels of the factors, except those named in `but`."""
+        free = [f for f in self.factors if f.name not in but]
+        for levels in itertools.product(*(f.levels for f in free)):
+            yield {f.name: level for f, level in zip(free, levels, strict=True)}
+
+
+@dataclass(frozen=True)
+class View:
+    """How a reader looks at a part: what runs along x, what is a line, what is a panel.
+
+    Attributes:
+        part: The runs.
+        measure: Column the question is about.
+        line: Factor with a line for each level, or None.
+        over: Factor along x, or None.
+        contrast: The two levels of `line` compared, the first minus the second; or None.
+        within: The panel that the answer speaks of.
+        smallest_effect: Smallest difference declared to matter, in the measure's unit.
+    """
+
+    part: Part
+    measure: str
+    line: Factor | None
+    over: Factor | None
+    contrast: tuple[Level, Level] | None
+    within: Setting
+    smallest_effect: float | None = None
+
+    @property
+    def lines(self) -> tuple[Level, ...]:
+        """Levels of the line factor; a single None where there is none."""
+        return self.line.levels if self.line else (None,)
+
+    @property
+    def stops(self) -> tuple[Level, ...]:
+        """Levels along x; a single None where there is none."""
+        return self.over.levels if self.over else (None,)
+
+    @property
+    def panels(self) -> list[Setting]:
+        """Settings of all other factors, the answer's first."""
+        names = [f.name for f in (self.line, self.over) if f]
+        every = list(self.part.settings(but=names))
+        return sorted(every, key=lambda panel: not self.speaks_of(panel))
+
+    @property
+    def shown(self) -> list[Setting]:
+        """The panels that a figure has room for."""
+        return self.panels[:MOST_PANELS]
+
+    def speaks_of(self, panel: Setting) -> bool:
+        """Whether this is the panel of the answer."""
+        return all(panel.get(key) == level for key, level in self.within.items())
+
+    def curve(self, grid: Floats, panel: Setting, line: Level) -> Floats:
+        """Values along x as `(stops, persons, trials)`."""
+        setting = dict(panel) | ({self.line.name: line} if self.line else {})
+        values = self.part.where(grid, setting)
+        return values if self.over else values[np.newaxis]
+
+    @property
+    def values(self) -> Floats:
+        """The measure as it is judged: in excess of the reference wherever there is one."""
+        if self.part.has_reference(self.measure):
+            return self.part.excess(self.measure)
+        return self.part.grid(self.measure)
+
+    def difference(self, panel: Setting, first: Level, second: Level) -> Floats:
+        """First minus second, paired by person and trial, as person means `(persons, stops)`."""
+        grid = self.values
+        return person_means(self.curve(grid, panel, first) - self.curve(grid, panel, second))
+
+
+def person_means(values: Floats) -> Floats:
+    """`(stops, persons, trials)` to means over trials `(persons, stops)`; nan where no trial."""
+    return nan_mean(values, axis=-1).T
+
+
+def nan_mean(values: Floats, axis: int) -> Floats:
+    """Mean of what is there; nan, in silence, where nothing is."""
+    there = np.isfinite(values)
+    count = there.sum(axis=axis)
+    total = np.where(there, values, 0.0).sum(axis=axis)
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+
+
+def present(values: Floats) -> Floats:
+    """The finite values, flat."""
+    return values[np.isfinite(values)]
+
+
+def as_floats(values: NDArray[Any]) -> Floats:
+    """Any column as floats: true is 1, nothing is nan, words are nan."""
+    if values.dtype.kind in "biuf":
+        return values.astype(float)
+    return np.array([_float(v) for v in values], dtype=float)
+
+
+def _float(value: Any) -> float:
+    return float(value) if isinstance(value, int | float | np.number | np.bool_) else np.nan
+
+
+def codes_of(table: Table, factor: Factor) -> NDArray[np.intp]:
+    """Which level of a factor each row has; -1 for none of them."""
+    values = np.asarray(table[factor.name])
+    codes = np.full(len(values), -1, dtype=np.intp)
+    for code, level in enumerate(factor.levels):
+        if isinstance(level, int | float):
+            codes[np.isclose(as_floats(values), float(level), rtol=1e-9, atol=1e-12)] = code
+        else:
+            codes[values.astype(str) == str(level)] = code
+    return codes

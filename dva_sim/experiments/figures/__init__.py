@@ -1,0 +1,73 @@
+"""The figures of a report, drawn from the tables of a study."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+from dva_sim.experiments.cadence import Cadence, cadence
+from dva_sim.experiments.effects import Setting, Table, View
+from dva_sim.experiments.figures import commands, distribution, effect, ground, story
+from dva_sim.experiments.figures.style import Drawn, styled
+from dva_sim.experiments.labels import Level
+
+__all__ = ["Drawn", "draw_all"]
+
+
+def draw_all(view: View, tables: Mapping[str, Table], scenario: Mapping[str, Any]) -> list[Drawn]:
+    """Every figure that the tables have the columns for, in the order of the report.
+
+    Args:
+        view: How to look at the part the answer is about.
+        tables: `events` and `tracks`, where the study has them.
+        scenario: The part's scenario before any factor changed it.
+    """
+    cadence_of = _cadences(view, scenario)
+    with styled():
+        drawn = [
+            effect.differences(view, cadence_of),
+            effect.measure_levels(view),
+            distribution.distributions(view),
+            commands.command_age(view),
+            commands.command_rate(view, cadence_of),
+            commands.delay_budget(view),
+        ]
+        if "tracks" in tables:
+            drawn.append(ground.trajectories(view, tables["tracks"], scenario))
+        if "events" in tables:
+            drawn.extend(_story(view, tables["events"]))
+    note = _what_is_not_shown(view)
+    return [replace(f, caption=f.caption + note) for f in drawn if f is not None]
+
+
+def _what_is_not_shown(view: View) -> str:
+    if len(view.shown) == len(view.panels):
+        return ""
+    return (
+        f" Shown are {len(view.shown)} of {len(view.panels)} settings of the other factors; "
+        "the table holds them all."
+    )
+
+
+def _cadences(view: View, scenario: Mapping[str, Any]) -> effect.CadenceOf:
+    """The cadence of each panel, where lock-step and delay are among the factors."""
+
+    @cache
+    def lookup(panel: tuple[tuple[str, Level], ...]) -> Cadence | None:
+        return cadence(scenario, dict(panel))
+
+    def cadence_of(panel: Setting) -> Cadence | None:
+        along_delay = view.over is not None and view.over.name == "link.delay_s"
+        return lookup(tuple(panel.items())) if along_delay and "req-rep" in view.lines else None
+
+    return cadence_of
+
+
+def _story(view: View, table: Table) -> list[Drawn]:
+    part = story.story_part(table, view)
+    if part is None:
+        return []
+    events = story.Events(table, part, view)
+    return [story.responses(view, events), story.outcomes(view, events)] if len(events) else []

@@ -1,0 +1,165 @@
+"""What becomes of the commands: how old they are, how many arrive, where the delay is spent."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dva_sim.experiments.cadence import Cadence
+from dva_sim.experiments.effects import Floats, View, nan_mean
+from dva_sim.experiments.figures.effect import CadenceOf, mark_boundary
+from dva_sim.experiments.figures.style import (
+    INK,
+    Drawn,
+    Ends,
+    axis_label,
+    colours,
+    dodge,
+    finish,
+    legend,
+    name_lines,
+    outer_labels,
+    panel_title,
+    panels,
+    stops_axis,
+)
+from dva_sim.experiments.labels import level_name
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_QUANTILES = ("p05", "p25", "p50", "p75", "p95")
+# The way around the loop, from what the camera saw; blue the link, orange the phone.
+_STAGES = {
+    "delay_frame_s": ("frame", "#6b6b6b"),
+    "delay_downlink_s": ("down-link", "#8fc1e3"),
+    "delay_human_s": ("human", "#cccccc"),
+    "delay_filter_s": ("filter", "#d98200"),
+    "delay_sampling_s": ("sampling", "#f6cd82"),
+    "delay_uplink_s": ("up-link", "#1f6fa8"),
+    "delay_processing_s": ("processing", "#a0508a"),
+}
+
+
+def command_age(view: View) -> Drawn | None:
+    """How old a command is when it takes effect, as quantile ranges."""
+    columns = [f"command_age_{q}_s" for q in _QUANTILES]
+    if not all(view.part.has(column) for column in columns):
+        return None
+    shown = view.shown
+    figure, axes = panels(1, len(shown), 3.0, sharey=True)
+    paint = colours(view.line)
+    grids = [view.part.grid(column) for column in columns]
+    for ax, panel in zip(axes[0], shown, strict=True):
+        for level, offset in dodge(view.lines):
+            ages = [_cell_means(view.curve(grid, panel, level)) for grid in grids]
+            _ranges(ax, [stop + offset for stop in range(len(view.stops))], ages, paint[level])
+        ax.set_yscale("log")
+        ax.yaxis.set_major_formatter("{x:g}")
+        panel_title(ax, panel)
+        stops_axis(ax, view.over)
+    axes[0][0].set_ylabel(axis_label("age_s", "Command age at application"))
+    legend(figure, view.line, paint)
+    caption = (
+        "From the moment a command is issued to its effect at the motors: dot, the median; thick, "
+        "the middle half; thin, 5 to 95 %. Quantiles within runs, averaged over runs; "
+        "logarithmic axis."
+    )
+    return finish(figure, "command_age", "Age of commands when they take effect", caption)
+
+
+def command_rate(view: View, cadence_of: CadenceOf) -> Drawn | None:
+    """Commands applied per second, beside what arithmetic allows request/reply."""
+    if not view.part.has("command_rate_hz"):
+        return None
+    shown = view.shown
+    figure, axes = panels(1, len(shown), 3.0, sharey=True)
+    paint, every = colours(view.line), []
+    grid = view.part.grid("command_rate_hz")
+    for ax, panel in zip(axes[0], shown, strict=True):
+        ends: Ends = {}
+        for i, level in enumerate(view.lines):
+            means = _cell_means(view.curve(grid, panel, level))
+            size = 4 + 2.5 * (len(view.lines) - 1 - i)  # rings, where lines lie on each other
+            ax.plot(means, color=paint[level], lw=1, alpha=0.5)
+            ax.plot(means, "o", ms=size, color=paint[level])
+            ends[level] = float(means[-1])
+        _closed_form(ax, view, cadence_of(panel))
+        panel_title(ax, panel)
+        stops_axis(ax, view.over)
+        ax.set_ylim(bottom=0)
+        every.append(ends)
+    name_lines(axes[0], every, view.line, paint)
+    axes[0][0].set_ylabel(axis_label("command_rate_hz"))
+    caption = "Mean over runs. Commands that came too old or were overtaken are not counted."
+    if any(cadence_of(panel) for panel in shown):
+        caption += (
+            " Dashed: the closed form for lock-step messaging, min(1/T, 1/(2 d + P)), with T the "
+            "wanted period (where the app only sends what has changed, the shortest it allows), "
+            "d the one-way delay and P the processing time."
+        )
+    return finish(figure, "command_rate", "Commands applied per second", caption)
+
+
+def delay_budget(view: View) -> Drawn | None:
+    """The delay of the whole loop as the sum it is."""
+    from matplotlib.patches import Patch
+
+    stages = [column for column in _STAGES if view.part.has(column)]
+    if not stages:
+        return None
+    shown = view.shown
+    figure, axes = panels(len(shown), len(view.lines), 2.5, sharex=True, sharey=True)
+    for row, panel in zip(axes, shown, strict=True):
+        for ax, level in zip(row, view.lines, strict=True):
+            means = {s: _cell_means(view.curve(view.part.grid(s), panel, level)) for s in stages}
+            _stack(ax, means)
+            stops_axis(ax, view.over)
+            if view.line and row is axes[0]:
+                ax.set_title(level_name(view.line.name, level))
+    outer_labels(axes, shown, "Loop delay [s]")
+    figure.legend(
+        handles=[Patch(color=_STAGES[stage][1], label=_STAGES[stage][0]) for stage in stages],
+        loc="outside upper left",
+        ncols=len(stages),
+        handlelength=1.2,
+    )
+    caption = (
+        "Mean time spent in each stage, from what a camera saw to the effect of the command it "
+        "led to: stacked, because a delay is a sum. Frame and sampling are the time that a value "
+        "stands before the next one replaces it."
+    )
+    return finish(figure, "delay_budget", "Where the delay of the loop is spent", caption)
+
+
+def _cell_means(values: Floats) -> Floats:
+    """`(stops, persons, trials)` to means over all runs of a stop."""
+    return nan_mean(values.reshape(len(values), -1), axis=1)
+
+
+def _ranges(ax: Axes, x: Sequence[float], ages: list[Floats], colour: str) -> None:
+    low, quarter, middle, three_quarters, high = ages
+    ax.vlines(x, low, high, color=colour, lw=1)
+    ax.vlines(x, quarter, three_quarters, color=colour, lw=4, alpha=0.55)
+    ax.plot(x, middle, "o", color=colour, ms=4)
+
+
+def _closed_form(ax: Axes, view: View, cadence: Cadence | None) -> None:
+    if cadence is None or view.over is None or not view.over.is_numeric:
+        return
+    delays = np.array([float(v) for v in view.over.levels if isinstance(v, int | float)])
+    x = np.linspace(0, len(delays) - 1, 40 * len(delays))
+    rates = [cadence.lock_step_rate(d) for d in np.interp(x, np.arange(len(delays)), delays)]
+    ax.plot(x, rates, color=INK, lw=1, ls=(0, (4, 2)), zorder=3)
+    mark_boundary(ax, view.over, cadence, text=False)
+
+
+def _stack(ax: Axes, means: dict[str, Floats]) -> None:
+    """The stages on top of each other."""
+    floor = np.zeros(len(next(iter(means.values()))))
+    for stage, values in means.items():
+        x, heights = range(len(values)), np.nan_to_num(values)
+        ax.bar(x, heights, 0.72, floor, color=_STAGES[stage][1], edgecolor="white", lw=0.4)
+        floor = floor + heights

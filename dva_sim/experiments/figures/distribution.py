@@ -1,0 +1,130 @@
+"""Whole distributions: every run is seen, not only its mean."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dva_sim.experiments.effects import Floats, View, present
+from dva_sim.experiments.figures.style import (
+    INK,
+    SOFT,
+    Drawn,
+    axis_label,
+    capital,
+    colours,
+    dodge,
+    finish,
+    legend,
+    panel_title,
+    panels,
+    stops_axis,
+    wrapped,
+)
+from dva_sim.experiments.labels import measure_name
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_CROWD = 60  # runs of a cell from which on dots must be small
+_GOLDEN = 0.6180339887498949
+
+
+def distributions(view: View) -> Drawn:
+    """Every run as a dot, with median and middle half."""
+    shown = view.shown
+    figure, axes = panels(len(shown), 1, 2.7, sharex=True, sharey=True)
+    paint = colours(view.line)
+    raw, confirmed = view.part.grid(view.measure), _confirmed(view)
+    for (ax,), panel in zip(axes, shown, strict=True):
+        for level, offset in dodge(view.lines):
+            values = view.curve(raw, panel, level).reshape(len(view.stops), -1)
+            ok = view.curve(confirmed, panel, level).reshape(values.shape) != 0
+            width = min(0.3, 0.62 / len(view.lines))
+            _dots(ax, offset, width, values, ok, paint[level])
+            _boxes(ax, offset, width, values)
+        _reference_line(ax, view)
+        panel_title(ax, panel)
+        stops_axis(ax, view.over)
+        if ax is not axes[-1][0]:
+            ax.set_xlabel("")
+        ax.set_ylabel(axis_label(view.measure, wrapped(measure_name(view.measure), 24)))
+    _spread(axes[0][0], present(raw))
+    legend(figure, view.line, paint)
+    caption = (
+        "Each dot is one run, none left out; the bar is the median, the box the middle half. "
+        "Hollow dots were not confirmed and count with the whole horizon."
+    )
+    title = f"{capital(measure_name(view.measure))} of all {len(view.part):,} runs"
+    return finish(figure, "distributions", title, caption)
+
+
+def _dots(
+    ax: Axes, offset: float, width: float, values: Floats, ok: NDArray[np.bool_], colour: str
+) -> None:
+    """Every run `(stops, runs)` as a dot, side by side with the others of its stop."""
+    stops, runs = values.shape
+    spots = width * ((np.arange(runs) * _GOLDEN) % 1 - 0.5)  # even, and the same every time
+    x = np.arange(stops)[:, np.newaxis] + offset + spots
+    good, missed = np.isfinite(values) & ok, np.isfinite(values) & ~ok
+    dots: dict[str, Any] = {
+        "s": 5 if runs > _CROWD else 14,
+        "lw": 0.5,
+        "rasterized": True,
+        "zorder": 2,
+    }
+    ax.scatter(x[good], values[good], color=colour, alpha=0.35, **dots)
+    ax.scatter(x[missed], values[missed], facecolor="white", edgecolor=colour, **dots)
+
+
+def _boxes(ax: Axes, offset: float, width: float, values: Floats) -> None:
+    """Median and middle half of each stop `(stops, runs)`, where there are runs."""
+    stops = np.flatnonzero(np.isfinite(values).any(axis=1))
+    if not len(stops):
+        return
+    low, middle, high = np.nanquantile(values[stops], [0.25, 0.5, 0.75], axis=1)
+    left, right = stops + offset - width / 2, stops + offset + width / 2
+    box: dict[str, Any] = {"color": INK, "zorder": 3}
+    for x in (left, right):
+        ax.vlines(x, low, high, lw=0.8, **box)
+    for y in (low, high):
+        ax.hlines(y, left, right, lw=0.8, **box)
+    ax.hlines(middle, left, right, lw=2, **box)
+
+
+def _spread(ax: Axes, values: Floats) -> None:
+    """A logarithmic axis where the slowest run takes many times as long as the fastest."""
+    from matplotlib.ticker import LogLocator, NullLocator
+
+    if len(values) and values.min() > 0 and values.max() > 5 * values.min():
+        ax.set_yscale("log")
+        ax.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        ax.yaxis.set_major_formatter("{x:g}")
+        ax.yaxis.set_minor_locator(NullLocator())
+
+
+def _reference_line(ax: Axes, view: View) -> None:
+    reference = present(view.part.reference(view.measure))
+    if not len(reference):
+        return
+    ax.axhline(float(np.median(reference)), color=SOFT, lw=1, ls=":")
+    ax.annotate(
+        "reference (median)",
+        (1.0, float(np.median(reference))),
+        xycoords=("axes fraction", "data"),
+        xytext=(0, -2),
+        textcoords="offset points",
+        ha="right",
+        va="top",
+        fontsize=7.5,
+        color=SOFT,
+    )
+
+
+def _confirmed(view: View) -> Floats:
+    """Whether each run ended in a confirmation; a study that does not say so has no misses."""
+    if view.part.has("confirmed"):
+        return view.part.grid("confirmed")
+    return np.ones_like(view.part.grid(view.measure))

@@ -1,0 +1,186 @@
+"""What the factor does to the measure: paired differences, and the measure itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dva_sim.experiments.cadence import Cadence
+from dva_sim.experiments.effects import (
+    Factor,
+    Floats,
+    Setting,
+    View,
+    person_means,
+    present,
+)
+from dva_sim.experiments.figures.style import (
+    FAINT,
+    INK,
+    SOFT,
+    Drawn,
+    Ends,
+    axis_label,
+    capital,
+    colours,
+    finish,
+    name_lines,
+    panel_title,
+    panels,
+    place_of,
+    stops_axis,
+    wrapped,
+)
+from dva_sim.experiments.labels import Level, factor_name, level_name, measure_name
+from dva_sim.experiments.statistics import band
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+CadenceOf = Callable[[Setting], Cadence | None]
+
+
+def differences(view: View, cadence_of: CadenceOf) -> Drawn | None:
+    """Each level minus the baseline, paired, with the band that covers all stops at once."""
+    if view.contrast is None or view.line is None:
+        return None
+    baseline = view.contrast[1]
+    others = tuple(level for level in view.lines if level != baseline)
+
+    def curve(panel: Setting, level: Level) -> Floats:
+        return view.difference(panel, level, baseline)
+
+    name = level_name(view.line.name, baseline)
+    label = axis_label(view.measure, f"Difference against\n{name}")
+    figure, axes, ends = _curves(view, others, curve, ylabel=label)
+    for ax, panel in zip(axes, view.shown, strict=True):
+        ax.axhline(0, color=INK, lw=0.8, zorder=1)
+        mark_boundary(ax, view.over, cadence_of(panel), text=True)
+    zoomed = _zoom_on_small(axes, view.smallest_effect)
+    name_lines(axes, ends, view.line, colours(view.line))
+    title = f"What the other levels cost against {name}: difference in {_what(view)}"
+    caption = (
+        f"Above zero, {name} has the lower value. Means of differences paired by person and trial; "
+        "shaded, the 95 % band that covers all levels of a line at once; bars, the 95 % interval "
+        f"of each level alone.{zoomed}{_boundary_words(view, cadence_of)}"
+    )
+    return finish(figure, "differences", title, caption)
+
+
+def measure_levels(view: View) -> Drawn:
+    """The measure itself along x, a line for each level."""
+    grid = view.values
+
+    def curve(panel: Setting, level: Level) -> Floats:
+        return person_means(view.curve(grid, panel, level))
+
+    what = capital(_what(view))
+    label = axis_label(view.measure, wrapped(what))
+    figure, axes, ends = _curves(view, view.lines, curve, label)
+    name_lines(axes, ends, view.line, colours(view.line))
+    excess = "Zero is the reference run of the same person and trial. " if _in_excess(view) else ""
+    caption = (
+        f"Mean over persons; shaded, its simultaneous 95 % band. {excess}Bands of two lines may "
+        "overlap although their paired difference is clear: persons differ more from each other "
+        "than from themselves."
+    )
+    title = f"{what} under each {factor_name(view.line.name)}" if view.line else what
+    return finish(figure, "levels", title, caption)
+
+
+def mark_boundary(ax: Axes, over: Factor | None, cadence: Cadence | None, text: bool) -> None:
+    """The delay from which request/reply must fall behind the wanted rate."""
+    if over is None or cadence is None:
+        return
+    place = place_of(over, cadence.boundary_s)
+    if place is None:
+        return
+    ax.axvline(place, color=SOFT, lw=1, ls=(0, (4, 2)), zorder=1)
+    if text:
+        ax.annotate(
+            f"2d + P = T\n(d = {level_name(over.name, round(cadence.boundary_s, 4))})",
+            (place, 0.98),
+            xycoords=("data", "axes fraction"),
+            xytext=(4, 0),
+            textcoords="offset points",
+            va="top",
+            fontsize=8,
+            color=SOFT,
+        )
+
+
+def _curves(
+    view: View,
+    lines: tuple[Level, ...],
+    curve: Callable[[Setting, Level], Floats],
+    ylabel: str,
+) -> tuple[Figure, list[Axes], list[Ends]]:
+    """A panel for each setting, in it a line with its band for each level, and where it ends."""
+    shown = view.shown
+    figure, (axes,) = panels(1, len(shown), 3.4, sharey=True)
+    paint, every = colours(view.line), []
+    for ax, panel in zip(axes, shown, strict=True):
+        ends: Ends = {}
+        for i, level in enumerate(lines):
+            shift = 0.12 * (i - (len(lines) - 1) / 2)  # bars of two lines stand side by side
+            ends[level] = _band(ax, curve(panel, level), paint[level], shift)
+        panel_title(ax, panel)
+        stops_axis(ax, view.over)
+        every.append(ends)
+    axes[0].set_ylabel(ylabel)
+    return figure, axes, every
+
+
+def _zoom_on_small(axes: list[Axes], smallest: float | None) -> str:
+    """Give small differences room, and mark those declared too small to matter."""
+    if smallest is None:
+        return ""
+    for ax in axes:
+        ax.axhspan(-smallest, smallest, color=FAINT, alpha=0.5, lw=0, zorder=0)
+    words = " Grey, differences declared too small to matter."
+    bottom, top = axes[0].get_ylim()
+    if max(-bottom, top) < 10 * smallest:
+        return words
+    steps = [k * 10.0**n for n in range(-3, 7) for k in (1, 2, 5) if smallest <= k * 10.0**n]
+    axes[0].set_yscale("symlog", linthresh=2 * smallest)
+    ticks = [0.0, *steps, *(-step for step in steps)]
+    axes[0].set_yticks([tick for tick in ticks if bottom <= tick <= top])
+    axes[0].set_ylim(bottom, top)
+    axes[0].yaxis.set_major_formatter("{x:g}")
+    axes[0].minorticks_off()
+    return f"{words} The axis is linear near zero and logarithmic beyond."
+
+
+def _band(ax: Axes, matrix: Floats, colour: str, shift: float) -> float:
+    """One line with its band and bars from `(persons, stops)`; gives the height of its end."""
+    bands = band(matrix)
+    x = np.arange(matrix.shape[1]) + shift
+    ax.fill_between(x, bands.low, bands.high, color=colour, alpha=0.16, lw=0)
+    ax.vlines(x, bands.pointwise_low, bands.pointwise_high, color=colour, lw=1.2)
+    ax.plot(x, bands.mean, "-o", color=colour, ms=4)
+    seen = present(bands.mean)
+    return float(seen[-1]) if len(seen) else float("nan")
+
+
+def _in_excess(view: View) -> bool:
+    return view.part.has_reference(view.measure)
+
+
+def _what(view: View) -> str:
+    return f"{'excess ' if _in_excess(view) else ''}{measure_name(view.measure)}"
+
+
+def _boundary_words(view: View, cadence_of: CadenceOf) -> str:
+    """Explain the dashed line, if any panel has one."""
+    cadences = [cadence_of(panel) for panel in view.shown]
+    over = view.over
+    if not any(c and over and place_of(over, c.boundary_s) is not None for c in cadences):
+        return ""
+    return (
+        " Dashed: the predicted boundary, where round trip and processing fill the wanted period "
+        "(2 d + P = T). To its right a request has to wait for the reply to the one before it, so "
+        "REQ/REP can no longer send as often as wanted."
+    )

@@ -1,0 +1,171 @@
+"""The site from above, with the ways that robots took."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dva_sim.errors import DvaSimError
+from dva_sim.experiments.effects import Floats, Table, View, codes_of
+from dva_sim.experiments.figures.style import (
+    INK,
+    SOFT,
+    WIDTH,
+    Drawn,
+    colours,
+    finish,
+    panels,
+)
+from dva_sim.experiments.labels import Level, factor_name, level_name, setting
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from dva_sim.worlds.site import Site
+
+_MARGIN = 2.5  # [m] around everything driven
+_BAR = 5.0  # [m]
+
+
+def trajectories(view: View, tracks: Table, scenario: Mapping[str, Any]) -> Drawn | None:
+    """One person, one trial: the ways taken under each line, at the first and the last stop."""
+    ways = Ways(tracks, view)
+    if not ways:
+        return None
+    stops = list(dict.fromkeys((view.stops[0], view.stops[-1])))
+    site = _site(scenario)
+    low, high = _frame(ways.all_points)
+    height = _row_height(high - low, columns=len(view.lines))
+    figure, axes = panels(len(stops), len(view.lines), height, sharex=True, sharey=True)
+    paint = colours(view.line)
+    for row, stop in zip(axes, stops, strict=True):
+        for ax, level in zip(row, view.lines, strict=True):
+            _ground(ax, site)
+            for way in ways.reference():
+                ax.plot(*way.T, color=SOFT, lw=1.3, ls=(0, (3, 2)), zorder=8)
+            for way in ways.under(level, stop):
+                _way(ax, way, paint[level])
+            ax.set_title(_heading(view, level, stop), color=paint[level] if level else INK)
+            ax.label_outer()
+    axes[0][0].set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+    _scale_bar(axes[-1][0], low)
+    caption = (
+        "The same person and trial everywhere; dashed, the reference drive. Ring: where a way "
+        "begins; dot: where it ends."
+        f"{'' if site else ' The files of the site were not found, so it is left out.'}"
+    )
+    within = f" ({setting(view.panels[0])})" if view.panels[0] else ""
+    return finish(figure, "trajectories", f"Ways taken{within}", caption)
+
+
+class Ways:
+    """Tracks of one person and trial, picked by what they were driven under."""
+
+    def __init__(self, tracks: Table, view: View) -> None:
+        self._view = view
+        rows = {key: np.asarray(values) for key, values in tracks.items()}
+        here = (rows["part"] == view.part.name) & np.isfinite(rows["x_m"].astype(float))
+        self._part = _first_trial({key: values[here] for key, values in rows.items()})
+        self._factors = view.part.factors
+
+    def __bool__(self) -> bool:
+        return len(self._part["x_m"]) > 0
+
+    @property
+    def all_points(self) -> Floats:
+        """Every point of every way `(n, 2)` [m]."""
+        return _points(self._part)
+
+    def reference(self) -> list[Floats]:
+        """Ways of the reference run, one `(n, 2)` for each agent that moved."""
+        return self._moved(self._part["is_reference"].astype(bool))
+
+    def under(self, line: Level, stop: Level) -> list[Floats]:
+        """Ways under one line and stop, in the panel the answer speaks of."""
+        view = self._view
+        wanted = dict(view.panels[0])
+        wanted |= {f.name: v for f, v in ((view.line, line), (view.over, stop)) if f}
+        mask = ~self._part["is_reference"].astype(bool)
+        for factor in self._factors:
+            mask &= codes_of(self._part, factor) == factor.levels.index(wanted[factor.name])
+        return self._moved(mask)
+
+    def _moved(self, mask: NDArray[np.bool_]) -> list[Floats]:
+        ways = []
+        for agent in np.unique(self._part["agent"][mask].astype(str)):
+            mine = mask & (self._part["agent"].astype(str) == agent)
+            order = np.argsort(self._part["t_s"][mine], kind="stable")
+            way = _points(self._part)[mine][order]
+            if len(way) > 1 and np.ptp(way, axis=0).max() > 0.5:
+                ways.append(way)
+        return ways
+
+
+def _first_trial(rows: Table) -> Table:
+    if not len(rows["person"]):
+        return rows
+    first = rows["person"] == rows["person"].min()
+    first = first & (rows["trial"] == rows["trial"][first].min())
+    return {key: values[first] for key, values in rows.items()}
+
+
+def _points(rows: Table) -> Floats:
+    return np.column_stack([rows["x_m"], rows["y_m"]]).astype(float)
+
+
+def _site(scenario: Mapping[str, Any]) -> Site | None:
+    """The site, or None where its files are not to be had; the ways are shown all the same."""
+    from dva_sim.scenario import build, site_of
+
+    try:
+        return site_of(build(scenario), seed=0)
+    except DvaSimError:
+        return None
+
+
+def _ground(ax: Axes, site: Site | None) -> None:
+    ax.set_aspect("equal")
+    ax.grid(False)
+    if site is None:
+        ax.set_xlabel("x (east) [m]")
+        ax.set_ylabel("y (north) [m]")
+        return
+    from dva_sim.worlds.view import draw_site
+
+    draw_site(ax, site, labels=False)
+    for text in ax.texts:
+        text.set_clip_on(True)  # what lies outside the frame must not claim room
+
+
+def _way(ax: Axes, way: Floats, colour: str) -> None:
+    ax.plot(*way.T, color=colour, lw=1.8, zorder=9)
+    ax.plot(*way[0], "o", ms=5, mfc="white", mec=colour, mew=1.4, zorder=10)
+    ax.plot(*way[-1], "o", ms=5, color=colour, zorder=10)
+
+
+def _frame(points: Floats) -> tuple[Floats, Floats]:
+    """Lower left and upper right corner of what is worth seeing [m]."""
+    return points.min(axis=0) - _MARGIN, points.max(axis=0) + _MARGIN
+
+
+def _row_height(size: Floats, columns: int) -> float:
+    """Height of a row of panels that are as wide as there is room for [in]."""
+    return float(np.clip(WIDTH / columns * size[1] / size[0] + 0.3, 1.2, 5.0))
+
+
+def _scale_bar(ax: Axes, corner: Floats) -> None:
+    x, y = corner + 0.8
+    ax.plot([x, x + _BAR], [y, y], color=INK, lw=2, solid_capstyle="butt", zorder=11)
+    ax.annotate(
+        f"{_BAR:g} m", (x, y), xytext=(0, 3), textcoords="offset points", fontsize=7.5, zorder=11
+    )
+
+
+def _heading(view: View, line: Level, stop: Level) -> str:
+    words = [level_name(view.line.name, line, short=True)] if view.line else []
+    if view.over:
+        words.append(f"{factor_name(view.over.name)} {level_name(view.over.name, stop)}")
+    return ", ".join(words)

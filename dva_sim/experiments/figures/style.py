@@ -1,0 +1,256 @@
+"""One look for all figures: colours that stay with their pattern, quiet axes, stable bytes."""
+
+from __future__ import annotations
+
+import io
+import textwrap
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dva_sim.experiments.effects import Factor, Setting
+from dva_sim.experiments.labels import (
+    Level,
+    factor_name,
+    level_name,
+    measure_name,
+    setting,
+    unit_of,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+WIDTH = 9.6  # [in], the width of the report's column at 96 dots per inch
+INK, SOFT, FAINT = "#222222", "#6b6b6b", "#d9d9d9"
+
+# Okabe & Ito: told apart under every common colour blindness, and by lightness in print.
+_PATTERNS = {"req-rep": "#D55E00", "pub-sub": "#0072B2", "latest-wins": "#009E73"}
+_OTHERS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#222222")
+
+_STYLE: dict[str, Any] = {
+    "font.family": "DejaVu Sans",
+    "font.size": 9,
+    "axes.titlesize": 9.5,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.labelcolor": INK,
+    "axes.edgecolor": SOFT,
+    "axes.linewidth": 0.7,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.grid.axis": "y",
+    "axes.axisbelow": True,
+    "grid.color": FAINT,
+    "grid.linewidth": 0.6,
+    "xtick.color": SOFT,
+    "ytick.color": SOFT,
+    "xtick.labelcolor": INK,
+    "ytick.labelcolor": INK,
+    "text.color": INK,
+    "lines.linewidth": 1.8,
+    "legend.frameon": False,
+    "svg.hashsalt": "dva-sim",
+    "svg.fonttype": "path",
+}
+
+
+Ends = dict[Level, float]  # where each line ends
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A finished figure.
+
+    Attributes:
+        name: Its file name without an ending.
+        title: What is seen.
+        caption: How to read it.
+        svg: The figure as vectors.
+        png: The same as pixels.
+    """
+
+    name: str
+    title: str
+    caption: str
+    svg: bytes
+    png: bytes
+
+
+@contextmanager
+def styled() -> Iterator[None]:
+    """The look of the report, for as long as the block lasts."""
+    import matplotlib as mpl
+
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(_STYLE)  # type: ignore[arg-type]
+        yield
+
+
+def panels(
+    rows: int, columns: int, height: float, **options: Any
+) -> tuple[Figure, list[list[Axes]]]:
+    """A grid of axes in the report's width; `height` per row [in]."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(WIDTH, height * rows), dpi=150, layout="constrained")
+    axes = figure.subplots(rows, columns, squeeze=False, **options)
+    return figure, [list(row) for row in axes]
+
+
+def finish(figure: Figure, name: str, title: str, caption: str) -> Drawn:
+    """Render once to SVG and once to PNG, with nothing in them that changes from day to day."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+
+    layout = figure.get_layout_engine()
+    if layout is not None:
+        layout.execute(figure)
+    figure.set_layout_engine("none")  # both files get one and the same layout
+    png, svg = io.BytesIO(), io.BytesIO()
+    # The canvases themselves, since savefig would draw each figure twice; the PNG first,
+    # because the SVG leaves the figure at its own resolution.
+    metadata: dict[str, str | None] = {"Software": None}
+    FigureCanvasAgg(figure).print_png(png, metadata=metadata)  # type: ignore[no-untyped-call]
+    metadata = {"Date": None, "Creator": None}
+    FigureCanvasSVG(figure).print_svg(svg, metadata=metadata)  # type: ignore[no-untyped-call]
+    return Drawn(name, title, caption, svg.getvalue(), png.getvalue())
+
+
+def colours(factor: Factor | None) -> Mapping[Level, str]:
+    """A colour for each level: a pattern's own, wherever it appears."""
+    if factor is None:
+        return {None: _OTHERS[0]}
+    if all(level in _PATTERNS for level in factor.levels):
+        return {level: _PATTERNS[str(level)] for level in factor.levels}
+    return {level: _OTHERS[i % len(_OTHERS)] for i, level in enumerate(factor.levels)}
+
+
+def axis_label(name: str, text: str | None = None) -> str:
+    """A measure or factor with its unit in brackets."""
+    unit = unit_of(name)
+    words = capital(text or measure_name(name))
+    return f"{words} [{unit}]" if unit else words
+
+
+def capital(text: str) -> str:
+    """A capital letter first; the others as they are."""
+    return text[:1].upper() + text[1:]
+
+
+def wrapped(text: str, width: int = 38) -> str:
+    """Text in lines of at most `width` characters."""
+    return "\n".join(textwrap.wrap(text, width))
+
+
+def stops_axis(axes: Axes, over: Factor | None) -> None:
+    """The factor along x, level beside level: 0 to 1 s are all readable."""
+    if over is None:
+        axes.set_xticks([])
+        return
+    names, unit = _tick_names(over)
+    axes.set_xticks(range(len(names)), names)
+    axes.set_xlabel(f"{capital(factor_name(over.name))}{f' [{unit}]' if unit else ''}")
+    axes.set_xlim(-0.5, len(names) - 0.5)
+
+
+def _tick_names(over: Factor) -> tuple[list[str], str]:
+    """Short names of the levels and the unit they have in common; below 1 s in milliseconds."""
+    values = [v for v in over.levels if isinstance(v, int | float)]
+    unit = unit_of(over.name)
+    if not over.is_numeric or not unit:
+        return [level_name(over.name, level, short=True) for level in over.levels], ""
+    if unit == "s" and max(values) <= 5 and any(0 < v < 1 for v in values):
+        return [f"{1000 * v:g}" for v in values], "ms"
+    return [f"{v:g}" for v in values], unit
+
+
+def panel_title(axes: Axes, panel: Setting) -> None:
+    """Say which levels a panel shows; nothing if there is but one panel."""
+    axes.set_title(panel_name(panel))
+
+
+def panel_name(panel: Setting) -> str:
+    """`Profile default`; nothing if there is but one panel."""
+    return capital(setting(panel))
+
+
+def outer_labels(axes: list[list[Axes]], shown: Sequence[Setting], text: str) -> None:
+    """In a grid with a row for each panel: label the left and the lower edge only."""
+    for row, panel in zip(axes, shown, strict=True):
+        row[0].set_ylabel(f"{panel_name(panel)}\n{text}" if panel else text)
+        for ax in row if row is not axes[-1] else ():
+            ax.set_xlabel("")
+
+
+def dodge(lines: tuple[Level, ...]) -> list[tuple[Level, float]]:
+    """Each line's place beside its stop, so that the marks of a stop stand in a row."""
+    width = 0.8 / len(lines)
+    return [(level, (i - (len(lines) - 1) / 2) * width) for i, level in enumerate(lines)]
+
+
+def place_of(over: Factor, value: float) -> float | None:
+    """Where a value lies between the evenly spaced levels; None outside of them."""
+    levels = np.array([float(v) for v in over.levels if isinstance(v, int | float)])
+    if not over.is_numeric or len(levels) < 2 or not levels[0] <= value <= levels[-1]:
+        return None
+    return float(np.interp(value, levels, np.arange(len(levels))))
+
+
+def name_lines(
+    axes: Sequence[Axes], ends: Sequence[Ends], factor: Factor | None, paint: Mapping[Level, str]
+) -> None:
+    """Write each line's name at its end, moved apart where lines end close together.
+
+    To be called last: the scale of y must be settled.
+    """
+    if factor is None:
+        return
+    for ax, heights in zip(axes, map(_in_axes, axes, ends), strict=True):
+        for level, height in zip(heights, _apart(list(heights.values()), gap=0.075), strict=True):
+            ax.annotate(
+                level_name(factor.name, level, short=True),
+                (1.01, height),
+                xycoords="axes fraction",
+                color=paint[level],
+                va="center",
+                fontweight="bold",
+                annotation_clip=False,
+            )
+
+
+def _in_axes(axes: Axes, ends: Ends) -> Ends:
+    """Heights as fractions of the axes, from the lowest up; lines without an end are left out."""
+    edges = axes.transData.transform([(0.0, y) for y in axes.get_ylim()])
+    bottom, top = float(edges[0, 1]), float(edges[1, 1])
+    there = sorted((item for item in ends.items() if np.isfinite(item[1])), key=lambda i: i[1])
+    return {
+        level: (float(axes.transData.transform((0.0, end))[1]) - bottom) / (top - bottom)
+        for level, end in there
+    }
+
+
+def _apart(heights: Sequence[float], gap: float) -> list[float]:
+    """Ascending heights, moved up where they are closer than `gap`, all of them below the top."""
+    placed: list[float] = []
+    for height in heights:
+        placed.append(max(height, placed[-1] + gap) if placed else height)
+    overshoot = max(0.0, placed[-1] - 1.0) if placed else 0.0
+    return [height - overshoot for height in placed]
+
+
+def legend(figure: Figure, factor: Factor | None, paint: Mapping[Level, str]) -> None:
+    """One key above all panels, for figures whose marks are too many to be named one by one."""
+    from matplotlib.lines import Line2D
+
+    if factor is None:
+        return
+    handles = [Line2D([], [], color=paint[level], marker="o", ls="") for level in factor.levels]
+    names = [level_name(factor.name, level) for level in factor.levels]
+    figure.legend(handles, names, loc="outside upper left", ncols=len(names))

@@ -1,0 +1,109 @@
+"""How factors, levels, measures and numbers are called when a reader sees them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+Level = str | float | int | bool | None
+
+_FACTORS = {
+    "pattern": "messaging pattern",
+    "link.delay_s": "one-way delay",
+    "link.jitter_s": "jitter",
+    "link.loss": "packet loss",
+    "link.rate_bps": "link rate",
+    "robot.processing_s": "processing time at the robot",
+    "command.rate_hz": "wanted command rate",
+    "operator.strategy": "operator strategy",
+    "dispatch.policy": "dispatch policy",
+}
+_LEVELS = {
+    "req-rep": "REQ/REP",
+    "pub-sub": "plain PUB/SUB",
+    "latest-wins": "latest-wins PUB/SUB",
+}
+_SHORT_LEVELS = {**_LEVELS, "latest-wins": "latest-wins"}
+_MEASURES = {
+    "drive_time_s": "driving time to confirmation",
+    "path_m": "path length",
+    "command_age_p50_s": "median command age at application",
+    "command_age_mean_s": "mean command age at application",
+    "age_in_force_mean_s": "mean age of the command in force",
+    "command_rate_hz": "applied command rate",
+    "stop_share": "share of driving time in safe stop",
+    "loop_delay_mean_s": "observation-to-effect delay",
+    "response_s": "response time",
+    "confirmation_s": "confirmation time",
+}
+_UNITS = {"s": "s", "m": "m", "hz": "Hz", "mps": "m/s", "bps": "bit/s", "ns": "N s", "deg": "deg"}
+
+
+def unit_of(name: str) -> str:
+    """The unit a key ends in, as printed: `link.delay_s` gives `s`, `pattern` nothing."""
+    head, _, tail = name.rpartition("_")
+    return _UNITS.get(tail, "") if head else ""
+
+
+def plain_name(name: str) -> str:
+    """A key without its unit and with spaces for the signs between its words."""
+    stem = name.rpartition("_")[0] if unit_of(name) else name
+    return stem.replace(".", " ").replace("_", " ")
+
+
+def factor_name(factor: str) -> str:
+    """`link.delay_s` is the one-way delay."""
+    return _FACTORS.get(factor, plain_name(factor))
+
+
+def measure_name(measure: str) -> str:
+    """`drive_time_s` is the driving time to confirmation."""
+    return _MEASURES.get(measure, plain_name(measure))
+
+
+def number(value: float) -> str:
+    """Three figures at most, and never more decimals than the size deserves."""
+    if not math.isfinite(value):
+        return "–"
+    decimals = 0 if abs(value) >= 100 else 1 if abs(value) >= 1 else 2
+    text = f"{value:.{decimals}f}"
+    return text.replace("-", "\N{MINUS SIGN}") if float(text) else "0"
+
+
+def quantity(value: float, unit: str) -> str:
+    """A number with its unit, apart by a space that does not break."""
+    return f"{number(value)}\N{NO-BREAK SPACE}{unit}" if unit else number(value)
+
+
+def percent(share: float) -> str:
+    """A share as a whole percentage; small ones keep a decimal so that they are not zero."""
+    if not math.isfinite(share):
+        return "–"
+    text = f"{100 * share:.0f}" if share == 0 or 0.01 <= share <= 0.99 else f"{100 * share:.1f}"
+    return f"{text.removesuffix('.0')}\N{NO-BREAK SPACE}%"
+
+
+def level_name(factor: str, level: Level, short: bool = False) -> str:
+    """One level with its unit: 0.05 of `link.delay_s` is `50 ms`."""
+    if isinstance(level, str):
+        return (_SHORT_LEVELS if short else _LEVELS).get(level, level)
+    if level is None or isinstance(level, bool):
+        return {None: "none", True: "yes", False: "no"}[level]
+    unit = unit_of(factor)
+    if unit == "s" and 0 < abs(level) < 1:
+        return f"{1000 * level:g}\N{NO-BREAK SPACE}ms"
+    return f"{level:g}\N{NO-BREAK SPACE}{unit}" if unit and level else f"{level:g}"
+
+
+def setting(levels: Mapping[str, Level]) -> str:
+    """Levels of several factors in a row: `profile default, jitter 20 ms`."""
+    return ", ".join(
+        f"{factor_name(factor)} {level_name(factor, level)}" for factor, level in levels.items()
+    )
+
+
+def listing(words: Sequence[str], last: str = "and") -> str:
+    """`a`, `a and b`, `a, b and c`."""
+    if len(words) < 2:
+        return "".join(words)
+    return f"{', '.join(words[:-1])} {last} {words[-1]}"

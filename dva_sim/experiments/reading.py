@@ -1,0 +1,120 @@
+"""How a report reads a study: which runs, which contrast, and what was found."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from dva_sim.experiments.answer import Finding, Missed
+from dva_sim.experiments.effects import Factor, Part, Table, View, as_floats, present
+from dva_sim.experiments.labels import Level, unit_of
+from dva_sim.experiments.statistics import band
+
+_KEYS = {"part", "cell", "config", "is_reference", "person", "trial", "seed"}
+
+
+def factors_of(study: Mapping[str, Any]) -> list[Factor]:
+    """The declared factors, in order."""
+    return [Factor(name, tuple(levels)) for name, levels in study.get("factors", {}).items()]
+
+
+def view_of(study: Mapping[str, Any], runs: Table) -> View | None:
+    """The view that the declared answer asks for, or a sensible one without it.
+
+    Returns None where there is no run to look at.
+    """
+    declared = study.get("answer") or {}
+    parts = list(dict.fromkeys(str(p) for p in runs["part"]))
+    name = declared.get("part") if declared.get("part") in parts else next(iter(parts), None)
+    part = Part(runs, name, factors_of(study)) if name else None
+    if part is None or not len(part):
+        return None
+    over = _factor(part, declared.get("over")) or _longest_numeric(part.factors)
+    line = _factor(part, declared.get("factor")) or _other(part.factors, over)
+    within = {k: v for k, v in (declared.get("within") or {}).items() if _factor(part, k)}
+    measure = declared.get("measure") or _first_measure(part)
+    return View(
+        part=part,
+        measure=measure,
+        line=line,
+        over=over,
+        contrast=_contrast(declared, line),
+        within=within,
+        smallest_effect=declared.get(f"smallest_effect_{measure.rpartition('_')[2]}")
+        or declared.get("smallest_effect"),
+    )
+
+
+def finding_of(view: View) -> Finding | None:
+    """The declared contrast, measured; None where no contrast was declared or run."""
+    if view.contrast is None or view.line is None:
+        return None
+    panel = view.panels[0]
+    found = band(view.difference(panel, *view.contrast))
+    return Finding(
+        measure=view.measure,
+        in_excess=view.part.has_reference(view.measure),
+        factor=view.line.name,
+        first=view.contrast[0],
+        second=view.contrast[1],
+        over=view.over.name if view.over else "",
+        levels=view.stops,
+        within=panel,
+        mean=found.mean,
+        low=found.low,
+        high=found.high,
+        persons=found.n_persons,
+        smallest_effect=view.smallest_effect,
+        missed=_missed(view),
+        horizon=_horizon(view),
+    )
+
+
+def _missed(view: View) -> tuple[Missed, ...]:
+    """Runs without confirmation at the last stop, for every line."""
+    if not view.part.has("confirmed"):
+        return ()
+    grid = view.part.grid("confirmed")
+    found = []
+    for level in view.lines:
+        seen = present(view.curve(grid, view.panels[0], level)[-1])
+        found.append(Missed(level, int((seen == 0).sum()), len(seen)))
+    return tuple(found)
+
+
+def _horizon(view: View) -> float | None:
+    """What missed runs count with, if it is one and the same time."""
+    if not view.part.has("confirmed") or unit_of(view.measure) != "s":
+        return None
+    missed = as_floats(view.part.treated["confirmed"]) == 0
+    counted = np.unique(present(as_floats(view.part.treated[view.measure])[missed]))
+    return float(counted[0]) if len(counted) == 1 else None
+
+
+def _factor(part: Part, name: str | None) -> Factor | None:
+    return next((f for f in part.factors if f.name == name), None)
+
+
+def _longest_numeric(factors: Sequence[Factor]) -> Factor | None:
+    numeric = [f for f in factors if f.is_numeric and len(f.levels) > 1]
+    return max(numeric, key=lambda f: len(f.levels), default=None) or next(iter(factors), None)
+
+
+def _other(factors: Sequence[Factor], over: Factor | None) -> Factor | None:
+    return next((f for f in factors if f is not over), None)
+
+
+def _first_measure(part: Part) -> str:
+    names = [c for c in part.treated if c not in _KEYS and part.has(c)]
+    factors = {f.name for f in part.factors}
+    measures = [c for c in names if c not in factors]
+    return "drive_time_s" if "drive_time_s" in measures else next(iter(measures), "seed")
+
+
+def _contrast(declared: Mapping[str, Any], line: Factor | None) -> tuple[Level, Level] | None:
+    levels = tuple(declared.get("contrast") or ())
+    if line is None or len(levels) != 2 or not set(levels) <= set(line.levels):
+        return None
+    return levels[0], levels[1]

@@ -1,0 +1,151 @@
+"""One page that answers a study: self-contained, and the same bytes whenever it is made again."""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dva_sim.experiments import statistics
+from dva_sim.experiments.answer import Answer, answer
+from dva_sim.experiments.cells import CellTable, cell_table
+from dva_sim.experiments.conditions import conditions, timeout_remark
+from dva_sim.experiments.effects import Part, Table, View, as_floats
+from dva_sim.experiments.figures import Drawn, draw_all
+from dva_sim.experiments.labels import factor_name, level_name, listing
+from dva_sim.experiments.reading import factors_of, finding_of, view_of
+from dva_sim.experiments.results import Results
+
+if TYPE_CHECKING:
+    import jinja2
+
+_OPTIONAL = ("events", "tracks")
+_MOST_ERRORS = 3
+
+
+def write_report(folder: Path) -> Path:
+    """Make `report.html` and `figures/` from the tables in a results folder.
+
+    Raises:
+        ConfigError: the folder holds no results.
+    """
+    results = Results.load(folder)
+    runs = results.table("runs") if results.has("runs") else {}
+    view = view_of(results.study, runs) if runs else None
+    drawn = _draw(view, results) if view else []
+    _write_figures(results.folder / "figures", drawn)
+    report = results.folder / "report.html"
+    report.write_text(_page(results, runs, view, drawn), encoding="utf-8", newline="\n")
+    return report
+
+
+def _draw(view: View, results: Results) -> list[Drawn]:
+    tables = {name: results.table(name) for name in _OPTIONAL if results.has(name)}
+    scenario = results.manifest.get("scenarios", {}).get(view.part.name, {})
+    return draw_all(view, tables, scenario)
+
+
+def _write_figures(folder: Path, drawn: list[Drawn]) -> None:
+    folder.mkdir(exist_ok=True)
+    for figure in drawn:
+        (folder / f"{figure.name}.svg").write_bytes(figure.svg)
+        (folder / f"{figure.name}.png").write_bytes(figure.png)
+
+
+def _page(results: Results, runs: Table, view: View | None, drawn: list[Drawn]) -> str:
+    """Fill the template."""
+    manifest, study = results.manifest, results.study
+    factors = factors_of(study)
+    scenarios = manifest.get("scenarios", {})
+    return _template().render(
+        question=study.get("question", "A study without a question"),
+        changes=[_as_words(change) for change in manifest.get("set", [])],
+        answer=_answer(view),
+        warnings=_warnings(results, runs),
+        parts=list(scenarios),
+        conditions=conditions(scenarios, factors),
+        timeout_remark=timeout_remark(next(iter(scenarios.values()), {}), factors),
+        factors=[_levels(f.name, f.levels) for f in factors],
+        figures=drawn,
+        tables=_tables(study, runs, view),
+        persons=study.get("persons"),
+        replications=study.get("replications"),
+        correlation=_pair_correlation(view),
+        manifest=json.dumps(manifest, indent=2, sort_keys=True, ensure_ascii=False),
+    )
+
+
+def _template() -> jinja2.Template:
+    import jinja2
+
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("dva_sim.experiments"),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=jinja2.StrictUndefined,
+    )
+    environment.filters["data_uri"] = _data_uri
+    return environment.get_template("report.html.j2")
+
+
+def _tables(study: Mapping[str, Any], runs: Table, view: View | None) -> list[CellTable]:
+    """A table of cells for each part that has runs."""
+    if view is None:
+        return []
+    names = dict.fromkeys(str(name) for name in runs["part"])
+    parts = (Part(runs, name, factors_of(study)) for name in names)
+    return [cell_table(part, view.measure) for part in parts if len(part)]
+
+
+def _answer(view: View | None) -> Answer:
+    if view is None:
+        return Answer("No run was completed, so there is nothing to answer with.")
+    finding = finding_of(view)
+    if finding is not None:
+        return answer(finding)
+    return Answer(
+        "The contrast that would answer the question was not declared or not run; "
+        "the figures and the table show what was."
+    )
+
+
+def _warnings(results: Results, runs: Table) -> list[str]:
+    """What a reader must see before anything else."""
+    found = []
+    if failures := results.failures:
+        errors = dict.fromkeys(str(failure.get("error")) for failure in failures)
+        shown = "; ".join(list(errors)[:_MOST_ERRORS])
+        found.append(f"Runs that failed and are missing below: {len(failures)} ({shown}).")
+    broken = int((as_floats(runs["violations"]) > 0).sum()) if "violations" in runs else 0
+    if broken:
+        found.append(f"Safety invariants were broken in {broken} runs.")
+    return found
+
+
+def _levels(name: str, levels: tuple[Any, ...]) -> tuple[str, str]:
+    return factor_name(name), listing([level_name(name, level) for level in levels])
+
+
+def _as_words(change: Any) -> str:
+    """One `--set`, however the manifest keeps it."""
+    return change if isinstance(change, str) else "=".join(str(word) for word in change)
+
+
+def _pair_correlation(view: View | None) -> float | None:
+    """How alike the two sides of the contrast are, run by run, at the last stop."""
+    if view is None or view.contrast is None:
+        return None
+    grid = view.part.grid(view.measure)
+    first, second = (view.curve(grid, view.panels[0], level)[-1] for level in view.contrast)
+    both = np.isfinite(first) & np.isfinite(second)
+    correlation = statistics.pair_correlation(first[both], second[both])
+    return correlation if np.isfinite(correlation) else None
+
+
+def _data_uri(svg: bytes) -> str:
+    return f"data:image/svg+xml;base64,{base64.b64encode(svg).decode()}"

@@ -1,0 +1,236 @@
+"""Run a study: what is not done yet, spread over processes, kept as it comes, then as tables."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import time
+from collections import defaultdict
+from collections.abc import Callable, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from dva_sim import __version__
+from dva_sim.errors import ConfigError, DvaSimError
+from dva_sim.experiments import design, pool
+from dva_sim.experiments.design import Cell, Job, Key
+from dva_sim.experiments.journal import FILE, Journal
+from dva_sim.experiments.pool import Episode
+from dva_sim.experiments.results import MANIFEST
+from dva_sim.experiments.study import Study
+from dva_sim.experiments.tables import design_row, write_tables
+
+MACHINE = "machine.json"
+_PACKAGES = ("duckdb", "lxml", "numpy", "pymunk", "scipy", "shapely", "simpy")
+
+Progress = Callable[[int, int], object]
+
+
+@dataclass(frozen=True)
+class DryRun:
+    """What running a study would mean.
+
+    Attributes:
+        runs: Different runs in all.
+        done: How many of them the results folder already holds.
+        cells: Configurations, with the reference runs' own.
+        estimate_s: Time for the rest [s], if runs done before tell their cost.
+    """
+
+    runs: int
+    done: int
+    cells: int
+    estimate_s: float | None
+
+
+def run_study(
+    study: Study,
+    out: str | Path,
+    *,
+    jobs: int | None = None,
+    episode: Episode | None = None,
+    progress: Progress | None = None,
+) -> Path:
+    """Run what the results folder does not hold yet, then write its tables and manifest.
+
+    The tables and the manifest are the same bytes with any number of processes and after any
+    interruption; times and costs are apart, in `machine.json`. Runs that fail are listed in
+    the manifest (`Results.failures`) and tried again the next time.
+
+    Args:
+        study: From `load_study`.
+        out: Results folder, made if need be.
+        jobs: Processes; by default one for each core.
+        episode: Makes the tables of one run; by default a simulation.
+        progress: Called with the number of runs done and of all runs, as they finish.
+
+    Returns:
+        The results folder.
+
+    Raises:
+        ConfigError: the study is not valid, or the folder holds another one.
+        DvaSimError: the disk is full, or another program holds the journal.
+        KeyboardInterrupt: after tidying up; its message says how to go on.
+    """
+    out, workers = Path(out), cores() if jobs is None else jobs
+    if workers < 1:
+        raise ConfigError(f"number of processes should be at least 1, not {workers}")
+    cells = design.cells(study)
+    todo = design.jobs(study, cells)
+    manifest = _manifest(study, cells, todo)
+    started, clock = datetime.now(UTC), time.perf_counter()
+    with _open(out, manifest) as journal:
+        _run_rest(todo, journal, episode or _simulation(), workers, progress)
+        write_tables(out, todo, journal)
+        manifest["failures"] = _failures(todo, journal)
+        _write_json(out / MANIFEST, manifest)
+        session = {"started": started.isoformat(), "wall_s": time.perf_counter() - clock}
+        _write_json(out / MACHINE, _machine(todo, journal, workers) | session)
+    return out
+
+
+def dry_run(study: Study, out: str | Path, *, jobs: int | None = None) -> DryRun:
+    """What `run_study` would do, without doing it.
+
+    Raises:
+        ConfigError: the study is not valid, or the folder holds another one.
+    """
+    cells = design.cells(study)
+    todo = design.jobs(study, cells)
+    keys = {job.key for job in todo}
+    costs: dict[Key, float] = {}
+    if (Path(out) / FILE).exists():
+        with _open(Path(out), _manifest(study, cells, todo)) as journal:
+            costs = journal.costs()
+    left = len(keys - costs.keys())
+    mean = sum(costs.values()) / len(costs) if costs else None
+    estimate = None if mean is None else mean * left / (jobs or cores())
+    return DryRun(len(keys), len(keys) - left, len(cells), estimate)
+
+
+def cores() -> int:
+    """How many processes can run at the same time here."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def _run_rest(
+    todo: Sequence[Job],
+    journal: Journal,
+    episode: Episode,
+    workers: int,
+    progress: Progress | None,
+) -> None:
+    """Run what is not done; each batch is in the journal before it is counted."""
+    distinct = {job.key: job for job in todo}
+    done = journal.done()
+    rest = [job for key, job in distinct.items() if key not in done]
+    count, total = len(distinct) - len(rest), len(distinct)
+    tell = progress or (lambda *_: None)
+    tell(count, total)
+    try:
+        with closing(pool.run_all(rest, episode, min(workers, len(rest)))) as batches:
+            for batch in batches:
+                journal.add(batch)
+                count += len(batch)
+                tell(count, total)
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(
+            f"interrupted after {count} of {total} runs; the same command goes on from there"
+        ) from None
+
+
+def _simulation() -> Episode:
+    from dva_sim.experiments.episode import run_job
+
+    return run_job
+
+
+def _open(out: Path, manifest: dict[str, Any]) -> Journal:
+    """The journal of the folder, which must be this study's or new."""
+    identity = manifest["hash"]
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        if not (out / FILE).exists() and (out / MANIFEST).exists():
+            found = json.loads((out / MANIFEST).read_text(encoding="utf-8")).get("hash")
+            if found != identity:
+                raise ConfigError(f"{out} holds another study ({found}); give another folder")
+    except FileExistsError:
+        raise ConfigError(f"{out} is a file; give a folder for the results") from None
+    except OSError as error:
+        raise DvaSimError(f"{out} cannot be written: {error.strerror}") from None
+    except ValueError:
+        raise ConfigError(f"{out} holds something else; give another folder") from None
+    return Journal(out, identity)
+
+
+def _manifest(study: Study, cells: Sequence[Cell], todo: Sequence[Job]) -> dict[str, Any]:
+    """What was asked and run: nothing in it depends on when, where or how fast."""
+    content: dict[str, Any] = {
+        "question": study.question,
+        "study": study.model_dump(mode="json"),
+        "scenarios": {
+            part: design.base_scenario(study, part).model_dump(mode="json") for part in study.parts
+        },
+        "set": list(study.settings),
+        "changes": dict(study.changes),
+        "inputs": design.inputs(cells),
+        "cells": [_cell_row(cell) for cell in cells],
+        "runs": len({job.key for job in todo}),
+        "seeds": {
+            "study": study.seed,
+            "population": study.seed,
+            "rule": "a run's seed depends on the study's seed, the part, the person and the "
+            "trial, never on the cell: all cells share their luck",
+        },
+        "versions": {"dva-sim": __version__},
+    }
+    identity = design.stable_hash(content)
+    content["versions"]["python"] = platform.python_version()
+    content["versions"] |= {name: version(name) for name in _PACKAGES}
+    return content | {"hash": identity}
+
+
+def _cell_row(cell: Cell) -> dict[str, Any]:
+    levels = dict(cell.levels)
+    return {"part": cell.part, "cell": cell.index, "config": cell.config, "levels": levels}
+
+
+def _failures(todo: Sequence[Job], journal: Journal) -> list[dict[str, Any]]:
+    """Failed runs in the order of the design."""
+    failures = journal.failures()
+    return [design_row(j) | {"error": failures[j.key]} for j in todo if j.key in failures]
+
+
+def _machine(todo: Sequence[Job], journal: Journal, workers: int) -> dict[str, Any]:
+    """What is different on every machine and at every time."""
+    costs = journal.costs()
+    spent: dict[str, list[float]] = defaultdict(list)
+    for job in {job.key: job for job in todo}.values():
+        if job.key in costs:
+            spent[f"{job.part}/{job.index}"].append(costs[job.key])
+    return {
+        "platform": platform.platform(),
+        "cores": cores(),
+        "jobs": workers,
+        "cpu_s": sum(costs.values()),
+        "cpu_s_per_run": {cell: sum(c) / len(c) for cell, c in spent.items()},
+    }
+
+
+def _write_json(path: Path, data: dict[str, Any]) -> None:
+    """Whole or not at all, whatever happens meanwhile."""
+    part = path.with_name(f".{path.name}.{os.getpid()}")
+    text = json.dumps(data, indent=2, ensure_ascii=False) + "\n"
+    try:
+        part.write_text(text, encoding="utf-8", newline="\n")
+        part.replace(path)
+    except OSError as error:
+        part.unlink(missing_ok=True)
+        raise DvaSimError(f"{path} cannot be written: {error.strerror}") from None

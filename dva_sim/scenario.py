@@ -1,0 +1,251 @@
+"""What one run consists of: site, team, network, phone, events; units are in the keys."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, model_validator
+
+from dva_sim import resources
+from dva_sim.agents.guard import GuardProfile
+from dva_sim.agents.operator.person import Population
+from dva_sim.agents.robot import RobotProfile
+from dva_sim.agents.tilt.phone import PhoneProfile
+from dva_sim.config import Config, Document, M, Path_, load_yaml, validate
+from dva_sim.errors import ConfigError
+from dva_sim.network.link import LinkConfig
+from dva_sim.worlds.site import Site, load_site, map_site
+
+FOLDER = "experiments/scenarios"
+
+Positive = Annotated[float, Field(gt=0)]
+NonNegative = Annotated[float, Field(ge=0)]
+
+
+class SiteConfig(Config):
+    """Where it happens: a site by name or path, or a bare map in ROS map_server form."""
+
+    name: str = "caparica"
+    map: str | None = None
+
+
+class RobotConfig(Config):
+    """The robots: how many, which kind, and the limits that keep them safe."""
+
+    profile: str = "servrobot"
+    count: Annotated[int, Field(ge=0, le=50)] = 1
+    processing_s: Annotated[float, Field(ge=0, le=10)] = 0.05
+    watchdog_s: Annotated[float, Field(gt=0, le=60)] = 3.0
+    max_age_s: Annotated[float, Field(gt=0, le=120)] = 6.0
+
+
+class GuardConfig(Config):
+    """The guards: how many, and from which profile they are drawn."""
+
+    profile: str = "guard"
+    count: Annotated[int, Field(ge=0, le=200)] = 0
+
+
+class OperatorConfig(Config):
+    """The operators: how they drive, and which simulated person each is.
+
+    Attributes:
+        person: Index of the first operator's person in the population; the next operator
+            is the next person.
+        population_seed: Draws the population; a study gives its own seed.
+    """
+
+    strategy: str = "pursuit"
+    count: Annotated[int, Field(ge=0, le=50)] = 1
+    population: str = "operators"
+    person: Annotated[int, Field(ge=0)] = 0
+    population_seed: Annotated[int, Field(ge=0)] = 1
+
+
+class CommandConfig(Config):
+    """How commands are sent, the same for every pattern."""
+
+    rate_hz: Annotated[float, Field(gt=0, le=100)] = 10.0
+    timeout_s: Annotated[float, Field(gt=0, le=120)] = 9.0
+    attempts: Annotated[int, Field(ge=1, le=10)] = 3
+
+
+class CameraConfig(Config):
+    """The robots' cameras: what a frame costs and what it can show."""
+
+    rate_hz: Annotated[float, Field(gt=0, le=60)] = 10.0
+    frame_bytes: Annotated[int, Field(ge=100, le=1_000_000)] = 12_000
+    field_of_view_deg: Annotated[float, Field(gt=10, le=360)] = 70.0
+    range_m: Positive = 6.0
+
+
+class EventConfig(Config):
+    """A fire, a gas leak or a flood.
+
+    Attributes:
+        room: Where, by name; left out, the run's seed chooses a room.
+        at_s: When it starts.
+        latest_s: If given, the seed draws the start between `at_s` and this.
+        reported: Whether somebody reports it at once; otherwise detectors must notice it.
+    """
+
+    kind: Literal["fire", "gas_leak", "flood"]
+    room: str | None = None
+    at_s: NonNegative = 0.0
+    latest_s: NonNegative | None = None
+    reported: bool = False
+
+    @model_validator(mode="after")
+    def _in_order(self) -> EventConfig:
+        if self.latest_s is not None and self.latest_s < self.at_s:
+            raise ValueError(f"latest_s {self.latest_s:g} is before at_s {self.at_s:g}")
+        return self
+
+
+class DispatchConfig(Config):
+    """How the DVA chooses who goes, and when it gives up waiting."""
+
+    policy: str = "min_eta"
+    escalate_after_s: Positive = 120.0
+
+
+class Scenario(Config):
+    """Everything one run needs but its seed."""
+
+    description: str = ""
+    site: SiteConfig = SiteConfig()
+    robot: RobotConfig = RobotConfig()
+    guard: GuardConfig = GuardConfig()
+    operator: OperatorConfig = OperatorConfig()
+    pattern: Literal["req-rep", "pub-sub", "latest-wins"] = "latest-wins"
+    profile: str = "default"
+    command: CommandConfig = CommandConfig()
+    link: LinkConfig = LinkConfig()
+    camera: CameraConfig = CameraConfig()
+    events: Annotated[tuple[EventConfig, ...], Field(min_length=1)] = (EventConfig(kind="fire"),)
+    dispatch: DispatchConfig = DispatchConfig()
+    horizon_s: Annotated[float, Field(gt=0, le=86_400)] = 300.0
+
+    @model_validator(mode="after")
+    def _somebody_can_act(self) -> Scenario:
+        if self.robot.count and not self.operator.count:
+            raise ValueError("robots need an operator: operator.count is 0")
+        if not self.robot.count and not self.guard.count:
+            raise ValueError("nobody can respond: robot.count and guard.count are 0")
+        return self
+
+
+def load(name: str, base: Path | None = None) -> Document:
+    """Read a scenario by name or path; the data is checked by `build`.
+
+    Raises:
+        ConfigError: not found or not YAML.
+    """
+    return load_yaml(resources.find(name, FOLDER, base=base))
+
+
+def build(
+    source: Document | Mapping[str, Any], changes: Mapping[str, Any] | None = None
+) -> Scenario:
+    """A scenario from a file or plain data, with some keys changed.
+
+    Args:
+        source: A document (mistakes are told with their place) or plain data.
+        changes: New values by dotted key, for example `{"link.delay_s": 0.25}`.
+
+    Raises:
+        ConfigError: an unknown key, a wrong type, a value out of range, a missing profile.
+    """
+    document = source if isinstance(source, Document) else None
+    data = copy.deepcopy(dict(document.data if document else source))  # type: ignore[arg-type]
+    changed = dict(changes or {})
+    for key, value in changed.items():
+        set_key(data, key, value)
+
+    def error(problem: str, path: Path_) -> ConfigError:
+        dotted = ".".join(str(p) for p in path)
+        if document is None or any(dotted == k or dotted.startswith(k + ".") for k in changed):
+            return ConfigError(problem)
+        return document.error(problem, path)
+
+    scenario = validate(Scenario, data, error)
+    check_names(scenario, error)
+    return scenario
+
+
+def set_key(data: dict[str, Any], key: str, value: Any) -> None:
+    """Change one value by dotted key, making the mappings on the way.
+
+    Raises:
+        ConfigError: a part of the key names something that holds no keys.
+    """
+    *parents, last = key.split(".")
+    for parent in parents:
+        inner = data.setdefault(parent, {})
+        if not isinstance(inner, dict):
+            raise ConfigError(f"unknown key {key!r}: {parent!r} holds no keys")
+        data = inner
+    data[last] = value
+
+
+def check_names(scenario: Scenario, error: Any) -> None:
+    """Refuse a profile, strategy or policy that does not exist, before anything runs."""
+    from dva_sim.agents.operator.strategies import STRATEGIES
+    from dva_sim.core.dispatch import POLICIES
+
+    choices: dict[Path_, tuple[str, Mapping[str, object]]] = {
+        ("operator", "strategy"): (scenario.operator.strategy, STRATEGIES),
+        ("dispatch", "policy"): (scenario.dispatch.policy, POLICIES),
+        ("profile",): (scenario.profile, resources.available("agents/phones")),
+        ("robot", "profile"): (scenario.robot.profile, resources.available("agents/robots")),
+        ("guard", "profile"): (scenario.guard.profile, resources.available("agents/people")),
+    }
+    for path, (given, known) in choices.items():
+        if given not in known and not Path(given).is_file():
+            key = ".".join(str(p) for p in path)
+            raise error(f"{key} {given!r} is unknown; known: {', '.join(sorted(known))}", path)
+
+
+def site_of(scenario: Scenario, seed: int) -> Site:
+    """The site a scenario plays on; a bare map places its bases by `seed`."""
+    if scenario.site.map is None:
+        return load_site(scenario.site.name)
+    team = max(1, scenario.robot.count), max(1, scenario.guard.count)
+    return map_site(scenario.site.map, seed, robots=team[0], guards=team[1])
+
+
+def robot_profile(scenario: Scenario) -> RobotProfile:
+    """Mass, size and limits of the scenario's robots."""
+    return _profile(RobotProfile, scenario.robot.profile, "agents/robots")
+
+
+def phone_profile(scenario: Scenario) -> PhoneProfile:
+    """The tilt phone the operators hold."""
+    return _profile(PhoneProfile, scenario.profile, "agents/phones")
+
+
+def guard_profile(scenario: Scenario) -> GuardProfile:
+    """How the scenario's guards are drawn."""
+    return _profile(GuardProfile, scenario.guard.profile, "agents/people")
+
+
+def population(scenario: Scenario) -> Population:
+    """The population that the scenario's operators are drawn from."""
+    return _profile(Population, scenario.operator.population, "agents/people")
+
+
+def _profile(model: type[M], name: str, folder: str) -> M:
+    profile = _read_profile(model, name, folder)
+    assert isinstance(profile, model)
+    return profile
+
+
+@cache
+def _read_profile(model: type[Config], name: str, folder: str) -> Config:
+    """A profile, read once per process: reading costs more than a short run."""
+    document = load_yaml(resources.find(name, folder))
+    return validate(model, document.data, document.error)

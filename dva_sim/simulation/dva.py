@@ -1,0 +1,91 @@
+"""The DVA on the network: binds the desk, which knows no clock, to messages and time."""
+
+from __future__ import annotations
+
+from dva_sim.agents.device import HEARTBEATS, Device
+from dva_sim.agents.robot import STATUS
+from dva_sim.core.events import State
+from dva_sim.core.registry import DETECTOR, ROBOT
+from dva_sim.core.service import Desk, Send
+from dva_sim.network.patterns import Subscription
+from dva_sim.protocol import messages as m
+
+TICK = 1.0  # how often the desk looks at deadlines [s]
+
+
+class DvaAgent:
+    """The DVA core node.
+
+    Args:
+        device: Its identity and ways to talk.
+        desk: What decides.
+    """
+
+    def __init__(self, device: Device, desk: Desk) -> None:
+        self.device, self.desk = device, desk
+        self._known: dict[int, State] = {}
+        self._heard: list[Subscription] = []
+        device.serve(self._on_request)
+
+    def start(self) -> None:
+        """Begin to look at deadlines."""
+        self.device.clock.every(TICK, self._tick, start=TICK)
+
+    def _on_request(self, message: m.Message) -> m.Reply:
+        reply, sends = self.desk.handle(message, self.device.clock.now)
+        if isinstance(message.body, m.Registration) and reply.code == m.OK:
+            self._listen(message.source, message.body.device_type)
+        self._carry_out(sends)
+        return reply
+
+    def _listen(self, source: str, device_type: str) -> None:
+        """Subscribe to what a new device publishes; detectors only speak when asked to."""
+        if device_type == DETECTOR:
+            return
+        topics = {HEARTBEATS: "heartbeat|"}
+        if device_type == ROBOT:
+            topics[STATUS] = "status|"
+        network = self.device.network
+        for service, topic in topics.items():
+            publisher = network.publisher(source, service)
+            heard = Subscription(network, self.device.id_tag, publisher, topic, self._on_published)
+            self._heard.append(heard)
+
+    def _on_published(self, data: bytes) -> None:
+        message = self.device.read(data)
+        if message is not None:
+            self.desk.note(message, self.device.clock.now)
+
+    def _tick(self) -> None:
+        self._carry_out(self.desk.tick(self.device.clock.now))
+
+    def _carry_out(self, sends: list[Send]) -> None:
+        for send in sends:
+            session = send.body.session if isinstance(send.body, m.PermissionGrant) else 0
+            self.device.ask(
+                send.to,
+                send.body,
+                lambda reply, send=send: self._answered(send, reply),  # type: ignore[misc]
+                lambda send=send: self._undelivered(send),  # type: ignore[misc]
+                session,
+            )
+        self._tell_changes()
+
+    def _answered(self, send: Send, reply: m.Reply) -> None:
+        if reply.code != m.OK:
+            self._undelivered(send)
+
+    def _undelivered(self, send: Send) -> None:
+        self._carry_out(self.desk.undelivered(send, self.device.clock.now))
+
+    def _tell_changes(self) -> None:
+        """Put each change of an event on the timeline."""
+        for event in self.desk.book.events.values():
+            if self._known.get(event.number) is event.state:
+                continue
+            self._known[event.number] = event.state
+            who = event.operator or event.responder
+            told = f"event {event.number} ({event.kind}) is {event.state}"
+            if event.state is State.ASSIGNED and who:
+                told += f" to {self.device.label_of(who)}"
+            self.device.tell(told)

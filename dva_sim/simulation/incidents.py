@@ -1,0 +1,106 @@
+"""The hazards of a run: which, where and when, drawn by the run's seed."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from dva_sim.agents.camera import HazardSpot
+from dva_sim.errors import ConfigError
+from dva_sim.scenario import EventConfig
+from dva_sim.streams import Streams
+from dva_sim.worlds.hazards import Hazard, make_hazard
+from dva_sim.worlds.site import Detector, Site
+
+REACHABLE = 0.4  # radius that fits through the doors on the way there [m]
+CLEARANCE = 0.7  # around the middle of a hazard, so that a robot can get near [m]
+FAR_ENOUGH = 6.0  # from every base, so that there is a way to go [m]
+TRIES = 200
+DETECTS = {"fire": "smoke", "gas_leak": "gas", "flood": "water"}
+
+
+@dataclass(frozen=True)
+class Incident:
+    """A hazard of this run.
+
+    Attributes:
+        kind: `fire`, `gas_leak` or `flood`.
+        room: Where, by name; empty outside all rooms.
+        start: When it begins [s].
+        detected: When a detector or a person notices it [s]; infinite if nobody does.
+        detector: The detector that does, if one does.
+        hazard: How it grows.
+    """
+
+    kind: str
+    room: str
+    start: float
+    detected: float
+    detector: Detector | None
+    hazard: Hazard
+
+    def spot(self, now: float) -> HazardSpot | None:
+        """What a camera may see of it at `now` [s]."""
+        if now < self.start:
+            return None
+        x, y = self.hazard.position
+        return HazardSpot(self.kind, x, y, self.hazard.radius(now))
+
+
+def draw_incidents(events: tuple[EventConfig, ...], site: Site, streams: Streams) -> list[Incident]:
+    """Place the events of a scenario, each by a stream of its own.
+
+    Raises:
+        ConfigError: a room that the site does not have, or no free place for an event.
+    """
+    return [
+        _draw(event, site, streams[f"event-{number}"]) for number, event in enumerate(events, 1)
+    ]
+
+
+def _draw(event: EventConfig, site: Site, rng: np.random.Generator) -> Incident:
+    start = event.at_s
+    if event.latest_s is not None:
+        start = float(rng.uniform(event.at_s, event.latest_s))
+    x, y = _place(event, site, rng)
+    hazard = make_hazard(event.kind, (x, y), start)
+    room = site.room_at(x, y) or ""
+    if event.reported:
+        return Incident(event.kind, room, start, start, None, hazard)
+    detector, detected = _first_detector(event.kind, site, hazard)
+    return Incident(event.kind, room, start, detected, detector, hazard)
+
+
+def _place(event: EventConfig, site: Site, rng: np.random.Generator) -> tuple[float, float]:
+    """A free place in the event's room; without one, in some room that is watched for its kind."""
+    rooms: list[str | None] = [event.room] if event.room else _watched_rooms(event.kind, site)
+    bases = [*site.robot_bases, *site.guard_posts]
+    for _ in range(TRIES):
+        x, y = site.sample_free(rng, REACHABLE, rooms[int(rng.integers(len(rooms)))])
+        gap = min((math.dist((x, y), (b.x, b.y)) for b in bases), default=math.inf)
+        if site.is_free(x, y, CLEARANCE) and (event.room is not None or gap >= FAR_ENOUGH):
+            return x, y
+    where = f"in room {event.room!r}" if event.room else f"{FAR_ENOUGH:g} m from all bases"
+    raise ConfigError(f"site {site.name!r} has no free place for a {event.kind} {where}")
+
+
+def _watched_rooms(kind: str, site: Site) -> list[str | None]:
+    """Rooms with a detector for a kind of event; `None`, which is anywhere, if there are none."""
+    watched = {site.room_at(d.x, d.y) for d in site.detectors if d.kind == DETECTS[kind]}
+    return [room.name for room in site.rooms if room.name in watched] or [None]
+
+
+def _first_detector(kind: str, site: Site, hazard: Hazard) -> tuple[Detector | None, float]:
+    """Who notices first, and when."""
+    best: tuple[Detector | None, float] = None, math.inf
+    here = site.room_at(*hazard.position)
+    for detector in site.detectors:
+        if detector.kind != DETECTS[kind]:
+            continue
+        same_room = site.room_at(detector.x, detector.y) == here
+        when = hazard.detection_time((detector.x, detector.y), same_room)
+        if when < best[1]:
+            best = detector, when
+    return best

@@ -1,0 +1,1 @@
+"""Where a run takes place: sites, maps, paths, moving bodies and hazards."""

@@ -1,0 +1,249 @@
+"""Occupancy grids: read from ROS maps, and measured for clearance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from dva_sim.config import Config, Document, load_yaml, validate
+from dva_sim.worlds.geo import Pose
+
+FREE, OCCUPIED, UNKNOWN = 0, 100, 255
+
+# What map_saver writes for "never seen" in a trinary map.
+UNKNOWN_SHADE = 205
+
+
+@dataclass(frozen=True, eq=False)
+class OccupancyGrid:
+    """What is known of a floor, cell by cell.
+
+    Attributes:
+        resolution: Side of a cell [m].
+        origin: Pose of the lower left corner of cell (0, 0).
+        cells: `FREE`, `OCCUPIED` or `UNKNOWN`, shape `(rows, columns)`; row 0 is the
+            lowest in y, unlike in an image.
+    """
+
+    resolution: float
+    origin: Pose
+    cells: NDArray[np.uint8]
+
+    def to_cell(self, x: float, y: float) -> tuple[int, int]:
+        """Row and column of a point [m]; may lie outside of the grid."""
+        dx, dy = x - self.origin.x, y - self.origin.y
+        cos, sin = np.cos(self.origin.heading), np.sin(self.origin.heading)
+        column = (cos * dx + sin * dy) / self.resolution
+        row = (cos * dy - sin * dx) / self.resolution
+        return int(np.floor(row)), int(np.floor(column))
+
+    def to_xy(self, rows: Any, columns: Any) -> NDArray[np.float64]:
+        """Points `(n, 2)` [m] at fractional cell coordinates; a cell's middle is at +0.5."""
+        u = np.asarray(columns, float) * self.resolution
+        v = np.asarray(rows, float) * self.resolution
+        cos, sin = np.cos(self.origin.heading), np.sin(self.origin.heading)
+        x, y = self.origin.x + cos * u - sin * v, self.origin.y + sin * u + cos * v
+        return np.stack([x, y], axis=-1)
+
+    def state_at(self, x: float, y: float) -> int:
+        """`FREE`, `OCCUPIED` or `UNKNOWN`; outside of the grid nothing is known."""
+        row, column = self.to_cell(x, y)
+        inside = 0 <= row < self.cells.shape[0] and 0 <= column < self.cells.shape[1]
+        return int(self.cells[row, column]) if inside else UNKNOWN
+
+    @cached_property
+    def clearance(self) -> NDArray[np.float64]:
+        """Room around each cell's middle [m]: distance to the nearest cell not known free.
+
+        Outside of the grid counts as not free. Measured to the near edge of that cell,
+        exactly so along the axes.
+        """
+        from scipy import ndimage
+
+        free = np.pad(self.cells == FREE, 1)
+        distance = ndimage.distance_transform_edt(free)[1:-1, 1:-1] - 0.5
+        room: NDArray[np.float64] = np.maximum(distance, 0) * self.resolution
+        return room
+
+    def clearance_at(self, x: float, y: float) -> float:
+        """Room around a point [m], to within a cell; 0 where it is not known free."""
+        row, column = self.to_cell(x, y)
+        inside = 0 <= row < self.cells.shape[0] and 0 <= column < self.cells.shape[1]
+        return float(self.clearance[row, column]) if inside else 0.0
+
+    def reachable(self, clearance: float) -> NDArray[np.bool_]:
+        """The largest connected part of the cells with at least `clearance` [m] of room."""
+        from scipy import ndimage
+
+        labels, count = ndimage.label((self.clearance >= clearance) & (self.cells == FREE))
+        if not count:
+            return np.zeros(self.cells.shape, bool)
+        sizes = np.bincount(labels.ravel())
+        sizes[0] = 0
+        largest: NDArray[np.bool_] = labels == int(np.argmax(sizes))
+        return largest
+
+
+def outline(grid: OccupancyGrid, free: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """The border of the cells `free` as few straight segments.
+
+    Scanned walls are ragged by one cell; the segments are true to one cell.
+
+    Args:
+        grid: Says where the cells lie.
+        free: Cells on the inside, shape `(rows, columns)`.
+
+    Returns:
+        Segments x1, y1, x2, y2 `(n, 4)` [m].
+    """
+    import shapely
+
+    inside = np.pad(free, 1)
+    rows, left, right = _runs(inside[1:, 1:-1] != inside[:-1, 1:-1])
+    columns, low, high = _runs((inside[1:-1, 1:] != inside[1:-1, :-1]).T)
+    starts = grid.to_xy(np.r_[rows, low], np.r_[left, columns])
+    ends = grid.to_xy(np.r_[rows, high], np.r_[right, columns])
+    edges = shapely.multilinestrings(np.round(np.stack([starts, ends], axis=1), 6))
+    lines = shapely.simplify(shapely.line_merge(edges), 1.001 * grid.resolution)
+    return segments(lines)
+
+
+def segments(geometry: Any) -> NDArray[np.float64]:
+    """All straight pieces of shapely lines or of the rings of polygons, `(n, 4)` [m]."""
+    import shapely
+
+    polygons = shapely.get_parts(geometry)
+    areas = shapely.get_type_id(polygons) == shapely.GeometryType.POLYGON
+    lines = shapely.get_parts(np.where(areas, shapely.boundary(polygons), polygons))
+    points, owner = shapely.get_coordinates(lines, return_index=True)
+    joined = owner[1:] == owner[:-1]
+    return np.hstack([points[:-1][joined], points[1:][joined]])
+
+
+def _runs(
+    marks: NDArray[np.bool_],
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Line, start and end of each run of true values along the rows of `marks`."""
+    edges = np.diff(np.pad(marks, ((0, 0), (1, 1))).astype(np.int8), axis=1)
+    lines, starts = np.nonzero(edges == 1)
+    _, ends = np.nonzero(edges == -1)
+    return lines, starts, ends
+
+
+class RosMap(Config):
+    """The YAML file of a ROS map, as map_server reads it.
+
+    References:
+        http://wiki.ros.org/map_server, section "Map format".
+    """
+
+    image: str
+    resolution: Annotated[float, Field(gt=0)]
+    origin: tuple[float, float, float]
+    negate: Annotated[int, Field(ge=0, le=1)] = 0
+    occupied_thresh: Annotated[float, Field(ge=0, le=1)]
+    free_thresh: Annotated[float, Field(ge=0, le=1)]
+    mode: Literal["trinary", "scale", "raw"] = "trinary"
+
+    @model_validator(mode="after")
+    def _thresholds_in_order(self) -> RosMap:
+        if self.free_thresh > self.occupied_thresh:
+            raise ValueError(
+                f"free_thresh {self.free_thresh:g} is above occupied_thresh "
+                f"{self.occupied_thresh:g}"
+            )
+        return self
+
+
+def load_ros_map(path: str | Path) -> OccupancyGrid:
+    """Read a map in ROS map_server form (YAML beside PGM or PNG).
+
+    Occupied is above `occupied_thresh`, free below `free_thresh`, all else unknown. The
+    shade 205 of a trinary map is unknown whatever the thresholds: map_saver writes it for
+    cells never seen, and with a `free_thresh` above 0.196 they would pass for free.
+
+    Raises:
+        ConfigError: a missing or unknown key, a bad value, an image that cannot be read.
+    """
+    document = load_yaml(path)
+    config = validate(RosMap, document.data, document.error)
+    shades = _read_shades(document, config)
+    cells = np.ascontiguousarray(_classify(shades, config)[::-1])
+    return OccupancyGrid(config.resolution, Pose(*config.origin), cells)
+
+
+def _read_shades(document: Document, config: RosMap) -> NDArray[np.float64]:
+    """Brightness of each pixel, 0 to 1, shape `(rows, columns)`; NaN where transparent."""
+    from PIL import Image
+
+    file = document.file.parent / config.image
+    try:
+        with Image.open(file) as opened:
+            image = opened.convert("RGBA") if opened.mode == "P" else opened
+            depth = 65535 if image.mode.startswith("I") else 1 if image.mode == "1" else 255
+            pixels = np.asarray(image, float) / depth
+            bands = image.getbands()
+    except FileNotFoundError:
+        raise document.error(f"image {config.image!r} not found", ("image",)) from None
+    except (OSError, ValueError, SyntaxError) as error:
+        problem = f"image {config.image!r} cannot be read: {error}"
+        raise document.error(problem, ("image",)) from error
+    if pixels.ndim == 2:
+        return pixels
+    if bands[-1] != "A" or config.mode == "trinary":
+        # map_server averages all bands of a trinary map, opacity among them.
+        return np.asarray(pixels.mean(axis=2))
+    return np.where(pixels[..., -1] > 0, pixels[..., :-1].mean(axis=2), np.nan)
+
+
+def _classify(shades: NDArray[np.float64], config: RosMap) -> NDArray[np.uint8]:
+    """Occupancy of each pixel; comparisons with NaN are false, so transparent is unknown."""
+    if config.mode == "raw":
+        percent = np.round(shades * 255)
+        occupancy = np.where(percent <= 100, percent / 100, np.nan)
+    else:
+        occupancy = shades if config.negate else 1 - shades
+    cells = np.full(shades.shape, UNKNOWN, np.uint8)
+    cells[occupancy > config.occupied_thresh] = OCCUPIED
+    cells[occupancy < config.free_thresh] = FREE
+    if config.mode == "trinary" and not config.negate:
+        cells[np.abs(shades * 255 - UNKNOWN_SHADE) < 1e-6] = UNKNOWN
+    return cells
+
+
+def rasterise(floor: Any, walls: NDArray[np.float64], resolution: float) -> OccupancyGrid:
+    """The grid of a drawn plan.
+
+    Args:
+        floor: Shapely area that people and robots may stand on; all else is unknown.
+        walls: Segments `(n, 4)` [m]; cells that they pass through are occupied.
+        resolution: Side of a cell [m].
+    """
+    import shapely
+
+    box = np.array(floor.bounds)
+    low = np.floor(box[:2] / resolution) - 1
+    columns, rows = (np.ceil(box[2:] / resolution) + 1 - low).astype(int)
+    # Half a cell aside, so that walls at round coordinates run through the middle of cells.
+    corner = (low - 0.5) * resolution
+    grid = OccupancyGrid(
+        resolution,
+        Pose(float(corner[0]), float(corner[1]), 0.0),
+        np.full((rows + 1, columns + 1), UNKNOWN, np.uint8),
+    )
+    middles = grid.to_xy(*(np.indices(grid.cells.shape) + 0.5))
+    shapely.prepare(floor)
+    grid.cells[shapely.contains_xy(floor, middles[..., 0], middles[..., 1])] = FREE
+    for x1, y1, x2, y2 in walls:
+        steps = int(np.hypot(x2 - x1, y2 - y1) / (resolution / 4)) + 2
+        along = np.linspace((x1, y1), (x2, y2), steps)
+        column, row = ((along - corner) / resolution).astype(int).T
+        inside = (row >= 0) & (row <= rows) & (column >= 0) & (column <= columns)
+        grid.cells[row[inside], column[inside]] = OCCUPIED
+    return grid

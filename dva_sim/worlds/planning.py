@@ -1,0 +1,241 @@
+"""Ways through a site: short, and away from walls where there is room."""
+
+from __future__ import annotations
+
+import math
+from collections import OrderedDict
+from collections.abc import Callable, Hashable
+from functools import lru_cache
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dva_sim.worlds.maps import OccupancyGrid
+from dva_sim.worlds.site import Site
+
+CELL = 0.2  # side of a planning cell [m]
+COMFORT = 1.0  # nearer to a wall than this, a way costs more [m]
+SHYNESS = 4.0  # how much more, right at the wall
+STEP = 0.25  # between the points of a finished way [m]
+SNAP = 1.5  # how far to look for a planning cell around a start or goal [m]
+ROUNDS = 20  # of smoothing
+SPARE = 0.30  # on top of the clearance: so near to a wall may a rounded corner get [m]
+KEPT_FIELDS, KEPT_PATHS = 256, 2048
+
+Point = tuple[float, float]
+Floats = NDArray[np.float64]
+T = TypeVar("T")
+
+
+class Planner:
+    """Plans ways on a site and says what can be seen.
+
+    Planners of one grid and clearance share what they have worked out: the field of a goal
+    is solved once per process.
+
+    Args:
+        site: Where.
+        clearance: Radius that must fit [m].
+    """
+
+    def __init__(self, site: Site, clearance: float) -> None:
+        x1, y1, x2, y2 = site.walls.T
+        self._lines = np.stack([y1 - y2, x2 - x1, x1 * y2 - x2 * y1], axis=1)
+        self._ends = site.walls.reshape(-1, 2).T
+        self._roadmap = _roadmap(site.grid, clearance)
+
+    def path(self, start: Point, goal: Point) -> Floats | None:
+        """A way from `start` to `goal` [m].
+
+        It keeps the clearance except near ends that are closer to a wall, and runs in the
+        middle of doors and corridors.
+
+        Returns:
+            Points about `STEP` apart, shape `(n, 2)`, or None if there is no way.
+        """
+        way = self._roadmap.way(_plain(start), _plain(goal), self.line_of_sight)
+        return None if way is None else way.copy()
+
+    def distance(self, start: Point, goal: Point) -> float:
+        """Length of that way [m]; infinite if there is none."""
+        way = self._roadmap.way(_plain(start), _plain(goal), self.line_of_sight)
+        return math.inf if way is None else float(np.hypot(*np.diff(way, axis=0).T).sum())
+
+    def line_of_sight(self, a: Point, b: Point) -> bool:
+        """Whether no wall stands between two places [m].
+
+        A wall blocks when its ends lie on both sides of the line a-b and a and b on both
+        sides of the wall.
+        """
+        (ax, ay), (bx, by) = a, b
+        sides = self._lines @ np.array([[ax, bx], [ay, by], [1.0, 1.0]])
+        across = np.array([ay - by, bx - ax]) @ self._ends + (ax * by - bx * ay)
+        blocked = (sides[:, 0] * sides[:, 1] < 0) & (across[::2] * across[1::2] < 0)
+        return not blocked.any()
+
+
+def _plain(point: Point) -> Point:
+    return float(point[0]), float(point[1])
+
+
+@lru_cache(maxsize=8)
+def _roadmap(grid: OccupancyGrid, clearance: float) -> Roadmap:
+    return Roadmap(grid, clearance)
+
+
+class Roadmap:
+    """The free floor as a graph: one node per planning cell, at the roomiest point of it.
+
+    So a door stays passable, and is passed in its middle, wherever it lies on the lattice.
+
+    Args:
+        grid: What is free.
+        clearance: Radius that must fit [m].
+    """
+
+    def __init__(self, grid: OccupancyGrid, clearance: float) -> None:
+        self._grid, self._clearance = grid, clearance
+        block = max(1, round(CELL / grid.resolution))
+        shape = -(-np.array(grid.cells.shape) // block)
+        padding = [(0, int(n * block - k)) for n, k in zip(shape, grid.cells.shape, strict=True)]
+        split = np.pad(grid.clearance, padding).reshape(shape[0], block, shape[1], block)
+        blocks = split.swapaxes(1, 2).reshape(shape[0], shape[1], block * block)
+        best = blocks.argmax(axis=2)
+        rows = np.arange(shape[0])[:, None] * block + best // block
+        columns = np.arange(shape[1])[None, :] * block + best % block
+        self._room = blocks.max(axis=2)
+        self._at = grid.to_xy(rows + 0.5, columns + 0.5)
+        self._nodes = np.flatnonzero(self._room.ravel() >= clearance)
+        self._spots = self._at.reshape(-1, 2)[self._nodes]
+        self._graph = self._connect()
+        cos, sin = math.cos(grid.origin.heading), math.sin(grid.origin.heading)
+        self._corner = np.array([grid.origin.x, grid.origin.y])
+        self._turn = np.array([[cos, -sin], [sin, cos]]) / grid.resolution
+        self._clearances = grid.clearance.ravel()
+        self._fields: OrderedDict[Hashable, tuple[Floats, NDArray[np.int32]]] = OrderedDict()
+        self._ways: OrderedDict[Hashable, Floats | None] = OrderedDict()
+
+    def _connect(self) -> object:
+        """Eight neighbours, where their free discs overlap: then nothing is between them."""
+        from scipy.sparse import csr_array
+
+        number = np.arange(self._room.size).reshape(self._room.shape)
+        free = self._room >= self._clearance
+        pairs, costs = [], []
+        for down, right in ((0, 1), (1, 0), (1, 1), (1, -1)):
+            here = np.s_[: len(free) - down, max(0, -right) : free.shape[1] - max(0, right)]
+            there = np.s_[down:, max(0, right) : free.shape[1] + min(0, right)]
+            length = np.hypot(*np.moveaxis(self._at[there] - self._at[here], -1, 0))
+            joined = free[here] & free[there] & (length < self._room[here] + self._room[there])
+            price = 0.5 * (_price(self._room[here]) + _price(self._room[there]))
+            pairs.append(np.stack([number[here][joined], number[there][joined]]))
+            costs.append((length * price)[joined])
+        (a, b), cost = np.concatenate(pairs, axis=1), np.concatenate(costs)
+        return csr_array((cost, (a, b)), shape=(free.size, free.size))
+
+    def way(self, start: Point, goal: Point, sees: Callable[[Point, Point], bool]) -> Floats | None:
+        """The finished way between two points [m], kept for the next time."""
+        return _kept(self._ways, (start, goal), KEPT_PATHS, lambda: self._solve(start, goal, sees))
+
+    def _solve(
+        self, start: Point, goal: Point, sees: Callable[[Point, Point], bool]
+    ) -> Floats | None:
+        first, last = self._node_at(start, sees), self._node_at(goal, sees)
+        if first is None or last is None:
+            return None
+        costs, towards = _kept(self._fields, last, KEPT_FIELDS, lambda: self._field(last))
+        if math.isinf(costs[first]):
+            return None
+        chain = [first]
+        while chain[-1] != last:
+            chain.append(int(towards[chain[-1]]))
+        points = np.vstack([start, self._at.reshape(-1, 2)[chain], goal])
+        return self._relax(_resample(self._shorten(points)))
+
+    def _field(self, goal: int) -> tuple[Floats, NDArray[np.int32]]:
+        """Cost from every node to `goal`, and each node's next one on the way there."""
+        from scipy.sparse.csgraph import dijkstra
+
+        costs, towards = dijkstra(
+            self._graph,  # type: ignore[call-overload]
+            directed=False,
+            indices=goal,
+            return_predecessors=True,
+        )
+        return costs, towards
+
+    def _node_at(self, point: Point, sees: Callable[[Point, Point], bool]) -> int | None:
+        """The nearest node in sight of a point."""
+        gaps = np.hypot(*(self._spots - point).T)
+        near = np.flatnonzero(gaps <= SNAP)
+        for index in near[np.argsort(gaps[near], kind="stable")]:
+            x, y = self._spots[index].tolist()
+            if sees(point, (x, y)):
+                return int(self._nodes[index])
+        return None
+
+    def _room_at(self, points: Floats) -> Floats:
+        """Clearance at many points `(n, 2)` [m]."""
+        column, row = ((points - self._corner) @ self._turn).T.astype(np.intp)
+        cells = row * self._grid.cells.shape[1] + column
+        return np.asarray(self._clearances.take(cells, mode="clip"))
+
+    def _cost(self, a: Floats, b: Floats) -> float:
+        """Cost of the straight line a-b; infinite where it does not keep the clearance."""
+        length = math.hypot(b[0] - a[0], b[1] - a[1])
+        samples = np.linspace(a, b, 2 + int(length / self._grid.resolution))
+        room = self._room_at(samples)
+        if room[1:-1].min(initial=math.inf) < self._clearance:
+            return math.inf
+        return length * float(_price(room).mean())
+
+    def _shorten(self, points: Floats) -> Floats:
+        """Cut corners where the straight line costs no more than the way around."""
+        price, length = _price(self._room_at(points)), np.hypot(*np.diff(points, axis=0).T)
+        total = np.r_[0.0, np.cumsum(0.5 * length * (price[1:] + price[:-1]))]
+        kept, i = [0], 0
+        while i < len(points) - 1:
+            reach, step = i + 1, 8
+            while step:
+                j = min(reach + step, len(points) - 1)
+                good = j > reach and self._cost(points[i], points[j]) <= total[j] - total[i]
+                reach, step = (j, step * 2) if good else (reach, step // 2)
+            kept.append(reach)
+            i = reach
+        return points[kept]
+
+    def _relax(self, points: Floats) -> Floats:
+        """Round the corners: each point moves between its neighbours if room allows."""
+        room = np.minimum(self._room_at(points), COMFORT)
+        for half in range(2 * ROUNDS):
+            these = np.arange(1 + half % 2, len(points) - 1, 2)
+            moved = 0.5 * points[these] + 0.25 * (points[these - 1] + points[these + 1])
+            new = np.minimum(self._room_at(moved), COMFORT)
+            good = new >= np.minimum(0.9 * room[these], self._clearance + SPARE)
+            points[these[good]] = moved[good]
+        return points
+
+
+def _price(room: Floats) -> Floats:
+    """What a metre costs at a clearance [m]: 1 in the open, more near walls."""
+    lack: Floats = np.maximum(1.0 - room / COMFORT, 0.0)
+    return 1.0 + SHYNESS * lack**2
+
+
+def _resample(points: Floats) -> Floats:
+    """The same line with points about `STEP` apart [m]."""
+    along = np.r_[0.0, np.cumsum(np.hypot(*np.diff(points, axis=0).T))]
+    at = np.linspace(0.0, along[-1], 2 + int(along[-1] / STEP))
+    return np.stack([np.interp(at, along, points[:, 0]), np.interp(at, along, points[:, 1])], 1)
+
+
+def _kept(memory: OrderedDict[Hashable, T], key: Hashable, size: int, make: Callable[[], T]) -> T:
+    """The value kept for `key`, or a new one; the one not used for longest makes place."""
+    if key in memory:
+        memory.move_to_end(key)
+        return memory[key]
+    value = memory[key] = make()
+    if len(memory) > size:
+        memory.popitem(last=False)
+    return value

@@ -1,0 +1,165 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dva_sim.experiments.answer import Finding, Missed, answer
+
+DELAYS = (0.0, 0.05, 0.1, 0.25, 0.5, 1.0)
+
+
+def finding(mean, half_width=1.0, **changes):
+    """A finding whose band is `half_width` [s] wide on either side."""
+    mean = np.array(mean, dtype=float)
+    whole = Finding(
+        measure="drive_time_s",
+        in_excess=True,
+        factor="pattern",
+        first="req-rep",
+        second="latest-wins",
+        over="link.delay_s",
+        levels=DELAYS,
+        within={"profile": "default"},
+        mean=mean,
+        low=mean - half_width,
+        high=mean + half_width,
+        persons=24,
+        smallest_effect=2.0,
+    )
+    return replace(whole, **changes)
+
+
+def lead(found):
+    return answer(found).lead.replace("\N{NO-BREAK SPACE}", " ")
+
+
+def notes(found):
+    return " ".join(answer(found).notes).replace("\N{NO-BREAK SPACE}", " ")
+
+
+GROWING = [0.1, 0.2, 0.3, 3.0, 6.0, 14.2]
+
+
+def test_a_growing_effect_is_told_with_contrast_conditions_interval_and_reach():
+    text = lead(finding(GROWING))
+    assert text.startswith(
+        "With profile default, REQ/REP takes 14.2 s longer than latest-wins PUB/SUB "
+        "at a one-way delay of 1 s (95 % Monte Carlo band, given the model: 13.2 to 15.2 s). "
+        "The difference can be told from zero from 250 ms on."
+    )
+
+
+def test_where_there_is_no_effect_the_size_that_is_ruled_out_is_told():
+    assert "It cannot be told from zero up to 100 ms, where an effect above 1.3 s" in lead(
+        finding(GROWING)
+    )
+
+
+def test_without_any_effect_the_whole_range_is_ruled_out_and_compared_with_what_matters():
+    text = lead(finding([0.0] * 6))
+    assert "no difference between REQ/REP and latest-wins PUB/SUB can be told from zero" in text
+    assert "at any one-way delay tried (95 % Monte Carlo band, given the model)" in text
+    assert (
+        "An effect above 1.0 s either way is ruled out at every one-way delay tried, "
+        "and with it the 2 s declared to matter." in text
+    )
+
+
+def test_a_band_too_wide_to_rule_out_what_matters_says_that_more_persons_are_needed():
+    assert (
+        "The question stays open at every one-way delay tried: an effect as large as 5.0 s is "
+        "not ruled out, so more persons are needed." in lead(finding([0] * 6, half_width=5))
+    )
+
+
+def test_one_wide_level_does_not_blur_what_the_others_rule_out():
+    wide = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 80.0])
+    text = lead(finding([0, 0, 0, 0, 6.0, 20.0], half_width=wide))
+    assert "takes 6.0 s longer" in text
+    assert "up to 250 ms, where an effect above 1.0 s either way is ruled out" in text
+    assert "The question stays open at 1 s: an effect as large as 100 s" in text
+
+
+def test_the_opposite_direction_is_told_as_it_is():
+    text = lead(finding([0, 0, 0, 0, 0, -4.0]))
+    assert "REQ/REP takes 4.0 s less than latest-wins PUB/SUB" in text
+    assert "can be told from zero only there" in text
+
+
+def test_an_effect_that_turns_round_is_told_in_both_directions():
+    text = lead(finding([-3.0, -3.0, 0, 0, 5.0, 9.0]))
+    assert "takes 9.0 s longer" in text
+    assert "from 500 ms on" in text
+    assert "Elsewhere it turns round: REQ/REP takes 3.0 s less" in text
+    assert "up to 50 ms" in text
+
+
+def test_scattered_levels_are_named_one_by_one():
+    assert "from zero at 50 ms and 500 ms" in lead(finding([0, 3.0, 0, 0, 3.0, 0]))
+
+
+def test_an_effect_below_what_matters_is_not_sold_as_relevant():
+    text = lead(finding([1.0] * 6, half_width=0.5))
+    assert "at every one-way delay tried, but stays below the 2 s declared to matter" in text
+
+
+def test_one_person_gives_the_plain_mean_and_no_claim():
+    nothing = np.full(6, np.nan)
+    text = lead(finding(GROWING, low=nothing, high=nothing, persons=1))
+    assert text.startswith("Too few persons to answer: an interval needs at least two, here is one")
+    assert "In the runs that were made, with profile default, REQ/REP takes 14.2 s longer" in text
+    assert "Monte Carlo" not in text
+
+
+def test_persons_who_do_not_differ_give_no_interval():
+    nothing = np.full(6, np.nan)
+    text = lead(finding([0.0] * 6, low=nothing, high=nothing))
+    assert text.startswith("The difference is the same for every person")
+    assert "REQ/REP equals latest-wins PUB/SUB" in text
+
+
+def test_without_any_complete_pair_the_question_stays_open():
+    nothing = np.full(6, np.nan)
+    text = lead(finding(nothing, low=nothing, high=nothing, persons=0))
+    assert text == "No pair of runs is complete, so the question stays open."
+
+
+def test_a_level_without_runs_is_named():
+    assert "Nothing can be said at a one-way delay of 500 ms: runs are missing." in lead(
+        finding([0, 0, 0, 0, np.nan, 0])
+    )
+
+
+def test_missed_confirmations_are_told_per_pattern_with_the_horizon():
+    missed = (Missed("req-rep", 14, 120), Missed("latest-wins", 0, 120))
+    text = notes(finding(GROWING, missed=missed, horizon=300.0))
+    assert (
+        "Not confirmed at a one-way delay of 1 s: REQ/REP 12 % (14 of 120) and "
+        "latest-wins PUB/SUB 0 % (0 of 120)" in text
+    )
+    assert "whole horizon of 300 s" in text
+
+
+def test_that_nothing_was_missed_is_told_too():
+    missed = (Missed("req-rep", 0, 120), Missed("latest-wins", 0, 120))
+    assert "Every event was confirmed at a one-way delay of 1 s" in notes(
+        finding(GROWING, missed=missed)
+    )
+
+
+def test_the_notes_say_what_is_measured_and_over_how_many_persons():
+    text = notes(finding(GROWING))
+    assert "driving time to confirmation, in excess of the reference run" in text
+    assert "24 simulated persons" in text
+
+
+@pytest.mark.parametrize("mean", [[3.0], [0.0]])
+def test_a_study_of_one_factor_gets_a_sentence_without_a_range(mean):
+    text = lead(finding(mean, over="", levels=(None,), within={}, smallest_effect=None))
+    assert "throughout" in text
+    assert "one-way delay" not in text
+
+
+def test_another_measure_is_compared_in_its_own_unit():
+    text = lead(finding(GROWING, measure="path_m", in_excess=False, smallest_effect=None))
+    assert "REQ/REP lies 14.2 m above latest-wins PUB/SUB" in text

@@ -1,0 +1,82 @@
+import numpy as np
+import pytest
+import synthetic_study
+
+from dva_sim.experiments.cadence import Cadence
+from dva_sim.experiments.effects import Factor, Part, View
+from dva_sim.experiments.figures.ground import Ways
+from dva_sim.experiments.figures.story import Events, fates
+from dva_sim.experiments.figures.style import _apart, colours, place_of
+
+DELAY = Factor("link.delay_s", (0.0, 0.05, 0.1, 0.25, 0.5, 1.0))
+PATTERN = Factor("pattern", ("req-rep", "pub-sub", "latest-wins"))
+PROFILE = Factor("profile", ("default", "dissertation"))
+
+
+@pytest.fixture(scope="module")
+def view():
+    runs = synthetic_study.columns(synthetic_study.drive_rows(2, 1))
+    part = Part(runs, "drive", [PATTERN, DELAY, PROFILE])
+    return View(part, "drive_time_s", PATTERN, DELAY, None, {"profile": "default"})
+
+
+def test_lock_step_falls_behind_where_round_trip_and_processing_fill_the_period():
+    wanted = Cadence(period_s=0.1, processing_s=0.05)
+    assert wanted.boundary_s == pytest.approx(0.025)
+    assert wanted.lock_step_rate(wanted.boundary_s) == pytest.approx(10.0)
+    assert wanted.lock_step_rate(0.0) == pytest.approx(10.0)
+    assert wanted.lock_step_rate(1.0) == pytest.approx(1 / 2.05)
+
+
+def test_a_delay_lies_between_the_evenly_spaced_levels_around_it():
+    assert place_of(DELAY, 0.025) == pytest.approx(0.5)
+    assert place_of(DELAY, 0.75) == pytest.approx(4.5)
+
+
+@pytest.mark.parametrize("delay", [-0.01, 1.5])
+def test_a_boundary_outside_the_levels_has_no_place(delay):
+    assert place_of(DELAY, delay) is None
+
+
+def test_a_pattern_keeps_its_colour_when_another_is_left_out():
+    assert colours(PATTERN)["req-rep"] == colours(Factor("pattern", ("req-rep",)))["req-rep"]
+
+
+def test_names_of_lines_that_end_together_are_moved_apart_within_the_axes():
+    placed = _apart([0.95, 0.96, 0.97], gap=0.1)
+    assert np.diff(placed).min() == pytest.approx(0.1)
+    assert max(placed) == pytest.approx(1.0)
+
+
+def test_every_event_has_a_fate_even_one_nobody_foresaw():
+    outcome = np.array(["confirmed", "confirmed", "expired", "open", "stolen"])
+    kind = np.array(["robot", "guard", "robot", "none", "none"])
+    assert fates(outcome, kind).tolist() == [
+        "confirmed by a robot",
+        "confirmed by a guard",
+        "expired",
+        "open at the end",
+        "other",
+    ]
+
+
+def test_shares_of_outcomes_add_up_to_one(view):
+    rows = synthetic_study.columns(synthetic_study.story_rows(4))
+    events = Events(rows, "story", view)
+    mask = events.under({"profile": "default"}, "req-rep", 1.0)
+    assert mask.sum() == 8
+    assert sum(events.shares(mask).values()) == pytest.approx(1.0)
+
+
+def test_a_way_is_found_by_its_pattern_delay_and_profile(view):
+    rows = synthetic_study.track_rows()
+    ways = Ways(synthetic_study.columns(rows), view)
+    (way,) = ways.under("pub-sub", 0.25)
+    wanted = [
+        (r["x_m"], r["y_m"])
+        for r in rows
+        if (r["pattern"], r["link.delay_s"], r["profile"]) == ("pub-sub", 0.25, "default")
+        and not r["is_reference"]
+    ]
+    np.testing.assert_array_equal(way, wanted)
+    assert len(ways.reference()) == 1

@@ -1,0 +1,153 @@
+import html
+import re
+
+import pytest
+import synthetic_study
+
+from dva_sim.errors import ConfigError
+from dva_sim.experiments.report import write_report
+
+FIGURES = [
+    "differences",
+    "levels",
+    "distributions",
+    "command_age",
+    "command_rate",
+    "delay_budget",
+    "trajectories",
+    "story_times",
+    "story_outcomes",
+]
+
+
+def words(report):
+    """The page as a reader sees it, without styles and pictures."""
+    page = re.sub(r"<style>.*?</style>", "", report.read_text(encoding="utf-8"), flags=re.S)
+    return " ".join(html.unescape(re.sub(r"<[^>]+>", " ", page)).split())
+
+
+def of_one_profile(rows):
+    """One profile is enough for most promises, and half the panels to draw."""
+    return [row for row in rows if row["profile"] != "dissertation"]
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory):
+    tables = {
+        "runs": of_one_profile(synthetic_study.drive_rows(6, 2, effect_s=30.0, missed=0.5)),
+        "events": of_one_profile(synthetic_study.story_rows(6)),
+        "tracks": of_one_profile(synthetic_study.track_rows()),
+    }
+    facts = synthetic_study.manifest(6, 2)
+    facts["study"]["factors"] |= {"profile": ["default"]}
+    return write_report(
+        synthetic_study.write(tmp_path_factory.mktemp("study") / "results", tables, facts)
+    )
+
+
+def test_the_report_finds_the_effect_that_was_put_in(report):
+    text = words(report)
+    assert re.search(
+        r"With profile default, REQ/REP takes [\d.]+ s longer than latest-wins PUB/SUB at a "
+        r"one-way delay of 500 ms \(95 % Monte Carlo band, given the model: [\d.]+ to",
+        text,
+    )
+
+
+def test_the_report_says_how_many_events_were_missed(report):
+    text = words(report)
+    assert re.search(r"Not confirmed at a one-way delay of 1 s: REQ/REP \d+ % \(\d of 12\)", text)
+    assert re.search(r"The question stays open at [^:]+ and 1 s: an effect as large as", text)
+
+
+def test_the_conditions_are_stated_and_the_time_out_is_checked(report):
+    text = words(report)
+    assert "processing time of a command at the robot 50 ms 50 ms" in text
+    assert "one-way delay varied varied" in text
+    assert "The time-out is above four round trips and the processing time" in text
+
+
+def test_the_report_needs_nothing_but_itself(report):
+    page = report.read_text(encoding="utf-8")
+    sources = re.findall(r'(?:src|href)="([^"]{0,20})', page)
+    assert len(sources) == len(FIGURES)
+    assert all(source.startswith("data:image/svg+xml") for source in sources)
+    assert "<script" not in page
+    assert "url(" not in page
+
+
+def test_the_figures_come_in_order_and_as_files(report):
+    page = report.read_text(encoding="utf-8")
+    assert re.findall(r'<figure id="(\w+)"', page) == FIGURES
+    files = {path.name for path in (report.parent / "figures").iterdir()}
+    assert files == {f"{name}.{ending}" for name in FIGURES for ending in ("svg", "png")}
+
+
+def test_the_report_made_again_has_the_same_bytes(report):
+    files = [report, *sorted((report.parent / "figures").iterdir())]
+    before = [path.read_bytes() for path in files]
+    write_report(report.parent)
+    assert [path.read_bytes() for path in files] == before
+
+
+def test_every_cell_has_its_row(report):
+    rows = re.findall(r"<tr.*?</tr>", report.read_text(encoding="utf-8"))
+    cells = [row for row in rows if row.count("<td") > 3]
+    assert len(cells) == 3 * 6
+
+
+def test_a_study_that_went_as_declared_is_not_called_exploratory(report):
+    assert "exploratory" not in words(report)
+
+
+def test_a_poor_study_is_reported_for_what_it_is(tmp_path):
+    runs = [r for r in synthetic_study.drive_rows(1, 1) if r["link.delay_s"] != 0.5]
+    runs[1]["violations"] = 2
+    facts = synthetic_study.manifest(
+        1,
+        1,
+        set=["replications=1", "robot.count=1"],
+        failures=[{"part": "drive", "error": "robot-1 left the world"}],
+    )
+    text = words(write_report(synthetic_study.write(tmp_path / "r", {"runs": runs}, facts)))
+    assert "exploratory" in text
+    assert "replications=1 , robot.count=1" in text
+    assert "Too few persons to answer" in text
+    assert "Runs that failed and are missing below: 1 (robot-1 left the world)" in text
+    assert "Safety invariants were broken in 1 runs" in text
+    assert "6 of 36 cells have no run" in text
+
+
+def test_a_study_of_other_factors_and_without_an_answer_is_shown_all_the_same(tmp_path):
+    runs = [
+        {"part": "walk", "person": person, "trial": 0, "seed": person, "is_reference": False}
+        | {"guard.count": guards, "dispatch.policy": policy, "response_s": 60 / guards + person}
+        for person in range(3)
+        for guards in (1, 2, 4)
+        for policy in ("nearest", "min_eta")
+    ]
+    facts = {
+        "study": {
+            "question": "How many guards?",
+            "persons": 3,
+            "replications": 1,
+            "factors": {"dispatch.policy": ["nearest", "min_eta"], "guard.count": [1, 2, 4]},
+        }
+    }
+    report = write_report(synthetic_study.write(tmp_path / "r", {"runs": runs}, facts))
+    text = words(report)
+    assert "not declared or not run" in text
+    assert "Response time under each dispatch policy" in text
+    assert "guard count" in text
+    assert 'id="command_rate"' not in report.read_text(encoding="utf-8")
+
+
+def test_a_study_of_which_no_run_was_completed_says_so(tmp_path):
+    facts = synthetic_study.manifest(2, 1, failures=[{"error": "no site"}])
+    text = words(write_report(synthetic_study.write(tmp_path / "r", {}, facts)))
+    assert "No run was completed" in text
+
+
+def test_a_folder_without_results_is_refused_in_one_line(tmp_path):
+    with pytest.raises(ConfigError, match="holds no finished results"):
+        write_report(tmp_path)

@@ -1,0 +1,193 @@
+import math
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from dva_sim.experiments import statistics
+
+
+def test_a_persons_mean_leaves_out_missing_runs_and_missing_persons():
+    persons, means = statistics.person_means([1, 3, np.nan, 5, np.nan], [7, 7, 7, 2, 9])
+    assert persons.tolist() == [2, 7]
+    assert means.tolist() == [5, 2]
+
+
+def test_the_interval_of_a_paired_difference_is_students_on_person_means():
+    rng = np.random.default_rng(3)
+    a, b = rng.gamma(2, 1, (24, 5)), rng.gamma(2, 1, (24, 5))
+    person = np.repeat(np.arange(24), 5)
+    found = statistics.paired_difference(a.ravel(), b.ravel(), person)
+    exact = stats.ttest_1samp((a - b).mean(axis=1), 0).confidence_interval(0.95)
+    assert (found.low, found.high) == pytest.approx(tuple(exact), rel=1e-12)
+    assert found.mean == pytest.approx((a - b).mean())
+    assert found.n_persons == 24
+
+
+def test_trials_of_one_person_do_not_narrow_the_interval():
+    one = statistics.mean_interval([1, 2, 4], [0, 1, 2])
+    many = statistics.mean_interval(np.repeat([1, 2, 4], 100), np.repeat([0, 1, 2], 100))
+    assert (many.low, many.high) == pytest.approx((one.low, one.high))
+
+
+def test_one_person_has_a_mean_but_no_interval():
+    for found in (
+        statistics.mean_interval([1, 3], [0, 0]),
+        statistics.quantile_interval([1, 3], [0, 0]),
+        statistics.share_interval([1, 3], [0, 0]),
+    ):
+        assert found.mean == 2
+        assert math.isnan(found.low)
+        assert math.isnan(found.high)
+        assert found.n_persons == 1
+
+
+def test_nobody_at_all_gives_nan_everywhere():
+    for make in (
+        statistics.mean_interval,
+        statistics.quantile_interval,
+        statistics.share_interval,
+    ):
+        found = make([np.nan], [0])
+        assert math.isnan(found.mean)
+        assert found.n_persons == 0
+
+
+def test_the_paired_interval_covers_a_skewed_truth_nineteen_times_in_twenty():
+    rng = np.random.default_rng(11)
+    studies, persons, trials = 2000, 24, 5
+    skill = rng.lognormal(0, 0.4, (studies, persons, 1))
+    slow = 30 * skill * rng.lognormal(0, 0.3, (studies, persons, trials))
+    fast = 24 * skill * rng.lognormal(0, 0.3, (studies, persons, trials))
+    truth = 6 * math.exp(0.4**2 / 2 + 0.3**2 / 2)
+    who = np.repeat(np.arange(persons), trials)
+    found = [
+        statistics.paired_difference(a.ravel(), b.ravel(), who)
+        for a, b in zip(slow, fast, strict=True)
+    ]
+    covered = np.mean([f.low <= truth <= f.high for f in found])
+    assert 0.93 <= covered <= 0.97
+
+
+def skewed(rng: np.random.Generator, persons: int, levels: int) -> np.ndarray:
+    """Correlated, log-normal differences whose true mean is zero."""
+    common = rng.normal(size=(persons, 1))
+    own = rng.normal(size=(persons, levels))
+    return np.exp(0.5 * (0.8 * common + 0.6 * own)) - math.exp(0.125)
+
+
+def test_the_band_covers_all_levels_at_once():
+    rng = np.random.default_rng(5)
+    inside = []
+    for _ in range(400):
+        band = statistics.band(skewed(rng, 24, 6), resamples=500)
+        inside.append(np.all((band.low <= 0) & (band.high >= 0)))
+    assert 0.90 <= np.mean(inside) <= 0.98
+
+
+def test_the_band_is_wider_than_each_levels_own_interval():
+    band = statistics.band(skewed(np.random.default_rng(6), 24, 6))
+    assert np.all(band.low < band.pointwise_low)
+    assert np.all(band.high > band.pointwise_high)
+    assert np.allclose(band.high - band.mean, band.mean - band.low)
+
+
+def test_levels_that_move_together_need_a_narrower_band_than_independent_ones():
+    rng = np.random.default_rng(7)
+    free = rng.normal(size=(40, 6))
+    bound = free[:, :1] + 0.01 * rng.normal(size=(40, 6))
+    assert statistics.band(bound).critical < statistics.band(free).critical - 0.3
+
+
+def test_a_level_of_the_band_alone_is_students_interval():
+    values = np.random.default_rng(8).normal(size=(24, 3))
+    band = statistics.band(values)
+    exact = stats.ttest_1samp(values, 0).confidence_interval(0.95)
+    assert np.allclose(band.pointwise_low, exact.low)
+    assert np.allclose(band.pointwise_high, exact.high)
+
+
+def test_the_same_differences_give_the_same_band():
+    values = skewed(np.random.default_rng(9), 24, 4)
+    assert statistics.band(values).critical == statistics.band(values).critical
+
+
+def test_few_persons_get_bonferronis_band():
+    values = np.random.default_rng(10).normal(size=(3, 4))
+    assert statistics.band(values).critical == pytest.approx(stats.t.isf(0.025 / 4, 2))
+
+
+def test_a_band_over_one_person_has_means_only():
+    band = statistics.band([[1.0, 2.0]])
+    assert band.mean.tolist() == [1, 2]
+    assert np.isnan([*band.low, *band.high, band.critical]).all()
+
+
+def test_a_band_over_nobody_is_nan():
+    band = statistics.band(np.full((3, 2), np.nan))
+    assert np.isnan(band.mean).all()
+    assert band.n_persons == 0
+
+
+def test_missing_cells_leave_the_other_levels_of_the_band_alone():
+    values = skewed(np.random.default_rng(12), 24, 3)
+    values[:, 1] = np.nan
+    values[0, 2] = np.nan
+    band = statistics.band(values)
+    assert np.isfinite(band.low).tolist() == [True, False, True]
+    assert band.mean[2] == pytest.approx(values[1:, 2].mean())
+
+
+def test_a_level_without_spread_has_a_band_without_width():
+    values = np.column_stack([np.full(24, 0.1), np.random.default_rng(13).normal(size=24)])
+    band = statistics.band(values)
+    assert band.low[0] == band.high[0] == pytest.approx(0.1)
+    assert band.low[1] < band.high[1]
+
+
+def test_weighted_quantiles_are_those_of_repeated_values():
+    ranked, weights = np.array([1.0, 2.0, 5.0, 9.0]), np.array([[2, 0, 3, 1], [1, 1, 1, 0]])
+    for q in (0.05, 0.5, 0.9):
+        found = statistics._weighted_quantiles(ranked, weights.astype(float), q)
+        expected = [np.quantile(np.repeat(ranked, w), q) for w in weights]
+        assert found == pytest.approx(expected)
+
+
+def test_the_interval_of_a_median_covers_it_nineteen_times_in_twenty():
+    rng = np.random.default_rng(14)
+    who = np.repeat(np.arange(24), 5)
+    inside = []
+    for _ in range(400):
+        values = np.exp(rng.normal(size=(24, 1)) + 0.5 * rng.normal(size=(24, 5)))
+        found = statistics.quantile_interval(values.ravel(), who, resamples=400)
+        inside.append(found.low <= 1 <= found.high)
+    assert 0.91 <= np.mean(inside) <= 0.98
+
+
+def test_a_share_over_persons_who_never_differ_counts_each_person_once():
+    found = statistics.share_interval(np.ones(120), np.repeat(np.arange(24), 5))
+    t = stats.t.isf(0.025, 23)
+    assert found.mean == found.high == 1
+    assert found.low == pytest.approx(24 / (24 + t**2))
+
+
+def test_clustered_failures_widen_the_interval_of_a_share():
+    person = np.repeat(np.arange(24), 5)
+    clustered = person < 6
+    spread = np.arange(120) % 4 == 0
+    wide, narrow = (statistics.share_interval(f, person) for f in (clustered, spread))
+    assert wide.mean == narrow.mean == 0.25
+    assert wide.high - wide.low > 1.5 * (narrow.high - narrow.low)
+
+
+def test_pairs_correlate_as_much_as_they_share():
+    rng = np.random.default_rng(15)
+    common, own = rng.normal(size=(2, 100_000)), rng.normal(size=(2, 100_000))
+    found = statistics.pair_correlation(3 * common[0] + own[0], 3 * common[0] + own[1])
+    assert found == pytest.approx(0.9, abs=0.01)
+    assert statistics.pair_correlation([1, 2, np.nan], [2, 4, 0]) == pytest.approx(1)
+
+
+def test_no_correlation_where_one_side_never_varies():
+    assert math.isnan(statistics.pair_correlation([1, 1, 1], [1, 2, 3]))
+    assert math.isnan(statistics.pair_correlation([1], [2]))

@@ -1,0 +1,118 @@
+"""Small studies with cheap episodes, and a runner that can be killed from outside.
+
+Run as `python -m small_study STUDY OUT JOBS` it prints the number of runs done so far.
+"""
+
+import math
+import os
+import signal
+import sys
+from pathlib import Path
+
+from dva_sim.experiments.design import Job
+from dva_sim.experiments.journal import Tables
+from dva_sim.experiments.runner import run_study
+from dva_sim.experiments.study import Study, load_study
+
+STUDY = """\
+question: Which is quicker?
+seed: 3
+persons: 3
+replications: 2
+factors:
+  pattern: [req-rep, latest-wins]
+  link.delay_s: [0, 0.25]
+parts:
+  drive:
+    scenario: one.yaml
+    reference: {operator.strategy: oracle}
+  story:
+    scenario: one.yaml
+    replications: 1
+answer:
+  part: drive
+  measure: drive_time_s
+  factor: pattern
+  contrast: [req-rep, latest-wins]
+  over: link.delay_s
+  smallest_effect_s: 2.0
+"""
+RUNS = 6 + 4 * 6 + 4 * 3
+
+
+def write_study(folder: Path, text: str = STUDY) -> Path:
+    (folder / "one.yaml").write_text("description: one robot\nhorizon_s: 60\n")
+    path = folder / "study.yaml"
+    path.write_text(text)
+    return path
+
+
+def study_in(folder: Path, *settings: str, text: str = STUDY) -> Study:
+    return load_study(write_study(folder, text), settings)
+
+
+def cheap(job: Job) -> Tables:
+    """Rows of every kind, with awkward floats, from the seed alone."""
+    time = math.sqrt(job.seed) + job.scenario.link.delay_s
+    run = {
+        "drive_time_s": time,
+        "confirmed": job.seed % 3 > 0,
+        "round_trip_s": math.nan if job.seed % 2 else time / 7,
+        "outcome": "confirmed" if job.seed % 3 else None,
+        "contacts": job.seed % 5,
+    }
+    track = [{"t_s": 0.1 * i, "x_m": 1 / (i + 1)} for i in range(3)] if job.trial == 0 else []
+    return {"runs": [run], "tracks": track}
+
+
+def slower(job: Job) -> Tables:
+    """The same at a cost that leaves time to be interrupted."""
+    sum(math.sin(i) for i in range(200_000))
+    return cheap(job)
+
+
+def unlucky(job: Job) -> Tables:
+    """One run of the reference fails."""
+    if job.is_reference and (job.person, job.trial) == (1, 0):
+        raise RuntimeError("the robot fell\ninto a hole")
+    return cheap(job)
+
+
+def deadly(job: Job) -> Tables:
+    """One run always takes its process with it."""
+    if job.part == "story" and job.index == 2 and job.person == 1:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return cheap(job)
+
+
+def deadly_once(mark: Path, job: Job) -> Tables:
+    """One run takes its process with it, the first time only."""
+    if job.part == "story" and job.index == 2 and job.person == 1 and not mark.exists():
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return cheap(job)
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    """All that must be the same bytes."""
+    names = [*sorted((folder / "tables").glob("*")), folder / "manifest.json"]
+    return {path.name: path.read_bytes() for path in names}
+
+
+def main() -> None:
+    study, out, jobs = sys.argv[1:]
+    try:
+        run_study(
+            load_study(study),
+            out,
+            jobs=int(jobs),
+            episode=slower,
+            progress=lambda done, _: print(done, flush=True),
+        )
+    except KeyboardInterrupt as stop:
+        print(stop, flush=True)
+        sys.exit(130)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,201 @@
+"""A results folder of SYNTHETIC numbers: shaped like a study's, but nothing was simulated.
+
+It exists to test figures and reports. Request/reply is made slower as delay grows, by an
+effect the caller knows, so that tests can say what a report must find.
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+PATTERNS = ["req-rep", "pub-sub", "latest-wins"]
+DELAYS = [0.0, 0.05, 0.1, 0.25, 0.5, 1.0]
+PROFILES = ["default", "dissertation"]
+HORIZON_S = 300.0
+PROCESSING_S = 0.05
+WANTED_PERIOD_S = {"default": 0.1, "dissertation": 0.5}
+FACTORS = {"pattern": PATTERNS, "link.delay_s": DELAYS, "profile": PROFILES}
+SCENARIO = {
+    "site": {"name": "caparica", "map": None},
+    "robot": {"count": 1, "processing_s": PROCESSING_S, "watchdog_s": 3.0, "max_age_s": 6.0},
+    "command": {"rate_hz": 10.0, "timeout_s": 9.0, "attempts": 3},
+    "link": {"delay_s": 0.0, "jitter_s": 0.0, "loss": 0.0, "rate_bps": 2e7},
+    "camera": {"rate_hz": 10.0, "frame_bytes": 12000},
+    "horizon_s": HORIZON_S,
+}
+Rows = list[dict[str, Any]]
+
+
+def manifest(persons: int, trials: int, **changes: Any) -> dict[str, Any]:
+    """What a runner would write beside the tables."""
+    study = {
+        "question": "REQ/REP or PUB/SUB for driving a robot by tilt, as delay grows?",
+        "seed": 1,
+        "persons": persons,
+        "replications": trials,
+        "factors": dict(FACTORS),
+        "parts": {"drive": {"scenario": "drive-to-event"}, "story": {"scenario": "fire-drill"}},
+        "answer": {
+            "part": "drive",
+            "measure": "drive_time_s",
+            "factor": "pattern",
+            "contrast": ["req-rep", "latest-wins"],
+            "over": "link.delay_s",
+            "within": {"profile": "default"},
+            "smallest_effect_s": 2.0,
+        },
+    }
+    whole = {
+        "question": study["question"],
+        "study": study,
+        "scenarios": {"drive": SCENARIO, "story": SCENARIO},
+        "set": [],
+        "versions": {"dva-sim": "synthetic"},
+    }
+    return whole | changes
+
+
+def drive_rows(persons: int, trials: int, effect_s: float = 12.0, missed: float = 0.1) -> Rows:
+    """Runs of the part `drive`; request/reply costs `effect_s` more at a delay of 1 s.
+
+    Args:
+        persons: Simulated persons.
+        trials: Trials of each.
+        effect_s: What request/reply adds at 1 s, growing with the delay squared.
+        missed: Share of request/reply runs not confirmed at 1 s.
+    """
+    rng = np.random.default_rng(1)
+    rows: Rows = []
+    for person, trial in itertools.product(range(persons), range(trials)):
+        skill, way = rng.lognormal(0, 0.25), rng.uniform(35, 55)
+        base = {"part": "drive", "person": person, "trial": trial, "seed": 1000 * person + trial}
+        rows.append(
+            base
+            | _treatment("latest-wins", 0.0, "ideal")
+            | _run(way, True)
+            | {"is_reference": True}
+        )
+        for pattern, delay, profile in itertools.product(PATTERNS, DELAYS, PROFILES):
+            slower = effect_s * delay**2 * (pattern == "req-rep") + 1.5 * delay * (
+                pattern == "pub-sub"
+            )
+            own = skill * (4 + 25 * delay + 6 * (profile == "dissertation"))
+            time = way + own + slower + rng.gamma(2.0, 0.8)
+            confirmed = not (pattern == "req-rep" and delay == 1.0 and rng.random() < missed)
+            run = _run(time if confirmed else HORIZON_S, confirmed)
+            run |= _commands(pattern, delay, profile, rng)
+            rows.append(base | _treatment(pattern, delay, profile) | run | {"is_reference": False})
+    return rows
+
+
+def story_rows(persons: int) -> Rows:
+    """Events of the part `story`: two for each person and cell."""
+    rng = np.random.default_rng(2)
+    rows: Rows = []
+    for person, event in itertools.product(range(persons), range(2)):
+        for pattern, delay, profile in itertools.product(PATTERNS, DELAYS, PROFILES):
+            kind = "robot" if rng.random() < 0.6 else "guard"
+            late = rng.random() < 0.05 + 0.2 * delay * (kind == "robot")
+            response = 20 + 30 * rng.random() + (25 * delay if kind == "robot" else 5)
+            rows.append(
+                {"part": "story", "person": person, "trial": 0, "seed": person}
+                | _treatment(pattern, delay, profile)
+                | {
+                    "is_reference": False,
+                    "event_id": event + 1,
+                    "kind": ("fire", "gas_leak")[event],
+                    "responder_kind": "none" if late else kind,
+                    "outcome": ("escalated", "undetected")[event] if late else "confirmed",
+                    "response_s": np.nan if late else response,
+                    "confirmation_s": np.nan if late else response + 4 * rng.random(),
+                }
+            )
+    return rows
+
+
+def track_rows() -> Rows:
+    """One way per cell of person 0, and that of the reference: round two corners."""
+    rng = np.random.default_rng(3)
+    corners = np.array([[12.0, 7.4], [12.0, 12.0], [27.5, 12.0], [27.5, 17.0]])
+    rows: Rows = []
+    cells = [("latest-wins", 0.0, "ideal", True)]
+    cells += [(*cell, False) for cell in itertools.product(PATTERNS, DELAYS, PROFILES)]
+    for pattern, delay, profile, is_reference in cells:
+        spread = 0.0 if is_reference else 0.1 + 0.8 * delay
+        sway = np.cumsum(rng.normal(0, 0.15, (61, 2)), axis=0) * spread
+        way = np.column_stack(
+            [np.interp(np.linspace(0, 3, 61), range(4), axis) for axis in corners.T]
+        )
+        for second, (x, y) in enumerate(way + sway):
+            rows.append(
+                {"part": "drive", "person": 0, "trial": 0, "seed": 0}
+                | _treatment(pattern, delay, profile)
+                | {"is_reference": is_reference, "agent": "robot-1", "t_s": float(second)}
+                | {"x_m": float(x), "y_m": float(y), "heading_rad": 0.0, "mode": "teleoperation"}
+            )
+    return rows
+
+
+def columns(rows: Rows) -> dict[str, Any]:
+    """Rows as columns; what a row does not say is nan."""
+    keys = dict.fromkeys(key for row in rows for key in row)
+    return {key: np.array([row.get(key, np.nan) for row in rows]) for key in keys}
+
+
+def write(folder: Path, tables: dict[str, Rows], facts: dict[str, Any]) -> Path:
+    """Write tables and manifest as a results folder."""
+    import duckdb
+
+    (folder / "tables").mkdir(parents=True)
+    for name, rows in tables.items():
+        with duckdb.connect() as connection:
+            connection.register("rows", columns(rows))
+            path = folder / "tables" / f"{name}.parquet"
+            connection.sql("select * from rows").write_parquet(str(path))
+    (folder / "manifest.json").write_text(json.dumps(facts), encoding="utf-8")
+    return folder
+
+
+def _treatment(pattern: str, delay: float, profile: str) -> dict[str, Any]:
+    cell = f"{pattern}/{delay:g}/{profile}"
+    return {"cell": cell, "pattern": pattern, "link.delay_s": delay, "profile": profile}
+
+
+def _run(time: float, confirmed: bool) -> dict[str, Any]:
+    return {
+        "confirmed": confirmed,
+        "outcome": "confirmed" if confirmed else "timeout",
+        "drive_time_s": time,
+        "violations": 0,
+    }
+
+
+def _commands(pattern: str, delay: float, profile: str, rng: np.random.Generator) -> dict[str, Any]:
+    period, lock_step = WANTED_PERIOD_S[profile], 2 * delay + PROCESSING_S
+    if pattern == "req-rep":
+        period = max(period, lock_step)
+    age = delay + PROCESSING_S + 0.02 * (pattern == "pub-sub")
+    ages = {
+        f"command_age_{q}_s": age * factor * rng.uniform(0.97, 1.03)
+        for q, factor in {"p05": 0.9, "p25": 0.95, "p50": 1, "p75": 1.2, "p95": 1.6}.items()
+    }
+    stages = {
+        "delay_human_s": 0.35,
+        "delay_filter_s": 0.07 if profile == "default" else 0.45,
+        "delay_sampling_s": period / 2,
+        "delay_uplink_s": delay,
+        "delay_processing_s": PROCESSING_S,
+        "delay_downlink_s": delay + 0.005,
+        "delay_frame_s": 0.05,
+    }
+    return (
+        {"command_rate_hz": 0.97 / period, "stop_share": 0.05 * delay, "contacts": 0}
+        | ages
+        | stages
+        | {"loop_delay_mean_s": sum(stages.values())}
+    )

@@ -1,0 +1,147 @@
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from dva_sim.errors import ConfigError
+from dva_sim.worlds.geo import Pose
+from dva_sim.worlds.maps import FREE, OCCUPIED, UNKNOWN, OccupancyGrid, load_ros_map, outline
+from dva_sim.worlds.site import map_site
+from PIL import Image
+
+MAPS = Path(__file__).parents[3] / "shared" / "maps"
+
+
+def write_map(folder, pixels, **changes):
+    """A ROS map of some grey values; `changes` replace or (None) remove keys."""
+    Image.fromarray(np.asarray(pixels, np.uint8)).save(folder / "map.pgm")
+    keys = {
+        "image": "map.pgm",
+        "resolution": 0.5,
+        "origin": "[0, 0, 0]",
+        "negate": 0,
+        "occupied_thresh": 0.65,
+        "free_thresh": 0.196,
+        **changes,
+    }
+    text = "".join(f"{key}: {value}\n" for key, value in keys.items() if value is not None)
+    (folder / "map.yaml").write_text(text)
+    return folder / "map.yaml"
+
+
+def test_black_is_occupied_white_is_free_and_205_is_unknown(tmp_path):
+    grid = load_ros_map(write_map(tmp_path, [[0, 254, 205]]))
+    assert grid.cells.tolist() == [[OCCUPIED, FREE, UNKNOWN]]
+
+
+def test_205_stays_unknown_even_when_the_free_threshold_is_above_its_shade(tmp_path):
+    grid = load_ros_map(write_map(tmp_path, [[204, 205, 206]], free_thresh=0.25))
+    assert grid.cells.tolist() == [[FREE, UNKNOWN, FREE]]
+
+
+def test_thresholds_are_exclusive_on_both_sides(tmp_path):
+    # Occupancy is (255 - shade) / 255: 0.8 for 51, 0.2 for 204.
+    path = write_map(tmp_path, [[50, 51, 52, 203, 204, 206]], occupied_thresh=0.8, free_thresh=0.2)
+    states = [OCCUPIED, UNKNOWN, UNKNOWN, UNKNOWN, UNKNOWN, FREE]
+    assert load_ros_map(path).cells.tolist() == [states]
+
+
+def test_negate_swaps_black_and_white(tmp_path):
+    grid = load_ros_map(write_map(tmp_path, [[0, 255, 120]], negate=1))
+    assert grid.cells.tolist() == [[FREE, OCCUPIED, UNKNOWN]]
+
+
+def test_raw_mode_reads_percent_and_takes_the_rest_for_unknown(tmp_path):
+    grid = load_ros_map(write_map(tmp_path, [[0, 100, 40, 255]], mode="raw"))
+    assert grid.cells.tolist() == [[FREE, OCCUPIED, UNKNOWN, UNKNOWN]]
+
+
+def test_the_last_image_row_is_the_lowest_in_y(tmp_path):
+    grid = load_ros_map(write_map(tmp_path, [[0, 0], [254, 0]], origin="[10, 20, 0]"))
+    assert grid.state_at(10.25, 20.25) == FREE
+    assert grid.state_at(10.25, 20.75) == OCCUPIED
+    assert grid.state_at(9.9, 20.25) == UNKNOWN
+
+
+def test_a_quarter_turn_of_the_origin_turns_the_map(tmp_path):
+    path = write_map(tmp_path, [[254, 0, 0]], origin=f"[1, 2, {math.pi / 2}]")
+    grid = load_ros_map(path)
+    assert grid.state_at(0.75, 2.25) == FREE
+    assert grid.state_at(0.75, 2.75) == OCCUPIED
+    assert grid.to_xy(0.5, 0.5) == pytest.approx([0.75, 2.25])
+
+
+def test_clearance_is_the_distance_to_the_next_wall_or_unknown_cell():
+    cells = np.full((9, 21), FREE, np.uint8)
+    cells[:, 0], cells[:, -1] = OCCUPIED, UNKNOWN
+    grid = OccupancyGrid(0.1, Pose(0, 0, 0), np.pad(cells, ((30, 30), (0, 0)), mode="edge"))
+    assert grid.clearance_at(0.55, 3.5) == pytest.approx(0.45)
+    assert grid.clearance_at(1.75, 3.5) == pytest.approx(0.25)
+
+
+def test_the_reachable_area_leaves_out_what_lies_behind_a_narrow_gap():
+    cells = np.full((20, 40), FREE, np.uint8)
+    cells[:, 25] = OCCUPIED
+    cells[9:11, 25] = FREE  # 0.2 m wide
+    grid = OccupancyGrid(0.1, Pose(0, 0, 0), cells)
+    reached = grid.reachable(0.3)
+    assert reached[10, 10]
+    assert not reached[10, 33]
+
+
+def test_a_rectangle_has_an_outline_of_four_segments():
+    cells = np.full((10, 10), UNKNOWN, np.uint8)
+    cells[2:5, 3:9] = FREE
+    grid = OccupancyGrid(0.1, Pose(0, 0, 0), cells)
+    walls = outline(grid, cells == FREE)
+    assert len(walls) <= 5  # a ring may start within a side
+    assert np.hypot(*(walls[:, 2:] - walls[:, :2]).T).sum() == pytest.approx(1.8)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"resolution": None}, "missing key 'resolution'"),
+        ({"resolution": -1}, "map.yaml:2:1: resolution"),
+        ({"occupied_tresh": 0.6}, "did you mean 'occupied_thresh'"),
+        ({"image": "gone.pgm"}, "map.yaml:1:1: image 'gone.pgm' not found"),
+        ({"image": "map.yaml"}, "cannot be read"),
+        ({"free_thresh": 0.9}, "free_thresh 0.9 is above occupied_thresh 0.65"),
+    ],
+)
+def test_a_mistake_in_a_map_is_told_in_one_line_with_its_place(tmp_path, changes, words):
+    path = write_map(tmp_path, [[254]], **changes)
+    with pytest.raises(ConfigError) as error:
+        load_ros_map(path)
+    assert words in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_a_map_without_room_for_a_robot_is_refused(tmp_path):
+    with pytest.raises(ConfigError, match="no known-free floor"):
+        map_site(write_map(tmp_path, [[0, 254, 0]], resolution=0.1), 1, 1, 1)
+
+
+def test_a_missing_map_is_refused():
+    with pytest.raises(ConfigError, match="not found"):
+        map_site("nowhere/gone.yaml", 1, 1, 1)
+
+
+def test_places_on_a_bare_map_depend_on_the_seed_and_not_on_the_size_of_the_team(tmp_path):
+    path = write_map(tmp_path, np.full((40, 60), 254), resolution=0.2)
+    small, large = map_site(path, 5, 1, 1), map_site(path, 5, 3, 2)
+    assert large.robot_bases[:1] == small.robot_bases
+    assert large.guard_posts[:1] == small.guard_posts
+    assert map_site(path, 6, 1, 1).robot_bases != small.robot_bases
+    assert {d.kind for d in small.detectors} == {"smoke", "gas", "water"}
+
+
+@pytest.mark.skipif(not MAPS.is_dir(), reason="recorded maps are not beside the project")
+@pytest.mark.parametrize("name", ["depot", "warehouse"])
+def test_a_recorded_map_becomes_a_site_of_few_walls_and_free_bases(name):
+    site = map_site(MAPS / f"{name}.yaml", 3, robots=3, guards=2)
+    assert len(site.walls) < 2000
+    reached = site.grid.reachable(0.30)
+    for pose in (*site.robot_bases, *site.guard_posts):
+        assert site.is_free(pose.x, pose.y, 0.30)
+        assert reached[site.grid.to_cell(pose.x, pose.y)]

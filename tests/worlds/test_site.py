@@ -1,0 +1,173 @@
+import json
+import math
+
+import numpy as np
+import pytest
+from dva_sim.errors import ConfigError
+from dva_sim.worlds.geo import GeoFrame
+from dva_sim.worlds.planning import Planner
+from dva_sim.worlds.site import load_site
+
+FRAME = GeoFrame(38.6612, -9.2058)
+
+
+def feature(kind, shape, points, **properties):
+    """A GeoJSON feature from points in metres."""
+    coordinates = [list(reversed(FRAME.to_latlon(x, y))) for x, y in points]
+    nested = {"Point": coordinates[0], "LineString": coordinates, "Polygon": [coordinates]}
+    geometry = {"type": shape, "coordinates": nested[shape]}
+    return {"type": "Feature", "properties": {"kind": kind, **properties}, "geometry": geometry}
+
+
+def square(x, y, size):
+    return [(x, y), (x + size, y), (x + size, y + size), (x, y + size), (x, y)]
+
+
+TWO_ROOMS = [
+    feature("room", "Polygon", square(0, 0, 4), name="west"),
+    feature("room", "Polygon", square(4, 0, 4), name="east"),
+    feature("wall", "LineString", square(0, 0, 4)),
+    feature("wall", "LineString", square(4, 0, 4)),
+    feature("door", "LineString", [(4, 1.5), (4, 2.5)]),
+]
+
+
+def write_site(folder, features, **changes):
+    keys = {
+        "name": "tiny",
+        "origin": "{latitude: 38.6612, longitude: -9.2058}",
+        "plan": "tiny.geojson",
+        **changes,
+    }
+    (folder / "tiny.yaml").write_text("".join(f"{k}: {v}\n" for k, v in keys.items()))
+    plan = {"type": "FeatureCollection", "features": features}
+    (folder / "tiny.geojson").write_text(json.dumps(plan, indent=1))
+    return folder / "tiny.yaml"
+
+
+# --- the shipped site ------------------------------------------------------------------
+
+
+def test_every_room_of_caparica_is_reached_from_every_base_by_a_robot():
+    site = load_site("caparica")
+    planner, rng = Planner(site, 0.30), np.random.default_rng(1)
+    for room in site.rooms:
+        goal = site.sample_free(rng, 0.35, room.name)
+        assert site.room_at(*goal) == room.name
+        for base in site.robot_bases:
+            assert math.isfinite(planner.distance((base.x, base.y), goal))
+
+
+def test_bases_posts_and_desks_of_caparica_stand_free():
+    site = load_site("caparica")
+    for pose in (*site.robot_bases, *site.guard_posts, *site.operator_desks):
+        assert site.is_free(pose.x, pose.y, 0.30)
+    assert {site.room_at(d.x, d.y) for d in site.operator_desks} == {"Control room"}
+
+
+def test_caparica_is_an_institute_of_40_by_24_metres_with_doors_a_robot_can_pass():
+    site = load_site("caparica")
+    assert site.extent == pytest.approx((0, 0, 40, 24), abs=0.01)
+    assert len(site.rooms) == 12 + 3
+    widths = np.hypot(*(site.doors[:, 2:] - site.doors[:, :2]).T)
+    assert widths.min() >= 1.09
+    assert widths.max() <= 1.31
+    for detector in site.detectors:
+        assert site.room_at(detector.x, detector.y) is not None
+
+
+def test_an_unknown_room_is_refused_with_the_rooms_there_are():
+    with pytest.raises(ConfigError, match=r"no room 'Archives'; did you mean 'Archive'\? rooms: "):
+        load_site("caparica").room("Archives")
+
+
+# --- the format ------------------------------------------------------------------------
+
+
+def test_a_door_opens_the_wall_it_lies_on(tmp_path):
+    site = load_site(write_site(tmp_path, TWO_ROOMS))
+    planner = Planner(site, 0.30)
+    assert planner.line_of_sight((3, 2), (5, 2))
+    assert not planner.line_of_sight((3, 3), (5, 3))
+    assert planner.distance((1, 2), (7, 2)) == pytest.approx(6, abs=0.1)
+
+
+def test_without_the_door_the_rooms_are_apart(tmp_path):
+    site = load_site(write_site(tmp_path, TWO_ROOMS[:-1]))
+    assert Planner(site, 0.30).path((1, 2), (7, 2)) is None
+
+
+def test_a_wall_drawn_as_an_area_is_solid(tmp_path):
+    shelf = feature("wall", "Polygon", square(1, 1, 1.5))
+    site = load_site(write_site(tmp_path, [*TWO_ROOMS, shelf]))
+    assert not site.is_free(1.75, 1.75, 0.0)
+    assert site.is_free(3.2, 1.75, 0.3)
+
+
+def test_poses_have_their_heading_in_radians(tmp_path):
+    base = feature("robot_base", "Point", [(1, 1)], heading_deg=90)
+    site = load_site(write_site(tmp_path, [*TWO_ROOMS, base]))
+    assert site.robot_bases[0] == pytest.approx((1, 1, math.pi / 2), abs=1e-3)
+
+
+def test_samples_are_free_inside_their_room_and_near_where_asked(tmp_path):
+    site, rng = load_site(write_site(tmp_path, TWO_ROOMS)), np.random.default_rng(2)
+    for _ in range(50):
+        x, y = site.sample_free(rng, 0.5, "east", near=(4.5, 0.5), within=1.5)
+        assert site.room_at(x, y) == "east"
+        assert site.is_free(x, y, 0.5)
+        assert math.dist((x, y), (4.5, 0.5)) < 1.6
+    with pytest.raises(ConfigError, match="no free place of 3 m radius"):
+        site.sample_free(rng, 3.0)
+
+
+def write_mistakes():
+    base = feature("robot_base", "Point", [(0.1, 1)])
+    window = feature("window", "LineString", [(0, 0), (1, 1)])
+    twice = feature("room", "Polygon", square(0, 4, 2), name="west")
+    point = feature("wall", "Point", [(1, 1)])
+    knot = [(0, 0), (2, 2), (2, 0), (0, 2), (0, 0)]
+    return {
+        "robot_base needs 0.3 m of free floor": [*TWO_ROOMS, base],
+        "unknown kind 'window'; known: wall, room": [*TWO_ROOMS, window],
+        "a room needs a name of its own, not 'west'": [*TWO_ROOMS, twice],
+        "a wall is drawn as LineString or MultiLineString or Polygon": [*TWO_ROOMS, point],
+        "crosses itself": [*TWO_ROOMS, feature("room", "Polygon", knot, name="knot")],
+        "is not a GeoJSON feature": [*TWO_ROOMS, {"type": "Feature"}],
+    }
+
+
+@pytest.mark.parametrize(("words", "features"), write_mistakes().items())
+def test_a_mistake_in_a_plan_is_told_with_line_and_column(tmp_path, words, features):
+    with pytest.raises(ConfigError) as error:
+        load_site(write_site(tmp_path, features))
+    assert words in str(error.value)
+    assert error.value.file.endswith("tiny.geojson")
+    assert error.value.line > 100
+    assert "feature 6" in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"plan": "gone.geojson"}, "tiny.yaml:3:1: plan 'gone.geojson' not found"),
+        ({"plam": "x"}, "unknown key 'plam'; did you mean 'plan'?"),
+        ({"origin": "{latitude: 138, longitude: 0}"}, "tiny.yaml:2:10: origin.latitude"),
+    ],
+)
+def test_a_mistake_in_a_site_file_is_told_with_its_place(tmp_path, changes, words):
+    with pytest.raises(ConfigError) as error:
+        load_site(write_site(tmp_path, TWO_ROOMS, **changes))
+    assert words in str(error.value)
+
+
+def test_a_plan_that_is_not_json_is_told_with_line_and_column(tmp_path):
+    path = write_site(tmp_path, TWO_ROOMS)
+    (tmp_path / "tiny.geojson").write_text('{"type": "FeatureCollection",\n "features": [}')
+    with pytest.raises(ConfigError, match=r"tiny.geojson:2:15: is not JSON"):
+        load_site(path)
+
+
+def test_a_missing_site_is_refused_with_the_sites_there_are():
+    with pytest.raises(ConfigError, match=r"world 'atlantis' not found; available: .*caparica"):
+        load_site("atlantis")
