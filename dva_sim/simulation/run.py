@@ -43,6 +43,7 @@ from dva_sim.worlds.planning import Planner
 from dva_sim.worlds.site import Site
 
 LAN = LinkConfig(delay_s=0.0005, rate_bps=1e9, queue_bytes=10_000_000)
+PHYSICS_TICK = 0.04  # two centimetres at top speed [s]
 WATCH_PERIOD = 0.5  # how often tracks are sampled and rules are checked [s]
 FILM_PERIOD = 0.1  # the same where pictures are wanted [s]
 ROBOT_PACE = 0.35  # what the DVA expects of a teleoperated robot [m/s]
@@ -116,7 +117,7 @@ class _Run:
         self._watch_period = FILM_PERIOD if self.keep_traffic else WATCH_PERIOD
         self.site = site_of(scenario, self.seed)
         self.planner = planner_of(self.site, robot_profile(scenario).radius_m)
-        self.world = World(self.site, 0.04)
+        self.world = World(self.site, PHYSICS_TICK)
         self.incidents = draw_incidents(scenario.events, self.site, self.streams)
         lan = Link(LAN, ConstantRate(LAN.rate_bps), self.streams, "lan")
         self._lan = lan, lan

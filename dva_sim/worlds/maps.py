@@ -179,15 +179,16 @@ def load_ros_map(path: str | Path) -> OccupancyGrid:
 
 
 def _read_shades(document: Document, config: RosMap) -> NDArray[np.float64]:
-    """Brightness of each pixel, 0 to 1, shape `(rows, columns)`; NaN where transparent."""
+    """Brightness of each pixel, 0 to 255, shape `(rows, columns)`; NaN where transparent."""
     from PIL import Image
 
     file = document.file.parent / config.image
     try:
         with Image.open(file) as opened:
-            image = opened.convert("RGBA") if opened.mode == "P" else opened
-            depth = 65535 if image.mode.startswith("I") else 1 if image.mode == "1" else 255
-            pixels = np.asarray(image, float) / depth
+            colours = "RGBA" if "transparency" in opened.info else "RGB"
+            image = opened.convert(colours) if opened.mode == "P" else opened
+            scale = 1 / 257 if image.mode.startswith("I") else 255 if image.mode == "1" else 1
+            pixels = np.asarray(image, float) * scale
             bands = image.getbands()
     except FileNotFoundError:
         raise document.error(f"image {config.image!r} not found", ("image",)) from None
@@ -205,15 +206,16 @@ def _read_shades(document: Document, config: RosMap) -> NDArray[np.float64]:
 def _classify(shades: NDArray[np.float64], config: RosMap) -> NDArray[np.uint8]:
     """Occupancy of each pixel; comparisons with NaN are false, so transparent is unknown."""
     if config.mode == "raw":
-        percent = np.round(shades * 255)
+        percent = np.round(shades)
         occupancy = np.where(percent <= 100, percent / 100, np.nan)
     else:
-        occupancy = shades if config.negate else 1 - shades
+        # Divided last: 1 - 204 / 255 would fall just below a threshold of 0.2.
+        occupancy = (shades if config.negate else 255 - shades) / 255
     cells = np.full(shades.shape, UNKNOWN, np.uint8)
     cells[occupancy > config.occupied_thresh] = OCCUPIED
     cells[occupancy < config.free_thresh] = FREE
     if config.mode == "trinary" and not config.negate:
-        cells[np.abs(shades * 255 - UNKNOWN_SHADE) < 1e-6] = UNKNOWN
+        cells[shades == UNKNOWN_SHADE] = UNKNOWN
     return cells
 
 

@@ -122,11 +122,12 @@ class Site:
         near: tuple[float, float] | None = None,
         within: float = 2.0,
     ) -> tuple[float, float]:
-        """A random point of the largest connected area where a disc of `clearance` [m] fits.
+        """A random free point that a robot can reach, or somebody slimmer if so asked.
 
         Args:
             rng: Source of luck.
-            clearance: Radius that must fit [m].
+            clearance: Radius that must fit at the point [m]; on the way there no more than a
+                robot's has to, or doors would part the site.
             room: Only inside this room.
             near: Only around this point [m] ...
             within: ... nearer than this [m].
@@ -152,7 +153,8 @@ class Site:
         """Flat indices of the cells that `sample_free` chooses from, kept for the next time."""
         key = clearance, room
         if key not in self._cache:
-            cells = np.flatnonzero(self.grid.reachable(clearance))
+            reached = self.grid.reachable(min(clearance, FOOTPRINT))
+            cells = np.flatnonzero(reached & (self.grid.clearance >= clearance))
             if room is not None:
                 import shapely
 

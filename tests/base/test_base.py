@@ -85,9 +85,13 @@ def test_a_mistake_is_told_by_file_line_and_column(
 ) -> None:
     path = tmp_path / "bad.yaml"
     path.write_text(text)
-    with pytest.raises(ConfigError) as caught:
+
+    def read() -> None:
         document = load_yaml(path)
         validate(Outer, document.data, document.error)
+
+    with pytest.raises(ConfigError) as caught:
+        read()
     line = str(caught.value)
     assert line.startswith(f"{path}:{place}"), line
     assert words in line

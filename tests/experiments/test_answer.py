@@ -65,6 +65,13 @@ def test_without_any_effect_the_whole_range_is_ruled_out_and_compared_with_what_
     )
 
 
+def test_levels_where_every_pair_is_equal_are_told_apart_from_those_that_are_settled():
+    half_width = np.array([0.0, 1.0, 1.0, 1.0, 1.0, 1.0])
+    text = lead(finding([0, 0.2, 0, 3.0, 6.0, 9.0], half_width=half_width))
+    assert "No person fares differently at 0." in text
+    assert "It cannot be told from zero at 50 ms and 100 ms, where an effect above 1.2 s" in text
+
+
 def test_a_band_too_wide_to_rule_out_what_matters_says_that_more_persons_are_needed():
     assert (
         "The question stays open at every one-way delay tried: an effect as large as 5.0 s is "
@@ -137,7 +144,7 @@ def test_missed_confirmations_are_told_per_pattern_with_the_horizon():
         "Not confirmed at a one-way delay of 1 s: REQ/REP 12 % (14 of 120) and "
         "latest-wins PUB/SUB 0 % (0 of 120)" in text
     )
-    assert "whole horizon of 300 s" in text
+    assert "all the time it was given (300 s)" in text
 
 
 def test_that_nothing_was_missed_is_told_too():

@@ -49,7 +49,7 @@ def test_the_report_finds_the_effect_that_was_put_in(report):
     text = words(report)
     assert re.search(
         r"With profile default, REQ/REP takes [\d.]+ s longer than latest-wins PUB/SUB at a "
-        r"one-way delay of 500 ms \(95 % Monte Carlo band, given the model: [\d.]+ to",
+        r"one-way delay of 1 s \(95 % Monte Carlo band, given the model: [\d.]+ to",
         text,
     )
 
@@ -57,7 +57,7 @@ def test_the_report_finds_the_effect_that_was_put_in(report):
 def test_the_report_says_how_many_events_were_missed(report):
     text = words(report)
     assert re.search(r"Not confirmed at a one-way delay of 1 s: REQ/REP \d+ % \(\d of 12\)", text)
-    assert re.search(r"The question stays open at [^:]+ and 1 s: an effect as large as", text)
+    assert re.search(r"The question stays open up to 250 ms: an effect as large as", text)
 
 
 def test_the_conditions_are_stated_and_the_time_out_is_checked(report):

@@ -191,3 +191,16 @@ def test_pairs_correlate_as_much_as_they_share():
 def test_no_correlation_where_one_side_never_varies():
     assert math.isnan(statistics.pair_correlation([1, 1, 1], [1, 2, 3]))
     assert math.isnan(statistics.pair_correlation([1], [2]))
+
+
+def test_a_level_at_which_most_persons_do_not_differ_does_not_make_the_band_endless():
+    rng = np.random.default_rng(4)
+    held, widest = 0, 0.0
+    for _ in range(300):
+        values = np.exp(0.6 * rng.normal(size=(12, 6))) - np.exp(0.18)
+        values[rng.random(12) < 0.8, 0] = 0.0
+        found = statistics.band(values, resamples=500)
+        held += bool(((found.low <= 0) & (found.high >= 0)).all())
+        widest = max(widest, found.critical)
+    assert 0.92 <= held / 300 <= 0.985
+    assert widest < 8

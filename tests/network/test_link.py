@@ -110,10 +110,10 @@ def test_a_bad_trace_is_refused_with_its_line(tmp_path: Path, text: str, words: 
 
 
 def test_a_missing_trace_is_named() -> None:
-    with pytest.raises(ConfigError, match="nowhere.up: trace cannot be read: No such file"):
+    with pytest.raises(ConfigError, match=r"nowhere\.up: trace cannot be read: No such file"):
         read_trace("nowhere.up")
 
 
 def test_jitter_above_the_delay_is_impossible() -> None:
-    with pytest.raises(ValueError, match="jitter_s 0.2 is above delay_s 0.1"):
+    with pytest.raises(ValueError, match=r"jitter_s 0\.2 is above delay_s 0\.1"):
         LinkConfig(delay_s=0.1, jitter_s=0.2)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import subprocess
 import sys
@@ -85,7 +86,7 @@ def test_no_safety_rule_is_broken_on_any_link(
 def test_request_reply_makes_commands_rarer_by_its_closed_form(delay: float) -> None:
     """Period = max(wanted period, round trip + processing), whole periods of the phone."""
     drive = run(pattern="req-rep", link__delay_s=delay).recorder.drives[0]
-    gaps = [b.time - a.time for a, b in zip(drive.applied, drive.applied[1:], strict=False)]
+    gaps = [b.time - a.time for a, b in itertools.pairwise(drive.applied)]
     expected = max(0.1, 2 * delay + 0.05)
     middle = sorted(gaps)[len(gaps) // 2]
     assert middle == pytest.approx(expected, abs=0.004)
@@ -94,7 +95,7 @@ def test_request_reply_makes_commands_rarer_by_its_closed_form(delay: float) -> 
 def test_publishing_keeps_the_wanted_rate_at_any_delay() -> None:
     for delay in (0.0, 1.0):
         drive = run(pattern="pub-sub", link__delay_s=delay).recorder.drives[0]
-        gaps = [b.time - a.time for a, b in zip(drive.applied, drive.applied[1:], strict=False)]
+        gaps = [b.time - a.time for a, b in itertools.pairwise(drive.applied)]
         assert sorted(gaps)[len(gaps) // 2] == pytest.approx(0.1, abs=0.002)
 
 

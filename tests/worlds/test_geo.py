@@ -3,6 +3,7 @@ import math
 import numpy as np
 import pymap3d
 import pytest
+
 from dva_sim.worlds.geo import GeoFrame
 
 CAPARICA = GeoFrame(38.6612, -9.2058)

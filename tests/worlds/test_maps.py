@@ -3,11 +3,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
+
 from dva_sim.errors import ConfigError
 from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.maps import FREE, OCCUPIED, UNKNOWN, OccupancyGrid, load_ros_map, outline
 from dva_sim.worlds.site import map_site
-from PIL import Image
 
 MAPS = Path(__file__).parents[3] / "shared" / "maps"
 

@@ -3,6 +3,7 @@ import math
 
 import numpy as np
 import pytest
+
 from dva_sim.errors import ConfigError
 from dva_sim.worlds.geo import GeoFrame
 from dva_sim.worlds.planning import Planner
@@ -110,7 +111,7 @@ def test_poses_have_their_heading_in_radians(tmp_path):
     assert site.robot_bases[0] == pytest.approx((1, 1, math.pi / 2), abs=1e-3)
 
 
-def test_samples_are_free_inside_their_room_and_near_where_asked(tmp_path):
+def test_samples_have_their_clearance_in_rooms_behind_doors_narrower_than_it(tmp_path):
     site, rng = load_site(write_site(tmp_path, TWO_ROOMS)), np.random.default_rng(2)
     for _ in range(50):
         x, y = site.sample_free(rng, 0.5, "east", near=(4.5, 0.5), within=1.5)

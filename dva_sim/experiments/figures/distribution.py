@@ -55,7 +55,7 @@ def distributions(view: View) -> Drawn:
     legend(figure, view.line, paint)
     caption = (
         "Each dot is one run, none left out; the bar is the median, the box the middle half. "
-        "Hollow dots were not confirmed and count with the whole horizon."
+        "Hollow dots were not confirmed and count with all the time they were given."
     )
     title = f"{capital(measure_name(view.measure))} of all {len(view.part):,} runs"
     return finish(figure, "distributions", title, caption)

@@ -144,7 +144,8 @@ def _zoom_on_small(axes: list[Axes], smallest: float | None) -> str:
     bottom, top = axes[0].get_ylim()
     if max(-bottom, top) < 10 * smallest:
         return words
-    steps = [k * 10.0**n for n in range(-3, 7) for k in (1, 2, 5) if smallest <= k * 10.0**n]
+    digits = (1, 2, 5) if max(-bottom, top) < 100 * smallest else (1,)
+    steps = [k * 10.0**n for n in range(-3, 7) for k in digits if smallest <= k * 10.0**n]
     axes[0].set_yscale("symlog", linthresh=2 * smallest)
     ticks = [0.0, *steps, *(-step for step in steps)]
     axes[0].set_yticks([tick for tick in ticks if bottom <= tick <= top])

@@ -1,0 +1,217 @@
+import math
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from dva_sim.errors import ConfigError
+from dva_sim.worlds.geo import Pose
+from dva_sim.worlds.physics import DriveSpec, World
+from dva_sim.worlds.site import load_site
+
+SPEC = DriveSpec()
+DT = 0.02
+
+
+@pytest.fixture
+def world():
+    return World(load_site("caparica"), DT)
+
+
+def in_corridor(world, x=4.0, heading=0.0, name="robot-1"):
+    return world.add_robot(name, SPEC, Pose(x, 12.0, heading))
+
+
+def test_full_speed_is_reached_and_never_passed(world):
+    robot = in_corridor(world)
+    robot.drive(0.5, 0.0, math.inf)
+    speeds = []
+    for tick in range(1, 300):
+        world.advance_to(tick * DT)
+        speeds.append(robot.speed)
+    assert max(speeds) <= 0.5 + 1e-9
+    assert speeds[-1] == pytest.approx(0.5, abs=1e-4)
+    assert max(np.diff(speeds)) <= SPEC.max_acceleration * DT + 1e-9
+
+
+def test_the_stopping_distance_is_v_squared_over_two_a_and_a_little_for_the_motor(world):
+    robot = in_corridor(world)
+    robot.drive(0.5, 0.0, 5.0)
+    world.advance_to(5.0)
+    start, ideal = robot.pose().x, 0.5**2 / (2 * SPEC.max_deceleration)
+    world.advance_to(20.0)
+    assert ideal <= robot.pose().x - start <= ideal + 0.5 * SPEC.motor_time_constant
+    assert robot.speed == 0.0
+
+
+def test_the_path_of_a_steady_turn_is_a_circle_of_radius_v_over_omega(world):
+    robot = world.add_robot("robot-1", SPEC, Pose(6.0, 15.0, 0.0))
+    robot.drive(0.4, 0.5, math.inf)
+    points = []
+    for tick in range(200, 900):
+        world.advance_to(tick * DT)
+        points.append(robot.pose()[:2])
+    xy = np.array(points)
+    system = np.column_stack([2 * xy, np.ones(len(xy))])
+    a, b, c = np.linalg.lstsq(system, (xy**2).sum(axis=1), rcond=None)[0]
+    assert robot.contacts == 0
+    assert math.sqrt(c + a * a + b * b) == pytest.approx(0.4 / 0.5, rel=0.01)
+
+
+@pytest.mark.parametrize(("asked", "got"), [(9.0, 0.5), (-9.0, 0.0), (0.3, 0.3)])
+def test_speed_is_clamped_at_the_motor(world, asked, got):
+    robot = in_corridor(world)
+    robot.drive(asked, 0.0, math.inf)
+    world.advance_to(5.0)
+    assert robot.speed == pytest.approx(got, abs=1e-4)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_turn_rate_is_clamped_at_the_motor(world, sign):
+    robot = in_corridor(world)
+    robot.drive(0.0, sign * 0.56, math.inf)
+    world.advance_to(5.0)
+    assert robot.turn_rate == pytest.approx(sign * math.pi / 6, abs=1e-4)
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+def test_what_is_not_a_finite_number_means_stop(world, bad):
+    robot = in_corridor(world)
+    robot.drive(0.5, 0.0, math.inf)
+    world.advance_to(2.0)
+    robot.drive(bad, 0.0, math.inf)
+    world.advance_to(4.0)
+    assert robot.speed == 0.0
+    robot.drive(0.5, bad, math.inf)
+    world.advance_to(6.0)
+    assert robot.speed == robot.turn_rate == 0.0
+    robot.drive(0.5, 0.0, math.nan)
+    world.advance_to(8.0)
+    assert robot.speed == 0.0
+
+
+@pytest.mark.parametrize(("until", "last_pushed"), [(1.0, 50), (1.01, 51), (0.99, 50), (1.02, 51)])
+def test_a_set_point_ends_with_the_tick_in_which_its_time_is_up(world, until, last_pushed):
+    robot = in_corridor(world)
+    robot.drive(0.5, 0.0, until)
+    world.advance_to(0.9)
+    speeds = {}
+    for tick in range(46, 60):
+        world.advance_to(tick * DT)
+        speeds[tick] = robot.speed
+    assert max(speeds, key=speeds.__getitem__) == last_pushed
+
+
+def test_a_set_point_changes_nothing_before_it_was_given(world):
+    robot = in_corridor(world)
+    robot.drive(0.5, 0.0, math.inf)
+    world.advance_to(2.019)  # within tick 100
+    robot.drive(0.0, 0.0, math.inf)
+    world.advance_to(2.02)
+    assert robot.speed == pytest.approx(0.5, abs=1e-3)
+    world.advance_to(2.04)
+    assert robot.speed < 0.49
+
+
+def test_how_often_somebody_looks_changes_nothing(world):
+    other = World(load_site("caparica"), DT)
+    seldom, often = in_corridor(world), in_corridor(other)
+    seldom.drive(0.5, 0.2, 3.0)
+    often.drive(0.5, 0.2, 3.0)
+    world.advance_to(10.0)
+    for time in np.arange(0.0, 10.0, 0.007):
+        other.advance_to(time)
+    other.advance_to(10.0)
+    assert often.pose() == seldom.pose()
+
+
+@pytest.mark.parametrize("heading", [0.0, 0.4, 1.2, -1.57, 3.1])
+def test_no_robot_tunnels_through_a_wall_at_full_speed(world, heading):
+    robot = world.add_robot("robot-1", SPEC, Pose(35.5, 10.0, heading))  # in the south office
+    robot.drive(0.5, 0.0, math.inf)
+    for time in range(1, 40):
+        world.advance_to(time)
+        x, y, _ = robot.pose()
+        assert 28.2 + 0.28 < x < 40 - 0.28
+        assert 5.6 + 0.28 < y < 10.8 - 0.28
+    assert robot.contacts >= 1
+
+
+def test_a_robot_that_presses_against_a_wall_has_one_contact_and_its_momentum_as_impulse(world):
+    robot = in_corridor(world, x=38.0)
+    robot.drive(0.5, 0.0, math.inf)
+    while not robot.in_contact:
+        world.advance_to((world.next_tick() + 1) * DT)
+    assert robot.impulse == pytest.approx(SPEC.mass * 0.5, rel=0.15)
+    world.advance_to(30.0)
+    assert robot.contacts == 1
+    assert robot.in_contact
+    assert robot.pose().x == pytest.approx(40 - SPEC.radius, abs=0.01)
+
+
+def test_two_robots_head_on_keep_their_total_momentum(world):
+    left = in_corridor(world, 10.0, 0.0, "robot-1")
+    right = in_corridor(world, 14.0, math.pi, "robot-2")
+    left.drive(0.5, 0.0, math.inf)
+    right.drive(0.5, 0.0, math.inf)
+    for tick in range(400):
+        world.advance_to(tick * DT)
+        momentum = left.body.velocity * SPEC.mass + right.body.velocity * SPEC.mass
+        assert momentum.length < 1e-6
+    assert left.contacts == right.contacts == 1
+    assert left.impulse == pytest.approx(right.impulse)
+    assert right.pose().x - left.pose().x == pytest.approx(2 * SPEC.radius, abs=0.01)
+
+
+def test_a_standing_robot_hit_from_behind_is_pushed_and_stands_again(world):
+    hit = in_corridor(world, 6.0, 0.0, "robot-1")
+    hitter = in_corridor(world, 4.8, 0.0, "robot-2")
+    hitter.drive(0.5, 0.0, 3.0)
+    world.advance_to(30.0)
+    assert hit.contacts == 1
+    assert 6.0 < hit.pose().x < 6.6
+    assert hit.speed == 0.0
+
+
+def test_standing_robots_stay_where_they_are_to_the_bit(world):
+    idle, busy = in_corridor(world, 30.0, 1.0, "robot-1"), in_corridor(world, 4.0, 0.0, "robot-2")
+    before = idle.pose()
+    busy.drive(0.5, 0.0, 20.0)
+    world.advance_to(3600.0)
+    assert idle.pose() == before
+    assert busy.distance == pytest.approx(busy.pose().x - 4.0, abs=1e-6)
+
+
+def test_a_robot_cannot_be_placed_in_a_wall_or_in_another_robot(world):
+    in_corridor(world)
+    with pytest.raises(ConfigError, match=r"'robot-2' does not fit .* another robot is in its way"):
+        in_corridor(world, 4.3, name="robot-2")
+    with pytest.raises(ConfigError, match="a wall is in its way"):
+        world.add_robot("robot-3", SPEC, Pose(8.1, 5.0, 0.0))
+
+
+DRIVE = """
+import math
+from dva_sim.worlds.geo import Pose
+from dva_sim.worlds.physics import DriveSpec, World
+from dva_sim.worlds.site import load_site
+world = World(load_site("caparica"))
+robots = [world.add_robot(str(i), DriveSpec(), Pose(4 + 2 * i, 12, i)) for i in range(4)]
+for step in range(300):
+    world.advance_to(step / 10)
+    for number, robot in enumerate(robots):
+        robot.drive(0.5, math.sin(step / 9 + number), step / 10 + 0.5)
+print([(*map(float.hex, r.pose()), r.contacts, r.impulse.hex()) for r in robots])
+"""
+
+
+def test_two_processes_give_the_same_trajectories_to_the_bit():
+    def run():
+        return subprocess.run(
+            [sys.executable, "-c", DRIVE], capture_output=True, text=True, check=True
+        ).stdout
+
+    first = run()
+    assert first == run()
+    assert "0x" in first

@@ -1,0 +1,130 @@
+import itertools
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dva_sim.worlds.geo import GeoFrame, Pose
+from dva_sim.worlds.maps import UNKNOWN, OccupancyGrid, rasterise
+from dva_sim.worlds.planning import Planner
+from dva_sim.worlds.site import Site, load_site, map_site
+
+MAPS = Path(__file__).parents[3] / "shared" / "maps"
+
+
+def make_site(walls, size=10.0):
+    """A square hall with some walls in it."""
+    import shapely
+
+    border = [(0, 0, size, 0), (size, 0, size, size), (size, size, 0, size), (0, size, 0, 0)]
+    lines = np.array([*border, *walls], float)
+    grid = rasterise(shapely.box(0, 0, size, size), lines, 0.05)
+    extent = (0.0, 0.0, size, size)
+    frame, doors = GeoFrame(38.6612, -9.2058), np.empty((0, 4))
+    return Site("hall", frame, lines, (), doors, (), (), (), (), extent, grid)
+
+
+def with_door(middle, width):
+    """A wall across the hall at x = 5 with one opening."""
+    return [(5, 0, 5, middle - width / 2), (5, middle + width / 2, 5, 10)]
+
+
+def length(path):
+    return float(np.hypot(*np.diff(path, axis=0).T).sum())
+
+
+def densely(path):
+    return np.concatenate([np.linspace(a, b, 20) for a, b in itertools.pairwise(path)])
+
+
+def test_in_the_open_the_way_is_straight():
+    planner = Planner(make_site([]), 0.3)
+    path = planner.path((1.5, 2.0), (8.5, 7.0))
+    assert path[0] == pytest.approx((1.5, 2.0))
+    assert path[-1] == pytest.approx((8.5, 7.0))
+    assert length(path) == pytest.approx(math.dist((1.5, 2), (8.5, 7)), rel=0.01)
+
+
+@pytest.mark.parametrize("middle", np.arange(5.0, 5.25, 0.03))
+def test_a_door_of_one_metre_is_passed_near_its_middle_wherever_it_lies(middle):
+    planner = Planner(make_site(with_door(middle, 1.0)), 0.3)
+    path = densely(planner.path((1, 1), (9, 1)))
+    crossing = path[np.argmin(np.abs(path[:, 0] - 5))]
+    assert crossing[1] == pytest.approx(middle, abs=0.12)
+
+
+def test_a_way_around_a_wall_is_hardly_longer_than_the_shortest():
+    planner = Planner(make_site([(5, 0, 5, 6)]), 0.3)
+    shortest = math.dist((2, 2), (5, 6.3)) + math.dist((5, 6.3), (8, 2))
+    assert shortest < planner.distance((2, 2), (8, 2)) < 1.15 * shortest
+
+
+@pytest.mark.parametrize("clearance", [0.2, 0.3, 0.4])
+def test_ways_through_caparica_keep_their_clearance(clearance):
+    site, rng = load_site("caparica"), np.random.default_rng(4)
+    planner = Planner(site, clearance)
+    for _ in range(12):
+        start, goal = site.sample_free(rng, 0.5), site.sample_free(rng, 0.5)
+        path = planner.path(start, goal)
+        assert min(site.grid.clearance_at(x, y) for x, y in densely(path)) > clearance - 0.05
+
+
+def test_a_corridor_is_followed_in_its_middle():
+    site = load_site("caparica")
+    path = Planner(site, 0.3).path((3.0, 12.0), (37.0, 12.4))
+    assert np.abs(path[20:-20, 1] - 12.0).max() < 0.35
+
+
+def test_behind_a_closed_wall_there_is_no_way():
+    planner = Planner(make_site([(5, 0, 5, 10)]), 0.3)
+    assert planner.path((2, 2), (8, 2)) is None
+    assert planner.distance((2, 2), (8, 2)) == math.inf
+
+
+def test_an_opening_narrower_than_the_body_is_no_way():
+    site = make_site(with_door(5.0, 0.5))
+    assert Planner(site, 0.3).path((2, 5), (8, 5)) is None
+    assert Planner(site, 0.15).path((2, 5), (8, 5)) is not None
+
+
+def test_an_end_close_to_a_wall_is_joined_on_its_own_side():
+    planner = Planner(make_site(with_door(8.0, 1.0)), 0.3)
+    path = planner.path((4.9, 2.0), (5.1, 2.0))
+    assert length(path) > 10
+
+
+def test_a_site_without_free_floor_has_no_ways():
+    grid = OccupancyGrid(0.1, Pose(0, 0, 0), np.full((30, 30), UNKNOWN, np.uint8))
+    site = make_site([])
+    blind = Site(**{**{k: getattr(site, k) for k in site.__dataclass_fields__}, "grid": grid})
+    assert Planner(blind, 0.3).path((1, 1), (2, 2)) is None
+
+
+def test_a_way_is_the_same_in_a_new_planner_and_whatever_was_asked_before():
+    first, second = make_site(with_door(3, 1.0)), make_site(with_door(3, 1.0))
+    busy = Planner(first, 0.3)
+    busy.path((2, 2), (9, 9))
+    again = Planner(second, 0.3).path((1, 8), (9, 1))
+    assert busy.path((1, 8), (9, 1)).tobytes() == again.tobytes()
+
+
+def test_who_changes_a_way_does_not_change_the_one_remembered():
+    planner = Planner(make_site([]), 0.3)
+    planner.path((1, 1), (8, 8))[:] = 0
+    assert planner.path((1, 1), (8, 8))[-1] == pytest.approx((8, 8))
+
+
+def test_walls_block_sight_and_openings_do_not():
+    planner = Planner(make_site(with_door(5.0, 1.0)), 0.3)
+    assert planner.line_of_sight((2, 5), (8, 5))
+    assert not planner.line_of_sight((2, 3), (8, 3))
+    assert planner.line_of_sight((2, 3), (4, 9))
+
+
+@pytest.mark.skipif(not MAPS.is_dir(), reason="recorded maps are not beside the project")
+def test_on_a_recorded_map_all_bases_reach_each_other():
+    site = map_site(MAPS / "depot.yaml", 2, robots=3, guards=1)
+    planner = Planner(site, 0.3)
+    for base in site.robot_bases:
+        assert math.isfinite(planner.distance(base[:2], site.guard_posts[0][:2]))
