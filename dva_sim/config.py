@@ -169,9 +169,8 @@ def _fields_at(model: Any, path: Path_) -> list[str]:
         if isinstance(step, int):
             continue
         info = getattr(model, "model_fields", {}).get(step)
-        if info is None:
-            return []
-        model = _model_in(info.annotation)
+        if info is not None:  # else a key that the user chose, inside a mapping to models
+            model = _model_in(info.annotation)
     return list(getattr(model, "model_fields", {}))
 
 

@@ -54,6 +54,10 @@ def episode(
     name: str, seed: int, pairs: list[str], video: Path | None, side_by_side: str | None
 ) -> None:
     """Run one scenario, tell its timeline, and film it if asked to."""
+    if video is not None:
+        from dva_sim.experiments.film import check_path
+
+        check_path(video)
     document = scenarios.load(name)
     changes = parse_changes(pairs)
     settings: list[dict[str, Any]] = [changes]
@@ -129,6 +133,7 @@ def _summarise(recording: Recording, took: float) -> None:
 
 def run(name: str, pairs: list[str], out: Path | None, jobs: int | None) -> int:
     """Run a study with a progress bar, then write its report; the exit code."""
+    from dva_sim.experiments.episode import rehearse_all
     from dva_sim.experiments.report import write_report
     from dva_sim.experiments.results import Results
     from dva_sim.experiments.runner import dry_run, run_study
@@ -136,7 +141,8 @@ def run(name: str, pairs: list[str], out: Path | None, jobs: int | None) -> int:
 
     study, folder = load_study(name, pairs), _folder(name, out)
     console.print(f"[bold]{escape(study.question)}[/bold]")
-    before = dry_run(study, folder)
+    before = dry_run(study, folder, jobs=jobs)
+    rehearse_all(study)
     _say_plan(before, folder)
     with _bar() as bar:
         task = bar.add_task("running", total=before.runs)
@@ -146,8 +152,9 @@ def run(name: str, pairs: list[str], out: Path | None, jobs: int | None) -> int:
     failures = Results.load(folder).failures
     with console.status("Writing the report ..."):
         report = write_report(folder)
-    for failure in failures[:5]:
-        console.print(f"[red]failed:[/red] {escape(str(failure))}")
+    for f in failures[:5]:
+        where = f"{f['part']}, cell {f['cell']}, person {f['person']}, trial {f['trial']}"
+        console.print(f"[red]failed:[/red] {where}: {escape(str(f['error']).splitlines()[-1])}")
     if failures:
         console.print(f"[red]{len(failures)} runs failed[/red]; the same command tries them again")
     console.print(f"Report: {report}")
@@ -156,11 +163,14 @@ def run(name: str, pairs: list[str], out: Path | None, jobs: int | None) -> int:
 
 def plan(name: str, pairs: list[str], out: Path | None, jobs: int | None) -> None:
     """Say what `run` would do."""
+    from dva_sim.experiments.episode import rehearse_all
     from dva_sim.experiments.runner import dry_run
     from dva_sim.experiments.study import load_study
 
-    folder = _folder(name, out)
-    _say_plan(dry_run(load_study(name, pairs), folder, jobs=jobs), folder)
+    study, folder = load_study(name, pairs), _folder(name, out)
+    plan = dry_run(study, folder, jobs=jobs)
+    rehearse_all(study)
+    _say_plan(plan, folder)
 
 
 def _folder(name: str, out: Path | None) -> Path:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from dva_sim.experiments import metrics
+from dva_sim.experiments import design, metrics
 from dva_sim.experiments.design import Job
-from dva_sim.simulation import simulate
+from dva_sim.experiments.study import Study
+from dva_sim.simulation import rehearse, simulate
 
 Tables = dict[str, list[dict[str, Any]]]
 
@@ -21,3 +22,13 @@ def run_job(job: Job) -> Tables:
     if job.person == 0 and job.trial == 0:
         tables["tracks"] = metrics.track_rows(recording)
     return tables
+
+
+def rehearse_all(study: Study) -> None:
+    """Build one run of every configuration, so that a mistake is found before the first run.
+
+    Raises:
+        ConfigError: what cannot be read or placed.
+    """
+    for cell in design.cells(study):
+        rehearse(cell.scenario, study.seed)

@@ -41,16 +41,27 @@ def write_film(recordings: Sequence[Recording], path: Path) -> Path:
         path: Where to; the ending decides the form.
 
     Raises:
-        ConfigError: an ending that is neither, or `.mp4` without ffmpeg.
+        ConfigError: see `check_path`.
+    """
+    check_path(path)
+    film = Film(recordings)
+    (_write_gif if path.suffix.lower() == ".gif" else _write_mp4)(film, path)
+    return path
+
+
+def check_path(path: Path) -> None:
+    """Refuse a film that cannot be written, before anything is run.
+
+    Raises:
+        ConfigError: an ending that is neither, `.mp4` without ffmpeg, or no such folder.
     """
     suffix = path.suffix.lower()
     if suffix not in (".gif", ".mp4"):
         raise ConfigError(f"video should end in .gif or .mp4, not {path.name!r}")
     if suffix == ".mp4" and shutil.which("ffmpeg") is None:
         raise ConfigError("mp4 needs ffmpeg, which is not installed; use a .gif")
-    film = Film(recordings)
-    (_write_gif if suffix == ".gif" else _write_mp4)(film, path)
-    return path
+    if not path.parent.is_dir():
+        raise ConfigError(f"folder {str(path.parent)!r} for the video does not exist")
 
 
 class Film:
@@ -69,11 +80,13 @@ class Film:
         extent = recordings[0].site.extent
         tall = (extent[3] - extent[1]) / (extent[2] - extent[0])
         across = 8.6 if len(recordings) == 1 else 6.2
-        size = across * len(recordings), across * tall + 1.5
+        size = across * len(recordings), (across - 0.9) * tall + 1.5
         self.figure: Figure = Figure(figsize=size, dpi=100, layout="constrained")
         canvas: Any = FigureCanvasAgg
         self._canvas = canvas(self.figure)
-        grid = self.figure.add_gridspec(2, len(recordings), height_ratios=[across * tall, 0.7])
+        grid = self.figure.add_gridspec(
+            2, len(recordings), height_ratios=[(across - 0.9) * tall + 0.4, 0.6]
+        )
         self._scenes = [
             Scene(r, self.figure.add_subplot(grid[0, i]), self.figure.add_subplot(grid[1, i]))
             for i, r in enumerate(recordings)
@@ -118,8 +131,12 @@ class Scene:
         self._hazards = [_HazardPatch(ax, recording, i) for i in range(len(recording.incidents))]
         self._traffic = _Traffic(strip, recording)
         self._caption = ax.text(
-            0.5, -0.02, "", transform=ax.transAxes, ha="center", va="top", fontsize=9, animated=True
+            0.34, -0.03, "", transform=ax.transAxes, ha="left", va="top", fontsize=9, animated=True
         )
+        ax.text(
+            *(1.0, -0.03), "orange: what the operator sees", transform=ax.transAxes, ha="right",
+            va="top", fontsize=7.5, color=GHOST_COLOUR,
+        )  # fmt: skip
         self._clock = ax.text(
             1.0, 1.015, "", transform=ax.transAxes, ha="right", va="bottom", animated=True
         )
@@ -165,7 +182,7 @@ class _Body:
         """The body at a moment [s]."""
         index = max(0, bisect_right(self._times, time) - 1)
         point = self._points[index]
-        past = self._points[max(0, index - 300) : index + 1]
+        past = self._points[: index + 1]
         self._trail.set_data([p.x for p in past], [p.y for p in past])
         self._disc.center = point.x, point.y
         reach = 1.3 * self._radius
@@ -253,8 +270,8 @@ def _write_gif(film: Film, path: Path) -> None:
     from PIL import Image
 
     pictures = [Image.fromarray(frame) for frame in film.frames()]
-    # One palette from a late picture, where all colours are on stage, keeps the file small.
-    palette = pictures[-1].quantize(96)
+    # One palette, from a picture with all colours on stage, keeps the file small.
+    palette = pictures[len(pictures) // 2].quantize(128, Image.Quantize.MAXCOVERAGE)
     reduced = [p.quantize(palette=palette, dither=Image.Dither.NONE) for p in pictures]
     reduced[0].save(
         path, save_all=True, append_images=reduced[1:], duration=1000 // FPS, loop=0, optimize=True

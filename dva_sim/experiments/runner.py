@@ -19,6 +19,7 @@ from dva_sim import __version__
 from dva_sim.errors import ConfigError, DvaSimError
 from dva_sim.experiments import design, pool
 from dva_sim.experiments.design import Cell, Job, Key
+from dva_sim.experiments.fingerprint import fingerprint
 from dva_sim.experiments.journal import FILE, Journal
 from dva_sim.experiments.pool import Episode
 from dva_sim.experiments.results import MANIFEST
@@ -189,7 +190,7 @@ def _manifest(study: Study, cells: Sequence[Cell], todo: Sequence[Job]) -> dict[
             "rule": "a run's seed depends on the study's seed, the part, the person and the "
             "trial, never on the cell: all cells share their luck",
         },
-        "versions": {"dva-sim": __version__},
+        "versions": {"dva-sim": __version__, "fingerprint": fingerprint()},
     }
     identity = design.stable_hash(content)
     content["versions"]["python"] = platform.python_version()

@@ -98,6 +98,15 @@ def simulate(scenario: Scenario, seed: int, keep_traffic: bool = False) -> Recor
     return _Run(scenario, seed, keep_traffic).run()
 
 
+def rehearse(scenario: Scenario, seed: int) -> None:
+    """Build a run without letting any time pass, to find what cannot work before it counts.
+
+    Raises:
+        ConfigError: a map or trace that cannot be read, a team or an event without a place.
+    """
+    _Run(scenario, seed, keep_traffic=False).build()
+
+
 @dataclass
 class _Run:
     """The parts of a run while it is built and while it lasts."""
@@ -124,8 +133,8 @@ class _Run:
         self.network = Network(self.clock, self._links, self.recorder.message_sent)
         self.dva = DvaAgent(self._device(DVA, "dva", "DVA", "192.168.1.1"), self._desk())
 
-    def run(self) -> Recording:
-        """Build everybody, let time pass until all is settled or the horizon is reached."""
+    def build(self) -> None:
+        """Put everybody in place."""
         for number in range(1, self.scenario.robot.count + 1):
             self._add_robot(number)
         for number in range(1, self.scenario.guard.count + 1):
@@ -133,6 +142,10 @@ class _Run:
         for number in range(1, self.scenario.operator.count + 1):
             self._add_operator(number)
         self._add_reports()
+
+    def run(self) -> Recording:
+        """Build, then let time pass until all is settled or the horizon is reached."""
+        self.build()
         self.dva.start()
         self.clock.every(self._watch_period, self._watch)
         self._let_time_pass()

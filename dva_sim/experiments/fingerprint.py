@@ -1,0 +1,55 @@
+"""What a run's numbers depend on besides its configuration: the program and what users edit."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from pathlib import Path
+
+import dva_sim
+from dva_sim import resources
+
+# Reports may change without making old runs stale; what measures and simulates may not.
+_CODE = (
+    "agents",
+    "core",
+    "network",
+    "protocol",
+    "simulation",
+    "worlds",
+    "clock.py",
+    "recorder.py",
+    "scenario.py",
+    "streams.py",
+    "experiments/episode.py",
+    "experiments/metrics.py",
+)
+_EDITED = ("agents", "protocol", "worlds")
+_SUFFIXES = {".yaml", ".geojson", ".xsd", ".pgm", ".png"}
+
+
+def fingerprint() -> str:
+    """64 bits over the simulating code and every profile, site and schema within reach."""
+    total = hashlib.sha256()
+    for name, path in (*_code(), *_edited()):
+        total.update(name.encode() + b"\0" + hashlib.sha256(path.read_bytes()).digest())
+    return total.hexdigest()[:16]
+
+
+def _code() -> Iterator[tuple[str, Path]]:
+    package = Path(dva_sim.__file__).parent
+    for part in _CODE:
+        start = package / part
+        for path in sorted(start.rglob("*.py")) if start.is_dir() else [start]:
+            yield path.relative_to(package).as_posix(), path
+
+
+def _edited() -> Iterator[tuple[str, Path]]:
+    """Each name once, from the nearest folder that has it, as it would be found."""
+    seen: dict[str, Path] = {}
+    for root in resources.roots():
+        for folder in _EDITED:
+            for path in sorted((root / folder).rglob("*")):
+                if path.suffix in _SUFFIXES and path.is_file():
+                    seen.setdefault(path.relative_to(root).as_posix(), path)
+    yield from sorted(seen.items())
