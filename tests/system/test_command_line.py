@@ -85,7 +85,9 @@ def test_another_study_is_not_written_into_the_same_folder(tmp_path: Path) -> No
 def test_a_mistake_ends_in_one_line_and_exit_code_2(
     tmp_path: Path, words: list[str], said: str
 ) -> None:
-    (tmp_path / "bad.yaml").write_text("question: what?\nparts:\n  drive:\n    scenario: drive-to-event\n    refrence: {}\n")
+    (tmp_path / "bad.yaml").write_text(
+        "question: what?\nparts:\n  drive:\n    scenario: drive-to-event\n    refrence: {}\n"
+    )
     (tmp_path / "bad.up").write_text("1\nsoon\n")
     (tmp_path / "inside.yaml").write_text("horizon_s: 5\nrobots: {}\n")
     ended = call(*words, cwd=tmp_path)

@@ -25,6 +25,7 @@ BLIND_AFTER = 20.0  # without a frame for so long, the link counts as lost [s]
 STUCK_AFTER = 4.0  # standing for so long though asked to drive, a person plans anew [s]
 LET_GO_FOR = 1.0  # one who sees no effect levels the phone for so long, and tilts again [s]
 SEARCH_FOR = 25.0  # looking around at the place for so long, a person says there is nothing [s]
+KEEP_OFF = 1.2  # distance kept to the event [m]
 AT_PLACE = 1.5  # nearer than this one is at the place [m]
 MATCH_WITHIN = 4.0  # a hazard so near the reported place is the one reported [m]
 
@@ -198,7 +199,7 @@ class Drive:
         route = self._consider(judged)
         if route is not None:
             delay = seat.delay.value + seat.person.perceptual_delay
-            self._intend(seat.strategy.drive(route, judged, delay))
+            self._intend(seat.strategy.drive(route, judged, delay, self._keep_off(judged)))
 
     def _look_at_truth(self) -> bool:
         """The oracle's own loop; False ends it."""
@@ -209,7 +210,7 @@ class Drive:
         self._seen_tick = truth.state.tick
         route = self._consider(truth.state)
         if route is not None:
-            self._intend(seat.strategy.drive_by_truth(route, truth))
+            self._intend(seat.strategy.drive_by_truth(route, truth, self._keep_off(truth.state)))
         return not self.over
 
     def _consider(self, seen: Observation) -> Route | None:
@@ -237,13 +238,23 @@ class Drive:
     def _search(self, seen: Observation) -> None:
         """At the place with nothing in view: look around for a while, then say so."""
         now = self._clock.now
-        if math.dist((seen.x, seen.y), self._goal) > AT_PLACE:
+        if not self._has_place_before_it(seen, AT_PLACE):
             self._at_place_since = None
         elif self._at_place_since is None:
             self._at_place_since = now
             self._arrive()
         elif self._in_view_since is None and now - self._at_place_since > SEARCH_FOR:
             self.end("refuted", "nothing there")
+
+    def _has_place_before_it(self, seen: Observation, within: float) -> bool:
+        """Whether the place is near [m], and by the map no wall stands between."""
+        here = seen.x, seen.y
+        near = math.dist(here, self._goal) < within
+        return near and self._seat.planner.line_of_sight(here, self._goal)
+
+    def _keep_off(self, seen: Observation) -> float:
+        """How far before the event to stop [m]; no wall may stand between."""
+        return KEEP_OFF if self._has_place_before_it(seen, 2 * KEEP_OFF) else 0.0
 
     def _arrive(self) -> None:
         if not self._arrived:

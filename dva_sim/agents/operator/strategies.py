@@ -18,7 +18,6 @@ from dva_sim.agents.steering import Route
 NEAREST_LOOK, FARTHEST_LOOK = 0.8, 1.8  # look-ahead inside a building [m]
 TURN_FROM, TURN_UNTIL = 0.9, 0.25  # bearing at which one stops to turn, and drives on [rad]
 TURN_MARGIN = 0.5  # crossover x delay kept below this: a third of the way to instability
-STOP_BEFORE = 1.2  # distance kept to the event [m]
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,13 +45,14 @@ class Reach:
 class Strategy(Protocol):
     """How a kind of operator drives along a route, by frames."""
 
-    def drive(self, route: Route, seen: Observation, delay: float) -> Intent:
+    def drive(self, route: Route, seen: Observation, delay: float, stop_before: float) -> Intent:
         """What to ask for.
 
         Args:
             route: The way to go.
             seen: The newest frame, as the person judges it.
             delay: What the person takes the whole delay to be [s].
+            stop_before: Where to stop: so far before the end of the route [m].
         """
 
 
@@ -71,10 +71,8 @@ class Pursuit:
         self._person, self._reach = person, reach
         self._turning = False
 
-    def drive(
-        self, route: Route, seen: Observation, delay: float, stop_before: float = STOP_BEFORE
-    ) -> Intent:
-        """See `Strategy`; drives up to `stop_before` [m] before the end of the route."""
+    def drive(self, route: Route, seen: Observation, delay: float, stop_before: float) -> Intent:
+        """See `Strategy`."""
         person, reach = self._person, self._reach
         wanted = person.pace * reach.speed
         look = min(max(wanted * delay / person.caution, NEAREST_LOOK), FARTHEST_LOOK)
@@ -102,9 +100,9 @@ class Oracle:
     def __init__(self, person: Person, reach: Reach) -> None:
         self._pursuit = Pursuit(person, reach)
 
-    def drive_by_truth(self, route: Route, truth: Truth) -> Intent:
+    def drive_by_truth(self, route: Route, truth: Truth, stop_before: float) -> Intent:
         """What to ask for, knowing the true state."""
-        return self._pursuit.drive(route, truth.state, self.DELAY)
+        return self._pursuit.drive(route, truth.state, self.DELAY, stop_before)
 
 
 STRATEGIES: dict[str, type[Pursuit] | type[Oracle]] = {"pursuit": Pursuit, "oracle": Oracle}
