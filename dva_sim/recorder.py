@@ -34,9 +34,16 @@ class TrackPoint(NamedTuple):
 
 
 class Issued(NamedTuple):
-    """A command on its way: when it was issued [s], and the mean age of its samples [s]."""
+    """A command on its way.
 
-    time: float
+    Attributes:
+        made: When the app made it from the tilt [s].
+        sent: When the pattern let it go [s].
+        sample_age: Mean age of the tilt samples behind it when it was made [s].
+    """
+
+    made: float
+    sent: float
     sample_age: float
 
 
@@ -44,15 +51,19 @@ class Applied(NamedTuple):
     """A command that took effect at the robot; times in [s].
 
     Attributes:
-        issued: When the operator's phone sent it.
+        issued: When the operator's app made it from the tilt.
+        sent: When the pattern let it go.
         arrived: When it reached the robot.
         time: When it took effect.
-        sample_age: Mean age of the tilt samples behind it when it was issued.
+        until: When it ceases to be in force, if no newer one comes.
+        sample_age: Mean age of the tilt samples behind it when it was made.
     """
 
     issued: float
+    sent: float
     arrived: float
     time: float
+    until: float
     sample_age: float
 
 
@@ -84,7 +95,6 @@ class DriveLog:
     round_trips: list[float] = field(default_factory=list)
     applied: list[Applied] = field(default_factory=list)
     frame_times: list[tuple[float, float]] = field(default_factory=list)
-    safe_stop: float = 0.0
 
 
 class Recorder:
@@ -121,19 +131,30 @@ class Recorder:
         if self.traffic is not None:
             self.traffic.append((time, source, destination, size))
 
-    def command_issued(self, source: str, message_id: int, time: float, sample_age: float) -> None:
+    def command_issued(self, source: str, message_id: int, issued: Issued) -> None:
         """A command leaves the phone."""
-        self._issued[source, message_id] = Issued(time, sample_age)
+        self._issued[source, message_id] = issued
 
     def command_applied(
-        self, drive: DriveLog, source: str, message_id: int, arrived: float, now: float
-    ) -> float:
-        """A command takes effect; returns its true age [s]."""
+        self,
+        drive: DriveLog,
+        source: str,
+        message_id: int,
+        arrived: float,
+        now: float,
+        until: float,
+    ) -> None:
+        """A command takes effect, and stays in force `until` [s] at the latest."""
         issued = self._issued.pop((source, message_id), None)
-        if issued is None:
-            return 0.0
-        drive.applied.append(Applied(issued.time, arrived, now, issued.sample_age))
-        return now - issued.time
+        if issued is not None:
+            drive.applied.append(
+                Applied(issued.made, issued.sent, arrived, now, until, issued.sample_age)
+            )
+
+    def drive_over(self, source: str) -> None:
+        """Forget the commands of a phone that were never applied."""
+        for key in [key for key in self._issued if key[0] == source]:
+            del self._issued[key]
 
     def violated(self, rule: str, time: float, who: str, what: str) -> None:
         """A safety rule was broken: counted always, told once per rule and agent."""

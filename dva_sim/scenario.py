@@ -138,6 +138,18 @@ class Scenario(Config):
             raise ValueError("nobody can respond: robot.count and guard.count are 0")
         return self
 
+    @model_validator(mode="after")
+    def _timeout_admits_the_delay(self) -> Scenario:
+        """Below four round trips a retry never gets through: the socket opens anew each time."""
+        longest = self.link.delay_s + self.link.jitter_s
+        needed = 8 * longest + self.robot.processing_s
+        if self.robot.count and self.command.timeout_s <= needed:
+            raise ValueError(
+                f"command.timeout_s {self.command.timeout_s:g} s should be above four round "
+                f"trips and the processing time ({needed:g} s), or link.delay_s be shorter"
+            )
+        return self
+
 
 def load(name: str, base: Path | None = None) -> Document:
     """Read a scenario by name or path; the data is checked by `build`.

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 from dva_sim.agents.tilt import Phone, TiltCommand
 from dva_sim.network.patterns import Network, Requester
 from dva_sim.protocol.exchange import Outbox
 from dva_sim.protocol.messages import SetTeleOp
-from dva_sim.recorder import DriveLog, Recorder
+from dva_sim.recorder import DriveLog, Issued, Recorder
 
 SERVICE = "commands"
 
@@ -16,6 +17,14 @@ SERVICE = "commands"
 def topic_of(robot: str) -> str:
     """Topic of the commands for a robot; the bar ends it, so that no topic begins another."""
     return f"{robot}|"
+
+
+class Made(NamedTuple):
+    """A command as the app made it: when [s], and the newest robot tick on the screen [ms]."""
+
+    command: TiltCommand
+    time: float
+    seen_tick: int | None
 
 
 class CommandSender:
@@ -62,20 +71,27 @@ class CommandSender:
         if not self._on:
             return
         now = self._clock.now
-        command = self._phone.look(now)
-        if command is not None:
-            self._offer(command)
+        made = self._make()
+        if made is not None:
+            self._offer(made)
         self._clock.call_at(self._phone.next_look(now, self._rate), self._look)
 
-    def _offer(self, command: TiltCommand) -> None:
+    def _make(self) -> Made | None:
+        """What the phone says now, if it is worth a message."""
+        now = self._clock.now
+        command = self._phone.look(now)
+        return None if command is None else Made(command, now, self._seen_tick())
+
+    def _offer(self, made: Made) -> None:
         raise NotImplementedError
 
-    def _encode(self, command: TiltCommand) -> bytes:
-        """The bytes of a command that is issued now."""
-        now = self._clock.now
-        body = SetTeleOp(command.speed, command.turn_rate, self._seen_tick())
+    def _encode(self, made: Made) -> bytes:
+        """The bytes of a command that is sent now; its tick is of when it was made."""
+        now, command = self._clock.now, made.command
+        body = SetTeleOp(command.speed, command.turn_rate, made.seen_tick)
         message = self._outbox.message(self._drive.robot, body, now, self._session)
-        self._recorder.command_issued(message.source, message.message_id, now, command.sample_age)
+        issued = Issued(made.time, now, command.sample_age)
+        self._recorder.command_issued(message.source, message.message_id, issued)
         self._drive.sent += 1
         return self._outbox.encoded(message)
 
@@ -83,8 +99,8 @@ class CommandSender:
 class PublishedCommands(CommandSender):
     """Publish/subscribe: send and forget."""
 
-    def _offer(self, command: TiltCommand) -> None:
-        data = self._encode(command)
+    def _offer(self, made: Made) -> None:
+        data = self._encode(made)
         publisher = self._network.publisher(self._outbox.source, SERVICE)
         publisher.publish(topic_of(self._drive.robot), data, len(data))
 
@@ -99,7 +115,7 @@ class RequestedCommands(CommandSender):
     def connect(self, requester: Requester, on_alert: Callable[[], object]) -> None:
         """Give it its REQ socket, and say what to do when the link is lost."""
         self._requester, self._on_alert = requester, on_alert
-        self._pending: TiltCommand | None = None
+        self._pending: Made | None = None
 
     def stop(self) -> None:
         """Send nothing more and close the socket."""
@@ -108,13 +124,13 @@ class RequestedCommands(CommandSender):
         self._drive.timeouts = self._requester.timeouts
         self._requester.close()
 
-    def _offer(self, command: TiltCommand) -> None:
+    def _offer(self, made: Made) -> None:
         if self._requester.busy:
             if self._pending is not None:
                 self._drive.superseded += 1
-            self._pending = command
+            self._pending = made
             return
-        self._requester.request(self._encode(command), self._answered, self._failed)
+        self._requester.request(self._encode(made), self._answered, self._failed)
 
     def _answered(self, _: bytes) -> None:
         """A command that waited goes now: the newest value if the app keeps sending anyway."""
@@ -122,7 +138,7 @@ class RequestedCommands(CommandSender):
         if pending is None or not self._on:
             return
         if self._phone.keeps_alive:
-            pending = self._phone.look(self._clock.now) or pending
+            pending = self._make() or pending
         self._offer(pending)
 
     def _failed(self) -> None:

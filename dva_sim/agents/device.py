@@ -17,6 +17,7 @@ from dva_sim.worlds.geo import GeoFrame
 CONTROL = "control"  # the acknowledged channel: everything but SetTeleOp
 HEARTBEATS = "heartbeats"
 HEARTBEAT_PERIOD = 2.0  # [s]
+REGISTER_AGAIN = 2.0  # pause after a registration that was not answered [s]
 
 Handler = Callable[[m.Message], m.Reply]
 
@@ -68,7 +69,11 @@ class Device:
         return self.network.clock
 
     def register(self, then: Callable[[], object] = do_nothing) -> None:
-        """Make oneself known to the DVA, and begin to send heartbeats."""
+        """Make oneself known to the DVA, until it has answered, and begin to send heartbeats."""
+        self._register(then)
+        self.clock.every(HEARTBEAT_PERIOD, self._heartbeat)
+
+    def _register(self, then: Callable[[], object]) -> None:
         body = m.Registration(self.label, self.device_type, self.address)
 
         def answered(reply: m.Reply) -> None:
@@ -77,8 +82,8 @@ class Device:
             else:
                 self.tell(f"was not registered: {reply.text}", "link")
 
-        self.ask(self.dva, body, answered)
-        self.clock.every(HEARTBEAT_PERIOD, self._heartbeat)
+        again = lambda: self.clock.call_after(REGISTER_AGAIN, self._register, then)  # noqa: E731
+        self.ask(self.dva, body, answered, again)
 
     def ask(
         self,

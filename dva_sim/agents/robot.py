@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -26,7 +26,6 @@ from dva_sim.worlds.planning import Planner
 STATUS = "status"
 STATUS_PERIOD = 1.0  # [s]
 MISSION_PERIOD = 0.1  # [s]
-MOVING = 0.05  # above this a robot is going somewhere [m/s]
 STANDING = 0.02  # below this the wheels count as still [m/s, rad/s]
 
 Positive = Annotated[float, Field(gt=0)]
@@ -110,8 +109,6 @@ class RobotAgent:
             device.clock, setup.processing, self._handle, setup.pattern == "latest-wins"
         )
         self._commands: Subscription | None = None
-        self._stopped_since: float | None = None
-        self._until = 0.0
         device.network.serve(device.id_tag, CONTROL, self._on_control)
         device.network.serve(device.id_tag, SERVICE, self.inbox.command)
 
@@ -130,17 +127,6 @@ class RobotAgent:
         speed, turn_rate = self.body.speed, self.body.turn_rate
         tick = self.controller.tick(now)
         return Observation(tick, pose.x, pose.y, pose.heading, speed, turn_rate, hazards)
-
-    def broken_rules(self, now: float) -> Iterator[tuple[str, str]]:
-        """Safety rules that do not hold now, each with what was seen; there should be none."""
-        spec, speed = self.body.spec, abs(self.body.speed)
-        stopping = spec.max_speed / spec.max_deceleration + 4 * spec.motor_time_constant
-        if speed > MOVING and now > self._until + stopping and not self.body.in_contact:
-            yield "S1", f"moves at {speed:.2f} m/s without a valid command"
-        if (self.controller.owner is None) != (self.controller.mode is Mode.IDLE):
-            yield "S2", f"mode {self.controller.mode} with owner {self.controller.owner}"
-        if speed > spec.max_speed * 1.02 and not self.body.in_contact:
-            yield "S4", f"moves at {speed:.2f} m/s"
 
     # --- messages ----------------------------------------------------------------------
 
@@ -170,33 +156,26 @@ class RobotAgent:
         moving = abs(self.body.speed) > STANDING or abs(self.body.turn_rate) > STANDING
         decision = self.controller.handle(message, arrived, now, moving)
         if decision.set_point is not None:
-            self._move(decision.set_point, now)
+            self._move(decision.set_point)
         if decision.code != m.OK:
             name = m.CODE_NAMES[decision.code]
             self.device.recorder.counters[f"robot refused: {name}"] += 1
         elif isinstance(message.body, m.SetTeleOp):
-            self._log_command(message, arrived, now)
+            self._log_command(message, arrived, now, decision.set_point)
         if self.controller.mode is not before:
             self._mode_changed(message.source)
         return decision
 
-    def _log_command(self, message: m.Message, arrived: float, now: float) -> None:
+    def _log_command(
+        self, message: m.Message, arrived: float, now: float, set_point: SetPoint | None
+    ) -> None:
         drive = self._drive_of(self.device.id_tag)
-        if drive is not None:
-            recorder = self.device.recorder
-            age = recorder.command_applied(drive, message.source, message.message_id, arrived, now)
-            if age > self.controller.limits.max_age:
-                recorder.violated("S1", now, self.device.label, f"obeys a command {age:.1f} s old")
+        if drive is not None and set_point is not None:
+            self.device.recorder.command_applied(
+                drive, message.source, message.message_id, arrived, now, set_point.until
+            )
 
-    def _move(self, set_point: SetPoint, now: float) -> None:
-        """Hand a set point to the motors; the time without one is time in safe stop."""
-        if self._stopped_since is not None and now > self._stopped_since:
-            drive = self._drive_of(self.device.id_tag)
-            if drive is not None:
-                drive.safe_stop += now - self._stopped_since
-        in_force = self.controller.mode is not Mode.IDLE
-        self._stopped_since = set_point.until if in_force and set_point.until > now else None
-        self._until = max(now, set_point.until)
+    def _move(self, set_point: SetPoint) -> None:
         self.body.drive(set_point.speed, set_point.turn_rate, set_point.until)
 
     def _mode_changed(self, source: str) -> None:
@@ -277,7 +256,7 @@ class RobotAgent:
     def _obey(self, intent: Intent) -> None:
         now = self.device.clock.now
         until = now + 2 * MISSION_PERIOD
-        self._move(SetPoint(intent.speed, intent.turn_rate, until), now)
+        self._move(SetPoint(intent.speed, intent.turn_rate, until))
 
 
 MISSION_NEAR = 0.3  # a waypoint counts as reached from here [m]

@@ -55,6 +55,9 @@ class Event:
         reports: How many reports were merged into it.
         responder: Device that goes there: a guard or a robot.
         operator: Device that drives the robot, if a robot goes.
+        pending_since: When it was last left without a responder [s].
+        failed: Responders that set out and gave the order back.
+        sent: Everybody who was ever ordered there; only they can tell what they found.
         times: Time of each step in `STEPS` that was taken [s].
     """
 
@@ -67,6 +70,9 @@ class Event:
     responder: str | None = None
     operator: str | None = None
     attempts: int = 0
+    pending_since: float = 0.0
+    failed: set[str] = field(default_factory=set)
+    sent: set[str] = field(default_factory=set)
     times: dict[str, float] = field(default_factory=dict)
 
     @property
@@ -95,7 +101,7 @@ class EventBook:
                 return event
         number = len(self.events) + 1
         event = self.events[number] = Event(number, kind, position, severity)
-        event.times["detected"] = now
+        event.times["detected"] = event.pending_since = now
         return event
 
     def move(self, event: Event, state: State, now: float) -> None:
@@ -108,6 +114,7 @@ class EventBook:
             raise ValueError(f"event {event.number} cannot go from {event.state} to {state}")
         event.state = state
         if state is State.PENDING:
+            event.pending_since = now
             event.responder = event.operator = None
             for step in STEPS[1:4]:
                 event.times.pop(step, None)

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dva_sim.core.dispatch import Policy, Responder, Situation
 from dva_sim.core.events import Event, EventBook, State
@@ -40,7 +41,7 @@ class Desk:
         policy: Advises who goes where.
         distance: Path length between two positions [m]; infinite if there is no way.
         paces: Expected pace of `guard` and `robot`.
-        escalate_after: An event nobody has been sent to by then is escalated [s].
+        escalate_after: An event that is left without a responder for so long is escalated [s].
         rng: Luck of policies that use it.
     """
 
@@ -89,18 +90,23 @@ class Desk:
         for entry in self.registry.fallen_silent(now):
             self._abandon(entry.device.id_tag, now)
         for event in list(self.book.in_state(State.PENDING)):
-            if now - event.times["detected"] >= self.escalate_after:
+            if now - event.pending_since >= self.escalate_after:
                 self.book.move(event, State.ESCALATED, now)
         return self._assign(now)
 
     def undelivered(self, send: Send, now: float) -> list[Send]:
-        """An order did not arrive or was declined: the event is open to others."""
-        if not isinstance(send.body, m.Order):
-            return []
-        event = self.book.events[send.body.event_id]
-        self._release(send.to, event)
-        if event.state in (State.ASSIGNED, State.ON_SCENE):
-            self._reopen(event, now)
+        """What was sent did not arrive or was declined: take it back.
+
+        Nobody set out, so it does not count as an attempt on the event.
+        """
+        if isinstance(send.body, m.PermissionGrant):
+            self.permissions.release(send.body.holder, send.to)
+        elif isinstance(send.body, m.Order):
+            event = self.book.events[send.body.event_id]
+            self._release(send.to, event)
+            if event.state in (State.ASSIGNED, State.ON_SCENE):
+                event.attempts -= 1
+                self._reopen(event, now)
         return []
 
     def place(self, device: str, position: m.Position) -> None:
@@ -120,6 +126,11 @@ class Desk:
         robot = self.registry.entries.get(body.device)
         if robot is None or robot.device.device_type != ROBOT:
             return self._refuse(message, m.UNKNOWN_DEVICE, f"no robot {body.device}")
+        asker = self.registry.entries[message.source]
+        if asker.device.device_type != OPERATOR:
+            return self._refuse(message, m.NOT_PERMITTED, "only operators drive robots")
+        if robot.order is not None and robot.order != asker.order:
+            return self._refuse(message, m.BUSY, f"robot {body.device} serves another order")
         grant = self.permissions.request(body.device, message.source, body.level)
         if grant is None:
             return self._refuse(message, m.BUSY, f"robot {body.device} is held by another")
@@ -136,11 +147,13 @@ class Desk:
         event = self.book.events.get(body.event_id)
         if event is None:
             return self._refuse(message, m.UNKNOWN_EVENT, f"no event {body.event_id}")
+        if message.source not in event.sent:
+            return self._refuse(message, m.NOT_PERMITTED, f"was not sent to event {event.number}")
+        if self._holder(event) == message.source:
+            self._arrived(event, now)
         if event.open and body.finding == "confirmed":
-            self._arrived(event, now)
             self.book.move(event, State.CONFIRMED, now)
-        elif body.finding == "refuted" and event.state in (State.ASSIGNED, State.ON_SCENE):
-            self._arrived(event, now)
+        elif body.finding == "refuted" and event.state is State.ON_SCENE:
             self.book.move(event, State.REFUTED, now)
         return m.Reply(message.message_id, m.OK, ""), []
 
@@ -160,6 +173,11 @@ class Desk:
             send = self._order_ends(event, entry, body.state, now)
         return m.Reply(message.message_id, m.OK, ""), send
 
+    @staticmethod
+    def _holder(event: Event) -> str | None:
+        """Who was given the order for an event: the operator of a robot, or a guard."""
+        return event.operator or event.responder
+
     def _arrived(self, event: Event, now: float) -> None:
         if event.state is State.ASSIGNED:
             event.times.setdefault("departed", now)
@@ -172,6 +190,8 @@ class Desk:
         """The responder is free again; an event it could not settle is open to others."""
         self._release(entry.device.id_tag, event)
         if state != "done" and event.state in (State.ASSIGNED, State.ON_SCENE):
+            if event.responder is not None:
+                event.failed.add(event.responder)
             self._reopen(event, now)
         return self._assign(now)
 
@@ -219,6 +239,7 @@ class Desk:
     def _order(self, event: Event, responder: str, operator: str | None, now: float) -> Send:
         self.book.move(event, State.ASSIGNED, now)
         event.responder, event.operator = responder, operator
+        event.sent.add(operator or responder)
         self.registry.entries[responder].order = event.number
         body = m.Order(event.number, event.kind, event.position, responder if operator else None)
         if operator is None:
@@ -247,6 +268,8 @@ class Desk:
                 assert where is not None
                 distance[row, column] = self.distance(where, event.position)
                 eta[row, column] = pace.mobilisation + distance[row, column] / pace.speed
+        for row, event in enumerate(pending):
+            _leave_out_who_failed(event, responders, distance[row], eta[row])
         return Situation(pending, responders, distance, eta)
 
     def _device_list(self, message: m.Message) -> tuple[m.Reply, list[Send]]:
@@ -257,3 +280,15 @@ class Desk:
     def _refuse(self, message: m.Message, code: int, text: str) -> tuple[m.Reply, list[Send]]:
         self.refused += 1
         return m.Reply(message.message_id, code, text), []
+
+
+def _leave_out_who_failed(
+    event: Event,
+    responders: tuple[Responder, ...],
+    distance: NDArray[np.float64],
+    eta: NDArray[np.float64],
+) -> None:
+    """A responder that gave an event back goes again only if nobody else can."""
+    failed = np.array([r.device in event.failed for r in responders])
+    if np.isfinite(distance[~failed]).any():
+        distance[failed] = eta[failed] = np.inf

@@ -26,6 +26,7 @@ from dva_sim.errors import ConfigError
 from dva_sim.scenario import Scenario
 from dva_sim.simulation import Recording, simulate
 
+INTERRUPTED = 130  # exit code of a program ended by Ctrl-C
 PATTERNS = ("req-rep", "pub-sub", "latest-wins")
 STYLES = {"safety": "bold red", "mode": "dim", "order": "cyan", "drive": "cyan", "link": "yellow"}
 
@@ -113,10 +114,10 @@ def _summarise(recording: Recording, took: float) -> None:
         known = row["response_s"] == row["response_s"]
         who = f" by {row['responder']}" if row["responder"] else ""
         console.print(f"{row['kind']}: {row['outcome']}{who}{response if known else ''}")
-    for drive in recording.recorder.drives:
-        row = drive_measures(drive, recording)
+    row = drive_measures(recording)
+    if "commands_sent" in row:
         console.print(
-            f"{recording.labels[drive.robot]}: {drive.outcome}, "
+            f"driving: {row['outcome']} in {row['attempts']} attempt(s), "
             f"{row['commands_applied']} of {row['commands_sent']} commands applied, "
             f"median age {row['command_age_p50_s']:.2f} s, {row['command_rate_hz']:.1f} per s, "
             f"{row['contacts']} contacts"
@@ -144,11 +145,13 @@ def run(name: str, pairs: list[str], out: Path | None, jobs: int | None) -> int:
     before = dry_run(study, folder, jobs=jobs)
     rehearse_all(study)
     _say_plan(before, folder)
-    with _bar() as bar:
-        task = bar.add_task("running", total=before.runs)
-        run_study(
-            study, folder, jobs=jobs, progress=lambda n, of: bar.update(task, completed=n, total=of)
-        )
+    try:
+        with _bar() as bar:
+            task = bar.add_task("running", total=before.runs)
+            run_study(study, folder, jobs=jobs, progress=lambda n, _: bar.update(task, completed=n))
+    except KeyboardInterrupt as stopped:
+        console.print(f"Stopped. {stopped}")
+        return INTERRUPTED
     failures = Results.load(folder).failures
     with console.status("Writing the report ..."):
         report = write_report(folder)

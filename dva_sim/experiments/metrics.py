@@ -18,9 +18,8 @@ QUANTILES = (5, 25, 50, 75, 95)
 
 
 def run_row(recording: Recording) -> Row:
-    """One row per run: its first drive, and what concerns the whole run."""
-    drives = recording.recorder.drives
-    row: Row = drive_measures(drives[0], recording) if drives else {}
+    """One row per run: the drives to its first event, and what concerns the whole run."""
+    row = drive_measures(recording)
     exposure = recording.recorder.exposure
     row["events"] = len(recording.events)
     row["person_exposure_s"] = float(sum(exposure.values()))
@@ -33,43 +32,81 @@ def run_row(recording: Recording) -> Row:
     return row
 
 
-def drive_measures(drive: DriveLog, recording: Recording) -> Row:
-    """Measures of one drive; times in [s].
+def drive_measures(recording: Recording) -> Row:
+    """Measures of driving to the event of the run's first drive; times in [s].
 
-    `drive_time_s` runs from the order to the confirmation; the horizon stands for a drive
-    that never got there, which `confirmed` and `outcome` tell.
+    `drive_time_s` runs from the first order to the confirmation, over all attempts and their
+    operators. The whole horizon stands for an event that no robot confirmed, be it that none
+    could be driven; `confirmed` and `outcome` tell. Where guards can go instead, a run
+    without any drive has no such measures.
     """
-    confirmed = drive.outcome == "confirmed"
-    ended = drive.ended if drive.ended is not None else recording.duration
-    time = ended - drive.ordered if confirmed else recording.scenario.horizon_s - drive.ordered
-    body = recording.robots[drive.robot].body
-    driving = ended - drive.started if drive.started is not None else NAN
-    row: Row = {
-        "confirmed": confirmed,
-        "outcome": drive.outcome,
-        "drive_time_s": time,
-        "path_m": body.distance,
+    drives = recording.recorder.drives
+    if not drives:
+        lost = not recording.scenario.guard.count
+        horizon = recording.scenario.horizon_s
+        return {"confirmed": False, "outcome": "no drive", "drive_time_s": horizon} if lost else {}
+    attempts = [d for d in drives if d.event == drives[0].event]
+    first, last = attempts[0], attempts[-1]
+    ended = last.ended if last.ended is not None else recording.duration
+    confirmed = last.outcome == "confirmed"
+    time = ended - first.ordered if confirmed else recording.scenario.horizon_s
+    row: Row = {"confirmed": confirmed, "outcome": last.outcome, "drive_time_s": time}
+    row |= {"attempts": len(attempts)} | _body_measures(attempts, recording)
+    return row | _command_measures(attempts, recording)
+
+
+def _body_measures(attempts: list[DriveLog], recording: Recording) -> Row:
+    """What the robots' bodies went through."""
+    bodies = [recording.robots[robot].body for robot in sorted({d.robot for d in attempts})]
+    return {
+        "path_m": sum(body.distance for body in bodies),
+        "contacts": sum(body.contacts for body in bodies),
+        "contact_impulse_ns": sum(body.impulse for body in bodies),
     }
-    row |= command_ages(drive.applied, ended)
-    row |= {
-        "command_rate_hz": len(drive.applied) / driving if driving else NAN,
-        "commands_sent": drive.sent,
-        "commands_applied": len(drive.applied),
+
+
+def _command_measures(attempts: list[DriveLog], recording: Recording) -> Row:
+    """Age, rate and fate of the commands of all attempts."""
+    spans = [_span(d, recording) for d in attempts]
+    driving = sum(end - start for start, end in spans)
+    applied = [a for d in attempts for a in d.applied]
+    hold = np.concatenate([_holds(d, end) for d, (_, end) in zip(attempts, spans, strict=True)])
+    trips = [t for d in attempts for t in d.round_trips]
+    inboxes = [recording.robots[robot].inbox for robot in sorted({d.robot for d in attempts})]
+    row = command_ages(applied, hold) | {
+        "command_rate_hz": len(applied) / driving if driving else NAN,
+        "commands_sent": sum(d.sent for d in attempts),
+        "commands_applied": len(applied),
         "commands_stale": recording.recorder.counters["robot refused: stale"],
-        "commands_superseded": drive.superseded + recording.robots[drive.robot].inbox.superseded,
-        "round_trip_p50_s": float(np.median(drive.round_trips)) if drive.round_trips else NAN,
-        "queue_max": recording.robots[drive.robot].inbox.longest,
-        "timeouts": drive.timeouts,
-        "alerts": drive.alerts,
-        "stop_share": drive.safe_stop / driving if driving else NAN,
-        "contacts": body.contacts,
-        "contact_impulse_ns": body.impulse,
+        "commands_superseded": sum(d.superseded for d in attempts)
+        + sum(inbox.superseded for inbox in inboxes),
+        "round_trip_p50_s": float(np.median(trips)) if trips else NAN,
+        "queue_max": max(inbox.longest for inbox in inboxes),
+        "timeouts": sum(d.timeouts for d in attempts),
+        "alerts": sum(d.alerts for d in attempts),
+        "stop_share": 1.0 - float(hold.sum()) / driving if driving else NAN,
     }
-    return row | delay_stages(drive, ended)
+    return row | delay_stages(attempts, applied, hold, recording)
 
 
-def command_ages(applied: list[Applied], ended: float) -> Row:
-    """Age at application (issue to effect) and in force (averaged over time)."""
+def _span(drive: DriveLog, recording: Recording) -> tuple[float, float]:
+    """From when to when a drive was under way [s]; nothing if it never started."""
+    end = drive.ended if drive.ended is not None else recording.duration
+    return (drive.started if drive.started is not None else end), end
+
+
+def _holds(drive: DriveLog, end: float) -> NDArray[np.float64]:
+    """How long each command of a drive was in force, shape `(n,)` [s]."""
+    if not drive.applied:
+        return np.zeros(0)
+    times = np.array([*(a.time for a in drive.applied), max(end, drive.applied[-1].time)])
+    until = np.array([a.until for a in drive.applied])
+    hold: NDArray[np.float64] = np.maximum(np.minimum(times[1:], until) - times[:-1], 0.0)
+    return hold
+
+
+def command_ages(applied: list[Applied], hold: NDArray[np.float64]) -> Row:
+    """Age at application (made to effect), and in force (averaged over time in force)."""
     if not applied:
         names = ["mean", *(f"p{q:02}" for q in QUANTILES)]
         empty: Row = {f"command_age_{n}_s": NAN for n in names}
@@ -78,45 +115,51 @@ def command_ages(applied: list[Applied], ended: float) -> Row:
     row: Row = {"command_age_mean_s": float(ages.mean())}
     for q, value in zip(QUANTILES, np.percentile(ages, QUANTILES), strict=True):
         row[f"command_age_p{q:02}_s"] = float(value)
-    hold = _holds(applied, ended)
     total = float(hold.sum())
     in_force = float((hold * (ages + hold / 2)).sum() / total) if total else NAN
     return row | {"age_in_force_mean_s": in_force}
 
 
-def _holds(applied: list[Applied], ended: float) -> NDArray[np.float64]:
-    """How long each command stood until the next, shape `(n,)` [s]."""
-    times = np.array([*(a.time for a in applied), max(ended, applied[-1].time)])
-    return np.diff(times)
+STAGES = (
+    *("frame", "downlink", "human", "filter", "pattern", "uplink"),
+    *("processing", "sampling", "motor"),
+)
 
 
-def delay_stages(drive: DriveLog, ended: float) -> Row:
+def delay_stages(
+    attempts: list[DriveLog],
+    applied: list[Applied],
+    hold: NDArray[np.float64],
+    recording: Recording,
+) -> Row:
     """The loop's delay as a sum of mean stages, from a frame's capture to its effect.
 
-    Each is an average over the drive: frame (half the time until the next one is shown) and
-    downlink are per frame, human is the person's perception and hand, filter, uplink and
-    processing are per command, sampling is half the hold of a command, weighted by time.
+    Frame (half the time until the next one is shown) and downlink are means per frame; human
+    is the person's perception and hand; filter, pattern (waiting to be sent), uplink and
+    processing are means per command; sampling is half the time a command is in force,
+    weighted by time; motor is the robot's time constant.
     """
-    stages: Row = {f"delay_{s}_s": NAN for s in STAGES}
-    if drive.applied and len(drive.frame_times) > 1:
-        captured, shown = np.array(drive.frame_times).T
-        gaps, hold = np.diff(shown), _holds(drive.applied, ended)
-        stages = {
-            "delay_frame_s": _half_hold(gaps),
-            "delay_downlink_s": float((shown - captured).mean()),
-            "delay_human_s": drive.human_delay,
-            "delay_filter_s": float(np.mean([a.sample_age for a in drive.applied])),
-            "delay_uplink_s": float(np.mean([a.arrived - a.issued for a in drive.applied])),
-            "delay_processing_s": float(np.mean([a.time - a.arrived for a in drive.applied])),
-            "delay_sampling_s": _half_hold(hold),
-        }
-        stages["frame_age_mean_s"] = stages["delay_downlink_s"] + stages["delay_frame_s"]
-    stages.setdefault("frame_age_mean_s", NAN)
-    stages["loop_delay_mean_s"] = sum(stages[f"delay_{s}_s"] for s in STAGES)
-    return stages
-
-
-STAGES = ("frame", "downlink", "human", "filter", "uplink", "processing", "sampling")
+    frames = [np.array(d.frame_times) for d in attempts if len(d.frame_times) > 1]
+    if not applied or not frames:
+        return {f"{name}_s": NAN for name in ("frame_age_mean", "loop_delay_mean")}
+    captured, shown = np.concatenate(frames).T
+    gaps = np.concatenate([np.diff(f[:, 1]) for f in frames])
+    robot = recording.robots[attempts[0].robot]
+    stages = {
+        "frame": _half_hold(gaps),
+        "downlink": float((shown - captured).mean()),
+        "human": attempts[0].human_delay,
+        "filter": float(np.mean([a.sample_age for a in applied])),
+        "pattern": float(np.mean([a.sent - a.issued for a in applied])),
+        "uplink": float(np.mean([a.arrived - a.sent for a in applied])),
+        "processing": float(np.mean([a.time - a.arrived for a in applied])),
+        "sampling": _half_hold(hold),
+        "motor": robot.body.spec.motor_time_constant,
+    }
+    row: Row = {f"delay_{name}_s": value for name, value in stages.items()}
+    row["frame_age_mean_s"] = stages["downlink"] + stages["frame"]
+    row["loop_delay_mean_s"] = sum(stages.values())
+    return row
 
 
 def _half_hold(gaps: NDArray[np.float64]) -> float:

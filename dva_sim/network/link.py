@@ -149,9 +149,9 @@ class Weather:
         number, inside = divmod(slot, _BLOCK)
         block = self._blocks.get(number)
         if block is None:
-            block = self._blocks[number] = self._streams.fresh(f"{self._name}/{number}").random(
-                _BLOCK
-            )
+            self._blocks.pop(number - 2, None)  # time only goes forward
+            luck = self._streams.fresh(f"{self._name}/{number}")
+            block = self._blocks[number] = luck.random(_BLOCK)
         return (float(block[inside]) + self._count * _GOLDEN) % 1.0
 
 
@@ -168,7 +168,7 @@ class Link:
     def __init__(
         self, config: LinkConfig, serialiser: Serialiser, streams: Streams, name: str
     ) -> None:
-        self.delay = config.delay_s
+        self.name, self.delay = name, config.delay_s
         self._jitter, self._loss, self._room = config.jitter_s, config.loss, config.queue_bytes
         self._serialiser = serialiser
         self._loss_luck = Weather(streams, f"{name}/loss")

@@ -17,7 +17,7 @@ from dva_sim.agents.robot import RobotAgent, RobotSetup
 from dva_sim.agents.tilt import Phone
 from dva_sim.clock import Clock
 from dva_sim.core.dispatch import POLICIES
-from dva_sim.core.events import STEPS, Event
+from dva_sim.core.events import Event
 from dva_sim.core.registry import DETECTOR, GUARD, OPERATOR, ROBOT
 from dva_sim.core.service import Desk, Pace
 from dva_sim.errors import ConfigError
@@ -36,6 +36,7 @@ from dva_sim.scenario import (
 from dva_sim.simulation.dva import DvaAgent
 from dva_sim.simulation.incidents import Incident, draw_incidents
 from dva_sim.simulation.names import DVA, address_of, id_of, label_of
+from dva_sim.simulation.watch import broken_event_rules, broken_rules
 from dva_sim.streams import Streams
 from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.physics import World
@@ -45,6 +46,7 @@ from dva_sim.worlds.site import Site
 LAN = LinkConfig(delay_s=0.0005, rate_bps=1e9, queue_bytes=10_000_000)
 PHYSICS_TICK = 0.04  # two centimetres at top speed [s]
 WATCH_PERIOD = 0.5  # how often tracks are sampled and rules are checked [s]
+MERGED_WITHIN = 8.5  # the DVA takes reports so near each other for one event [m]
 FILM_PERIOD = 0.1  # the same where pictures are wanted [s]
 ROBOT_PACE = 0.35  # what the DVA expects of a teleoperated robot [m/s]
 ROBOT_READY = 4.0  # and of its operator [s]
@@ -75,13 +77,7 @@ class Recording:
 
     def event_of(self, number: int) -> Event | None:
         """The DVA's event about incident `number`, if it knows of it."""
-        incident = self.incidents[number]
-        x, y = incident.hazard.position
-        for event in self.events:
-            at = self.site.frame.to_xy(event.position.latitude, event.position.longitude)
-            if event.kind == incident.kind and math.dist(at, (x, y)) < 0.5:
-                return event
-        return None
+        return event_about(self.incidents[number], self.events, self.site)
 
 
 def simulate(scenario: Scenario, seed: int, keep_traffic: bool = False) -> Recording:
@@ -150,7 +146,7 @@ class _Run:
         self.clock.every(self._watch_period, self._watch)
         self._let_time_pass()
         self.world.advance_to(self.clock.now)
-        self._check_events()
+        self._watch()
         events = list(self.dva.desk.book.events.values())
         return Recording(
             self.scenario,
@@ -173,13 +169,16 @@ class _Run:
 
     def _settled(self) -> bool:
         """Whether every incident is known and closed, and nobody drives any more."""
-        desk, now = self.dva.desk, self.clock.now
-        known = sum(1 for i in self.incidents if i.detected < math.inf)
+        events = list(self.dva.desk.book.events.values())
         return (
-            now > 1.0
-            and len(desk.book.events) >= known
-            and not any(e.open for e in desk.book.events.values())
+            bool(events)
+            and not any(e.open for e in events)
             and all(d.ended is not None for d in self.recorder.drives)
+            and all(
+                event_about(i, events, self.site) is not None
+                for i in self.incidents
+                if i.detected < math.inf
+            )
         )
 
     # --- who is there ------------------------------------------------------------------
@@ -333,10 +332,11 @@ class _Run:
 
     def _drive_of(self, robot: str) -> DriveLog | None:
         """The newest drive of a robot, while it lasts."""
-        for drive in reversed(self.recorder.drives):
-            if drive.robot == robot:
-                return drive if drive.ended is None else None
-        return None
+        drive = self._newest_drive(robot)
+        return drive if drive is not None and drive.ended is None else None
+
+    def _newest_drive(self, robot: str) -> DriveLog | None:
+        return next((d for d in reversed(self.recorder.drives) if d.robot == robot), None)
 
     # --- watching ----------------------------------------------------------------------
 
@@ -349,7 +349,8 @@ class _Run:
             recorder.tracks[label].append(
                 TrackPoint(now, pose.x, pose.y, pose.heading, robot.controller.mode.value)
             )
-            for rule, what in robot.broken_rules(now):
+            drive = self._newest_drive(robot.device.id_tag)
+            for rule, what in broken_rules(robot, drive, self.scenario.robot, now):
                 recorder.violated(rule, now, label, what)
         for guard in self.guards:
             label = guard.device.label
@@ -358,23 +359,26 @@ class _Run:
             )
             if self._in_danger(guard.x, guard.y, now):
                 recorder.exposure[label] += self._watch_period
-
-    def _check_events(self) -> None:
-        """Each event in one state, its times in order (S6, S7)."""
-        book, now = self.dva.desk.book, self.clock.now
-        if sum(book.counts().values()) != len(book.events):
-            self.recorder.violated("S6", now, "dva", "the states do not add up to all events")
-        for event in book.events.values():
-            times = [event.times[step] for step in STEPS if step in event.times]
-            if times != sorted(times):
-                what = f"times of event {event.number} are out of order"
-                self.recorder.violated("S7", now, "dva", what)
+        deadline = self.scenario.dispatch.escalate_after_s
+        for rule, what in broken_event_rules(self.dva.desk.book, deadline, now):
+            recorder.violated(rule, now, "dva", what)
 
     def _in_danger(self, x: float, y: float, now: float) -> bool:
         return any(
             now >= i.start and math.dist(i.hazard.position, (x, y)) < i.hazard.danger_radius(now)
             for i in self.incidents
         )
+
+
+def event_about(incident: Incident, events: list[Event], site: Site) -> Event | None:
+    """The DVA's event that an incident was reported as; two near each other are one event."""
+    known: tuple[float, Event | None] = MERGED_WITHIN, None
+    for event in events:
+        at = site.frame.to_xy(event.position.latitude, event.position.longitude)
+        gap = math.dist(at, incident.hazard.position)
+        if event.kind == incident.kind and gap <= known[0]:
+            known = gap, event
+    return known[1]
 
 
 _PLANNERS: dict[tuple[str, float], tuple[Site, Planner]] = {}

@@ -17,6 +17,7 @@ from dva_sim.worlds.planning import Planner
 
 FIRST_GUESS = 0.6  # delay a person expects before having seen any [s]
 ASK_AGAIN = 2.0  # when the robot is held by somebody else [s]
+START_TRIES = 20
 START_AGAIN = 1.0  # when the grant may still be on its way to the robot [s]
 
 
@@ -87,7 +88,7 @@ class OperatorAgent:
             self.device.network, self.device.id_tag, publisher, "frame|", drive.on_frame
         )
 
-    def _start(self, drive: Drive) -> None:
+    def _start(self, drive: Drive, tries: int = 1) -> None:
         def answered(reply: m.Reply) -> None:
             if drive.over:
                 return
@@ -95,8 +96,8 @@ class OperatorAgent:
                 self.device.progress(drive.order.event_id, "departed")
                 self.device.tell(f"drives {self.device.label_of(drive.robot)}", "drive")
                 drive.begin()
-            elif reply.code in (m.BUSY, m.NOT_PERMITTED, m.BAD_SESSION):
-                self.device.clock.call_after(START_AGAIN, self._start, drive)
+            elif tries < START_TRIES and reply.code in (m.BUSY, m.NOT_PERMITTED, m.BAD_SESSION):
+                self.device.clock.call_after(START_AGAIN, self._start, drive, tries + 1)
             else:
                 drive.end("gave up", reply.text)
 

@@ -22,8 +22,11 @@ from dva_sim.recorder import DriveLog
 from dva_sim.worlds.planning import Planner
 
 BLIND_AFTER = 20.0  # without a frame for so long, the link counts as lost [s]
+STILL = 0.02  # a robot that moves less stands [m/s, rad/s]
+ASKED_SPEED, ASKED_TURN = 0.05, 0.1  # from here on one expects to see it move [m/s, rad/s]
 STUCK_AFTER = 4.0  # standing for so long though asked to drive, a person plans anew [s]
 LET_GO_FOR = 1.0  # one who sees no effect levels the phone for so long, and tilts again [s]
+GIVE_UP_AFTER = 4  # after so many attempts in a row without any motion, the link is lost
 SEARCH_FOR = 25.0  # looking around at the place for so long, a person says there is nothing [s]
 KEEP_OFF = 1.2  # distance kept to the event [m]
 AT_PLACE = 1.5  # nearer than this one is at the place [m]
@@ -126,6 +129,7 @@ class Drive:
         self._at_place_since: float | None = None
         self._arrived = False
         self._let_go_until = 0.0
+        self._without_effect = 0
 
     def begin(self) -> None:
         """The robot has agreed to be driven: look, and tilt."""
@@ -159,6 +163,7 @@ class Drive:
         self.log.ended, self.log.outcome = self._clock.now, outcome
         if self._sender is not None:
             self._sender.stop()
+        self._device.recorder.drive_over(self._device.id_tag)
         if self.picture is not None:
             self.picture.close()
         self._on_end(self, outcome, why)
@@ -198,8 +203,10 @@ class Drive:
         self._device.recorder.view(now, self.robot, judged.x, judged.y, judged.heading)
         route = self._consider(judged)
         if route is not None:
-            delay = seat.delay.value + seat.person.perceptual_delay
-            self._intend(seat.strategy.drive(route, judged, delay, self._keep_off(judged)))
+            # The guess is made when a frame is perceived, so it holds the perceptual delay.
+            self._intend(
+                seat.strategy.drive(route, judged, seat.delay.value, self._keep_off(judged))
+            )
 
     def _look_at_truth(self) -> bool:
         """The oracle's own loop; False ends it."""
@@ -275,6 +282,10 @@ class Drive:
             self._route, self._standing_since = None, None
             self._let_go_until = self._clock.now + LET_GO_FOR
             self._device.recorder.counters["replans"] += 1
+            self._without_effect += 1
+            if self._without_effect >= GIVE_UP_AFTER:
+                self.end("lost link", "the robot does not move")
+                return None
         if self._route is None:
             points = self._seat.planner.path((seen.x, seen.y), self._goal)
             if points is None:
@@ -284,8 +295,12 @@ class Drive:
         return self._route
 
     def _is_stuck(self, seen: Observation) -> bool:
-        now = self._clock.now
-        if self._intent.speed <= 0.05 or abs(seen.speed) >= 0.02:
+        """Whether the robot has stood for too long although it was asked to move."""
+        now, intent = self._clock.now, self._intent
+        moves = abs(seen.speed) >= STILL or abs(seen.turn_rate) >= STILL
+        if moves:
+            self._without_effect = 0
+        if moves or (intent.speed <= ASKED_SPEED and abs(intent.turn_rate) <= ASKED_TURN):
             self._standing_since = None
             return False
         if self._standing_since is None:

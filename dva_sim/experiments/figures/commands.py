@@ -37,9 +37,11 @@ _STAGES = {
     "delay_downlink_s": ("down-link", "#8fc1e3"),
     "delay_human_s": ("human", "#cccccc"),
     "delay_filter_s": ("filter", "#d98200"),
+    "delay_pattern_s": ("pattern", "#c23b22"),
     "delay_sampling_s": ("sampling", "#f6cd82"),
     "delay_uplink_s": ("up-link", "#1f6fa8"),
     "delay_processing_s": ("processing", "#a0508a"),
+    "delay_motor_s": ("motor", "#4a7a4a"),
 }
 
 

@@ -1,0 +1,76 @@
+"""Checks of the safety rules from outside: nothing here trusts what a robot says of itself.
+
+What a robot may do follows from the log of commands with their true times, and from the
+body in the world; a robot that trusts a command too long is found out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from dva_sim.agents.modes import Mode
+from dva_sim.agents.robot import RobotAgent
+from dva_sim.core.events import STEPS, EventBook, State
+from dva_sim.recorder import DriveLog
+from dva_sim.scenario import RobotConfig
+
+MOVING = 0.05  # above this a robot is going somewhere [m/s]
+SLACK = 1.02  # measured speeds may exceed a limit by so much
+PENDING_SLACK = 2.0  # the desk looks at deadlines once a second [s]
+
+Broken = tuple[str, str]
+
+
+def broken_rules(
+    robot: RobotAgent, drive: DriveLog | None, config: RobotConfig, now: float
+) -> Iterator[Broken]:
+    """Rules that do not hold for a robot now, each with what was seen.
+
+    Args:
+        robot: The robot.
+        drive: Its newest drive, over or not.
+        config: Its limits as the scenario states them.
+        now: Time [s].
+    """
+    spec, speed, turn_rate = robot.body.spec, robot.body.speed, robot.body.turn_rate
+    mode = robot.controller.mode
+    stopping = spec.max_speed / spec.max_deceleration + 4 * spec.motor_time_constant
+    if mode is not Mode.MISSION and abs(speed) > MOVING and not robot.body.in_contact:
+        allowed = _allowed_until(drive, config)
+        if now > allowed + stopping:
+            yield "S1", f"moves at {speed:.2f} m/s, {now - allowed:.1f} s after it had to stop"
+    if mode is Mode.TELEOPERATION and drive is not None and drive.ended is None:
+        if robot.controller.owner != drive.operator:
+            yield "S2", f"is owned by {robot.controller.owner}, driven by {drive.operator}"
+        if _moved_by_the_past(robot, drive):
+            yield "S3", "obeys a session from before the emergency"
+    # Comparisons that a nan fails, too.
+    within = abs(speed) <= spec.max_speed * SLACK and abs(turn_rate) <= spec.max_turn_rate * SLACK
+    if not within and not robot.body.in_contact:
+        yield "S4", f"moves at {speed:.2f} m/s and {turn_rate:.2f} rad/s"
+
+
+def _allowed_until(drive: DriveLog | None, config: RobotConfig) -> float:
+    """When the newest command ceases to hold, by its true age and its reception [s]."""
+    if drive is None or not drive.applied:
+        return 0.0
+    last = drive.applied[-1]
+    return min(last.arrived + config.watchdog_s, last.issued + config.max_age_s)
+
+
+def _moved_by_the_past(robot: RobotAgent, drive: DriveLog) -> bool:
+    emergency = robot.controller.emergency_at
+    if emergency < 0 or not drive.applied or drive.started is None:
+        return False
+    return drive.applied[-1].time > emergency > drive.started
+
+
+def broken_event_rules(book: EventBook, deadline: float, now: float) -> Iterator[Broken]:
+    """Events that wait beyond their deadline [s] (S6), or whose times are out of order (S7)."""
+    for event in book.events.values():
+        waited = now - event.pending_since
+        if event.state is State.PENDING and waited > deadline + PENDING_SLACK:
+            yield "S6", f"event {event.number} is pending after {waited:.0f} s"
+        times = [event.times[step] for step in STEPS if step in event.times]
+        if times != sorted(times):
+            yield "S7", f"times of event {event.number} are out of order"
