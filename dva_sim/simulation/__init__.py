@@ -1,5 +1,6 @@
 """From a scenario and a seed to what happened."""
 
-from dva_sim.simulation.run import Recording, rehearse, simulate
+from dva_sim.simulation.recording import Recording
+from dva_sim.simulation.run import rehearse, simulate
 
 __all__ = ["Recording", "rehearse", "simulate"]

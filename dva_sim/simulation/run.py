@@ -10,14 +10,13 @@ from dva_sim.agents.device import Device
 from dva_sim.agents.guard import GuardAgent, Walker
 from dva_sim.agents.modes import Limits, RobotController
 from dva_sim.agents.operator.agent import OperatorAgent
-from dva_sim.agents.operator.drive import OperatorSetup
+from dva_sim.agents.operator.drive import DriverSeat, OperatorSetup
 from dva_sim.agents.operator.person import draw_person
 from dva_sim.agents.operator.strategies import STRATEGIES, Oracle, Reach, Truth
 from dva_sim.agents.robot import RobotAgent, RobotSetup
 from dva_sim.agents.tilt import Phone
 from dva_sim.clock import Clock
 from dva_sim.core.dispatch import POLICIES
-from dva_sim.core.events import Event
 from dva_sim.core.registry import DETECTOR, GUARD, OPERATOR, ROBOT
 from dva_sim.core.service import Desk, Pace
 from dva_sim.errors import ConfigError
@@ -36,6 +35,7 @@ from dva_sim.scenario import (
 from dva_sim.simulation.dva import DvaAgent
 from dva_sim.simulation.incidents import Incident, draw_incidents
 from dva_sim.simulation.names import DVA, address_of, id_of, label_of
+from dva_sim.simulation.recording import Recording, event_about
 from dva_sim.simulation.watch import broken_event_rules, broken_rules
 from dva_sim.streams import Streams
 from dva_sim.worlds.geo import Pose
@@ -46,38 +46,9 @@ from dva_sim.worlds.site import Site
 LAN = LinkConfig(delay_s=0.0005, rate_bps=1e9, queue_bytes=10_000_000)
 PHYSICS_TICK = 0.04  # two centimetres at top speed [s]
 WATCH_PERIOD = 0.5  # how often tracks are sampled and rules are checked [s]
-MERGED_WITHIN = 8.5  # the DVA takes reports so near each other for one event [m]
 FILM_PERIOD = 0.1  # the same where pictures are wanted [s]
 ROBOT_PACE = 0.35  # what the DVA expects of a teleoperated robot [m/s]
 ROBOT_READY = 4.0  # and of its operator [s]
-
-
-@dataclass
-class Recording:
-    """What happened in one run.
-
-    Attributes:
-        incidents: The hazards as they were.
-        events: The events as the DVA knew them.
-        robots: The robots by id, as they ended.
-        labels: Names by id.
-        duration: How long the run lasted [s].
-    """
-
-    scenario: Scenario
-    seed: int
-    site: Site
-    recorder: Recorder
-    incidents: list[Incident]
-    events: list[Event]
-    robots: dict[str, RobotAgent]
-    labels: dict[str, str]
-    links: dict[str, tuple[Link, Link]]
-    duration: float
-
-    def event_of(self, number: int) -> Event | None:
-        """The DVA's event about incident `number`, if it knows of it."""
-        return event_about(self.incidents[number], self.events, self.site)
 
 
 def simulate(scenario: Scenario, seed: int, keep_traffic: bool = False) -> Recording:
@@ -271,16 +242,25 @@ class _Run:
         robot = robot_profile(scenario)
         reach = Reach(robot.max_speed_mps, robot.max_turn_rate_rad_s)
         strategy = STRATEGIES[config.strategy](person, reach)
-        phone = Phone(
-            phone_profile(scenario), person.hand_lag, self.streams[f"{device.label}/phone"]
-        )
-        truth = self._truth if isinstance(strategy, Oracle) else None
         command = scenario.command
         setup = OperatorSetup(
-            scenario.pattern, command.rate_hz, command.timeout_s, command.attempts, truth
+            scenario.pattern,
+            command.rate_hz,
+            command.timeout_s,
+            command.attempts,
+            truth=self._truth if isinstance(strategy, Oracle) else None,
         )
-        judgement = self.streams[f"{device.label}/judgement"]
-        OperatorAgent(device, person, phone, strategy, self.planner, setup, judgement)
+        phone_luck = self.streams[f"{device.label}/phone"]
+        seat = DriverSeat(
+            device,
+            person,
+            Phone(phone_profile(scenario), person.hand_lag, phone_luck),
+            strategy,
+            self.planner,
+            setup,
+            self.streams[f"{device.label}/judgement"],
+        )
+        OperatorAgent(seat)
         device.register()
 
     def _add_reports(self) -> None:
@@ -368,17 +348,6 @@ class _Run:
             now >= i.start and math.dist(i.hazard.position, (x, y)) < i.hazard.danger_radius(now)
             for i in self.incidents
         )
-
-
-def event_about(incident: Incident, events: list[Event], site: Site) -> Event | None:
-    """The DVA's event that an incident was reported as; two near each other are one event."""
-    known: tuple[float, Event | None] = MERGED_WITHIN, None
-    for event in events:
-        at = site.frame.to_xy(event.position.latitude, event.position.longitude)
-        gap = math.dist(at, incident.hazard.position)
-        if event.kind == incident.kind and gap <= known[0]:
-            known = gap, event
-    return known[1]
 
 
 _PLANNERS: dict[tuple[str, float], tuple[Site, Planner]] = {}

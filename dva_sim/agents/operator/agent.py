@@ -2,20 +2,11 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from dva_sim.agents.device import Device
-from dva_sim.agents.operator.delay import DelayEstimate
-from dva_sim.agents.operator.drive import Drive, DriverSeat, OperatorSetup
-from dva_sim.agents.operator.person import Person
-from dva_sim.agents.operator.strategies import Oracle, Pursuit
-from dva_sim.agents.tilt import Phone
+from dva_sim.agents.operator.drive import Drive, DriverSeat
 from dva_sim.network.patterns import Subscription
 from dva_sim.protocol import messages as m
 from dva_sim.recorder import DriveLog
-from dva_sim.worlds.planning import Planner
 
-FIRST_GUESS = 0.6  # delay a person expects before having seen any [s]
 ASK_AGAIN = 2.0  # when the robot is held by somebody else [s]
 START_TRIES = 20
 START_AGAIN = 1.0  # when the grant may still be on its way to the robot [s]
@@ -25,31 +16,13 @@ class OperatorAgent:
     """A person with a phone in the control room.
 
     Args:
-        device: Identity and ways to talk.
-        person: Who it is.
-        phone: The phone in the hand.
-        strategy: How the person drives.
-        planner: The person knows the building.
-        setup: Pattern, rate, time-outs.
-        rng: Luck of this person's judgement.
+        seat: Who it is, and what is at hand.
     """
 
-    def __init__(
-        self,
-        device: Device,
-        person: Person,
-        phone: Phone,
-        strategy: Pursuit | Oracle,
-        planner: Planner,
-        setup: OperatorSetup,
-        rng: np.random.Generator,
-    ) -> None:
-        self.device = device
-        self._seat = DriverSeat(
-            device, person, phone, strategy, planner, setup, DelayEstimate(0.0, FIRST_GUESS), rng
-        )
+    def __init__(self, seat: DriverSeat) -> None:
+        self.device, self._seat = seat.device, seat
         self._drive: Drive | None = None
-        device.serve(self._on_order)
+        self.device.serve(self._on_order)
 
     def _on_order(self, message: m.Message) -> m.Reply:
         order, device = message.body, self.device

@@ -21,6 +21,7 @@ from dva_sim.protocol import messages as m
 from dva_sim.recorder import DriveLog
 from dva_sim.worlds.planning import Planner
 
+FIRST_GUESS = 0.6  # delay a person expects before having seen any [s]
 BLIND_AFTER = 20.0  # without a frame for so long, the link counts as lost [s]
 STILL = 0.02  # a robot that moves less stands [m/s, rad/s]
 ASKED_SPEED, ASKED_TURN = 0.05, 0.1  # from here on one expects to see it move [m/s, rad/s]
@@ -62,8 +63,10 @@ class DriverSeat:
         strategy: How the person drives.
         planner: The person knows the building.
         setup: Pattern, rate, time-outs.
-        delay: What the person has learnt of the delay.
         rng: Luck of this person's judgement.
+
+    Attributes:
+        delay: What the person has learnt of the delay.
     """
 
     def __init__(
@@ -74,11 +77,11 @@ class DriverSeat:
         strategy: Pursuit | Oracle,
         planner: Planner,
         setup: OperatorSetup,
-        delay: DelayEstimate,
         rng: np.random.Generator,
     ) -> None:
         self.device, self.person, self.phone, self.strategy = device, person, phone, strategy
-        self.planner, self.setup, self.delay = planner, setup, delay
+        self.planner, self.setup = planner, setup
+        self.delay = DelayEstimate(0.0, FIRST_GUESS)
         self._errors = _normals(rng)
 
     def judge(self, seen: Observation) -> Observation:

@@ -1,0 +1,55 @@
+"""What is left of a run when it is over."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from dva_sim.agents.robot import RobotAgent
+from dva_sim.core.events import Event
+from dva_sim.network.link import Link
+from dva_sim.recorder import Recorder
+from dva_sim.scenario import Scenario
+from dva_sim.simulation.incidents import Incident
+from dva_sim.worlds.site import Site
+
+MERGED_WITHIN = 8.5  # the DVA takes reports so near each other for one event [m]
+
+
+@dataclass
+class Recording:
+    """What happened in one run.
+
+    Attributes:
+        incidents: The hazards as they were.
+        events: The events as the DVA knew them.
+        robots: The robots by id, as they ended.
+        labels: Names by id.
+        duration: How long the run lasted [s].
+    """
+
+    scenario: Scenario
+    seed: int
+    site: Site
+    recorder: Recorder
+    incidents: list[Incident]
+    events: list[Event]
+    robots: dict[str, RobotAgent]
+    labels: dict[str, str]
+    links: dict[str, tuple[Link, Link]]
+    duration: float
+
+    def event_of(self, number: int) -> Event | None:
+        """The DVA's event about incident `number`, if it knows of it."""
+        return event_about(self.incidents[number], self.events, self.site)
+
+
+def event_about(incident: Incident, events: list[Event], site: Site) -> Event | None:
+    """The DVA's event that an incident was reported as; two near each other are one event."""
+    known: tuple[float, Event | None] = MERGED_WITHIN, None
+    for event in events:
+        at = site.frame.to_xy(event.position.latitude, event.position.longitude)
+        gap = math.dist(at, incident.hazard.position)
+        if event.kind == incident.kind and gap <= known[0]:
+            known = gap, event
+    return known[1]
