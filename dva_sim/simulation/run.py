@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from dva_sim.agents.camera import HazardSpot, View
 from dva_sim.agents.device import Device
 from dva_sim.agents.guard import GuardAgent, Walker
-from dva_sim.agents.modes import Limits, RobotController
+from dva_sim.agents.modes import Limits, Mode, RobotController
 from dva_sim.agents.operator.agent import OperatorAgent
 from dva_sim.agents.operator.drive import DriverSeat, OperatorSetup
 from dva_sim.agents.operator.person import draw_person
@@ -85,6 +85,7 @@ class _Run:
     links: dict[str, tuple[Link, Link]] = field(default_factory=dict)
     robots: dict[str, RobotAgent] = field(default_factory=dict)
     guards: list[GuardAgent] = field(default_factory=list)
+    _last_mission: dict[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         scenario = self.scenario
@@ -330,7 +331,10 @@ class _Run:
                 TrackPoint(now, pose.x, pose.y, pose.heading, robot.controller.mode.value)
             )
             drive = self._newest_drive(robot.device.id_tag)
-            for rule, what in broken_rules(robot, drive, self.scenario.robot, now):
+            if robot.controller.mode is Mode.MISSION:
+                self._last_mission[label] = now
+            mission = self._last_mission.get(label, 0.0)
+            for rule, what in broken_rules(robot, drive, self.scenario.robot, mission, now):
                 recorder.violated(rule, now, label, what)
         for guard in self.guards:
             label = guard.device.label

@@ -22,7 +22,11 @@ Broken = tuple[str, str]
 
 
 def broken_rules(
-    robot: RobotAgent, drive: DriveLog | None, config: RobotConfig, now: float
+    robot: RobotAgent,
+    drive: DriveLog | None,
+    config: RobotConfig,
+    last_mission: float,
+    now: float,
 ) -> Iterator[Broken]:
     """Rules that do not hold for a robot now, each with what was seen.
 
@@ -30,13 +34,14 @@ def broken_rules(
         robot: The robot.
         drive: Its newest drive, over or not.
         config: Its limits as the scenario states them.
+        last_mission: When it was last seen on a mission, driving by itself [s].
         now: Time [s].
     """
     spec, speed, turn_rate = robot.body.spec, robot.body.speed, robot.body.turn_rate
     mode = robot.controller.mode
     stopping = spec.max_speed / spec.max_deceleration + 4 * spec.motor_time_constant
     if mode is not Mode.MISSION and abs(speed) > MOVING and not robot.body.in_contact:
-        allowed = _allowed_until(drive, config)
+        allowed = max(_allowed_until(drive, config), last_mission)
         if now > allowed + stopping:
             yield "S1", f"moves at {speed:.2f} m/s, {now - allowed:.1f} s after it had to stop"
     if mode is Mode.TELEOPERATION and drive is not None and drive.ended is None:

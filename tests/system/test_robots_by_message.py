@@ -1,0 +1,108 @@
+"""Robots on the network: what they do when they are told to, by messages alone."""
+
+from __future__ import annotations
+
+import math
+
+from dva_sim import scenario as scenarios
+from dva_sim.protocol import messages as m
+from dva_sim.simulation.names import DVA, id_of
+from dva_sim.simulation.run import PHYSICS_TICK, _Run
+
+ROBOT = id_of("robot", 1)
+QUIET = {"events": [{"kind": "fire", "at_s": 500}], "horizon_s": 600}
+
+
+def staged(**changes: object) -> _Run:
+    """A run with everybody in place, whose time the test lets pass."""
+    scenario = scenarios.build(scenarios.load("drive-to-event"), QUIET | changes)
+    run = _Run(scenario, 1, keep_traffic=False)
+    run.build()
+    run.clock.every(0.5, run._watch)
+    return run
+
+
+def send(run: _Run, time: float, body: m.Body, session: int = 5) -> list[m.Reply]:
+    """Let the DVA send a request at a time [s]; replies come into the list."""
+    replies: list[m.Reply] = []
+    run.clock.call_at(
+        time, lambda: run.dva.device.ask(ROBOT, body, replies.append, session=session)
+    )
+    return replies
+
+
+def place(run: _Run, x: float, y: float) -> m.Position:
+    return m.Position(*run.site.frame.to_latlon(x, y))
+
+
+def test_a_robot_drives_a_mission_by_itself_and_is_idle_again() -> None:
+    run = staged()
+    robot = run.robots[ROBOT]
+    start = robot.body.pose()
+    corner, goal = (12.0, 12.0), (20.0, 12.0)
+    send(run, 10.0, m.PermissionGrant(DVA, "missions", 5))
+    told = send(run, 12.0, m.GoTo((place(run, *corner), place(run, *goal))))
+    run.clock.run(14.0)
+    assert [r.code for r in told] == [m.OK]
+    assert robot.controller.mode == "Mission"
+    run.clock.run(120.0)
+    assert robot.controller.mode == "Idle"
+    assert math.dist(robot.body.pose()[:2], goal) < 0.6
+    assert robot.body.distance > math.dist(start[:2], corner)
+    assert run.recorder.violations == {}
+
+
+def test_an_emergency_stops_a_moving_robot_within_its_braking_distance() -> None:
+    run = staged()
+    robot = run.robots[ROBOT]
+    send(run, 10.0, m.PermissionGrant(DVA, "missions", 5))
+    send(run, 12.0, m.GoTo((place(run, 30.0, 12.0),)))
+    run.clock.run(45.0)
+    run.world.advance_to(45.0)
+    assert robot.body.speed > 0.4
+    before = robot.body.distance
+    told = send(run, 45.0, m.Emergency(), session=0)
+    run.clock.run(60.0)
+    run.world.advance_to(60.0)
+    assert [r.code for r in told] == [m.OK]
+    assert robot.controller.mode == "Idle"
+    processing, lag, brake = 0.05 * 0.5, 0.15 * 0.5, 0.5**2 / 2
+    assert robot.body.distance - before < processing + lag + brake + 0.02
+    assert run.recorder.violations == {}
+
+
+def test_two_robots_that_meet_head_on_do_not_pass_through_each_other() -> None:
+    run = staged(**{"robot.count": 2, "operator.count": 2})
+    one, two = (run.robots[id_of("robot", n)] for n in (1, 2))
+    ways = ((ROBOT, (14.5, 7.4)), (id_of("robot", 2), (9.5, 7.4)))
+    device = run.dva.device
+    for robot, goal in ways:
+        grant = m.PermissionGrant(DVA, "missions", 5)
+        run.clock.call_at(10.0, lambda r=robot, g=grant: device.ask(r, g, session=5))
+        there = m.GoTo((place(run, *goal),))
+        run.clock.call_at(12.0, lambda r=robot, g=there: device.ask(r, g, session=5))
+    gaps: list[float] = []
+
+    def measure() -> None:
+        run.world.advance_to(run.clock.now)
+        gaps.append(math.dist(one.body.pose()[:2], two.body.pose()[:2]))
+
+    run.clock.every(0.1, measure)
+    run.clock.run(60.0)
+    one_tick_of_closing = 2 * 0.5 * PHYSICS_TICK
+    assert min(gaps) > 2 * one.body.spec.radius - one_tick_of_closing
+    assert one.body.contacts >= 1
+
+
+def test_bad_bytes_are_answered_and_change_nothing() -> None:
+    run = staged()
+    answers: list[bytes] = []
+    handler = run.network.service(ROBOT, "control")
+    assert handler is not None
+    for data in (b"", b"<msg>", b"<!DOCTYPE x><msg/>", b"\xff" * 9000):
+        handler(data, answers.append)
+    run.clock.run(5.0)
+    assert len(answers) == 4
+    assert all(b"<Code>1</Code>" in a for a in answers)
+    assert run.recorder.counters["refused"] == 4
+    assert run.robots[ROBOT].controller.mode == "Idle"
