@@ -76,7 +76,8 @@ class DriveLog:
         started: When the robot said that teleoperation had started [s].
         ended: When the drive was over [s].
         outcome: `confirmed`, `refuted`, `gave up`, `lost link` or `timeout`.
-        applied: Commands in the order they took effect.
+        applied: Commands in the order they took effect; those still under way when the
+            drive ended, too.
         frame_times: (captured, arrived) of each frame shown [s].
     """
 
@@ -151,8 +152,8 @@ class Recorder:
                 Applied(issued.made, issued.sent, arrived, now, until, issued.sample_age)
             )
 
-    def drive_over(self, source: str) -> None:
-        """Forget the commands of a phone that were never applied."""
+    def drive_begins(self, source: str) -> None:
+        """Forget the commands of a phone's earlier drives that were never applied."""
         for key in [key for key in self._issued if key[0] == source]:
             del self._issued[key]
 

@@ -89,7 +89,7 @@ class RobotAgent:
         body: Its own body there.
         planner: Its map, for missions.
         setup: Pattern, processing time, camera.
-        drive_of: The log of the drive that a robot is in, if any.
+        drive_of: The log of a robot's newest drive, if it had any.
     """
 
     def __init__(

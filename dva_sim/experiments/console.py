@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,7 @@ PATTERNS = ("req-rep", "pub-sub", "latest-wins")
 STYLES = {"safety": "bold red", "mode": "dim", "order": "cyan", "drive": "cyan", "link": "yellow"}
 
 console = Console(highlight=False)
+say = partial(console.print, soft_wrap=True)  # one line stays one line, also in a file
 
 
 def parse_changes(pairs: list[str]) -> dict[str, Any]:
@@ -72,7 +74,7 @@ def episode(
 
         with console.status(f"Filming {video} ..."):
             write_film(runs, video)
-        console.print(f"Video: {video}")
+        say(f"Video: {video}")
 
 
 def _two_patterns(text: str) -> list[str]:
@@ -108,22 +110,22 @@ def _tell(scenario: Scenario, seed: int, keep_traffic: bool) -> Recording:
 def _summarise(recording: Recording, took: float) -> None:
     from dva_sim.experiments.metrics import drive_measures, event_rows
 
-    console.print()
+    say()
     for row in event_rows(recording):
         response = f", on scene {row['response_s']:.1f} s after detection"
         known = row["response_s"] == row["response_s"]
         who = f" by {row['responder']}" if row["responder"] else ""
-        console.print(f"{row['kind']}: {row['outcome']}{who}{response if known else ''}")
+        say(f"{row['kind']}: {row['outcome']}{who}{response if known else ''}")
     row = drive_measures(recording)
     if "commands_sent" in row:
-        console.print(
+        say(
             f"driving: {row['outcome']} in {row['attempts']} attempt(s), "
             f"{row['commands_applied']} of {row['commands_sent']} commands applied, "
             f"median age {row['command_age_p50_s']:.2f} s, {row['command_rate_hz']:.1f} per s, "
             f"{row['contacts']} contacts"
         )
     broken = sum(recording.recorder.violations.values())
-    console.print(
+    say(
         f"{recording.duration:.0f} s simulated in {took:.2f} s, "
         f"{recording.recorder.counters['messages']} messages, {broken} safety rules broken"
     )
@@ -141,7 +143,7 @@ def run(name: str, pairs: list[str], out: Path | None, jobs: int | None) -> int:
     from dva_sim.experiments.study import load_study
 
     study, folder = load_study(name, pairs), _folder(name, out)
-    console.print(f"[bold]{escape(study.question)}[/bold]")
+    say(f"[bold]{escape(study.question)}[/bold]")
     before = dry_run(study, folder, jobs=jobs)
     rehearse_all(study)
     _say_plan(before, folder)
@@ -150,17 +152,17 @@ def run(name: str, pairs: list[str], out: Path | None, jobs: int | None) -> int:
             task = bar.add_task("running", total=before.runs)
             run_study(study, folder, jobs=jobs, progress=lambda n, _: bar.update(task, completed=n))
     except KeyboardInterrupt as stopped:
-        console.print(f"Stopped. {stopped}")
+        say(f"Stopped. {stopped}")
         return INTERRUPTED
     failures = Results.load(folder).failures
     with console.status("Writing the report ..."):
         report = write_report(folder)
     for f in failures[:5]:
         where = f"{f['part']}, cell {f['cell']}, person {f['person']}, trial {f['trial']}"
-        console.print(f"[red]failed:[/red] {where}: {escape(str(f['error']).splitlines()[-1])}")
+        say(f"[red]failed:[/red] {where}: {escape(str(f['error']).splitlines()[-1])}")
     if failures:
-        console.print(f"[red]{len(failures)} runs failed[/red]; the same command tries them again")
-    console.print(f"Report: {report}")
+        say(f"[red]{len(failures)} runs failed[/red]; the same command tries them again")
+    say(f"Report: {report}")
     return 1 if failures else 0
 
 
@@ -183,7 +185,7 @@ def _folder(name: str, out: Path | None) -> Path:
 def _say_plan(plan: Any, folder: Path) -> None:
     done = f", {plan.done} of them done already" if plan.done else ""
     about = "" if plan.estimate_s is None else f", about {plan.estimate_s:.0f} s to go"
-    console.print(f"{plan.runs} runs in {plan.cells} configurations{done}{about}; into {folder}")
+    say(f"{plan.runs} runs in {plan.cells} configurations{done}{about}; into {folder}")
 
 
 def _bar() -> Progress:

@@ -69,7 +69,7 @@ def _command_measures(attempts: list[DriveLog], recording: Recording) -> Row:
     """Age, rate and fate of the commands of all attempts."""
     spans = [_span(d, recording) for d in attempts]
     driving = sum(end - start for start, end in spans)
-    applied = [a for d in attempts for a in d.applied]
+    applied = [a for d, (_, end) in zip(attempts, spans, strict=True) for a in _until(d, end)]
     hold = np.concatenate([_holds(d, end) for d, (_, end) in zip(attempts, spans, strict=True)])
     trips = [t for d in attempts for t in d.round_trips]
     inboxes = [recording.robots[robot].inbox for robot in sorted({d.robot for d in attempts})]
@@ -97,12 +97,16 @@ def _span(drive: DriveLog, recording: Recording) -> tuple[float, float]:
 
 def _holds(drive: DriveLog, end: float) -> NDArray[np.float64]:
     """How long each command of a drive was in force, shape `(n,)` [s]."""
-    if not drive.applied:
-        return np.zeros(0)
-    times = np.array([*(a.time for a in drive.applied), max(end, drive.applied[-1].time)])
-    until = np.array([a.until for a in drive.applied])
+    applied = _until(drive, end)
+    times = np.array([*(a.time for a in applied), end])
+    until = np.array([a.until for a in applied])
     hold: NDArray[np.float64] = np.maximum(np.minimum(times[1:], until) - times[:-1], 0.0)
     return hold
+
+
+def _until(drive: DriveLog, end: float) -> list[Applied]:
+    """The commands that took effect while the drive lasted."""
+    return [a for a in drive.applied if a.time <= end]
 
 
 def command_ages(applied: list[Applied], hold: NDArray[np.float64]) -> Row:

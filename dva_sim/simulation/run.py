@@ -221,7 +221,7 @@ class _Run:
             self._spots,
         )
         robot = RobotAgent(
-            device, controller, self.world, body, self.planner, setup, self._drive_of
+            device, controller, self.world, body, self.planner, setup, self._newest_drive
         )
         self.robots[device.id_tag] = robot
         device.register(robot.start)
@@ -310,11 +310,6 @@ class _Run:
 
     def _truth(self, robot: str) -> Truth:
         return Truth(self.robots[robot].observe())
-
-    def _drive_of(self, robot: str) -> DriveLog | None:
-        """The newest drive of a robot, while it lasts."""
-        drive = self._newest_drive(robot)
-        return drive if drive is not None and drive.ended is None else None
 
     def _newest_drive(self, robot: str) -> DriveLog | None:
         return next((d for d in reversed(self.recorder.drives) if d.robot == robot), None)

@@ -17,6 +17,7 @@ from dva_sim.agents.operator.delay import DelayEstimate
 from dva_sim.experiments import metrics
 from dva_sim.network.link import Link
 from dva_sim.simulation import Recording, simulate
+from dva_sim.streams import derive_seed
 
 NEAR = [{"kind": "fire", "room": "Main corridor", "at_s": 10, "reported": True}]
 
@@ -171,6 +172,17 @@ def test_a_robot_without_watchdog_is_found_out(monkeypatch: pytest.MonkeyPatch) 
     assert cut_link_run().recorder.violations == {}
     monkeypatch.setattr(RobotController, "_set", trusting)
     assert cut_link_run().recorder.violations["S1"] > 0
+
+
+def test_commands_still_under_way_when_a_drive_ends_are_known_to_the_checks() -> None:
+    """At a second's delay they move the robot once more, lawfully, before the stop arrives."""
+    operator = {"operator__person": 18, "operator__population_seed": 2014}
+    seed = derive_seed(2014, "drive", 18, 0)
+    recording = run(seed=seed, profile="dissertation", link__delay_s=1.0, **operator)
+    drive = recording.recorder.drives[0]
+    assert drive.ended is not None
+    assert drive.applied[-1].time > drive.ended
+    assert recording.recorder.violations == {}
 
 
 def cut_link_run(pattern: str = "latest-wins", until: float = 65.0, **more: Any) -> Recording:

@@ -138,6 +138,7 @@ class Drive:
         """The robot has agreed to be driven: look, and tilt."""
         seat, now = self._seat, self._clock.now
         self.log.started = self._last_frame = now
+        self._device.recorder.drive_begins(self._device.id_tag)
         seat.delay = DelayEstimate(now, seat.delay.value)
         self._sender = self._make_sender()
         self._sender.start()
@@ -166,7 +167,6 @@ class Drive:
         self.log.ended, self.log.outcome = self._clock.now, outcome
         if self._sender is not None:
             self._sender.stop()
-        self._device.recorder.drive_over(self._device.id_tag)
         if self.picture is not None:
             self.picture.close()
         self._on_end(self, outcome, why)
