@@ -158,7 +158,7 @@ class Roadmap:
         from scipy.sparse.csgraph import dijkstra
 
         costs, towards = dijkstra(
-            self._graph,  # type: ignore[call-overload]
+            self._graph,
             directed=False,
             indices=goal,
             return_predecessors=True,
