@@ -24,7 +24,7 @@ class Made(NamedTuple):
 
     command: TiltCommand
     time: float
-    seen_tick: int | None
+    seen_tick: int
 
 
 class CommandSender:
@@ -77,10 +77,16 @@ class CommandSender:
         self._clock.call_at(self._phone.next_look(now, self._rate), self._look)
 
     def _make(self) -> Made | None:
-        """What the phone says now, if it is worth a message."""
-        now = self._clock.now
+        """What the phone says now, if it is worth a message.
+
+        Nobody drives before the first picture: without its tick the robot could not bound
+        the age of a command that waits for a connection to open.
+        """
+        now, tick = self._clock.now, self._seen_tick()
+        if tick is None:
+            return None
         command = self._phone.look(now)
-        return None if command is None else Made(command, now, self._seen_tick())
+        return None if command is None else Made(command, now, tick)
 
     def _offer(self, made: Made) -> None:
         raise NotImplementedError
