@@ -115,4 +115,6 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    # A shell's background job inherits an ignored Ctrl-C; this program is here to be stopped.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     main()
