@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from dva_sim.protocol import messages as m
 
 UINT32 = 2**32 - 1
+UINT64 = 2**64 - 1
 ROBOT, TABLET = "70:1A:04:F9:81:D6", "56:2B:04:E4:56:D8"
 
 
@@ -31,14 +32,19 @@ positions = st.builds(m.Position, real(-90, 90), real(-180, 180))
 speeds = turn_rates = real(-100, 100)
 shares = real(0, 1)
 kinds = st.sampled_from(["fire", "gas_leak", "flood"])
-levels = st.sampled_from(["teleoperation", "missions", "both"])
+levels = st.sampled_from(["teleoperation", "missions", "both", "sensors"])
+
+sessions = st.integers(1, UINT64)
+sensor_names = st.lists(names, max_size=4).map(tuple)
+sensors = st.builds(m.Sensor, names, names)
+granted = levels, sessions, st.none() | addresses, sensor_names
 
 devices = st.builds(m.Device, ids, names, names, addresses)
 contents = st.one_of(
     st.none(),
     st.builds(m.DeviceList, st.lists(devices, max_size=6).map(tuple)),
-    st.builds(m.SensorInfo, urls),
-    st.builds(m.Permission, ids, levels, numbers),
+    st.builds(m.SensorInfo, urls, st.lists(sensors, max_size=4).map(tuple)),
+    st.builds(m.Permission, ids, *granted),
 )
 BODIES: dict[type, st.SearchStrategy[m.Body]] = {
     m.Emergency: st.builds(m.Emergency),
@@ -56,13 +62,16 @@ BODIES: dict[type, st.SearchStrategy[m.Body]] = {
         turn_rates,
         ticks,
     ),
+    m.PersonStatus: st.builds(m.PersonStatus, names, positions),
     m.GoTo: st.builds(m.GoTo, st.lists(positions, min_size=1, max_size=40).map(tuple)),
     m.CancelMission: st.builds(m.CancelMission),
     m.GetSensorInfo: st.builds(m.GetSensorInfo),
+    m.SensorValue: st.builds(m.SensorValue, names, real(-1e8, 1e8), names, ticks),
     m.GetDeviceList: st.builds(m.GetDeviceList),
-    m.DevSub: st.builds(m.DevSub, names, real(0.001, 1000)),
-    m.PermissionRequest: st.builds(m.PermissionRequest, ids, levels),
-    m.PermissionGrant: st.builds(m.PermissionGrant, ids, levels, numbers),
+    m.DevSub: st.builds(m.DevSub, names, real(0, 1000)),
+    m.PermissionRequest: st.builds(m.PermissionRequest, ids, levels, sensor_names),
+    m.PermissionGrant: st.builds(m.PermissionGrant, ids, *granted),
+    m.PermissionRevocation: st.builds(m.PermissionRevocation, ids, ids, sessions),
     m.EventReport: st.builds(
         m.EventReport,
         st.none() | numbers,
@@ -78,6 +87,11 @@ BODIES: dict[type, st.SearchStrategy[m.Body]] = {
         numbers,
         st.sampled_from(["accepted", "declined", "departed", "arrived", "failed", "done"]),
     ),
+    m.TaskAnnouncement: st.builds(
+        m.TaskAnnouncement, numbers, kinds, positions, shares, real(0, 1e6)
+    ),
+    m.TaskBid: st.builds(m.TaskBid, numbers, real(0, 1e6)),
+    m.TaskAward: st.builds(m.TaskAward, numbers),
     m.Reply: st.builds(
         m.Reply, st.integers(0, UINT32), st.integers(0, 999), characters(0, 256), contents
     ),
@@ -85,7 +99,7 @@ BODIES: dict[type, st.SearchStrategy[m.Body]] = {
 
 
 def with_header(body: m.Body) -> st.SearchStrategy[m.Message]:
-    session = st.none() if isinstance(body, m.Heartbeat) else st.integers(0, UINT32)
+    session = st.none() if isinstance(body, m.Heartbeat) else st.integers(0, UINT64)
     return st.builds(m.Message, ids, numbers, ids, clocks, session, st.just(body))
 
 

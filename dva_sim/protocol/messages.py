@@ -123,6 +123,14 @@ class RobotStatus:
 
 
 @dataclass(frozen=True, slots=True)
+class PersonStatus:
+    """What a guard's terminal publishes: what the guard is doing, in words, and where."""
+
+    activity: str
+    position: Position
+
+
+@dataclass(frozen=True, slots=True)
 class GoTo:
     """Visit these places in this order; 1 to 64 of them."""
 
@@ -140,17 +148,34 @@ class GetSensorInfo:
 
 
 @dataclass(frozen=True, slots=True)
+class SensorValue:
+    """What a sensor shows, published to one subscriber.
+
+    Attributes:
+        sensor: Its name, up to 64 characters.
+        value: In the unit.
+        unit: Such as `kW/m2`, up to 64 characters.
+        tick: The robot's own clock when it was measured [ms].
+    """
+
+    sensor: str
+    value: float
+    unit: str
+    tick: int
+
+
+@dataclass(frozen=True, slots=True)
 class GetDeviceList:
     """Ask the DVA who is registered; answered with `DeviceList`."""
 
 
 @dataclass(frozen=True, slots=True)
 class DevSub:
-    """Subscribe to a sensor.
+    """Subscribe to a sensor, or renew the subscription.
 
     Attributes:
         sensor: Its name, up to 64 characters.
-        frequency: How often a value is wanted [Hz], above 0 and up to 1000.
+        frequency: How often a value is wanted [Hz], up to 1000; 0 ends the subscription.
     """
 
     sensor: str
@@ -163,11 +188,13 @@ class PermissionRequest:
 
     Attributes:
         device: Id of the device.
-        level: `teleoperation`, `missions` or `both`.
+        level: `teleoperation`, `missions`, `both`, or `sensors` for nothing but these.
+        sensors: Names of the sensors to subscribe to; at most 16.
     """
 
     device: str
     level: str
+    sensors: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,12 +203,31 @@ class PermissionGrant:
 
     Attributes:
         holder: Id of the device that may act.
-        level: `teleoperation`, `missions` or `both`.
+        level: `teleoperation`, `missions`, `both`, or `sensors`, which ends nobody's session.
         session: The fencing token, at least 1.
+        address: Where the holder publishes, if the DVA knows it.
+        sensors: Names of the sensors that the holder may subscribe to; at most 16.
     """
 
     holder: str
     level: str
+    session: int
+    address: str | None = None
+    sensors: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class PermissionRevocation:
+    """A session is over: said by its holder to the DVA, and by the DVA to robot and holder.
+
+    Attributes:
+        device: Id of the robot.
+        holder: Id of the device that held it.
+        session: The session that is over.
+    """
+
+    device: str
+    holder: str
     session: int
 
 
@@ -237,6 +283,40 @@ class OrderProgress:
 
 
 @dataclass(frozen=True, slots=True)
+class TaskAnnouncement:
+    """The DVA asks who could go to an event.
+
+    Attributes:
+        event_id: The event.
+        kind: `fire`, `gas_leak` or `flood`.
+        position: Where it is.
+        severity: 0 (harmless) to 1.
+        bid_within: Bids are taken for so long after this was sent [s].
+    """
+
+    event_id: int
+    kind: str
+    position: Position
+    severity: float
+    bid_within: float
+
+
+@dataclass(frozen=True, slots=True)
+class TaskBid:
+    """What a device offers: to arrive at the event so long after this was sent [s]."""
+
+    event_id: int
+    arrival_in: float
+
+
+@dataclass(frozen=True, slots=True)
+class TaskAward:
+    """The bid is taken: the device shall go to the event, as by an `Order`."""
+
+    event_id: int
+
+
+@dataclass(frozen=True, slots=True)
 class Device:
     """One line of the device list; fields as in `Registration`."""
 
@@ -254,19 +334,43 @@ class DeviceList:
 
 
 @dataclass(frozen=True, slots=True)
+class Sensor:
+    """A sensor that a robot has: its name and the unit of its values."""
+
+    name: str
+    unit: str
+
+
+@dataclass(frozen=True, slots=True)
 class SensorInfo:
-    """Where the camera of a robot is found; printable ASCII, up to 256 characters."""
+    """What a robot can show.
+
+    Attributes:
+        camera_url: Where its camera is found; printable ASCII, up to 256 characters.
+        sensors: What may be subscribed to; at most 16.
+    """
 
     camera_url: str
+    sensors: tuple[Sensor, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class Permission:
-    """What was granted: act on `device` with `session` in the header."""
+    """What was granted: act on `device` with `session` in the header.
+
+    Attributes:
+        device: Id of the robot.
+        level: As in `PermissionGrant`.
+        session: The fencing token, at least 1.
+        address: Where the robot takes requests, if the DVA knows it.
+        sensors: Names of the sensors to which one may subscribe; at most 16.
+    """
 
     device: str
     level: str
     session: int
+    address: str | None = None
+    sensors: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -294,16 +398,22 @@ Body = (
     | SetTeleOp
     | StopTeleOp
     | RobotStatus
+    | PersonStatus
     | GoTo
     | CancelMission
     | GetSensorInfo
+    | SensorValue
     | GetDeviceList
     | DevSub
     | PermissionRequest
     | PermissionGrant
+    | PermissionRevocation
     | EventReport
     | Order
     | OrderProgress
+    | TaskAnnouncement
+    | TaskBid
+    | TaskAward
     | Reply
 )
 

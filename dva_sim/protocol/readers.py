@@ -51,6 +51,16 @@ def _read_status(element: _Element) -> m.RobotStatus:
     )
 
 
+def _read_person_status(element: _Element) -> m.PersonStatus:
+    activity, position = _children(element)
+    return m.PersonStatus(_str(activity), _read_position(position))
+
+
+def _read_sensor_value(element: _Element) -> m.SensorValue:
+    sensor, value, unit, tick = _children(element)
+    return m.SensorValue(_str(sensor), _float(value), _str(unit), _int(tick))
+
+
 def _read_go_to(element: _Element) -> m.GoTo:
     return m.GoTo(tuple(_read_position(waypoint) for waypoint in element))
 
@@ -61,13 +71,24 @@ def _read_dev_sub(element: _Element) -> m.DevSub:
 
 
 def _read_permission_request(element: _Element) -> m.PermissionRequest:
-    device, level = _children(element)
-    return m.PermissionRequest(_str(device), _str(level))
+    device, level, *sensors = _children(element)
+    return m.PermissionRequest(_str(device), _str(level), tuple(map(_str, sensors)))
 
 
 def _read_permission_grant(element: _Element) -> m.PermissionGrant:
-    holder, level, session = _children(element)
-    return m.PermissionGrant(_str(holder), _str(level), _int(session))
+    return m.PermissionGrant(*_granted(element))
+
+
+def _granted(element: _Element) -> tuple[str, str, int, str | None, tuple[str, ...]]:
+    """What a grant and the reply about it have in common; the address may be absent."""
+    who, level, session, *rest = _children(element)
+    address = _str(rest.pop(0)) if rest and rest[0].tag == "IpAddr" else None
+    return _str(who), _str(level), _int(session), address, tuple(map(_str, rest))
+
+
+def _read_permission_revocation(element: _Element) -> m.PermissionRevocation:
+    device, holder, session = _children(element)
+    return m.PermissionRevocation(_str(device), _str(holder), _int(session))
 
 
 def _read_event_report(element: _Element) -> m.EventReport:
@@ -97,6 +118,18 @@ def _read_order_progress(element: _Element) -> m.OrderProgress:
     return m.OrderProgress(_int(number), _str(state))
 
 
+def _read_task_announcement(element: _Element) -> m.TaskAnnouncement:
+    number, kind, position, severity, bid_within = _children(element)
+    return m.TaskAnnouncement(
+        _int(number), _str(kind), _read_position(position), _float(severity), _float(bid_within)
+    )
+
+
+def _read_task_bid(element: _Element) -> m.TaskBid:
+    number, arrival_in = _children(element)
+    return m.TaskBid(_int(number), _float(arrival_in))
+
+
 def _read_reply(element: _Element) -> m.Reply:
     answers, code, text, *content = _children(element)
     return m.Reply(
@@ -112,12 +145,12 @@ def _read_device_list(element: _Element) -> m.DeviceList:
 
 
 def _read_sensor_info(element: _Element) -> m.SensorInfo:
-    return m.SensorInfo(_str(element[0]))
+    url, *sensors = _children(element)
+    return m.SensorInfo(_str(url), tuple(m.Sensor(*map(_str, sensor)) for sensor in sensors))
 
 
 def _read_permission(element: _Element) -> m.Permission:
-    device, level, session = _children(element)
-    return m.Permission(_str(device), _str(level), _int(session))
+    return m.Permission(*_granted(element))
 
 
 _CONTENT_READERS: Final[dict[str, Callable[[_Element], Any]]] = {
@@ -132,15 +165,21 @@ _COMMAND_READERS: Final[dict[str, Callable[[_Element], m.Body]]] = {
     "GoTo": _read_go_to,
     "CancelMission": lambda element: m.CancelMission(),
     "GetSensorInfo": lambda element: m.GetSensorInfo(),
+    "SensorValue": _read_sensor_value,
     "GetDeviceList": lambda element: m.GetDeviceList(),
     "PermissionRequest": _read_permission_request,
     "PermissionGrant": _read_permission_grant,
+    "PermissionRevocation": _read_permission_revocation,
     "EventReport": _read_event_report,
     "Order": _read_order,
     "OrderProgress": _read_order_progress,
+    "TaskAnnouncement": _read_task_announcement,
+    "TaskBid": _read_task_bid,
+    "TaskAward": lambda element: m.TaskAward(_int(element[0])),
 }
 _PAYLOAD_READERS: Final[dict[str, Callable[[_Element], m.Body]]] = {
     "RobotStatus": _read_status,
+    "PersonStatus": _read_person_status,
     "DevSub": _read_dev_sub,
     "reply": _read_reply,
 }

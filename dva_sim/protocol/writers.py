@@ -61,6 +61,7 @@ def _choice(name: str, *values: str) -> Callable[[str], str]:
 
 
 _UINT32 = 2**32 - 1
+_UINT64 = 2**64 - 1
 _OCTET = "(?:25[0-5]|2[0-4][0-9]|1[0-9]{2}|[1-9]?[0-9])"
 _CHARACTER = "[^\x00-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]"
 
@@ -75,15 +76,15 @@ _address = _string(
 )
 _url = _string("CameraUrl", "[!-~]{1,256}", "1 to 256 ASCII characters without spaces")
 _mode = _choice("Mode", "Idle", "Mission", "Teleoperation")
-_level = _choice("Level", "teleoperation", "missions", "both")
+_level = _choice("Level", "teleoperation", "missions", "both", "sensors")
 _kind = _choice("Kind", "fire", "gas_leak", "flood")
 _finding = _choice("Finding", "detected", "confirmed", "refuted")
 _state = _choice("State", "accepted", "declined", "departed", "arrived", "failed", "done")
 
 _message_id = _integer("MessageID", 1, _UINT32)
 _answers = _integer("Answers", 0, _UINT32)
-_session_id = _integer("SessionID", 0, _UINT32)
-_session = _integer("Session", 1, _UINT32)
+_session_id = _integer("SessionID", 0, _UINT64)
+_session = _integer("Session", 1, _UINT64)
 _event_id = _integer("EventID", 1, _UINT32)
 _code = _integer("Code", 0, 999)
 _tick = _integer("a tick", 0, 2**53 - 1)
@@ -94,7 +95,9 @@ _heading = _real("Heading", -1e6, 1e6)
 _latitude = _real("Latitude", -90.0, 90.0)
 _longitude = _real("Longitude", -180.0, 180.0)
 _unit = _real("Severity and Confidence", 0.0, 1.0)
-_frequency = _real("Frequency", 0.001, 1000.0)
+_frequency = _real("Frequency", 0.0, 1000.0)
+_duration = _real("a duration", 0.0, 1e6)
+_measured = _real("Value", -1e8, 1e8)
 
 
 def _write_position(at: m.Position, tag: str = "Position") -> str:
@@ -130,6 +133,21 @@ def _write_status(body: m.RobotStatus) -> str:
     )
 
 
+def _write_person_status(body: m.PersonStatus) -> str:
+    return (
+        f"<PersonStatus><Activity>{_name(body.activity)}</Activity>"
+        f"{_write_position(body.position)}</PersonStatus>"
+    )
+
+
+def _write_sensor_value(body: m.SensorValue) -> str:
+    return (
+        f"<Sensor><SensorValue><SensorName>{_name(body.sensor)}</SensorName>"
+        f"<Value>{_measured(body.value)}</Value><Unit>{_name(body.unit)}</Unit>"
+        f"<Tick>{_tick(body.tick)}</Tick></SensorValue></Sensor>"
+    )
+
+
 def _write_go_to(body: m.GoTo) -> str:
     if not 1 <= len(body.waypoints) <= 64:
         raise _bad(f"GoTo must have 1 to 64 waypoints, not {len(body.waypoints)}")
@@ -147,15 +165,38 @@ def _write_dev_sub(body: m.DevSub) -> str:
 def _write_permission_request(body: m.PermissionRequest) -> str:
     return (
         f"<Access><PermissionRequest><DeviceID>{_device_id(body.device)}</DeviceID>"
-        f"<Level>{_level(body.level)}</Level></PermissionRequest></Access>"
+        f"<Level>{_level(body.level)}</Level>{_write_sensor_names(body.sensors)}"
+        "</PermissionRequest></Access>"
+    )
+
+
+def _write_sensor_names(names: tuple[str, ...]) -> str:
+    if len(names) > 16:
+        raise _bad(f"at most 16 sensors fit into a message, not {len(names)}")
+    return "".join(f"<SensorName>{_name(name)}</SensorName>" for name in names)
+
+
+def _write_granted(body: m.PermissionGrant | m.Permission) -> str:
+    """What a grant and the reply about it have in common."""
+    address = "" if body.address is None else f"<IpAddr>{_address(body.address)}</IpAddr>"
+    return (
+        f"<Level>{_level(body.level)}</Level><Session>{_session(body.session)}</Session>"
+        f"{address}{_write_sensor_names(body.sensors)}"
     )
 
 
 def _write_permission_grant(body: m.PermissionGrant) -> str:
     return (
         f"<Access><PermissionGrant><HolderID>{_device_id(body.holder)}</HolderID>"
-        f"<Level>{_level(body.level)}</Level><Session>{_session(body.session)}</Session>"
-        "</PermissionGrant></Access>"
+        f"{_write_granted(body)}</PermissionGrant></Access>"
+    )
+
+
+def _write_permission_revocation(body: m.PermissionRevocation) -> str:
+    return (
+        f"<Access><PermissionRevocation><DeviceID>{_device_id(body.device)}</DeviceID>"
+        f"<HolderID>{_device_id(body.holder)}</HolderID>"
+        f"<Session>{_session(body.session)}</Session></PermissionRevocation></Access>"
     )
 
 
@@ -184,6 +225,27 @@ def _write_order_progress(body: m.OrderProgress) -> str:
     )
 
 
+def _write_task_announcement(body: m.TaskAnnouncement) -> str:
+    return (
+        f"<Event><TaskAnnouncement><EventID>{_event_id(body.event_id)}</EventID>"
+        f"<Kind>{_kind(body.kind)}</Kind>{_write_position(body.position)}"
+        f"<Severity>{_unit(body.severity)}</Severity>"
+        f"<BidWithin>{_duration(body.bid_within)}</BidWithin></TaskAnnouncement></Event>"
+    )
+
+
+def _write_task_bid(body: m.TaskBid) -> str:
+    return (
+        f"<Event><TaskBid><EventID>{_event_id(body.event_id)}</EventID>"
+        f"<ArrivalIn>{_duration(body.arrival_in)}</ArrivalIn></TaskBid></Event>"
+    )
+
+
+def _write_task_award(body: m.TaskAward) -> str:
+    number = _event_id(body.event_id)
+    return f"<Event><TaskAward><EventID>{number}</EventID></TaskAward></Event>"
+
+
 def _write_reply(body: m.Reply) -> str:
     content = "" if body.content is None else _CONTENT_WRITERS[type(body.content)](body.content)
     return (
@@ -203,14 +265,21 @@ def _write_device_list(content: m.DeviceList) -> str:
 
 
 def _write_sensor_info(content: m.SensorInfo) -> str:
-    return f"<SensorInfo><CameraUrl>{_url(content.camera_url)}</CameraUrl></SensorInfo>"
+    if len(content.sensors) > 16:
+        raise _bad(f"SensorInfo must have at most 16 sensors, not {len(content.sensors)}")
+    sensors = "".join(
+        f"<Sensor><SensorName>{_name(sensor.name)}</SensorName>"
+        f"<Unit>{_name(sensor.unit)}</Unit></Sensor>"
+        for sensor in content.sensors
+    )
+    url = _url(content.camera_url)
+    return f"<SensorInfo><CameraUrl>{url}</CameraUrl>{sensors}</SensorInfo>"
 
 
 def _write_permission(content: m.Permission) -> str:
     return (
         f"<Permission><DeviceID>{_device_id(content.device)}</DeviceID>"
-        f"<Level>{_level(content.level)}</Level><Session>{_session(content.session)}</Session>"
-        "</Permission>"
+        f"{_write_granted(content)}</Permission>"
     )
 
 
@@ -231,16 +300,22 @@ _WRITERS: Final[dict[type, tuple[str, Callable[[Any], str]]]] = {
     m.SetTeleOp: ("SimpleMsg", _write_set_teleop),
     m.StopTeleOp: ("SimpleMsg", _always("<TeleOp><StopTeleOp></StopTeleOp></TeleOp>")),
     m.RobotStatus: ("SimpleMsg", _write_status),
+    m.PersonStatus: ("SimpleMsg", _write_person_status),
     m.GoTo: ("SimpleMsg", _write_go_to),
     m.CancelMission: ("SimpleMsg", _always("<Mission><CancelMission></CancelMission></Mission>")),
     m.GetSensorInfo: ("SimpleMsg", _always("<Sensor><GetSensorInfo></GetSensorInfo></Sensor>")),
+    m.SensorValue: ("SimpleMsg", _write_sensor_value),
     m.GetDeviceList: ("SimpleMsg", _always("<Access><GetDeviceList></GetDeviceList></Access>")),
     m.DevSub: ("SimpleMsg", _write_dev_sub),
     m.PermissionRequest: ("SimpleMsg", _write_permission_request),
     m.PermissionGrant: ("SimpleMsg", _write_permission_grant),
+    m.PermissionRevocation: ("SimpleMsg", _write_permission_revocation),
     m.EventReport: ("SimpleMsg", _write_event_report),
     m.Order: ("SimpleMsg", _write_order),
     m.OrderProgress: ("SimpleMsg", _write_order_progress),
+    m.TaskAnnouncement: ("SimpleMsg", _write_task_announcement),
+    m.TaskBid: ("SimpleMsg", _write_task_bid),
+    m.TaskAward: ("SimpleMsg", _write_task_award),
     m.Reply: ("SimpleMsg", _write_reply),
 }
 

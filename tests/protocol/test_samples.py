@@ -16,8 +16,15 @@ PROTOCOL = Path(__file__).parents[2] / "protocol"
 SCHEMA = etree.XMLSchema(file=str(PROTOCOL / "dva.xsd"))
 VALID = sorted((PROTOCOL / "samples" / "valid").glob("*.xml"))
 INVALID = sorted((PROTOCOL / "samples" / "invalid").glob("*.xml"))
-ROW = re.compile(r"^\| `([\w-]+\.xml)` \| (.+) \| (XML|schema|rule) \|$", re.MULTILINE)
-FOUND_BY = {name: by for name, _, by in ROW.findall((PROTOCOL / "samples/README.md").read_text())}
+ROW = re.compile(r"^\| `([\w-]+\.xml)` \| `(\w+)` \| (.+) \| (XML|schema|rule) \|$", re.MULTILINE)
+ROWS = ROW.findall((PROTOCOL / "samples/README.md").read_text())
+FOUND_BY = {name: by for name, _, _, by in ROWS}
+ELEMENTS = {
+    m.Emergency: "EmergencyMsg",
+    m.Heartbeat: "HBMsg",
+    m.Registration: "RegMsg",
+    m.Reply: "reply",
+}
 
 
 def stem(path):
@@ -40,6 +47,16 @@ def test_there_is_a_valid_sample_of_every_body_and_content():
 
 def test_every_invalid_sample_is_explained():
     assert [path.name for path in INVALID] == sorted(FOUND_BY)
+
+
+def test_there_is_an_invalid_sample_of_every_message_and_it_is_of_that_message():
+    named = {name: element for name, element, _, _ in ROWS}
+    assert set(named.values()) >= {ELEMENTS.get(body, body.__name__) for body in get_args(m.Body)}
+    misspelt = {"cancel-mission-misspelt.xml"}
+    for path in INVALID:
+        if path.name not in misspelt:
+            text = path.read_bytes().replace(b"\0", b"")
+            assert f"<{named[path.name]}>".encode() in text, path.name
 
 
 def who_finds(data):
