@@ -1,0 +1,155 @@
+"""Key files: made once, kept, checked."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import stat
+from pathlib import Path
+
+import pytest
+import zmq
+import zmq.auth
+
+from dva_sim.errors import ConfigError
+from dva_sim.network.keys import KeyRing, create_keys
+
+ROBOT, GUARD = "02:00:00:01:00:01", "02:00:00:02:00:01"
+PUBLIC = "public/02-00-00-01-00-01.key"
+SECRET = "secret/02-00-00-01-00-01.key_secret"
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    assert create_keys(tmp_path / "keys", [ROBOT, GUARD]) == [ROBOT, GUARD]
+    return tmp_path / "keys"
+
+
+def mode(file: Path) -> int:
+    return stat.S_IMODE(file.stat().st_mode)
+
+
+def refused(folder: Path, device: str | None = None) -> str:
+    """The one line that a broken ring ends in."""
+    with pytest.raises(ConfigError) as error:
+        KeyRing(folder) if device is None else KeyRing(folder).pair(device)
+    assert "\n" not in str(error.value)
+    return str(error.value)
+
+
+def test_keys_survive_writing_and_reading(folder: Path) -> None:
+    ring = KeyRing(folder)
+    assert ring.devices == [ROBOT, GUARD]
+    public, secret = ring.pair(ROBOT)
+    assert zmq.curve_public(secret) == public == ring.public(ROBOT)
+    assert ring.owner(public) == ROBOT
+    assert ring.owner(zmq.utils.z85.decode(ring.public(GUARD))) == GUARD
+    assert ring.owner(zmq.curve_keypair()[0]) is None
+
+
+def test_the_files_are_certificates_as_others_read_them(folder: Path) -> None:
+    assert zmq.auth.load_certificate(folder / SECRET) == KeyRing(folder).pair(ROBOT)
+    assert zmq.auth.load_certificate(folder / PUBLIC) == (KeyRing(folder).public(ROBOT), None)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="file modes of POSIX")
+def test_secrets_are_for_their_owner_only(folder: Path) -> None:
+    assert mode(folder / SECRET) == 0o600
+    assert mode(folder / "secret") == 0o700
+    (folder / SECRET).chmod(0o640)
+    assert "others may read this secret; mend it with: chmod 600" in refused(folder, ROBOT)
+    KeyRing(folder).pair(GUARD)
+
+
+def test_existing_keys_are_kept(folder: Path) -> None:
+    before = KeyRing(folder).pair(ROBOT)
+    assert create_keys(folder, [ROBOT, "operator-1"]) == ["operator-1"]
+    assert KeyRing(folder).pair(ROBOT) == before
+
+
+def test_a_public_key_is_made_again_from_its_secret(folder: Path) -> None:
+    before = KeyRing(folder).pair(ROBOT)
+    (folder / PUBLIC).unlink()
+    assert create_keys(folder, [ROBOT]) == []
+    assert KeyRing(folder).pair(ROBOT) == before
+
+
+def test_a_folder_can_be_split(folder: Path, tmp_path: Path) -> None:
+    there = tmp_path / "there"
+    shutil.copytree(folder / "public", there / "public")
+    (there / "secret").mkdir()
+    shutil.copy(folder / SECRET, there / SECRET)
+    ring = KeyRing(there)
+    assert ring.pair(ROBOT) == KeyRing(folder).pair(ROBOT)
+    assert ring.public(GUARD) == KeyRing(folder).public(GUARD)
+    assert f"there is no secret key of {GUARD}" in refused(there, GUARD)
+    assert create_keys(there, [GUARD]) == []  # its secret is elsewhere
+
+
+def test_what_is_missing_is_named(folder: Path, tmp_path: Path) -> None:
+    assert "dva-sim keys" in refused(tmp_path / "nowhere")
+    assert "there is no public key of robot-9" in refused(folder, "robot-9")
+    (tmp_path / "empty").mkdir()
+    assert "holds no keys" in refused(tmp_path / "empty")
+
+
+@pytest.mark.parametrize(
+    ("content", "problem"),
+    [
+        (b"", 'no line id = "..."'),
+        (b'id = "x"\n', 'no line public-key = "..."'),
+        (b'id = "x"\npublic-key = "short"\n', "not a key of 40 letters"),
+        (b'id = "x"\npublic-key = "' + b"#" * 40 + b'"\n', "not a key of 40 letters"),
+        (b'id = "x"\npublic-key = "' + b"~" * 40 + b'"\n', "not a key of 40 letters"),
+        (b"\xff\xfe\x00", "not plain text"),
+    ],
+)
+def test_a_broken_file_is_named(folder: Path, content: bytes, problem: str) -> None:
+    (folder / PUBLIC).write_bytes(content)
+    line = refused(folder)
+    assert line.startswith(str(folder / PUBLIC))
+    assert problem in line
+
+
+def test_two_devices_cannot_have_one_key(folder: Path) -> None:
+    text = (folder / PUBLIC).read_text()
+    (folder / "public" / "copy.key").write_text(text)
+    assert f"is a second key of {ROBOT}" in refused(folder)
+    (folder / "public" / "copy.key").write_text(text.replace(ROBOT, "robot-9"))
+    assert "have the same key" in refused(folder)
+
+
+def test_a_secret_does_not_belong_among_the_public_keys(folder: Path) -> None:
+    shutil.copy(folder / SECRET, folder / PUBLIC)
+    assert "holds a secret key" in refused(folder)
+
+
+def test_keys_that_are_no_pair_are_refused(folder: Path, tmp_path: Path) -> None:
+    create_keys(tmp_path / "other", [ROBOT])
+    shutil.copy(tmp_path / "other" / SECRET, folder / SECRET)
+    assert "one of them is outdated" in refused(folder, ROBOT)
+    shutil.copy(folder / "secret" / "02-00-00-02-00-01.key_secret", folder / SECRET)
+    assert f"is the key of {GUARD}" in refused(folder, ROBOT)
+    text = (tmp_path / "other" / SECRET).read_text()
+    stranger = zmq.curve_keypair()[0].decode()
+    public = KeyRing(tmp_path / "other").public(ROBOT).decode()
+    (folder / SECRET).write_text(text.replace(public, stranger))
+    assert "are no pair" in refused(folder, ROBOT)
+
+
+@pytest.mark.parametrize("id_", ["", "../robot", "a b", "-", 'x"', "é", "x" * 65, "a\n"])
+def test_an_id_that_is_no_file_name_is_refused(tmp_path: Path, id_: str) -> None:
+    with pytest.raises(ConfigError, match="cannot be the id of a device"):
+        create_keys(tmp_path, ["fine", id_])
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_two_ids_never_share_a_file(folder: Path) -> None:
+    with pytest.raises(ConfigError, match="would have the same file"):
+        create_keys(folder, [ROBOT.replace(":", "-")])
+
+
+def test_a_place_that_cannot_be_written_is_named(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(ConfigError, match="cannot be written"):
+        create_keys(tmp_path / "file", [ROBOT])
