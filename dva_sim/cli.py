@@ -75,6 +75,31 @@ def list_() -> None:
     console.list_all()
 
 
+@app.command()
+def check(
+    files: Annotated[
+        list[str],
+        typer.Argument(
+            help="Messages, studies, scenarios, sites, plans, maps, agents; - reads a message."
+        ),
+    ],
+) -> None:
+    """Tell of each file whether it is valid, and if not where and why."""
+    from dva_sim.checking import console
+
+    raise typer.Exit(console.check(files))
+
+
+@app.command()
+def schema(
+    kind: Annotated[str, typer.Argument(help="message, study, scenario, site or agent.")],
+) -> None:
+    """Print the schema of a kind of file: XSD for messages, else JSON Schema."""
+    from dva_sim.checking import console
+
+    console.print_schema(kind)
+
+
 @app.command(hidden=True)
 def version() -> None:
     """Print the version."""

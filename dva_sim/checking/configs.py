@@ -1,0 +1,190 @@
+"""Configurations: read and rehearsed by the same code that runs them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any, Final
+
+from PIL import Image
+
+from dva_sim import scenario as scenarios
+from dva_sim.agents.guard import GuardProfile
+from dva_sim.agents.operator.person import Population
+from dva_sim.agents.robot import RobotProfile
+from dva_sim.agents.tilt.phone import PhoneProfile
+from dva_sim.checking.problem import Problem
+from dva_sim.config import Config, Document, Path_, validate
+from dva_sim.errors import ConfigError
+from dva_sim.experiments import design
+from dva_sim.experiments.study import Study, load_study
+from dva_sim.scenario import Scenario
+from dva_sim.simulation import rehearse
+from dva_sim.worlds.geo import GeoFrame
+from dva_sim.worlds.maps import RosMap
+from dva_sim.worlds.plan import read_plan
+from dva_sim.worlds.site import DEFAULT_FRAME, SiteFile, load_site, map_site
+
+# What readers may raise on files that nobody would write, besides what they say in words.
+_HOSTILE: Final = (RecursionError, ValueError, OverflowError, Image.DecompressionBombError)
+
+_COUNTS: Final[dict[str, Path_]] = {
+    "robot base": ("robot", "count"),
+    "guard post": ("guard", "count"),
+    "operator desk": ("operator", "count"),
+}
+
+Check = Callable[[Document], Iterator[ConfigError]]
+
+
+@dataclass(frozen=True)
+class Kind:
+    """One kind of YAML file.
+
+    Attributes:
+        name: As it is called in the output.
+        model: Its keys.
+        folder: Where files of this kind lie.
+        check: Yields what is wrong, or raises it.
+    """
+
+    name: str
+    model: type[Config]
+    folder: str
+    check: Check
+
+
+def check_config(kind: Kind, document: Document) -> list[Problem]:
+    """What is wrong with a configuration, by the code that runs it."""
+    return _collect(document.file, partial(kind.check, document), partial(_blamed, document))
+
+
+def check_plan(path: Path) -> list[Problem]:
+    """What is wrong with a drawn plan; whether its bases are free is for its site to say."""
+
+    def read() -> Iterator[ConfigError]:
+        read_plan(path, _frame_of(path))
+        return iter(())
+
+    return _collect(path, read, lambda error: error)
+
+
+def recognise(document: Document) -> Kind | None:
+    """The kind that knows most of the keys; among equals, the one whose folder it lies in."""
+    keys = document.data.keys() - {"description"}
+    shared = {kind.name: len(keys & kind.model.model_fields.keys()) for kind in KINDS}
+    likely = [kind for kind in KINDS if shared[kind.name] == max(shared.values())]
+    if len(likely) == 1:
+        return likely[0]
+    folder = document.file.resolve().parent.as_posix()
+    here = [kind for kind in likely if folder.endswith(f"/{kind.folder}")]
+    return here[0] if len(here) == 1 else None
+
+
+def _collect(
+    path: Path,
+    check: Callable[[], Iterator[ConfigError]],
+    blame: Callable[[ConfigError], ConfigError],
+) -> list[Problem]:
+    found = []
+    try:
+        for error in check():
+            found.append(_told(path, blame(error)))
+    except ConfigError as error:
+        found.append(_told(path, blame(error)))
+    except _HOSTILE as error:
+        what = "is nested too deeply" if isinstance(error, RecursionError) else str(error)
+        found.append(Problem(1, 1, f"cannot be read: {what}"))
+    return list(dict.fromkeys(found))
+
+
+def _told(path: Path, error: ConfigError) -> Problem:
+    same = error.file is None or Path(error.file).resolve() == path.resolve()
+    return Problem(
+        error.line or 1, error.column or 1, error.problem, None if same else str(error.file)
+    )
+
+
+def _blamed(document: Document, error: ConfigError) -> ConfigError:
+    """The same mistake at the key that it is about, if nobody has said where it stands."""
+    if error.file is not None:
+        return error
+    counts = [path for phrase, path in _COUNTS.items() if phrase in error.problem]
+    return document.error(error.problem, counts[0] if counts else _quoted(document, error.problem))
+
+
+def _quoted(document: Document, problem: str) -> Path_:
+    """The deepest key whose value the problem quotes."""
+    for path in sorted(document.places, key=len, reverse=True):
+        value: Any = document.data
+        for step in path:
+            value = value[step]
+        if isinstance(value, str) and repr(value) in problem:
+            return path
+    return ()
+
+
+# --- kinds -----------------------------------------------------------------------------
+
+
+def _check_study(document: Document) -> Iterator[ConfigError]:
+    """The study, its scenarios in every cell, and one run of each built as by the runner."""
+    study = load_study(document.file)
+    for cell in design.cells(study):
+        try:
+            rehearse(cell.scenario, study.seed)
+        except ConfigError as error:
+            path = _quoted(document, error.problem) or ("parts", cell.part, "scenario")
+            yield error if error.file else document.error(error.problem, path)
+
+
+def _check_scenario(document: Document) -> Iterator[ConfigError]:
+    rehearse(scenarios.build(document), seed=1)
+    return iter(())
+
+
+def _check_site(document: Document) -> Iterator[ConfigError]:
+    load_site(document.file)
+    return iter(())
+
+
+def _check_map(document: Document) -> Iterator[ConfigError]:
+    validate(RosMap, document.data, document.error)
+    map_site(document.file.resolve(), seed=1, robots=1, guards=1)
+    return iter(())
+
+
+def _check_model(model: type[Config]) -> Check:
+    def check(document: Document) -> Iterator[ConfigError]:
+        validate(model, document.data, document.error)
+        return iter(())
+
+    return check
+
+
+def _frame_of(path: Path) -> GeoFrame:
+    """A plane where the plan is, so that it can be judged without its site."""
+    try:
+        position: Any = json.loads(path.read_text(encoding="utf-8"))
+        position = position["features"][0]["geometry"]["coordinates"]
+        while isinstance(position[0], list):
+            position = position[0]
+        longitude, latitude = float(position[0]), float(position[1])
+    except (LookupError, TypeError, ValueError):
+        return DEFAULT_FRAME  # what is wrong with it, its reader says with the place
+    return GeoFrame(latitude, longitude) if abs(latitude) < 89 else DEFAULT_FRAME
+
+
+KINDS: Final = (
+    Kind("study", Study, "experiments", _check_study),
+    Kind("scenario", Scenario, "experiments/scenarios", _check_scenario),
+    Kind("site", SiteFile, "worlds", _check_site),
+    Kind("ROS map", RosMap, "worlds", _check_map),
+    Kind("robot", RobotProfile, "agents/robots", _check_model(RobotProfile)),
+    Kind("phone", PhoneProfile, "agents/phones", _check_model(PhoneProfile)),
+    Kind("guard", GuardProfile, "agents/people", _check_model(GuardProfile)),
+    Kind("operators", Population, "agents/people", _check_model(Population)),
+)

@@ -1,0 +1,149 @@
+"""One file: what kind it is of, and what is wrong with it."""
+
+from __future__ import annotations
+
+import stat
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
+
+from dva_sim.checking.messages import READ_BYTES, check_message
+from dva_sim.checking.problem import Problem, not_text
+from dva_sim.config import Document, load_yaml
+from dva_sim.errors import ConfigError, DvaSimError
+
+YAML_BYTES: Final = 256 * 1024
+PLAN_BYTES: Final = 16 * 1024 * 1024
+_VALUES: Final = 100_000  # in a YAML file with all aliases written out
+_SUFFIXES: Final = {
+    ".xml": "message",
+    ".geojson": "plan",
+    ".json": "plan",
+    ".yaml": "configuration",
+    ".yml": "configuration",
+}
+_UNKNOWN: Final = (
+    "cannot be recognised; should be a message (.xml), a plan (.geojson), or a study, scenario, "
+    "site, ROS map or agent profile (.yaml)"
+)
+
+
+class NotReadError(DvaSimError):
+    """There is no file to judge, or it cannot be read."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What was found: the kind of a file, and its problems; none if it is valid."""
+
+    kind: str
+    problems: list[Problem]
+
+
+def check_file(path: Path) -> Verdict:
+    """Judge one file.
+
+    Raises:
+        NotReadError: not there, not a file, or not readable.
+    """
+    kind = _SUFFIXES.get(path.suffix.lower()) or _by_content(_read(path, READ_BYTES))
+    if kind == "message":
+        return Verdict(kind, check_message(_read(path, READ_BYTES)))
+    if kind == "plan":
+        return _check_plan(path)
+    if kind == "configuration":
+        return _check_yaml(path)
+    return Verdict("unknown", [Problem(1, 1, _UNKNOWN)])
+
+
+def _by_content(head: bytes) -> str | None:
+    """What a file without a telling name holds."""
+    text = head.lstrip()
+    if text.startswith(b"<"):
+        return "message"
+    return "plan" if text.startswith(b"{") and b'"FeatureCollection"' in text else None
+
+
+def _read(path: Path, limit: int) -> bytes:
+    """The first bytes of a file; never waits for a pipe, and never reads more than asked."""
+    try:
+        mode = path.stat().st_mode
+        if stat.S_ISDIR(mode):
+            raise NotReadError("is a folder; give the files in it")
+        if not stat.S_ISREG(mode):
+            raise NotReadError("is not a file; a message may come through -")
+        with path.open("rb") as file:
+            return file.read(limit)
+    except FileNotFoundError:
+        raise NotReadError("is not there") from None
+    except OSError as error:
+        raise NotReadError(f"cannot be read: {error.strerror}") from None
+
+
+def _flawed(path: Path, limit: int) -> list[Problem]:
+    """What is wrong before anything is parsed."""
+    data = _read(path, limit + 1)
+    if not data.strip():
+        return [Problem(1, 1, "is empty")]
+    if len(data) > limit:
+        return [Problem(1, 1, f"is too large; should have at most {limit} bytes")]
+    problem = not_text(data)
+    return [problem] if problem else []
+
+
+def _check_plan(path: Path) -> Verdict:
+    from dva_sim.checking.configs import check_plan
+
+    return Verdict("plan", _flawed(path, PLAN_BYTES) or check_plan(path))
+
+
+def _check_yaml(path: Path) -> Verdict:
+    """A message needs none of what reads configurations: it is imported here."""
+    from dva_sim.checking.configs import check_config, recognise
+
+    problems = _flawed(path, YAML_BYTES)
+    document, problem = (None, problems[0]) if problems else _parse(path)
+    if document is None:
+        return Verdict("configuration", [problem] if problem else [])
+    kind = recognise(document)
+    if kind is None:
+        return Verdict("unknown", [Problem(1, 1, _UNKNOWN)])
+    return Verdict(kind.name, check_config(kind, document))
+
+
+def _parse(path: Path) -> tuple[Document | None, Problem | None]:
+    """The document, or why there is none."""
+    try:
+        if _is_bomb(path.read_text(encoding="utf-8")):
+            return None, Problem(1, 1, "has too many aliases within aliases; write the values out")
+        return load_yaml(path), None
+    except ConfigError as error:
+        return None, Problem(error.line or 1, error.column or 1, error.problem)
+    except RecursionError:
+        return None, Problem(1, 1, "is nested too deeply")
+    except ValueError as error:  # such as the date 2001-13-32, or a number of 5000 digits
+        return None, Problem(1, 1, f"has a value that cannot be read: {error}")
+
+
+def _is_bomb(text: str) -> bool:
+    """Whether a few aliases stand for more values than anybody writes."""
+    if "*" not in text:
+        return False
+    try:
+        root = YAML(typ="rt", pure=True).compose(text)
+    except YAMLError:
+        return False  # no YAML at all, as its reader will say with the place
+    return _size(root, {}) > _VALUES
+
+
+def _size(node: Any, known: dict[int, float]) -> float:
+    """How many values a node stands for; infinite if it holds itself."""
+    if id(node) not in known:
+        known[id(node)] = float("inf")
+        inside = node.value if isinstance(getattr(node, "value", None), list) else []
+        parts = (part for item in inside for part in (item if isinstance(item, tuple) else (item,)))
+        known[id(node)] = 1 + sum(_size(part, known) for part in parts)
+    return known[id(node)]

@@ -1,0 +1,49 @@
+"""The schemas that files follow: the XSD of messages, JSON Schemas of configurations."""
+
+from __future__ import annotations
+
+import difflib
+import json
+from typing import Any, Final
+
+from dva_sim.checking.forms import schema_file
+from dva_sim.errors import ConfigError
+
+KINDS: Final = ("message", "study", "scenario", "site", "agent")
+_DIALECT: Final = "https://json-schema.org/draft/2020-12/schema"
+
+
+def schema_text(kind: str) -> str:
+    """The schema of a kind of file.
+
+    Raises:
+        ConfigError: no such kind.
+    """
+    if kind == "message":
+        return schema_file().read_text(encoding="utf-8")
+    if kind in KINDS:
+        return json.dumps({"$schema": _DIALECT} | _json_schema(kind), indent=2) + "\n"
+    near = difflib.get_close_matches(kind, KINDS, n=1)
+    hint = f"did you mean {near[0]!r}? " if near else ""
+    raise ConfigError(f"no schema {kind!r}; {hint}there are: {', '.join(KINDS)}")
+
+
+def _json_schema(kind: str) -> dict[str, Any]:
+    """From the models that read the files; an agent may be of any of four kinds."""
+    from pydantic import TypeAdapter
+
+    from dva_sim.agents.guard import GuardProfile
+    from dva_sim.agents.operator.person import Population
+    from dva_sim.agents.robot import RobotProfile
+    from dva_sim.agents.tilt.phone import PhoneProfile
+    from dva_sim.experiments.study import Study
+    from dva_sim.scenario import Scenario
+    from dva_sim.worlds.site import SiteFile
+
+    kinds: dict[str, Any] = {
+        "study": Study,
+        "scenario": Scenario,
+        "site": SiteFile,
+        "agent": RobotProfile | PhoneProfile | GuardProfile | Population,
+    }
+    return TypeAdapter(kinds[kind]).json_schema()
