@@ -20,6 +20,7 @@ from dva_sim.checking.problem import Problem
 from dva_sim.config import Config, Document, Path_, validate
 from dva_sim.errors import ConfigError
 from dva_sim.experiments import design
+from dva_sim.experiments.design import Cell
 from dva_sim.experiments.study import Study, load_study
 from dva_sim.scenario import Scenario
 from dva_sim.simulation import rehearse
@@ -29,9 +30,9 @@ from dva_sim.worlds.plan import read_plan
 from dva_sim.worlds.site import DEFAULT_FRAME, SiteFile, load_site, map_site
 
 # What readers may raise on files that nobody would write, besides what they say in words.
-_HOSTILE: Final = (RecursionError, ValueError, OverflowError, Image.DecompressionBombError)
+_HOSTILE: Final = (ValueError, OverflowError, Image.DecompressionBombError)
 
-_COUNTS: Final[dict[str, Path_]] = {
+_COUNTS: Final = {
     "robot base": ("robot", "count"),
     "guard post": ("guard", "count"),
     "operator desk": ("operator", "count"),
@@ -95,9 +96,10 @@ def _collect(
             found.append(_told(path, blame(error)))
     except ConfigError as error:
         found.append(_told(path, blame(error)))
+    except RecursionError:
+        found.append(Problem(1, 1, "is nested too deeply"))
     except _HOSTILE as error:
-        what = "is nested too deeply" if isinstance(error, RecursionError) else str(error)
-        found.append(Problem(1, 1, f"cannot be read: {what}"))
+        found.append(Problem(1, 1, f"cannot be read: {error}"))
     return list(dict.fromkeys(found))
 
 
@@ -109,11 +111,14 @@ def _told(path: Path, error: ConfigError) -> Problem:
 
 
 def _blamed(document: Document, error: ConfigError) -> ConfigError:
-    """The same mistake at the key that it is about, if nobody has said where it stands."""
+    """The same mistake at the key that it is about, unless another file holds it."""
+    problem = error.problem
     if error.file is not None:
-        return error
-    counts = [path for phrase, path in _COUNTS.items() if phrase in error.problem]
-    return document.error(error.problem, counts[0] if counts else _quoted(document, error.problem))
+        if Path(error.file).exists():
+            return error
+        problem = f"{error.file!r}: {problem}"
+    counts: list[Path_] = [path for phrase, path in _COUNTS.items() if phrase in problem]
+    return document.error(problem, counts[0] if counts else _quoted(document, problem))
 
 
 def _quoted(document: Document, problem: str) -> Path_:
@@ -137,8 +142,17 @@ def _check_study(document: Document) -> Iterator[ConfigError]:
         try:
             rehearse(cell.scenario, study.seed)
         except ConfigError as error:
-            path = _quoted(document, error.problem) or ("parts", cell.part, "scenario")
-            yield error if error.file else document.error(error.problem, path)
+            yield _blamed_in_cell(document, cell, error)
+
+
+def _blamed_in_cell(document: Document, cell: Cell, error: ConfigError) -> ConfigError:
+    """A mistake at the factor that makes it, or else at the scenario of the part."""
+    blamed = _blamed(document, error)
+    if blamed.file != str(document.file) or blamed.line != 1:
+        return blamed
+    keys = [".".join(path) for phrase, path in _COUNTS.items() if phrase in error.problem]
+    factors = [("factors", key) for key in keys if key in dict(cell.levels)]
+    return document.error(blamed.problem, (*factors, ("parts", cell.part, "scenario"))[0])
 
 
 def _check_scenario(document: Document) -> Iterator[ConfigError]:

@@ -40,7 +40,7 @@ def _check_one(name: str) -> int:
         _say(f"{name}: {error}")
         return NOT_READ
     for problem in verdict.problems[:_SHOWN]:
-        where = problem.file or name
+        where = _near(problem.file) if problem.file else name
         _say(f"{where}:{problem.line}:{problem.column}: {problem.text}")
     number = len(verdict.problems)
     if not number:
@@ -55,6 +55,12 @@ def _judge(name: str) -> Verdict:
     if name == STDIN:
         return Verdict("message", check_message(sys.stdin.buffer.read(READ_BYTES)))
     return check_file(Path(name))
+
+
+def _near(file: str) -> str:
+    """A path as one would write it here."""
+    here = Path.cwd()
+    return str(Path(file).relative_to(here)) if Path(file).is_relative_to(here) else file
 
 
 def _say(text: str) -> None:

@@ -27,7 +27,7 @@ _PIECES: Final = (
     (rb"""(?:\s+standalone\s*=\s*(["'])(?:yes|no)\1)?""", ""),
     (rb"\s*\?>", 'should be <?xml version="1.0" encoding="UTF-8"?>, or left out'),
 )
-_ALLOWED: Final = re.compile(rb"</?[^\s<>&/=!?:]+\s*/?>")
+_ALLOWED: Final = re.compile(rb"</?\w+\s*/?>")
 _MARKUP: Final = (
     (rb"<!--", "a comment is not allowed; leave it out"),
     (rb"<!\[CDATA\[", "a CDATA section is not allowed; write &lt; and &amp; in plain text"),
@@ -35,6 +35,7 @@ _MARKUP: Final = (
     (rb"<\?", "a processing instruction is not allowed; leave it out"),
     (rb"</?[^\s<>&/=!?]*:", "a prefix is not allowed; names stand without a namespace"),
     (rb"<[^\s<>&/=!?]+\s+[^\s<>=]+\s*=", "an attribute is not allowed; leave it out"),
+    (rb"</?[^\s<>&/=!?]+\s*/?>", "a name of other signs is not allowed; all are A to Z and a to z"),
 )
 
 
@@ -120,13 +121,11 @@ def _by_schema(data: bytes) -> list[Problem]:
     tree = etree.ElementTree(etree.fromstring(data, _plain_parser()))
     schema = _schema()
     schema.validate(tree)
-    walked, stop = _walk(data)
-    # Expat knows fewer letters in names than libxml2 and may stop early.
-    places = dict(zip(tree.iter("*"), walked, strict=False))
+    places = dict(zip(tree.iter("*"), _walk(data)[0], strict=True))
     found: dict[int, Problem] = {}
     for entry in _entries(schema):
         element = _element_at(tree, entry.path)
-        place = places.get(element, _Place(stop or 0))
+        place = places[element]
         stray = place.text if "haracter content" in entry.message else None
         offset = place.start if stray is None else stray
         found.setdefault(offset, at(data, offset, _explain(element, entry)))

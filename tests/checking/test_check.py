@@ -1,0 +1,245 @@
+"""`dva-sim check` and `dva-sim schema` as users call them."""
+
+import os
+import re
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from dva_sim.checking import console
+
+ROOT = Path(__file__).parents[2]
+SAMPLES = ROOT / "protocol" / "samples"
+GOOD = SAMPLES / "valid" / "set-teleop.xml"
+BOMB = "a: &a [x, x]\n" + "".join(
+    f"{new}: &{new} [*{old}, *{old}]\n"
+    for old, new in zip("abcdefghijklmnopqrstu", "bcdefghijklmnopqrstuv", strict=True)
+)
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def check(here, capsys):
+    """Writes texts into files, checks them, gives the exit code and the lines printed."""
+
+    def run(*names, **texts):
+        for name, text in texts.items():
+            (here / name.replace("__", ".")).write_text(text)
+        code = console.check(names or [name.replace("__", ".") for name in texts])
+        return code, capsys.readouterr().out.splitlines()
+
+    return run
+
+
+def test_all_that_is_shipped_is_valid(check):
+    files = [*ROOT.glob("experiments/**/*.yaml"), *ROOT.glob("agents/**/*.yaml")]
+    files += [*ROOT.glob("worlds/*.yaml"), *ROOT.glob("worlds/*.geojson")]
+    files += [*SAMPLES.glob("valid/*.xml")]
+    code, lines = check(*map(str, files))
+    assert code == 0
+    assert lines[-1] == f"{len(files)} files: {len(files)} valid"
+    kinds = {line.split(": ")[1] for line in lines[:-1]}
+    agents = {"robot", "phone", "guard", "operators"}
+    assert kinds == {"study", "scenario", "site", "plan", "message"} | agents
+
+
+def test_the_kind_is_told_by_the_keys_wherever_the_file_lies(check):
+    code, lines = check(
+        a__yaml=(ROOT / "agents/people/operators.yaml").read_text(),
+        b__yaml=(ROOT / "agents/robots/servrobot.yaml").read_text(),
+        c__yaml="horizon_s: 5\n",
+        d__yaml="question: what?\nparts: {drive: {scenario: c.yaml}}\n",
+        e__txt=GOOD.read_text(),
+    )
+    assert code == 0
+    assert lines == [
+        "a.yaml: operators: valid",
+        "b.yaml: robot: valid",
+        "c.yaml: scenario: valid",
+        "d.yaml: study: valid",
+        "e.txt: message: valid",
+        "5 files: 5 valid",
+    ]
+
+
+def test_the_place_tells_the_kind_where_the_keys_do_not(check, here):
+    folder = here / "experiments" / "scenarios"
+    folder.mkdir(parents=True)
+    (folder / "plain.yaml").write_text("description: As it comes.\n")
+    code, lines = check("experiments/scenarios/plain.yaml")
+    assert (code, lines[0]) == (0, "experiments/scenarios/plain.yaml: scenario: valid")
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("horizon_s: 5\nrobots: {}\n", "2:1: unknown key 'robots'; did you mean 'robot'?"),
+        ("link:\n  delay_s: 0.1\n  los: 0.1\n", "3:3: unknown key 'link.los'; did you mean 'loss'"),
+        ("link:\n  loss: much\n", "2:3: link.loss: input should be a valid number"),
+        ("events:\n  - kind: fire\n  - {kind: gas_leak, at_s: soon}\n", "3:22: events.1.at_s: inp"),
+        ("robot: {count: 1}\nrobot: {count: 2}\n", "2:1: found duplicate key"),
+        ("robot: {count: 1\n", "2:1: "),
+        ("robot:\n  count: 1\n  profile: tank\n", "3:3: robot.profile 'tank' is unknown; known:"),
+        ("horizon_s: 5\noperator:\n  population: crowd\n", "3:3: people 'crowd' not found; avail"),
+        ("events:\n- {kind: fire, room: Attic}\n", "2:16: site 'caparica' has no room 'Attic'"),
+        ("horizon_s: 5\nrobot: {count: 9}\n", "2:9: site 'caparica' has 3 robot bases"),
+        ("link:\n  trace_up: no.up\n", "2:3: 'no.up': trace cannot be read"),
+        ("site:\n  map: no.yaml\n", "2:3: world 'no.yaml' not found"),
+        ("dispatch: {policy: dice}\n", "1:12: dispatch.policy 'dice' is unknown"),
+        ("question: what?\nparts:\n  a:\n    scenario: lost\n", "4:5: scenario 'lost' not found"),
+        ("question: what?\nparts: {a: {scenario: fire-drill, x: 1}}\n", "2:35: unknown key 'parts"),
+        ("name: x\nplan: no.geojson\norigin: {latitude: 1, longitude: 1}\n", "2:1: plan 'no.geo"),
+        ("mass_kg: 60\nradius_m: wide\n", "2:1: radius_m: input should be"),
+        ("bias_mps2: 1\nfilter: mean\n", "2:1: filter: input should be 'median20-copy'"),
+        ("image: no.pgm\nresolution: 1\norigin: [0, 0, 0]\noccupied_thresh: 0.6\n", "1:1: missing"),
+        ("colour: blue\n", "1:1: cannot be recognised; should be a message (.xml), a plan"),
+        ("- 1\n", "1:1: should be a mapping"),
+        ("", "1:1: is empty"),
+        ("horizon_s: 2001-13-32\n", "1:1: has a value that cannot be read"),
+        ("horizon_s: " + "[" * 3000, "1:1: is nested too deeply"),
+        ("horizon_s: &a [*a]\n", "1:1: has too many aliases"),
+        (BOMB, "1:1: has too many aliases"),
+    ],
+)  # fmt: skip
+def test_a_mistake_is_told_in_one_line_at_its_place(check, text, said):
+    code, lines = check(f__yaml=text)
+    assert code == 1
+    assert lines[0].startswith(f"f.yaml:{said}")
+    assert len(lines) == 3
+    assert lines[1].endswith(": invalid, 1 problem")
+    assert lines[2] == "1 file: 1 invalid"
+
+
+def test_a_study_is_checked_with_its_scenarios(check):
+    study = "question: what?\nfactors:\n  robot.count: [1, 9]\nparts: {a: {scenario: s.yaml}}\n"
+    code, lines = check("study.yaml", study__yaml=study, s__yaml="horizon_s: 5\n")
+    assert code == 1
+    assert lines[0].startswith("study.yaml:3:3: site 'caparica' has 3 robot bases")
+    code, lines = check("study.yaml", s__yaml="horizon_s: 5\nlink: {los: 1}\n")
+    assert code == 1
+    assert lines[0].startswith("s.yaml:2:8: unknown key 'link.los'")
+    assert lines[1] == "study.yaml: study: invalid, 1 problem"
+
+
+def test_a_plan_is_checked_alone_and_with_its_site(check):
+    plan = '{"type": "FeatureCollection", "features": [\n{"properties": {"kind": "moat"}}]}'
+    site = "name: x\nplan: p.geojson\norigin: {latitude: 1, longitude: 1}\n"
+    code, lines = check(p__geojson=plan, x__yaml=site, q__geojson="{", r__geojson="[" * 200_000)
+    assert code == 1
+    assert [line[:13] for line in lines[:8:2]] == [
+        "p.geojson:2:1",
+        "p.geojson:2:1",
+        "q.geojson:1:2",
+        "r.geojson:1:1",
+    ]
+
+
+def test_a_ros_map_is_checked_with_its_image(check, here):
+    keys = "resolution: 0.2\norigin: [0, 0, 0]\noccupied_thresh: 0.6\nfree_thresh: 0.2\n"
+    (here / "free.pgm").write_bytes(b"P5\n40 40\n255\n" + b"\xfe" * 1600)
+    (here / "wall.pgm").write_bytes(b"P5\n40 40\n255\n" + b"\x00" * 1600)
+    (here / "huge.pgm").write_bytes(b"P5\n100000 100000\n255\n")
+    images = ("free", "wall", "huge", "none")
+    code, lines = check(**{f"{image}__yaml": f"image: {image}.pgm\n{keys}" for image in images})
+    assert code == 1
+    assert lines[0] == "free.yaml: ROS map: valid"
+    assert lines[1].startswith("wall.yaml:1:1: has no known-free floor")
+    assert lines[3].startswith("huge.yaml:1:1: cannot be read: Image size")
+    assert lines[5].startswith("none.yaml:1:1: image 'none.pgm' not found")
+
+
+def test_binary_files_are_refused(check, here):
+    for name in ("a.xml", "a.yaml", "a.geojson", "a.pgm", "a"):
+        (here / name).write_bytes(bytes(range(256)) * 100)
+    code, lines = check("a.xml", "a.yaml", "a.geojson", "a.pgm", "a")
+    assert code == 1
+    assert lines[-1] == "5 files: 5 invalid"
+
+
+def test_a_huge_file_is_not_read(check, here):
+    names = ("huge.xml", "huge.yaml", "huge.geojson", "huge")
+    for name in names:
+        with (here / name).open("wb") as file:
+            file.write(b"<")
+            file.truncate(100_000_000)
+    started = time.perf_counter()
+    code, lines = check("huge.xml", "huge")
+    assert time.perf_counter() - started < 0.5
+    assert code == 1
+    assert lines[0] == "huge.xml:1:8193: is too long; a message has at most 8192 bytes"
+    assert check("huge.yaml")[1][0].startswith("huge.yaml:1:1: is too large")
+    assert check("huge.geojson")[1][0].startswith("huge.geojson:1:1: is too large")
+
+
+def test_what_is_no_file_gives_exit_code_2_and_the_rest_is_still_checked(check, here):
+    (here / "folder.xml").mkdir()
+    os.mkfifo(here / "pipe.xml")
+    code, lines = check("lost.yaml", "folder.xml", "pipe.xml", str(GOOD), "x" * 5000)
+    assert code == 2
+    assert lines[:3] == [
+        "lost.yaml: is not there",
+        "folder.xml: is a folder; give the files in it",
+        "pipe.xml: is not a file; a message may come through -",
+    ]
+    assert lines[3] == f"{GOOD}: message: valid"
+    assert lines[5] == "5 files: 1 valid, 4 not read"
+
+
+@pytest.mark.skipif(not Path("/proc/self/mem").exists(), reason="needs a file that gives an error")
+def test_an_unreadable_file_is_told(check):
+    assert check("/proc/self/mem")[1][0].startswith("/proc/self/mem: cannot be read: ")
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")
+def test_a_forbidden_file_is_told(check, here):
+    (here / "secret.xml").touch(mode=0)
+    code, lines = check("secret.xml")
+    assert (code, lines[0]) == (2, "secret.xml: cannot be read: Permission denied")
+
+
+def test_one_line_stays_one_line_whatever_the_file_holds(check, here):
+    name = "two\nlines\udcff.xml"
+    (here / name).write_text(GOOD.read_text().replace("0.56", "0&#10;5\u2028é"))
+    code, lines = check(name)
+    assert (code, len(lines)) == (1, 3)
+    assert lines[0].startswith("two\\nlines\\udcff.xml:12:9: TurnRate '0\\n5\\u2028é' is not valid")
+
+
+def test_many_problems_do_not_flood_the_terminal(check):
+    _, lines = check(many__xml="<msg>" + "<!-- -->" * 200 + "</msg>")
+    assert len(lines) == 52
+    assert lines[50].endswith("invalid, 200 problems, the first 50 shown")
+
+
+def call(*words, **options):
+    command = [sys.executable, "-m", "dva_sim.cli", *map(str, words)]
+    return subprocess.run(command, capture_output=True, check=False, **options)
+
+
+def test_the_commands_end_with_the_exit_code(here):
+    bad = GOOD.read_bytes().replace(b"0.56", b"fast")
+    assert call("check", GOOD).returncode == 0
+    assert call("check", "lost.xml").returncode == 2
+    assert call("check").returncode == 2
+    refused = call("check", "-", input=bad)
+    assert refused.returncode == 1
+    assert refused.stdout.startswith(b"-:12:9: TurnRate 'fast' is not valid; should be a number")
+    assert refused.stderr == b""
+    assert call("check", "-", input=GOOD.read_bytes()).stdout.startswith(b"-: message: valid")
+
+
+def test_the_printed_schema_can_be_written_to_a_file(here):
+    printed = call("schema", "message")
+    assert printed.stdout == (ROOT / "protocol" / "dva.xsd").read_bytes()
+    assert call("schema", "site").stdout.startswith(b'{\n  "$schema"')
+    wrong = call("schema", "sites")
+    assert wrong.returncode == 2
+    assert re.fullmatch(rb"dva-sim: no schema 'sites'; did you mean 'site'\?.*\n", wrong.stderr)

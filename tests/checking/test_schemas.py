@@ -1,0 +1,152 @@
+"""The printed schemas accept what is shipped, and refuse what the program refuses."""
+
+import json
+from pathlib import Path
+
+import pytest
+from lxml import etree
+
+from dva_sim.checking.schemas import KINDS, schema_text
+from dva_sim.config import load_yaml
+from dva_sim.errors import ConfigError
+
+ROOT = Path(__file__).parents[2]
+SHIPPED = {
+    "study": sorted(ROOT.glob("experiments/*.yaml")),
+    "scenario": sorted(ROOT.glob("experiments/scenarios/*.yaml")),
+    "site": sorted(ROOT.glob("worlds/*.yaml")),
+    "agent": sorted(ROOT.glob("agents/*/*.yaml")),
+}
+TYPES = {
+    "object": dict,
+    "array": list,
+    "string": str,
+    "boolean": bool,
+    "null": type(None),
+    "integer": int,
+    "number": (int, float),
+}
+
+
+SILENT = {"$schema", "$defs", "title", "description", "default"}
+
+
+class Validator:
+    """As much of JSON Schema as the printed ones use; any other keyword fails the test."""
+
+    def __init__(self, schema):
+        self.schema = schema
+
+    def accepts(self, data, schema=None):
+        schema = self.schema if schema is None else schema
+        keywords = schema.keys() - SILENT
+        return all(getattr(self, "_" + word.strip("$"))(data, schema) for word in sorted(keywords))
+
+    def _ref(self, data, schema):
+        return self.accepts(data, self.schema["$defs"][schema["$ref"].rpartition("/")[2]])
+
+    def _anyOf(self, data, schema):  # noqa: N802
+        return any(self.accepts(data, inner) for inner in schema["anyOf"])
+
+    def _type(self, data, schema):
+        flag = isinstance(data, bool) and schema["type"] in ("integer", "number")
+        return isinstance(data, TYPES[schema["type"]]) and not flag
+
+    def _enum(self, data, schema):
+        return data in schema["enum"]
+
+    def _const(self, data, schema):
+        return data == schema["const"]
+
+    def _minimum(self, data, schema):
+        return data >= schema["minimum"]
+
+    def _maximum(self, data, schema):
+        return data <= schema["maximum"]
+
+    def _exclusiveMinimum(self, data, schema):  # noqa: N802
+        return data > schema["exclusiveMinimum"]
+
+    def _exclusiveMaximum(self, data, schema):  # noqa: N802
+        return data < schema["exclusiveMaximum"]
+
+    def _minItems(self, data, schema):  # noqa: N802
+        return len(data) >= schema["minItems"]
+
+    def _maxItems(self, data, schema):  # noqa: N802
+        return len(data) <= schema["maxItems"]
+
+    def _minProperties(self, data, schema):  # noqa: N802
+        return len(data) >= schema["minProperties"]
+
+    def _items(self, data, schema):
+        return all(self.accepts(item, schema["items"]) for item in data)
+
+    def _prefixItems(self, data, schema):  # noqa: N802
+        return all(map(self.accepts, data, schema["prefixItems"]))
+
+    def _required(self, data, schema):
+        return set(schema["required"]) <= data.keys()
+
+    def _properties(self, data, schema):
+        known = schema["properties"]
+        return isinstance(data, dict) and all(
+            self.accepts(data[key], known[key]) for key in data if key in known
+        )
+
+    def _additionalProperties(self, data, schema):  # noqa: N802
+        others = [value for key, value in data.items() if key not in schema.get("properties", {})]
+        allowed = schema["additionalProperties"]
+        if isinstance(allowed, bool):
+            return allowed or not others
+        return all(self.accepts(value, allowed) for value in others)
+
+
+def validator(kind):
+    schema = json.loads(schema_text(kind))
+    assert schema["$schema"] == "https://json-schema.org/draft/2020-12/schema"
+    return Validator(schema)
+
+
+@pytest.mark.parametrize("kind", SHIPPED)
+def test_shipped_files_follow_the_printed_schema(kind):
+    assert SHIPPED[kind]
+    for path in SHIPPED[kind]:
+        assert validator(kind).accepts(load_yaml(path).data), path
+
+
+@pytest.mark.parametrize("kind", SHIPPED)
+def test_a_file_with_a_key_that_nobody_knows_does_not_follow_it(kind):
+    for path in SHIPPED[kind]:
+        assert not validator(kind).accepts(load_yaml(path).data | {"colour": "blue"})
+
+
+def test_ranges_and_choices_are_in_the_schema():
+    scenario = validator("scenario")
+    assert scenario.accepts({"pattern": "pub-sub", "link": {"loss": 0.1}})
+    assert not scenario.accepts({"pattern": "post"})
+    assert not scenario.accepts({"link": {"loss": 1}})
+    assert not scenario.accepts({"robot": {"count": 0.5}})
+    assert not validator("study").accepts({"question": "what?"})
+
+
+def test_every_kind_of_agent_is_named():
+    schema = json.loads(schema_text("agent"))
+    named = {inner["$ref"].rpartition("/")[2] for inner in schema["anyOf"]}
+    assert named == {"RobotProfile", "PhoneProfile", "GuardProfile", "Population"}
+    assert all(schema["$defs"][name]["title"] == name for name in named)
+
+
+def test_the_printed_xsd_is_the_schema_and_accepts_the_samples():
+    text = schema_text("message")
+    assert text == (ROOT / "protocol" / "dva.xsd").read_text(encoding="utf-8")
+    schema = etree.XMLSchema(etree.fromstring(text.encode()))
+    samples = sorted(ROOT.glob("protocol/samples/valid/*.xml"))
+    assert samples
+    for path in samples:
+        schema.assertValid(etree.parse(path))
+
+
+def test_a_schema_of_nothing_is_refused_with_what_there_is():
+    with pytest.raises(ConfigError, match=f"did you mean 'site'.*{', '.join(KINDS)}"):
+        schema_text("sites")
