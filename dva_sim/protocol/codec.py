@@ -1,7 +1,8 @@
 """Messages to bytes and back, by `protocol/dva.xsd`.
 
 What `encode` returns is valid by construction. `decode` trusts nobody: libxml2 validates every
-message while parsing it, and what a schema cannot forbid is refused before.
+message while parsing it, and what a schema cannot forbid is refused before. Only messages in the
+very form `encode` gives them, of the kinds that a drive is made of, take a shorter way.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from typing import Final
 
 from lxml import etree
 
+from dva_sim.protocol.canonical import read_canonical
 from dva_sim.protocol.errors import ProtocolError
 from dva_sim.protocol.messages import BAD_MESSAGE, Message
 from dva_sim.protocol.readers import read
@@ -58,6 +60,11 @@ def decode(data: bytes) -> Message:
     Raises:
         ProtocolError: not a message by the specification; the reason fits into a reply.
     """
+    return read_canonical(data) or _read_validated(data)
+
+
+def _read_validated(data: bytes) -> Message:
+    """The message in any form that the specification allows."""
     _refuse_by_sight(data)
     try:
         root = etree.fromstring(data, _parser())
