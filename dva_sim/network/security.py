@@ -1,0 +1,416 @@
+"""Sockets with keys, and a clear word at both ends when two do not come together.
+
+Without keys a socket is only watched. With keys a socket that binds is a CURVE server with its
+device's own key, and one that connects knows the key of the device it wants to reach; who asks
+at a server must have a key of the ring. Nothing here waits or has a thread: the loop that polls
+all sockets passes those that are ready to `Security.handle`.
+"""
+
+from __future__ import annotations
+
+import errno
+import itertools
+import struct
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import zmq
+from zmq.utils import z85
+
+from dva_sim.network.greeting import Greeting
+from dva_sim.network.keys import KeyRing
+
+# Pause before connecting again, up to twice as long by chance. It doubles while nobody listens,
+# but not while somebody listens and hangs up, so the first one is what limits that storm.
+RECONNECT_FIRST = 250  # [ms]
+RECONNECT_MAX = 4_000  # [ms]
+HANDSHAKE_LIMIT = 10_000  # for the other end to answer, whose loop may be busy [ms]
+PATIENCE = 3  # times that a peer may hang up in the handshake before it is told
+STRANGERS_TOLD = 100  # unknown keys that are told one by one; there can be any number
+EVENTS_AT_ONCE = 1_000  # read from a monitor before the loop has its turn again
+
+# A monitor that nobody reads stops all traffic of its context when it is full.
+_MONITOR_ROOM = 100_000
+_ZAP = "inproc://zeromq.zap.01"
+_FAILED = (
+    zmq.EVENT_HANDSHAKE_FAILED_AUTH
+    | zmq.EVENT_HANDSHAKE_FAILED_PROTOCOL
+    | zmq.EVENT_HANDSHAKE_FAILED_NO_DETAIL
+)
+_EVENTS = _FAILED | zmq.EVENT_HANDSHAKE_SUCCEEDED | zmq.EVENT_MONITOR_STOPPED
+_names = itertools.count()
+
+Socket = zmq.Socket[bytes]
+_Way = tuple[str, str, str]  # from which device to which, at which endpoint
+
+
+class Reason(StrEnum):
+    """Why two ends did not come together; the same word at both, as far as an end can know."""
+
+    UNKNOWN_KEY = "unknown key"
+    WRONG_SERVER_KEY = "wrong server key"
+    PLAIN_CLIENT = "client without keys"
+    PLAIN_SERVER = "server without keys"
+    SILENT = "no answer"
+    CLOSED = "closed"
+    NOT_UNDERSTOOD = "not understood"
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """Two ends that did not come together, as seen from one.
+
+    Attributes:
+        device: Whose socket has noticed.
+        peer: The device it wanted to reach; None at a server, which cannot know.
+        endpoint: Where the server is bound; empty where that is not known.
+        reason: Why.
+        why: The same for people.
+    """
+
+    device: str
+    peer: str | None
+    endpoint: str
+    reason: Reason
+    why: str
+
+    def __str__(self) -> str:
+        if self.peer is None:
+            place = f" at {self.endpoint}" if self.endpoint else ""
+            return f"{self.device}{place} refused a connection: {self.why}"
+        return f"{self.device}: handshake with {self.peer} at {self.endpoint} failed: {self.why}"
+
+    @property
+    def gave_up(self) -> bool:
+        """Whether ZeroMQ makes no further attempt; see `Security.retry`."""
+        final = {Reason.UNKNOWN_KEY, Reason.PLAIN_CLIENT, Reason.PLAIN_SERVER}
+        return self.peer is not None and self.reason in final
+
+
+@dataclass
+class _Handshake:
+    """What a device has gone through with one endpoint since they last came together."""
+
+    hang_ups: int = 0
+    latest: Refusal | None = None
+    told: set[Reason] = field(default_factory=set)
+    greeted: bool = False
+
+
+@dataclass(frozen=True)
+class _Watch:
+    """A watched socket; without a peer, it is one that binds."""
+
+    socket: Socket
+    device: str
+    peer: str | None
+
+
+class Security:
+    """The keys of all sockets in one context, and what goes wrong with them.
+
+    Args:
+        context: Whose sockets; a context can have one `Security` with keys.
+        poller: The loop's; monitors come and go in it with the sockets that they watch.
+        ring: The keys; None to run without.
+        tell: Called with what there is to say: once for each cause until both ends have come
+            together, so it cannot become a flood.
+
+    Attributes:
+        refused: How often a handshake of a device failed, by reason, whether told or not.
+    """
+
+    def __init__(
+        self,
+        context: zmq.Context[Socket],
+        poller: zmq.Poller,
+        ring: KeyRing | None,
+        tell: Callable[[Refusal], object],
+    ) -> None:
+        self._context, self._poller, self._ring, self._tell = context, poller, ring, tell
+        self._watches: dict[Socket, _Watch] = {}
+        self._handshakes: dict[_Way, _Handshake] = {}
+        self._greetings: dict[Socket, tuple[_Way, Greeting]] = {}
+        self._told: set[Refusal] = set()
+        self._strangers: set[tuple[str, bytes]] = set()
+        self.refused: Counter[tuple[str, Reason]] = Counter()
+        self._zap = None if ring is None else self._open_zap()
+
+    def bind_server(self, socket: Socket, device: str) -> None:
+        """Make `socket`, before it binds, one that serves with the key of `device`.
+
+        Raises:
+            ConfigError: the pair of keys of `device` is not at hand.
+        """
+        socket.setsockopt(zmq.HANDSHAKE_IVL, HANDSHAKE_LIMIT)
+        if self._ring is not None:
+            public, secret = self._ring.pair(device)
+            socket.setsockopt(zmq.CURVE_SERVER, 1)
+            socket.setsockopt(zmq.CURVE_PUBLICKEY, public)
+            socket.setsockopt(zmq.CURVE_SECRETKEY, secret)
+            socket.setsockopt(zmq.ZAP_DOMAIN, device.encode())
+            # Else a server whom nobody tells which keys are good takes any.
+            socket.setsockopt(zmq.ZAP_ENFORCE_DOMAIN, 1)
+        self._watch(_Watch(socket, device, None))
+
+    def connect_client(self, socket: Socket, device: str, peer: str) -> None:
+        """Make `socket`, before it connects, one of `device` that reaches nobody but `peer`.
+
+        It is for one peer only: what arrives on it carries no name, but can be from nobody else.
+
+        Raises:
+            ConfigError: the pair of `device` or the public key of `peer` is not at hand.
+        """
+        socket.setsockopt(zmq.HANDSHAKE_IVL, HANDSHAKE_LIMIT)
+        socket.setsockopt(zmq.RECONNECT_IVL, RECONNECT_FIRST)
+        socket.setsockopt(zmq.RECONNECT_IVL_MAX, RECONNECT_MAX)
+        if self._ring is not None:
+            public, secret = self._ring.pair(device)
+            socket.setsockopt(zmq.CURVE_SERVERKEY, self._ring.public(peer))
+            socket.setsockopt(zmq.CURVE_PUBLICKEY, public)
+            socket.setsockopt(zmq.CURVE_SECRETKEY, secret)
+        self._watch(_Watch(socket, device, peer))
+
+    def sockets(self) -> list[Socket]:
+        """The sockets that `handle` wants; they are in the poller already."""
+        zap = [] if self._zap is None else [self._zap]
+        return [*self._watches, *self._greetings, *zap]
+
+    def handle(self, ready: object) -> bool:
+        """Take what has arrived if `ready` is one of these sockets; whether it was."""
+        if ready is self._zap and self._zap is not None:
+            self._read(self._zap, self._answer)
+        elif isinstance(ready, zmq.Socket) and ready in self._watches:
+            self._read(ready, lambda frames: self._note(ready, frames))
+        elif isinstance(ready, zmq.Socket) and ready in self._greetings:
+            self._read_greeting(ready)
+        else:
+            return False
+        return True
+
+    def vouches(self, frame: zmq.Frame, source: str) -> bool:
+        """Whether a message at a server may say that it is from `source`; anything without keys."""
+        return self._ring is None or speaks_for(user_of(frame), source)
+
+    def trouble(self, device: str, peer: str) -> str | None:
+        """What stands between a device and its peer now: for the message after a time-out."""
+        for (one, other, _), handshake in self._handshakes.items():
+            if (one, other) == (device, peer) and handshake.latest is not None:
+                return str(handshake.latest)
+        return None
+
+    def retry(self, socket: Socket) -> None:
+        """Connect again after ZeroMQ gave up; what waited in the socket was lost with that."""
+        last = socket.getsockopt(zmq.LAST_ENDPOINT)
+        assert isinstance(last, bytes)
+        endpoint = last.rstrip(b"\0").decode()
+        socket.disconnect(endpoint)
+        socket.connect(endpoint)
+
+    def release(self, socket: Socket) -> None:
+        """Watch a socket no longer; to be called before it is closed."""
+        for monitor, watch in list(self._watches.items()):
+            if watch.socket is socket:
+                self._drop(monitor)
+
+    def close(self) -> None:
+        """Release everything. From now on servers refuse whoever knocks."""
+        for monitor in list(self._watches):
+            self._drop(monitor)
+        for socket in list(self._greetings):
+            self._end_greeting(socket)
+        if self._zap is not None:
+            self._poller.unregister(self._zap)
+            self._zap.close()
+            self._zap = None
+
+    def _open_zap(self) -> Socket:
+        """The socket that libzmq asks, by its name, whether a key is good."""
+        zap = self._context.socket(zmq.REP)
+        zap.setsockopt(zmq.LINGER, 0)
+        try:
+            zap.bind(_ZAP)
+        except zmq.ZMQError:
+            zap.close()
+            raise
+        self._poller.register(zap, zmq.POLLIN)
+        return zap
+
+    def _watch(self, watch: _Watch) -> None:
+        address = f"inproc://dva-sim.monitor.{next(_names)}"
+        watch.socket.monitor(address, _EVENTS)
+        monitor = self._context.socket(zmq.PAIR)
+        monitor.setsockopt(zmq.LINGER, 0)
+        monitor.setsockopt(zmq.RCVHWM, _MONITOR_ROOM)
+        monitor.connect(address)
+        self._poller.register(monitor, zmq.POLLIN)
+        self._watches[monitor] = watch
+
+    def _drop(self, monitor: Socket) -> None:
+        """End a monitor, its source first: libzmq would wait for a reader that has gone."""
+        watch = self._watches.pop(monitor)
+        if not watch.socket.closed:
+            watch.socket.disable_monitor()
+        self._poller.unregister(monitor)
+        monitor.close()
+
+    def _read(self, socket: Socket, take: Callable[[list[bytes]], object]) -> None:
+        for _ in range(EVENTS_AT_ONCE):
+            if socket.closed:
+                return
+            try:
+                frames = socket.recv_multipart(zmq.NOBLOCK)
+            except zmq.Again:
+                return
+            take(frames)
+
+    def _answer(self, frames: list[bytes]) -> None:
+        """Say whether a key is good, and whose it is (ZeroMQ RFC 27)."""
+        version, request, domain, address, _, mechanism, *credentials = frames
+        device, key = domain.decode(), b"".join(credentials)
+        curve = mechanism == b"CURVE" and len(key) == 32
+        owner = self._ring.owner(key) if curve and self._ring is not None else None
+        status = [b"400", b"unknown key", b""] if owner is None else [b"200", b"", owner.encode()]
+        assert self._zap is not None
+        self._zap.send_multipart([version, request, *status, b""])
+        if owner is None:
+            self._tell_stranger(device, key, address.decode())
+
+    def _tell_stranger(self, device: str, key: bytes, address: str) -> None:
+        self.refused[device, Reason.UNKNOWN_KEY] += 1
+        if (device, key) in self._strangers or len(self._strangers) >= STRANGERS_TOLD:
+            return
+        self._strangers.add((device, key))
+        shown = z85.encode(key).decode()[:8] if len(key) == 32 else ""
+        why = f"an unknown key ({shown}...) tried to connect from {address}"
+        if len(self._strangers) == STRANGERS_TOLD:
+            why += "; there are many, no more will be told"
+        self._tell(Refusal(device, None, "", Reason.UNKNOWN_KEY, why))
+
+    def _note(self, monitor: Socket, frames: list[bytes]) -> None:
+        """Take an event of a monitor."""
+        event, value = struct.unpack("=HI", frames[0])
+        watch, endpoint = self._watches[monitor], frames[1].decode()
+        if event == zmq.EVENT_MONITOR_STOPPED:
+            self._drop(monitor)
+        elif watch.peer is None:
+            self._note_server(watch.device, endpoint, event, value)
+        else:
+            self._note_client(watch.device, watch.peer, endpoint, event, value)
+
+    def _note_server(self, device: str, endpoint: str, event: int, value: int) -> None:
+        """A bad key is told with the question for it; a peer that just leaves is no refusal."""
+        if event == zmq.EVENT_HANDSHAKE_FAILED_PROTOCOL:
+            reason, why = self._at_server(device, value)
+            refusal = Refusal(device, None, endpoint, reason, why)
+            self.refused[device, reason] += 1
+            if refusal not in self._told:  # few: there are few endpoints and few reasons
+                self._told.add(refusal)
+                self._tell(refusal)
+
+    def _at_server(self, device: str, code: int) -> tuple[Reason, str]:
+        if code == zmq.PROTOCOL_ERROR_ZMTP_MECHANISM_MISMATCH:
+            if self._ring is None:
+                return Reason.PLAIN_SERVER, "the other end has keys switched on, this one has not"
+            return Reason.PLAIN_CLIENT, "the other end has no keys, this one wants them"
+        if code == zmq.PROTOCOL_ERROR_ZMTP_CRYPTOGRAPHIC:
+            return Reason.WRONG_SERVER_KEY, f"the other end has a wrong public key of {device}"
+        return Reason.NOT_UNDERSTOOD, "the other end shakes hands in a way not understood"
+
+    def _note_client(self, device: str, peer: str, endpoint: str, event: int, value: int) -> None:
+        way = device, peer, endpoint
+        if event == zmq.EVENT_HANDSHAKE_SUCCEEDED:
+            self._handshakes.pop(way, None)
+            return
+        handshake = self._handshakes.setdefault(way, _Handshake())
+        reason, why = self._at_client(device, peer, event, value)
+        self.refused[device, reason] += 1
+        handshake.latest = Refusal(device, peer, endpoint, reason, why)
+        if event != zmq.EVENT_HANDSHAKE_FAILED_NO_DETAIL or value == errno.EAGAIN:
+            self._tell_once(handshake)
+            if reason in (Reason.PLAIN_CLIENT, Reason.PLAIN_SERVER):
+                self._greet(way, handshake)  # the server may not have heard why
+            return
+        # A connection may break in its handshake by chance, but hardly again and again.
+        handshake.hang_ups += 1
+        if handshake.hang_ups == PATIENCE:
+            self._greet(way, handshake)
+        elif handshake.hang_ups == 2 * PATIENCE:  # the greeting has not helped
+            self._tell_once(handshake)
+
+    def _tell_once(self, handshake: _Handshake) -> None:
+        refusal = handshake.latest
+        if refusal is not None and refusal.reason not in handshake.told:
+            handshake.told.add(refusal.reason)
+            self._tell(refusal)
+
+    def _greet(self, way: _Way, handshake: _Handshake) -> None:
+        """Find out, and let the other end find out, whether one has keys and one has none."""
+        if not handshake.greeted:
+            handshake.greeted = True
+            greeting = Greeting(self._context, way[2], "NULL" if self._ring is None else "CURVE")
+            self._greetings[greeting.socket] = way, greeting
+            self._poller.register(greeting.socket, zmq.POLLIN)
+
+    def _read_greeting(self, socket: Socket) -> None:
+        way, greeting = self._greetings[socket]
+        greeting.read()
+        if not greeting.done:
+            return
+        self._end_greeting(socket)
+        handshake = self._handshakes.get(way)
+        if handshake is None or handshake.told:
+            return
+        device, peer, endpoint = way
+        if greeting.theirs not in (None, greeting.mechanism):
+            reason, why = self._at_mismatch(peer)
+            handshake.latest = Refusal(device, peer, endpoint, reason, why)
+        self._tell_once(handshake)
+
+    def _end_greeting(self, socket: Socket) -> None:
+        del self._greetings[socket]
+        self._poller.unregister(socket)
+        socket.close()
+
+    def _at_client(self, device: str, peer: str, event: int, code: int) -> tuple[Reason, str]:
+        if event == zmq.EVENT_HANDSHAKE_FAILED_AUTH:
+            return Reason.UNKNOWN_KEY, f"{peer} does not know the key of {device}"
+        if event == zmq.EVENT_HANDSHAKE_FAILED_NO_DETAIL:
+            return self._at_hang_up(peer, code)
+        if code == zmq.PROTOCOL_ERROR_ZMTP_MECHANISM_MISMATCH:
+            return self._at_mismatch(peer)
+        if code == zmq.PROTOCOL_ERROR_ZMTP_CRYPTOGRAPHIC:
+            return Reason.WRONG_SERVER_KEY, f"what answers does not have the key of {peer}"
+        return Reason.NOT_UNDERSTOOD, "what answers shakes hands in a way not understood"
+
+    def _at_mismatch(self, peer: str) -> tuple[Reason, str]:
+        if self._ring is None:
+            return Reason.PLAIN_CLIENT, f"{peer} wants keys, this end has none"
+        return Reason.PLAIN_SERVER, f"{peer} has no keys switched on, this end has"
+
+    def _at_hang_up(self, peer: str, code: int) -> tuple[Reason, str]:
+        """A server does not say that it cannot read a greeting: it hangs up."""
+        if code == errno.EAGAIN:
+            limit = HANDSHAKE_LIMIT // 1000
+            return Reason.SILENT, f"no answer within {limit} s: is it {peer} who listens there?"
+        if self._ring is None:
+            return Reason.CLOSED, f"it hung up: is it {peer} who listens there?"
+        return (
+            Reason.WRONG_SERVER_KEY,
+            f"it hung up, most likely because the public key of {peer} here is not the one it has",
+        )
+
+
+def user_of(frame: zmq.Frame) -> str | None:
+    """Whose key a message came with, as told by its last frame, received with `copy=False`."""
+    try:
+        return str(frame.get("User-Id")) or None
+    except zmq.ZMQError:
+        return None
+
+
+def speaks_for(user: str | None, source: str) -> bool:
+    """Whether the owner of a key may send a message with this `SourceID`: its own only."""
+    return user is not None and user == source
