@@ -13,6 +13,8 @@ from typing import Any, get_args
 from lxml import etree
 
 from dva_sim.protocol import messages as m
+from dva_sim.protocol.codec import decode, encode
+from dva_sim.protocol.errors import ProtocolError
 
 SCHEMA = etree.XMLSchema(file=str(Path(__file__).parents[1] / "protocol" / "dva.xsd"))
 PLAIN = re.compile(r"[A-Za-z]\w*", re.ASCII)
@@ -142,3 +144,19 @@ def same_value(text: str, value: str | int | float) -> bool:
     if isinstance(value, int):
         return exact == value
     return float(exact) == value and math.copysign(1, value) == (-1 if text[0] == "-" else 1)
+
+
+def decode_or_refuse(data: bytes) -> m.Message | None:
+    """What `decode` gives; fails where the specification says anything else."""
+    tree = judged(data)
+    try:
+        decoded = decode(data)
+    except ProtocolError as error:
+        answer = m.Reply(0, error.code, error.reason)
+        sent = m.Message("00:" * 5 + "00", 1, "00:" * 5 + "00", "00:00:00", 0, answer)
+        assert decode(encode(sent)) == sent, "the reason fits into a reply"
+        assert tree is None, data
+        return None
+    assert tree is not None, data
+    assert says(tree, decoded), data
+    return decoded

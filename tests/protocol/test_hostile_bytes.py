@@ -1,10 +1,21 @@
-"""Whatever the bytes, decode gives a message or a ProtocolError, and works as before after it."""
+"""Whatever the bytes, decode gives a message or a ProtocolError, and works as before after it.
 
+What it gives is compared with an independent reading of the specification: the tree, validated
+separately, and its text.
+"""
+
+import itertools
+import os
+import sys
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from random import Random
 
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from message_mutations import LEAF, mutated
+from message_oracle import decode_or_refuse
 from message_strategies import message
 
 from dva_sim.protocol import messages as m
@@ -13,16 +24,17 @@ from dva_sim.protocol.errors import ProtocolError
 
 GOOD = encode(message(m.SetTeleOp(0.5, 0.56, 86320)))
 REPLY = encode(message(m.Reply(124, m.BUSY, "é & <ü>", m.SensorInfo("http://10.0.0.1/?a=b"))))
+SAMPLES = Path(__file__).parents[2] / "protocol" / "samples" / "valid"
+ALL = {path.stem: encode(decode(path.read_bytes())) for path in sorted(SAMPLES.glob("*.xml"))}
+each_kind = pytest.mark.parametrize("data", ALL.values(), ids=ALL)
 
 
-def decode_or_refuse(data):
-    """What decode gives; fails the test on any other exception than a ProtocolError."""
-    try:
-        return decode(data)
-    except ProtocolError as error:
-        text = m.Reply(0, error.code, error.reason)
-        assert decode(encode(message(text))).body == text, "the reason fits into a reply"
-        return None
+def with_every_bit_flipped(data):
+    for index in range(len(data)):
+        for bit in range(8):
+            damaged = bytearray(data)
+            damaged[index] ^= 1 << bit
+            yield bytes(damaged)
 
 
 def refused(old, new, data=GOOD):
@@ -32,7 +44,7 @@ def refused(old, new, data=GOOD):
     return caught.value.reason
 
 
-@pytest.mark.parametrize("data", [GOOD, REPLY], ids=["command", "reply"])
+@each_kind
 def test_a_message_cut_off_anywhere_is_refused(data):
     for end in range(len(data)):
         with pytest.raises(ProtocolError):
@@ -40,12 +52,37 @@ def test_a_message_cut_off_anywhere_is_refused(data):
 
 
 @pytest.mark.parametrize("data", [GOOD, REPLY], ids=["command", "reply"])
-def test_a_flipped_bit_gives_a_message_or_a_refusal(data):
-    for index in range(len(data)):
-        for bit in range(8):
-            damaged = bytearray(data)
-            damaged[index] ^= 1 << bit
-            decode_or_refuse(bytes(damaged))
+def test_a_flipped_bit_gives_what_the_bytes_say_or_a_refusal(data):
+    for damaged in with_every_bit_flipped(data):
+        decode_or_refuse(damaged)
+
+
+@pytest.mark.slow
+@each_kind
+def test_a_flipped_bit_in_any_kind_gives_what_the_bytes_say_or_a_refusal(data):
+    for damaged in with_every_bit_flipped(data):
+        decode_or_refuse(damaged)
+
+
+@each_kind
+def test_exchanged_elements_give_what_the_bytes_say_or_a_refusal(data):
+    spans = [found.span() for found in LEAF.finditer(data)]
+    for (a, b), (c, d) in itertools.combinations(spans, 2):
+        exchanged = data[:a] + data[c:d] + data[b:c] + data[a:b] + data[d:]
+        assert exchanged == data or decode_or_refuse(exchanged) != decode(data)
+
+
+@each_kind
+def test_dropped_and_doubled_elements_give_what_the_bytes_say_or_a_refusal(data):
+    for found in LEAF.finditer(data):
+        for instead in (b"", found[0] * 2):
+            decode_or_refuse(data[: found.start()] + instead + data[found.end() :])
+
+
+def test_the_fields_of_a_command_stand_in_one_order_once():
+    speed, turn_rate = b"<Speed>0.5</Speed>", b"<TurnRate>0.56</TurnRate>"
+    for instead in (turn_rate + speed, speed, turn_rate, speed * 2 + turn_rate, b""):
+        refused(speed + turn_rate, instead)
 
 
 @settings(deadline=None)
@@ -63,8 +100,14 @@ def test_any_bytes_are_refused(data):
 
 @settings(deadline=None)
 @given(st.integers(55, len(REPLY)), st.integers(0, 12), st.binary(max_size=12))
-def test_a_message_with_any_bytes_in_it_gives_a_message_or_a_refusal(at, width, inserted):
+def test_any_bytes_in_a_message_give_what_they_say_or_a_refusal(at, width, inserted):
     decode_or_refuse(REPLY[:at] + inserted + REPLY[at + width :])
+
+
+@settings(deadline=None, max_examples=300)
+@given(st.sampled_from(list(ALL.values())), st.randoms(use_true_random=False))
+def test_a_damaged_message_gives_what_it_says_or_a_refusal(data, rng):
+    decode_or_refuse(mutated(data, rng))
 
 
 @pytest.mark.parametrize(
@@ -73,6 +116,9 @@ def test_a_message_with_any_bytes_in_it_gives_a_message_or_a_refusal(at, width, 
         b"<!DOCTYPE msg>",
         b'<!DOCTYPE msg [<!ENTITY half "0.5">]>',
         b'<!DOCTYPE msg SYSTEM "file:///etc/passwd">',
+        b'<!DOCTYPE msg [<!ENTITY half SYSTEM "file:///etc/hostname">]>',
+        b'<!DOCTYPE msg [<!ENTITY % more SYSTEM "http://127.0.0.1:9/x.dtd"> %more;]>',
+        b'<!DOCTYPE msg [<!ATTLIST Speed unit CDATA "knots">]>',
         b'<!DOCTYPE msg [<!ENTITY a "aaaaaaaa"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;">]>',
     ],
 )
@@ -157,6 +203,36 @@ def test_utf_16_and_utf_32_are_refused_whatever_they_declare(encoding, declared)
     data = (start + text[text.index("<msg>") :]).encode(encoding)
     with pytest.raises(ProtocolError):
         decode(data)
+
+
+@pytest.mark.parametrize("start", [b"", b"+/v8-", b'<?xml version="1.0" encoding="UTF-7"?>'])
+def test_utf_7_is_refused_with_or_without_its_mark(start):
+    text = GOOD[GOOD.index(b"<msg>") :].decode()
+    shifted = "".join(f"+{'ADw' if c == '<' else 'AD4'}-" if c in "<>" else c for c in text)
+    assert shifted.encode().decode("utf-7") == text
+    with pytest.raises(ProtocolError):
+        decode(start + shifted.encode())
+
+
+@pytest.mark.parametrize(
+    "root", [b"Msg", b"MSG", b"message", b"SimpleMsg", b"HBMsg", b"m", b"msg2", "mśg".encode()]
+)
+def test_another_root_is_refused(root):
+    data = GOOD.replace(b"<msg>", b"<" + root + b">").replace(b"</msg>", b"</" + root + b">")
+    assert decode_or_refuse(data) is None
+
+
+@pytest.mark.parametrize("name", [b"SimpleMsg", b"TeleOp", b"SetTeleOp"])
+def test_a_message_inside_out_is_refused(name):
+    inner = GOOD[GOOD.index(b"<" + name + b">") : GOOD.index(b"</" + name + b">")]
+    assert decode_or_refuse(inner + b"</" + name + b">") is None
+
+
+def test_two_messages_are_none():
+    plain = GOOD[GOOD.index(b"<msg>") :]
+    assert decode_or_refuse(plain * 2) is None
+    assert decode_or_refuse(GOOD + plain) is None
+    assert decode_or_refuse(GOOD + b"x") is None
 
 
 @pytest.mark.parametrize(
@@ -256,3 +332,28 @@ def test_threads_share_the_parser():
     with ThreadPoolExecutor(4) as pool:
         got = list(pool.map(decode_or_refuse, [GOOD, bad, REPLY] * 200))
     assert got == [decode(GOOD), None, decode(REPLY)] * 200
+
+
+def resident_bytes():
+    """Memory that this process holds now."""
+    pages = Path("/proc/self/statm").read_text().split()[1]
+    return int(pages) * os.sysconf("SC_PAGE_SIZE")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="reads the memory in use from /proc")
+def test_a_million_hostile_messages_leave_no_memory_behind():
+    rng, seeds = Random(8192), list(ALL.values())
+
+    def attack(times):
+        for _ in range(times):
+            try:
+                decode(mutated(rng.choice(seeds), rng))
+            except ProtocolError:
+                continue
+
+    attack(50_000)
+    before = resident_bytes()
+    attack(1_000_000)
+    grown = resident_bytes() - before
+    assert grown < 8e6, f"{grown / 1e6:.1f} MB more, which is that many bytes per message"

@@ -1,0 +1,79 @@
+"""A short search, and proof that the search finds what is wrong."""
+
+import importlib.util
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(
+        importlib.util.find_spec("atheris") is None,
+        reason="atheris guides the search; it is not to be had for this platform",
+    ),
+]
+
+
+def search(root, folder, *options):
+    """Run the search on the program that lies in a root; what it leaves goes to the folder."""
+    script = root / "tests" / "fuzz" / "fuzz_decode.py"
+    return subprocess.run(
+        [sys.executable, str(script), *options],
+        cwd=folder,
+        env=os.environ | {"PYTHONPATH": str(root)},
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+
+
+def coverage(said):
+    return [int(number) for number in re.findall(r"\bcov: (\d+)", said)]
+
+
+def test_a_short_search_finds_nothing_wrong(tmp_path):
+    done = search(ROOT, tmp_path, "-runs=20000", "-seed=1")
+    assert done.returncode == 0, done.stderr[-3000:]
+    assert "Done 20000 runs" in done.stderr
+    assert coverage(done.stderr)[-1] > 100, "the program is not instrumented"
+    assert not list(tmp_path.iterdir())
+
+
+def test_bytes_that_take_new_branches_are_kept_in_the_folder_given(tmp_path):
+    corpus = tmp_path / "corpus"
+    corpus.mkdir()
+    done = search(ROOT, tmp_path, "-runs=3000", "-seed=1", str(corpus))
+    assert done.returncode == 0, done.stderr[-3000:]
+    assert list(corpus.iterdir()), "no branch beyond those of the samples"
+
+
+@pytest.mark.parametrize(
+    ("file", "right", "wrong"),
+    [
+        ("canonical.py", '_real("[0-9]{1,2}")', '_real("[0-9]{1,3}")'),
+        ("codec.py", 'rb"<(?!/?\\w++\\s*+/?>)"', 'rb"<!D"'),
+        ("readers.py", "_float(speed), _float(turn_rate)", "_float(turn_rate), _float(speed)"),
+    ],
+    ids=["bound", "markup", "fields"],
+)
+def test_the_search_finds_a_fault_put_into_the_decoder(tmp_path, file, right, wrong):
+    broken = tmp_path / "broken"
+    for folder in ("dva_sim", "protocol", "tests/fuzz"):
+        shutil.copytree(ROOT / folder, broken / folder)
+    for file_needed in [ROOT / "pyproject.toml", *(ROOT / "tests").glob("message_*.py")]:
+        shutil.copy(file_needed, broken / file_needed.relative_to(ROOT))
+    path = broken / "dva_sim" / "protocol" / file
+    assert right in path.read_text()
+    path.write_text(path.read_text().replace(right, wrong))
+    done = search(broken, tmp_path, "-runs=200000", "-seed=1")
+    assert done.returncode != 0
+    assert "AssertionError" in done.stdout + done.stderr
+    assert list(tmp_path.glob("crash-*"))
