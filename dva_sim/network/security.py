@@ -323,6 +323,8 @@ class Security:
         way = device, peer, endpoint
         if event == zmq.EVENT_HANDSHAKE_SUCCEEDED:
             self._handshakes.pop(way, None)
+            for socket in [s for s, (at, _) in self._greetings.items() if at == way]:
+                self._end_greeting(socket)
             return
         handshake = self._handshakes.setdefault(way, _Handshake())
         reason, why = self._at_client(device, peer, event, value)
@@ -337,7 +339,7 @@ class Security:
         handshake.hang_ups += 1
         if handshake.hang_ups == PATIENCE:
             self._greet(way, handshake)
-        elif handshake.hang_ups == 2 * PATIENCE:  # the greeting has not helped
+        elif handshake.hang_ups == 2 * PATIENCE and not handshake.told:  # greeting has not helped
             self._tell_once(handshake)
 
     def _tell_once(self, handshake: _Handshake) -> None:
@@ -357,11 +359,12 @@ class Security:
     def _read_greeting(self, socket: Socket) -> None:
         way, greeting = self._greetings[socket]
         greeting.read()
-        if not greeting.done:
-            return
-        self._end_greeting(socket)
+        if greeting.done:
+            self._end_greeting(socket)
         handshake = self._handshakes.get(way)
-        if handshake is None or handshake.told:
+        # The news of the end may fail to come: what the other end speaks is enough to conclude.
+        is_open = greeting.theirs is None and not greeting.done
+        if is_open or handshake is None or handshake.told:
             return
         device, peer, endpoint = way
         if greeting.theirs not in (None, greeting.mechanism):
