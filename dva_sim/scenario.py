@@ -67,11 +67,16 @@ class OperatorConfig(Config):
 
 
 class CommandConfig(Config):
-    """How commands are sent, the same for every pattern."""
+    """How commands are sent, the same for every pattern.
+
+    Attributes:
+        window: How many requests may be unanswered at once under `pipelined`.
+    """
 
     rate_hz: Annotated[float, Field(gt=0, le=100)] = 10.0
     timeout_s: Annotated[float, Field(gt=0, le=120)] = 9.0
     attempts: Annotated[int, Field(ge=1, le=10)] = 3
+    window: Annotated[int, Field(ge=2, le=1000)] = 8
 
 
 class CameraConfig(Config):
@@ -121,7 +126,7 @@ class Scenario(Config):
     robot: RobotConfig = RobotConfig()
     guard: GuardConfig = GuardConfig()
     operator: OperatorConfig = OperatorConfig()
-    pattern: Literal["req-rep", "pub-sub", "latest-wins"] = "latest-wins"
+    pattern: Literal["req-rep", "pipelined", "pub-sub", "latest-wins"] = "latest-wins"
     profile: str = "default"
     command: CommandConfig = CommandConfig()
     link: LinkConfig = LinkConfig()
@@ -129,6 +134,11 @@ class Scenario(Config):
     events: Annotated[tuple[EventConfig, ...], Field(min_length=1)] = (EventConfig(kind="fire"),)
     dispatch: DispatchConfig = DispatchConfig()
     horizon_s: Annotated[float, Field(gt=0, le=86_400)] = 300.0
+
+    @property
+    def window(self) -> int | None:
+        """How many commands may be unanswered at once; None if nobody answers them."""
+        return {"req-rep": 1, "pipelined": self.command.window}.get(self.pattern)
 
     @model_validator(mode="after")
     def _somebody_can_act(self) -> Scenario:

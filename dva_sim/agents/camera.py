@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import NamedTuple
 
 from dva_sim.agents.steering import wrap
+
+CAMERA_SCHEME = "zmq+tcp://"  # host, port, topic: where simulated robots publish their frames
 
 
 class SeenHazard(NamedTuple):
@@ -42,10 +45,33 @@ class Observation(NamedTuple):
 
 
 class Frame(NamedTuple):
-    """An observation on its way; `captured` [s] is for the recorder, not for the operator."""
+    """An observation on its way; `captured` [s] is for the recorder, not for the operator.
+
+    It stands in for a picture: what a person would make of the picture is what it holds.
+    """
 
     observation: Observation
     captured: float
+
+    def pack(self, size: int) -> bytes:
+        """The frame as JSON, filled up with spaces to the size of a picture [B]."""
+        return json.dumps((self.observation, self.captured)).encode().ljust(size)
+
+    @classmethod
+    def unpack(cls, data: bytes) -> Frame | None:
+        """The frame in `data`; None if there is none."""
+        try:
+            (*values, hazards), captured = json.loads(data)
+            tick, *pose = (float(value) for value in values)
+            x, y, heading, speed, turn_rate = pose
+            seen = tuple(
+                SeenHazard(str(kind), float(hx), float(hy), float(distance))
+                for kind, hx, hy, distance in hazards
+            )
+            at = Observation(int(tick), x, y, heading, speed, turn_rate, seen)
+            return cls(at, float(captured)) if math.isfinite(sum(pose)) else None
+        except (ValueError, TypeError, OverflowError, RecursionError):
+            return None
 
 
 class HazardSpot(NamedTuple):

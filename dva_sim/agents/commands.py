@@ -1,4 +1,4 @@
-"""How the phone's app sends SetTeleOp: by request/reply or by publishing. Nothing else differs."""
+"""How the phone's app sends SetTeleOp: by requests or by publishing. Nothing else differs."""
 
 from __future__ import annotations
 
@@ -6,12 +6,10 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from dva_sim.agents.tilt import Phone, TiltCommand
-from dva_sim.network.patterns import Network, Requester
+from dva_sim.network.patterns import Requester, Transport
 from dva_sim.protocol.exchange import Outbox
 from dva_sim.protocol.messages import SetTeleOp
 from dva_sim.recorder import DriveLog, Issued, Recorder
-
-SERVICE = "commands"
 
 
 def topic_of(robot: str) -> str:
@@ -43,7 +41,7 @@ class CommandSender:
 
     def __init__(
         self,
-        network: Network,
+        network: Transport,
         outbox: Outbox,
         drive: DriveLog,
         session: int,
@@ -107,26 +105,27 @@ class PublishedCommands(CommandSender):
 
     def _offer(self, made: Made) -> None:
         data = self._encode(made)
-        publisher = self._network.publisher(self._outbox.source, SERVICE)
-        publisher.publish(topic_of(self._drive.robot), data, len(data))
+        topic = topic_of(self._drive.robot)
+        self._network.publish(self._outbox.source, topic, data, len(data))
 
 
 class RequestedCommands(CommandSender):
-    """Request/reply: the next command goes when the last one is answered.
+    """Request/reply: the next command goes when the window allows, at the latest when the last
+    one is answered; so it is with one request at a time and with several under way.
 
     What the phone says meanwhile is overtaken by what it says last. After the last attempt
     without an answer the app alerts: the link is lost.
     """
 
     def connect(self, requester: Requester, on_alert: Callable[[], object]) -> None:
-        """Give it its REQ socket, and say what to do when the link is lost."""
+        """Give it its socket, and say what to do when the link is lost."""
         self._requester, self._on_alert = requester, on_alert
         self._pending: Made | None = None
 
     def stop(self) -> None:
         """Send nothing more and close the socket."""
         super().stop()
-        self._drive.round_trips = self._requester.round_trips
+        self._drive.round_trips = list(self._requester.round_trips)
         self._drive.timeouts = self._requester.timeouts
         self._requester.close()
 

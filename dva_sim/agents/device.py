@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from dva_sim.clock import Clock
-from dva_sim.network.patterns import Answer, Network, Requester
+from dva_sim.network.patterns import Request, Requester, Transport
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode, encode
 from dva_sim.protocol.errors import ProtocolError
@@ -14,12 +14,17 @@ from dva_sim.protocol.exchange import Outbox, ReplyCache
 from dva_sim.recorder import Recorder
 from dva_sim.worlds.geo import GeoFrame
 
-CONTROL = "control"  # the acknowledged channel: everything but SetTeleOp
-HEARTBEATS = "heartbeats"
+HEARTBEAT = "heartbeat|"  # topics; the bar ends each, so that none begins another
+STATUS = "status|"
 HEARTBEAT_PERIOD = 2.0  # [s]
 REGISTER_AGAIN = 2.0  # pause after a registration that was not answered [s]
 
 Handler = Callable[[m.Message], m.Reply]
+
+
+def urgent(message: m.Message) -> bool:
+    """Whether a message overtakes everything else."""
+    return isinstance(message.body, m.Emergency)
 
 
 def do_nothing(*_: object) -> None:
@@ -49,7 +54,7 @@ class Device:
     device_type: str
     address: str
     dva: str
-    network: Network
+    network: Transport
     recorder: Recorder
     frame: GeoFrame
     timeout: float
@@ -101,11 +106,11 @@ class Device:
         requester = self._requesters.get(key)
         if requester is None:
             requester = self._requesters[key] = Requester(
-                self.network, self.id_tag, peer, CONTROL, self.timeout, self.attempts
+                self.network, self.id_tag, peer, self.timeout, self.attempts
             )
 
         def answered(data: bytes) -> None:
-            reply = self.read(data)
+            reply = self.read(data, peer)
             if reply is not None and isinstance(reply.body, m.Reply):
                 on_reply(reply.body)
 
@@ -115,47 +120,69 @@ class Device:
     def serve(self, handler: Handler) -> None:
         """Let `handler` take the requests on the acknowledged channel."""
 
-        def take(data: bytes, answer: Answer) -> None:
-            answer(self.answer(data, handler))
+        def take(request: Request) -> None:
+            request.answer(self.answer(request.data, handler, request.sender))
 
-        self.network.serve(self.id_tag, CONTROL, take)
+        self.network.serve(self.id_tag, take)
 
-    def answer(self, data: bytes, handler: Handler) -> bytes:
-        """The reply to a request as bytes: an error reply to bad bytes, once per request."""
+    def answer(self, data: bytes, handler: Handler, sender: str | None = None) -> bytes:
+        """The reply to a request as bytes: an error reply to bad bytes, once per request.
+
+        Args:
+            data: The request.
+            handler: Takes it if it is valid and was not answered before.
+            sender: Whose key it came by, if keys are used.
+        """
+        known = self._replies.get(data)
+        if known is not None:
+            return known
         try:
             message = decode(data)
         except ProtocolError as error:
             self.recorder.counters["refused"] += 1
             return self._bad_message(error)
-        known = self._replies.get(message)
-        if known is not None:
-            return known
-        body = handler(message)
+        body = self._imposture(message, sender) or handler(message)
         if body.code != m.OK:
             self.recorder.counters[f"refused: {m.CODE_NAMES[body.code]}"] += 1
-        return self._replies.put(message, self.reply(message, body))
+        reply = self.reply(message, body)
+        # An emergency acts whenever it comes: a button whose bytes never change must not fail.
+        return reply if urgent(message) else self._replies.put(data, reply)
+
+    def _imposture(self, message: m.Message, sender: str | None) -> m.Reply | None:
+        """The refusal of a message that speaks for another device than its key is of.
+
+        An emergency is obeyed all the same: it can only stop.
+        """
+        if sender in (None, message.source) or urgent(message):
+            return None
+        self.tell(f"{sender} speaks for {message.source}", "link")
+        return m.Reply(message.message_id, m.NOT_PERMITTED, f"this is the key of {sender}")
 
     def reply(self, message: m.Message, body: m.Reply) -> bytes:
         """A reply to `message` as bytes."""
         session = message.session or 0
         return self.outbox.encode(message.source, body, self.clock.now, session)
 
-    def read(self, data: bytes) -> m.Message | None:
-        """A message from bytes; None, and counted, if it is not valid."""
+    def read(self, data: bytes, source: str | None = None) -> m.Message | None:
+        """A message from bytes; None, and counted, if it is not valid or not from `source`."""
         try:
-            return decode(data)
+            message = decode(data)
         except ProtocolError:
             self.recorder.counters["refused"] += 1
             return None
+        if source not in (None, message.source):
+            self.recorder.counters["refused: of another source"] += 1
+            return None
+        return message
 
     def progress(self, event_id: int, state: str) -> None:
         """Tell the DVA how an order stands."""
         self.ask(self.dva, m.OrderProgress(event_id, state))
 
-    def publish(self, service: str, topic: str, body: m.Body) -> None:
+    def publish(self, topic: str, body: m.Body) -> None:
         """Publish a message to whoever has subscribed."""
         data = encode(self.outbox.message(self.dva, body, self.clock.now))
-        self.network.publisher(self.id_tag, service).publish(topic, data, len(data))
+        self.network.publish(self.id_tag, topic, data, len(data))
 
     def tell(self, what: str, kind: str = "event") -> None:
         """Add a line to the timeline."""
@@ -166,7 +193,7 @@ class Device:
         return self.labels.get(id_tag, id_tag)
 
     def _heartbeat(self) -> None:
-        self.publish(HEARTBEATS, "heartbeat|", m.Heartbeat())
+        self.publish(HEARTBEAT, m.Heartbeat())
 
     def _bad_message(self, error: ProtocolError) -> bytes:
         body = m.Reply(0, error.code, error.reason[:256])

@@ -10,13 +10,14 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from dva_sim.agents.device import Device
+from dva_sim.agents.device import STATUS, Device
 from dva_sim.agents.operator.person import Trait
 from dva_sim.agents.steering import Route
 from dva_sim.config import Config
 from dva_sim.protocol import messages as m
 from dva_sim.worlds.planning import Planner
 
+STATUS_PERIOD, FIRST_STATUS = 2.0, 0.5  # of where a guard is [s]
 STEP = 0.5  # how often a walking guard's place is looked at [s]
 SLOWEST, FASTEST = 0.6, 2.2  # [m/s]
 NEAR_ENOUGH = 2.0  # from where a guard sees what there is, if nothing stands between [m]
@@ -89,8 +90,19 @@ class GuardAgent:
         self._order: m.Order | None = None
         device.serve(self._on_order)
 
+    def start(self) -> None:
+        """Begin to tell where one is."""
+        clock = self.device.clock
+        clock.every(STATUS_PERIOD, self._publish_status, start=clock.now + FIRST_STATUS)
+
+    def _publish_status(self) -> None:
+        position = m.Position(*self.device.frame.to_latlon(self.x, self.y))
+        self.device.publish(STATUS, m.PersonStatus(self.activity, position))
+
     def _on_order(self, message: m.Message) -> m.Reply:
         order = message.body
+        if message.source != self.device.dva:
+            return m.Reply(message.message_id, m.NOT_PERMITTED, "only the DVA gives orders")
         if not isinstance(order, m.Order) or order.device is not None:
             return m.Reply(message.message_id, m.NOT_SUPPORTED, "a guard takes orders to walk")
         if self._order is not None:

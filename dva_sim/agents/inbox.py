@@ -7,17 +7,25 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from dva_sim.clock import Clock
-from dva_sim.network.patterns import Answer
+from dva_sim.network.patterns import Answer, Request
 
 LIMIT = 1000  # ZeroMQ's default high-water mark: a full subscriber keeps the oldest
 
 
 class Letter(NamedTuple):
-    """A message that has arrived: its bytes, when [s], and how to answer it."""
+    """A message that has arrived.
+
+    Attributes:
+        data: Its bytes.
+        arrived: When [s].
+        answer: Takes the reply; None if nobody waits for one.
+        sender: Whose key it came by, if keys are used.
+    """
 
     data: bytes
     arrived: float
     answer: Answer | None
+    sender: str | None
 
 
 class Inbox:
@@ -46,24 +54,32 @@ class Inbox:
         self._busy = False
         self.longest = self.superseded = self.overflowed = 0
 
-    def emergency(self, data: bytes, answer: Answer) -> None:
-        """An emergency has arrived: it overtakes everything that waits."""
-        self._put(self._emergencies, Letter(data, self._clock.now, answer))
+    def request(self, request: Request) -> None:
+        """A request has arrived; somebody waits for the answer.
 
-    def control(self, data: bytes, answer: Answer) -> None:
-        """A request on the acknowledged channel has arrived."""
-        self._put(self._control, Letter(data, self._clock.now, answer))
+        Only the kind of message is looked at here; it is validated when its turn comes.
+        """
+        data = request.data
+        queue = self._control
+        if b"<EmergencyMsg>" in data:
+            queue = self._emergencies
+        elif b"<SetTeleOp>" in data:
+            queue = self._commands
+        self._put(queue, Letter(data, self._clock.now, request.answer, request.sender))
 
-    def command(self, data: bytes, answer: Answer | None = None) -> None:
-        """A command has arrived, with somebody waiting for an answer or not."""
-        if self._latest_wins and self._commands:
-            self.superseded += len(self._commands)
-            self._commands.clear()
-        self._put(self._commands, Letter(data, self._clock.now, answer))
+    def published(self, data: bytes) -> None:
+        """A command has arrived that nobody waits to be answered."""
+        if self._latest_wins:
+            self.superseded += self.forget_published()
+        self._put(self._commands, Letter(data, self._clock.now, None, None))
 
-    def forget_commands(self) -> None:
-        """Drop the commands that wait: their subscription is closed."""
-        self._commands.clear()
+    def forget_published(self) -> int:
+        """Drop the published commands that wait: how many those were."""
+        before = len(self._commands)
+        if before:
+            asked = [letter for letter in self._commands if letter.answer is not None]
+            self._commands = deque(asked)
+        return before - len(self._commands)
 
     def _put(self, queue: deque[Letter], letter: Letter) -> None:
         if len(queue) >= LIMIT:

@@ -5,13 +5,15 @@ Pure: it takes messages with their times and returns what to answer and how to m
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import NamedTuple
 
 from dva_sim.protocol import messages as m
 
 LEASE_S = 30.0  # teleoperation without a valid command ends by itself after this
+MOST_OBSERVERS = 64  # devices that may subscribe to sensors without holding the robot
 
 
 class Mode(StrEnum):
@@ -71,6 +73,7 @@ class RobotController:
         dva: Id of the DVA: the only one whose grants count.
         limits: Watchdog and age limit.
         camera_url: Told to whoever asks for the sensors.
+        sensors: The sensors it has.
         clock_offset: What the robot's own clock shows at the run's start [s]; no other
             clock agrees with it.
     """
@@ -79,11 +82,15 @@ class RobotController:
     dva: str
     limits: Limits
     camera_url: str = "http://192.168.1.20:8080/camera"
+    sensors: tuple[m.Sensor, ...] = ()
     clock_offset: float = 0.0
     mode: Mode = Mode.IDLE
     owner: str | None = None
     grant: m.PermissionGrant | None = None
+    highest_session: int = 0
+    observers: dict[str, m.PermissionGrant] = field(default_factory=dict)
     mission: tuple[m.Position, ...] = ()
+    last_order_id: int = 0
     last_set_id: int = 0
     last_valid: float = 0.0
     emergency_at: float = -1.0
@@ -110,6 +117,10 @@ class RobotController:
                 return self._emergency(now)
             case m.PermissionGrant():
                 return self._granted(message, body)
+            case m.PermissionRevocation():
+                return self._revoked(message, body)
+            case m.DevSub():
+                return self._subscription(message, body)
             case m.StartTeleOp():
                 return self._start(message, arrived, now, moving)
             case m.StopTeleOp():
@@ -117,7 +128,7 @@ class RobotController:
             case m.GoTo() | m.CancelMission():
                 return self._mission(message, arrived, moving)
             case m.GetSensorInfo():
-                return Decision(m.OK, content=m.SensorInfo(self.camera_url))
+                return Decision(m.OK, content=m.SensorInfo(self.camera_url, self.sensors))
             case _:
                 return Decision(m.NOT_SUPPORTED, f"a robot does not take {type(body).__name__}")
 
@@ -144,14 +155,55 @@ class RobotController:
     def _granted(self, message: m.Message, body: m.PermissionGrant) -> Decision:
         if message.source != self.dva:
             return Decision(m.NOT_PERMITTED, "only the DVA grants permissions")
-        if self.grant is not None and body.session <= self.grant.session:
+        if body.level == "sensors":
+            return self._observer(body)
+        if body.session <= self.highest_session:
             old = body == self.grant
             return Decision(m.OK if old else m.BAD_SESSION, "" if old else "that session is over")
-        self.grant = body
+        self.grant, self.highest_session = body, body.session
+        self.last_order_id = 0
         if self.owner is not None:
             self._idle()
             return Decision(m.OK, set_point=STAND)
         return Decision(m.OK)
+
+    def _observer(self, body: m.PermissionGrant) -> Decision:
+        """Somebody may subscribe to sensors; the one who drives goes on driving."""
+        if body.holder not in self.observers and len(self.observers) >= MOST_OBSERVERS:
+            return Decision(m.BUSY, f"{MOST_OBSERVERS} observers are all that this robot serves")
+        self.observers[body.holder] = body
+        return Decision(m.OK)
+
+    def _revoked(self, message: m.Message, body: m.PermissionRevocation) -> Decision:
+        """A session is over; one that is over already is so all the more."""
+        if message.source != self.dva:
+            return Decision(m.NOT_PERMITTED, "only the DVA revokes permissions")
+        observer = self.observers.get(body.holder)
+        if observer is not None and observer.session == body.session:
+            del self.observers[body.holder]
+        if self.grant is None or self.grant.session != body.session:
+            return Decision(m.OK)
+        self.grant = None
+        if self.owner is None:
+            return Decision(m.OK)
+        self._idle()
+        return Decision(m.OK, set_point=STAND)
+
+    def _subscription(self, message: m.Message, body: m.DevSub) -> Decision:
+        """Whether somebody may subscribe to a sensor: each one is permitted by name (S5)."""
+        grants = (self.grant, self.observers.get(message.source))
+        held = [g for g in grants if g is not None and g.holder == message.source]
+        if body.sensor not in {sensor.name for sensor in self.sensors}:
+            return Decision(m.UNKNOWN_SENSOR, f"no sensor {body.sensor!r}; {self._what_there_is()}")
+        if not any(body.sensor in grant.sensors for grant in held):
+            return Decision(m.NOT_PERMITTED, f"{message.source} may not subscribe to {body.sensor}")
+        if message.session not in {g.session for g in held if body.sensor in g.sensors}:
+            return Decision(m.BAD_SESSION, f"session {message.session} is not the current one")
+        return Decision(m.OK)
+
+    def _what_there_is(self) -> str:
+        names: Iterable[str] = (sensor.name for sensor in self.sensors)
+        return f"there are {', '.join(names) or 'none'}"
 
     def _refusal(self, message: m.Message, level: str) -> Decision | None:
         """Why a source may not act now, or None (S5)."""
@@ -162,6 +214,16 @@ class RobotController:
             return Decision(m.BAD_SESSION, f"session {message.session} is not the current one")
         if grant.level not in (level, "both"):
             return Decision(m.NOT_PERMITTED, f"permission is for {grant.level}, not {level}")
+        return None
+
+    def _order(self, message: m.Message) -> Decision | None:
+        """Why an order may not act now, or None: orders of a session act once and in order.
+
+        A copy of an old one that comes late, after its reply was forgotten, ends here.
+        """
+        if message.message_id <= self.last_order_id:
+            return Decision(m.OUT_OF_ORDER, "a newer order was received before")
+        self.last_order_id = message.message_id
         return None
 
     def _begin(self, message: m.Message, arrived: float, moving: bool) -> Decision | None:
@@ -180,7 +242,7 @@ class RobotController:
             return refusal
         if self.mode is Mode.TELEOPERATION and self.owner == message.source:
             return Decision(m.OK, "already started")
-        refusal = self._begin(message, arrived, moving)
+        refusal = self._begin(message, arrived, moving) or self._order(message)
         if refusal is not None:
             return refusal
         self.mode, self.owner = Mode.TELEOPERATION, message.source
@@ -208,7 +270,7 @@ class RobotController:
         return Decision(m.OK, set_point=SetPoint(body.speed, body.turn_rate, until))
 
     def _stop(self, message: m.Message) -> Decision:
-        refusal = self._refusal(message, "teleoperation")
+        refusal = self._refusal(message, "teleoperation") or self._order(message)
         if refusal is not None:
             return refusal
         if self.mode is not Mode.TELEOPERATION:
@@ -221,10 +283,13 @@ class RobotController:
         if refusal is not None:
             return refusal
         if isinstance(message.body, m.CancelMission):
+            refusal = self._order(message)
+            if refusal is not None:
+                return refusal
             if self.mode is Mode.MISSION:
                 self._idle()
             return Decision(m.OK, set_point=STAND)
-        refusal = self._begin(message, arrived, moving)
+        refusal = self._begin(message, arrived, moving) or self._order(message)
         if refusal is not None:
             return refusal
         assert isinstance(message.body, m.GoTo)

@@ -2,28 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import Annotated
 
 from pydantic import Field
 
 from dva_sim.agents.camera import Frame, HazardSpot, Observation, View
-from dva_sim.agents.commands import SERVICE, topic_of
-from dva_sim.agents.device import CONTROL, Device
+from dva_sim.agents.commands import topic_of
+from dva_sim.agents.device import STATUS, Device
 from dva_sim.agents.inbox import Inbox, Letter
 from dva_sim.agents.modes import Decision, Mode, RobotController, SetPoint
 from dva_sim.agents.operator.person import Person
 from dva_sim.agents.operator.strategies import Intent, Pursuit, Reach
+from dva_sim.agents.sensing import SensorDesk, SensorPort
 from dva_sim.agents.steering import Route
 from dva_sim.config import Config
-from dva_sim.network.patterns import Answer, Subscription
+from dva_sim.network.patterns import Subscription
 from dva_sim.protocol import messages as m
 from dva_sim.recorder import DriveLog
 from dva_sim.worlds.physics import DriveSpec, RobotBody, World
 from dva_sim.worlds.planning import Planner
 
-STATUS = "status"
+FRAME = "frame|"  # topic of the camera
+PUBLISHED = ("pub-sub", "latest-wins")  # patterns in which nobody answers a command
 STATUS_PERIOD = 1.0  # [s]
 MISSION_PERIOD = 0.1  # [s]
 STANDING = 0.02  # below this the wheels count as still [m/s, rad/s]
@@ -69,6 +71,7 @@ class RobotSetup:
         frame_bytes: Size of a frame [B].
         view: What the camera sees.
         hazards: What is there to be seen, at a time [s].
+        sensors: What it measures, by name.
     """
 
     pattern: str
@@ -77,6 +80,7 @@ class RobotSetup:
     frame_bytes: int
     view: View
     hazards: Callable[[float], list[HazardSpot]]
+    sensors: Mapping[str, SensorPort] = field(default_factory=dict)
 
 
 class RobotAgent:
@@ -108,9 +112,10 @@ class RobotAgent:
         self.inbox = Inbox(
             device.clock, setup.processing, self._handle, setup.pattern == "latest-wins"
         )
+        self._sensing = SensorDesk(device, setup.sensors, controller.tick)
+        controller.sensors = tuple(m.Sensor(n, port.unit) for n, port in setup.sensors.items())
         self._commands: Subscription | None = None
-        device.network.serve(device.id_tag, CONTROL, self._on_control)
-        device.network.serve(device.id_tag, SERVICE, self.inbox.command)
+        device.network.serve(device.id_tag, self.inbox.request)
 
     def start(self) -> None:
         """Begin to publish frames, status and mode changes."""
@@ -130,15 +135,11 @@ class RobotAgent:
 
     # --- messages ----------------------------------------------------------------------
 
-    def _on_control(self, data: bytes, answer: Answer) -> None:
-        # Only the kind of message is looked at here; it is validated when its turn comes.
-        urgent = b"<EmergencyMsg>" in data
-        (self.inbox.emergency if urgent else self.inbox.control)(data, answer)
-
     def _handle(self, letter: Letter) -> None:
         """A letter's processing is done."""
         if letter.answer is None:
-            message = self.device.read(letter.data)
+            owner = self.controller.owner
+            message = self.device.read(letter.data, owner)
             if message is not None:
                 self._decide(message, letter.arrived)
             return
@@ -147,7 +148,7 @@ class RobotAgent:
             decision = self._decide(message, letter.arrived)
             return m.Reply(message.message_id, decision.code, decision.text, decision.content)
 
-        letter.answer(self.device.answer(letter.data, decide))
+        letter.answer(self.device.answer(letter.data, decide, letter.sender))
 
     def _decide(self, message: m.Message, arrived: float) -> Decision:
         now = self.device.clock.now
@@ -157,6 +158,8 @@ class RobotAgent:
         decision = self.controller.handle(message, arrived, now, moving)
         if decision.set_point is not None:
             self._move(decision.set_point)
+        if decision.code == m.OK:
+            decision = self._follow_up(message, decision)
         if decision.code != m.OK:
             name = m.CODE_NAMES[decision.code]
             self.device.recorder.counters[f"robot refused: {name}"] += 1
@@ -164,6 +167,17 @@ class RobotAgent:
             self._log_command(message, arrived, now, decision.set_point)
         if self.controller.mode is not before:
             self._mode_changed(message.source)
+        return decision
+
+    def _follow_up(self, message: m.Message, decision: Decision) -> Decision:
+        """What a decision means to others than the motors."""
+        match message.body:
+            case m.DevSub() as wish:
+                return Decision(*self._sensing.subscribe(message.source, wish))
+            case m.PermissionGrant(holder=holder, address=str(address)):
+                self.device.network.introduce(holder, address)
+            case m.PermissionRevocation(holder=holder):
+                self._sensing.end(holder)
         return decision
 
     def _log_command(
@@ -184,12 +198,11 @@ class RobotAgent:
         if self._commands is not None:
             self._commands.close()
             self._commands = None
-            self.inbox.forget_commands()
-        if mode is Mode.TELEOPERATION and self._setup.pattern != "req-rep":
-            publisher = self.device.network.publisher(source, SERVICE)
-            topic = topic_of(self.device.id_tag)
-            self._commands = Subscription(
-                self.device.network, self.device.id_tag, publisher, topic, self.inbox.command
+            self.inbox.forget_published()
+        if mode is Mode.TELEOPERATION and self._setup.pattern in PUBLISHED:
+            me = self.device.id_tag
+            self._commands = self.device.network.subscribe(
+                me, source, topic_of(me), self.inbox.published
             )
         if mode is Mode.MISSION:
             self._begin_mission()
@@ -198,16 +211,9 @@ class RobotAgent:
 
     def _take_frame(self) -> None:
         """Film for whoever watches; a frame is left out while the last one still waits."""
-        network, size = self.device.network, self._setup.frame_bytes
-        publisher = network.publisher(self.device.id_tag, "camera")
-        if not publisher.subscribers:
-            return
-        downlink, _ = network.links(self.device.id_tag, publisher.subscribers[0].node)
-        if downlink.backlog_bytes(self.device.clock.now) >= size:
-            self.device.recorder.counters["frames left out"] += 1
-            return
-        frame = Frame(self.observe(), self.device.clock.now)
-        publisher.publish("frame|", frame, size)
+        network, me, size = self.device.network, self.device.id_tag, self._setup.frame_bytes
+        if network.ready(me, FRAME, size):
+            network.publish(me, FRAME, Frame(self.observe(), self.device.clock.now), size)
 
     def _publish_status(self) -> None:
         now = self.device.clock.now
@@ -223,7 +229,7 @@ class RobotAgent:
             self.body.turn_rate,
             self.controller.tick(now),
         )
-        self.device.publish(STATUS, "status|", body)
+        self.device.publish(STATUS, body)
 
     def _begin_mission(self) -> None:
         """Drive to the waypoints one by one, by the robot's own map."""

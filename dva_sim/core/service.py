@@ -43,6 +43,7 @@ class Desk:
         paces: Expected pace of `guard` and `robot`.
         escalate_after: An event that is left without a responder for so long is escalated [s].
         rng: Luck of policies that use it.
+        permissions: Who may act on what.
     """
 
     policy: Policy
@@ -50,13 +51,18 @@ class Desk:
     paces: dict[str, Pace]
     escalate_after: float
     rng: np.random.Generator
+    permissions: Permissions
     registry: Registry = field(default_factory=Registry)
-    permissions: Permissions = field(default_factory=Permissions)
     book: EventBook = field(default_factory=EventBook)
     refused: int = 0
+    _revocations: list[Send] = field(default_factory=list)
 
     def handle(self, message: m.Message, now: float) -> tuple[m.Reply, list[Send]]:
         """Take a request; the reply goes to the sender, the rest where it says."""
+        reply, sends = self._handle(message, now)
+        return reply, self._and_revocations(sends)
+
+    def _handle(self, message: m.Message, now: float) -> tuple[m.Reply, list[Send]]:
         body, source = message.body, message.source
         if isinstance(body, m.Registration):
             return self._register(message, body, now)
@@ -67,6 +73,8 @@ class Desk:
         match body:
             case m.PermissionRequest():
                 return self._permission(message, body)
+            case m.PermissionRevocation():
+                return self._give_back(message, body)
             case m.EventReport():
                 return self._report(message, body, now)
             case m.OrderProgress():
@@ -84,6 +92,8 @@ class Desk:
             self.refused += 1
         elif isinstance(message.body, m.RobotStatus):
             entry.position, entry.mode = message.body.position, message.body.mode
+        elif isinstance(message.body, m.PersonStatus):
+            entry.position = message.body.position
 
     def tick(self, now: float) -> list[Send]:
         """What time brings: silent devices, deadlines, and another look at who is free."""
@@ -92,7 +102,7 @@ class Desk:
         for event in list(self.book.in_state(State.PENDING)):
             if now - event.pending_since >= self.escalate_after:
                 self.book.move(event, State.ESCALATED, now)
-        return self._assign(now)
+        return self._and_revocations(self._assign(now))
 
     def undelivered(self, send: Send, now: float) -> list[Send]:
         """What was sent did not arrive or was declined: take it back.
@@ -100,22 +110,34 @@ class Desk:
         Nobody set out, so it does not count as an attempt on the event.
         """
         if isinstance(send.body, m.PermissionGrant):
-            self.permissions.release(send.body.holder, send.to)
+            self._take_back(send.body.holder, send.to, tell_holder=True)
         elif isinstance(send.body, m.Order):
             event = self.book.events[send.body.event_id]
             self._release(send.to, event)
             if event.state in (State.ASSIGNED, State.ON_SCENE):
                 event.attempts -= 1
                 self._reopen(event, now)
-        return []
+        return self._and_revocations([])
 
-    def place(self, device: str, position: m.Position) -> None:
-        """Note where a registered device stands, when that is known without a message."""
-        self.registry.entries[device].position = position
+    def _and_revocations(self, sends: list[Send]) -> list[Send]:
+        """What to send, after the word that sessions are over."""
+        revocations, self._revocations = self._revocations, []
+        return revocations + sends
+
+    def _take_back(self, holder: str, robot: str | None = None, tell_holder: bool = False) -> None:
+        """End the right of a device to drive one robot, or any."""
+        for grant in self.permissions.release(holder, robot):
+            body = m.PermissionRevocation(grant.robot, grant.holder, grant.session)
+            self._revocations.append(Send(grant.robot, body))
+            if tell_holder:
+                self._revocations.append(Send(grant.holder, body))
 
     def _register(
         self, message: m.Message, body: m.Registration, now: float
     ) -> tuple[m.Reply, list[Send]]:
+        if message.source in self.registry.entries:
+            # A device that starts anew knows nothing of what it held.
+            self._abandon(message.source, now)
         if self.registry.register(message.source, body, now) is None:
             return self._refuse(message, m.BUSY, "the registry is full")
         return m.Reply(message.message_id, m.OK, ""), []
@@ -127,16 +149,37 @@ class Desk:
         if robot is None or robot.device.device_type != ROBOT:
             return self._refuse(message, m.UNKNOWN_DEVICE, f"no robot {body.device}")
         asker = self.registry.entries[message.source]
+        if body.level == "sensors":
+            return self._grant(message, robot, body)
         if asker.device.device_type != OPERATOR:
             return self._refuse(message, m.NOT_PERMITTED, "only operators drive robots")
         if robot.order is not None and robot.order != asker.order:
             return self._refuse(message, m.BUSY, f"robot {body.device} serves another order")
-        grant = self.permissions.request(body.device, message.source, body.level)
+        return self._grant(message, robot, body)
+
+    def _grant(
+        self, message: m.Message, robot: Entry, body: m.PermissionRequest
+    ) -> tuple[m.Reply, list[Send]]:
+        """Introduce holder and robot to each other: each is told the other's address."""
+        holder = self.registry.entries[message.source].device
+        grant = self.permissions.request(body.device, holder.id_tag, body.level, body.sensors)
         if grant is None:
             return self._refuse(message, m.BUSY, f"robot {body.device} is held by another")
-        content = m.Permission(body.device, grant.level, grant.session)
-        told = Send(body.device, m.PermissionGrant(grant.holder, grant.level, grant.session))
-        return m.Reply(message.message_id, m.OK, "", content), [told]
+        level, session, sensors = grant.level, grant.session, grant.sensors
+        content = m.Permission(body.device, level, session, robot.device.address, sensors)
+        told = m.PermissionGrant(grant.holder, level, session, holder.address, sensors)
+        return m.Reply(message.message_id, m.OK, "", content), [Send(body.device, told)]
+
+    def _give_back(
+        self, message: m.Message, body: m.PermissionRevocation
+    ) -> tuple[m.Reply, list[Send]]:
+        """A holder needs its permission no longer; only its own."""
+        held = self.permissions.grants.get(body.device)
+        mine = held is not None and (held.holder, held.session) == (message.source, body.session)
+        if not mine or body.holder != message.source:
+            return self._refuse(message, m.BAD_SESSION, "that session is not yours, or is over")
+        self._take_back(message.source, body.device)
+        return m.Reply(message.message_id, m.OK, ""), []
 
     def _report(
         self, message: m.Message, body: m.EventReport, now: float
@@ -196,7 +239,7 @@ class Desk:
         return self._assign(now)
 
     def _release(self, device: str, event: Event) -> None:
-        self.permissions.release(device)
+        self._take_back(device)
         for name in (device, event.responder, event.operator):
             if name is not None and self.registry.entries[name].order == event.number:
                 self.registry.entries[name].order = None
@@ -206,7 +249,9 @@ class Desk:
         self.book.move(event, State.ESCALATED if out_of_tries else State.PENDING, now)
 
     def _abandon(self, device: str, now: float) -> None:
-        """A device has fallen silent: what it was doing is open to others."""
+        """A device is gone: what it held is free, what it was doing is open to others."""
+        self._take_back(device, tell_holder=True)
+        self.permissions.forget(device)
         for event in self.book.in_state(State.ASSIGNED, State.ON_SCENE):
             if device in (event.responder, event.operator):
                 self._release(event.operator or device, event)

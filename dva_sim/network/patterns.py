@@ -1,112 +1,145 @@
-"""Messaging patterns as ZeroMQ offers them, on the virtual network.
+"""Messaging patterns behind one promise, whatever carries them.
 
-Request/reply is lock-step with a time-out and a number of attempts; publish/subscribe
-sends and forgets. Both run on reliable streams, as ZeroMQ's run on TCP.
+A `Transport` is a set of nodes that can ask each other (request/reply) and tell each other
+(publish/subscribe). `dva_sim.network.virtual` keeps the promise in virtual time,
+`dva_sim.network.sockets` over ZeroMQ sockets; agents know only what stands here.
 """
 
 from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Protocol
 
 from dva_sim.clock import Clock
-from dva_sim.network.link import Link
-from dva_sim.network.stream import Connection
 
-FRAMING = 9  # ZMTP header of a frame above 255 bytes [B]
 QUEUE_LIMIT = 1000  # requests waiting at one requester
+ROUND_TRIPS_KEPT = 100_000
 
-Answer = Callable[[bytes], None]
-Service = Callable[[bytes, Answer], None]
-Links = Callable[[str, str], tuple[Link, Link]]
-Traffic = Callable[[float, str, str, int], None]
+Answer = Callable[[bytes], object]
 
 
-class Network:
-    """Who is reachable, over which links.
+class Request(NamedTuple):
+    """A request that has arrived.
 
-    Args:
-        clock: The run's clock.
-        links: Gives the link from one node to another, and the one back.
-        traffic: Told of each message sent: time [s], from, to, size [B].
+    Attributes:
+        data: Its bytes.
+        answer: Takes the bytes of the reply; once, now or later.
+        sender: Id of the device whose key opened the connection; None without keys.
     """
 
-    def __init__(self, clock: Clock, links: Links, traffic: Traffic | None = None) -> None:
-        self.clock = clock
-        self.links = links
-        self.traffic = traffic or (lambda *_: None)
-        self._services: dict[tuple[str, str], Service] = {}
-        self._publishers: dict[tuple[str, str], Publisher] = {}
+    data: bytes
+    answer: Answer
+    sender: str | None = None
 
-    def serve(self, node: str, service: str, handler: Service) -> None:
-        """Let `handler(data, answer)` take the requests to a service of `node`."""
-        self._services[node, service] = handler
 
-    def service(self, node: str, service: str) -> Service | None:
-        """The handler of a service, if anybody offers it."""
-        return self._services.get((node, service))
+Service = Callable[[Request], object]
 
-    def publisher(self, node: str, service: str) -> Publisher:
-        """The publishing socket of `node`, made when first asked for."""
-        key = node, service
-        if key not in self._publishers:
-            self._publishers[key] = Publisher(self, node)
-        return self._publishers[key]
+
+class Subscription(Protocol):
+    """What one node wants to hear of another."""
+
+    def close(self) -> None:
+        """Leave; nothing more is delivered."""
+
+
+class Wire(Protocol):
+    """A connection to the service of a peer, made anew by closing it and opening another."""
+
+    def send(self, tag: int, data: bytes) -> None:
+        """Send a request as soon as the connection is open; its reply comes with the tag."""
+
+    def close(self) -> None:
+        """Forget what is under way: no reply is delivered any more."""
+
+
+OnReply = Callable[[int, bytes], object]
+
+
+class Transport(Protocol):
+    """What carries messages between nodes; a node is named by the id of its device."""
+
+    @property
+    def clock(self) -> Clock:
+        """The clock that all who use this transport share."""
+
+    def introduce(self, node: str, address: str) -> None:
+        """Say where a node is found, as in its registration."""
+
+    def serve(self, node: str, service: Service) -> None:
+        """Let `service` take the requests to `node`."""
+
+    def connect(self, node: str, peer: str, on_reply: OnReply, pipelined: bool) -> Wire:
+        """Open a connection from `node` to the service of `peer`."""
+
+    def publish(self, node: str, topic: str, payload: Any, size: int) -> None:
+        """Send a payload, which counts as `size` bytes [B], to the subscribers of a topic."""
+
+    def ready(self, node: str, topic: str, size: int) -> bool:
+        """Whether somebody wants a topic, and `size` more bytes [B] would not have to wait."""
+
+    def subscribe(
+        self, node: str, publisher: str, topic: str, handler: Callable[[Any], object]
+    ) -> Subscription:
+        """Hand what `publisher` publishes to `handler`: topics that begin with `topic`.
+
+        Topics end in `|`, so that none begins another.
+        """
 
 
 @dataclass
-class _Request:
+class _Asked:
     """A request that waits or is under way."""
 
+    tag: int
     data: bytes
     on_reply: Callable[[bytes], object]
     on_failure: Callable[[], object]
-    attempts_left: int = 0
-    generation: int = 0
+    attempts: int = 0
     sent_at: float = 0.0
 
 
 class Requester:
-    """A REQ socket: one request at a time, each answered before the next is sent.
+    """Asks one peer; each request is answered, or fails after a number of attempts.
 
-    After a time-out the socket is closed and opened anew (a reply still under way is lost,
-    a request already received is executed), and the same bytes are sent again.
+    With a window of 1 it is a REQ socket: the next request goes when the last one is
+    answered, and after a time-out the connection is closed and opened anew. A wider window
+    is a DEALER: so many requests may be under way at once, over one connection.
+    The same bytes are sent again after a time-out, so a receiver can tell a repetition.
 
     Args:
-        network: Where it lives.
+        transport: Carries the messages.
         node: Who asks.
         peer: Who answers.
-        service: Name of the service there.
         timeout: How long to wait for a reply [s].
         attempts: How often a request is sent before it has failed.
+        window: How many requests may be unanswered at once.
     """
 
     def __init__(
         self,
-        network: Network,
+        transport: Transport,
         node: str,
         peer: str,
-        service: str,
         timeout: float,
         attempts: int = 3,
+        window: int = 1,
     ) -> None:
-        self._network, self._clock = network, network.clock
-        self.node, self.peer, self._service = node, peer, service
-        self._timeout, self._attempts = timeout, attempts
-        self._queue: deque[_Request] = deque()
-        self._current: _Request | None = None
-        self._connection: Connection | None = None
-        self._is_open = False
-        self._generation = 0
+        self._transport, self._clock = transport, transport.clock
+        self.node, self.peer = node, peer
+        self._timeout, self._attempts, self._window = timeout, attempts, window
+        self._queue: deque[_Asked] = deque()
+        self._open: dict[int, _Asked] = {}
+        self._wire: Wire | None = None
+        self._last_tag = 0
         self.timeouts = self.failures = self.overflows = 0
-        self.round_trips: list[float] = []
+        self.round_trips: deque[float] = deque(maxlen=ROUND_TRIPS_KEPT)
 
     @property
     def busy(self) -> bool:
-        """Whether a request is under way."""
-        return self._current is not None
+        """Whether a further request would have to wait."""
+        return len(self._open) >= self._window
 
     def request(
         self,
@@ -114,160 +147,62 @@ class Requester:
         on_reply: Callable[[bytes], object],
         on_failure: Callable[[], object] = lambda: None,
     ) -> None:
-        """Send `data` as soon as all earlier requests are done."""
+        """Send `data` as soon as the window allows."""
         if len(self._queue) >= QUEUE_LIMIT:
             self.overflows += 1
             on_failure()
             return
-        self._queue.append(_Request(data, on_reply, on_failure, self._attempts))
-        if self._current is None:
-            self._next()
+        self._last_tag += 1
+        self._queue.append(_Asked(self._last_tag, data, on_reply, on_failure))
+        self._fill()
 
     def close(self) -> None:
         """Forget everything, without a word to those who wait."""
         self._queue.clear()
-        self._current = None
+        self._open.clear()
         self._disconnect()
 
-    def _next(self) -> None:
-        if not self._queue:
-            return
-        self._current = self._queue.popleft()
-        self._current.sent_at = self._clock.now
-        self._attempt()
+    def _fill(self) -> None:
+        while self._queue and not self.busy:
+            asked = self._queue.popleft()
+            asked.sent_at = self._clock.now
+            self._open[asked.tag] = asked
+            self._attempt(asked)
 
-    def _attempt(self) -> None:
-        """Send the current request, over a new connection if there is none."""
-        request = self._current
-        assert request is not None
-        request.attempts_left -= 1
-        self._generation += 1
-        request.generation = self._generation
-        self._clock.call_after(self._timeout, self._expire, self._generation)
-        if self._is_open:
-            self._send()
-        else:
-            self._connect()
-
-    def _connect(self) -> None:
-        out, back = self._network.links(self.node, self.peer)
-        connection = Connection(self._clock, out, back, self._at_peer, self._on_reply)
-        self._connection = connection
-
-        def opened() -> None:
-            self._is_open = True
-            self._send()
-
-        connection.open(opened)
+    def _attempt(self, asked: _Asked) -> None:
+        """Send a request, over a new connection if there is none."""
+        asked.attempts += 1
+        self._clock.call_after(self._timeout, self._expire, asked.tag, asked.attempts)
+        if self._wire is None:
+            self._wire = self._transport.connect(
+                self.node, self.peer, self._on_reply, pipelined=self._window > 1
+            )
+        self._wire.send(asked.tag, asked.data)
 
     def _disconnect(self) -> None:
-        if self._connection is not None:
-            self._connection.close()
-        self._connection, self._is_open = None, False
+        if self._wire is not None:
+            self._wire.close()
+        self._wire = None
 
-    def _send(self) -> None:
-        request, connection = self._current, self._connection
-        if request is None or connection is None:
-            return
-        size = len(request.data) + FRAMING
-        self._network.traffic(self._clock.now, self.node, self.peer, size)
-        connection.to_peer.send((request.data, request.generation), size)
+    def _on_reply(self, tag: int, reply: bytes) -> None:
+        asked = self._open.pop(tag, None)
+        if asked is None:
+            return  # doubled, or to a request that was given up
+        self.round_trips.append(self._clock.now - asked.sent_at)
+        asked.on_reply(reply)
+        self._fill()
 
-    def _at_peer(self, payload: tuple[bytes, int]) -> None:
-        """The request has reached the peer: hand it to the service there."""
-        data, generation = payload
-        handler = self._network.service(self.peer, self._service)
-        if handler is None:
-            return
-        connection = self._connection
-
-        def answer(reply: bytes) -> None:
-            if connection is None or connection.to_opener.closed:
-                return
-            size = len(reply) + FRAMING
-            self._network.traffic(self._clock.now, self.peer, self.node, size)
-            connection.to_opener.send((reply, generation), size)
-
-        handler(data, answer)
-
-    def _on_reply(self, payload: tuple[bytes, int]) -> None:
-        reply, generation = payload
-        request = self._current
-        if request is None or generation != request.generation:
-            return  # an answer to an attempt that was given up
-        self.round_trips.append(self._clock.now - request.sent_at)
-        self._current = None
-        request.on_reply(reply)
-        if self._current is None:
-            self._next()
-
-    def _expire(self, generation: int) -> None:
-        request = self._current
-        if request is None or request.generation != generation:
+    def _expire(self, tag: int, attempt: int) -> None:
+        asked = self._open.get(tag)
+        if asked is None or asked.attempts != attempt:
             return
         self.timeouts += 1
-        self._disconnect()
-        if request.attempts_left > 0:
-            self._attempt()
+        if self._window == 1:
+            self._disconnect()
+        if attempt < self._attempts:
+            self._attempt(asked)
             return
         self.failures += 1
-        self._current = None
-        request.on_failure()
-        if self._current is None:
-            self._next()
-
-
-@dataclass
-class Publisher:
-    """A PUB socket: what is published goes to everybody who has subscribed by then."""
-
-    network: Network
-    node: str
-    subscribers: list[Subscription] = field(default_factory=list)
-    refused: int = 0
-
-    def publish(self, topic: str, payload: Any, size: int) -> None:
-        """Send `payload`, counted as `size` bytes [B], to the subscribers of `topic`."""
-        for subscription in self.subscribers:
-            if topic.startswith(subscription.topic):
-                total = size + FRAMING + len(topic) + 2
-                self.network.traffic(self.network.clock.now, self.node, subscription.node, total)
-                if not subscription.connection.to_opener.send(payload, total):
-                    self.refused += 1
-
-
-class Subscription:
-    """A SUB socket: opens a connection to the publisher and says what it wants.
-
-    Args:
-        network: Where it lives.
-        node: Who subscribes.
-        publisher: To whom.
-        topic: Prefix of the topics wanted; ends with `|` so that none matches by accident.
-        handler: Takes each payload.
-    """
-
-    def __init__(
-        self,
-        network: Network,
-        node: str,
-        publisher: Publisher,
-        topic: str,
-        handler: Callable[[Any], object],
-    ) -> None:
-        self.node, self.topic, self._publisher = node, topic, publisher
-        out, back = network.links(node, publisher.node)
-        self.connection = Connection(network.clock, out, back, self._joined, handler)
-        self.connection.open(self._subscribe)
-
-    def close(self) -> None:
-        """Leave; nothing more is delivered."""
-        self.connection.close()
-        if self in self._publisher.subscribers:
-            self._publisher.subscribers.remove(self)
-
-    def _subscribe(self) -> None:
-        self.connection.to_peer.send(self.topic, len(self.topic) + 1)
-
-    def _joined(self, _: object) -> None:
-        self._publisher.subscribers.append(self)
+        del self._open[tag]
+        asked.on_failure()
+        self._fill()

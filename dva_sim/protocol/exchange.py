@@ -41,21 +41,24 @@ class Outbox:
 class ReplyCache:
     """Replies already given, so that a request sent again acts once.
 
+    A request is known by its bytes: a device that starts anew counts its MessageIDs from 1
+    again, and must not be given the answers of its former life.
+
     Args:
         size: How many are kept; the oldest are forgotten first.
     """
 
     def __init__(self, size: int = 256) -> None:
         self._size = size
-        self._replies: OrderedDict[tuple[str, int], bytes] = OrderedDict()
+        self._replies: OrderedDict[bytes, bytes] = OrderedDict()
 
-    def get(self, message: Message) -> bytes | None:
+    def get(self, request: bytes) -> bytes | None:
         """The reply to the same request, if it was answered before."""
-        return self._replies.get((message.source, message.message_id))
+        return self._replies.get(request)
 
-    def put(self, message: Message, reply: bytes) -> bytes:
+    def put(self, request: bytes, reply: bytes) -> bytes:
         """Remember a reply and return it."""
-        self._replies[message.source, message.message_id] = reply
+        self._replies[request] = reply
         if len(self._replies) > self._size:
             self._replies.popitem(last=False)
         return reply

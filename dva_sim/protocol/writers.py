@@ -63,6 +63,7 @@ def _choice(name: str, *values: str) -> Callable[[str], str]:
 _UINT32 = 2**32 - 1
 _UINT64 = 2**64 - 1
 _OCTET = "(?:25[0-5]|2[0-4][0-9]|1[0-9]{2}|[1-9]?[0-9])"
+_PORT = "(?:6553[0-4]|655[0-2][0-9]|65[0-4][0-9]{2}|6[0-4][0-9]{3}|[1-5][0-9]{4}|[1-9][0-9]{0,3})"
 _CHARACTER = "[^\x00-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]"
 
 _device_id = _string("an id", "[0-9A-F]{2}(?::[0-9A-F]{2}){5}", "like 70:1A:04:F9:81:D6")
@@ -72,7 +73,7 @@ _clock = _string(
 _name = _string("a name", _CHARACTER + "{1,64}", "1 to 64 printable characters")
 _text = _string("Text", _CHARACTER + "{0,256}", "up to 256 printable characters")
 _address = _string(
-    "IpAddr", rf"{_OCTET}(?:\.{_OCTET}){{3}}(?::[0-9]{{1,5}})?", "like 192.168.1.48 or with :port"
+    "IpAddr", rf"{_OCTET}(?:\.{_OCTET}){{3}}(?::{_PORT})?", "like 192.168.1.48 or with :port"
 )
 _url = _string("CameraUrl", "[!-~]{1,256}", "1 to 256 ASCII characters without spaces")
 _mode = _choice("Mode", "Idle", "Mission", "Teleoperation")

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dva_sim.agents.device import HEARTBEATS, Device
-from dva_sim.agents.robot import STATUS
+from functools import partial
+
+from dva_sim.agents.device import HEARTBEAT, STATUS, Device
 from dva_sim.core.events import State
-from dva_sim.core.registry import DETECTOR, ROBOT
+from dva_sim.core.registry import DETECTOR, GUARD, ROBOT
 from dva_sim.core.service import Desk, Send
 from dva_sim.network.patterns import Subscription
 from dva_sim.protocol import messages as m
@@ -24,7 +25,7 @@ class DvaAgent:
     def __init__(self, device: Device, desk: Desk) -> None:
         self.device, self.desk = device, desk
         self._known: dict[int, State] = {}
-        self._heard: list[Subscription] = []
+        self._heard: dict[tuple[str, str], Subscription] = {}
         device.serve(self._on_request)
 
     def start(self) -> None:
@@ -34,25 +35,29 @@ class DvaAgent:
     def _on_request(self, message: m.Message) -> m.Reply:
         reply, sends = self.desk.handle(message, self.device.clock.now)
         if isinstance(message.body, m.Registration) and reply.code == m.OK:
+            self.device.network.introduce(message.source, message.body.address)
             self._listen(message.source, message.body.device_type)
         self._carry_out(sends)
         return reply
 
     def _listen(self, source: str, device_type: str) -> None:
-        """Subscribe to what a new device publishes; detectors only speak when asked to."""
-        if device_type == DETECTOR:
-            return
-        topics = {HEARTBEATS: "heartbeat|"}
-        if device_type == ROBOT:
-            topics[STATUS] = "status|"
-        network = self.device.network
-        for service, topic in topics.items():
-            publisher = network.publisher(source, service)
-            heard = Subscription(network, self.device.id_tag, publisher, topic, self._on_published)
-            self._heard.append(heard)
+        """Subscribe to what a device publishes, anew when it registers anew.
 
-    def _on_published(self, data: bytes) -> None:
-        message = self.device.read(data)
+        Detectors only speak when they have something to report.
+        """
+        topics = [] if device_type == DETECTOR else [HEARTBEAT]
+        if device_type in (ROBOT, GUARD):
+            topics.append(STATUS)
+        for topic in topics:
+            earlier = self._heard.pop((source, topic), None)
+            if earlier is not None:
+                earlier.close()
+            self._heard[source, topic] = self.device.network.subscribe(
+                self.device.id_tag, source, topic, partial(self._on_published, source)
+            )
+
+    def _on_published(self, source: str, data: bytes) -> None:
+        message = self.device.read(data, source)
         if message is not None:
             self.desk.note(message, self.device.clock.now)
 

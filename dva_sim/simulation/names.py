@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 DVA = "02:00:00:00:00:01"
-_ROOMS = {"robot": 1, "guard": 2, "operator": 3, "detector": 4}
+_ROOMS = {"dva": 0, "robot": 1, "guard": 2, "operator": 3, "detector": 4}
 
 
 def id_of(kind: str, number: int) -> str:
@@ -12,10 +12,10 @@ def id_of(kind: str, number: int) -> str:
 
 
 def label_of(kind: str, number: int) -> str:
-    """Its name for people: `robot-1`."""
-    return f"{kind}-{number}"
+    """Its name for people: `robot-1`; of the DVA there is but one."""
+    return "dva" if kind == "dva" else f"{kind}-{number}"
 
 
 def address_of(kind: str, number: int) -> str:
-    """Its address in the registration."""
-    return f"192.168.{_ROOMS[kind]}.{number % 250 + 1}"
+    """Its address in the registration, where nobody has a real one."""
+    return f"192.168.{_ROOMS[kind] or 1}.{number % 250 + 1}"

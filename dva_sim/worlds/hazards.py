@@ -19,6 +19,7 @@ SMOKE_ALARM_KW = 20.0  # heat release that a ceiling detector near by notices [k
 SMOKE_SPEED = 0.2  # spread of smoke under a ceiling [m/s]
 EDDY_DIFFUSIVITY = 0.05  # indoor mixing of gas [m^2/s]
 DOOR_DELAY = 30.0  # until a detector in another room notices [s]
+RADIATIVE_FRACTION = 0.3  # of a fire's heat release
 LARGEST = 2.5  # a hazard's visible disc never grows beyond this [m]
 
 
@@ -64,6 +65,16 @@ class Fire:
         """Heat release at `time` [s], in [kW]."""
         age = max(0.0, time - self.start)
         return float(FULL_GROWTH_KW * (age / GROWTH_S[self.growth]) ** 2)
+
+    def heat_flux(self, time: float, point: Point) -> float:
+        """Radiant heat at a place [m] in free sight of the fire, in [kW/m^2].
+
+        References:
+            Point-source model: SFPE Handbook of Fire Protection Engineering, 5th ed., chapter 66.
+        """
+        distance = max(math.dist(self.position, point), self.radius(time), 0.1)
+        radiated = RADIATIVE_FRACTION * self.heat_release(time)
+        return float(radiated / (4.0 * math.pi * distance * distance))
 
     def radius(self, time: float) -> float:
         """See `Hazard`: radius of the burning floor."""

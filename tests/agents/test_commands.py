@@ -8,7 +8,7 @@ from dva_sim.agents.commands import PublishedCommands, topic_of
 from dva_sim.agents.tilt import Phone, PhoneProfile
 from dva_sim.clock import Clock
 from dva_sim.network.link import ConstantRate, Link, LinkConfig
-from dva_sim.network.patterns import Network, Subscription
+from dva_sim.network.virtual import VirtualNetwork
 from dva_sim.protocol.codec import decode
 from dva_sim.protocol.exchange import Outbox
 from dva_sim.protocol.messages import SetTeleOp
@@ -21,9 +21,9 @@ PHONE, ROBOT = "02:00:00:03:00:01", "02:00:00:01:00:01"
 def test_no_command_leaves_the_phone_before_the_first_picture() -> None:
     """Without a tick the robot could not bound the age of what waits for a connection."""
     line = Link(LinkConfig(), ConstantRate(1e9), Streams(1), "line")
-    network = Network(Clock(), lambda a, b: (line, line))
+    network = VirtualNetwork(Clock(), lambda a, b: (line, line))
     got: list[bytes] = []
-    Subscription(network, ROBOT, network.publisher(PHONE, "commands"), topic_of(ROBOT), got.append)
+    network.subscribe(ROBOT, PHONE, topic_of(ROBOT), got.append)
     network.clock.run(1.0)
 
     seen: list[int | None] = [None]

@@ -14,7 +14,8 @@ from dva_sim.agents.operator.person import Population, draw_person
 from dva_sim.agents.operator.strategies import Pursuit, Reach
 from dva_sim.agents.steering import Route
 from dva_sim.simulation import simulate
-from dva_sim.simulation.run import PHYSICS_TICK, planner_of
+from dva_sim.simulation.field import PHYSICS_TICK
+from dva_sim.simulation.stage import planner_of
 from dva_sim.worlds.physics import DriveSpec, World
 from dva_sim.worlds.site import load_site
 

@@ -7,6 +7,7 @@ import pytest
 
 from dva_sim.core.dispatch import POLICIES, Assignment, MinEta, Policy, Situation
 from dva_sim.core.events import Event, EventBook, State
+from dva_sim.core.permissions import Permissions
 from dva_sim.core.service import MAX_ATTEMPTS, Desk, Pace, Send
 from dva_sim.protocol import messages as m
 
@@ -31,12 +32,12 @@ class Office:
     def __init__(self, policy: Policy | None = None) -> None:
         paces = {"guard": Pace(1.3, 20.0), "robot": Pace(0.35, 4.0)}
         rng = np.random.default_rng(1)
-        self.desk = Desk(policy or MinEta(), crow, paces, 60.0, rng)
+        self.desk = Desk(policy or MinEta(), crow, paces, 60.0, rng, Permissions(lambda: 7))
         self.number = 0
         team = {GUARD: "Guard", ROBOT: "Robot", OPERATOR: "TeleOp", DETECTOR: "Sensor"}
         for id_tag, kind in team.items():
             self.say(id_tag, m.Registration(kind.lower(), kind, "192.168.1.9"))
-        self.desk.place(GUARD, east(0))
+        self.stands(GUARD, 0)
         self.status(ROBOT, 10)
 
     def say(self, source: str, body: m.Body, now: float = 0.0) -> tuple[m.Reply, list[Send]]:
@@ -48,6 +49,10 @@ class Office:
     def status(self, robot: str, metres: float, now: float = 0.0) -> None:
         body = m.RobotStatus("Idle", east(metres), 0.0, 0.0, 0.0, 5)
         self.desk.note(m.Message(DVA, 1, robot, "12:00:00", 0, body), now)
+
+    def stands(self, guard: str, metres: float, now: float = 0.0) -> None:
+        body = m.PersonStatus("waiting", east(metres))
+        self.desk.note(m.Message(DVA, 1, guard, "12:00:00", 0, body), now)
 
     def fire(self, metres: float, now: float = 0.0, kind: str = "fire") -> list[Send]:
         body = m.EventReport(None, kind, east(metres), 0.5, 0.9, "detected")
@@ -78,7 +83,7 @@ def test_a_robot_is_held_by_one_and_the_robot_is_told(office: Office) -> None:
     office.say(OTHER_OPERATOR, m.Registration("second", "TeleOp", "192.168.1.10"))
     reply, sends = office.say(OPERATOR, m.PermissionRequest(ROBOT, "teleoperation"))
     assert isinstance(reply.content, m.Permission)
-    told = m.PermissionGrant(OPERATOR, "teleoperation", reply.content.session)
+    told = m.PermissionGrant(OPERATOR, "teleoperation", reply.content.session, "192.168.1.9")
     assert sends == [Send(ROBOT, told)]
     other = office.say(OTHER_OPERATOR, m.PermissionRequest(ROBOT, "teleoperation"))[0]
     assert other.code == m.BUSY

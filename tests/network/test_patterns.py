@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
 
 import pytest
 
 from dva_sim.clock import Clock
 from dva_sim.network.link import ConstantRate, Link, LinkConfig
-from dva_sim.network.patterns import Network, Requester, Subscription
+from dva_sim.network.patterns import Request, Requester
 from dva_sim.network.stream import MAX_IN_FLIGHT, Connection, Stream
+from dva_sim.network.virtual import VirtualNetwork
 from dva_sim.streams import Streams
 
 
@@ -23,20 +23,20 @@ def pair(seed: int = 1, **config: float) -> tuple[Link, Link]:
     )
 
 
-def network(seed: int = 1, **config: float) -> Network:
+def network(seed: int = 1, **config: float) -> VirtualNetwork:
     links = pair(seed, **config)
-    return Network(Clock(), lambda a, b: links if b == "robot" else links[::-1])
+    return VirtualNetwork(Clock(), lambda a, b: links if b == "robot" else links[::-1])
 
 
-def echo(net: Network, service_time: float) -> list[bytes]:
+def echo(net: VirtualNetwork, service_time: float) -> list[bytes]:
     """A robot that answers after its service time, one request at a time."""
     seen: list[bytes] = []
 
-    def serve(data: bytes, answer: Callable[[bytes], None]) -> None:
-        seen.append(data)
-        net.clock.call_after(service_time, answer, b"re: " + data)
+    def serve(request: Request) -> None:
+        seen.append(request.data)
+        net.clock.call_after(service_time, request.answer, b"re: " + request.data)
 
-    net.serve("robot", "commands", serve)
+    net.serve("robot", serve)
     return seen
 
 
@@ -93,7 +93,7 @@ def test_the_period_under_request_reply_is_round_trip_plus_service(
 ) -> None:
     net = network(delay_s=delay)
     seen = echo(net, service)
-    requester = Requester(net, "phone", "robot", "commands", timeout=9.0)
+    requester = Requester(net, "phone", "robot", timeout=9.0)
     times: list[float] = []
 
     def again(_: bytes = b"") -> None:
@@ -110,7 +110,7 @@ def test_the_period_under_request_reply_is_round_trip_plus_service(
 def test_a_request_is_tried_three_times_then_fails_and_late_replies_are_dropped() -> None:
     net = network(delay_s=0.1)
     seen = echo(net, 100.0)
-    requester = Requester(net, "phone", "robot", "commands", timeout=2.0, attempts=3)
+    requester = Requester(net, "phone", "robot", timeout=2.0, attempts=3)
     replies: list[bytes] = []
     failures: list[float] = []
     requester.request(b"go", replies.append, lambda: failures.append(net.clock.now))
@@ -124,11 +124,12 @@ def test_a_request_is_tried_three_times_then_fails_and_late_replies_are_dropped(
 def test_a_late_reply_is_never_taken_for_another_request() -> None:
     net = network(delay_s=0.1)
 
-    def slow_then_quick(data: bytes, answer: Callable[[bytes], None]) -> None:
-        net.clock.call_after(3.0 if data == b"slow" else 0.0, answer, b"re: " + data)
+    def slow_then_quick(request: Request) -> None:
+        wait = 3.0 if request.data == b"slow" else 0.0
+        net.clock.call_after(wait, request.answer, b"re: " + request.data)
 
-    net.serve("robot", "commands", slow_then_quick)
-    requester = Requester(net, "phone", "robot", "commands", timeout=2.0, attempts=1)
+    net.serve("robot", slow_then_quick)
+    requester = Requester(net, "phone", "robot", timeout=2.0, attempts=1)
     replies: list[bytes] = []
     requester.request(b"slow", replies.append)
     requester.request(b"quick", replies.append)
@@ -141,7 +142,7 @@ def test_below_four_round_trips_a_retry_never_gets_through() -> None:
     for timeout, heard in ((1.9, 0), (2.2, 1)):
         net = network(delay_s=0.25)
         echo(net, 0.0)
-        requester = Requester(net, "phone", "robot", "commands", timeout, attempts=3)
+        requester = Requester(net, "phone", "robot", timeout, attempts=3)
         replies: list[bytes] = []
         requester.request(b"go", replies.append)
         net.clock.run(20.0)
@@ -151,10 +152,9 @@ def test_below_four_round_trips_a_retry_never_gets_through() -> None:
 def test_what_is_published_before_the_subscription_has_arrived_is_lost() -> None:
     net = network(delay_s=0.1)
     got: list[int] = []
-    publisher = net.publisher("phone", "commands")
-    Subscription(net, "robot", publisher, "robot|", got.append)
+    net.subscribe("robot", "phone", "robot|", got.append)
     for i in range(20):
-        net.clock.call_at(i * 0.1, publisher.publish, "robot|", i, 100)
+        net.clock.call_at(i * 0.1, net.publish, "phone", "robot|", i, 100)
     net.clock.run(5.0)
     joined = 7  # three round trips and a half, at 0.2 s each
     assert got[0] in (joined, joined + 1)
@@ -164,11 +164,10 @@ def test_what_is_published_before_the_subscription_has_arrived_is_lost() -> None
 def test_topics_that_end_in_a_bar_do_not_match_by_accident() -> None:
     net = network()
     got: list[str] = []
-    publisher = net.publisher("phone", "commands")
-    Subscription(net, "robot", publisher, "robot-1|", got.append)
+    net.subscribe("robot", "phone", "robot-1|", got.append)
     net.clock.run(1.0)
-    publisher.publish("robot-1|", "mine", 10)
-    publisher.publish("robot-11|", "not mine", 10)
+    net.publish("phone", "robot-1|", "mine", 10)
+    net.publish("phone", "robot-11|", "not mine", 10)
     net.clock.run(2.0)
     assert got == ["mine"]
 
@@ -176,11 +175,10 @@ def test_topics_that_end_in_a_bar_do_not_match_by_accident() -> None:
 def test_nothing_is_delivered_after_a_subscription_is_closed() -> None:
     net = network(delay_s=0.2)
     got: list[str] = []
-    publisher = net.publisher("phone", "commands")
-    subscription = Subscription(net, "robot", publisher, "r|", got.append)
+    subscription = net.subscribe("robot", "phone", "r|", got.append)
     net.clock.run(3.0)
-    publisher.publish("r|", "under way", 10)
+    net.publish("phone", "r|", "under way", 10)
     subscription.close()
     net.clock.run(5.0)
     assert got == []
-    assert publisher.subscribers == []
+    assert not net.ready("phone", "r|", 10)

@@ -5,24 +5,23 @@ from __future__ import annotations
 import math
 
 from dva_sim import scenario as scenarios
+from dva_sim.network.patterns import Request
 from dva_sim.protocol import messages as m
+from dva_sim.simulation.field import PHYSICS_TICK
 from dva_sim.simulation.names import DVA, id_of
-from dva_sim.simulation.run import PHYSICS_TICK, _Run
+from dva_sim.simulation.run import Run
 
 ROBOT = id_of("robot", 1)
 QUIET = {"events": [{"kind": "fire", "at_s": 500}], "horizon_s": 600}
 
 
-def staged(**changes: object) -> _Run:
+def staged(**changes: object) -> Run:
     """A run with everybody in place, whose time the test lets pass."""
     scenario = scenarios.build(scenarios.load("drive-to-event"), QUIET | changes)
-    run = _Run(scenario, 1, keep_traffic=False)
-    run.build()
-    run.clock.every(0.5, run._watch)
-    return run
+    return Run(scenario, 1)
 
 
-def send(run: _Run, time: float, body: m.Body, session: int = 5) -> list[m.Reply]:
+def send(run: Run, time: float, body: m.Body, session: int = 5) -> list[m.Reply]:
     """Let the DVA send a request at a time [s]; replies come into the list."""
     replies: list[m.Reply] = []
     run.clock.call_at(
@@ -31,13 +30,13 @@ def send(run: _Run, time: float, body: m.Body, session: int = 5) -> list[m.Reply
     return replies
 
 
-def place(run: _Run, x: float, y: float) -> m.Position:
-    return m.Position(*run.site.frame.to_latlon(x, y))
+def place(run: Run, x: float, y: float) -> m.Position:
+    return m.Position(*run.stage.site.frame.to_latlon(x, y))
 
 
 def test_a_robot_drives_a_mission_by_itself_and_is_idle_again() -> None:
     run = staged()
-    robot = run.robots[ROBOT]
+    robot = run.field.robots[ROBOT]
     start = robot.body.pose()
     corner, goal = (12.0, 12.0), (20.0, 12.0)
     send(run, 10.0, m.PermissionGrant(DVA, "missions", 5))
@@ -54,16 +53,16 @@ def test_a_robot_drives_a_mission_by_itself_and_is_idle_again() -> None:
 
 def test_an_emergency_stops_a_moving_robot_within_its_braking_distance() -> None:
     run = staged()
-    robot = run.robots[ROBOT]
+    robot = run.field.robots[ROBOT]
     send(run, 10.0, m.PermissionGrant(DVA, "missions", 5))
     send(run, 12.0, m.GoTo((place(run, 30.0, 12.0),)))
     run.clock.run(45.0)
-    run.world.advance_to(45.0)
+    run.field.world.advance_to(45.0)
     assert robot.body.speed > 0.4
     before = robot.body.distance
     told = send(run, 45.0, m.Emergency(), session=0)
     run.clock.run(60.0)
-    run.world.advance_to(60.0)
+    run.field.world.advance_to(60.0)
     assert [r.code for r in told] == [m.OK]
     assert robot.controller.mode == "Idle"
     processing, lag, brake = 0.05 * 0.5, 0.15 * 0.5, 0.5**2 / 2
@@ -73,7 +72,7 @@ def test_an_emergency_stops_a_moving_robot_within_its_braking_distance() -> None
 
 def test_two_robots_that_meet_head_on_do_not_pass_through_each_other() -> None:
     run = staged(**{"robot.count": 2, "operator.count": 2})
-    one, two = (run.robots[id_of("robot", n)] for n in (1, 2))
+    one, two = (run.field.robots[id_of("robot", n)] for n in (1, 2))
     ways = ((ROBOT, (14.5, 7.4)), (id_of("robot", 2), (9.5, 7.4)))
     device = run.dva.device
     for robot, goal in ways:
@@ -84,7 +83,7 @@ def test_two_robots_that_meet_head_on_do_not_pass_through_each_other() -> None:
     gaps: list[float] = []
 
     def measure() -> None:
-        run.world.advance_to(run.clock.now)
+        run.field.world.advance_to(run.clock.now)
         gaps.append(math.dist(one.body.pose()[:2], two.body.pose()[:2]))
 
     run.clock.every(0.1, measure)
@@ -97,12 +96,12 @@ def test_two_robots_that_meet_head_on_do_not_pass_through_each_other() -> None:
 def test_bad_bytes_are_answered_and_change_nothing() -> None:
     run = staged()
     answers: list[bytes] = []
-    handler = run.network.service(ROBOT, "control")
+    handler = run.network.service(ROBOT)
     assert handler is not None
     for data in (b"", b"<msg>", b"<!DOCTYPE x><msg/>", b"\xff" * 9000):
-        handler(data, answers.append)
+        handler(Request(data, answers.append))
     run.clock.run(5.0)
     assert len(answers) == 4
     assert all(b"<Code>1</Code>" in a for a in answers)
     assert run.recorder.counters["refused"] == 4
-    assert run.robots[ROBOT].controller.mode == "Idle"
+    assert run.field.robots[ROBOT].controller.mode == "Idle"

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from dva_sim.agents.camera import CAMERA_SCHEME
 from dva_sim.agents.operator.drive import Drive, DriverSeat
-from dva_sim.network.patterns import Subscription
 from dva_sim.protocol import messages as m
 from dva_sim.recorder import DriveLog
 
@@ -22,7 +22,21 @@ class OperatorAgent:
     def __init__(self, seat: DriverSeat) -> None:
         self.device, self._seat = seat.device, seat
         self._drive: Drive | None = None
-        self.device.serve(self._on_order)
+        self.device.serve(self._on_request)
+
+    def _on_request(self, message: m.Message) -> m.Reply:
+        if message.source != self.device.dva:
+            return m.Reply(message.message_id, m.NOT_PERMITTED, "only the DVA gives orders")
+        if isinstance(message.body, m.PermissionRevocation):
+            return self._on_revocation(message, message.body)
+        return self._on_order(message)
+
+    def _on_revocation(self, message: m.Message, body: m.PermissionRevocation) -> m.Reply:
+        """The robot is no longer ours to drive; it has been told, too."""
+        drive = self._drive
+        if drive is not None and (drive.robot, drive.session) == (body.device, body.session):
+            drive.end("gave up", "the permission was revoked")
+        return m.Reply(message.message_id, m.OK, "")
 
     def _on_order(self, message: m.Message) -> m.Reply:
         order, device = message.body, self.device
@@ -43,7 +57,10 @@ class OperatorAgent:
     def _ask_permission(self, drive: Drive) -> None:
         def answered(reply: m.Reply) -> None:
             if isinstance(reply.content, m.Permission):
-                drive.session = reply.content.session
+                granted = reply.content
+                drive.session = granted.session
+                if granted.address is not None:
+                    self.device.network.introduce(drive.robot, granted.address)
                 self._turn_on_picture(drive)
                 self._start(drive)
             elif reply.code == m.BUSY:
@@ -56,10 +73,21 @@ class OperatorAgent:
         self.device.ask(self.device.dva, body, answered, unreachable)
 
     def _turn_on_picture(self, drive: Drive) -> None:
-        publisher = self.device.network.publisher(drive.robot, "camera")
-        drive.picture = Subscription(
-            self.device.network, self.device.id_tag, publisher, "frame|", drive.on_frame
-        )
+        """Ask the robot where its camera is, and watch it."""
+
+        def answered(reply: m.Reply) -> None:
+            if drive.over:
+                return
+            url = reply.content.camera_url if isinstance(reply.content, m.SensorInfo) else ""
+            if not url.startswith(CAMERA_SCHEME):
+                drive.end("gave up", f"no camera to watch at {url!r}")
+                return
+            topic = url.rpartition("/")[2]
+            drive.picture = self.device.network.subscribe(
+                self.device.id_tag, drive.robot, topic, drive.on_frame
+            )
+
+        self.device.ask(drive.robot, m.GetSensorInfo(), answered, session=drive.session)
 
     def _start(self, drive: Drive, tries: int = 1) -> None:
         def answered(reply: m.Reply) -> None:

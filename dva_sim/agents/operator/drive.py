@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dva_sim.agents.camera import Frame, Observation
-from dva_sim.agents.commands import SERVICE, CommandSender, PublishedCommands, RequestedCommands
+from dva_sim.agents.commands import CommandSender, PublishedCommands, RequestedCommands
 from dva_sim.agents.device import Device
 from dva_sim.agents.operator.delay import DelayEstimate
 from dva_sim.agents.operator.person import Person
@@ -39,14 +39,15 @@ class OperatorSetup:
     """How an operator works, beside who it is.
 
     Attributes:
-        pattern: `req-rep`, `pub-sub` or `latest-wins`, for SetTeleOp alone.
+        window: Of the requests that carry SetTeleOp: how many may be unanswered at once; None
+            if SetTeleOp is published instead.
         rate_hz: Wanted commands per second.
         timeout: Of a request [s].
         attempts: Of a request.
         truth: The true state of a robot by id, if the strategy is the oracle; else None.
     """
 
-    pattern: str
+    window: int | None
     rate_hz: float
     timeout: float
     attempts: int
@@ -146,8 +147,12 @@ class Drive:
         if isinstance(seat.strategy, Oracle):
             self._clock.every(Oracle.DELAY, self._look_at_truth)
 
-    def on_frame(self, frame: Frame) -> None:
+    def on_frame(self, shown: Frame | bytes) -> None:
         """A frame is on the screen; the person perceives it a little later."""
+        frame = shown if isinstance(shown, Frame) else Frame.unpack(shown)
+        if frame is None:
+            self._device.recorder.counters["refused: no picture"] += 1
+            return
         now = self._clock.now
         self._last_frame, self._seen_tick = now, frame.observation.tick
         self.log.frame_times.append((frame.captured, now))
@@ -174,9 +179,7 @@ class Drive:
     def _make_sender(self) -> CommandSender:
         """The pattern decides how commands travel, and nothing else."""
         seat, device, setup = self._seat, self._device, self._seat.setup
-        kind: type[CommandSender] = PublishedCommands
-        if setup.pattern == "req-rep":
-            kind = RequestedCommands
+        kind = PublishedCommands if setup.window is None else RequestedCommands
         sender = kind(
             device.network,
             device.outbox,
@@ -188,8 +191,14 @@ class Drive:
             lambda: self._seen_tick,
         )
         if isinstance(sender, RequestedCommands):
+            assert setup.window is not None
             requester = Requester(
-                device.network, device.id_tag, self.robot, SERVICE, setup.timeout, setup.attempts
+                device.network,
+                device.id_tag,
+                self.robot,
+                setup.timeout,
+                setup.attempts,
+                setup.window,
             )
             sender.connect(requester, self.link_lost)
         return sender

@@ -91,7 +91,6 @@ class Phone:
         self._hand = (0.0, 0.0)
         self._samples_taken = 0
         self._last_key: tuple[int, int] | None = None
-        self._last_look = 0.0
 
     def ask(self, now: float, speed: float, turn_rate: float) -> None:
         """What the person wants from `now` on: speed [m/s], turn rate [rad/s].
@@ -106,19 +105,17 @@ class Phone:
         """When the app next considers sending [s]: its period, or when a batch is complete."""
         if self._profile.send == "keep_alive":
             return now + 1.0 / rate_hz
-        batch = BATCH * self._period
-        return self._last_look + min(self._profile.max_delay_s, batch)
+        return now + min(self._profile.max_delay_s, BATCH * self._period)
 
     def pick_up(self, now: float) -> None:
         """Begin a drive: the hand is level, the filter keeps what it held."""
         self._samples_taken = int(now * self._profile.sample_rate_hz)
-        self._last_look, self._last_key = now, None
+        self._last_key = None
         self._asked = self._hand = (0.0, 0.0)
 
     def look(self, now: float) -> TiltCommand | None:
         """The command to send at `now`, or None if there is nothing new to say."""
         self._sample_until(now)
-        self._last_look = now
         age = 0.0 if self._profile.ideal else 0.5 * self._filter.span * self._period
         level, turn = self._asked if self._profile.ideal else self._filter.value()
         level = min(max(level, 0.0), float(LEVELS))

@@ -1,0 +1,104 @@
+"""What the parts of a run share: scenario, luck, clock, network, site, and who is who."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from dva_sim.agents.device import Device
+from dva_sim.clock import Clock
+from dva_sim.core.registry import DETECTOR, GUARD, OPERATOR, ROBOT
+from dva_sim.errors import ConfigError
+from dva_sim.network.patterns import Transport
+from dva_sim.recorder import Recorder
+from dva_sim.scenario import Scenario, robot_profile, site_of
+from dva_sim.simulation.names import DVA, address_of, id_of, label_of
+from dva_sim.streams import Streams
+from dva_sim.worlds.geo import Pose
+from dva_sim.worlds.planning import Planner
+from dva_sim.worlds.site import Site
+
+TYPES = {"dva": "DVA", "robot": ROBOT, "guard": GUARD, "operator": OPERATOR, "detector": DETECTOR}
+
+
+@dataclass
+class Stage:
+    """Where a run, or a part of one, takes place.
+
+    Attributes:
+        scenario: What the run consists of.
+        seed: Decides all luck but the persons'.
+        network: What carries messages.
+        recorder: Told what happens.
+        address: Gives a new device its address, by kind and number.
+
+    Raises:
+        ConfigError: a map that cannot be read, or that the team does not fit on.
+    """
+
+    scenario: Scenario
+    seed: int
+    network: Transport
+    recorder: Recorder
+    address: Callable[[str, int], str] = address_of
+    labels: dict[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.streams = Streams(self.seed)
+        self.site = site_of(self.scenario, self.seed)
+        self.planner = planner_of(self.site, robot_profile(self.scenario).radius_m)
+        counts = {
+            "robot": self.scenario.robot.count,
+            "guard": self.scenario.guard.count,
+            "operator": self.scenario.operator.count,
+        }
+        self.labels[DVA] = label_of("dva", 1)
+        for kind, count in counts.items():
+            for number in range(1, count + 1):
+                self.labels[id_of(kind, number)] = label_of(kind, number)
+
+    @property
+    def clock(self) -> Clock:
+        """The clock that everybody shares."""
+        return self.network.clock
+
+    def device(self, kind: str, number: int) -> Device:
+        """A new device: its identity and ways to talk."""
+        command = self.scenario.command
+        return Device(
+            id_of(kind, number),
+            label_of(kind, number),
+            TYPES[kind],
+            self.address(kind, number),
+            DVA,
+            self.network,
+            self.recorder,
+            self.site.frame,
+            command.timeout_s,
+            command.attempts,
+            self.labels,
+        )
+
+
+_PLANNERS: dict[tuple[str, float], tuple[Site, Planner]] = {}
+
+
+def planner_of(site: Site, radius: float) -> Planner:
+    """The planner of a site, kept for the next run on it in this process."""
+    key = site.name, radius
+    known = _PLANNERS.get(key)
+    if known is None or known[0] is not site:
+        known = _PLANNERS[key] = site, Planner(site, radius)
+    return known[1]
+
+
+def place_of(places: tuple[Pose, ...], number: int, what: str, site: Site) -> Pose:
+    """The place of the `number`-th of something.
+
+    Raises:
+        ConfigError: the site has not so many.
+    """
+    if number > len(places):
+        problem = f"site {site.name!r} has {len(places)} {what}s, the scenario needs more"
+        raise ConfigError(problem)
+    return places[number - 1]
