@@ -15,7 +15,7 @@ import zmq
 
 from dva_sim.clock import US, Clock
 
-LONGEST_WAIT = 3_600_000  # of one poll [ms]
+LONGEST_WAIT = 60_000  # of one poll [ms]
 
 
 class LiveClock(Clock):
@@ -26,17 +26,20 @@ class LiveClock(Clock):
     Args:
         epoch: The run's start in seconds since 1970 [s]; processes that share it share
             their time. Default: now.
+
+    Attributes:
+        lateness: The longest that an event had to wait [s].
     """
 
     def __init__(self, epoch: float | None = None) -> None:
         super().__init__()
-        wall = time.time()
-        self._origin = time.monotonic() - (0.0 if epoch is None else wall - epoch)
+        elapsed = 0.0 if epoch is None else time.time() - epoch
+        self._origin = time.monotonic_ns() // 1000 - round(elapsed * US)
         self._poller = zmq.Poller()
         self._handlers: dict[Any, Callable[[], object]] = {}
         self._running = False
         self.lateness = 0.0
-        self._advance()
+        self._catch_up(math.inf)
 
     def watch(self, source: Any, handler: Callable[[], object]) -> None:
         """Call `handler()` whenever a socket or file descriptor has something to read."""
@@ -56,44 +59,37 @@ class LiveClock(Clock):
         """Live until a time [s], or until `stop` is called."""
         self._running = True
         end = math.inf if math.isinf(until) else round(until * US)
-        while self._running and self._step(end):
-            pass
+        self._catch_up(end)
+        while self._running and self.env._now < end:
+            self._wait(end)
         self._running = False
 
-    def _step(self, end: float) -> bool:
-        """Do what is due, then wait for the next event or message; False at the end."""
-        self._catch_up(end)
-        if self.env._now >= end or not self._running:
-            return False
-        due = min(self.env.peek(), end)
+    def _wait(self, end: float) -> None:
+        """Wait for the next event or message; events that are due by then go first."""
+        wait = min(self.env.peek(), end) - self._real()
         # Rounded up: an event may be a millisecond late, but the processor is not kept spinning.
-        wait = min(LONGEST_WAIT, max(0.0, math.ceil((due - self._real()) / 1000)))
-        ready = self._poller.poll(int(wait))
+        ready = self._poller.poll(0 if wait <= 0 else min(LONGEST_WAIT, int(wait) // 1000 + 1))
         self._catch_up(end)
         for source, _ in ready:
             handler = self._handlers.get(source)
-            if handler is not None:
+            if handler is not None:  # nobody unwatched it since
                 handler()
-        return True
+        if self.env.peek() <= self.env._now:
+            self._catch_up(end)
 
     def _catch_up(self, end: float) -> None:
         """Let the events happen that are due, in their order, then make it now."""
         env, real = self.env, self._real()
-        while env.peek() <= min(real, end) and self._running:
-            late = (real - env.peek()) / US
-            self.lateness = max(self.lateness, late)
+        until = min(real, end)
+        due = env.peek()
+        while due <= until:
+            self.lateness = max(self.lateness, (real - due) / US)
             env.step()
-        self._advance()
-
-    def _advance(self) -> None:
-        """Time has passed without an event."""
-        env = self.env
-        env._now = max(env._now, min(self._real(), _before(env.peek())))
+            if not self._running:
+                return
+            due = env.peek()
+        # Never beyond the next event, whose own step would turn time back.
+        env._now = max(env._now, min(until, due))
 
     def _real(self) -> int:
-        return round((time.monotonic() - self._origin) * US)
-
-
-def _before(due: float) -> int | float:
-    """The last moment before an event, so that its own step does not turn time back."""
-    return due if math.isinf(due) else int(due)
+        return time.monotonic_ns() // 1000 - self._origin

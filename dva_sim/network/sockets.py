@@ -15,16 +15,25 @@ from typing import Any, Final
 import zmq
 
 from dva_sim.errors import DvaSimError
+from dva_sim.network.keys import KeyRing
 from dva_sim.network.patterns import OnReply, Request, Service
 from dva_sim.network.realtime import LiveClock
+from dva_sim.network.security import Refusal, Security, Socket, user_of
 
 DEFAULT_PORT: Final = 5600  # of requests; what is published is on the next one
 LARGEST: Final = 65_536  # ZeroMQ drops who sends longer messages [B]
 LARGEST_PICTURE: Final = 2_000_000  # the same of a publisher [B]
 DRAIN: Final = 64  # messages read from one socket before others have their turn
 LINGER: Final = 200  # for last words when a node leaves [ms]
-FIRST_TRY, LAST_TRY = 100, 2_000  # between attempts to connect [ms]
+LOOK_ASIDE: Final = 0.05  # between looks at handshakes [s]
+RETRY: Final = 5.0  # after ZeroMQ gave up to connect [s]
 PORT_TRIES: Final = 50
+
+# As plain numbers: the arithmetic of pyzmq's enumerations costs more than a system call.
+NOBLOCK: Final = int(zmq.NOBLOCK)
+MORE: Final = int(zmq.NOBLOCK | zmq.SNDMORE)
+EVENTS: Final = int(zmq.EVENTS)
+POLLIN: Final = int(zmq.POLLIN)
 
 
 class NetworkError(DvaSimError):
@@ -37,44 +46,37 @@ def split_address(address: str) -> tuple[str, int]:
     return host, int(port) if port else DEFAULT_PORT
 
 
-class Security:
-    """No keys: everybody may connect. What binds keys to sockets has the same methods."""
-
-    def secure_server(self, socket: zmq.Socket[bytes], node: str) -> None:
-        """Before a socket of `node` is bound."""
-
-    def secure_client(self, socket: zmq.Socket[bytes], node: str, peer: str) -> None:
-        """Before a socket of `node` is connected to `peer`."""
-
-    def release(self, socket: zmq.Socket[bytes]) -> None:
-        """Before a socket is closed."""
-
-    def sender(self, frame: zmq.Frame) -> str | None:
-        """Id of the device whose key opened the connection that a frame came by."""
-        return None
-
-
 class SocketNetwork:
     """The nodes of this process on the network; see `Transport`.
 
     Args:
         clock: Waits for the sockets.
-        security: Gives sockets their keys.
+        ring: Keys of the devices; None to run without.
+        tell: Takes one line about each connection that could not be made.
 
     Attributes:
         counters: What was refused or could not be sent, by reason.
     """
 
-    def __init__(self, clock: LiveClock, security: Security | None = None) -> None:
-        self.clock = clock
-        self.context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
-        self.security = security or Security()
+    def __init__(
+        self,
+        clock: LiveClock,
+        ring: KeyRing | None = None,
+        tell: Callable[[str], object] = lambda _: None,
+    ) -> None:
+        self.clock, self._tell = clock, tell
+        self._context: zmq.Context[Socket] = zmq.Context()
+        self._has_keys = ring is not None
+        # Polled now and then: each socket in the clock's own poller makes every message slower.
+        self._aside = zmq.Poller()
+        self._security = Security(self._context, self._aside, ring, self._refused)
+        clock.every(LOOK_ASIDE, self._look_aside)
         self.counters: Counter[str] = Counter()
         self._addresses: dict[str, str] = {}
         self._services: dict[str, Service] = {}
-        self._routers: dict[str, zmq.Socket[bytes]] = {}
+        self._routers: dict[str, Socket] = {}
         self._publishers: dict[str, _Publisher] = {}
-        self._clients: set[zmq.Socket[bytes]] = set()
+        self._clients: dict[Socket, tuple[str, str]] = {}
 
     # --- who is where ------------------------------------------------------------------
 
@@ -125,7 +127,6 @@ class SocketNetwork:
         self._routers[node] = router
         self._publishers[node] = _Publisher(publisher)
         self.clock.watch(router, lambda: self._requests(node, router))
-        self.clock.watch(publisher, self._publishers[node].hear)
         self.introduce(node, f"{host}:{chosen}")
         return self._addresses[node]
 
@@ -133,13 +134,19 @@ class SocketNetwork:
         """Close the sockets of a node; a request that is still answered goes nowhere."""
         self._discard(self._routers.pop(node), self._publishers.pop(node).socket)
 
+    def _look_aside(self) -> bool:
+        for socket, _ in self._aside.poll(0):
+            self._security.handle(socket)
+        return not self._context.closed
+
     def close(self) -> None:
         """Close everything; what was sent last has a moment to leave."""
         for node in list(self._routers):
             self.leave(node)
         for socket in list(self._clients):
             self.close_client(socket, linger=LINGER)
-        self.context.term()
+        self._security.close()
+        self._context.term()
 
     # --- requests ----------------------------------------------------------------------
 
@@ -151,38 +158,38 @@ class SocketNetwork:
         """See `Transport`: by a REQ socket, or by a DEALER."""
         return (_DealerWire if pipelined else _ReqWire)(self, node, peer, on_reply)
 
-    def _requests(self, node: str, router: zmq.Socket[bytes]) -> None:
+    def _requests(self, node: str, router: Socket) -> None:
         """Hand the requests that have arrived to the service of a node."""
         for _ in range(DRAIN):
-            try:
-                frames = router.recv_multipart(zmq.NOBLOCK, copy=False)
-            except zmq.Again:
+            if self._has_keys:
+                parts = router.recv_multipart(NOBLOCK, copy=False)
+                frames, sender = [part.bytes for part in parts], user_of(parts[-1])
+            else:
+                frames, sender = router.recv_multipart(NOBLOCK), None
+            self._request(node, router, frames, sender)
+            if not _has_more(router):
                 return
-            self._request(node, router, frames)
 
-    def _request(self, node: str, router: zmq.Socket[bytes], frames: list[zmq.Frame]) -> None:
+    def _request(self, node: str, router: Socket, frames: list[bytes], sender: str | None) -> None:
         """One request: its route back, an empty frame, and one frame with the message."""
-        empty = next((i for i, frame in enumerate(frames) if i and not len(frame)), None)
         service = self._services.get(node)
-        if empty is None or service is None:
+        if service is None or b"" not in frames[1:]:
             self.counters["requests of another form"] += 1
             return
-        route = [frame.bytes for frame in frames[: empty + 1]]
-        body = frames[empty + 1 :]
+        start = frames.index(b"", 1) + 1
+        route, body = frames[:start], frames[start:]
         # Anything but one frame is no message; its empty text is refused as such, and answered.
-        data = body[0].bytes if len(body) == 1 else b""
+        data = body[0] if len(body) == 1 else b""
+        service(Request(data, lambda reply: self.send(router, [*route, reply]), sender))
 
-        def answer(reply: bytes) -> None:
-            self._send(router, [*route, reply])
-
-        service(Request(data, answer, self.security.sender(frames[-1])))
-
-    def _send(self, socket: zmq.Socket[bytes], frames: list[bytes]) -> None:
+    def send(self, socket: Socket, frames: list[bytes]) -> None:
         """Send without waiting; what does not fit is dropped and counted."""
         try:
-            socket.send_multipart(frames, zmq.NOBLOCK)
+            for frame in frames[:-1]:
+                socket.send(frame, MORE)
+            socket.send(frames[-1], NOBLOCK)
         except zmq.ZMQError:
-            # The queue is full, the peer is gone, or the node has left since.
+            # The queue is full, or nobody is there: whoever waits for a reply has a time-out.
             self.counters["not sent"] += 1
 
     # --- publications ------------------------------------------------------------------
@@ -192,7 +199,7 @@ class SocketNetwork:
         publisher = self._publishers.get(node)
         if publisher is not None:
             data = payload if isinstance(payload, bytes) else payload.pack(size)
-            self._send(publisher.socket, [topic.encode(), data])
+            self.send(publisher.socket, [topic.encode(), data])
 
     def ready(self, node: str, topic: str, size: int) -> bool:
         """See `Transport`: what waits in the kernel cannot be seen from here."""
@@ -207,37 +214,52 @@ class SocketNetwork:
 
     # --- sockets -----------------------------------------------------------------------
 
-    def _listener(self, kind: int, node: str) -> zmq.Socket[bytes]:
-        socket = self.context.socket(kind)
+    def _listener(self, kind: int, node: str) -> Socket:
+        socket = self._context.socket(kind)
         socket.linger = LINGER
         socket.setsockopt(zmq.MAXMSGSIZE, LARGEST)
-        self.security.secure_server(socket, node)
+        self._security.bind_server(socket, node)
         return socket
 
-    def client(self, kind: int, node: str, peer: str) -> zmq.Socket[bytes]:
+    def client(self, kind: int, node: str, peer: str) -> Socket:
         """A socket of `node` for a connection to `peer`, not yet connected."""
-        socket = self.context.socket(kind)
+        socket = self._context.socket(kind)
         socket.linger = 0
         socket.setsockopt(zmq.MAXMSGSIZE, LARGEST_PICTURE if kind == zmq.SUB else LARGEST)
-        socket.setsockopt(zmq.RECONNECT_IVL, FIRST_TRY)
-        socket.setsockopt(zmq.RECONNECT_IVL_MAX, LAST_TRY)
-        self.security.secure_client(socket, node, peer)
-        self._clients.add(socket)
+        self._security.connect_client(socket, node, peer)
+        self._clients[socket] = node, peer
         return socket
 
-    def close_client(self, socket: zmq.Socket[bytes], linger: int = 0) -> None:
+    def close_client(self, socket: Socket, linger: int = 0) -> None:
         """Close a socket made by `client`."""
-        if socket in self._clients:
-            self._clients.remove(socket)
+        if self._clients.pop(socket, None) is not None:
             self.clock.unwatch(socket)
-            self.security.release(socket)
+            self._security.release(socket)
             socket.close(linger)
 
-    def _discard(self, *sockets: zmq.Socket[bytes]) -> None:
+    def _discard(self, *sockets: Socket) -> None:
         for socket in sockets:
             self.clock.unwatch(socket)
-            self.security.release(socket)
+            self._security.release(socket)
             socket.close()
+
+    def _refused(self, refusal: Refusal) -> None:
+        """A connection could not be made: say so, and try again where ZeroMQ does not."""
+        self._tell(str(refusal))
+        if refusal.gave_up and refusal.peer is not None:
+            self.clock.call_after(RETRY, self._retry, refusal.device, refusal.peer)
+
+    def _retry(self, node: str, peer: str) -> None:
+        if self._security.trouble(node, peer) is None:
+            return
+        for socket in [s for s, way in self._clients.items() if way == (node, peer)]:
+            self._security.retry(socket)
+        self.clock.call_after(RETRY, self._retry, node, peer)
+
+
+def _has_more(socket: Socket) -> bool:
+    """Whether something can be read: asking costs a third of trying in vain."""
+    return bool(socket.getsockopt(EVENTS) & POLLIN)  # type: ignore[operator]
 
 
 def _text(option: object) -> str:
@@ -245,7 +267,7 @@ def _text(option: object) -> str:
     return option.decode() if isinstance(option, bytes) else str(option)
 
 
-def _bind(router: zmq.Socket[bytes], host: str, port: int) -> int:
+def _bind(router: Socket, host: str, port: int) -> int:
     if port:
         router.bind(f"tcp://{host}:{port}")
         return port
@@ -255,19 +277,20 @@ def _bind(router: zmq.Socket[bytes], host: str, port: int) -> int:
 class _Publisher:
     """An XPUB socket, and what its subscribers want."""
 
-    def __init__(self, socket: zmq.Socket[bytes]) -> None:
+    def __init__(self, socket: Socket) -> None:
         self.socket = socket
         self._topics: set[str] = set()
 
     def wanted(self, topic: str) -> bool:
         """Whether anybody has subscribed to a topic."""
+        self._hear()
         return any(topic.startswith(known) for known in self._topics)
 
-    def hear(self) -> None:
-        """A subscriber came or went: XPUB tells of the first and of the last for a topic."""
+    def _hear(self) -> None:
+        """Who came or went: XPUB tells of the first subscriber and of the last for a topic."""
         with suppress(zmq.Again):
-            while True:
-                said = self.socket.recv(zmq.NOBLOCK)
+            while _has_more(self.socket):
+                said = self.socket.recv(NOBLOCK)
                 topic = said[1:].decode(errors="replace")
                 if said[:1] == b"\x01" and len(self._topics) < 10_000:
                     self._topics.add(topic)
@@ -302,13 +325,9 @@ class _Wire:
 
     def _replies(self) -> None:
         for _ in range(DRAIN):
-            if self._socket.closed:
-                return  # by what the last reply brought about
-            try:
-                frames = self._socket.recv_multipart(zmq.NOBLOCK)
-            except zmq.Again:
-                return
-            self._reply(frames)
+            if self._socket.closed or not _has_more(self._socket):
+                return  # all read, or closed by what the last reply brought about
+            self._reply(self._socket.recv_multipart(NOBLOCK))
 
     def _reply(self, frames: list[bytes]) -> None:
         raise NotImplementedError
@@ -327,11 +346,7 @@ class _ReqWire(_Wire):
     def send(self, tag: int, data: bytes) -> None:
         """See `Wire`; the last one sent must have been answered."""
         self._tag = tag
-        try:
-            self._socket.send(data, zmq.NOBLOCK)
-        except zmq.ZMQError:
-            # Nobody to connect to: the time-out will tell.
-            self._network.counters["not sent"] += 1
+        self._network.send(self._socket, [data])
 
     def _reply(self, frames: list[bytes]) -> None:
         if len(frames) == 1:
@@ -345,10 +360,7 @@ class _DealerWire(_Wire):
 
     def send(self, tag: int, data: bytes) -> None:
         """See `Wire`."""
-        try:
-            self._socket.send_multipart([tag.to_bytes(8, "big"), b"", data], zmq.NOBLOCK)
-        except zmq.ZMQError:
-            self._network.counters["not sent"] += 1
+        self._network.send(self._socket, [tag.to_bytes(8, "big"), b"", data])
 
     def _reply(self, frames: list[bytes]) -> None:
         if len(frames) == 3 and len(frames[0]) == 8 and not frames[1]:
@@ -380,12 +392,9 @@ class _Subscription:
 
     def _hear(self) -> None:
         for _ in range(DRAIN):
-            if self._socket.closed:
-                return  # by what was heard last
-            try:
-                frames = self._socket.recv_multipart(zmq.NOBLOCK)
-            except zmq.Again:
-                return
+            if self._socket.closed or not _has_more(self._socket):
+                return  # all read, or closed by what was heard last
+            frames = self._socket.recv_multipart(NOBLOCK)
             if len(frames) == 2:
                 self._handler(frames[1])
             else:
