@@ -106,6 +106,13 @@ def test_any_number_is_read_the_same_or_left_to_the_parser(element, value):
     agrees(re.sub(pattern, rb"\g<1>" + text.encode(), SEEDS[-1]))
 
 
+@pytest.mark.parametrize("data", SEEDS, ids=map(name, KNOWN))
+def test_what_follows_or_precedes_a_message_is_never_overlooked(data):
+    for at in range(len(data)):
+        assert not agrees(data + data[at:])
+        assert not agrees(data[: at + 1] + data)
+
+
 @pytest.mark.slow
 def test_a_million_damaged_messages_are_read_the_same_or_left_to_the_parser():
     rng = Random(20140901)
