@@ -67,6 +67,52 @@ def episode(
     console.episode(scenario, seed, set_ or [], video, side_by_side)
 
 
+@app.command()
+def live(
+    scenario: Annotated[str, typer.Argument(help="A scenario by name or path.")],
+    only: Annotated[
+        str | None, typer.Option(metavar="dva|world|operator", help="Run one part alone.")
+    ] = None,
+    number: Annotated[int, typer.Option(help="Which operator, with --only operator.")] = 1,
+    operators: Annotated[str, typer.Option(metavar="simulated|scripted")] = "simulated",
+    dva: Annotated[
+        str | None, typer.Option(metavar="HOST:PORT", help="Where the DVA listens.")
+    ] = None,
+    host: Annotated[str, typer.Option(help="Address of this machine to listen on.")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(help="First port of this part; default: free ones.")] = 0,
+    keys: Annotated[Path | None, typer.Option(help="Folder of keys: CURVE is on.")] = None,
+    record: Annotated[Path | None, typer.Option(help="Folder for the robots' traces.")] = None,
+    seconds: Annotated[
+        float | None, typer.Option("--for", metavar="SECONDS", help="Default: the horizon.")
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Seed of all luck but the network's.")] = 1,
+    set_: Sets = None,
+) -> None:
+    """Run a scenario in real time: DVA, world and operators as processes that talk by sockets."""
+    from dva_sim.live import console
+    from dva_sim.live.options import Options
+
+    changes = tuple(set_ or ())
+    options = Options(scenario, changes, seed, operators, host, dva, port, keys, record, seconds)
+    if only is None:
+        console.run_all(options)
+    else:
+        console.run_one(only, options, number)
+
+
+@app.command()
+def keys(
+    folder: Annotated[Path, typer.Argument(help="Where to put them.")],
+    names: Annotated[
+        list[str], typer.Argument(metavar="NAME...", help="Devices (robot-1, an id), or scenarios.")
+    ],
+) -> None:
+    """Make keys for devices that have none, one pair each; existing ones are kept."""
+    from dva_sim.live.keys import make_keys
+
+    typer.echo(make_keys(folder, names))
+
+
 @app.command(name="list")
 def list_() -> None:
     """Name the studies, scenarios, sites, agents, policies and operators there are."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
@@ -105,6 +105,21 @@ def parse_scalar(text: str) -> Any:
         return _plain(YAML(typ="safe", pure=True).load(text), (), {})
     except YAMLError as error:
         raise ConfigError(f"value {text!r} is not valid YAML") from error
+
+
+def parse_changes(pairs: Iterable[str]) -> dict[str, Any]:
+    """`key=value` pairs, as given on the command line, as a mapping.
+
+    Raises:
+        ConfigError: a pair without `=`, or a value that is not YAML.
+    """
+    changes = {}
+    for pair in pairs:
+        key, equals, value = pair.partition("=")
+        if not equals or not key.strip():
+            raise ConfigError(f"--set {pair!r} should be key=value, such as seed=2")
+        changes[key.strip()] = parse_scalar(value)
+    return changes
 
 
 def validate(

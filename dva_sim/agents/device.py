@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from itertools import islice
 
 from dva_sim.clock import Clock
 from dva_sim.network.patterns import Request, Requester, Transport
@@ -112,10 +113,17 @@ class Device:
         def answered(data: bytes) -> None:
             reply = self.read(data, peer)
             if reply is not None and isinstance(reply.body, m.Reply):
+                self._meet(peer, reply.body)
                 on_reply(reply.body)
 
         data = self.outbox.encode(peer, body, self.clock.now, session)
         requester.request(data, answered, on_failure)
+
+    def _meet(self, peer: str, reply: m.Reply) -> None:
+        """The DVA introduces a device to those that it may act on."""
+        content = reply.content
+        if peer == self.dva and isinstance(content, m.Permission) and content.address is not None:
+            self.network.introduce(content.device, content.address)
 
     def serve(self, handler: Handler) -> None:
         """Let `handler` take the requests on the acknowledged channel."""
@@ -183,6 +191,15 @@ class Device:
         """Publish a message to whoever has subscribed."""
         data = encode(self.outbox.message(self.dva, body, self.clock.now))
         self.network.publish(self.id_tag, topic, data, len(data))
+
+    @property
+    def round_trips(self) -> list[float]:
+        """How long the last requests to each peer took [s], on the acknowledged channel."""
+        return [
+            trip
+            for asker in self._requesters.values()
+            for trip in islice(reversed(asker.round_trips), 50)
+        ]
 
     def tell(self, what: str, kind: str = "event") -> None:
         """Add a line to the timeline."""

@@ -17,6 +17,7 @@ from dva_sim.agents.operator.person import Person
 from dva_sim.agents.operator.strategies import Intent, Pursuit, Reach
 from dva_sim.agents.sensing import SensorDesk, SensorPort
 from dva_sim.agents.steering import Route
+from dva_sim.agents.trace import LEASE_ENDS, MISSION_ENDS, Trace
 from dva_sim.config import Config
 from dva_sim.network.patterns import Subscription
 from dva_sim.protocol import messages as m
@@ -94,6 +95,13 @@ class RobotAgent:
         planner: Its map, for missions.
         setup: Pattern, processing time, camera.
         drive_of: The log of a robot's newest drive, if it had any.
+
+    Attributes:
+        applied: Commands that took effect.
+        refused: Messages that were refused.
+        picture_age: How old the picture behind the last command was when it took effect [s],
+            by the robot's own clock.
+        trace: Told each decision, if there is one.
     """
 
     def __init__(
@@ -109,6 +117,9 @@ class RobotAgent:
         self.device, self.controller = device, controller
         self.body, self._world, self._planner, self._setup = body, world, planner, setup
         self._drive_of = drive_of
+        self.applied = self.refused = 0
+        self.picture_age: float | None = None
+        self.trace: Trace | None = None
         self.inbox = Inbox(
             device.clock, setup.processing, self._handle, setup.pattern == "latest-wins"
         )
@@ -156,11 +167,14 @@ class RobotAgent:
         before = self.controller.mode
         moving = abs(self.body.speed) > STANDING or abs(self.body.turn_rate) > STANDING
         decision = self.controller.handle(message, arrived, now, moving)
+        if self.trace is not None:
+            self.trace.decided(message, arrived, now, moving, decision)
         if decision.set_point is not None:
             self._move(decision.set_point)
         if decision.code == m.OK:
             decision = self._follow_up(message, decision)
         if decision.code != m.OK:
+            self.refused += 1
             name = m.CODE_NAMES[decision.code]
             self.device.recorder.counters[f"robot refused: {name}"] += 1
         elif isinstance(message.body, m.SetTeleOp):
@@ -183,6 +197,10 @@ class RobotAgent:
     def _log_command(
         self, message: m.Message, arrived: float, now: float, set_point: SetPoint | None
     ) -> None:
+        assert isinstance(message.body, m.SetTeleOp)
+        self.applied += 1
+        if message.body.seen_tick is not None:
+            self.picture_age = (self.controller.tick(now) - message.body.seen_tick) / 1000
         drive = self._drive_of(self.device.id_tag)
         if drive is not None and set_point is not None:
             self.device.recorder.command_applied(
@@ -219,6 +237,8 @@ class RobotAgent:
         now = self.device.clock.now
         self._world.advance_to(now)
         if self.controller.expire(now):
+            if self.trace is not None:
+                self.trace.happened(LEASE_ENDS, now)
             self._mode_changed("")
         pose = self.body.pose()
         body = m.RobotStatus(
@@ -246,6 +266,8 @@ class RobotAgent:
                 points = self._planner.path((seen.x, seen.y), goals[0]) if goals else None
                 if points is None:
                     self.controller.mission_done()
+                    if self.trace is not None:
+                        self.trace.happened(MISSION_ENDS, self.device.clock.now)
                     self._mode_changed("")
                     return False
                 route.append(Route(points))

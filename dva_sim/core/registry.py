@@ -21,6 +21,7 @@ class Entry:
         mode: Last known mode of a robot.
         order: Event that it is working on.
         silent: Whether it has been quiet for longer than the time-out.
+        free_from: Until then it is given no order, because it declined one [s].
     """
 
     device: Device
@@ -29,6 +30,7 @@ class Entry:
     mode: str = "Idle"
     order: int | None = None
     silent: bool = False
+    free_from: float = 0.0
 
 
 @dataclass

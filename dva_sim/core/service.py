@@ -14,6 +14,7 @@ from dva_sim.core.permissions import Permissions
 from dva_sim.core.registry import DETECTOR, GUARD, OPERATOR, ROBOT, Entry, Registry
 from dva_sim.protocol import messages as m
 
+DECLINED_PAUSE = 10.0  # who declines an order, or is not reached, is not asked again for [s]
 MAX_ATTEMPTS = 4  # orders given for one event before it is escalated
 
 
@@ -113,10 +114,17 @@ class Desk:
             self._take_back(send.body.holder, send.to, tell_holder=True)
         elif isinstance(send.body, m.Order):
             event = self.book.events[send.body.event_id]
-            self._release(send.to, event)
+            self._release_order(event)
+            self.registry.entries[send.to].free_from = now + DECLINED_PAUSE
             if event.state in (State.ASSIGNED, State.ON_SCENE):
                 event.attempts -= 1
                 self._reopen(event, now)
+        return self._and_revocations([])
+
+    def close(self) -> list[Send]:
+        """The desk closes: all sessions are over."""
+        for holder in dict.fromkeys(g.holder for g in self.permissions.grants.values()):
+            self._take_back(holder, tell_holder=True)
         return self._and_revocations([])
 
     def _and_revocations(self, sends: list[Send]) -> list[Send]:
@@ -239,8 +247,13 @@ class Desk:
         return self._assign(now)
 
     def _release(self, device: str, event: Event) -> None:
-        self._take_back(device)
-        for name in (device, event.responder, event.operator):
+        """The order for an event is over, and with it the right to drive to it."""
+        if event.responder is not None:
+            self._take_back(device, event.responder)
+        self._release_order(event)
+
+    def _release_order(self, event: Event) -> None:
+        for name in (event.responder, event.operator):
             if name is not None and self.registry.entries[name].order == event.number:
                 self.registry.entries[name].order = None
 
@@ -261,8 +274,8 @@ class Desk:
     def _assign(self, now: float) -> list[Send]:
         """Ask the policy, keep what the rules allow, and give the orders."""
         pending = tuple(self.book.in_state(State.PENDING))
-        operators = [e for e in self.registry.of_type(OPERATOR) if e.order is None]
-        responders = self._idle_responders(bool(operators))
+        operators = self._free(OPERATOR, now)
+        responders = self._idle_responders(bool(operators), now)
         if not pending or not responders:
             return []
         situation = self._situation(pending, responders)
@@ -292,14 +305,19 @@ class Desk:
         self.registry.entries[operator].order = event.number
         return Send(operator, body)
 
-    def _idle_responders(self, operator_free: bool) -> tuple[Responder, ...]:
-        guards = [Responder(e.device.id_tag, "guard") for e in self._idle(GUARD)]
-        robots = [Responder(e.device.id_tag, "robot") for e in self._idle(ROBOT)]
-        return tuple(guards + robots) if operator_free else tuple(guards)
+    def _idle_responders(self, operator_free: bool, now: float) -> tuple[Responder, ...]:
+        placed = [e for kind in (GUARD, ROBOT) for e in self._free(kind, now) if e.position]
+        kinds = {GUARD: "guard", ROBOT: "robot"}
+        return tuple(
+            Responder(e.device.id_tag, kinds[e.device.device_type])
+            for e in placed
+            if operator_free or e.device.device_type == GUARD
+        )
 
-    def _idle(self, device_type: str) -> list[Entry]:
+    def _free(self, device_type: str, now: float) -> list[Entry]:
+        """Devices of a type that may be given an order."""
         entries = self.registry.of_type(device_type)
-        return [e for e in entries if e.order is None and e.position is not None]
+        return [e for e in entries if e.order is None and e.free_from <= now]
 
     def _situation(
         self, pending: tuple[Event, ...], responders: tuple[Responder, ...]

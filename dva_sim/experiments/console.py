@@ -22,7 +22,7 @@ from rich.table import Table
 
 from dva_sim import resources
 from dva_sim import scenario as scenarios
-from dva_sim.config import parse_scalar
+from dva_sim.config import parse_changes
 from dva_sim.errors import ConfigError
 from dva_sim.scenario import Scenario
 from dva_sim.simulation import Recording, simulate
@@ -33,21 +33,6 @@ STYLES = {"safety": "bold red", "mode": "dim", "order": "cyan", "drive": "cyan",
 
 console = Console(highlight=False)
 say = partial(console.print, soft_wrap=True)  # one line stays one line, also in a file
-
-
-def parse_changes(pairs: list[str]) -> dict[str, Any]:
-    """`key=value` pairs as a mapping; values are read as YAML.
-
-    Raises:
-        ConfigError: a pair without `=`.
-    """
-    changes = {}
-    for pair in pairs:
-        key, equals, value = pair.partition("=")
-        if not equals or not key.strip():
-            raise ConfigError(f"--set {pair!r} should look like key=value")
-        changes[key.strip()] = parse_scalar(value)
-    return changes
 
 
 # --- episodes --------------------------------------------------------------------------

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, Field, PrivateAttr, field_validator
 
 from dva_sim import resources
-from dva_sim.config import Config, Document, Path_, load_yaml, parse_scalar, validate
+from dva_sim.config import Config, Document, Path_, load_yaml, parse_changes, validate
 from dva_sim.errors import ConfigError
 
 FOLDER = "experiments"
@@ -156,7 +156,7 @@ def _with_settings(study: Study, document: Document, settings: Sequence[str]) ->
         return study
     data, changes, touched = copy.deepcopy(document.data), {}, []
     data.setdefault("factors", {})
-    for key, value in map(_pair, settings):
+    for key, value in parse_changes(settings).items():
         path = _study_path(key, data["factors"])
         if path is None:
             changes[key] = value
@@ -173,13 +173,6 @@ def _with_settings(study: Study, document: Document, settings: Sequence[str]) ->
     changed._document = dataclasses.replace(document, places=kept)
     changed._changes, changed._settings = changes, tuple(settings)
     return changed
-
-
-def _pair(text: str) -> tuple[str, Any]:
-    key, sign, value = text.partition("=")
-    if not sign or not key.strip():
-        raise ConfigError(f"--set {text!r} should be key=value, such as replications=2")
-    return key.strip(), parse_scalar(value)
 
 
 def _study_path(key: str, factors: Mapping[str, Any]) -> tuple[str, ...] | None:

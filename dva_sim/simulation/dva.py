@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from functools import partial
 
 from dva_sim.agents.device import HEARTBEAT, STATUS, Device
@@ -20,17 +21,25 @@ class DvaAgent:
     Args:
         device: Its identity and ways to talk.
         desk: What decides.
+
+    Attributes:
+        beats: Heartbeats heard, by device.
     """
 
     def __init__(self, device: Device, desk: Desk) -> None:
         self.device, self.desk = device, desk
         self._known: dict[int, State] = {}
+        self.beats: Counter[str] = Counter()
         self._heard: dict[tuple[str, str], Subscription] = {}
         device.serve(self._on_request)
 
     def start(self) -> None:
         """Begin to look at deadlines."""
         self.device.clock.every(TICK, self._tick, start=TICK)
+
+    def close(self) -> None:
+        """End all sessions: nobody drives by a permission of a DVA that is no more."""
+        self._carry_out(self.desk.close())
 
     def _on_request(self, message: m.Message) -> m.Reply:
         reply, sends = self.desk.handle(message, self.device.clock.now)
@@ -59,6 +68,7 @@ class DvaAgent:
     def _on_published(self, source: str, data: bytes) -> None:
         message = self.device.read(data, source)
         if message is not None:
+            self.beats[source] += isinstance(message.body, m.Heartbeat)
             self.desk.note(message, self.device.clock.now)
 
     def _tick(self) -> None:

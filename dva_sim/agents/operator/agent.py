@@ -24,6 +24,25 @@ class OperatorAgent:
         self._drive: Drive | None = None
         self.device.serve(self._on_request)
 
+    @property
+    def activity(self) -> str:
+        """What the person is doing, in words."""
+        drive = self._drive
+        if drive is None:
+            return "waiting"
+        robot = self.device.label_of(drive.robot)
+        return f"{'reads of' if drive.log.started is None else 'drives'} {robot}"
+
+    @property
+    def drive(self) -> Drive | None:
+        """The drive that is going on."""
+        return self._drive
+
+    def put_down(self) -> None:
+        """Leave: a drive that is going on ends here, and its robot is told to stop."""
+        if self._drive is not None:
+            self._drive.end("gave up", "the operator leaves")
+
     def _on_request(self, message: m.Message) -> m.Reply:
         if message.source != self.device.dva:
             return m.Reply(message.message_id, m.NOT_PERMITTED, "only the DVA gives orders")
@@ -57,10 +76,7 @@ class OperatorAgent:
     def _ask_permission(self, drive: Drive) -> None:
         def answered(reply: m.Reply) -> None:
             if isinstance(reply.content, m.Permission):
-                granted = reply.content
-                drive.session = granted.session
-                if granted.address is not None:
-                    self.device.network.introduce(drive.robot, granted.address)
+                drive.session = reply.content.session
                 self._turn_on_picture(drive)
                 self._start(drive)
             elif reply.code == m.BUSY:

@@ -1,0 +1,171 @@
+"""Operators who follow a script: what to ask next depends on the replies, never on time.
+
+A script is a generator that yields what to ask and is sent the reply, or None if none came.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Generator
+from typing import NamedTuple
+
+from dva_sim.agents.device import STATUS, Device
+from dva_sim.protocol import messages as m
+
+
+class Ask(NamedTuple):
+    """A request: to which device, what, in which session."""
+
+    to: str
+    body: m.Body
+    session: int = 0
+
+
+class Pause(NamedTuple):
+    """Ask nothing for so long [s]."""
+
+    seconds: float
+
+
+Script = Generator[Ask | Pause, m.Reply | None, None]
+
+
+class ScriptedOperator:
+    """Registers, then does what a script says.
+
+    Args:
+        device: Identity and ways to talk.
+        script: Makes the script; told the operator, whom it may ask for `seen_tick`.
+
+    Attributes:
+        transcript: What was asked and answered: the name of the message, and the reply code;
+            -1 if there was no reply.
+        done: Whether the script has ended.
+        asked: How many requests were made.
+    """
+
+    def __init__(self, device: Device, script: Callable[[ScriptedOperator], Script]) -> None:
+        self.device = device
+        self.transcript: list[tuple[str, int]] = []
+        self.done = False
+        self.asked = 0
+        self.seen_tick: int | None = None
+        self._script = script(self)
+        device.serve(self._on_request)
+
+    @property
+    def activity(self) -> str:
+        """What it does, in words."""
+        return "done" if self.done else "follows a script"
+
+    def start(self) -> None:
+        """Register, and begin."""
+        self.device.register(lambda: self._go_on(None))
+
+    def watch_status(self, robot: str) -> None:
+        """Read the ticks of a robot, to echo them in commands."""
+        network, me = self.device.network, self.device.id_tag
+        network.subscribe(me, robot, STATUS, lambda data: self._on_status(robot, data))
+
+    def put_down(self) -> None:
+        """End the script here: its own last orders are sent, nobody waits for the answers."""
+        if not self.done:
+            self.done = True
+            self._script.close()
+
+    def _on_status(self, robot: str, data: bytes) -> None:
+        message = self.device.read(data, robot)
+        if message is not None and isinstance(message.body, m.RobotStatus):
+            self.seen_tick = message.body.tick
+
+    def _on_request(self, message: m.Message) -> m.Reply:
+        if isinstance(message.body, m.PermissionRevocation):
+            return m.Reply(message.message_id, m.OK, "")
+        return m.Reply(message.message_id, m.NOT_SUPPORTED, "follows a script")
+
+    def _go_on(self, reply: m.Reply | None) -> None:
+        if self.done:
+            return
+        try:
+            step = self._script.send(reply)
+        except StopIteration:
+            self.done = True
+            return
+        if isinstance(step, Pause):
+            self.device.clock.call_after(step.seconds, self._go_on, None)
+            return
+        self.asked += 1
+        name = type(step.body).__name__
+        self.device.ask(
+            step.to,
+            step.body,
+            lambda answer: self._note(name, answer),
+            lambda: self._note(name, None),
+            step.session,
+        )
+
+    def _note(self, name: str, reply: m.Reply | None) -> None:
+        self.transcript.append((name, -1 if reply is None else reply.code))
+        self._go_on(reply)
+
+
+def drill(operator: ScriptedOperator, commands: int = 200) -> Script:
+    """A whole session: find a robot, drive it, stop it by emergency, be refused, drive again.
+
+    Args:
+        operator: Who follows the script.
+        commands: How many commands the first drive has.
+    """
+    dva = operator.device.dva
+    robot, session = yield from _take_a_robot(dva)
+    operator.watch_status(robot)
+    try:
+        if not (yield from _start(robot, session)):
+            return
+        for number in range(commands):
+            yield Ask(robot, _swaying(number, operator.seen_tick), session)
+        yield Ask(robot, m.Emergency(), session)
+        yield Ask(robot, _swaying(0, operator.seen_tick), session)  # refused: the robot is idle
+        yield Pause(STANDSTILL)
+        if not (yield from _start(robot, session)):
+            return
+        for number in range(10):
+            yield Ask(robot, _swaying(number, operator.seen_tick), session)
+        yield Ask(robot, m.StopTeleOp(), session)
+    except GeneratorExit:
+        operator.device.ask(robot, m.StopTeleOp(), session=session)
+        raise
+    yield Ask(dva, m.PermissionRevocation(robot, operator.device.id_tag, session))
+
+
+STANDSTILL = 2.0  # after it a robot certainly stands [s]
+TRIES = 20  # to start
+AGAIN = 0.5  # before asking once more for what is not there yet [s]
+
+
+def _take_a_robot(dva: str) -> Generator[Ask | Pause, m.Reply | None, tuple[str, int]]:
+    """Wait until there is a robot that nobody holds: its id, and the session."""
+    while True:
+        listed = yield Ask(dva, m.GetDeviceList())
+        content = None if listed is None else listed.content
+        devices = content.devices if isinstance(content, m.DeviceList) else ()
+        for robot in (d.id_tag for d in devices if d.device_type == "Robot"):
+            reply = yield Ask(dva, m.PermissionRequest(robot, "teleoperation"))
+            if reply is not None and isinstance(reply.content, m.Permission):
+                return robot, reply.content.session
+        yield Pause(AGAIN)
+
+
+def _start(robot: str, session: int) -> Generator[Ask | Pause, m.Reply | None, bool]:
+    """Start; the grant may reach the robot a little later than the permission reached us."""
+    for _ in range(TRIES):
+        yield Pause(AGAIN)
+        reply = yield Ask(robot, m.StartTeleOp(), session)
+        if reply is not None and reply.code == m.OK:
+            return True
+    return False
+
+
+def _swaying(number: int, seen_tick: int | None) -> m.SetTeleOp:
+    """Slowly forward, to the left and to the right by turns."""
+    return m.SetTeleOp(0.1, 0.3 * math.sin(number / 10.0), seen_tick)

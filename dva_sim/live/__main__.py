@@ -1,0 +1,37 @@
+"""A part of a live run as a process, started by the supervisor with one argument of JSON."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+from dva_sim.errors import DvaSimError
+from dva_sim.live.options import Options
+from dva_sim.live.process import run_part, say_as_json
+
+
+def main(argument: str) -> int:
+    """Run the part that the supervisor asks for; its exit code."""
+    told = json.loads(argument)
+    options = told["options"]
+    options["changes"] = tuple(options["changes"])
+    for key in ("keys", "record"):
+        options[key] = None if options[key] is None else Path(options[key])
+    try:
+        run_part(
+            told["part"],
+            Options(**options),
+            say_as_json(sys.stdout),
+            told["number"],
+            told["epoch"],
+            supervised=True,
+        )
+    except DvaSimError as error:
+        print(f"dva-sim: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1]))

@@ -1,0 +1,141 @@
+"""A live run on the terminal: the table of devices, and the story as it happens."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rich.console import Console, Group
+from rich.live import Live
+from rich.table import Table
+from rich.text import Text
+
+from dva_sim.live.options import Options
+from dva_sim.live.process import Report, run_part
+from dva_sim.live.supervisor import Summary, Supervisor
+
+STORY_LINES = 12
+
+
+class Board:
+    """What is known of all devices, put together from the reports of all parts."""
+
+    def __init__(self) -> None:
+        self.devices: dict[str, dict[str, Any]] = {}
+        self.events: list[dict[str, Any]] = []
+        self.story: list[list[Any]] = []
+        self.time = 0.0
+
+    def hear(self, report: Report) -> list[list[Any]]:
+        """Take a report; the new lines of the story."""
+        self.time = max(self.time, report.time)
+        for row in report.rows:
+            self.devices.setdefault(row["label"], {}).update(row)
+        if report.part == "dva":
+            self.events = report.events
+        new = sorted(report.story)
+        self.story = (self.story + new)[-1000:]
+        return new
+
+    def table(self) -> Table:
+        """The devices: what they are, do, and how the link to each is."""
+        table = Table(title=f"{self.time:.0f} s", title_justify="left")
+        for column in ("device", "type", "doing", "address"):
+            table.add_column(column)
+        for column in ("heard", "beats", "commands", "refused", "picture", "round trip"):
+            table.add_column(column, justify="right")
+        for label, row in sorted(self.devices.items()):
+            table.add_row(label, *_cells(row))
+        return table
+
+    def lines_of_story(self) -> Text:
+        """The last lines of the story."""
+        return Text("\n".join(story_line(line) for line in self.story[-STORY_LINES:]))
+
+    def state_of_events(self) -> str:
+        """How the events stand, in a line."""
+        told = [f"event {e['number']} ({e['kind']}) is {e['state']}" for e in self.events]
+        return "; ".join(told) or "no event was reported"
+
+
+def story_line(line: list[Any]) -> str:
+    """A line of the timeline."""
+    time, who, what, _ = line
+    return f"{time:7.1f} s  {who:<14} {what}"
+
+
+def _cells(row: dict[str, Any]) -> list[str]:
+    heard = _number(row.get("heard_s"), ".1f", " s ago")
+    return [
+        row.get("type", ""),
+        row.get("doing", ""),
+        row.get("address", ""),
+        "silent" if row.get("silent") else heard,
+        _number(row.get("beats_hz"), ".1f", "/s"),
+        _number(row.get("commands_hz"), ".1f", "/s"),
+        _number(row.get("refused"), "d", ""),
+        _number(row.get("picture_age_s"), ".2f", " s old"),
+        _number(row.get("round_trip_s"), ".1f", " ms", 1000.0),
+    ]
+
+
+def _number(value: float | None, form: str, unit: str, factor: float = 1) -> str:
+    return "" if value is None else f"{value * factor:{form}}{unit}"
+
+
+def run_all(options: Options) -> None:
+    """Run all parts, show them, and say how it ended.
+
+    Raises:
+        DvaSimError: the scenario cannot be run, or a part failed.
+    """
+    console, board = Console(), Board()
+    if not console.is_terminal:
+        supervisor = Supervisor(options, lambda _, report: _print_story(console, board, report))
+        _conclude(console, board, supervisor.run())
+        return
+    with Live(console=console, refresh_per_second=4, transient=True) as screen:
+
+        def hear(_: str, report: Report) -> None:
+            board.hear(report)
+            screen.update(Group(board.table(), board.lines_of_story()))
+
+        summary = Supervisor(options, hear).run()
+    for line in board.story:
+        console.print(story_line(line), highlight=False)
+    _conclude(console, board, summary)
+
+
+def run_one(part: str, options: Options, number: int) -> None:
+    """Run one part in this process and show what it knows.
+
+    Raises:
+        DvaSimError: the scenario, the keys or the ports are not as they should be.
+    """
+    console, board = Console(), Board()
+    with Live(console=console, refresh_per_second=4, transient=True) as screen:
+
+        def say(report: Report) -> None:
+            for line in board.hear(report):
+                screen.console.print(story_line(line), highlight=False)
+            if console.is_terminal:
+                screen.update(board.table())
+
+        run_part(part, options, say, number)
+    console.print(board.table())
+
+
+def _print_story(console: Console, board: Board, report: Report) -> None:
+    for line in board.hear(report):
+        console.print(story_line(line), highlight=False, soft_wrap=True)
+
+
+def _conclude(console: Console, board: Board, summary: Summary) -> None:
+    console.print(board.table())
+    console.print(f"The run ended ({summary.why}): {board.state_of_events()}.", highlight=False)
+    counters: dict[str, int] = {}
+    for report in summary.latest.values():
+        for name, count in report.counters.items():
+            if "refused" in name or "not sent" in name or "form" in name:
+                counters[name] = counters.get(name, 0) + count
+    for name, count in sorted(counters.items()):
+        console.print(f"  {name}: {count}", highlight=False)

@@ -1,0 +1,57 @@
+"""How a live run, or a part of one, is to be done."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from dva_sim.config import parse_changes
+from dva_sim.errors import ConfigError
+from dva_sim.scenario import Scenario, build, load
+
+PARTS = ("dva", "world", "operator")
+OPERATORS = ("simulated", "scripted")
+
+
+@dataclass(frozen=True)
+class Options:
+    """What to run, where to listen, whom to reach.
+
+    Attributes:
+        scenario: Name or path.
+        changes: Keys of the scenario with new values, `KEY=VALUE`.
+        seed: Decides all luck but that of the real network.
+        operators: `simulated` people, or `scripted`.
+        host: Address of this machine to listen on.
+        dva: Address of the DVA, `HOST:PORT`.
+        port: First port of this part's devices; each takes two. 0 for free ones.
+        keys: Folder with the keys of the devices; None to run without.
+        record: Folder for a trace of each robot's decisions.
+        duration: How long the run lasts [s]; None: to the scenario's horizon.
+    """
+
+    scenario: str
+    changes: tuple[str, ...] = ()
+    seed: int = 1
+    operators: str = "simulated"
+    host: str = "127.0.0.1"
+    dva: str | None = None
+    port: int = 0
+    keys: Path | None = None
+    record: Path | None = None
+    duration: float | None = None
+
+    def read(self) -> Scenario:
+        """The scenario, with its changes.
+
+        Raises:
+            ConfigError: it is not valid, or cannot be run live.
+        """
+        if self.operators not in OPERATORS:
+            raise ConfigError(f"--operators {self.operators!r} should be {' or '.join(OPERATORS)}")
+        if not 0 <= self.port < 65_000:
+            raise ConfigError(f"--port {self.port} should be from 1 to 64999")
+        scenario = build(load(self.scenario), parse_changes(self.changes))
+        if scenario.operator.strategy == "oracle":
+            raise ConfigError("operator.strategy 'oracle' knows the truth: only in virtual time")
+        return scenario

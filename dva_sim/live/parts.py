@@ -1,0 +1,206 @@
+"""The parts of a live run, each of which can be a process of its own."""
+
+from __future__ import annotations
+
+import math
+import secrets
+import statistics
+import time
+from collections import deque
+from collections.abc import Callable
+from typing import Any, Protocol
+
+from dva_sim.agents.operator.agent import OperatorAgent
+from dva_sim.agents.operator.script import ScriptedOperator, drill
+from dva_sim.agents.robot import RobotAgent
+from dva_sim.agents.trace import Trace
+from dva_sim.core.permissions import LOW_BITS, Permissions
+from dva_sim.errors import ConfigError
+from dva_sim.live.options import PARTS, Options
+from dva_sim.simulation.control_room import add_dva, add_operator
+from dva_sim.simulation.field import Field
+from dva_sim.simulation.stage import Stage
+
+RATE_OVER = 5.0  # rates are of so many last seconds [s]
+
+Row = dict[str, Any]
+
+
+class Part(Protocol):
+    """What a process of a live run does."""
+
+    def rows(self) -> list[Row]:
+        """One line per device for the table; only what this part knows."""
+
+    def settled(self) -> bool:
+        """Whether, as far as this part knows, nothing more will happen."""
+
+    def finish(self) -> None:
+        """Leave everything in a safe state; a moment is left for last words."""
+
+
+class Rate:
+    """How fast a count grows."""
+
+    def __init__(self) -> None:
+        self._samples: deque[tuple[float, int]] = deque([(0.0, 0)], maxlen=int(RATE_OVER) + 1)
+
+    def of(self, count: int, now: float) -> float:
+        """Growth per second over the last samples [1/s], asked for once a second."""
+        self._samples.append((now, count))
+        then, before = self._samples[0]
+        return (count - before) / (now - then) if now > then else 0.0
+
+
+class DvaPart:
+    """The DVA core."""
+
+    def __init__(self, stage: Stage) -> None:
+        # Sessions that no one can guess, higher than in any earlier life of the DVA.
+        permissions = Permissions(lambda: secrets.randbits(LOW_BITS), count=int(time.time()))
+        self._agent = add_dva(stage, permissions)
+        self._agent.start()
+        self._stage = stage
+        self._beats: dict[str, Rate] = {}
+
+    def rows(self) -> list[Row]:
+        """See `Part`: what everybody told the DVA."""
+        now, desk = self._stage.clock.now, self._agent.desk
+        rows = []
+        for id_tag, entry in desk.registry.entries.items():
+            beats = self._beats.setdefault(id_tag, Rate()).of(self._agent.beats[id_tag], now)
+            rows.append(
+                {
+                    "label": entry.device.label,
+                    "type": entry.device.device_type,
+                    "address": entry.device.address,
+                    "heard_s": now - entry.last_heard,
+                    "beats_hz": beats,
+                    "silent": entry.silent,
+                    "order": entry.order,
+                }
+            )
+        return rows
+
+    def events(self) -> list[Row]:
+        """The events, as the DVA knows them."""
+        return [
+            {"number": e.number, "kind": e.kind, "state": str(e.state)}
+            for e in self._agent.desk.book.events.values()
+        ]
+
+    def settled(self) -> bool:
+        """See `Part`."""
+        events = self._agent.desk.book.events.values()
+        return bool(events) and not any(e.open for e in events)
+
+    def finish(self) -> None:
+        """See `Part`: nobody drives any longer by our permission."""
+        self._agent.close()
+
+
+class WorldPart:
+    """Robots, guards, hazards and the physics of a site."""
+
+    def __init__(self, stage: Stage, options: Options) -> None:
+        self._stage = stage
+        self._field = Field(stage)
+        self._field.populate()
+        self._field.schedule_incidents()
+        self._commands: dict[str, Rate] = {}
+        self._traces: list[Trace] = []
+        if options.record is not None:
+            options.record.mkdir(parents=True, exist_ok=True)
+            for robot in self._field.robots.values():
+                path = options.record / f"{robot.device.label}.trace.jsonl"
+                robot.trace = Trace(path, robot.controller)
+                self._traces.append(robot.trace)
+
+    def rows(self) -> list[Row]:
+        """See `Part`: how robots and guards are."""
+        now = self._stage.clock.now
+        self._field.world.advance_to(now)
+        robots = [self._robot_row(robot, now) for robot in self._field.robots.values()]
+        guards = [
+            {"label": g.device.label, "doing": g.activity, "at": [g.x, g.y]}
+            for g in self._field.guards
+        ]
+        return robots + guards
+
+    def _robot_row(self, robot: RobotAgent, now: float) -> Row:
+        pose, label = robot.body.pose(), robot.device.label
+        rate = self._commands.setdefault(label, Rate()).of(robot.applied, now)
+        return {
+            "label": label,
+            "doing": robot.controller.mode.value,
+            "commands_hz": rate,
+            "refused": robot.refused,
+            "picture_age_s": robot.picture_age if rate else None,
+            "at": [pose.x, pose.y],
+            "speed_mps": robot.body.speed,
+        }
+
+    def settled(self) -> bool:
+        """See `Part`: everything that will be noticed was reported, and every robot is idle."""
+        detected = [i.detected for i in self._field.incidents if i.detected < math.inf]
+        reported = self._stage.clock.now > max(detected, default=0.0) + 2.0
+        return reported and all(r.controller.owner is None for r in self._field.robots.values())
+
+    def finish(self) -> None:
+        """See `Part`."""
+        for trace in self._traces:
+            trace.close()
+
+
+class OperatorPart:
+    """One operator: a simulated person, or one who follows a script."""
+
+    def __init__(self, stage: Stage, options: Options, number: int) -> None:
+        self._stage, self._sent = stage, Rate()
+        if options.operators == "scripted":
+            self._agent: OperatorAgent | ScriptedOperator = ScriptedOperator(
+                stage.device("operator", number), drill
+            )
+            self._agent.start()
+        else:
+            self._agent = add_operator(stage, number)
+
+    def rows(self) -> list[Row]:
+        """See `Part`: what the operator does, and how the phone finds the link."""
+        now, agent = self._stage.clock.now, self._agent
+        row: Row = {"label": agent.device.label, "doing": agent.activity}
+        sent = agent.asked if isinstance(agent, ScriptedOperator) else self._commands_sent()
+        row["commands_hz"] = self._sent.of(sent, now)
+        trips = agent.device.round_trips
+        row["round_trip_s"] = statistics.median(trips) if trips else None
+        return [row]
+
+    def _commands_sent(self) -> int:
+        return sum(drive.sent for drive in self._stage.recorder.drives)
+
+    def settled(self) -> bool:
+        """See `Part`."""
+        return self._agent.activity in ("done", "waiting")
+
+    def finish(self) -> None:
+        """See `Part`: a robot that is still driven is told to stop."""
+        self._agent.put_down()
+
+
+def make_part(name: str, stage: Stage, options: Options, number: int) -> Part:
+    """The part of that name; `number` says which operator.
+
+    Raises:
+        ConfigError: the scenario has no such operator, or no place for its team.
+    """
+    if name not in PARTS:
+        raise ConfigError(f"--only {name!r} should be {', '.join(PARTS)}")
+    if name == "operator" and not 1 <= number <= stage.scenario.operator.count:
+        count = stage.scenario.operator.count
+        raise ConfigError(f"operator {number}: the scenario has operators 1 to {count}")
+    makers: dict[str, Callable[[], Part]] = {
+        "dva": lambda: DvaPart(stage),
+        "world": lambda: WorldPart(stage, options),
+        "operator": lambda: OperatorPart(stage, options, number),
+    }
+    return makers[name]()

@@ -1,0 +1,195 @@
+"""One process of a live run: its part, its sockets, its clock, and how it ends."""
+
+from __future__ import annotations
+
+import json
+import signal
+import socket
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any, TextIO
+
+from dva_sim.live.options import Options
+from dva_sim.live.parts import DvaPart, Part, make_part
+from dva_sim.network.keys import KeyRing
+from dva_sim.network.realtime import LiveClock
+from dva_sim.network.sockets import DEFAULT_PORT, SocketNetwork, split_address
+from dva_sim.recorder import Recorder
+from dva_sim.simulation.names import DVA, id_of
+from dva_sim.simulation.stage import Stage
+
+REPORT_PERIOD = 1.0  # [s]
+LAST_WORDS = 0.5  # between the end and closing the sockets [s]
+
+
+@dataclass
+class Report:
+    """What a part says once a second, as one line of JSON.
+
+    Attributes:
+        part: `dva`, `world` or `operator`.
+        number: Which operator.
+        time: Since the start of the run [s].
+        rows: See `Part.rows`.
+        events: The events, from the DVA.
+        story: New lines of the timeline: time [s], who, what, kind.
+        counters: What was refused or dropped so far, by reason.
+        settled: See `Part.settled`.
+        dva: Address of the DVA, from the DVA.
+        lateness: The longest that an event had to wait for the processor [s].
+    """
+
+    part: str
+    number: int
+    time: float
+    rows: list[dict[str, Any]]
+    events: list[dict[str, Any]]
+    story: list[list[Any]]
+    counters: dict[str, int]
+    settled: bool
+    dva: str | None
+    lateness: float
+
+
+def run_part(
+    name: str,
+    options: Options,
+    say: Callable[[Report], object],
+    number: int = 1,
+    epoch: float | None = None,
+    supervised: bool = False,
+) -> None:
+    """Be one part until the end of the run, Ctrl-C, SIGTERM, or the end of standard input.
+
+    Args:
+        name: `dva`, `world` or `operator`.
+        options: What to run and where.
+        say: Takes a report each second, and one at the end.
+        number: Which operator.
+        epoch: Start of the run, shared by its parts [s since 1970].
+        supervised: End when standard input does: whoever started this process is gone.
+
+    Raises:
+        ConfigError: scenario, keys or part are not as they should be.
+        NetworkError: a port is taken.
+    """
+    scenario = options.read()
+    ring = None if options.keys is None else KeyRing(options.keys)
+    clock, recorder = LiveClock(epoch), Recorder()
+
+    def tell(line: str) -> None:
+        recorder.tell(clock.now, name, line, "link")
+
+    network = SocketNetwork(clock, ring, tell)
+    try:
+        stage = Stage(scenario, options.seed, network, recorder, _joining(network, options, name))
+        if options.dva is not None and name != "dva":
+            network.introduce(DVA, options.dva)
+        part = make_part(name, stage, options, number)
+        reporter = _Reporter(name, number, stage, part, network)
+        clock.every(REPORT_PERIOD, lambda: say(reporter.report()))
+        with _ending(clock, supervised):
+            clock.run(scenario.horizon_s if options.duration is None else options.duration)
+            part.finish()
+            clock.run(clock.now + LAST_WORDS)
+        say(reporter.report())
+    finally:
+        network.close()
+
+
+def _joining(network: SocketNetwork, options: Options, name: str) -> Callable[[str, int], str]:
+    """Gives each new device of this process two ports, and its address."""
+    given = options.port
+
+    def join(kind: str, number: int) -> str:
+        nonlocal given
+        host, port = options.host, given
+        if name == "dva" and options.dva is not None:
+            host, port = split_address(options.dva)
+        elif given:
+            given += 2
+        return network.join(id_of(kind, number), host, port)
+
+    return join
+
+
+class _Reporter:
+    """Collects the reports of a part; each line of the story is told once."""
+
+    def __init__(
+        self, name: str, number: int, stage: Stage, part: Part, network: SocketNetwork
+    ) -> None:
+        self._name, self._number, self._stage = name, number, stage
+        self._part, self._network = part, network
+
+    def report(self) -> Report:
+        """What there is to say now."""
+        recorder, part = self._stage.recorder, self._part
+        story, recorder.timeline = recorder.timeline, []
+        clock = self._network.clock
+        return Report(
+            self._name,
+            self._number,
+            clock.now,
+            part.rows(),
+            part.events() if isinstance(part, DvaPart) else [],
+            [list(moment) for moment in story],
+            dict(recorder.counters + self._network.counters),
+            part.settled(),
+            self._network.address(DVA) if self._name == "dva" else None,
+            clock.lateness,
+        )
+
+
+class _ending:  # noqa: N801 - reads as a statement
+    """Stop the clock on SIGINT, SIGTERM, or the end of standard input.
+
+    A signal interrupts no poll by itself; it writes to a socket that the poller watches.
+    """
+
+    def __init__(self, clock: LiveClock, supervised: bool) -> None:
+        self._clock, self._supervised = clock, supervised
+        self._reader, self._writer = socket.socketpair()
+
+    def __enter__(self) -> None:
+        self._writer.setblocking(False)
+        self._before = signal.set_wakeup_fd(self._writer.fileno())
+        self._handlers = {
+            number: signal.signal(number, lambda *_: None)
+            for number in (signal.SIGINT, signal.SIGTERM)
+        }
+        self._clock.watch(self._reader.fileno(), self._stop)
+        if self._supervised:
+            self._clock.watch(sys.stdin.fileno(), self._stop)
+
+    def _stop(self) -> None:
+        self._clock.unwatch(self._reader.fileno())
+        if self._supervised:
+            self._clock.unwatch(sys.stdin.fileno())
+        self._clock.stop()
+
+    def __exit__(self, *_: object) -> None:
+        self._clock.unwatch(self._reader.fileno())
+        signal.set_wakeup_fd(self._before)
+        for number, handler in self._handlers.items():
+            signal.signal(number, handler)
+        self._reader.close()
+        self._writer.close()
+
+
+def say_as_json(stream: TextIO) -> Callable[[Report], None]:
+    """Writes reports for a program to read; one whose reader is gone is not written."""
+
+    def say(report: Report) -> None:
+        with suppress(BrokenPipeError):
+            stream.write(json.dumps(vars(report)) + "\n")
+            stream.flush()
+
+    return say
+
+
+def default_dva() -> str:
+    """Where a DVA is looked for if nobody says where: on this machine, at its usual port."""
+    return f"127.0.0.1:{DEFAULT_PORT}"

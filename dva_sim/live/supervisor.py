@@ -1,0 +1,206 @@
+"""Starts the parts of a live run as processes, listens to them, and ends them all."""
+
+from __future__ import annotations
+
+import json
+import os
+import selectors
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import IO
+
+from dva_sim.errors import DvaSimError
+from dva_sim.live.options import Options
+from dva_sim.live.process import Report
+
+START_WITHIN = 60.0  # for a part to speak, from its start [s]
+END_WITHIN = 5.0  # for a part to end by itself once it is asked to [s]
+SETTLED_FOR = 3.0  # all parts settled for so long: the run is over [s]
+LOOK = 0.5  # between looks at whether all parts are still there [s]
+
+
+class PartFailed(DvaSimError):
+    """A part ended before it was asked to."""
+
+
+@dataclass
+class _Child:
+    """A part that runs: its process, and what it said last."""
+
+    name: str
+    process: subprocess.Popen[bytes]
+    buffer: bytes = b""
+    errors: bytes = b""
+    latest: Report | None = None
+
+
+@dataclass
+class Summary:
+    """How a live run ended.
+
+    Attributes:
+        why: `settled`, `time is up` or `interrupted`.
+        latest: The last report of each part, by its name.
+    """
+
+    why: str
+    latest: dict[str, Report] = field(default_factory=dict)
+
+
+class Supervisor:
+    """One live run.
+
+    Args:
+        options: What to run and how.
+        hear: Takes each report of each part.
+    """
+
+    def __init__(self, options: Options, hear: Callable[[str, Report], object]) -> None:
+        self._options, self._hear = options, hear
+        self._children: list[_Child] = []
+        self._selector = selectors.DefaultSelector()
+        self._epoch = time.time()
+        self._interrupted = False
+        self._settled_since: float | None = None
+
+    def run(self) -> Summary:
+        """Start everything, wait for the end, end everything.
+
+        Raises:
+            PartFailed: a part could not start, or ended by itself.
+            ConfigError: the scenario cannot be run live.
+        """
+        scenario = self._options.read()
+        limit = scenario.horizon_s if self._options.duration is None else self._options.duration
+        before = {
+            number: signal.signal(number, self._interrupt)
+            for number in (signal.SIGINT, signal.SIGTERM)
+        }
+        try:
+            self._start("dva", "dva", self._options.dva)
+            address = self._address_of_dva()
+            if address is not None:
+                self._start("world", "world", address)
+                for number in range(1, scenario.operator.count + 1):
+                    self._start(f"operator-{number}", "operator", address, number)
+            why = self._watch(limit)
+        finally:
+            self._end_all()
+            for number, handler in before.items():
+                signal.signal(number, handler)
+        return Summary(why, {c.name: c.latest for c in self._children if c.latest})
+
+    def _interrupt(self, *_: object) -> None:
+        self._interrupted = True
+
+    def _start(self, name: str, part: str, dva: str | None, number: int = 1) -> None:
+        """Start a part; it ends when its standard input does, whatever happens to us."""
+        process = subprocess.Popen(
+            [sys.executable, "-m", "dva_sim.live", *self._arguments(part, dva, number)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            start_new_session=True,  # Ctrl-C reaches us alone; we end the parts in good order
+        )
+        child = _Child(name, process)
+        self._children.append(child)
+        for stream, take in ((process.stdout, self._take_line), (process.stderr, self._take_error)):
+            assert stream is not None
+            os.set_blocking(stream.fileno(), False)
+            self._selector.register(stream, selectors.EVENT_READ, (child, take))
+
+    def _arguments(self, part: str, dva: str | None, number: int) -> Iterator[str]:
+        told = {**vars(self._options), "dva": dva, "port": 0}
+        for key in ("keys", "record"):
+            told[key] = None if told[key] is None else str(told[key])
+        yield json.dumps({"part": part, "number": number, "epoch": self._epoch, "options": told})
+
+    def _address_of_dva(self) -> str | None:
+        """Where the DVA listens, once it does; None if the user ends the run before that."""
+        deadline = time.monotonic() + START_WITHIN
+        while not self._interrupted:
+            self._listen()
+            latest = self._children[0].latest
+            if latest is not None and latest.dva is not None:
+                return latest.dva
+            if time.monotonic() > deadline:
+                raise PartFailed(f"the DVA said nothing within {START_WITHIN:g} s")
+        return None
+
+    def _watch(self, limit: float) -> str:
+        while not self._interrupted:
+            self._listen()
+            if time.time() - self._epoch > limit:
+                return "time is up"
+            if self._all_settled():
+                return "settled"
+        return "interrupted"
+
+    def _all_settled(self) -> bool:
+        reports = [child.latest for child in self._children]
+        if not all(report is not None and report.settled for report in reports):
+            self._settled_since = None
+            return False
+        if self._settled_since is None:
+            self._settled_since = time.monotonic()
+        return time.monotonic() - self._settled_since > SETTLED_FOR
+
+    def _listen(self) -> None:
+        """Read what the parts say, for a moment at most.
+
+        Raises:
+            PartFailed: one of them is gone.
+        """
+        self._read(LOOK)
+        for child in self._children:
+            code = child.process.poll()
+            if code is not None and not self._interrupted:
+                self._read(0.0)
+                said = child.errors.decode(errors="replace").strip().splitlines()
+                why = said[-1].removeprefix("dva-sim: ") if said else f"exit code {code}"
+                raise PartFailed(f"{child.name} has ended by itself: {why}")
+
+    def _read(self, wait: float) -> None:
+        for key, _ in self._selector.select(wait):
+            child, take = key.data
+            stream: IO[bytes] = key.fileobj  # type: ignore[assignment]
+            data = stream.read(65_536)
+            if data:
+                take(child, data)
+            elif data == b"":
+                self._selector.unregister(stream)
+
+    def _take_line(self, child: _Child, data: bytes) -> None:
+        *lines, child.buffer = (child.buffer + data).split(b"\n")
+        for line in lines:
+            child.latest = Report(**json.loads(line))
+            self._hear(child.name, child.latest)
+
+    @staticmethod
+    def _take_error(child: _Child, data: bytes) -> None:
+        child.errors = (child.errors + data)[-10_000:]
+
+    def _end_all(self) -> None:
+        """Ask all parts to end, operators first, and make sure that they have."""
+        for child in reversed(self._children):
+            if child.process.stdin is not None:
+                with suppress(OSError):
+                    child.process.stdin.close()
+        deadline = time.monotonic() + END_WITHIN
+        while any(c.process.poll() is None for c in self._children):
+            if time.monotonic() > deadline:
+                for child in self._children:
+                    child.process.kill()
+            self._read(0.05)
+        self._read(0.0)
+        for child in self._children:
+            child.process.wait()
+            for stream in (child.process.stdout, child.process.stderr):
+                if stream is not None:
+                    stream.close()
+        self._selector.close()
