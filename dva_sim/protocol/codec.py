@@ -32,7 +32,10 @@ _DECLARATION = re.compile(
     re.IGNORECASE,
 )
 # Every `<` has to begin `<name>`, `</name>` or `<name/>`.
-_OTHER_MARKUP = re.compile(rb"<(?!/?\w++\s*+/?>)")
+_TAG = re.compile(rb"</?(\w++)\s*+/?>")
+_OTHER_ENTITY = re.compile(rb"&(?!(?:amp|lt|gt|quot|apos|#[0-9]++|#x[0-9A-Fa-f]++);)")
+# No string may hold a line break or tab, so between `>` and `<` one blank is as good as any.
+_BLANK_LINES = re.compile(rb"> *+[\t\r\n][ \t\r\n]*+<")
 
 
 def timestamp(seconds_of_day: float) -> str:
@@ -67,28 +70,36 @@ def _read_validated(data: bytes) -> Message:
     """The message in any form that the specification allows."""
     _refuse_by_sight(data)
     try:
-        root = etree.fromstring(data, _parser())
+        # libxml2 never forgets a run of blanks that it saw between elements.
+        root = etree.fromstring(_BLANK_LINES.sub(b">\n<", data), _parser())
     except etree.XMLSyntaxError as error:
         raise ProtocolError(BAD_MESSAGE, _one_line(error)) from None
     return read(root)
 
 
 def _refuse_by_sight(data: bytes) -> None:
-    """Refuse what no schema can: size, encodings, and markup other than plain elements.
+    """Refuse what the parser must not see: size, encodings, other markup, unknown names.
 
     The markup matters: a DOCTYPE brings entities, `xsi:schemaLocation` makes libxml2 open files,
     a comment inside a value hides half of it from careless readers, and a schema does not see
-    prefixes that were never declared.
+    prefixes that were never declared. The names matter, also of entities, because libxml2 keeps
+    each one that it has read for as long as the thread lives: new ones would fill the memory.
     """
     if len(data) > MAX_BYTES:
         raise ProtocolError(BAD_MESSAGE, f"{len(data)} bytes; a message has at most {MAX_BYTES}")
     rest = data[_end_of_declaration(data) :]
     if 0 in rest or not rest.lstrip().startswith(b"<"):
         raise ProtocolError(BAD_MESSAGE, "not XML in UTF-8 without byte order mark")
-    if _OTHER_MARKUP.search(rest):
+    found = _TAG.findall(rest)
+    if len(found) != rest.count(b"<"):
         raise ProtocolError(
             BAD_MESSAGE, "markup other than plain elements, which have no attribute or namespace"
         )
+    if not _names().issuperset(found):
+        unknown = next(name for name in found if name not in _names())
+        raise ProtocolError(BAD_MESSAGE, f"no element is called {unknown.decode()[:64]}")
+    if _OTHER_ENTITY.search(rest):
+        raise ProtocolError(BAD_MESSAGE, "& that begins no &amp;, &lt;, &gt; or the like")
 
 
 def _end_of_declaration(data: bytes) -> int:
@@ -102,6 +113,13 @@ def _end_of_declaration(data: bytes) -> int:
             BAD_MESSAGE, "the XML declaration is broken, or names another encoding than UTF-8"
         )
     return declaration.end()
+
+
+@cache
+def _names() -> frozenset[bytes]:
+    """All names of elements in the schema."""
+    elements = etree.parse(_schema_path()).iter("{http://www.w3.org/2001/XMLSchema}element")
+    return frozenset(element.get("name", "").encode() for element in elements)
 
 
 @cache

@@ -59,7 +59,7 @@ def test_bytes_that_take_new_branches_are_kept_in_the_folder_given(tmp_path):
     ("file", "right", "wrong"),
     [
         ("canonical.py", '_real("[0-9]{1,2}")', '_real("[0-9]{1,3}")'),
-        ("codec.py", 'rb"<(?!/?\\w++\\s*+/?>)"', 'rb"<!D"'),
+        ("codec.py", 'len(found) != rest.count(b"<")', "False"),
         ("readers.py", "_float(speed), _float(turn_rate)", "_float(turn_rate), _float(speed)"),
     ],
     ids=["bound", "markup", "fields"],
