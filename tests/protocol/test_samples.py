@@ -6,7 +6,6 @@ from typing import get_args
 
 import pytest
 from lxml import etree
-from message_strategies import ROBOT, TABLET
 
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode, encode
@@ -102,14 +101,6 @@ def test_the_registration_printed_in_the_dissertation_is_accepted_once_mended():
 def test_the_message_in_the_specification_is_the_sample():
     printed = re.search(r"```xml\n(.*?)```", (PROTOCOL / "README.md").read_text(), re.DOTALL)
     assert printed[1] == (PROTOCOL / "samples/valid/set-teleop.xml").read_text()
-
-
-def test_the_client_in_the_specification_works():
-    code = re.search(r"```python\n(.*?)```", (PROTOCOL / "README.md").read_text(), re.DOTALL)
-    names = {}
-    exec(code[1], names)
-    data = names["set_teleop"](ROBOT, TABLET, 7, 1425, "12:30:56", 0.5, -0.1)
-    assert decode(data) == m.Message(ROBOT, 7, TABLET, "12:30:56", 1425, m.SetTeleOp(0.5, -0.1))
 
 
 def test_the_reply_codes_of_the_specification_are_those_of_the_program():

@@ -1,0 +1,76 @@
+"""The client that the specification prints, run as it stands there against real sockets."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from dva_sim import scenario as scenarios
+from dva_sim.network.realtime import LiveClock
+from dva_sim.network.sockets import SocketNetwork
+from dva_sim.recorder import Recorder
+from dva_sim.simulation.control_room import add_dva
+from dva_sim.simulation.field import Field
+from dva_sim.simulation.names import id_of
+from dva_sim.simulation.stage import Stage
+
+SPECIFICATION = Path(__file__).parents[2] / "protocol" / "README.md"
+ROBOT = id_of("robot", 1)
+PATIENCE = 60.0
+
+
+@pytest.fixture
+def network():
+    clock = LiveClock()
+    network = SocketNetwork(clock)
+    yield network
+    network.close()
+
+
+def live_until(clock, condition):
+    def look():
+        if condition():
+            clock.stop()
+            return False
+        return None
+
+    clock.every(0.05, look)
+    clock.run(clock.now + PATIENCE)
+
+
+def test_the_client_of_the_specification_drives_a_robot(network, tmp_path):
+    quiet = {"events": [{"kind": "fire", "at_s": 500}]}
+    scenario = scenarios.build(scenarios.load("drive-to-event"), quiet)
+    stage = Stage(
+        scenario, 1, network, Recorder(), lambda kind, number: network.join(id_of(kind, number))
+    )
+    dva = add_dva(stage)
+    field = Field(stage)
+    field.populate()
+    robot = field.robots[ROBOT]
+    clock = network.clock
+    live_until(clock, lambda: dva.beats[ROBOT] > 0)
+
+    code = re.search(r"```python\n(.*?)```", SPECIFICATION.read_text(), re.DOTALL)[1]
+    assert len(code.splitlines()) <= 30
+    program = tmp_path / "client.py"
+    program.write_text(code)
+    client = subprocess.Popen(
+        [sys.executable, str(program), dva.device.address],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        live_until(clock, lambda: client.poll() is not None)
+    finally:
+        client.kill()
+        out, err = client.communicate()
+    assert (out, err) == ("the last command was answered with code 0\n", "")
+    assert robot.applied == 20
+    assert robot.controller.without_tick == 20
+    field.world.advance_to(clock.now)
+    assert robot.body.distance > 0.3
+    assert robot.controller.mode == "Idle"
