@@ -4,16 +4,27 @@ from __future__ import annotations
 
 from typing import Any
 
+from rich.box import SIMPLE_HEAD
 from rich.console import Console, Group
 from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
+from dva_sim.core.registry import DETECTOR
 from dva_sim.live.options import Options
 from dva_sim.live.process import Report, run_part
 from dva_sim.live.supervisor import Summary, Supervisor
 
 STORY_LINES = 12
+WIDTH = 120  # where there is no terminal to ask [characters]
+COLUMNS = (
+    "heard\ns ago",
+    "heart-\nbeats/s",
+    "commands\n/s",
+    "refused\nso far",
+    "picture\ns old",
+    "round\ntrip ms",
+)
 
 
 class Board:
@@ -38,10 +49,10 @@ class Board:
 
     def table(self) -> Table:
         """The devices: what they are, do, and how the link to each is."""
-        table = Table(title=f"{self.time:.0f} s", title_justify="left")
+        table = Table(title=f"after {self.time:.0f} s", title_justify="left", box=SIMPLE_HEAD)
         for column in ("device", "type", "doing", "address"):
-            table.add_column(column)
-        for column in ("heard", "beats", "commands", "refused", "picture", "round trip"):
+            table.add_column(column, no_wrap=True)
+        for column in COLUMNS:
             table.add_column(column, justify="right")
         for label, row in sorted(self.devices.items()):
             table.add_row(label, *_cells(row))
@@ -64,22 +75,23 @@ def story_line(line: list[Any]) -> str:
 
 
 def _cells(row: dict[str, Any]) -> list[str]:
-    heard = _number(row.get("heard_s"), ".1f", " s ago")
+    listened_to = row.get("type") != DETECTOR  # a detector speaks only when it has something to say
+    silent = row.get("silent") and listened_to
     return [
         row.get("type", ""),
         row.get("doing", ""),
         row.get("address", ""),
-        "silent" if row.get("silent") else heard,
-        _number(row.get("beats_hz"), ".1f", "/s"),
-        _number(row.get("commands_hz"), ".1f", "/s"),
-        _number(row.get("refused"), "d", ""),
-        _number(row.get("picture_age_s"), ".2f", " s old"),
-        _number(row.get("round_trip_s"), ".1f", " ms", 1000.0),
+        "silent" if silent else _number(row.get("heard_s"), ".1f"),
+        _number(row.get("beats_hz") if listened_to else None, ".1f"),
+        _number(row.get("commands_hz"), ".1f"),
+        _number(row.get("refused"), "d"),
+        _number(row.get("picture_age_s"), ".2f"),
+        _number(row.get("round_trip_s"), ".1f", 1000.0),
     ]
 
 
-def _number(value: float | None, form: str, unit: str, factor: float = 1) -> str:
-    return "" if value is None else f"{value * factor:{form}}{unit}"
+def _number(value: float | None, form: str, factor: float = 1) -> str:
+    return "" if value is None else f"{value * factor:{form}}"
 
 
 def run_all(options: Options) -> None:
@@ -88,7 +100,7 @@ def run_all(options: Options) -> None:
     Raises:
         DvaSimError: the scenario cannot be run, or a part failed.
     """
-    console, board = Console(), Board()
+    console, board = _console(), Board()
     if not console.is_terminal:
         supervisor = Supervisor(options, lambda _, report: _print_story(console, board, report))
         _conclude(console, board, supervisor.run())
@@ -105,13 +117,18 @@ def run_all(options: Options) -> None:
     _conclude(console, board, summary)
 
 
+def _console() -> Console:
+    console = Console()
+    return console if console.is_terminal else Console(width=WIDTH)
+
+
 def run_one(part: str, options: Options, number: int) -> None:
     """Run one part in this process and show what it knows.
 
     Raises:
         DvaSimError: the scenario, the keys or the ports are not as they should be.
     """
-    console, board = Console(), Board()
+    console, board = _console(), Board()
     with Live(console=console, refresh_per_second=4, transient=True) as screen:
 
         def say(report: Report) -> None:
