@@ -84,6 +84,10 @@ class SocketNetwork:
         """See `Transport`; who connects from now on goes to the new address."""
         self._addresses[node] = address
 
+    def address(self, node: str) -> str | None:
+        """Where a node is found, if anybody said."""
+        return self._addresses.get(node)
+
     def endpoint(self, node: str, published: bool) -> str | None:
         """Where a node takes requests, or publishes; None if it was never introduced."""
         address = self._addresses.get(node)
@@ -262,6 +266,16 @@ def _has_more(socket: Socket) -> bool:
     return bool(socket.getsockopt(EVENTS) & POLLIN)  # type: ignore[operator]
 
 
+def _next_of(socket: Socket) -> list[bytes] | None:
+    """The next message; None if all are read, or the last one has led to closing the socket."""
+    if socket.closed or not _has_more(socket):
+        return None
+    try:
+        return socket.recv_multipart(NOBLOCK)
+    except zmq.Again:
+        return None  # what a REQ socket had was the copy of a reply, and it threw that away
+
+
 def _text(option: object) -> str:
     """The text of a socket option, which pyzmq gives as bytes."""
     return option.decode() if isinstance(option, bytes) else str(option)
@@ -325,9 +339,10 @@ class _Wire:
 
     def _replies(self) -> None:
         for _ in range(DRAIN):
-            if self._socket.closed or not _has_more(self._socket):
-                return  # all read, or closed by what the last reply brought about
-            self._reply(self._socket.recv_multipart(NOBLOCK))
+            frames = _next_of(self._socket)
+            if frames is None:
+                return
+            self._reply(frames)
 
     def _reply(self, frames: list[bytes]) -> None:
         raise NotImplementedError
@@ -392,9 +407,9 @@ class _Subscription:
 
     def _hear(self) -> None:
         for _ in range(DRAIN):
-            if self._socket.closed or not _has_more(self._socket):
-                return  # all read, or closed by what was heard last
-            frames = self._socket.recv_multipart(NOBLOCK)
+            frames = _next_of(self._socket)
+            if frames is None:
+                return
             if len(frames) == 2:
                 self._handler(frames[1])
             else:
