@@ -18,7 +18,8 @@ from dva_sim.worlds.geo import GeoFrame
 HEARTBEAT = "heartbeat|"  # topics; the bar ends each, so that none begins another
 STATUS = "status|"
 HEARTBEAT_PERIOD = 2.0  # [s]
-REGISTER_AGAIN = 2.0  # pause after a registration that was not answered [s]
+REGISTER_AGAIN = 2.0  # pause after a registration that was not answered, or refused [s]
+RENEW_PERIOD = 10.0  # from one registration to the next [s]
 
 Handler = Callable[[m.Message], m.Reply]
 
@@ -75,7 +76,13 @@ class Device:
         return self.network.clock
 
     def register(self, then: Callable[[], object] = do_nothing) -> None:
-        """Make oneself known to the DVA, until it has answered, and begin to send heartbeats."""
+        """Make oneself known to the DVA until it has answered, then renew that now and then.
+
+        A DVA that was started anew so comes to know everybody again.
+
+        Args:
+            then: Called when the DVA has answered for the first time.
+        """
         self._register(then)
         self.clock.every(HEARTBEAT_PERIOD, self._heartbeat)
 
@@ -85,11 +92,15 @@ class Device:
         def answered(reply: m.Reply) -> None:
             if reply.code == m.OK:
                 then()
+                self.clock.call_after(RENEW_PERIOD, self._register, do_nothing)
             else:
                 self.tell(f"was not registered: {reply.text}", "link")
+                failed()
 
-        again = lambda: self.clock.call_after(REGISTER_AGAIN, self._register, then)  # noqa: E731
-        self.ask(self.dva, body, answered, again)
+        def failed() -> None:
+            self.clock.call_after(REGISTER_AGAIN, self._register, then)
+
+        self.ask(self.dva, body, answered, failed)
 
     def ask(
         self,

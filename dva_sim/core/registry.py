@@ -21,6 +21,7 @@ class Entry:
         mode: Last known mode of a robot.
         order: Event that it is working on.
         silent: Whether it has been quiet for longer than the time-out.
+        registered_by: MessageID of its last registration.
         free_from: Until then it is given no order, because it declined one [s].
     """
 
@@ -30,6 +31,7 @@ class Entry:
     mode: str = "Idle"
     order: int | None = None
     silent: bool = False
+    registered_by: int = 0
     free_from: float = 0.0
 
 
@@ -43,6 +45,11 @@ class Registry:
 
     silent_after: float = 10.0
     entries: dict[str, Entry] = field(default_factory=dict)
+
+    def is_new_life(self, id_tag: str, message_id: int) -> bool:
+        """Whether a known device has started anew: its MessageIDs have gone back."""
+        known = self.entries.get(id_tag)
+        return known is not None and message_id <= known.registered_by
 
     def register(self, id_tag: str, request: Registration, now: float) -> Entry | None:
         """Enter a device, or renew its entry; None if the registry is full."""

@@ -143,11 +143,12 @@ class Desk:
     def _register(
         self, message: m.Message, body: m.Registration, now: float
     ) -> tuple[m.Reply, list[Send]]:
-        if message.source in self.registry.entries:
-            # A device that starts anew knows nothing of what it held.
-            self._abandon(message.source, now)
-        if self.registry.register(message.source, body, now) is None:
+        if self.registry.is_new_life(message.source, message.message_id):
+            self._abandon(message.source, now)  # it knows nothing of what it held
+        entry = self.registry.register(message.source, body, now)
+        if entry is None:
             return self._refuse(message, m.BUSY, "the registry is full")
+        entry.registered_by = message.message_id
         return m.Reply(message.message_id, m.OK, ""), []
 
     def _permission(

@@ -30,7 +30,7 @@ class DvaAgent:
         self.device, self.desk = device, desk
         self._known: dict[int, State] = {}
         self.beats: Counter[str] = Counter()
-        self._heard: dict[tuple[str, str], Subscription] = {}
+        self._heard: dict[tuple[str, str], tuple[str, Subscription]] = {}
         device.serve(self._on_request)
 
     def start(self) -> None:
@@ -45,25 +45,28 @@ class DvaAgent:
         reply, sends = self.desk.handle(message, self.device.clock.now)
         if isinstance(message.body, m.Registration) and reply.code == m.OK:
             self.device.network.introduce(message.source, message.body.address)
-            self._listen(message.source, message.body.device_type)
+            self._listen(message.source, message.body)
         self._carry_out(sends)
         return reply
 
-    def _listen(self, source: str, device_type: str) -> None:
-        """Subscribe to what a device publishes, anew when it registers anew.
+    def _listen(self, source: str, body: m.Registration) -> None:
+        """Subscribe to what a device publishes, anew when it has moved to another address.
 
         Detectors only speak when they have something to report.
         """
-        topics = [] if device_type == DETECTOR else [HEARTBEAT]
-        if device_type in (ROBOT, GUARD):
+        topics = [] if body.device_type == DETECTOR else [HEARTBEAT]
+        if body.device_type in (ROBOT, GUARD):
             topics.append(STATUS)
         for topic in topics:
-            earlier = self._heard.pop((source, topic), None)
+            address, earlier = self._heard.get((source, topic), ("", None))
+            if address == body.address:
+                continue
             if earlier is not None:
                 earlier.close()
-            self._heard[source, topic] = self.device.network.subscribe(
+            heard = self.device.network.subscribe(
                 self.device.id_tag, source, topic, partial(self._on_published, source)
             )
+            self._heard[source, topic] = body.address, heard
 
     def _on_published(self, source: str, data: bytes) -> None:
         message = self.device.read(data, source)
