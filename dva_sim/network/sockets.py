@@ -66,7 +66,7 @@ class SocketNetwork:
     ) -> None:
         self.clock, self._tell = clock, tell
         self._context: zmq.Context[Socket] = zmq.Context()
-        self._has_keys = ring is not None
+        self._ring = ring
         # Polled now and then: each socket in the clock's own poller makes every message slower.
         self._aside = zmq.Poller()
         self._security = Security(self._context, self._aside, ring, self._refused)
@@ -165,7 +165,7 @@ class SocketNetwork:
     def _requests(self, node: str, router: Socket) -> None:
         """Hand the requests that have arrived to the service of a node."""
         for _ in range(DRAIN):
-            if self._has_keys:
+            if self._ring is not None:
                 parts = router.recv_multipart(NOBLOCK, copy=False)
                 frames, sender = [part.bytes for part in parts], user_of(parts[-1])
             else:
@@ -226,13 +226,29 @@ class SocketNetwork:
         return socket
 
     def client(self, kind: int, node: str, peer: str) -> Socket:
-        """A socket of `node` for a connection to `peer`, not yet connected."""
+        """A socket of `node`, connected to `peer` if there is a way to it."""
         socket = self._context.socket(kind)
         socket.linger = 0
         socket.setsockopt(zmq.MAXMSGSIZE, LARGEST_PICTURE if kind == zmq.SUB else LARGEST)
-        self._security.connect_client(socket, node, peer)
         self._clients[socket] = node, peer
+        if self._has_key(peer):
+            self._security.connect_client(socket, node, peer)
+            endpoint = self.endpoint(peer, published=kind == zmq.SUB)
+            if endpoint is not None:
+                socket.connect(endpoint)
         return socket
+
+    def _has_key(self, peer: str) -> bool:
+        """Whether a peer can be told from an impostor; who asks one without a key has a time-out.
+
+        Which peers there are is said by messages: an unknown one must not end this program.
+        """
+        if self._ring is None or peer in self._ring.devices:
+            return True
+        if not self.counters[f"no public key of {peer}"]:
+            self._tell(f"there is no public key of {peer} here, so nothing is sent to it")
+        self.counters[f"no public key of {peer}"] += 1
+        return False
 
     def close_client(self, socket: Socket, linger: int = 0) -> None:
         """Close a socket made by `client`."""
@@ -321,9 +337,6 @@ class _Wire:
         self._network, self._on_reply = network, on_reply
         self._socket = network.client(self.kind, node, peer)
         self._configure()
-        endpoint = network.endpoint(peer, published=False)
-        if endpoint is not None:
-            self._socket.connect(endpoint)
         network.clock.watch(self._socket, self._replies)
 
     def _configure(self) -> None:
@@ -396,9 +409,6 @@ class _Subscription:
         self._network, self._handler = network, handler
         self._socket = network.client(zmq.SUB, node, publisher)
         self._socket.subscribe(topic)
-        endpoint = network.endpoint(publisher, published=True)
-        if endpoint is not None:
-            self._socket.connect(endpoint)
         network.clock.watch(self._socket, self._hear)
 
     def close(self) -> None:
