@@ -1,0 +1,78 @@
+"""The same session in both clocks: what a robot decides does not depend on which one ticks."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+
+import pytest
+from one_session import (
+    Decided,
+    Way,
+    in_virtual_time,
+    one_by_one,
+    over_sockets,
+    pipelined,
+    published,
+)
+
+from dva_sim.protocol import messages as m
+
+WAYS = {"req-rep": one_by_one, "pipelined": pipelined, "pub-sub": published}
+
+
+def since_the_grant(decisions: list[Decided]) -> list[Decided]:
+    """All decisions but refused starts that came before the grant.
+
+    The operator has its permission from the DVA as soon as the robot has the grant, or a little
+    earlier: which of the two is faster is up to the network, and the operator asks again.
+    """
+    first = next(i for i, d in enumerate(decisions) if d.message == "PermissionGrant")
+    for early in decisions[:first]:
+        assert (early.message, early.code) == ("StartTeleOp", m.NOT_PERMITTED)
+    return decisions[first:]
+
+
+@pytest.mark.parametrize("pattern", WAYS)
+def test_a_session_leads_to_the_same_decisions_in_both_clocks(pattern: str) -> None:
+    way: Way = WAYS[pattern]
+    virtual = since_the_grant(in_virtual_time(way, pattern=pattern))
+    live = since_the_grant(over_sockets(way, pattern=pattern))
+    assert live == virtual
+
+    refused = 0 if pattern == "pub-sub" else 1  # who only listens while driven hears nothing else
+    assert Counter(d.message for d in live) == {
+        "PermissionGrant": 1,
+        "StartTeleOp": 2,
+        "SetTeleOp": 200 + refused + 10,
+        "Emergency": 1,
+        "StopTeleOp": 1,
+        "PermissionRevocation": 1,
+    }
+    assert [d.code for d in live if d.code != m.OK] == [m.WRONG_MODE] * refused
+
+
+def test_the_session_is_what_it_says() -> None:
+    decisions = since_the_grant(in_virtual_time())
+    grant, start, first, *_ = decisions
+    assert (grant.message, grant.mode) == ("PermissionGrant", "Idle")
+    assert start == Decided("StartTeleOp", m.OK, "", "Teleoperation", 0.0, 0.0)
+    assert first == Decided("SetTeleOp", m.OK, "", "Teleoperation", 0.1, 0.0)
+    turn = pytest.approx(0.3 * math.sin(19.9))
+    assert decisions[2 + 199] == Decided("SetTeleOp", m.OK, "", "Teleoperation", 0.1, turn)
+    assert decisions[2 + 200] == Decided("Emergency", m.OK, "stopped", "Idle", 0.0, 0.0)
+    refused = decisions[2 + 201]
+    assert (refused.code, refused.mode, refused.speed) == (m.WRONG_MODE, "Idle", None)
+    assert [d.message for d in decisions[-2:]] == ["StopTeleOp", "PermissionRevocation"]
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [{"robot.max_age_s": 0.2}, {"robot.processing_s": 0.3, "robot.watchdog_s": 0.2}],
+)
+def test_a_shorter_limit_leads_to_other_decisions(changed: dict[str, float]) -> None:
+    """So it is no wonder of the comparison that both clocks agree."""
+    usual, strict = (since_the_grant(in_virtual_time(**c)) for c in ({}, changed))
+    assert strict != usual
+    assert m.STALE in {d.code for d in strict}
+    assert m.STALE not in {d.code for d in usual}

@@ -1,0 +1,177 @@
+"""One session of one robot and one scripted operator, in virtual time or over sockets."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from functools import partial
+from typing import NamedTuple
+
+from dva_sim import scenario as scenarios
+from dva_sim.agents.commands import topic_of
+from dva_sim.agents.modes import Decision, RobotController
+from dva_sim.agents.operator.script import Ask, Pause, Script, ScriptedOperator, drill
+from dva_sim.clock import Clock
+from dva_sim.network.link import ConstantRate, Link, LinkConfig
+from dva_sim.network.patterns import Requester, Transport
+from dva_sim.network.realtime import LiveClock
+from dva_sim.network.sockets import SocketNetwork
+from dva_sim.network.virtual import VirtualNetwork
+from dva_sim.protocol import messages as m
+from dva_sim.recorder import Recorder
+from dva_sim.simulation.control_room import add_dva
+from dva_sim.simulation.field import Field
+from dva_sim.simulation.names import id_of
+from dva_sim.simulation.stage import Stage
+from dva_sim.streams import Streams
+
+ROBOT, OPERATOR = id_of("robot", 1), id_of("operator", 1)
+LIMIT = 300.0  # for a session that takes five seconds, on a machine that is busy [s]
+STEP = 0.02  # between two looks at whether it is over [s]
+
+# Far above any gap between commands, so that nothing hangs on how fast a clock goes.
+PATIENT = {
+    "robot.watchdog_s": 60,
+    "robot.max_age_s": 120,
+    "robot.processing_s": 0,
+    "command.timeout_s": 120,
+}
+SILENT_AFTER = 600.0  # the same for the DVA [s]
+
+
+class Decided(NamedTuple):
+    """What a robot made of a message; a set point's time is left out, as no two clocks agree."""
+
+    message: str
+    code: int
+    text: str
+    mode: str
+    speed: float | None
+    turn_rate: float | None
+
+
+@dataclass
+class Witness:
+    """In the place of a robot's trace: notes each decision."""
+
+    controller: RobotController
+    decisions: list[Decided] = field(default_factory=list)
+
+    def decided(
+        self, message: m.Message, arrived: float, now: float, moving: bool, decision: Decision
+    ) -> None:
+        kind, mode = type(message.body).__name__, self.controller.mode.value
+        speed, turn_rate, _ = decision.set_point or (None, None, None)
+        self.decisions.append(Decided(kind, decision.code, decision.text, mode, speed, turn_rate))
+
+    def happened(self, what: str, now: float) -> None:
+        self.decisions.append(Decided(what, 0, "", self.controller.mode.value, None, None))
+
+    def count(self, kind: str) -> int:
+        return sum(d.message == kind for d in self.decisions)
+
+
+Way = Callable[[ScriptedOperator, Witness], Script]
+
+
+def one_by_one(operator: ScriptedOperator, _: Witness) -> Script:
+    """The drill as it is: each command waits for the reply to the last one."""
+    return drill(operator)
+
+
+def pipelined(operator: ScriptedOperator, _: Witness) -> Script:
+    """The drill with eight commands under way at once; anything else waits for their replies."""
+    device, steps, reply = operator.device, drill(operator), None
+    requester = Requester(device.network, OPERATOR, ROBOT, timeout=120.0, window=8)
+    asked, answered = 0, list[bytes]()
+    while (step := _next(steps, reply)) is not None:
+        if isinstance(step, Ask) and isinstance(step.body, m.SetTeleOp):
+            data = device.outbox.encode(ROBOT, step.body, device.clock.now, step.session)
+            requester.request(data, answered.append)
+            asked += 1
+            continue
+        while len(answered) < asked:
+            yield Pause(STEP)
+        reply = yield step
+
+
+def published(operator: ScriptedOperator, witness: Witness) -> Script:
+    """The drill with commands that nobody answers: the next goes when the robot has the last.
+
+    A robot that is not driven hears no commands, so the one after the emergency goes nowhere.
+    """
+    device, steps, reply = operator.device, drill(operator), None
+    wanted = partial(device.network.ready, OPERATOR, topic_of(ROBOT), 1)
+    driving, sent = False, 0
+    while (step := _next(steps, reply)) is not None:
+        if isinstance(step, Ask) and isinstance(step.body, m.SetTeleOp):
+            if not driving:
+                continue
+            data = device.outbox.encode(ROBOT, step.body, device.clock.now, step.session)
+            device.network.publish(OPERATOR, topic_of(ROBOT), data, len(data))
+            sent += 1
+            while witness.count("SetTeleOp") < sent:
+                yield Pause(STEP / 10)
+            continue
+        reply = yield step
+        if isinstance(step, Ask) and isinstance(step.body, m.StartTeleOp | m.Emergency):
+            driving = isinstance(step.body, m.StartTeleOp) and reply.code == m.OK
+            while wanted() is not driving:  # a subscription takes a moment to come or to go
+                yield Pause(STEP)
+
+
+def _next(steps: Script, reply: m.Reply | None) -> Ask | Pause | None:
+    try:
+        return steps.send(reply)
+    except StopIteration:
+        return None
+
+
+def in_virtual_time(way: Way = one_by_one, **changes: object) -> list[Decided]:
+    """What the robot decided in a session that took no time."""
+    config = LinkConfig(delay_s=0.001)
+    links = {
+        pair: Link(config, ConstantRate(config.rate_bps), Streams(1), pair)
+        for pair in ("there", "back")
+    }
+    network = VirtualNetwork(Clock(), lambda *_: (links["there"], links["back"]))
+    return _act_out(_stage(network, changes), way)
+
+
+def over_sockets(way: Way = one_by_one, **changes: object) -> list[Decided]:
+    """What the robot decided in a session of some seconds."""
+    network = SocketNetwork(LiveClock())
+    join = lambda kind, number: network.join(id_of(kind, number))  # noqa: E731
+    try:
+        return _act_out(_stage(network, changes, address=join), way)
+    finally:
+        network.close()
+
+
+def _stage(network: Transport, changes: dict[str, object], **address: object) -> Stage:
+    scenario = scenarios.build(scenarios.load("drive-to-event"), PATIENT | changes)
+    return Stage(scenario, 1, network, Recorder(), **address)  # type: ignore[arg-type]
+
+
+def _act_out(stage: Stage, way: Way) -> list[Decided]:
+    """Let everybody do what they do until the operator is done and the robot knows."""
+    dva = add_dva(stage)
+    dva.desk.registry.silent_after = SILENT_AFTER
+    field_ = Field(stage)
+    field_.populate()
+    robot = field_.robots[ROBOT]
+    witness = Witness(robot.controller)
+    robot.trace = witness  # type: ignore[assignment]
+    operator = ScriptedOperator(stage.device("operator", 1), lambda o: way(o, witness))
+    operator.start()
+    dva.start()
+    for _ in _steps_of(stage.clock):
+        if operator.done and robot.controller.grant is None:
+            return witness.decisions
+    raise AssertionError(f"not over within {LIMIT:g} s: {operator.transcript[-3:]}")
+
+
+def _steps_of(clock: Clock) -> Iterator[None]:
+    while clock.now < LIMIT:
+        clock.run(clock.now + STEP)
+        yield
