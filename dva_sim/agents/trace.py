@@ -12,6 +12,7 @@ from dva_sim.agents.modes import Decision, Limits, RobotController, SetPoint
 from dva_sim.errors import ConfigError
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode, encode
+from dva_sim.protocol.errors import ProtocolError
 
 LEASE_ENDS, MISSION_ENDS = "lease ends", "mission ends"
 
@@ -71,19 +72,34 @@ def replay(path: Path) -> Iterator[tuple[m.Message, Decision, Decision]]:
         Each message, what was decided then, and what is decided now (reply contents left out).
 
     Raises:
-        ConfigError: the file is no trace, or its last line is not whole.
+        ConfigError: the file cannot be read or is no trace, or its last line is not whole.
     """
-    lines = path.read_text(encoding="utf-8").splitlines()
     try:
-        controller = _controller(json.loads(lines[0]))
-        for line in lines[1:]:
+        lines = path.read_bytes().splitlines()
+    except OSError as error:
+        raise ConfigError(f"cannot be read: {error.strerror}", path) from error
+    controller: RobotController | None = None
+    for number, line in enumerate(lines or [b""], 1):
+        try:
             entry = json.loads(line)
-            if "happened" in entry:
-                _happen(controller, entry)
+            if controller is None:
+                controller, asked = _controller(entry), None
             else:
-                yield _ask_again(controller, entry)
-    except (ValueError, KeyError, TypeError, IndexError) as error:
-        raise ConfigError(f"{path} is no trace of a robot: {error}") from error
+                asked = _again(controller, entry)
+        except _BROKEN as error:
+            problem = f"is no line of a robot's trace: {_in_words(error)}"
+            raise ConfigError(problem, path, number) from error
+        if asked is not None:
+            yield asked
+
+
+_BROKEN = ValueError, KeyError, TypeError, RecursionError, ProtocolError
+
+
+def _in_words(error: Exception) -> str:
+    if isinstance(error, KeyError):
+        return f"{error} is missing"
+    return error.msg if isinstance(error, json.JSONDecodeError) else str(error)
 
 
 def _controller(start: dict[str, Any]) -> RobotController:
@@ -97,18 +113,36 @@ def _controller(start: dict[str, Any]) -> RobotController:
     )
 
 
-def _happen(controller: RobotController, entry: dict[str, Any]) -> None:
-    if entry["happened"] == LEASE_ENDS:
-        controller.expire(entry["now"])
-    else:
+def _again(
+    controller: RobotController, entry: dict[str, Any]
+) -> tuple[m.Message, Decision, Decision] | None:
+    """Let it happen once more; a message, and what is decided about it then and now."""
+    if "message" in entry:
+        return _ask_again(controller, entry)
+    now, happened = _value(entry, "now", float, int), _value(entry, "happened", str)
+    if happened == LEASE_ENDS:
+        controller.expire(now)
+    elif happened == MISSION_ENDS:
         controller.mission_done()
+    else:
+        raise ValueError(f"{happened!r} does not happen to a robot")
+    return None
 
 
 def _ask_again(
     controller: RobotController, entry: dict[str, Any]
 ) -> tuple[m.Message, Decision, Decision]:
-    message = decode(entry["message"].encode())
-    now = controller.handle(message, entry["arrived"], entry["now"], entry["moving"])
-    point = entry["set_point"]
-    then = Decision(entry["code"], entry["text"], None if point is None else SetPoint(*point))
+    message = decode(_value(entry, "message", str).encode())
+    arrived, time = (_value(entry, name, float, int) for name in ("arrived", "now"))
+    code, text = _value(entry, "code", int), _value(entry, "text", str)
+    point = _value(entry, "set_point", list, type(None))
+    then = Decision(code, text, None if point is None else SetPoint(*point))
+    now = controller.handle(message, arrived, time, _value(entry, "moving", bool))
     return message, then, now._replace(content=None)
+
+
+def _value(entry: dict[str, Any], name: str, *types: type) -> Any:
+    value = entry[name]
+    if not isinstance(value, types):
+        raise TypeError(f"{name} is {value!r}")
+    return value
