@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import partial
+from pathlib import Path
 from typing import NamedTuple
 
 from dva_sim import scenario as scenarios
 from dva_sim.agents.commands import topic_of
 from dva_sim.agents.modes import Decision, RobotController
 from dva_sim.agents.operator.script import Ask, Pause, Script, ScriptedOperator, drill
+from dva_sim.agents.trace import Trace
 from dva_sim.clock import Clock
 from dva_sim.network.link import ConstantRate, Link, LinkConfig
 from dva_sim.network.patterns import Requester, Transport
@@ -52,9 +54,10 @@ class Decided(NamedTuple):
 
 @dataclass
 class Witness:
-    """In the place of a robot's trace: notes each decision."""
+    """In the place of a robot's trace, or before it: notes each decision."""
 
     controller: RobotController
+    trace: Trace | None = None
     decisions: list[Decided] = field(default_factory=list)
 
     def decided(
@@ -63,9 +66,13 @@ class Witness:
         kind, mode = type(message.body).__name__, self.controller.mode.value
         speed, turn_rate, _ = decision.set_point or (None, None, None)
         self.decisions.append(Decided(kind, decision.code, decision.text, mode, speed, turn_rate))
+        if self.trace is not None:
+            self.trace.decided(message, arrived, now, moving, decision)
 
     def happened(self, what: str, now: float) -> None:
         self.decisions.append(Decided(what, 0, "", self.controller.mode.value, None, None))
+        if self.trace is not None:
+            self.trace.happened(what, now)
 
     def count(self, kind: str) -> int:
         return sum(d.message == kind for d in self.decisions)
@@ -138,12 +145,14 @@ def in_virtual_time(way: Way = one_by_one, **changes: object) -> list[Decided]:
     return _act_out(_stage(network, changes), way)
 
 
-def over_sockets(way: Way = one_by_one, **changes: object) -> list[Decided]:
-    """What the robot decided in a session of some seconds."""
+def over_sockets(
+    way: Way = one_by_one, trace: Path | None = None, **changes: object
+) -> list[Decided]:
+    """What the robot decided in a session of some seconds, which it may write down, too."""
     network = SocketNetwork(LiveClock())
     join = lambda kind, number: network.join(id_of(kind, number))  # noqa: E731
     try:
-        return _act_out(_stage(network, changes, address=join), way)
+        return _act_out(_stage(network, changes, address=join), way, trace)
     finally:
         network.close()
 
@@ -153,22 +162,24 @@ def _stage(network: Transport, changes: dict[str, object], **address: object) ->
     return Stage(scenario, 1, network, Recorder(), **address)  # type: ignore[arg-type]
 
 
-def _act_out(stage: Stage, way: Way) -> list[Decided]:
+def _act_out(stage: Stage, way: Way, trace: Path | None = None) -> list[Decided]:
     """Let everybody do what they do until the operator is done and the robot knows."""
     dva = add_dva(stage)
     dva.desk.registry.silent_after = SILENT_AFTER
     field_ = Field(stage)
     field_.populate()
     robot = field_.robots[ROBOT]
-    witness = Witness(robot.controller)
+    witness = Witness(robot.controller, trace and Trace(trace, robot.controller))
     robot.trace = witness  # type: ignore[assignment]
     operator = ScriptedOperator(stage.device("operator", 1), lambda o: way(o, witness))
     operator.start()
     dva.start()
     for _ in _steps_of(stage.clock):
         if operator.done and robot.controller.grant is None:
+            if witness.trace is not None:
+                witness.trace.close()
             return witness.decisions
-    raise AssertionError(f"not over within {LIMIT:g} s: {operator.transcript[-3:]}")
+    raise TimeoutError(f"not over within {LIMIT:g} s: {operator.transcript[-3:]}")
 
 
 def _steps_of(clock: Clock) -> Iterator[None]:

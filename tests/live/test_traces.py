@@ -1,0 +1,278 @@
+"""Traces of robots' decisions: replayed through a fresh controller they give the same."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+from one_session import ROBOT, over_sockets, pipelined
+
+from dva_sim import scenario as scenarios
+from dva_sim.agents.modes import LEASE_S, Limits, RobotController
+from dva_sim.agents.trace import LEASE_ENDS, MISSION_ENDS, Trace, replay
+from dva_sim.errors import ConfigError
+from dva_sim.protocol import messages as m
+from dva_sim.simulation.names import DVA, id_of
+from dva_sim.simulation.run import Run
+
+PHONE = id_of("operator", 1)
+LATER = {"events": [{"kind": "fire", "at_s": 500}], "horizon_s": 600}
+
+
+def differences(path: Path) -> int:
+    """How many of a trace's decisions a fresh controller makes otherwise."""
+    return sum(then != now for _, then, now in replay(path))
+
+
+def kinds(path: Path) -> Counter[str]:
+    return Counter(type(message.body).__name__ for message, _, _ in replay(path))
+
+
+@contextmanager
+def traced(path: Path, **changes: object) -> Iterator[Run]:
+    """A virtual run, everybody in place, whose robot keeps a trace."""
+    scenario = scenarios.build(scenarios.load("drive-to-event"), changes)
+    run = Run(scenario, 1)
+    robot = run.field.robots[ROBOT]
+    robot.trace = Trace(path, robot.controller)
+    yield run
+    robot.trace.close()
+
+
+def lines(path: Path) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in path.read_text().splitlines()]
+
+
+def change(path: Path, number: int, how: Callable[[dict[str, Any]], object]) -> None:
+    """Change a line of a trace by hand."""
+    entries = lines(path)
+    how(entries[number])
+    path.write_text("".join(json.dumps(entry) + "\n" for entry in entries))
+
+
+@pytest.fixture
+def drive(tmp_path: Path) -> Path:
+    """A short trace: a grant, a start, three commands, an emergency, a refused command."""
+    path = tmp_path / "robot-1.trace.jsonl"
+    controller = RobotController(ROBOT, DVA, Limits(watchdog=1.0, max_age=2.0))
+    trace = Trace(path, controller)
+    told: list[tuple[str, m.Body]] = [
+        (DVA, m.PermissionGrant(PHONE, "teleoperation", 7)),
+        (PHONE, m.StartTeleOp()),
+        (PHONE, m.SetTeleOp(0.1, 0.0, 1000)),
+        (PHONE, m.SetTeleOp(0.2, 0.1, 1100)),
+        (PHONE, m.SetTeleOp(0.3, 0.2, None)),
+        (PHONE, m.Emergency()),
+        (PHONE, m.SetTeleOp(0.4, 0.0, 1300)),
+    ]
+    for number, (source, body) in enumerate(told, 1):
+        message = m.Message(ROBOT, number, source, "12:00:00", 7, body)
+        now = 1.0 + number / 10
+        trace.decided(message, now, now, False, controller.handle(message, now, now, False))
+    trace.close()
+    return path
+
+
+# --- the same again ------------------------------------------------------------------------
+
+
+def test_a_trace_taken_over_sockets_is_decided_the_same_again(tmp_path: Path) -> None:
+    path = tmp_path / "robot-1.trace.jsonl"
+    decisions = over_sockets(pipelined, trace=path)
+    replayed = list(replay(path))
+    assert [(d.code, d.text) for d in decisions] == [(now.code, now.text) for _, _, now in replayed]
+    assert kinds(path)["SetTeleOp"] == 200 + 1 + 10
+    assert differences(path) == 0
+
+
+@pytest.mark.parametrize("pattern", ["req-rep", "pipelined", "pub-sub", "latest-wins"])
+def test_a_simulated_operators_drive_is_decided_the_same_again(
+    tmp_path: Path, pattern: str
+) -> None:
+    link = {"delay_s": 0.2, "jitter_s": 0.1, "loss": 0.1}
+    path = tmp_path / "robot-1.trace.jsonl"
+    with traced(path, pattern=pattern, link=link, horizon_s=120) as run:
+        drive = run.run().recorder.drives[0]
+    assert 100 < kinds(path)["SetTeleOp"] <= drive.sent
+    assert differences(path) == 0
+
+
+def test_missions_emergencies_and_leases_that_end_are_decided_the_same_again(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "robot-1.trace.jsonl"
+    with traced(path, **LATER) as run:
+        _mission_lease_and_emergency(run)
+    happened = [entry["happened"] for entry in lines(path) if "happened" in entry]
+    assert happened == [MISSION_ENDS, LEASE_ENDS]
+    codes = {then.code for _, then, _ in replay(path)}
+    assert {m.OK, m.BUSY, m.BAD_SESSION, m.WRONG_MODE} <= codes
+    assert differences(path) == 0
+
+
+def _mission_lease_and_emergency(run: Run) -> None:
+    def send(time: float, body: m.Body, session: int = 5) -> None:
+        run.clock.call_at(time, lambda: run.dva.device.ask(ROBOT, body, session=session))
+
+    place = m.Position(*run.stage.site.frame.to_latlon(12.0, 12.0))
+    send(10.0, m.PermissionGrant(DVA, "both", 5))
+    send(11.0, m.GoTo((place,)))
+    send(12.0, m.GoTo((place,)))  # refused: busy
+    send(60.0, m.StartTeleOp())
+    for tenths in range(20):
+        send(61.0 + tenths / 10, m.SetTeleOp(0.2, 0.1))
+    send(61.5, m.SetTeleOp(0.2, 0.1), session=4)  # refused: not the session
+    send(63.0 + LEASE_S + 5.0, m.SetTeleOp(0.2, 0.1))  # refused: idle by then
+    send(110.0, m.GoTo((place,)))
+    send(111.0, m.Emergency(), session=0)
+    send(120.0, m.StartTeleOp())
+    send(125.0, m.PermissionRevocation(DVA, DVA, 5))
+    run.clock.run(130.0)
+
+
+def test_reply_contents_are_not_kept_but_what_leads_to_them_is(tmp_path: Path) -> None:
+    path = tmp_path / "robot-1.trace.jsonl"
+    grant = m.PermissionGrant(DVA, "both", 5, sensors=("heat_flux",))
+    told = ((10.0, grant), (11.0, m.GetSensorInfo()), (12.0, m.DevSub("heat_flux", 1)))
+    with traced(path, **LATER) as run:
+        for time, body in told:
+            run.clock.call_at(time, lambda b=body: run.dva.device.ask(ROBOT, b, session=5))
+        run.clock.run(20.0)
+    assert kinds(path) == {"PermissionGrant": 1, "GetSensorInfo": 1, "DevSub": 1}
+    assert [then.code for _, then, _ in replay(path)] == [m.OK, m.OK, m.OK]
+    assert differences(path) == 0
+
+
+def test_what_was_decided_is_on_disk_at_once(drive: Path) -> None:
+    """A robot that is switched off in the middle leaves what it has decided until then."""
+    controller = RobotController(ROBOT, DVA, Limits(1.0, 2.0))
+    path = drive.with_name("other.jsonl")
+    trace = Trace(path, controller)
+    message = m.Message(ROBOT, 1, PHONE, "12:00:00", 7, m.Emergency())
+    trace.decided(message, 1.0, 1.0, False, controller.handle(message, 1.0, 1.0, False))
+    assert kinds(path) == {"Emergency": 1}
+    trace.close()
+
+
+# --- changed by hand -----------------------------------------------------------------------
+
+
+def test_the_trace_as_it_was_taken_shows_no_difference(drive: Path) -> None:
+    assert sum(kinds(drive).values()) == 7
+    assert differences(drive) == 0
+
+
+@pytest.mark.parametrize(
+    ("number", "how", "found"),
+    [
+        (3, lambda e: e.update(code=m.STALE), 1),
+        (3, lambda e: e.update(text="faster"), 1),
+        (3, lambda e: e["set_point"].__setitem__(0, 0.5), 1),
+        (3, lambda e: e["set_point"].__setitem__(2, 9.0), 1),
+        (7, lambda e: e.update(code=m.OK, text="", set_point=[0.4, 0.0, 3.0]), 1),
+        (4, lambda e: e.update(message=e["message"].replace("0.2<", "0.25<")), 1),
+        (4, lambda e: e.update(arrived=1.2), 1),
+        (2, lambda e: e.update(moving=True), 4),  # no start, so three commands are refused, too
+        (0, lambda e: e["limits"].update(watchdog=0.5), 3),
+    ],
+)
+def test_a_trace_changed_by_hand_is_found_out(
+    drive: Path, number: int, how: Callable[[dict[str, Any]], object], found: int
+) -> None:
+    change(drive, number, how)
+    assert differences(drive) == found
+
+
+def test_a_line_taken_out_is_found_out(drive: Path) -> None:
+    whole = drive.read_text().splitlines(keepends=True)
+    drive.write_text("".join(whole[:2] + whole[3:]))  # without the start
+    assert differences(drive) == 3
+
+
+# --- no trace ------------------------------------------------------------------------------
+
+
+def said_of(path: Path) -> str:
+    with pytest.raises(ConfigError) as error:
+        list(replay(path))
+    return str(error.value)
+
+
+@pytest.mark.parametrize("kept", [1, 100, 500, -1, -2, -20])
+def test_a_trace_that_ends_in_the_middle_of_a_line_ends_in_one_line(drive: Path, kept: int) -> None:
+    data = drive.read_text().rstrip("\n")
+    drive.write_text(data[:kept])
+    said = said_of(drive)
+    number = data[:kept].count("\n") + 1
+    assert said.startswith(f"{drive}:{number}: is no line of a robot's trace")
+    assert "\n" not in said
+
+
+FOREIGN = {
+    "empty": b"",
+    "blank": b"\n\n",
+    "text": b"What a robot decided\n",
+    "no text": b"\xff\xfe\x00\x01",
+    "a number": b"5\n",
+    "a list": b"[]\n",
+    "another object": b'{"robot": "robot-1"}\n',
+    "nested": b"[" * 100_000,
+    "yaml": b"robot: 1\n",
+}
+
+
+@pytest.mark.parametrize("what", FOREIGN)
+def test_a_foreign_file_ends_in_one_line(tmp_path: Path, what: str) -> None:
+    path = tmp_path / "foreign"
+    path.write_bytes(FOREIGN[what])
+    said = said_of(path)
+    assert said.startswith(f"{path}:1: is no line of a robot's trace")
+    assert "\n" not in said
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "5",
+        '"happened"',
+        "{}",
+        '{"happened": "lunch", "now": 1}',
+        '{"happened": "lease ends"}',
+        '{"message": 5}',
+        '{"message": "<msg/>"}',
+        '{"message": "\\ud800"}',
+    ],
+)
+def test_a_foreign_line_is_told_by_its_number(drive: Path, line: str) -> None:
+    whole = drive.read_text().splitlines()
+    whole[3] = line
+    drive.write_text("\n".join(whole))
+    assert said_of(drive).startswith(f"{drive}:4: is no line of a robot's trace")
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("arrived", "soon"),
+        ("now", None),
+        ("set_point", [1]),
+        ("set_point", 5),
+        ("code", "fine"),
+        ("moving", "no"),
+        ("text", 5),
+    ],
+)
+def test_a_value_of_another_type_is_told_by_its_line(drive: Path, key: str, value: object) -> None:
+    change(drive, 3, lambda entry: entry.update({key: value}))
+    assert said_of(drive).startswith(f"{drive}:4: is no line of a robot's trace")
+
+
+def test_a_file_that_is_not_there_is_told_in_one_line(tmp_path: Path) -> None:
+    assert (
+        said_of(tmp_path / "no") == f"{tmp_path / 'no'}: cannot be read: No such file or directory"
+    )
