@@ -25,6 +25,9 @@ class Config(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
+MOST_VALUES = 20_000  # in one file
+
+
 @dataclass(frozen=True)
 class Document:
     """A parsed file: plain data, and the place of every key.
@@ -69,16 +72,31 @@ def load_yaml(path: str | Path) -> Document:
         raise ConfigError(problem, path, line, column) from error
     except YAMLError as error:
         raise ConfigError(f"is not valid YAML: {str(error).splitlines()[0]}", path) from error
+    except RecursionError:
+        raise ConfigError("is nested too deeply", path) from None
+    except ValueError as error:  # such as the date 2001-13-32, or a number of 5000 digits
+        raise ConfigError(f"has a value that cannot be read: {error}", path) from error
     if not isinstance(tree, CommentedMap):
         raise ConfigError("should be a mapping of keys to values", path, 1, 1)
     places: dict[Path_, tuple[int, int]] = {(): (1, 1)}
-    data = _plain(tree, (), places)
+    try:
+        data = _plain(tree, (), places)
+    except _TooMuchError as error:
+        raise ConfigError(str(error), path) from None
+    except RecursionError:
+        raise ConfigError("has an alias of itself, or is nested too deeply", path) from None
     assert isinstance(data, dict)
     return Document(data, path, places)
 
 
+class _TooMuchError(ValueError):
+    """A few aliases of aliases can stand for more values than any memory holds."""
+
+
 def _plain(node: Any, path: Path_, places: dict[Path_, tuple[int, int]]) -> Any:
     """Plain data without ruamel's types; records the place of every key on the way."""
+    if len(places) > MOST_VALUES:
+        raise _TooMuchError(f"has more than {MOST_VALUES} values, aliases counted")
     if isinstance(node, CommentedMap):
         out = {}
         for key, value in node.items():
@@ -103,8 +121,8 @@ def parse_scalar(text: str) -> Any:
     """What `text` would be as a value in YAML: `--set seed=3` gives the number 3."""
     try:
         return _plain(YAML(typ="safe", pure=True).load(text), (), {})
-    except YAMLError as error:
-        raise ConfigError(f"value {text!r} is not valid YAML") from error
+    except (YAMLError, ValueError, RecursionError) as error:
+        raise ConfigError(f"value {text[:80]!r} is not valid YAML") from error
 
 
 def parse_changes(pairs: Iterable[str]) -> dict[str, Any]:

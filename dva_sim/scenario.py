@@ -225,6 +225,10 @@ def check_names(scenario: Scenario, error: Any) -> None:
         ("profile",): (scenario.profile, resources.available("agents/phones")),
         ("robot", "profile"): (scenario.robot.profile, resources.available("agents/robots")),
         ("guard", "profile"): (scenario.guard.profile, resources.available("agents/people")),
+        ("operator", "population"): (
+            scenario.operator.population,
+            resources.available("agents/people"),
+        ),
     }
     for path, (given, known) in choices.items():
         if given not in known and not Path(given).is_file():

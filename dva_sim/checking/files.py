@@ -5,10 +5,7 @@ from __future__ import annotations
 import stat
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
-
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
+from typing import Final
 
 from dva_sim.checking.messages import READ_BYTES, check_message
 from dva_sim.checking.problem import Problem, not_text
@@ -17,7 +14,6 @@ from dva_sim.errors import ConfigError, DvaSimError
 
 YAML_BYTES: Final = 256 * 1024
 PLAN_BYTES: Final = 16 * 1024 * 1024
-_VALUES: Final = 100_000  # in a YAML file with all aliases written out
 _SUFFIXES: Final = {
     ".xml": "message",
     ".geojson": "plan",
@@ -117,33 +113,6 @@ def _check_yaml(path: Path) -> Verdict:
 def _parse(path: Path) -> tuple[Document | None, Problem | None]:
     """The document, or why there is none."""
     try:
-        if _is_bomb(path.read_text(encoding="utf-8")):
-            return None, Problem(1, 1, "has too many aliases within aliases; write the values out")
         return load_yaml(path), None
     except ConfigError as error:
         return None, Problem(error.line or 1, error.column or 1, error.problem)
-    except RecursionError:
-        return None, Problem(1, 1, "is nested too deeply")
-    except ValueError as error:  # such as the date 2001-13-32, or a number of 5000 digits
-        return None, Problem(1, 1, f"has a value that cannot be read: {error}")
-
-
-def _is_bomb(text: str) -> bool:
-    """Whether a few aliases stand for more values than anybody writes."""
-    if "*" not in text:
-        return False
-    try:
-        root = YAML(typ="rt", pure=True).compose(text)
-    except YAMLError:
-        return False  # no YAML at all, as its reader will say with the place
-    return _size(root, {}) > _VALUES
-
-
-def _size(node: Any, known: dict[int, float]) -> float:
-    """How many values a node stands for; infinite if it holds itself."""
-    if id(node) not in known:
-        known[id(node)] = float("inf")
-        inside = node.value if isinstance(getattr(node, "value", None), list) else []
-        parts = (part for item in inside for part in (item if isinstance(item, tuple) else (item,)))
-        known[id(node)] = 1 + sum(_size(part, known) for part in parts)
-    return known[id(node)]

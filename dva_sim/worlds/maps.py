@@ -192,7 +192,7 @@ def _read_shades(document: Document, config: RosMap) -> NDArray[np.float64]:
             bands = image.getbands()
     except FileNotFoundError:
         raise document.error(f"image {config.image!r} not found", ("image",)) from None
-    except (OSError, ValueError, SyntaxError) as error:
+    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
         problem = f"image {config.image!r} cannot be read: {error}"
         raise document.error(problem, ("image",)) from error
     if pixels.ndim == 2:

@@ -90,6 +90,10 @@ def _features(path: Path) -> list[Any]:
         raise ConfigError(f"is not JSON: {error.msg}", path, error.lineno, error.colno) from error
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigError("cannot be read", path) from error
+    except RecursionError:
+        raise ConfigError("is nested too deeply", path) from None
+    except ValueError as error:
+        raise ConfigError(f"has a value that cannot be read: {error}", path) from error
     features = data.get("features") if isinstance(data, dict) else None
     if not isinstance(features, list):
         raise ConfigError("should be a GeoJSON FeatureCollection with 'features'", path, 1, 1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 
 import numpy as np
@@ -118,3 +119,26 @@ def test_a_nearer_folder_hides_a_farther_one(
 def test_an_unknown_name_lists_what_there_is() -> None:
     with pytest.raises(ConfigError, match="did you mean 'req-rep-vs-pub-sub'"):
         resources.find("req-rep-vs-pubsub", "experiments")
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        ("day: 2001-13-45\n", "has a value that cannot be read"),
+        ("[" * 5000, "is nested too deeply"),
+        (
+            "a: &a [1, 2, 3, 4, 5, 6, 7, 8, 9]\n"
+            + "".join(
+                f"{x}: &{x} [{', '.join([f'*{y}'] * 9)}]\n"
+                for y, x in itertools.pairwise("abcdefgh")
+            ),
+            "more than 20000 values",
+        ),
+    ],
+    ids=["no date", "deep", "aliases of aliases"],
+)
+def test_a_file_that_nobody_would_write_ends_in_one_line(tmp_path, text, problem):
+    file = tmp_path / "odd.yaml"
+    file.write_text(text)
+    with pytest.raises(ConfigError, match=problem):
+        load_yaml(file)
