@@ -84,7 +84,7 @@ def load_yaml(path: str | Path) -> Document:
     except _TooMuchError as error:
         raise ConfigError(str(error), path) from None
     except RecursionError:
-        raise ConfigError("has an alias of itself, or is nested too deeply", path) from None
+        raise ConfigError("is nested too deeply", path) from None
     assert isinstance(data, dict)
     return Document(data, path, places)
 
