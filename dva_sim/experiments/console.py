@@ -28,7 +28,7 @@ from dva_sim.scenario import Scenario
 from dva_sim.simulation import Recording, simulate
 
 INTERRUPTED = 130  # exit code of a program ended by Ctrl-C
-PATTERNS = ("req-rep", "pub-sub", "latest-wins")
+PATTERNS = ("req-rep", "pipelined", "pub-sub", "latest-wins")
 STYLES = {"safety": "bold red", "mode": "dim", "order": "cyan", "drive": "cyan", "link": "yellow"}
 
 console = Console(highlight=False)

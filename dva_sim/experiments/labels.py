@@ -20,6 +20,7 @@ _FACTORS = {
 }
 _LEVELS = {
     "req-rep": "REQ/REP",
+    "pipelined": "pipelined requests",
     "pub-sub": "plain PUB/SUB",
     "latest-wins": "latest-wins PUB/SUB",
 }

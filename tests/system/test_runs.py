@@ -75,7 +75,7 @@ def test_keeping_traffic_for_pictures_changes_nothing() -> None:
     assert str(metrics.run_row(plain)) == str(metrics.run_row(filmed))
 
 
-@pytest.mark.parametrize("pattern", ["req-rep", "pub-sub", "latest-wins"])
+@pytest.mark.parametrize("pattern", ["req-rep", "pipelined", "pub-sub", "latest-wins"])
 @pytest.mark.parametrize("profile", ["default", "dissertation"])
 @pytest.mark.parametrize("link", [{}, {"loss": 0.1, "jitter_s": 0.1, "delay_s": 0.2}])
 def test_no_safety_rule_is_broken_on_any_link(
@@ -94,6 +94,15 @@ def test_request_reply_makes_commands_rarer_by_its_closed_form(delay: float) -> 
     expected = max(0.1, 2 * delay + 0.05)
     middle = sorted(gaps)[len(gaps) // 2]
     assert middle == pytest.approx(expected, abs=0.004)
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.5, 1.0])
+def test_a_window_of_requests_makes_commands_as_many_times_as_frequent(delay: float) -> None:
+    """Rate = min(wanted rate, window / (round trip + processing))."""
+    drive = run(pattern="pipelined", command__window=4, link__delay_s=delay).recorder.drives[0]
+    first, last = drive.applied[10], drive.applied[-10]
+    rate = (len(drive.applied) - 20) / (last.time - first.time)
+    assert rate == pytest.approx(min(10.0, 4 / (2 * delay + 0.05)), rel=0.08)
 
 
 def test_publishing_keeps_the_wanted_rate_at_any_delay() -> None:

@@ -29,7 +29,12 @@ WIDTH = 9.6  # [in], the width of the report's column at 96 dots per inch
 INK, SOFT, FAINT = "#222222", "#6b6b6b", "#d9d9d9"
 
 # Okabe & Ito: told apart under every common colour blindness, and by lightness in print.
-_PATTERNS = {"req-rep": "#D55E00", "pub-sub": "#0072B2", "latest-wins": "#009E73"}
+_PATTERNS = {
+    "req-rep": "#D55E00",
+    "pipelined": "#CC79A7",
+    "pub-sub": "#0072B2",
+    "latest-wins": "#009E73",
+}
 _OTHERS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#222222")
 
 _STYLE: dict[str, Any] = {

@@ -1,0 +1,39 @@
+"""Worlds for the contract tests: every promise is held against every transport."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+from transports import GUARD, NODES, SocketWorld, VirtualWorld, World
+
+from dva_sim.network.keys import KeyRing, create_keys
+
+
+@pytest.fixture(scope="session")
+def ring(tmp_path_factory: pytest.TempPathFactory) -> KeyRing:
+    folder = tmp_path_factory.mktemp("keys")
+    create_keys(folder, [*NODES, GUARD])
+    return KeyRing(folder)
+
+
+@pytest.fixture(params=["virtual", "sockets", "sockets with keys"])
+def world(request: pytest.FixtureRequest) -> Iterator[World]:
+    made = _world(request)
+    yield made
+    made.close()
+
+
+@pytest.fixture(params=["sockets", "sockets with keys"])
+def sockets(request: pytest.FixtureRequest) -> Iterator[SocketWorld]:
+    made = SocketWorld(_ring(request))
+    yield made
+    made.close()
+
+
+def _world(request: pytest.FixtureRequest) -> World:
+    return VirtualWorld() if request.param == "virtual" else SocketWorld(_ring(request))
+
+
+def _ring(request: pytest.FixtureRequest) -> KeyRing | None:
+    return request.getfixturevalue("ring") if "keys" in request.param else None

@@ -1,0 +1,323 @@
+"""What whoever asks is promised, whatever carries the request."""
+
+from __future__ import annotations
+
+import pytest
+from transports import (
+    BRIEF,
+    GUARD,
+    NODES,
+    PHONE,
+    ROBOT,
+    STRANGER,
+    TABLET,
+    Asker,
+    Meddler,
+    Plan,
+    SocketWorld,
+    Tap,
+    World,
+    echo,
+    numbered,
+)
+
+from dva_sim.network.patterns import QUEUE_LIMIT, Request
+
+WINDOWS = pytest.mark.parametrize("window", [1, 4], ids=["one at a time", "pipelined"])
+TROUBLE = Plan(lose=0.2, double=0.4, hold=0.5)
+
+
+def silent(_: Request) -> None:
+    """A service that never answers."""
+
+
+def asked_until_answered(world: World, asker: Asker) -> int:
+    """How many requests it took until one was answered."""
+    for number in range(1, 101):
+        question = b"are you there? %d" % len(asker.ends)
+        asker.ask(question)
+        world.run_until(asker.all_over)
+        if asker.ends[question] == [b"re: " + question]:
+            return number
+    raise AssertionError("100 requests have failed")
+
+
+@WINDOWS
+def test_each_request_gets_its_own_reply_in_the_order_asked(world: World, window: int) -> None:
+    seen: list[bytes] = []
+    world.serve(ROBOT, lambda request: (seen.append(request.data), echo(request)))
+    asker = Asker(world.network, window=window)
+    questions = numbered(50)
+    asker.ask(*questions)
+    world.run_until(asker.all_over)
+    assert seen == questions
+    assert asker.replies() == [b"re: " + question for question in questions]
+
+
+@WINDOWS
+def test_each_request_ends_once_in_its_own_reply_or_in_failure(world: World, window: int) -> None:
+    meddler = Meddler(world.clock, 1, TROUBLE)
+    world.serve(ROBOT, meddler.service(echo))
+    askers = [Asker(world.network, BRIEF, window, node=node) for node in 3 * (PHONE, TABLET)]
+    for number, asker in enumerate(askers):
+        asker.ask(*numbered(5, f"asker {number}, question"))
+    world.run_until(lambda: all(asker.all_over() for asker in askers))
+    world.run_for(2 * TROUBLE.hold)  # copies may still come
+    for asker in askers:
+        for question, reply in zip(asker.ends, asker.replies(), strict=True):
+            assert reply in (b"re: " + question, None)
+    assert min(meddler.done[what] for what in ("lost", "doubled", "held back")) > 0
+    meddler.plan = Plan()
+    asked_until_answered(world, askers[0])
+
+
+@WINDOWS
+def test_doubled_replies_answer_one_request_each(world: World, window: int) -> None:
+    def stutter(request: Request) -> None:
+        """The second copy may come when the next request is under way."""
+        echo(request)
+        world.clock.call_after(0.02, echo, request)
+        world.clock.call_after(0.04, echo, request)
+
+    world.serve(ROBOT, stutter)
+    asker = Asker(world.network, window=window)
+    questions = numbered(20)
+    asker.ask(*questions)
+    world.run_until(asker.all_over)
+    asker.ask(b"and now?")
+    world.run_until(asker.all_over)
+    world.run_for(0.1)
+    assert asker.replies() == [b"re: " + question for question in [*questions, b"and now?"]]
+
+
+@WINDOWS
+def test_a_request_is_sent_three_times_then_fails_and_others_are_served(
+    world: World, window: int
+) -> None:
+    seen: list[bytes] = []
+
+    def choosy(request: Request) -> None:
+        seen.append(request.data)
+        if request.data != b"never":
+            echo(request)
+
+    world.serve(ROBOT, choosy)
+    tap = Tap(world.network)
+    asker = Asker(tap, BRIEF, window)
+    asker.ask(b"never")
+    world.run_until(asker.all_over)
+    assert asker.replies() == [None]
+    assert tap.sent == [b"never"] * 3
+    assert tap.wires == (3 if window == 1 else 1)
+    assert (asker.requester.timeouts, asker.requester.failures) == (3, 1)
+    assert set(seen) <= {b"never"}
+    asked_until_answered(world, asker)
+    assert asker.ends[b"never"] == [None]
+
+
+@WINDOWS
+def test_the_same_bytes_come_again_until_they_are_answered(world: World, window: int) -> None:
+    seen: list[bytes] = []
+
+    def third_time_lucky(request: Request) -> None:
+        seen.append(request.data)
+        if len(seen) >= 3:
+            echo(request)
+
+    world.serve(ROBOT, third_time_lucky)
+    asker = Asker(world.network, BRIEF, window, attempts=50)
+    asker.ask(b"\x00\xff any bytes <&>")
+    world.run_until(asker.all_over)
+    assert asker.replies() == [b"re: \x00\xff any bytes <&>"]
+    assert set(seen) == {b"\x00\xff any bytes <&>"}
+    assert len(seen) >= 3
+
+
+@WINDOWS
+def test_a_reply_that_comes_after_the_failure_answers_nothing(world: World, window: int) -> None:
+    late: list[Request] = []
+
+    def slow_for_one(request: Request) -> None:
+        late.append(request) if request.data.startswith(b"slow") else echo(request)
+
+    world.serve(ROBOT, slow_for_one)
+    asker = Asker(world.network, BRIEF, window)
+    while not late:
+        asker.ask(b"slow %d" % len(asker.ends))
+        world.run_until(asker.all_over)
+    slow = list(asker.ends)
+    for request in late:
+        echo(request)
+    asked_until_answered(world, asker)
+    assert [asker.ends[question] for question in slow] == [[None]] * len(slow)
+
+
+@pytest.mark.parametrize("window", [1, 2, 7])
+def test_never_more_than_the_window_is_unanswered(world: World, window: int) -> None:
+    held: list[Request] = []
+    most = 0
+
+    def hold(request: Request) -> None:
+        nonlocal most
+        held.append(request)
+        most = max(most, len(held))
+
+    world.serve(ROBOT, hold)
+    asker = Asker(world.network, window=window)
+    asker.ask(*numbered(20))
+    assert asker.requester.busy
+    for _ in range(20):
+        world.run_until(lambda: held)
+        echo(held.pop(0))
+    world.run_until(asker.all_over)
+    assert most == window
+    assert asker.replies() == [b"re: " + question for question in numbered(20)]
+    assert not asker.requester.busy
+
+
+@WINDOWS
+def test_a_full_queue_refuses_at_once_and_what_waits_is_served(world: World, window: int) -> None:
+    world.serve(ROBOT, echo)
+    asker = Asker(world.network, window=window)
+    room = window + QUEUE_LIMIT
+    asker.ask(*numbered(room))
+    assert not any(asker.ends.values())
+    asker.ask(b"one too many")
+    assert asker.ends[b"one too many"] == [None]
+    assert asker.requester.overflows == 1
+    world.run_until(asker.all_over)
+    assert asker.replies() == [b"re: " + question for question in numbered(room)] + [None]
+
+
+@WINDOWS
+def test_who_closes_hears_nothing_more(world: World, window: int) -> None:
+    held: list[Request] = []
+    world.serve(ROBOT, held.append)
+    asker = Asker(world.network, BRIEF, window)
+    asker.ask(*numbered(10))
+    world.run_until(lambda: held)
+    asker.requester.close()
+    for request in held:
+        echo(request)
+    world.run_for(4 * BRIEF)
+    assert list(asker.ends.values()) == [[]] * 10
+    assert not asker.requester.busy
+    assert (asker.requester.timeouts, asker.requester.failures) == (0, 0)
+
+
+@WINDOWS
+def test_who_closes_in_the_middle_of_a_reply_hears_nothing_more(world: World, window: int) -> None:
+    world.serve(ROBOT, echo)
+    asker = Asker(world.network, window=window)
+    got: list[bytes] = []
+
+    def first(reply: bytes) -> None:
+        got.append(reply)
+        asker.requester.close()
+
+    asker.requester.request(b"first", first)
+    asker.ask(*numbered(10))
+    world.run_until(lambda: got)
+    other = Asker(world.network)
+    other.ask(*numbered(10))
+    world.run_until(other.all_over)
+    assert got == [b"re: first"]
+    assert list(asker.ends.values()) == [[]] * 10
+
+
+@WINDOWS
+def test_who_has_closed_may_ask_again(world: World, window: int) -> None:
+    held: list[Request] = []
+    world.serve(ROBOT, held.append)
+    asker = Asker(world.network, window=window)
+    asker.ask(b"before")
+    world.run_until(lambda: held)
+    asker.requester.close()
+    asker.ask(b"after")
+    world.run_until(lambda: len(held) == 2)
+    for request in held:
+        echo(request)
+    world.run_until(lambda: asker.ends[b"after"])
+    assert asker.ends == {b"before": [], b"after": [b"re: after"]}
+
+
+@WINDOWS
+def test_a_peer_that_vanishes_fails_and_is_reached_when_it_is_back(
+    world: World, window: int
+) -> None:
+    held: list[Request] = []
+    world.serve(ROBOT, held.append)
+    asker = Asker(world.network, BRIEF, window)
+    asker.ask(b"under way")
+    world.run_until(lambda: held)
+    world.leave(ROBOT)
+    asker.ask(b"too late")
+    world.run_until(asker.all_over)
+    assert asker.replies() == [None, None]
+    for request in held:
+        echo(request)  # the service has not noticed, or notices too late
+    world.serve(ROBOT, echo)
+    world.come_back(ROBOT)
+    asked_until_answered(world, asker)
+    assert asker.ends[b"under way"] == asker.ends[b"too late"] == [None]
+
+
+@WINDOWS
+def test_a_peer_that_nobody_knows_fails_and_harms_nobody(world: World, window: int) -> None:
+    world.serve(ROBOT, echo)
+    lost = Asker(world.network, BRIEF, window, peer=STRANGER)
+    well = Asker(world.network, window=window)
+    lost.ask(*numbered(3))
+    well.ask(*numbered(3))
+    world.run_until(lambda: lost.all_over() and well.all_over())
+    assert lost.replies() == [None] * 3
+    assert well.replies() == [b"re: " + question for question in numbered(3)]
+
+
+@WINDOWS
+def test_a_peer_that_does_not_serve_fails(world: World, window: int) -> None:
+    asker = Asker(world.network, BRIEF, window)
+    asker.ask(b"anybody?")
+    world.run_until(asker.all_over)
+    assert asker.replies() == [None]
+
+
+def test_everybody_can_ask_everybody_at_once(world: World) -> None:
+    for node in NODES:
+        world.serve(node, echo)
+    pairs = [(a, b) for a in NODES for b in NODES if a != b]
+    askers = [Asker(world.network, window=3, node=a, peer=b) for a, b in pairs]
+    for (a, b), asker in zip(pairs, askers, strict=True):
+        asker.ask(*numbered(10, f"{a} to {b}"))
+    world.run_until(lambda: all(asker.all_over() for asker in askers))
+    for asker in askers:
+        assert asker.replies() == [b"re: " + question for question in asker.ends]
+
+
+@WINDOWS
+def test_a_peer_is_reached_once_somebody_has_told_where_it_is(
+    sockets: SocketWorld, window: int
+) -> None:
+    elsewhere = sockets.elsewhere()
+    address = elsewhere.join(GUARD)
+    elsewhere.serve(GUARD, echo)
+    asker = Asker(sockets.network, BRIEF, window, peer=GUARD)
+    asker.ask(b"where are you?")
+    sockets.run_until(asker.all_over)
+    assert asker.replies() == [None]
+    sockets.network.introduce(GUARD, address)
+    asked_until_answered(sockets, asker)
+
+
+@WINDOWS
+def test_a_peer_that_has_moved_is_reached_where_it_is_now(
+    sockets: SocketWorld, window: int
+) -> None:
+    elsewhere = sockets.elsewhere()
+    sockets.network.introduce(GUARD, elsewhere.join(GUARD))
+    elsewhere.serve(GUARD, echo)
+    asker = Asker(sockets.network, BRIEF, window, peer=GUARD)
+    asked_until_answered(sockets, asker)
+    elsewhere.leave(GUARD)
+    sockets.network.introduce(GUARD, elsewhere.join(GUARD))
+    asked_until_answered(sockets, asker)

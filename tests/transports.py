@@ -1,0 +1,309 @@
+"""The same small world over every transport, and a meddler that troubles its messages.
+
+What a test says about a `World` it says about virtual time, about sockets, and about sockets
+with keys alike. Nothing here waits for a fixed time where it can wait for a condition.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from random import Random
+from typing import Any
+
+import zmq
+
+from dva_sim.clock import Clock
+from dva_sim.network.keys import KeyRing
+from dva_sim.network.link import ConstantRate, Link, LinkConfig
+from dva_sim.network.patterns import OnReply, Request, Requester, Service, Transport, Wire
+from dva_sim.network.realtime import LiveClock
+from dva_sim.network.sockets import NetworkError, SocketNetwork
+from dva_sim.network.virtual import VirtualNetwork
+from dva_sim.streams import Streams
+
+DVA, ROBOT, PHONE, TABLET = (f"02:00:00:00:00:0{i}" for i in range(1, 5))
+NODES = (DVA, ROBOT, PHONE, TABLET)
+GUARD = "02:00:00:00:00:05"  # has a key like them, but is elsewhere
+STRANGER = "02:00:00:00:00:99"  # nobody was ever told where it is
+
+BRIEF = 0.3  # a time-out that is meant to run out; an authenticated handshake fits in [s]
+PATIENT = 120.0  # one that is not [s]
+LIMIT = 60.0  # until what is waited for has happened, on a machine that is busy [s]
+STEP = 0.005  # between two looks at a condition [s]
+DELAY = 0.001  # one way, in virtual time [s]
+
+
+class World:
+    """Four nodes that can ask and tell each other."""
+
+    network: Transport
+
+    @property
+    def clock(self) -> Clock:
+        return self.network.clock
+
+    def run_for(self, seconds: float) -> None:
+        self.clock.run(self.clock.now + seconds)
+
+    def run_until(self, condition: Callable[[], object], limit: float = LIMIT) -> None:
+        """Let time pass until something is so."""
+        end = self.clock.now + limit
+        while not condition():
+            assert self.clock.now < end, f"has not come true within {limit} s"
+            self.run_for(STEP)
+
+    def serve(self, node: str, service: Service) -> None:
+        self.network.serve(node, service)
+
+    def leave(self, node: str) -> None:
+        """A node crashes."""
+        raise NotImplementedError
+
+    def come_back(self, node: str) -> None:
+        """It is there again, at its old address."""
+        raise NotImplementedError
+
+    def close(self) -> None:
+        """Close whatever is open."""
+
+
+class VirtualWorld(World):
+    """Virtual time over good links."""
+
+    def __init__(self) -> None:
+        self._links: dict[tuple[str, str], Link] = {}
+        self.network: VirtualNetwork = VirtualNetwork(
+            Clock(), lambda a, b: (self._link(a, b), self._link(b, a))
+        )
+        self.leave, self.come_back = self.network.leave, self.network.come_back  # type: ignore[method-assign]
+
+    def _link(self, a: str, b: str) -> Link:
+        config = LinkConfig(delay_s=DELAY)
+        link = Link(config, ConstantRate(config.rate_bps), Streams(1), f"{a}>{b}")
+        return self._links.setdefault((a, b), link)
+
+
+class SocketWorld(World):
+    """Sockets on this machine, in real time; with keys if there is a ring."""
+
+    def __init__(self, ring: KeyRing | None = None) -> None:
+        self.ring, self.said = ring, list[str]()
+        self.network: SocketNetwork = SocketNetwork(LiveClock(), ring, self.said.append)
+        self._ports = {n: int(self.network.join(n).partition(":")[2]) for n in NODES}
+        self._elsewhere: list[SocketNetwork] = []
+        self._outside: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+
+    def leave(self, node: str) -> None:
+        self.network.leave(node)
+
+    def come_back(self, node: str) -> None:
+        self.run_until(lambda: self._joined(node))
+
+    def _joined(self, node: str) -> bool:
+        try:
+            self.network.join(node, port=self._ports[node])
+        except NetworkError:
+            return False  # sockets are closed in the background: the port is not free yet
+        return True
+
+    def port(self, node: str, published: bool = False) -> int:
+        return self._ports[node] + published
+
+    def elsewhere(self) -> SocketNetwork:
+        """The network as another process sees it: it knows nobody."""
+        network = SocketNetwork(self.network.clock, self.ring, self.said.append)
+        self._elsewhere.append(network)
+        return network
+
+    def program(self, kind: int, peer: str, published: bool = False) -> zmq.Socket[bytes]:
+        """A socket of another program, connected to a node, with the keys of the tablet."""
+        socket = self._outside.socket(kind)
+        if self.ring is not None:
+            public, secret = self.ring.pair(TABLET)
+            socket.setsockopt(zmq.CURVE_SERVERKEY, self.ring.public(peer))
+            socket.setsockopt(zmq.CURVE_PUBLICKEY, public)
+            socket.setsockopt(zmq.CURVE_SECRETKEY, secret)
+        socket.connect(f"tcp://127.0.0.1:{self.port(peer, published)}")
+        return socket
+
+    def replace(self, node: str, kind: int, published: bool = False) -> zmq.Socket[bytes]:
+        """Put a socket of another program in the place of a node."""
+        socket = self._outside.socket(kind)
+        if self.ring is not None:
+            public, secret = self.ring.pair(node)
+            socket.setsockopt(zmq.CURVE_SERVER, 1)
+            socket.setsockopt(zmq.CURVE_PUBLICKEY, public)
+            socket.setsockopt(zmq.CURVE_SECRETKEY, secret)
+        port = socket.bind_to_random_port("tcp://127.0.0.1")
+        self.network.introduce(node, f"127.0.0.1:{port - published}")
+        return socket
+
+    def receive(self, socket: zmq.Socket[bytes]) -> list[bytes]:
+        """What another program gets, while the nodes go on with their work."""
+        self.run_until(lambda: socket.poll(0))
+        return socket.recv_multipart()
+
+    def close(self) -> None:
+        self._outside.destroy(linger=0)
+        for network in [self.network, *self._elsewhere]:
+            network.close()
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How often a message is lost, or doubled, and how long it may be held back [s]."""
+
+    lose: float = 0.0
+    double: float = 0.0
+    hold: float = 0.0
+
+
+class Meddler:
+    """Stands between the transport and whoever takes a message; luck comes from a seed.
+
+    Messages that are held back are overtaken by others, copies too.
+    """
+
+    def __init__(self, clock: Clock, seed: int, plan: Plan) -> None:
+        self._clock, self._luck, self.plan = clock, Random(seed), plan
+        self.done: Counter[str] = Counter()
+
+    def service(self, service: Service) -> Service:
+        """The same service, whose requests and replies are meddled with."""
+
+        def troubled(request: Request) -> None:
+            def answer(reply: bytes) -> None:
+                self.pass_on(request.answer, reply)
+
+            self.pass_on(service, request._replace(answer=answer))
+
+        return troubled
+
+    def handler(self, handler: Callable[[Any], object]) -> Callable[[Any], None]:
+        """The same handler of publications, but these are meddled with."""
+        return lambda payload: self.pass_on(handler, payload)
+
+    def pass_on(self, take: Callable[[Any], object], what: object) -> None:
+        luck, plan = self._luck, self.plan
+        if luck.random() < plan.lose:
+            self.done["lost"] += 1
+            return
+        if luck.random() < plan.double:
+            self.done["doubled"] += 1
+            self._later(take, what)
+        self._later(take, what)
+
+    def _later(self, take: Callable[[Any], object], what: object) -> None:
+        """Half of them are held back, so that those behind them overtake."""
+        hold = self._luck.choice((0.0, self._luck.uniform(0.0, self.plan.hold)))
+        if hold:
+            self.done["held back"] += 1
+        self._clock.call_after(hold, take, what)
+
+
+class Asker:
+    """Asks a peer, and keeps how each request has ended: in replies, or in None for failure."""
+
+    def __init__(
+        self,
+        transport: Transport,
+        timeout: float = PATIENT,
+        window: int = 1,
+        attempts: int = 3,
+        node: str = PHONE,
+        peer: str = ROBOT,
+    ) -> None:
+        self.requester = Requester(transport, node, peer, timeout, attempts, window)
+        self.ends: dict[bytes, list[bytes | None]] = {}
+
+    def ask(self, *questions: bytes) -> None:
+        for question in questions:
+            ends = self.ends.setdefault(question, [])
+            self.requester.request(question, ends.append, lambda ends=ends: ends.append(None))
+
+    def all_over(self) -> bool:
+        return all(self.ends.values())
+
+    def replies(self) -> list[bytes | None]:
+        """How all requests have ended; each exactly once, or it is no list of them."""
+        assert [len(ends) for ends in self.ends.values()] == [1] * len(self.ends)
+        return [ends[0] for ends in self.ends.values()]
+
+
+class Tap:
+    """A transport that notes what its wires send, and how many of them there were."""
+
+    def __init__(self, transport: Transport) -> None:
+        self._transport = transport
+        self.sent: list[bytes] = []
+        self.wires = 0
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._transport, name)
+
+    def connect(self, node: str, peer: str, on_reply: OnReply, pipelined: bool) -> Wire:
+        self.wires += 1
+        return _TappedWire(self._transport.connect(node, peer, on_reply, pipelined), self.sent)
+
+
+class _TappedWire:
+    def __init__(self, wire: Wire, sent: list[bytes]) -> None:
+        self._wire, self._sent = wire, sent
+        self.close = wire.close
+
+    def send(self, tag: int, data: bytes) -> None:
+        self._sent.append(data)
+        self._wire.send(tag, data)
+
+
+def echo(request: Request) -> None:
+    """A service whose reply can be told from that to any other request."""
+    request.answer(b"re: " + request.data)
+
+
+def numbered(count: int, word: str = "question") -> list[bytes]:
+    return [f"{word} {number}".encode() for number in range(count)]
+
+
+class Listener:
+    """Hears a topic of a publisher.
+
+    Marks are published until one is heard: then the subscription has reached the publisher.
+    A mark published last of all shows that nothing before it is still to come.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        topic: str,
+        handler: Callable[[bytes], object] | None = None,
+        node: str = ROBOT,
+        publisher: str = PHONE,
+    ) -> None:
+        self._world, self._topic, self._publisher = world, topic, publisher
+        self.got: list[bytes] = []
+        self._marks: list[bytes] = []
+        self._number = 0
+        self._handler = handler or self.got.append
+        self.subscription = world.network.subscribe(node, publisher, topic, self._hear)
+
+    def _hear(self, payload: bytes) -> None:
+        if payload.startswith(b"mark "):
+            self._marks.append(payload)
+        else:
+            self._handler(payload)
+
+    def await_a_mark(self) -> None:
+        """Publish marks until one of them is heard."""
+        first = self._number
+        self._world.run_until(lambda: self._heard_since(first))
+
+    def _heard_since(self, first: int) -> bool:
+        if any(int(mark.split()[1]) >= first for mark in self._marks):
+            return True
+        mark = f"mark {self._number}".encode()
+        self._number += 1
+        self._world.network.publish(self._publisher, self._topic, mark, len(mark))
+        return False
