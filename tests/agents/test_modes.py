@@ -162,3 +162,73 @@ def test_a_refused_message_changes_nothing(
     assert decision.code != m.OK
     assert decision.text
     assert vars(driven.robot) == before
+
+
+def test_a_revocation_stops_the_robot_and_its_session_never_comes_back(driven: Bench) -> None:
+    over = m.PermissionRevocation(ROBOT, ANA, 7)
+    assert driven.say(ANA, over).code == m.NOT_PERMITTED
+    assert driven.robot.owner == ANA
+    assert driven.say(DVA, over).set_point == STAND
+    assert driven.robot.mode is Mode.IDLE
+    assert driven.say(ANA, m.StartTeleOp()).code == m.NOT_PERMITTED
+    assert driven.say(DVA, m.PermissionGrant(ANA, "teleoperation", 7)).code == m.BAD_SESSION
+    assert driven.say(DVA, over).code == m.OK  # once more: it is over all the same
+
+
+def test_a_revocation_of_an_older_session_changes_nothing(driven: Bench) -> None:
+    assert driven.say(DVA, m.PermissionRevocation(ROBOT, ANA, 6)).set_point is None
+    assert driven.robot.owner == ANA
+
+
+def test_a_copy_of_an_old_order_that_comes_late_does_nothing(driven: Bench) -> None:
+    """Its reply may have been forgotten by then, so the number has to tell."""
+    driven.say(ANA, m.StopTeleOp(), number=50)
+    driven.say(ANA, m.StartTeleOp(), number=60)
+    assert driven.say(ANA, m.StopTeleOp(), number=50).code == m.OUT_OF_ORDER
+    assert driven.robot.mode is Mode.TELEOPERATION
+    driven.say(ANA, m.StopTeleOp(), number=70)
+    assert driven.say(ANA, m.StartTeleOp(), number=60).code == m.OUT_OF_ORDER
+    assert driven.robot.mode is Mode.IDLE
+
+
+@pytest.fixture
+def sensing(driven: Bench) -> Bench:
+    """Ana drives and may read the heat; Rui may read the smoke and nothing else."""
+    driven.robot.sensors = (m.Sensor("heat_flux", "kW/m2"), m.Sensor("smoke", "1/m"))
+    driven.say(DVA, m.PermissionGrant(ANA, "teleoperation", 8, None, ("heat_flux",)))
+    driven.say(ANA, m.StartTeleOp(), session=8)
+    assert driven.say(DVA, m.PermissionGrant(RUI, "sensors", 9, None, ("smoke",))).code == m.OK
+    return driven
+
+
+@pytest.mark.parametrize(
+    ("who", "session", "sensor", "code"),
+    [
+        (ANA, 8, "heat_flux", m.OK),
+        (RUI, 9, "smoke", m.OK),
+        (ANA, 8, "smoke", m.NOT_PERMITTED),
+        (RUI, 9, "heat_flux", m.NOT_PERMITTED),
+        (DVA, 9, "smoke", m.NOT_PERMITTED),
+        (ANA, 7, "heat_flux", m.BAD_SESSION),
+        (RUI, 8, "smoke", m.BAD_SESSION),
+        (ANA, 8, "radar", m.UNKNOWN_SENSOR),
+    ],
+)
+def test_each_sensor_is_permitted_by_name(
+    sensing: Bench, who: str, session: int, sensor: str, code: int
+) -> None:
+    assert sensing.say(who, m.DevSub(sensor, 2.0), session=session).code == code
+
+
+def test_who_may_read_sensors_takes_the_robot_from_nobody(sensing: Bench) -> None:
+    assert sensing.robot.owner == ANA
+    assert sensing.say(RUI, m.StartTeleOp(), session=9).code == m.NOT_PERMITTED
+    sensing.say(DVA, m.PermissionRevocation(ROBOT, RUI, 9))
+    assert sensing.say(RUI, m.DevSub("smoke", 1.0), session=9).code == m.NOT_PERMITTED
+    assert sensing.robot.owner == ANA
+
+
+def test_a_robot_tells_everybody_which_sensors_it_has(sensing: Bench) -> None:
+    told = sensing.say("02:00:00:00:00:99", m.GetSensorInfo(), session=0).content
+    assert told is not None
+    assert [sensor.name for sensor in told.sensors] == ["heat_flux", "smoke"]

@@ -254,3 +254,88 @@ def test_a_step_that_does_not_exist_is_refused() -> None:
     book.move(event, State.ESCALATED, 1.0)
     with pytest.raises(ValueError, match="cannot go from escalated to confirmed"):
         book.move(event, State.CONFIRMED, 2.0)
+
+
+def granted(office: Office, who: str = OPERATOR, level: str = "teleoperation") -> m.Permission:
+    content = office.say(who, m.PermissionRequest(ROBOT, level, ("heat_flux",)))[0].content
+    assert isinstance(content, m.Permission)
+    return content
+
+
+def test_a_permission_introduces_holder_and_robot_to_each_other(office: Office) -> None:
+    office.say(ROBOT, m.Registration("robot", "Robot", "192.168.1.20:5600"))
+    reply, sends = office.say(OPERATOR, m.PermissionRequest(ROBOT, "both", ("heat_flux",)))
+    content, grant = reply.content, sends[0].body
+    assert isinstance(content, m.Permission)
+    assert isinstance(grant, m.PermissionGrant)
+    assert (content.address, content.sensors) == ("192.168.1.20:5600", ("heat_flux",))
+    assert (grant.address, grant.sensors) == ("192.168.1.9", ("heat_flux",))
+    assert grant.session == content.session
+
+
+def test_a_session_grows_above_and_is_luck_below(office: Office) -> None:
+    first = granted(office).session
+    office.desk.permissions.release(OPERATOR)
+    office.desk.permissions.draw = lambda: 2**32 - 1
+    second = granted(office).session
+    assert first & (2**32 - 1) == 7
+    assert second & (2**32 - 1) == 2**32 - 1
+    assert (second >> 32) - (first >> 32) == 1
+
+
+def test_a_holder_gives_its_permission_back_and_the_robot_is_told(office: Office) -> None:
+    session = granted(office).session
+    mine = m.PermissionRevocation(ROBOT, OPERATOR, session)
+    assert office.say(DETECTOR, mine)[0].code == m.BAD_SESSION
+    wrong = m.PermissionRevocation(ROBOT, OPERATOR, session + 1)
+    assert office.say(OPERATOR, wrong)[0].code == m.BAD_SESSION
+    reply, sends = office.say(OPERATOR, mine)
+    assert (reply.code, sends) == (m.OK, [Send(ROBOT, mine)])
+    assert granted(office).session > session
+
+
+def test_who_reads_sensors_holds_nothing_else_and_needs_no_order(office: Office) -> None:
+    driver = granted(office).session
+    reader = granted(office, DETECTOR, "sensors").session
+    assert reader != driver
+    assert office.desk.permissions.grants[ROBOT].holder == OPERATOR
+
+
+def test_a_silent_holder_loses_its_session_and_both_ends_are_told(office: Office) -> None:
+    session = granted(office).session
+    office.status(ROBOT, 10, now=11.0)
+    sends = office.desk.tick(11.0)
+    over = m.PermissionRevocation(ROBOT, OPERATOR, session)
+    assert sends == [Send(ROBOT, over), Send(OPERATOR, over)]
+    assert office.desk.permissions.grants == {}
+
+
+def test_a_renewed_registration_changes_nothing_and_a_new_life_ends_what_was_held(
+    office: Office,
+) -> None:
+    registration = m.Registration("operator", "TeleOp", "192.168.1.9")
+    session = granted(office).session
+    assert office.say(OPERATOR, registration)[1] == []
+    assert office.desk.permissions.grants[ROBOT].session == session
+    office.number = 0  # started anew, it counts its messages from 1 again
+    over = m.PermissionRevocation(ROBOT, OPERATOR, session)
+    assert office.say(OPERATOR, registration)[1] == [Send(ROBOT, over), Send(OPERATOR, over)]
+
+
+def test_who_declines_an_order_is_not_asked_again_at_once(office: Office) -> None:
+    order = office.fire(12)[0]
+    assert order.to == OPERATOR
+    office.desk.undelivered(order, 1.0)
+    assert [send.to for send in office.desk.tick(2.0)] == [GUARD]
+
+
+def test_a_declined_order_leaves_the_operator_what_it_held_by_itself(office: Office) -> None:
+    session = granted(office).session
+    order = office.fire(12)[0]
+    assert office.desk.undelivered(order, 1.0) == []
+    assert office.desk.permissions.grants[ROBOT].session == session
+
+
+def test_all_sessions_end_with_the_desk(office: Office) -> None:
+    over = m.PermissionRevocation(ROBOT, OPERATOR, granted(office).session)
+    assert office.desk.close() == [Send(ROBOT, over), Send(OPERATOR, over)]

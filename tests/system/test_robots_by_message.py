@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 
 from dva_sim import scenario as scenarios
+from dva_sim.agents.sensing import topic_of_sensor
 from dva_sim.network.patterns import Request
 from dva_sim.protocol import messages as m
+from dva_sim.protocol.codec import decode
 from dva_sim.simulation.field import PHYSICS_TICK
 from dva_sim.simulation.names import DVA, id_of
 from dva_sim.simulation.run import Run
@@ -105,3 +107,28 @@ def test_bad_bytes_are_answered_and_change_nothing() -> None:
     assert all(b"<Code>1</Code>" in a for a in answers)
     assert run.recorder.counters["refused"] == 4
     assert run.field.robots[ROBOT].controller.mode == "Idle"
+
+
+def test_a_sensor_is_read_at_the_frequency_asked_for_while_it_is_permitted() -> None:
+    run = staged(events=[{"kind": "fire", "at_s": 5, "room": "Chemistry lab"}])
+    values: list[m.SensorValue] = []
+
+    def hear(data: bytes) -> None:
+        body = decode(data).body
+        assert isinstance(body, m.SensorValue)
+        values.append(body)
+
+    run.network.subscribe(DVA, ROBOT, topic_of_sensor("heat_flux", DVA), hear)
+    told = send(run, 1.0, m.GetSensorInfo(), session=0)
+    early = send(run, 1.5, m.DevSub("heat_flux", 2.0))
+    send(run, 2.0, m.PermissionGrant(DVA, "sensors", 5, None, ("heat_flux",)))
+    late = send(run, 3.0, m.DevSub("heat_flux", 2.0))
+    over = send(run, 23.0, m.PermissionRevocation(ROBOT, DVA, 5))
+    run.clock.run(40.0)
+    assert isinstance(told[0].content, m.SensorInfo)
+    assert told[0].content.sensors == (m.Sensor("heat_flux", "kW/m2"),)
+    assert [r.code for r in (*early, *late, *over)] == [m.NOT_PERMITTED, m.OK, m.OK]
+    assert len(values) in (39, 40, 41)
+    assert {value.unit for value in values} == {"kW/m2"}
+    ticks = [value.tick for value in values]
+    assert ticks == sorted(ticks)

@@ -44,3 +44,13 @@ def test_a_farther_detector_and_one_in_another_room_notice_later(kind):
 def test_a_leak_spreads_with_the_square_root_of_time():
     leak = make_hazard("gas_leak", (0, 0), 0.0)
     assert leak.radius(20.0) == pytest.approx(2 * leak.radius(5.0))
+
+
+def test_the_heat_of_a_fire_falls_with_the_square_of_the_distance():
+    """30 % of 1055 kW, spread over a sphere of 10 m: 0.252 kW/m2."""
+    fire = Fire((0.0, 0.0), 0.0)
+    assert fire.heat_flux(300.0, (10.0, 0.0)) == pytest.approx(0.252, abs=0.001)
+    near, far = fire.heat_flux(300.0, (5.0, 0.0)), fire.heat_flux(300.0, (10.0, 0.0))
+    assert near / far == pytest.approx(4.0)
+    assert fire.heat_flux(-1.0, (5.0, 0.0)) == 0.0
+    assert fire.heat_flux(300.0, (0.0, 0.0)) == pytest.approx(0.3 * 500 / 4)  # at the flames
