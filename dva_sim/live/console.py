@@ -55,7 +55,8 @@ class Board:
         for column in COLUMNS:
             table.add_column(column, justify="right")
         for label, row in sorted(self.devices.items()):
-            table.add_row(label, *_cells(row))
+            # As it is: a label may look like markup, and comes from whoever registers.
+            table.add_row(*(Text(cell) for cell in (label, *_cells(row))))
         return table
 
     def lines_of_story(self) -> Text:
@@ -113,8 +114,12 @@ def run_all(options: Options) -> None:
 
         summary = Supervisor(options, hear).run()
     for line in board.story:
-        console.print(story_line(line), highlight=False)
+        _print(console, story_line(line))
     _conclude(console, board, summary)
+
+
+def _print(console: Console, line: str) -> None:
+    console.print(line, highlight=False, markup=False, soft_wrap=True)
 
 
 def _console() -> Console:
@@ -133,7 +138,7 @@ def run_one(part: str, options: Options, number: int) -> None:
 
         def say(report: Report) -> None:
             for line in board.hear(report):
-                screen.console.print(story_line(line), highlight=False)
+                _print(screen.console, story_line(line))
             if console.is_terminal:
                 screen.update(board.table())
 
@@ -143,16 +148,16 @@ def run_one(part: str, options: Options, number: int) -> None:
 
 def _print_story(console: Console, board: Board, report: Report) -> None:
     for line in board.hear(report):
-        console.print(story_line(line), highlight=False, soft_wrap=True)
+        _print(console, story_line(line))
 
 
 def _conclude(console: Console, board: Board, summary: Summary) -> None:
     console.print(board.table())
-    console.print(f"The run ended ({summary.why}): {board.state_of_events()}.", highlight=False)
+    _print(console, f"The run ended ({summary.why}): {board.state_of_events()}.")
     counters: dict[str, int] = {}
     for report in summary.latest.values():
         for name, count in report.counters.items():
             if "refused" in name or "not sent" in name or "form" in name:
                 counters[name] = counters.get(name, 0) + count
     for name, count in sorted(counters.items()):
-        console.print(f"  {name}: {count}", highlight=False)
+        _print(console, f"  {name}: {count}")
