@@ -81,8 +81,12 @@ class SocketNetwork:
     # --- who is where ------------------------------------------------------------------
 
     def introduce(self, node: str, address: str) -> None:
-        """See `Transport`; who connects from now on goes to the new address."""
+        """See `Transport`; connections to a node that has moved follow it."""
+        before = self.endpoint(node, published=False)
         self._addresses[node] = address
+        if self.endpoint(node, published=False) != before:
+            for socket in [s for s, (_, peer) in self._clients.items() if peer == node]:
+                self._reach(socket, node)
 
     def address(self, node: str) -> str | None:
         """Where a node is found, if anybody said."""
@@ -233,22 +237,31 @@ class SocketNetwork:
         self._clients[socket] = node, peer
         if self._has_key(peer):
             self._security.connect_client(socket, node, peer)
-            endpoint = self.endpoint(peer, published=kind == zmq.SUB)
-            if endpoint is not None:
-                socket.connect(endpoint)
+        else:
+            # Messages say which peers there are: an unknown one must not end this program.
+            self._tell_once(f"no public key of {peer}: nothing is sent to it")
+        self._reach(socket, peer)
         return socket
 
     def _has_key(self, peer: str) -> bool:
-        """Whether a peer can be told from an impostor; who asks one without a key has a time-out.
+        """Whether a peer can be told from an impostor, or need not be."""
+        return self._ring is None or peer in self._ring.devices
 
-        Which peers there are is said by messages: an unknown one must not end this program.
-        """
-        if self._ring is None or peer in self._ring.devices:
-            return True
-        if not self.counters[f"no public key of {peer}"]:
-            self._tell(f"there is no public key of {peer} here, so nothing is sent to it")
-        self.counters[f"no public key of {peer}"] += 1
-        return False
+    def _tell_once(self, problem: str) -> None:
+        self.counters[problem] += 1
+        if self.counters[problem] == 1:
+            self._tell(problem)
+
+    def _reach(self, socket: Socket, peer: str) -> None:
+        """Connect to where a peer is now, and to nowhere else, if there is a way to it."""
+        published = socket.getsockopt(zmq.TYPE) == zmq.SUB
+        endpoint = self.endpoint(peer, published)
+        if endpoint is None or not self._has_key(peer):
+            return
+        last = _text(socket.last_endpoint).rstrip("\0")
+        if last:
+            socket.disconnect(last)
+        socket.connect(endpoint)
 
     def close_client(self, socket: Socket, linger: int = 0) -> None:
         """Close a socket made by `client`."""
