@@ -39,6 +39,7 @@ class World:
     """Four nodes that can ask and tell each other."""
 
     network: Transport
+    marks = 0  # published so far; see `Listener`
 
     @property
     def clock(self) -> Clock:
@@ -94,6 +95,7 @@ class SocketWorld(World):
         self._ports = {n: int(self.network.join(n).partition(":")[2]) for n in NODES}
         self._elsewhere: list[SocketNetwork] = []
         self._outside: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+        self._programs: list[zmq.Socket[bytes]] = []
 
     def leave(self, node: str) -> None:
         self.network.leave(node)
@@ -117,9 +119,13 @@ class SocketWorld(World):
         self._elsewhere.append(network)
         return network
 
+    def _program(self, kind: int) -> zmq.Socket[bytes]:
+        self._programs.append(self._outside.socket(kind))
+        return self._programs[-1]
+
     def program(self, kind: int, peer: str, published: bool = False) -> zmq.Socket[bytes]:
         """A socket of another program, connected to a node, with the keys of the tablet."""
-        socket = self._outside.socket(kind)
+        socket = self._program(kind)
         if self.ring is not None:
             public, secret = self.ring.pair(TABLET)
             socket.setsockopt(zmq.CURVE_SERVERKEY, self.ring.public(peer))
@@ -130,7 +136,7 @@ class SocketWorld(World):
 
     def replace(self, node: str, kind: int, published: bool = False) -> zmq.Socket[bytes]:
         """Put a socket of another program in the place of a node."""
-        socket = self._outside.socket(kind)
+        socket = self._program(kind)
         if self.ring is not None:
             public, secret = self.ring.pair(node)
             socket.setsockopt(zmq.CURVE_SERVER, 1)
@@ -282,10 +288,9 @@ class Listener:
         node: str = ROBOT,
         publisher: str = PHONE,
     ) -> None:
-        self._world, self._topic, self._publisher = world, topic, publisher
+        self._world, self._topic, self.publisher = world, topic, publisher
         self.got: list[bytes] = []
         self._marks: list[bytes] = []
-        self._number = 0
         self._handler = handler or self.got.append
         self.subscription = world.network.subscribe(node, publisher, topic, self._hear)
 
@@ -297,13 +302,13 @@ class Listener:
 
     def await_a_mark(self) -> None:
         """Publish marks until one of them is heard."""
-        first = self._number
+        first = self._world.marks
         self._world.run_until(lambda: self._heard_since(first))
 
     def _heard_since(self, first: int) -> bool:
         if any(int(mark.split()[1]) >= first for mark in self._marks):
             return True
-        mark = f"mark {self._number}".encode()
-        self._number += 1
-        self._world.network.publish(self._publisher, self._topic, mark, len(mark))
+        mark = f"mark {self._world.marks}".encode()
+        self._world.marks += 1
+        self._world.network.publish(self.publisher, self._topic, mark, len(mark))
         return False

@@ -1,0 +1,310 @@
+"""What publishers and subscribers are promised, whatever carries the publications."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+import zmq
+from transports import (
+    DVA,
+    GUARD,
+    NODES,
+    PHONE,
+    ROBOT,
+    STRANGER,
+    TABLET,
+    Asker,
+    Listener,
+    Meddler,
+    Plan,
+    SocketWorld,
+    World,
+    echo,
+    numbered,
+)
+
+from dva_sim.agents.inbox import Inbox, Letter
+from dva_sim.network.patterns import Request
+
+Publish = Callable[..., None]
+
+
+def publish(world: World, topic: str, *payloads: bytes, node: str = PHONE) -> None:
+    for payload in payloads:
+        world.network.publish(node, topic, payload, len(payload))
+
+
+def test_subscribers_get_everything_once_and_in_order(world: World) -> None:
+    listeners = [Listener(world, "robot-1|", node=node) for node in (ROBOT, TABLET, DVA)]
+    for listener in listeners:
+        listener.await_a_mark()
+    publish(world, "robot-1|", *numbered(500))
+    for listener in listeners:
+        listener.await_a_mark()
+    for listener in listeners:
+        assert listener.got == numbered(500)
+
+
+def test_topics_do_not_match_by_accident(world: World) -> None:
+    one, ten = Listener(world, "robot-1|"), Listener(world, "robot-10|")
+    one.await_a_mark()
+    ten.await_a_mark()
+    for topic in ("robot-1|", "robot-10|", "robot-|", "robot-1", "ROBOT-1|", "", "|", " robot-1|"):
+        publish(world, topic, topic.encode())
+    one.await_a_mark()
+    ten.await_a_mark()
+    assert one.got == [b"robot-1|"]
+    assert ten.got == [b"robot-10|"]
+
+
+def test_who_wants_a_prefix_gets_all_that_begin_with_it(world: World) -> None:
+    everything, robots = Listener(world, ""), Listener(world, "robot-1")
+    everything.await_a_mark()
+    robots.await_a_mark()
+    topics = ["robot-1|", "robot-10|", "robot-2|", "", "|"]
+    for topic in topics:
+        publish(world, topic, topic.encode())
+    everything.await_a_mark()
+    robots.await_a_mark()
+    assert everything.got == [topic.encode() for topic in topics]
+    assert robots.got == [b"robot-1|", b"robot-10|"]
+
+
+def test_two_subscriptions_of_one_node_to_one_topic_both_hear_it(world: World) -> None:
+    pair = [Listener(world, "news|"), Listener(world, "news|")]
+    for listener in pair:
+        listener.await_a_mark()
+    publish(world, "news|", b"extra")
+    for listener in pair:
+        listener.await_a_mark()
+    pair[0].subscription.close()
+    publish(world, "news|", b"late edition")
+    pair[1].await_a_mark()
+    assert pair[0].got == [b"extra"]
+    assert pair[1].got == [b"extra", b"late edition"]
+
+
+def test_to_publish_to_nobody_does_no_harm(world: World) -> None:
+    publish(world, "news|", *numbered(3000))
+    publish(world, "news|", b"from nobody", node=STRANGER)
+    assert not world.network.ready(PHONE, "news|", 10)
+    assert not world.network.ready(STRANGER, "news|", 10)
+    listener = Listener(world, "news|")
+    listener.await_a_mark()
+    publish(world, "news|", b"extra")
+    listener.await_a_mark()
+    assert listener.got == [b"extra"]
+
+
+def test_a_publisher_knows_whether_somebody_wants_a_topic(world: World) -> None:
+    listener = Listener(world, "frame|")
+    listener.await_a_mark()
+    world.run_until(lambda: world.network.ready(PHONE, "frame|", 10))
+    assert not world.network.ready(PHONE, "status|", 10)
+    listener.subscription.close()
+    world.run_until(lambda: not world.network.ready(PHONE, "frame|", 10))
+
+
+def test_a_subscription_to_nobody_hears_nothing_and_harms_nobody(world: World) -> None:
+    lost = Listener(world, "news|", publisher=STRANGER)
+    well = Listener(world, "news|")
+    well.await_a_mark()
+    publish(world, "news|", b"extra")
+    well.await_a_mark()
+    lost.subscription.close()
+    assert lost.got == []
+    assert well.got == [b"extra"]
+
+
+def test_a_subscription_works_again_when_its_publisher_is_back(world: World) -> None:
+    listener = Listener(world, "news|")
+    listener.await_a_mark()
+    publish(world, "news|", *numbered(3, "before"))
+    listener.await_a_mark()
+    for round_ in range(2):
+        world.leave(PHONE)
+        publish(world, "news|", b"from the grave")
+        world.come_back(PHONE)
+        listener.await_a_mark()
+        publish(world, "news|", *numbered(3, f"after {round_}"))
+        listener.await_a_mark()
+    after = [*numbered(3, "after 0"), *numbered(3, "after 1")]
+    assert listener.got == [*numbered(3, "before"), *after]
+
+
+def test_a_subscription_made_while_its_publisher_is_away_works_when_it_is_back(
+    world: World,
+) -> None:
+    world.leave(PHONE)
+    listener = Listener(world, "news|")
+    world.run_for(0.05)
+    world.come_back(PHONE)
+    listener.await_a_mark()
+    publish(world, "news|", b"extra")
+    listener.await_a_mark()
+    assert listener.got == [b"extra"]
+
+
+def test_nothing_comes_after_a_subscription_is_closed(world: World) -> None:
+    closing, other = Listener(world, "news|"), Listener(world, "news|")
+    closing.await_a_mark()
+    other.await_a_mark()
+    publish(world, "news|", *numbered(100))
+    closing.subscription.close()
+    publish(world, "news|", *numbered(100))
+    other.await_a_mark()
+    world.leave(PHONE)
+    world.come_back(PHONE)
+    other.await_a_mark()
+    assert closing.got == []
+    assert other.got[:100] == numbered(100)
+    closing.subscription.close()  # once more does no harm
+
+
+def test_who_closes_in_the_middle_of_a_publication_hears_nothing_more(world: World) -> None:
+    got: list[bytes] = []
+
+    def first(payload: bytes) -> None:
+        got.append(payload)
+        closing.subscription.close()
+
+    closing, other = Listener(world, "news|", first), Listener(world, "news|")
+    closing.await_a_mark()
+    other.await_a_mark()
+    publish(world, "news|", *numbered(100))
+    other.await_a_mark()
+    assert got == numbered(1)
+    assert other.got == numbered(100)
+
+
+def test_meddled_publications_are_those_that_were_made(world: World) -> None:
+    got: list[bytes] = []
+    meddler = Meddler(world.clock, 1, Plan(lose=0.2, double=0.2, hold=0.1))
+    listener = Listener(world, "news|", meddler.handler(got.append))
+    listener.await_a_mark()
+    publish(world, "news|", *numbered(200))
+    listener.await_a_mark()
+    world.run_for(0.2)
+    assert len(got) == 200 - meddler.done["lost"] + meddler.done["doubled"]
+    assert set(got) < set(numbered(200))
+    assert got != sorted(got, key=numbered(200).index)
+
+
+# --- a subscriber that is slower than its publisher ---------------------------------------
+
+
+class SlowRobot:
+    """Takes 20 ms for each message, whether anybody waits for the answer or not."""
+
+    def __init__(self, world: World, latest_wins: bool) -> None:
+        self.done: list[bytes] = []
+        self.inbox = Inbox(world.clock, 0.02, self._handle, latest_wins)
+        self.listener = Listener(world, "robot|", self.inbox.published)
+        self.listener.await_a_mark()
+        world.serve(ROBOT, self.inbox.request)
+
+    def _handle(self, letter: Letter) -> None:
+        self.done.append(letter.data)
+        if letter.answer is not None:
+            letter.answer(b"re: " + letter.data)
+
+
+COMMANDS = numbered(40, "<SetTeleOp>")
+
+
+def test_a_slow_subscriber_gets_the_newest_where_the_latest_wins(world: World) -> None:
+    robot = SlowRobot(world, latest_wins=True)
+    publish(world, "robot|", *COMMANDS)
+    world.run_until(lambda: robot.done and robot.done[-1] == COMMANDS[-1])
+    assert robot.done == [command for command in COMMANDS if command in robot.done]
+    assert robot.inbox.superseded == 40 - len(robot.done) > 0
+
+
+def test_a_slow_subscriber_gets_everything_in_order_where_nothing_is_dropped(world: World) -> None:
+    robot = SlowRobot(world, latest_wins=False)
+    publish(world, "robot|", *COMMANDS)
+    world.run_until(lambda: len(robot.done) == 40)
+    assert robot.done == COMMANDS
+    assert robot.inbox.superseded == 0
+
+
+@pytest.mark.parametrize("latest_wins", [True, False])
+def test_requests_overtake_what_is_published_and_emergencies_overtake_both(
+    world: World, latest_wins: bool
+) -> None:
+    robot = SlowRobot(world, latest_wins)
+    control = Asker(world.network, window=5)
+    emergency = Asker(world.network)
+    ready = Asker(world.network, node=TABLET)
+    ready.ask(b"open the connection")
+    world.run_until(ready.all_over)
+    # All of it has arrived before the first message is done.
+    world.serve(ROBOT, lambda request: held.append(request))
+    held: list[Request] = []
+    control.ask(*numbered(5, "control"))
+    emergency.ask(b"<EmergencyMsg>")
+    world.run_until(lambda: len(held) == 6)
+    robot.done.clear()
+    for command in COMMANDS[:5]:
+        robot.inbox.published(command)
+    for request in held:
+        robot.inbox.request(request)
+    world.run_until(lambda: control.all_over() and emergency.all_over())
+    world.run_until(lambda: robot.done[-1] == COMMANDS[4])
+    waiting = COMMANDS[4:5] if latest_wins else COMMANDS[1:5]
+    expected = [COMMANDS[0], b"<EmergencyMsg>", *numbered(5, "control"), *waiting]
+    assert robot.done == expected
+
+
+# --- other programs -----------------------------------------------------------------------
+
+
+def test_publications_of_another_form_are_dropped_and_counted(sockets: SocketWorld) -> None:
+    program = sockets.replace(GUARD, zmq.PUB, published=True)
+    listener = Listener(sockets, "news|", publisher=GUARD)
+
+    def heard() -> bool:
+        program.send_multipart([b"news|", b"good"])
+        return bool(listener.got)
+
+    sockets.run_until(heard)
+    program.send_multipart([b"news|"])
+    program.send_multipart([b"news|", b"a", b"b"])
+    program.send_multipart([b"news|", *numbered(1000)])
+    program.send_multipart([b"news|", b"last"])
+    sockets.run_until(lambda: listener.got[-1] == b"last")
+    assert set(listener.got) == {b"good", b"last"}
+    assert sockets.network.counters["publications of another form"] == 3
+
+
+def test_what_is_said_to_a_publisher_does_no_harm(sockets: SocketWorld) -> None:
+    """A subscriber says what it wants, and nothing keeps it from saying anything else."""
+    program = sockets.program(zmq.XSUB, PHONE, published=True)
+    for said in (b"", b"\x02", b"\x00never wanted", b"\x01\xff\xfe", b"\xff" * 60_000):
+        program.send(said)
+    program.send_multipart([b"\x01a", b"\x01b", b""])
+    listener = Listener(sockets, "news|")
+    listener.await_a_mark()
+    sockets.run_until(lambda: sockets.network.ready(PHONE, "news|", 10))
+    publish(sockets, "news|", b"extra")
+    listener.await_a_mark()
+    assert listener.got == [b"extra"]
+
+
+def test_every_node_publishes_and_serves_at_once(world: World) -> None:
+    listeners = [
+        Listener(world, "news|", node=a, publisher=b) for a in NODES for b in NODES if a != b
+    ]
+    for node in NODES:
+        world.serve(node, echo)
+    for listener in listeners:
+        listener.await_a_mark()
+    for node in NODES:
+        publish(world, "news|", *numbered(20, node), node=node)
+    asker = Asker(world.network)
+    asker.ask(*numbered(20))
+    world.run_until(asker.all_over)
+    for listener in listeners:
+        listener.await_a_mark()
+        assert listener.got == numbered(20, listener.publisher)
