@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -51,7 +53,17 @@ class Options:
             raise ConfigError(f"--operators {self.operators!r} should be {' or '.join(OPERATORS)}")
         if not 0 <= self.port < 65_000:
             raise ConfigError(f"--port {self.port} should be from 1 to 64999")
+        if self.duration is not None and not 0 < self.duration < math.inf:
+            raise ConfigError(f"--for {self.duration:g} should be a number of seconds above 0")
+        if self.dva is not None and not _is_address(self.dva):
+            raise ConfigError(f"--dva {self.dva!r} should be HOST:PORT, as in 127.0.0.1:5600")
         scenario = build(load(self.scenario), parse_changes(self.changes))
         if scenario.operator.strategy == "oracle":
             raise ConfigError("operator.strategy 'oracle' knows the truth: only in virtual time")
         return scenario
+
+
+def _is_address(text: str) -> bool:
+    """Whether it is a host and a port; the next port must be one, too."""
+    found = re.fullmatch(r"[^:\s]+(?::([0-9]{1,5}))?", text)
+    return found is not None and (found[1] is None or 0 < int(found[1]) < 65_535)

@@ -8,6 +8,7 @@ import statistics
 import time
 from collections import deque
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, Protocol
 
 from dva_sim.agents.operator.agent import OperatorAgent
@@ -110,11 +111,18 @@ class WorldPart:
         self._commands: dict[str, Rate] = {}
         self._traces: list[Trace] = []
         if options.record is not None:
-            options.record.mkdir(parents=True, exist_ok=True)
+            self._record(options.record)
+
+    def _record(self, folder: Path) -> None:
+        """Give each robot a trace."""
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
             for robot in self._field.robots.values():
-                path = options.record / f"{robot.device.label}.trace.jsonl"
+                path = folder / f"{robot.device.label}.trace.jsonl"
                 robot.trace = Trace(path, robot.controller)
                 self._traces.append(robot.trace)
+        except OSError as error:
+            raise ConfigError(f"cannot be written: {error.strerror}", error.filename) from error
 
     def rows(self) -> list[Row]:
         """See `Part`: how robots and guards are."""
