@@ -14,6 +14,7 @@ from typing import Any
 
 import zmq
 
+from dva_sim.agents.device import Device
 from dva_sim.clock import Clock
 from dva_sim.network.keys import KeyRing
 from dva_sim.network.link import ConstantRate, Link, LinkConfig
@@ -21,7 +22,9 @@ from dva_sim.network.patterns import OnReply, Request, Requester, Service, Trans
 from dva_sim.network.realtime import LiveClock
 from dva_sim.network.sockets import NetworkError, SocketNetwork
 from dva_sim.network.virtual import VirtualNetwork
+from dva_sim.recorder import Recorder
 from dva_sim.streams import Streams
+from dva_sim.worlds.geo import GeoFrame
 
 DVA, ROBOT, PHONE, TABLET = (f"02:00:00:00:00:0{i}" for i in range(1, 5))
 NODES = (DVA, ROBOT, PHONE, TABLET)
@@ -267,6 +270,15 @@ class _TappedWire:
 def echo(request: Request) -> None:
     """A service whose reply can be told from that to any other request."""
     request.answer(b"re: " + request.data)
+
+
+def small_device(world: World, id_tag: str, timeout: float = PATIENT) -> Device:
+    """A real device, with no more around it than it needs."""
+    lisbon = GeoFrame(38.66, -9.2)
+    address, label = "127.0.0.1:5600", f"device {id_tag[-2:]}"
+    return Device(
+        id_tag, label, "Device", address, DVA, world.network, Recorder(), lisbon, timeout, 3, {}
+    )
 
 
 def numbered(count: int, word: str = "question") -> list[bytes]:
