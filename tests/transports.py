@@ -18,7 +18,15 @@ from dva_sim.agents.device import Device
 from dva_sim.clock import Clock
 from dva_sim.network.keys import KeyRing
 from dva_sim.network.link import ConstantRate, Link, LinkConfig
-from dva_sim.network.patterns import OnReply, Request, Requester, Service, Transport, Wire
+from dva_sim.network.patterns import (
+    OnReply,
+    Request,
+    Requester,
+    Service,
+    Subscription,
+    Transport,
+    Wire,
+)
 from dva_sim.network.realtime import LiveClock
 from dva_sim.network.sockets import NetworkError, SocketNetwork
 from dva_sim.network.virtual import VirtualNetwork
@@ -105,6 +113,11 @@ class SocketWorld(World):
 
     def come_back(self, node: str) -> None:
         self.run_until(lambda: self._joined(node))
+
+    def come_back_soon(self, node: str) -> None:
+        """As soon as its port is free, while the nodes go on with their work."""
+        if not self._joined(node):
+            self.clock.call_after(STEP, self.come_back_soon, node)
 
     def _joined(self, node: str) -> bool:
         try:
@@ -212,6 +225,25 @@ class Meddler:
         self._clock.call_after(hold, take, what)
 
 
+class Meddled:
+    """A transport whose requests, replies and publications a meddler is allowed to touch."""
+
+    def __init__(self, transport: Transport, meddler: Meddler) -> None:
+        self._transport, self._meddler = transport, meddler
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._transport, name)
+
+    def serve(self, node: str, service: Service) -> None:
+        self._transport.serve(node, self._meddler.service(service))
+
+    def subscribe(
+        self, node: str, publisher: str, topic: str, handler: Callable[[Any], object]
+    ) -> Subscription:
+        handler = self._meddler.handler(handler)
+        return self._transport.subscribe(node, publisher, topic, handler)
+
+
 class Asker:
     """Asks a peer, and keeps how each request has ended: in replies, or in None for failure."""
 
@@ -272,12 +304,15 @@ def echo(request: Request) -> None:
     request.answer(b"re: " + request.data)
 
 
-def small_device(world: World, id_tag: str, timeout: float = PATIENT) -> Device:
+def small_device(
+    world: World, id_tag: str, timeout: float = PATIENT, network: Transport | None = None
+) -> Device:
     """A real device, with no more around it than it needs."""
     lisbon = GeoFrame(38.66, -9.2)
     address, label = "127.0.0.1:5600", f"device {id_tag[-2:]}"
+    network = network or world.network
     return Device(
-        id_tag, label, "Device", address, DVA, world.network, Recorder(), lisbon, timeout, 3, {}
+        id_tag, label, "Device", address, DVA, network, Recorder(), lisbon, timeout, 3, {}
     )
 
 

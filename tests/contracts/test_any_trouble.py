@@ -1,0 +1,122 @@
+"""Whatever is lost, doubled, late or overtaken: each request ends once, and in its own reply."""
+
+from __future__ import annotations
+
+from random import Random
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from transports import (
+    BRIEF,
+    NODES,
+    PHONE,
+    ROBOT,
+    TABLET,
+    Asker,
+    Meddled,
+    Meddler,
+    Plan,
+    SocketWorld,
+    Tap,
+    VirtualWorld,
+    World,
+    echo,
+    numbered,
+)
+
+from dva_sim.network.keys import KeyRing
+
+plans = st.builds(Plan, st.floats(0, 0.9), st.floats(0, 1), st.floats(0, 5 * BRIEF))
+
+
+def ask_in_trouble(
+    world: World, seed: int, plan: Plan, window: int, attempts: int = 3, count: int = 12
+) -> None:
+    """Two ask at moments of their own; the service comes and goes; then all is looked at."""
+    meddler, luck = Meddler(world.clock, seed, plan), Random(seed)
+    Meddled(world.network, meddler).serve(ROBOT, echo)
+    taps = [Tap(world.network), Tap(world.network)]
+    askers = [
+        Asker(tap, BRIEF, window, attempts, node)
+        for tap, node in zip(taps, (PHONE, TABLET), strict=True)
+    ]
+    start = world.clock.now
+    for number, asker in enumerate(askers):
+        for question in numbered(count, f"asker {number}, question"):
+            asker.ends[question] = []
+            world.clock.call_at(start + luck.uniform(0, 2 * BRIEF), asker.ask, question)
+    longest = 2 * BRIEF + count * attempts * BRIEF
+    world.run_until(lambda: all(asker.all_over() for asker in askers), limit=2 * longest + 60)
+    world.run_for(2 * plan.hold + BRIEF)
+    for tap, asker in zip(taps, askers, strict=True):
+        for question, reply in zip(asker.ends, asker.replies(), strict=True):
+            assert reply in (b"re: " + question, None)
+            sent = tap.sent.count(question)
+            assert sent == attempts if reply is None else 1 <= sent <= attempts
+        failures = asker.replies().count(None)
+        assert asker.requester.failures == failures
+        assert asker.requester.timeouts == len(tap.sent) - count + failures
+        assert not asker.requester.busy
+
+
+@settings(deadline=None, max_examples=200)
+@given(
+    seed=st.integers(0, 2**32),
+    plan=plans,
+    window=st.integers(1, 8),
+    attempts=st.integers(1, 4),
+)
+def test_each_request_ends_once_in_virtual_time(
+    seed: int, plan: Plan, window: int, attempts: int
+) -> None:
+    ask_in_trouble(VirtualWorld(), seed, plan, window, attempts)
+
+
+@pytest.mark.parametrize("window", [1, 3])
+@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("keys", [False, True], ids=["plain", "with keys"])
+def test_each_request_ends_once_over_sockets(
+    ring: KeyRing, seed: int, window: int, keys: bool
+) -> None:
+    world = SocketWorld(ring if keys else None)
+    try:
+        plan = Plan(lose=0.15 * seed, double=0.5, hold=seed * BRIEF)
+        ask_in_trouble(world, seed, plan, window, count=4)
+    finally:
+        world.close()
+
+
+@settings(deadline=None, max_examples=50)
+@given(
+    seed=st.integers(0, 2**32),
+    absences=st.lists(
+        st.tuples(st.sampled_from(NODES), st.floats(0.01, 3), st.floats(0.01, 3)), max_size=8
+    ),
+    window=st.integers(1, 4),
+)
+def test_each_request_ends_once_while_nodes_come_and_go_in_virtual_time(
+    seed: int, absences: list[tuple[str, float, float]], window: int
+) -> None:
+    world = VirtualWorld()
+    for node, at, duration in absences:
+        world.clock.call_at(at, world.leave, node)
+        world.clock.call_at(at + duration, world.come_back, node)
+    ask_in_trouble(world, seed, Plan(lose=0.1, double=0.3, hold=BRIEF), window)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("window", [1, 3])
+@pytest.mark.parametrize("keys", [False, True], ids=["plain", "with keys"])
+def test_each_request_ends_once_while_the_service_comes_and_goes_over_sockets(
+    ring: KeyRing, window: int, keys: bool
+) -> None:
+    world = SocketWorld(ring if keys else None)
+    try:
+        for at in (0.5, 1.5, 2.5):
+            world.clock.call_after(at, world.leave, ROBOT)
+            world.clock.call_after(at + 0.3, world.come_back_soon, ROBOT)
+        ask_in_trouble(world, 1, Plan(lose=0.1, double=0.3, hold=BRIEF), window, count=6)
+        world.run_for(0.1)
+    finally:
+        world.close()
