@@ -29,6 +29,8 @@ LOOK_ASIDE: Final = 0.05  # between looks at handshakes [s]
 RETRY: Final = 5.0  # after ZeroMQ gave up to connect [s]
 PORT_TRIES: Final = 50
 
+NOBODY: Final = "nobody"  # whose key it is where keys are on and there is none
+
 # As plain numbers: the arithmetic of pyzmq's enumerations costs more than a system call.
 NOBLOCK: Final = int(zmq.NOBLOCK)
 MORE: Final = int(zmq.NOBLOCK | zmq.SNDMORE)
@@ -171,7 +173,7 @@ class SocketNetwork:
         for _ in range(DRAIN):
             if self._ring is not None:
                 parts = router.recv_multipart(NOBLOCK, copy=False)
-                frames, sender = [part.bytes for part in parts], user_of(parts[-1])
+                frames, sender = [part.bytes for part in parts], user_of(parts[-1]) or NOBODY
             else:
                 frames, sender = router.recv_multipart(NOBLOCK), None
             self._request(node, router, frames, sender)
