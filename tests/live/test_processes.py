@@ -1,0 +1,243 @@
+"""`dva-sim live` as users run it: real processes, real sockets, real signals."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from programs import Programs, all_gone_after, wait_until
+
+from dva_sim.agents.trace import replay
+from dva_sim.protocol import messages as m
+from dva_sim.protocol.codec import decode
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not Path("/proc/self/environ").exists(), reason="no list of processes"),
+]
+
+SCRIPTED = (
+    *("live", "drive-to-event", "--operators", "scripted"),
+    *("--set", "robot.processing_s=0"),
+)
+
+
+@pytest.fixture
+def programs(tmp_path: Path) -> Iterator[Programs]:
+    yield from all_gone_after(tmp_path)
+
+
+@pytest.fixture
+def address() -> str:
+    """Where nobody listens: two free ports in a row, of which the first is named."""
+    while True:
+        with socket.socket() as one, socket.socket() as two:
+            one.bind(("127.0.0.1", 0))
+            port = one.getsockname()[1]
+            try:
+                two.bind(("127.0.0.1", port + 1))
+            except (OSError, OverflowError):
+                continue
+            return f"127.0.0.1:{port}"
+
+
+# --- a whole run ---------------------------------------------------------------------------
+
+
+def test_a_run_tells_its_story_shows_all_devices_and_ends_when_all_is_settled(
+    programs: Programs, tmp_path: Path
+) -> None:
+    settings = ("--set", "dispatch.escalate_after_s=5")  # nobody who follows a script goes there
+    run = programs.start(*SCRIPTED, *settings, "--record", "traces")
+    assert run.ends() == 0, run.complained
+    for line in ("breaks out", "is now in mode Teleoperation", "is now in mode Idle"):
+        assert line in run.said
+    assert "The run ended (settled): event 1 (fire) is escalated." in run.said
+    table = run.said[run.said.rindex("is now in mode Idle") :]
+    for device in ("robot-1", "operator-1"):
+        assert device in table
+    assert run.complained == []
+    assert programs.processes() == {}
+
+    decided = list(replay(tmp_path / "traces" / "robot-1.trace.jsonl"))
+    assert sum(isinstance(message.body, m.SetTeleOp) for message, _, _ in decided) == 211
+    assert all(then == now for _, then, now in decided)
+
+
+def test_a_run_lasts_as_long_as_it_is_told_to(programs: Programs) -> None:
+    run = programs.start(*SCRIPTED, "--for", "3")
+    assert run.ends() == 0
+    assert "The run ended (time is up)" in run.said
+    assert programs.processes() == {}
+
+
+def test_a_simulated_person_drives_to_the_fire_and_confirms_it(
+    programs: Programs, tmp_path: Path
+) -> None:
+    run = programs.start("live", "drive-to-event", "--record", "traces")
+    assert run.ends(within=700.0) == 0, run.complained
+    assert "The run ended (settled): event 1 (fire) is confirmed." in run.said
+    assert programs.processes() == {}
+    decided = list(replay(tmp_path / "traces" / "robot-1.trace.jsonl"))
+    assert len(decided) > 100
+    assert all(then == now for _, then, now in decided)
+
+
+# --- how it ends ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_run_that_is_interrupted_ends_cleanly(programs: Programs, number: signal.Signals) -> None:
+    run = programs.start("live", "drive-to-event")
+    run.wait_to_say("is now in mode Teleoperation")
+    run.send(number)
+    assert run.ends() == 0
+    assert "The run ended (interrupted)" in run.said
+    assert run.said.rindex("is now in mode Idle") > run.said.rindex("is now in mode Teleoperation")
+    assert run.complained == []
+    assert programs.processes() == {}
+
+
+def test_a_run_can_be_interrupted_before_anything_has_happened(programs: Programs) -> None:
+    run = programs.start(*SCRIPTED)
+    programs.process_of("dva")
+    run.send(signal.SIGINT)
+    assert run.ends() == 0
+    assert "The run ended (interrupted): no event was reported." in run.said
+    assert programs.processes() == {}
+
+
+def test_parts_whose_supervisor_is_killed_end_by_themselves(programs: Programs) -> None:
+    run = programs.start(*SCRIPTED)
+    run.wait_to_say("is now in mode Teleoperation")
+    run.send(signal.SIGKILL)
+    assert run.ends() == -signal.SIGKILL
+    programs.wait_for_none()
+
+
+@pytest.mark.parametrize("part", ["dva", "world", "operator"])
+def test_a_part_that_is_killed_ends_the_run(programs: Programs, part: str) -> None:
+    run = programs.start(*SCRIPTED)
+    run.wait_to_say("is now in mode Teleoperation")
+    os.kill(programs.process_of(part), signal.SIGKILL)
+    assert run.ends() == 2
+    name = "operator-1" if part == "operator" else part
+    assert run.complained == [f"dva-sim: {name} has ended by itself: exit code -9"]
+    assert programs.processes() == {}
+
+
+# --- mistakes ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--set", "operator.strategy=oracle"], "only in virtual time"),
+        (["--set", "nonsense"], "should be key=value"),
+        (["--set", "robot.count=9"], "has 3 robot bases"),
+        (["--set", "link.delay_ms=1"], "did you mean 'delay_s'?"),
+        (["--only", "nothing"], "--only 'nothing' should be dva, world, operator"),
+        (["--only", "operator", "--number", "2"], "the scenario has operators 1 to 1"),
+        (["--only", "operator", "--number", "0"], "the scenario has operators 1 to 1"),
+        (["--operators", "idle"], "should be simulated or scripted"),
+        (["--port", "70000"], "should be from 1 to 64999"),
+        (["--dva", "a:b:c"], "should be HOST:PORT"),
+        (["--dva", "127.0.0.1:65535"], "should be HOST:PORT"),
+        (["--for", "-1"], "should be a number of seconds above 0"),
+        (["--for", "nan"], "should be a number of seconds above 0"),
+        (["--keys", "no"], "there is no such folder; make keys with: dva-sim keys no NAME..."),
+        (["--keys", "."], "holds no keys"),
+        (["--record", "/dev/null"], "/dev/null: cannot be written: File exists"),
+    ],
+)
+def test_a_mistake_ends_in_one_line_and_exit_code_2(
+    programs: Programs, words: list[str], said: str
+) -> None:
+    run = programs.start("live", "drive-to-event", "--for", "60", *words)
+    assert run.ends() == 2
+    (line,) = run.complained
+    assert line.startswith("dva-sim: ")
+    assert said in line
+    assert programs.processes() == {}
+
+
+@pytest.mark.parametrize("taken", [0, 1])
+def test_a_port_that_is_taken_ends_in_one_line(
+    programs: Programs, address: str, taken: int
+) -> None:
+    port = int(address.partition(":")[2])
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", port + taken))
+        other.listen()
+        runs = [
+            programs.start(*SCRIPTED, "--dva", address),
+            programs.start(*SCRIPTED, "--only", "world", "--port", str(port)),
+        ]
+        for run in runs:
+            assert run.ends() == 2
+            (line,) = run.complained
+            assert f"cannot listen on 127.0.0.1, ports {port} and {port + 1}" in line
+            assert "Address already in use" in line
+    assert programs.processes() == {}
+
+
+# --- parts started by hand -----------------------------------------------------------------
+
+
+def test_three_parts_started_by_hand_work_together(programs: Programs, address: str) -> None:
+    at = ("--dva", address)
+    parts = [programs.start(*SCRIPTED, "--only", part, *at) for part in ("dva", "world")]
+    parts.append(programs.start(*SCRIPTED, "--only", "operator", *at))
+    dva, world, operator = parts
+    dva.wait_to_say("event 1 (fire) is pending")
+    world.wait_to_say("is now in mode Teleoperation", "is now in mode Idle")
+    for part in reversed(parts):
+        part.send(signal.SIGINT)
+        assert part.ends() == 0
+        assert part.complained == []
+    assert "robot-1" in dva.said
+    assert "operator-1" in operator.said
+    programs.wait_for_none()
+
+
+def test_parts_may_start_before_the_dva(programs: Programs, address: str) -> None:
+    at = ("--dva", address, "--set", "command.timeout_s=1")
+    operator = programs.start(*SCRIPTED, "--only", "operator", *at)
+    world = programs.start(*SCRIPTED, "--only", "world", *at)
+    world.wait_to_say("breaks out")  # both have found nobody so far
+    programs.start(*SCRIPTED, "--only", "dva", *at)
+    world.wait_to_say("is now in mode Teleoperation", "is now in mode Idle")
+    assert (operator.process.poll(), world.process.poll()) == (None, None)
+
+
+def sessions_of_drives(trace: Path) -> set[int | None]:
+    """In which sessions a robot was driven so far; its trace grows meanwhile."""
+    whole = trace.read_text().split("\n")[1:-1]
+    entries = [json.loads(line) for line in whole]
+    messages = [decode(e["message"].encode()) for e in entries if e.get("code") == m.OK]
+    return {message.session for message in messages if isinstance(message.body, m.SetTeleOp)}
+
+
+def test_devices_register_again_at_a_dva_that_was_killed_and_is_back(
+    programs: Programs, address: str, tmp_path: Path
+) -> None:
+    """The world is the same all the time; only a DVA that knows the robot can permit to drive."""
+    at = ("--dva", address, "--set", "command.timeout_s=1")
+    dva = programs.start(*SCRIPTED, "--only", "dva", *at)
+    world = programs.start(*SCRIPTED, "--only", "world", *at, "--record", "traces")
+    operator = programs.start(*SCRIPTED, "--only", "operator", *at)
+    world.wait_to_say("is now in mode Teleoperation")
+    for part in (dva, operator):
+        part.send(signal.SIGKILL)
+        assert part.ends() == -signal.SIGKILL
+    trace = tmp_path / "traces" / "robot-1.trace.jsonl"
+    (before,) = sessions_of_drives(trace)
+    for part in ("dva", "operator"):
+        programs.start(*SCRIPTED, "--only", part, *at)
+    wait_until(lambda: sessions_of_drives(trace) > {before}, "is driven by a new permission")
+    assert max(sessions_of_drives(trace)) != before
