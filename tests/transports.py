@@ -39,7 +39,7 @@ NODES = (DVA, ROBOT, PHONE, TABLET)
 GUARD = "02:00:00:00:00:05"  # has a key like them, but is elsewhere
 STRANGER = "02:00:00:00:00:99"  # nobody was ever told where it is
 
-BRIEF = 0.3  # a time-out that is meant to run out; an authenticated handshake fits in [s]
+BRIEF = 0.15  # a time-out that is meant to run out; an authenticated handshake fits in [s]
 PATIENT = 120.0  # one that is not [s]
 LIMIT = 60.0  # until what is waited for has happened, on a machine that is busy [s]
 STEP = 0.005  # between two looks at a condition [s]

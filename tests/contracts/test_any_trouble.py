@@ -43,7 +43,7 @@ def ask_in_trouble(
     ]
     start = world.clock.now
     for number, asker in enumerate(askers):
-        for question in numbered(count, f"asker {number}, question"):
+        for question in numbered(count, f"asker {number} of seed {seed}, question"):
             asker.ends[question] = []
             world.clock.call_at(start + luck.uniform(0, 2 * BRIEF), asker.ask, question)
     longest = 2 * BRIEF + count * attempts * BRIEF
@@ -74,15 +74,13 @@ def test_each_request_ends_once_in_virtual_time(
 
 
 @pytest.mark.parametrize("window", [1, 3])
-@pytest.mark.parametrize("seed", [1, 2])
 @pytest.mark.parametrize("keys", [False, True], ids=["plain", "with keys"])
-def test_each_request_ends_once_over_sockets(
-    ring: KeyRing, seed: int, window: int, keys: bool
-) -> None:
+def test_each_request_ends_once_over_sockets(ring: KeyRing, window: int, keys: bool) -> None:
     world = SocketWorld(ring if keys else None)
     try:
-        plan = Plan(lose=0.15 * seed, double=0.5, hold=seed * BRIEF)
-        ask_in_trouble(world, seed, plan, window, count=4)
+        plan = Plan(lose=0.25, double=0.5, hold=1.5 * BRIEF)
+        for seed in range(2):
+            ask_in_trouble(world, seed, plan, window, count=4)
     finally:
         world.close()
 
@@ -113,10 +111,9 @@ def test_each_request_ends_once_while_the_service_comes_and_goes_over_sockets(
 ) -> None:
     world = SocketWorld(ring if keys else None)
     try:
-        for at in (0.5, 1.5, 2.5):
+        for at in (0.3, 0.9):
             world.clock.call_after(at, world.leave, ROBOT)
-            world.clock.call_after(at + 0.3, world.come_back_soon, ROBOT)
+            world.clock.call_after(at + 0.2, world.come_back_soon, ROBOT)
         ask_in_trouble(world, 1, Plan(lose=0.1, double=0.3, hold=BRIEF), window, count=6)
-        world.run_for(0.1)
     finally:
         world.close()

