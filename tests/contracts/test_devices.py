@@ -21,8 +21,8 @@ from transports import (
     small_device,
 )
 
+from dva_sim.agents import device
 from dva_sim.agents.commands import topic_of
-from dva_sim.agents.device import REGISTER_AGAIN
 from dva_sim.agents.modes import Limits, Mode, RobotController
 from dva_sim.network.patterns import Request, Requester
 from dva_sim.protocol import messages as m
@@ -62,10 +62,10 @@ def test_a_request_that_is_sent_again_or_doubled_acts_once(world: World) -> None
     robot = Acting(world, Meddler(world.clock, 1, TROUBLE))
     ends: dict[tuple[str, int], list[m.Reply | None]] = {}
     for node in (PHONE, TABLET, DVA):
-        device = small_device(world, node, BRIEF)
+        asker = small_device(world, node, BRIEF)
         for number in range(1, 6):
             end = ends[node, number] = []
-            device.ask(ROBOT, m.StopTeleOp(), end.append, lambda end=end: end.append(None))
+            asker.ask(ROBOT, m.StopTeleOp(), end.append, lambda end=end: end.append(None))
     world.run_until(lambda: all(ends.values()))
     world.run_for(2 * TROUBLE.hold)
     assert set(robot.acts.values()) == {1}
@@ -107,7 +107,10 @@ def test_an_emergency_does_not_wait_behind_a_request_that_is_not_answered(world:
     assert len(robot.acts) == 1
 
 
-def test_a_device_registers_as_soon_as_the_dva_is_there(world: World) -> None:
+def test_a_device_registers_as_soon_as_the_dva_is_there(
+    world: World, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(device, "REGISTER_AGAIN", BRIEF)
     robot = small_device(world, ROBOT, BRIEF)
     known: list[str] = []
 
@@ -123,7 +126,7 @@ def test_a_device_registers_as_soon_as_the_dva_is_there(world: World) -> None:
     assert not done
     world.come_back(DVA)
     world.run_until(lambda: done)
-    world.run_for(REGISTER_AGAIN / 4)
+    world.run_for(3 * BRIEF)
     assert len(done) == 1
     assert set(known) == {ROBOT}
 
