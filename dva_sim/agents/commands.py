@@ -120,6 +120,7 @@ class RequestedCommands(CommandSender):
     def connect(self, requester: Requester, on_alert: Callable[[], object]) -> None:
         """Give it its socket, and say what to do when the link is lost."""
         self._requester, self._on_alert = requester, on_alert
+        requester.open()
         self._pending: Made | None = None
 
     def stop(self) -> None:

@@ -141,6 +141,13 @@ class Requester:
         """Whether a further request would have to wait."""
         return len(self._open) >= self._window
 
+    def open(self) -> None:
+        """Connect now, as a socket does, so that the first request need not wait for it."""
+        if self._wire is None:
+            self._wire = self._transport.connect(
+                self.node, self.peer, self._on_reply, pipelined=self._window > 1
+            )
+
     def request(
         self,
         data: bytes,
@@ -173,10 +180,8 @@ class Requester:
         """Send a request, over a new connection if there is none."""
         asked.attempts += 1
         self._clock.call_after(self._timeout, self._expire, asked.tag, asked.attempts)
-        if self._wire is None:
-            self._wire = self._transport.connect(
-                self.node, self.peer, self._on_reply, pipelined=self._window > 1
-            )
+        self.open()
+        assert self._wire is not None
         self._wire.send(asked.tag, asked.data)
 
     def _disconnect(self) -> None:
