@@ -86,6 +86,8 @@ class VirtualNetwork:
 
     def come_back(self, node: str) -> None:
         """The node is there again; those who had subscribed to it connect anew."""
+        if node not in self._gone:
+            return  # a second connection would be opened over the first
         self._gone.discard(node)
         for subscription in self._subscriptions[node]:
             subscription.open()

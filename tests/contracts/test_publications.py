@@ -19,6 +19,7 @@ from transports import (
     Meddler,
     Plan,
     SocketWorld,
+    VirtualWorld,
     World,
     echo,
     numbered,
@@ -131,6 +132,16 @@ def test_a_subscription_works_again_when_its_publisher_is_back(world: World) -> 
         listener.await_a_mark()
     after = [*numbered(3, "after 0"), *numbered(3, "after 1")]
     assert listener.got == [*numbered(3, "before"), *after]
+
+
+def test_who_never_left_and_comes_back_loses_nothing() -> None:
+    world = VirtualWorld()
+    listener = Listener(world, "news|")
+    listener.await_a_mark()
+    world.come_back(PHONE)
+    publish(world, "news|", *numbered(10))
+    listener.await_a_mark()
+    assert listener.got == numbered(10)
 
 
 def test_a_subscription_made_while_its_publisher_is_away_works_when_it_is_back(
