@@ -147,6 +147,8 @@ class SocketNetwork:
     def _look_aside(self) -> bool:
         for socket, _ in self._aside.poll(0):
             self._security.handle(socket)
+        for publisher in self._publishers.values():
+            publisher.hear()
         return not self._context.closed
 
     def close(self) -> None:
@@ -228,7 +230,11 @@ class SocketNetwork:
         socket = self._context.socket(kind)
         socket.linger = LINGER
         socket.setsockopt(zmq.MAXMSGSIZE, LARGEST)
-        self._security.bind_server(socket, node)
+        try:
+            self._security.bind_server(socket, node)
+        except DvaSimError:
+            socket.close()  # the context would wait for it without end
+            raise
         return socket
 
     def client(self, kind: int, node: str, peer: str) -> Socket:
@@ -328,10 +334,10 @@ class _Publisher:
 
     def wanted(self, topic: str) -> bool:
         """Whether anybody has subscribed to a topic."""
-        self._hear()
+        self.hear()
         return any(topic.startswith(known) for known in self._topics)
 
-    def _hear(self) -> None:
+    def hear(self) -> None:
         """Who came or went: XPUB tells of the first subscriber and of the last for a topic."""
         with suppress(zmq.Again):
             while _has_more(self.socket):
