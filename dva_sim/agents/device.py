@@ -121,14 +121,27 @@ class Device:
                 self.network, self.id_tag, peer, self.timeout, self.attempts
             )
 
-        def answered(data: bytes) -> None:
-            reply = self.read(data, peer)
-            if reply is not None and isinstance(reply.body, m.Reply):
-                self._meet(peer, reply.body)
-                on_reply(reply.body)
+        message = self.outbox.message(peer, body, self.clock.now, session)
 
-        data = self.outbox.encode(peer, body, self.clock.now, session)
-        requester.request(data, answered, on_failure)
+        def answered(data: bytes) -> None:
+            reply = self._reply_to(message, data)
+            if reply is None:
+                on_failure()  # what was asked may have been done, but nobody can tell
+            else:
+                self._meet(peer, reply)
+                on_reply(reply)
+
+        requester.request(self.outbox.encoded(message), answered, on_failure)
+
+    def _reply_to(self, message: m.Message, data: bytes) -> m.Reply | None:
+        """The reply in `data`, if it is one, from the device asked, to this very request."""
+        said = self.read(data, message.destination)
+        if said is None or not isinstance(said.body, m.Reply):
+            return None
+        if said.body.answers not in (message.message_id, 0):  # 0: it could not be read
+            self.recorder.counters["refused: a reply to something else"] += 1
+            return None
+        return said.body
 
     def _meet(self, peer: str, reply: m.Reply) -> None:
         """The DVA introduces a device to those that it may act on."""
@@ -152,7 +165,7 @@ class Device:
             handler: Takes it if it is valid and was not answered before.
             sender: Whose key it came by, if keys are used.
         """
-        known = self._replies.get(data)
+        known = self._replies.get(sender, data)
         if known is not None:
             return known
         try:
@@ -165,7 +178,7 @@ class Device:
             self.recorder.counters[f"refused: {m.CODE_NAMES[body.code]}"] += 1
         reply = self.reply(message, body)
         # An emergency acts whenever it comes: a button whose bytes never change must not fail.
-        return reply if urgent(message) else self._replies.put(data, reply)
+        return reply if urgent(message) else self._replies.put(sender, data, reply)
 
     def _imposture(self, message: m.Message, sender: str | None) -> m.Reply | None:
         """The refusal of a message that speaks for another device than its key is of.

@@ -41,7 +41,8 @@ class Outbox:
 class ReplyCache:
     """Replies already given, so that a request sent again acts once.
 
-    A request is known by its bytes: a device that starts anew counts its MessageIDs from 1
+    A request is known by its bytes and by whose key it came: what an impostor was told is not
+    for the one it played. A device that starts anew counts its MessageIDs from 1
     again, and must not be given the answers of its former life.
 
     Args:
@@ -50,15 +51,15 @@ class ReplyCache:
 
     def __init__(self, size: int = 256) -> None:
         self._size = size
-        self._replies: OrderedDict[bytes, bytes] = OrderedDict()
+        self._replies: OrderedDict[tuple[str | None, bytes], bytes] = OrderedDict()
 
-    def get(self, request: bytes) -> bytes | None:
+    def get(self, sender: str | None, request: bytes) -> bytes | None:
         """The reply to the same request, if it was answered before."""
-        return self._replies.get(request)
+        return self._replies.get((sender, request))
 
-    def put(self, request: bytes, reply: bytes) -> bytes:
+    def put(self, sender: str | None, request: bytes, reply: bytes) -> bytes:
         """Remember a reply and return it."""
-        self._replies[request] = reply
+        self._replies[sender, request] = reply
         if len(self._replies) > self._size:
             self._replies.popitem(last=False)
         return reply

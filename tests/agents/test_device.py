@@ -1,0 +1,79 @@
+"""What every device does with requests and replies, whatever carries them."""
+
+from __future__ import annotations
+
+import pytest
+
+from dva_sim import scenario as scenarios
+from dva_sim.agents.device import Device
+from dva_sim.network.patterns import Request
+from dva_sim.protocol import messages as m
+from dva_sim.protocol.codec import decode, encode
+from dva_sim.simulation.names import DVA, id_of
+from dva_sim.simulation.run import Run
+
+ME, ROBOT, THIEF = id_of("operator", 1), id_of("robot", 1), "02:00:00:03:00:66"
+
+
+@pytest.fixture
+def device() -> Device:
+    """An operator's device on a network where nobody else is heard."""
+    run = Run(scenarios.build(scenarios.load("drive-to-event")), 1)
+    return run.stage.device("operator", 1)
+
+
+def request(body: m.Body, number: int = 5) -> bytes:
+    return encode(m.Message(ME, number, ROBOT, "12:00:00", 0, body))
+
+
+def code(reply: bytes) -> int:
+    body = decode(reply).body
+    assert isinstance(body, m.Reply)
+    return body.code
+
+
+def test_what_an_impostor_was_told_is_not_for_the_one_it_played(device: Device) -> None:
+    acted: list[m.Message] = []
+
+    def act(message: m.Message) -> m.Reply:
+        acted.append(message)
+        return m.Reply(message.message_id, m.OK, "done")
+
+    data = request(m.GetDeviceList())
+    assert code(device.answer(data, act, THIEF)) == m.NOT_PERMITTED
+    assert code(device.answer(data, act, ROBOT)) == m.OK
+    assert code(device.answer(data, act, THIEF)) == m.NOT_PERMITTED
+    assert code(device.answer(data, act, ROBOT)) == m.OK
+    assert len(acted) == 1
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [
+        b"garbage",
+        encode(m.Message(ME, 1, ROBOT, "12:00:00", 0, m.Reply(1, m.OK, ""))),  # not the DVA
+        encode(m.Message(ME, 1, DVA, "12:00:00", 0, m.GetDeviceList())),  # no reply
+        encode(m.Message(ME, 1, DVA, "12:00:00", 0, m.Reply(77, m.OK, ""))),  # to another
+    ],
+    ids=["garbage", "of another device", "no reply", "to another request"],
+)
+def test_a_request_with_a_bad_answer_has_failed(device: Device, answer: bytes) -> None:
+    """Else whoever asked would wait for ever, and a device would never register."""
+    device.network.serve(DVA, lambda request: request.answer(answer))
+    ended: list[str] = []
+    device.ask(DVA, m.GetDeviceList(), lambda _: ended.append("reply"), lambda: ended.append("no"))
+    device.clock.run(3.0)
+    assert ended == ["no"]
+
+
+def test_an_answer_to_what_could_not_be_read_is_taken(device: Device) -> None:
+    def refuse(request: Request) -> None:
+        request.answer(
+            encode(m.Message(ME, 1, DVA, "12:00:00", 0, m.Reply(0, m.BAD_MESSAGE, "cannot")))
+        )
+
+    device.network.serve(DVA, refuse)
+    codes: list[int] = []
+    device.ask(DVA, m.GetDeviceList(), lambda reply: codes.append(reply.code))
+    device.clock.run(3.0)
+    assert codes == [m.BAD_MESSAGE]
