@@ -69,7 +69,8 @@ class Frame(NamedTuple):
                 for kind, hx, hy, distance in hazards
             )
             at = Observation(int(tick), x, y, heading, speed, turn_rate, seen)
-            return cls(at, float(captured)) if math.isfinite(sum(pose)) else None
+            sound = 0 <= tick < 2**53 and math.isfinite(sum(pose))
+            return cls(at, float(captured)) if sound else None
         except (ValueError, TypeError, OverflowError, RecursionError):
             return None
 

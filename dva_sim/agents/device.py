@@ -173,7 +173,7 @@ class Device:
         except ProtocolError as error:
             self.recorder.counters["refused"] += 1
             return self._bad_message(error)
-        body = self._imposture(message, sender) or handler(message)
+        body = self._imposture(message, sender) or self._misdirection(message) or handler(message)
         if body.code != m.OK:
             self.recorder.counters[f"refused: {m.CODE_NAMES[body.code]}"] += 1
         reply = self.reply(message, body)
@@ -190,10 +190,21 @@ class Device:
         self.tell(f"{sender} speaks for {message.source}", "link")
         return m.Reply(message.message_id, m.NOT_PERMITTED, f"this is the key of {sender}")
 
+    def _misdirection(self, message: m.Message) -> m.Reply | None:
+        """The refusal of a message to another device; anybody's emergency is everybody's."""
+        if message.destination == self.id_tag or urgent(message):
+            return None
+        return m.Reply(message.message_id, m.UNKNOWN_DEVICE, f"this is {self.id_tag}")
+
     def reply(self, message: m.Message, body: m.Reply) -> bytes:
-        """A reply to `message` as bytes."""
-        session = message.session or 0
-        return self.outbox.encode(message.source, body, self.clock.now, session)
+        """A reply to `message` as bytes; one that no message can hold keeps its code alone."""
+        session, now = message.session or 0, self.clock.now
+        try:
+            return self.outbox.encode(message.source, body, now, session)
+        except ProtocolError:
+            self.recorder.counters["replies cut short"] += 1
+            short = m.Reply(body.answers, body.code, "")
+            return self.outbox.encode(message.source, short, now, session)
 
     def read(self, data: bytes, source: str | None = None) -> m.Message | None:
         """A message from bytes; None, and counted, if it is not valid or not from `source`."""

@@ -8,6 +8,9 @@ from typing import NamedTuple
 
 from dva_sim.clock import Clock
 from dva_sim.network.patterns import Answer, Request
+from dva_sim.protocol.codec import decode
+from dva_sim.protocol.errors import ProtocolError
+from dva_sim.protocol.messages import Emergency
 
 LIMIT = 1000  # ZeroMQ's default high-water mark: a full subscriber keeps the oldest
 
@@ -57,11 +60,12 @@ class Inbox:
     def request(self, request: Request) -> None:
         """A request has arrived; somebody waits for the answer.
 
-        Only the kind of message is looked at here; it is validated when its turn comes.
+        Only what calls itself an emergency is validated here, so that nothing else overtakes;
+        the rest is when its turn comes.
         """
         data = request.data
         queue = self._control
-        if b"<EmergencyMsg>" in data:
+        if b"<EmergencyMsg" in data and _is_emergency(data):
             queue = self._emergencies
         elif b"<SetTeleOp>" in data:
             queue = self._commands
@@ -101,3 +105,10 @@ class Inbox:
     def _done(self, letter: Letter) -> None:
         self._handle(letter)
         self._work()
+
+
+def _is_emergency(data: bytes) -> bool:
+    try:
+        return isinstance(decode(data).body, Emergency)
+    except ProtocolError:
+        return False

@@ -157,11 +157,14 @@ class RobotController:
             return Decision(m.NOT_PERMITTED, "only the DVA grants permissions")
         if body.level == "sensors":
             return self._observer(body)
+        held = self.grant
+        if held is not None and (held.holder, held.session) == (body.holder, body.session):
+            self.grant = body  # the same session, told again: the holder may have moved
+            return Decision(m.OK)
         if body.session <= self.highest_session:
-            old = body == self.grant
-            return Decision(m.OK if old else m.BAD_SESSION, "" if old else "that session is over")
+            return Decision(m.BAD_SESSION, "that session is over")
         self.grant, self.highest_session = body, body.session
-        self.last_order_id = 0
+        self.last_order_id = self.last_set_id = 0
         if self.owner is not None:
             self._idle()
             return Decision(m.OK, set_point=STAND)
@@ -181,6 +184,9 @@ class RobotController:
         observer = self.observers.get(body.holder)
         if observer is not None and observer.session == body.session:
             del self.observers[body.holder]
+            return Decision(m.OK)
+        # Its grant may still be on the way, and must find that it is over.
+        self.highest_session = max(self.highest_session, body.session)
         if self.grant is None or self.grant.session != body.session:
             return Decision(m.OK)
         self.grant = None
@@ -194,12 +200,16 @@ class RobotController:
         grants = (self.grant, self.observers.get(message.source))
         held = [g for g in grants if g is not None and g.holder == message.source]
         if body.sensor not in {sensor.name for sensor in self.sensors}:
-            return Decision(m.UNKNOWN_SENSOR, f"no sensor {body.sensor!r}; {self._what_there_is()}")
+            return Decision(m.UNKNOWN_SENSOR, f"no sensor of that name; {self._what_there_is()}")
         if not any(body.sensor in grant.sensors for grant in held):
             return Decision(m.NOT_PERMITTED, f"{message.source} may not subscribe to {body.sensor}")
         if message.session not in {g.session for g in held if body.sensor in g.sensors}:
             return Decision(m.BAD_SESSION, f"session {message.session} is not the current one")
         return Decision(m.OK)
+
+    def may_read(self, device: str) -> bool:
+        """Whether a device holds any permission to read sensors."""
+        return device in self.observers or (self.grant is not None and self.grant.holder == device)
 
     def _what_there_is(self) -> str:
         names: Iterable[str] = (sensor.name for sensor in self.sensors)
@@ -240,13 +250,16 @@ class RobotController:
         refusal = self._refusal(message, "teleoperation")
         if refusal is not None:
             return refusal
-        if self.mode is Mode.TELEOPERATION and self.owner == message.source:
-            return Decision(m.OK, "already started")
-        refusal = self._begin(message, arrived, moving) or self._order(message)
+        again = self.mode is Mode.TELEOPERATION and self.owner == message.source
+        refusal = None if again else self._begin(message, arrived, moving)
+        refusal = refusal or self._order(message)
         if refusal is not None:
             return refusal
+        self.last_set_id = max(self.last_set_id, message.message_id)
+        if again:
+            return Decision(m.OK, "already started")
         self.mode, self.owner = Mode.TELEOPERATION, message.source
-        self.last_set_id, self.last_valid = message.message_id, now
+        self.last_valid = now
         return Decision(m.OK, set_point=STAND)
 
     def _set(self, message: m.Message, body: m.SetTeleOp, arrived: float, now: float) -> Decision:

@@ -117,7 +117,7 @@ class RobotAgent:
         self.device, self.controller = device, controller
         self.body, self._world, self._planner, self._setup = body, world, planner, setup
         self._drive_of = drive_of
-        self.applied = self.refused = 0
+        self.applied = self.refused = self._missions = 0
         self.picture_age: float | None = None
         self.trace: Trace | None = None
         self.inbox = Inbox(
@@ -151,7 +151,7 @@ class RobotAgent:
         if letter.answer is None:
             owner = self.controller.owner
             message = self.device.read(letter.data, owner)
-            if message is not None:
+            if message is not None and message.destination == self.device.id_tag:
                 self._decide(message, letter.arrived)
             return
 
@@ -191,7 +191,8 @@ class RobotAgent:
             case m.PermissionGrant(holder=holder, address=str(address)):
                 self.device.network.introduce(holder, address)
             case m.PermissionRevocation(holder=holder):
-                self._sensing.end(holder)
+                if not self.controller.may_read(holder):
+                    self._sensing.end(holder)
         return decision
 
     def _log_command(
@@ -258,9 +259,12 @@ class RobotAgent:
         driver = Pursuit(AUTOPILOT, Reach(self.body.spec.max_speed, self.body.spec.max_turn_rate))
         route: list[Route] = []
 
+        self._missions += 1
+        number = self._missions
+
         def step() -> bool:
-            if self.controller.mode is not Mode.MISSION:
-                return False
+            if self.controller.mode is not Mode.MISSION or number != self._missions:
+                return False  # stopped, or another mission has begun since
             seen = self.observe()
             if not route:
                 points = self._planner.path((seen.x, seen.y), goals[0]) if goals else None

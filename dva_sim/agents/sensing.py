@@ -10,6 +10,7 @@ from dva_sim.protocol import messages as m
 
 LEASE = 60.0  # a subscription that is not renewed ends by itself after this [s]
 MOST = 64  # subscriptions at one robot
+FASTEST, SLOWEST = 20.0, 0.02  # values that a robot gives [Hz]
 
 
 @dataclass(frozen=True)
@@ -27,11 +28,11 @@ def topic_of_sensor(sensor: str, subscriber: str) -> str:
 
 @dataclass
 class _Subscribed:
-    """One subscription: how often [s], until when [s]; the number tells it from earlier ones."""
+    """One subscription: how often [s], until when [s], and when the next value is due [s]."""
 
     period: float
     until: float
-    number: int
+    due: float
 
 
 class SensorDesk:
@@ -46,9 +47,9 @@ class SensorDesk:
     def __init__(
         self, device: Device, sensors: Mapping[str, SensorPort], tick: Callable[[float], int]
     ) -> None:
-        self._device, self._sensors, self._tick = device, sensors, tick
+        self._device, self._sensors, self._tick_of = device, sensors, tick
         self._subscribed: dict[tuple[str, str], _Subscribed] = {}
-        self._number = 0
+        self._ticking = False
 
     def subscribe(self, subscriber: str, wish: m.DevSub) -> tuple[int, str]:
         """Begin, renew, change or end a subscription: reply code, and why."""
@@ -57,16 +58,18 @@ class SensorDesk:
         if wish.frequency == 0.0:
             self._subscribed.pop(key, None)
             return m.OK, ""
+        if not SLOWEST <= wish.frequency <= FASTEST:
+            return m.NOT_SUPPORTED, f"a value is given {SLOWEST:g} to {FASTEST:g} times a second"
+        self._forget_who_vanished(now)
         known = self._subscribed.get(key)
-        if known is not None and known.period == 1.0 / wish.frequency:
-            known.until = now + LEASE
-            return m.OK, ""
         if known is None and len(self._subscribed) >= MOST:
             return m.BUSY, f"{MOST} subscriptions are all that this robot serves"
-        self._number += 1
         period = 1.0 / wish.frequency
-        begun = self._subscribed[key] = _Subscribed(period, now + LEASE, self._number)
-        self._device.clock.every(period, lambda: self._publish(key, begun))
+        due = now if known is None else min(known.due, now + period)
+        self._subscribed[key] = _Subscribed(period, now + LEASE, due)
+        if not self._ticking:
+            self._ticking = True
+            self._device.clock.every(1.0 / FASTEST, self._tick)
         return m.OK, ""
 
     def end(self, subscriber: str) -> None:
@@ -74,16 +77,22 @@ class SensorDesk:
         for key in [key for key in self._subscribed if key[1] == subscriber]:
             del self._subscribed[key]
 
-    def _publish(self, key: tuple[str, str], begun: _Subscribed) -> bool:
-        """One value; False when the subscription has ended or another took its place."""
-        current, now = self._subscribed.get(key), self._device.clock.now
-        if current is None or current.number != begun.number:
-            return False
-        if now > current.until:
+    def _forget_who_vanished(self, now: float) -> None:
+        for key in [key for key, held in self._subscribed.items() if held.until < now]:
             del self._subscribed[key]
-            return False
-        sensor, subscriber = key
+
+    def _tick(self) -> bool:
+        """Publish what is due. One timer for all: nobody can fill the clock with wishes."""
+        now = self._device.clock.now
+        self._forget_who_vanished(now)
+        for (sensor, subscriber), held in self._subscribed.items():
+            if now >= held.due - 1e-9:
+                held.due = max(held.due + held.period, now)
+                self._publish(sensor, subscriber, now)
+        self._ticking = bool(self._subscribed)
+        return self._ticking
+
+    def _publish(self, sensor: str, subscriber: str, now: float) -> None:
         port = self._sensors[sensor]
-        body = m.SensorValue(sensor, port.read(now), port.unit, self._tick(now))
+        body = m.SensorValue(sensor, port.read(now), port.unit, self._tick_of(now))
         self._device.publish(topic_of_sensor(sensor, subscriber), body)
-        return True

@@ -305,12 +305,15 @@ def _has_more(socket: Socket) -> bool:
 
 def _next_of(socket: Socket) -> list[bytes] | None:
     """The next message; None if all are read, or the last one has led to closing the socket."""
-    if socket.closed or not _has_more(socket):
-        return None
+    return None if socket.closed or not _has_more(socket) else _receive(socket)
+
+
+def _receive(socket: Socket) -> list[bytes] | None:
+    """A message, if there is one: what a REQ socket had may be the copy of a reply."""
     try:
         return socket.recv_multipart(NOBLOCK)
     except zmq.Again:
-        return None  # what a REQ socket had was the copy of a reply, and it threw that away
+        return None
 
 
 def _text(option: object) -> str:
@@ -396,6 +399,12 @@ class _ReqWire(_Wire):
         """See `Wire`; the last one sent must have been answered."""
         self._tag = tag
         self._network.send(self._socket, [data])
+
+    def _replies(self) -> None:
+        """There is one at most: asking whether there are more would delay every command."""
+        frames = _receive(self._socket)
+        if frames is not None:
+            self._reply(frames)
 
     def _reply(self, frames: list[bytes]) -> None:
         if len(frames) == 1:
