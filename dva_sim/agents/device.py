@@ -11,7 +11,7 @@ from dva_sim.network.patterns import Request, Requester, Transport
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode, encode
 from dva_sim.protocol.errors import ProtocolError
-from dva_sim.protocol.exchange import Outbox, ReplyCache
+from dva_sim.protocol.exchange import NOON, Outbox, ReplyCache
 from dva_sim.recorder import Recorder
 from dva_sim.worlds.geo import GeoFrame
 
@@ -49,6 +49,7 @@ class Device:
         timeout: Of a request on the acknowledged channel [s].
         attempts: Of the same.
         labels: Names of all devices by id, for the timeline.
+        time_of_day: When the run starts [s since midnight], and whether timestamps are exact.
     """
 
     id_tag: str
@@ -62,12 +63,13 @@ class Device:
     timeout: float
     attempts: int
     labels: dict[str, str]
+    time_of_day: tuple[float, bool] = (NOON, False)
     outbox: Outbox = field(init=False)
     _requesters: dict[tuple[str, bool], Requester] = field(default_factory=dict)
     _replies: ReplyCache = field(default_factory=ReplyCache)
 
     def __post_init__(self) -> None:
-        self.outbox = Outbox(self.id_tag)
+        self.outbox = Outbox(self.id_tag, *self.time_of_day)
         self.labels[self.id_tag] = self.label
 
     @property
@@ -178,7 +180,7 @@ class Device:
             self.recorder.counters[f"refused: {m.CODE_NAMES[body.code]}"] += 1
         reply = self.reply(message, body)
         # An emergency acts whenever it comes: a button whose bytes never change must not fail.
-        return reply if urgent(message) else self._replies.put(sender, data, reply)
+        return reply if urgent(message) else self._replies.put(sender, message.source, data, reply)
 
     def _imposture(self, message: m.Message, sender: str | None) -> m.Reply | None:
         """The refusal of a message that speaks for another device than its key is of.

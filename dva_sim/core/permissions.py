@@ -22,6 +22,7 @@ class Grant:
         level: `teleoperation`, `missions`, `both` or `sensors`.
         session: Fencing token: a robot obeys only the highest it was told.
         sensors: Sensors that the holder may subscribe to.
+        address: Where the holder is found.
     """
 
     robot: str
@@ -29,6 +30,7 @@ class Grant:
     level: str
     session: int
     sensors: tuple[str, ...] = ()
+    address: str | None = None
 
 
 @dataclass
@@ -47,33 +49,43 @@ class Permissions:
     observers: dict[tuple[str, str], Grant] = field(default_factory=dict)
 
     def request(
-        self, robot: str, holder: str, level: str, sensors: tuple[str, ...] = ()
-    ) -> Grant | None:
-        """Grant a robot that is free, or already the holder's; None if another holds it."""
-        if level == "sensors":
-            return self._observe(robot, holder, sensors)
-        held = self.grants.get(robot)
+        self,
+        robot: str,
+        holder: str,
+        level: str,
+        sensors: tuple[str, ...] = (),
+        address: str | None = None,
+    ) -> tuple[Grant | None, bool]:
+        """Grant a robot that is free, or already the holder's.
+
+        Returns:
+            The grant, or None if another holds the robot; and whether the robot has to be told:
+            of what it knows already, asked for once more, it has not.
+        """
+        only_sensors = level == "sensors"
+        held = self.observers.get((robot, holder)) if only_sensors else self.grants.get(robot)
         if held is not None and held.holder != holder:
-            return None
-        if held is not None and (held.level, held.sensors) == (level, sensors):
-            return held
-        grant = Grant(robot, holder, level, self._new_session(), sensors)
-        self.grants[robot] = grant
-        return grant
+            return None, False
+        if only_sensors and held is None and len(self.observers) >= MOST_OBSERVERS:
+            return None, False
+        same = held is not None and (held.level, held.sensors) == (level, sensors)
+        session = held.session if held is not None and same else self._new_session(only_sensors)
+        grant = Grant(robot, holder, level, session, sensors, address)
+        if only_sensors:
+            self.observers[robot, holder] = grant
+        else:
+            self.grants[robot] = grant
+        return grant, grant != held
 
-    def _observe(self, robot: str, holder: str, sensors: tuple[str, ...]) -> Grant | None:
-        held = self.observers.get((robot, holder))
-        if held is not None and held.sensors == sensors:
-            return held
-        if held is None and len(self.observers) >= MOST_OBSERVERS:
-            return None
-        grant = Grant(robot, holder, "sensors", self._new_session(), sensors)
-        self.observers[robot, holder] = grant
-        return grant
-
-    def _new_session(self) -> int:
-        self.count += 1
+    def _new_session(self, only_sensors: bool) -> int:
+        """Only the right to drive is fenced by the height of its session."""
+        self.count += not only_sensors
         return self.count << LOW_BITS | self.draw()
+
+    def end(self, session: int) -> None:
+        """A single grant is over, or never began."""
+        _drop_session(self.grants, session)
+        _drop_session(self.observers, session)
 
     def release(self, holder: str, robot: str | None = None) -> list[Grant]:
         """Take back the right to drive from `holder`: of one robot, or of all; what that was."""
@@ -90,3 +102,8 @@ def _take(grants: dict[K, Grant], holder: str, robot: str | None) -> list[Grant]
     for key in taken:
         del grants[key]
     return list(taken.values())
+
+
+def _drop_session(grants: dict[K, Grant], session: int) -> None:
+    for key in [key for key, grant in grants.items() if grant.session == session]:
+        del grants[key]

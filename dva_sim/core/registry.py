@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass, field
 
 from dva_sim.protocol.messages import Device, Position, Registration
@@ -21,7 +22,7 @@ class Entry:
         mode: Last known mode of a robot.
         order: Event that it is working on.
         silent: Whether it has been quiet for longer than the time-out.
-        registered_by: MessageID of its last registration.
+        registrations: MessageID and timestamp of its last ones.
         free_from: Until then it is given no order, because it declined one [s].
     """
 
@@ -31,8 +32,17 @@ class Entry:
     mode: str = "Idle"
     order: int | None = None
     silent: bool = False
-    registered_by: int = 0
+    registrations: deque[tuple[int, str]] = field(default_factory=lambda: deque(maxlen=8))
     free_from: float = 0.0
+
+    def is_new_life(self, message_id: int, timestamp: str) -> bool:
+        """Whether a registration says that the device has started anew: MessageIDs go back.
+
+        A copy of an earlier registration, sent again or come late, does not say so.
+        """
+        if not self.registrations or (message_id, timestamp) in self.registrations:
+            return False
+        return message_id <= self.registrations[-1][0]
 
 
 @dataclass
@@ -41,15 +51,12 @@ class Registry:
 
     Attributes:
         silent_after: How long a device may be quiet before it counts as gone [s].
+        most: How many devices there may be.
     """
 
     silent_after: float = 10.0
+    most: int = MAX_DEVICES
     entries: dict[str, Entry] = field(default_factory=dict)
-
-    def is_new_life(self, id_tag: str, message_id: int) -> bool:
-        """Whether a known device has started anew: its MessageIDs have gone back."""
-        known = self.entries.get(id_tag)
-        return known is not None and message_id <= known.registered_by
 
     def register(self, id_tag: str, request: Registration, now: float) -> Entry | None:
         """Enter a device, or renew its entry; None if the registry is full."""
@@ -59,7 +66,7 @@ class Registry:
             known.device = device
             self.heard(id_tag, now)
             return known
-        if len(self.entries) >= MAX_DEVICES:
+        if len(self.entries) >= self.most:
             return None
         entry = self.entries[id_tag] = Entry(device, now)
         return entry

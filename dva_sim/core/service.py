@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dva_sim.core.dispatch import Policy, Responder, Situation
 from dva_sim.core.events import Event, EventBook, State
-from dva_sim.core.permissions import Permissions
-from dva_sim.core.registry import DETECTOR, GUARD, OPERATOR, ROBOT, Entry, Registry
+from dva_sim.core.permissions import Grant, Permissions
+from dva_sim.core.registry import GUARD, OPERATOR, ROBOT, Entry, Registry
 from dva_sim.protocol import messages as m
 
+LIST_BYTES = 7000  # of a device list, the rest of the message apart [B]
+DEVICE_BYTES = 175  # of one device without its label, at most [B]
+CONSIDERED = 200  # oldest pending events that one decision looks at
+MOST_EVENTS = 10_000
 DECLINED_PAUSE = 10.0  # who declines an order, or is not reached, is not asked again for [s]
 MAX_ATTEMPTS = 4  # orders given for one event before it is escalated
 
@@ -57,6 +63,7 @@ class Desk:
     book: EventBook = field(default_factory=EventBook)
     refused: int = 0
     _revocations: list[Send] = field(default_factory=list)
+    _unheard: deque[Send] = field(default_factory=lambda: deque(maxlen=1000))
 
     def handle(self, message: m.Message, now: float) -> tuple[m.Reply, list[Send]]:
         """Take a request; the reply goes to the sender, the rest where it says."""
@@ -103,6 +110,9 @@ class Desk:
         for event in list(self.book.in_state(State.PENDING)):
             if now - event.pending_since >= self.escalate_after:
                 self.book.move(event, State.ESCALATED, now)
+        # A robot that could not be told that a session is over is told until it has heard.
+        self._revocations += self._unheard
+        self._unheard.clear()
         return self._and_revocations(self._assign(now))
 
     def undelivered(self, send: Send, now: float) -> list[Send]:
@@ -111,7 +121,11 @@ class Desk:
         Nobody set out, so it does not count as an attempt on the event.
         """
         if isinstance(send.body, m.PermissionGrant):
-            self._take_back(send.body.holder, send.to, tell_holder=True)
+            self.permissions.end(send.body.session)
+            over = m.PermissionRevocation(send.to, send.body.holder, send.body.session)
+            self._revocations += [Send(send.to, over), Send(send.body.holder, over)]
+        elif isinstance(send.body, m.PermissionRevocation) and send.to == send.body.device:
+            self._unheard.append(send)
         elif isinstance(send.body, m.Order):
             event = self.book.events[send.body.event_id]
             self._release_order(event)
@@ -123,8 +137,9 @@ class Desk:
 
     def close(self) -> list[Send]:
         """The desk closes: all sessions are over."""
-        for holder in dict.fromkeys(g.holder for g in self.permissions.grants.values()):
-            self._take_back(holder, tell_holder=True)
+        held = [*self.permissions.grants.values(), *self.permissions.observers.values()]
+        for holder in dict.fromkeys(grant.holder for grant in held):
+            self._take_back_all(holder)
         return self._and_revocations([])
 
     def _and_revocations(self, sends: list[Send]) -> list[Send]:
@@ -132,23 +147,30 @@ class Desk:
         revocations, self._revocations = self._revocations, []
         return revocations + sends
 
-    def _take_back(self, holder: str, robot: str | None = None, tell_holder: bool = False) -> None:
-        """End the right of a device to drive one robot, or any."""
+    def _take_back(self, holder: str, robot: str) -> None:
+        """End the right of a device to drive a robot, which it knows of."""
         for grant in self.permissions.release(holder, robot):
-            body = m.PermissionRevocation(grant.robot, grant.holder, grant.session)
-            self._revocations.append(Send(grant.robot, body))
-            if tell_holder:
-                self._revocations.append(Send(grant.holder, body))
+            self._revocations.append(Send(grant.robot, _over(grant)))
+
+    def _take_back_all(self, holder: str) -> None:
+        """End all rights of a device, and tell it."""
+        for grant in (*self.permissions.release(holder), *self.permissions.forget(holder)):
+            self._revocations.append(Send(grant.robot, _over(grant)))
+            self._revocations.append(Send(grant.holder, _over(grant)))
 
     def _register(
         self, message: m.Message, body: m.Registration, now: float
     ) -> tuple[m.Reply, list[Send]]:
-        if self.registry.is_new_life(message.source, message.message_id):
+        known = self.registry.entries.get(message.source)
+        if known is not None and known.device.device_type != body.device_type:
+            text = f"{message.source} is registered as {known.device.device_type}"
+            return self._refuse(message, m.NOT_PERMITTED, text)
+        if known is not None and known.is_new_life(message.message_id, message.timestamp):
             self._abandon(message.source, now)  # it knows nothing of what it held
         entry = self.registry.register(message.source, body, now)
         if entry is None:
             return self._refuse(message, m.BUSY, "the registry is full")
-        entry.registered_by = message.message_id
+        entry.registrations.append((message.message_id, message.timestamp))
         return m.Reply(message.message_id, m.OK, ""), []
 
     def _permission(
@@ -171,29 +193,37 @@ class Desk:
     ) -> tuple[m.Reply, list[Send]]:
         """Introduce holder and robot to each other: each is told the other's address."""
         holder = self.registry.entries[message.source].device
-        grant = self.permissions.request(body.device, holder.id_tag, body.level, body.sensors)
+        grant, is_news = self.permissions.request(
+            body.device, holder.id_tag, body.level, body.sensors, holder.address
+        )
         if grant is None:
             return self._refuse(message, m.BUSY, f"robot {body.device} is held by another")
         level, session, sensors = grant.level, grant.session, grant.sensors
         content = m.Permission(body.device, level, session, robot.device.address, sensors)
         told = m.PermissionGrant(grant.holder, level, session, holder.address, sensors)
-        return m.Reply(message.message_id, m.OK, "", content), [Send(body.device, told)]
+        sends = [Send(body.device, told)] if is_news else []
+        return m.Reply(message.message_id, m.OK, "", content), sends
 
     def _give_back(
         self, message: m.Message, body: m.PermissionRevocation
     ) -> tuple[m.Reply, list[Send]]:
         """A holder needs its permission no longer; only its own."""
-        held = self.permissions.grants.get(body.device)
-        mine = held is not None and (held.holder, held.session) == (message.source, body.session)
-        if not mine or body.holder != message.source:
+        both = (
+            self.permissions.grants.get(body.device),
+            self.permissions.observers.get((body.device, message.source)),
+        )
+        mine = {g.session for g in both if g is not None and g.holder == message.source}
+        if body.session not in mine or body.holder != message.source:
             return self._refuse(message, m.BAD_SESSION, "that session is not yours, or is over")
-        self._take_back(message.source, body.device)
-        return m.Reply(message.message_id, m.OK, ""), []
+        self.permissions.end(body.session)
+        return m.Reply(message.message_id, m.OK, ""), [Send(body.device, body)]
 
     def _report(
         self, message: m.Message, body: m.EventReport, now: float
     ) -> tuple[m.Reply, list[Send]]:
         if body.event_id is None:
+            if len(self.book.events) >= MOST_EVENTS:
+                return self._refuse(message, m.BUSY, f"{MOST_EVENTS} events are all that fit")
             self.book.report(body.kind, body.position, body.severity, now)
             return m.Reply(message.message_id, m.OK, ""), self._assign(now)
         event = self.book.events.get(body.event_id)
@@ -264,8 +294,7 @@ class Desk:
 
     def _abandon(self, device: str, now: float) -> None:
         """A device is gone: what it held is free, what it was doing is open to others."""
-        self._take_back(device, tell_holder=True)
-        self.permissions.forget(device)
+        self._take_back_all(device)
         for event in self.book.in_state(State.ASSIGNED, State.ON_SCENE):
             if device in (event.responder, event.operator):
                 self._release(event.operator or device, event)
@@ -274,7 +303,7 @@ class Desk:
 
     def _assign(self, now: float) -> list[Send]:
         """Ask the policy, keep what the rules allow, and give the orders."""
-        pending = tuple(self.book.in_state(State.PENDING))
+        pending = tuple(islice(self.book.in_state(State.PENDING), CONSIDERED))
         operators = self._free(OPERATOR, now)
         responders = self._idle_responders(bool(operators), now)
         if not pending or not responders:
@@ -318,7 +347,12 @@ class Desk:
     def _free(self, device_type: str, now: float) -> list[Entry]:
         """Devices of a type that may be given an order."""
         entries = self.registry.of_type(device_type)
-        return [e for e in entries if e.order is None and e.free_from <= now]
+        held = self.permissions.grants
+        return [
+            e
+            for e in entries
+            if e.order is None and e.free_from <= now and e.device.id_tag not in held
+        ]
 
     def _situation(
         self, pending: tuple[Event, ...], responders: tuple[Responder, ...]
@@ -337,13 +371,34 @@ class Desk:
         return Situation(pending, responders, distance, eta)
 
     def _device_list(self, message: m.Message) -> tuple[m.Reply, list[Send]]:
-        devices = [e.device for e in self.registry.entries.values()]
-        shown = tuple(d for d in devices if d.device_type != DETECTOR)[:32]
-        return m.Reply(message.message_id, m.OK, "", m.DeviceList(shown)), []
+        return m.Reply(message.message_id, m.OK, "", m.DeviceList(self._shown())), []
+
+    def _shown(self) -> tuple[m.Device, ...]:
+        """Devices one can do something with, robots first, as many as fit into a message."""
+        known = [e for e in self.registry.entries.values() if not e.silent]
+        shown: list[m.Device] = []
+        room = LIST_BYTES
+        for device_type in (ROBOT, OPERATOR, GUARD):
+            for device in (e.device for e in known if e.device.device_type == device_type):
+                room -= DEVICE_BYTES + len(device.label.encode()) + 4 * _escaped(device.label)
+                if room < 0 or len(shown) == 64:
+                    return tuple(shown)
+                shown.append(device)
+        return tuple(shown)
 
     def _refuse(self, message: m.Message, code: int, text: str) -> tuple[m.Reply, list[Send]]:
         self.refused += 1
         return m.Reply(message.message_id, code, text), []
+
+
+def _escaped(text: str) -> int:
+    """How many characters take more room in XML, up to four bytes each."""
+    return sum(text.count(sign) for sign in "&<>")
+
+
+def _over(grant: Grant) -> m.PermissionRevocation:
+    """The word that a session is over."""
+    return m.PermissionRevocation(grant.robot, grant.holder, grant.session)
 
 
 def _leave_out_who_failed(

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from dva_sim.errors import DvaSimError
 from dva_sim.live.options import Options
-from dva_sim.live.process import run_part, say_as_json
+from dva_sim.live.process import Teller, run_part
 
 
 def main(argument: str) -> int:
@@ -22,7 +22,7 @@ def main(argument: str) -> int:
         run_part(
             told["part"],
             Options(**options),
-            say_as_json(sys.stdout),
+            Teller(sys.stdout).say,
             told["number"],
             told["epoch"],
             supervised=True,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import resource
 import secrets
 import statistics
 import time
@@ -22,6 +23,9 @@ from dva_sim.simulation.control_room import add_dva, add_operator
 from dva_sim.simulation.field import Field
 from dva_sim.simulation.stage import Stage
 
+SESSION_EPOCH = 1_735_689_600  # 2025-01-01, UTC [s]
+SESSIONS_PER_SECOND = 4  # enough room in 32 bits for 34 years
+FILES_PER_DEVICE, FILES_APART = 16, 200  # open at the DVA
 RATE_OVER = 5.0  # rates are of so many last seconds [s]
 
 Row = dict[str, Any]
@@ -57,9 +61,12 @@ class DvaPart:
     """The DVA core."""
 
     def __init__(self, stage: Stage) -> None:
-        # Sessions that no one can guess, higher than in any earlier life of the DVA.
-        permissions = Permissions(lambda: secrets.randbits(LOW_BITS), count=int(time.time()))
+        # Sessions that no one can guess, and higher than in any earlier life of the DVA, as
+        # long as that handed out no more than so many a second and the clock was not set back.
+        count = int((time.time() - SESSION_EPOCH) * SESSIONS_PER_SECOND)
+        permissions = Permissions(lambda: secrets.randbits(LOW_BITS), count=count)
         self._agent = add_dva(stage, permissions)
+        self._agent.desk.registry.most = _devices_that_fit()
         self._agent.start()
         self._stage = stage
         self._beats: dict[str, Rate] = {}
@@ -98,6 +105,14 @@ class DvaPart:
     def finish(self) -> None:
         """See `Part`: nobody drives any longer by our permission."""
         self._agent.close()
+
+
+def _devices_that_fit() -> int:
+    """How many devices one process can listen to: each takes some open files."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
+    usable = soft if hard == resource.RLIM_INFINITY else hard
+    return max(1, (usable - FILES_APART) // FILES_PER_DEVICE)
 
 
 class WorldPart:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import socket
 import sys
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
@@ -84,7 +86,8 @@ def run_part(
 
     network = SocketNetwork(clock, ring, tell)
     try:
-        stage = Stage(scenario, options.seed, network, recorder, _joining(network, options, name))
+        joining = _joining(network, options, name)
+        stage = Stage(scenario, options.seed, network, recorder, joining, _time_of_day(clock))
         if options.dva is not None and name != "dva":
             network.introduce(DVA, options.dva)
         part = make_part(name, stage, options, number)
@@ -97,6 +100,14 @@ def run_part(
         say(reporter.report())
     finally:
         network.close()
+
+
+def _time_of_day(clock: LiveClock) -> tuple[float, bool]:
+    """When the run started, by the clock on the wall [s since midnight]; exactly."""
+    started = time.time() - clock.now
+    local = time.localtime(started)
+    whole = local.tm_hour * 3600 + local.tm_min * 60 + local.tm_sec
+    return whole + started % 1.0, True
 
 
 def _joining(network: SocketNetwork, options: Options, name: str) -> Callable[[str, int], str]:
@@ -179,15 +190,29 @@ class _ending:  # noqa: N801 - reads as a statement
         self._writer.close()
 
 
-def say_as_json(stream: TextIO) -> Callable[[Report], None]:
-    """Writes reports for a program to read; one whose reader is gone is not written."""
+class Teller:
+    """Writes reports as lines of JSON for a program to read, and never waits for it.
 
-    def say(report: Report) -> None:
-        with suppress(BrokenPipeError):
-            stream.write(json.dumps(vars(report)) + "\n")
-            stream.flush()
+    A reader that does not read must not stop the robots: what it has no room for is dropped,
+    but for the rest of a line that has begun.
+    """
 
-    return say
+    def __init__(self, stream: TextIO) -> None:
+        self._file, self._rest = stream.fileno(), b""
+        os.set_blocking(self._file, False)
+
+    def say(self, report: Report) -> None:
+        """Write a report, if there is room."""
+        if not self._flush():
+            return
+        self._rest = json.dumps(vars(report)).encode() + b"\n"
+        self._flush()
+
+    def _flush(self) -> bool:
+        with suppress(BlockingIOError, BrokenPipeError):
+            while self._rest:
+                self._rest = self._rest[os.write(self._file, self._rest) :]
+        return not self._rest
 
 
 def default_dva() -> str:

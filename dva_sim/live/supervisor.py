@@ -64,7 +64,7 @@ class Supervisor:
         self._options, self._hear = options, hear
         self._children: list[_Child] = []
         self._selector = selectors.DefaultSelector()
-        self._epoch = time.time()
+        self._epoch, self._started = time.time(), time.monotonic()
         self._interrupted = False
         self._settled_since: float | None = None
 
@@ -135,11 +135,15 @@ class Supervisor:
     def _watch(self, limit: float) -> str:
         while not self._interrupted:
             self._listen()
-            if time.time() - self._epoch > limit:
+            if time.monotonic() - self._started > limit or self._some_are_done():
                 return "time is up"
             if self._all_settled():
                 return "settled"
         return "interrupted"
+
+    def _some_are_done(self) -> bool:
+        """Whether a part has come to its end in good order: its time is up, so is ours."""
+        return any(child.process.poll() == 0 for child in self._children)
 
     def _all_settled(self) -> bool:
         reports = [child.latest for child in self._children]
@@ -159,7 +163,7 @@ class Supervisor:
         self._read(LOOK)
         for child in self._children:
             code = child.process.poll()
-            if code is not None and not self._interrupted:
+            if code is not None and code != 0 and not self._interrupted:
                 self._read(0.0)
                 said = child.errors.decode(errors="replace").strip().splitlines()
                 why = said[-1].removeprefix("dva-sim: ") if said else f"exit code {code}"

@@ -22,12 +22,14 @@ from dva_sim.network.security import Refusal, Security, Socket, user_of
 
 DEFAULT_PORT: Final = 5600  # of requests; what is published is on the next one
 LARGEST: Final = 65_536  # ZeroMQ drops who sends longer messages [B]
+LARGEST_TOPIC: Final = 512  # the same of a subscriber [B]
 LARGEST_PICTURE: Final = 2_000_000  # the same of a publisher [B]
 DRAIN: Final = 64  # messages read from one socket before others have their turn
 LINGER: Final = 200  # for last words when a node leaves [ms]
 LOOK_ASIDE: Final = 0.05  # between looks at handshakes [s]
 RETRY: Final = 5.0  # after ZeroMQ gave up to connect [s]
 PORT_TRIES: Final = 50
+MOST_SOCKETS: Final = 60_000
 
 NOBODY: Final = "nobody"  # whose key it is where keys are on and there is none
 
@@ -68,6 +70,8 @@ class SocketNetwork:
     ) -> None:
         self.clock, self._tell = clock, tell
         self._context: zmq.Context[Socket] = zmq.Context()
+        # Each connection needs three; the system's own limit of open files comes first.
+        self._context.set(zmq.MAX_SOCKETS, MOST_SOCKETS)
         self._ring = ring
         # Polled now and then: each socket in the clock's own poller makes every message slower.
         self._aside = zmq.Poller()
@@ -229,7 +233,7 @@ class SocketNetwork:
     def _listener(self, kind: int, node: str) -> Socket:
         socket = self._context.socket(kind)
         socket.linger = LINGER
-        socket.setsockopt(zmq.MAXMSGSIZE, LARGEST)
+        socket.setsockopt(zmq.MAXMSGSIZE, LARGEST_TOPIC if kind == zmq.XPUB else LARGEST)
         try:
             self._security.bind_server(socket, node)
         except DvaSimError:

@@ -38,10 +38,17 @@ _OTHER_ENTITY = re.compile(rb"&(?!(?:amp|lt|gt|quot|apos|#[0-9]++|#x[0-9A-Fa-f]+
 _BLANK_LINES = re.compile(rb"> *+[\t\r\n][ \t\r\n]*+<")
 
 
-def timestamp(seconds_of_day: float) -> str:
-    """Time of day as `HH:MM:SS`; fractions are dropped, midnight wraps."""
-    minutes, seconds = divmod(int(seconds_of_day // 1) % 86_400, 60)
-    return f"{minutes // 60:02}:{minutes % 60:02}:{seconds:02}"
+def timestamp(seconds_of_day: float, exact: bool = False) -> str:
+    """Time of day as `HH:MM:SS`; midnight wraps.
+
+    Args:
+        seconds_of_day: [s]
+        exact: To the microsecond; otherwise fractions are dropped.
+    """
+    whole = int(seconds_of_day // 1)
+    minutes, seconds = divmod(whole % 86_400, 60)
+    told = f"{minutes // 60:02}:{minutes % 60:02}:{seconds:02}"
+    return f"{told}.{int((seconds_of_day - whole) * 1e6):06}" if exact else told
 
 
 def encode(message: Message) -> bytes:

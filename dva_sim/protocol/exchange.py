@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
+from collections import OrderedDict, deque
+from hashlib import blake2b
 
 from dva_sim.protocol.codec import encode, timestamp
 from dva_sim.protocol.messages import Body, Heartbeat, Message
+
+NOON = 43_200.0  # when a run in virtual time begins [s since midnight]
 
 
 class Outbox:
@@ -14,18 +17,20 @@ class Outbox:
     Args:
         source: Id of the device.
         start_of_day: Time of day at which the run starts [s since midnight].
+        exact: Timestamps to the microsecond. In real time they have to tell the messages of a
+            device from those of its former life, which are numbered alike.
     """
 
-    def __init__(self, source: str, start_of_day: float = 43_200.0) -> None:
+    def __init__(self, source: str, start_of_day: float = NOON, exact: bool = False) -> None:
         self.source = source
-        self._start = start_of_day
+        self._start, self._exact = start_of_day, exact
         self._last_id = 0
 
     def message(self, destination: str, body: Body, now: float, session: int = 0) -> Message:
         """A message that is newer than all before it."""
         self._last_id += 1
         held = None if isinstance(body, Heartbeat) else session
-        stamp = timestamp(self._start + now)
+        stamp = timestamp(self._start + now, self._exact)
         return Message(destination, self._last_id, self.source, stamp, held, body)
 
     def encode(self, destination: str, body: Body, now: float, session: int = 0) -> bytes:
@@ -46,20 +51,38 @@ class ReplyCache:
     again, and must not be given the answers of its former life.
 
     Args:
-        size: How many are kept; the oldest are forgotten first.
+        each: How many replies are kept for each source; the oldest are forgotten first, so
+            that no other source can make one's own be forgotten.
+        sources: For how many sources; those longest unheard of are forgotten first.
     """
 
-    def __init__(self, size: int = 256) -> None:
-        self._size = size
-        self._replies: OrderedDict[tuple[str | None, bytes], bytes] = OrderedDict()
+    def __init__(self, each: int = 64, sources: int = 1024) -> None:
+        self._each, self._sources = each, sources
+        self._replies: dict[_Key, bytes] = {}
+        self._order: OrderedDict[str, deque[_Key]] = OrderedDict()
 
     def get(self, sender: str | None, request: bytes) -> bytes | None:
         """The reply to the same request, if it was answered before."""
-        return self._replies.get((sender, request))
+        return self._replies.get(_key(sender, request))
 
-    def put(self, sender: str | None, request: bytes, reply: bytes) -> bytes:
-        """Remember a reply and return it."""
-        self._replies[sender, request] = reply
-        if len(self._replies) > self._size:
-            self._replies.popitem(last=False)
+    def put(self, sender: str | None, source: str, request: bytes, reply: bytes) -> bytes:
+        """Remember a reply to a request of `source`, and return it."""
+        keys = self._order.setdefault(source, deque())
+        self._order.move_to_end(source)
+        key = _key(sender, request)
+        keys.append(key)
+        self._replies[key] = reply
+        if len(keys) > self._each:
+            self._replies.pop(keys.popleft(), None)
+        if len(self._order) > self._sources:
+            _, forgotten = self._order.popitem(last=False)
+            for key in forgotten:
+                self._replies.pop(key, None)
         return reply
+
+
+_Key = tuple[str | None, bytes]
+
+
+def _key(sender: str | None, request: bytes) -> _Key:
+    return sender, blake2b(request, digest_size=16).digest()

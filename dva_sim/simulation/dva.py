@@ -90,7 +90,8 @@ class DvaAgent:
         self._tell_changes()
 
     def _answered(self, send: Send, reply: m.Reply) -> None:
-        if reply.code != m.OK:
+        # Whoever refuses to hear that a session is over has no such session.
+        if reply.code != m.OK and not isinstance(send.body, m.PermissionRevocation):
             self._undelivered(send)
 
     def _undelivered(self, send: Send) -> None:

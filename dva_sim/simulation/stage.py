@@ -10,6 +10,7 @@ from dva_sim.clock import Clock
 from dva_sim.core.registry import DETECTOR, GUARD, OPERATOR, ROBOT
 from dva_sim.errors import ConfigError
 from dva_sim.network.patterns import Transport
+from dva_sim.protocol.exchange import NOON
 from dva_sim.recorder import Recorder
 from dva_sim.scenario import Scenario, robot_profile, site_of
 from dva_sim.simulation.names import DVA, address_of, id_of, label_of
@@ -31,6 +32,7 @@ class Stage:
         network: What carries messages.
         recorder: Told what happens.
         address: Gives a new device its address, by kind and number.
+        time_of_day: See `Device`.
 
     Raises:
         ConfigError: a map that cannot be read, or that the team does not fit on.
@@ -41,6 +43,7 @@ class Stage:
     network: Transport
     recorder: Recorder
     address: Callable[[str, int], str] = address_of
+    time_of_day: tuple[float, bool] = (NOON, False)
     labels: dict[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -77,6 +80,7 @@ class Stage:
             command.timeout_s,
             command.attempts,
             self.labels,
+            self.time_of_day,
         )
 
 

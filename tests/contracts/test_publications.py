@@ -27,6 +27,8 @@ from transports import (
 
 from dva_sim.agents.inbox import Inbox, Letter
 from dva_sim.network.patterns import Request
+from dva_sim.protocol import messages as m
+from dva_sim.protocol.codec import encode
 
 Publish = Callable[..., None]
 
@@ -221,6 +223,7 @@ class SlowRobot:
             letter.answer(b"re: " + letter.data)
 
 
+EMERGENCY = encode(m.Message(ROBOT, 9, TABLET, "12:00:00", 0, m.Emergency()))
 COMMANDS = numbered(40, "<SetTeleOp>")
 
 
@@ -254,7 +257,7 @@ def test_requests_overtake_what_is_published_and_emergencies_overtake_both(
     world.serve(ROBOT, lambda request: held.append(request))
     held: list[Request] = []
     control.ask(*numbered(5, "control"))
-    emergency.ask(b"<EmergencyMsg>")
+    emergency.ask(EMERGENCY)
     world.run_until(lambda: len(held) == 6)
     robot.done.clear()
     for command in COMMANDS[:5]:
@@ -264,7 +267,7 @@ def test_requests_overtake_what_is_published_and_emergencies_overtake_both(
     world.run_until(lambda: control.all_over() and emergency.all_over())
     world.run_until(lambda: robot.done[-1] == COMMANDS[4])
     waiting = COMMANDS[4:5] if latest_wins else COMMANDS[1:5]
-    expected = [COMMANDS[0], b"<EmergencyMsg>", *numbered(5, "control"), *waiting]
+    expected = [COMMANDS[0], EMERGENCY, *numbered(5, "control"), *waiting]
     assert robot.done == expected
 
 

@@ -10,6 +10,7 @@ from dva_sim.core.events import Event, EventBook, State
 from dva_sim.core.permissions import Permissions
 from dva_sim.core.service import MAX_ATTEMPTS, Desk, Pace, Send
 from dva_sim.protocol import messages as m
+from dva_sim.protocol.codec import MAX_BYTES, encode
 
 DVA = "02:00:00:00:00:01"
 ROBOT, OTHER_ROBOT = "02:00:00:01:00:01", "02:00:00:01:00:02"
@@ -76,7 +77,7 @@ def test_who_is_not_registered_is_refused_and_counted(office: Office) -> None:
 def test_the_device_list_shows_everybody_but_detectors(office: Office) -> None:
     content = office.say(OPERATOR, m.GetDeviceList())[0].content
     assert isinstance(content, m.DeviceList)
-    assert [d.device_type for d in content.devices] == ["Guard", "Robot", "TeleOp"]
+    assert [d.device_type for d in content.devices] == ["Robot", "TeleOp", "Guard"]
 
 
 def test_a_robot_is_held_by_one_and_the_robot_is_told(office: Office) -> None:
@@ -296,8 +297,10 @@ def test_a_holder_gives_its_permission_back_and_the_robot_is_told(office: Office
 
 def test_who_reads_sensors_holds_nothing_else_and_needs_no_order(office: Office) -> None:
     driver = granted(office).session
+    office.desk.permissions.draw = lambda: 8
     reader = granted(office, DETECTOR, "sensors").session
     assert reader != driver
+    assert reader >> 32 == driver >> 32  # only the right to drive uses up what makes them grow
     assert office.desk.permissions.grants[ROBOT].holder == OPERATOR
 
 
@@ -339,3 +342,68 @@ def test_a_declined_order_leaves_the_operator_what_it_held_by_itself(office: Off
 def test_all_sessions_end_with_the_desk(office: Office) -> None:
     over = m.PermissionRevocation(ROBOT, OPERATOR, granted(office).session)
     assert office.desk.close() == [Send(ROBOT, over), Send(OPERATOR, over)]
+
+
+def test_a_list_of_any_devices_fits_into_a_message(office: Office) -> None:
+    for number in range(200):
+        name = ("&" if number % 2 else "\U0001f525") * 64
+        office.say(
+            f"02:00:00:01:01:{number:02X}", m.Registration(name, "Robot", "255.255.255.255:65534")
+        )
+    reply = office.say(OPERATOR, m.GetDeviceList())[0]
+    data = encode(m.Message(OPERATOR, 1, DVA, "12:00:00", 0, reply))
+    assert 5000 < len(data) <= MAX_BYTES
+
+
+def test_a_robot_is_told_of_a_permission_once_and_again_when_its_holder_moves(
+    office: Office,
+) -> None:
+    ask = m.PermissionRequest(ROBOT, "both")
+    first = office.say(OPERATOR, ask)[1]
+    assert [type(send.body) for send in first] == [m.PermissionGrant]
+    assert office.say(OPERATOR, ask)[1] == []
+    office.say(OPERATOR, m.Registration("operator", "TeleOp", "192.168.1.77"))
+    moved = office.say(OPERATOR, ask)[1][0].body
+    assert isinstance(moved, m.PermissionGrant)
+    assert moved.address == "192.168.1.77"
+    assert isinstance(first[0].body, m.PermissionGrant)
+    assert moved.session == first[0].body.session
+
+
+def test_a_grant_that_fails_ends_its_own_session_alone(office: Office) -> None:
+    driver = granted(office).session
+    office.desk.permissions.draw = lambda: 8
+    _, sends = office.say(OPERATOR, m.PermissionRequest(ROBOT, "sensors", ("heat_flux",)))
+    office.desk.undelivered(sends[0], 1.0)
+    assert office.desk.permissions.grants[ROBOT].session == driver
+    assert office.desk.permissions.observers == {}
+
+
+def test_a_robot_that_could_not_be_told_is_told_again(office: Office) -> None:
+    session = granted(office).session
+    over = m.PermissionRevocation(ROBOT, OPERATOR, session)
+    sent = office.say(OPERATOR, over)[1][0]
+    assert office.desk.undelivered(sent, 1.0) == []
+    assert office.desk.tick(2.0) == [sent]
+    assert office.desk.tick(3.0) == []
+
+
+def test_a_copy_of_an_old_registration_ends_nothing(office: Office) -> None:
+    registration = m.Registration("operator", "TeleOp", "192.168.1.9")
+    granted(office)
+    first = m.Message(DVA, office.number + 1, OPERATOR, "12:00:01", 0, registration)
+    later = m.Message(DVA, office.number + 9, OPERATOR, "12:00:11", 0, registration)
+    for message in (first, later, first, later):
+        assert office.desk.handle(message, 1.0)[1] == []
+    assert office.desk.permissions.grants[ROBOT].holder == OPERATOR
+
+
+def test_a_device_stays_what_it_is(office: Office) -> None:
+    changed = m.Registration("detector", "TeleOp", "192.168.1.9")
+    assert office.say(DETECTOR, changed)[0].code == m.NOT_PERMITTED
+
+
+def test_a_robot_that_somebody_holds_is_sent_nowhere_by_another(office: Office) -> None:
+    office.say(OTHER_OPERATOR, m.Registration("second", "TeleOp", "192.168.1.10"))
+    granted(office)
+    assert [send.to for send in office.fire(12)] == [GUARD]
