@@ -95,12 +95,17 @@ class Inbox:
             self._work()
 
     def _work(self) -> None:
-        for queue in (self._emergencies, self._control, self._commands):
-            if queue:
-                self._busy = True
-                self._clock.call_after(self._processing, self._done, queue.popleft())
+        """Take the next letter; where processing takes no time, all of them."""
+        while True:
+            queue = next((q for q in (self._emergencies, self._control, self._commands) if q), None)
+            self._busy = queue is not None
+            if queue is None:
                 return
-        self._busy = False
+            letter = queue.popleft()
+            if self._processing > 0.0:
+                self._clock.call_after(self._processing, self._done, letter)
+                return
+            self._handle(letter)
 
     def _done(self, letter: Letter) -> None:
         self._handle(letter)
