@@ -77,3 +77,38 @@ def test_an_answer_to_what_could_not_be_read_is_taken(device: Device) -> None:
     device.ask(DVA, m.GetDeviceList(), lambda reply: codes.append(reply.code))
     device.clock.run(3.0)
     assert codes == [m.BAD_MESSAGE]
+
+
+def test_a_message_to_another_device_is_refused_unless_it_is_an_emergency(device: Device) -> None:
+    acted: list[m.Body] = []
+
+    def act(message: m.Message) -> m.Reply:
+        acted.append(message.body)
+        return m.Reply(message.message_id, m.OK, "")
+
+    for body, expected in ((m.StartTeleOp(), m.UNKNOWN_DEVICE), (m.Emergency(), m.OK)):
+        data = encode(m.Message(THIEF, 5, ROBOT, "12:00:00", 0, body))
+        assert code(device.answer(data, act)) == expected
+    assert acted == [m.Emergency()]
+
+
+def test_a_reason_too_long_for_a_reply_leaves_its_code(device: Device) -> None:
+    """Else whoever finds a way to make one could end the receiver."""
+    refuse = lambda message: m.Reply(message.message_id, m.BUSY, "x" * 300)  # noqa: E731
+    assert code(device.answer(request(m.GetDeviceList()), refuse)) == m.BUSY
+
+
+def test_the_requests_of_others_do_not_make_a_reply_forgotten(device: Device) -> None:
+    acted: list[str] = []
+
+    def act(message: m.Message) -> m.Reply:
+        acted.append(message.source)
+        return m.Reply(message.message_id, m.OK, "")
+
+    mine = request(m.GetDeviceList())
+    device.answer(mine, act)
+    for number in range(1, 500):
+        other = m.Message(ME, number, THIEF, "12:00:00", 0, m.GetDeviceList())
+        device.answer(encode(other), act)
+    device.answer(mine, act)
+    assert acted.count(ROBOT) == 1

@@ -232,3 +232,23 @@ def test_a_robot_tells_everybody_which_sensors_it_has(sensing: Bench) -> None:
     told = sensing.say("02:00:00:00:00:99", m.GetSensorInfo(), session=0).content
     assert told is not None
     assert [sensor.name for sensor in told.sensors] == ["heat_flux", "smoke"]
+
+
+def test_a_revocation_that_overtakes_its_grant_holds(bench: Bench) -> None:
+    bench.say(DVA, m.PermissionRevocation(ROBOT, ANA, 7))
+    assert bench.say(DVA, m.PermissionGrant(ANA, "both", 7)).code == m.BAD_SESSION
+    assert bench.say(ANA, m.StartTeleOp()).code == m.NOT_PERMITTED
+
+
+def test_a_session_told_again_renews_the_address_and_stops_nothing(driven: Bench) -> None:
+    again = m.PermissionGrant(ANA, "teleoperation", 7, "192.168.1.77")
+    assert driven.say(DVA, again).code == m.OK
+    assert driven.robot.owner == ANA
+    assert driven.robot.grant == again
+
+
+def test_starting_again_makes_older_orders_and_commands_old(driven: Bench) -> None:
+    driven.say(ANA, m.StartTeleOp(), number=60)
+    assert driven.say(ANA, m.SetTeleOp(0.4, 0.0), number=59).code == m.OUT_OF_ORDER
+    assert driven.say(ANA, m.StopTeleOp(), number=58).code == m.OUT_OF_ORDER
+    assert driven.robot.mode is Mode.TELEOPERATION

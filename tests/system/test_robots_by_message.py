@@ -132,3 +132,19 @@ def test_a_sensor_is_read_at_the_frequency_asked_for_while_it_is_permitted() -> 
     assert {value.unit for value in values} == {"kW/m2"}
     ticks = [value.tick for value in values]
     assert ticks == sorted(ticks)
+
+
+def test_a_new_mission_right_after_an_emergency_is_driven_by_one_loop_alone() -> None:
+    run = staged(**{"robot.processing_s": 0.0})
+    robot = run.field.robots[ROBOT]
+    obeyed: list[float] = []
+    drive = robot._obey
+    robot._obey = lambda intent: (obeyed.append(run.clock.now), drive(intent))  # type: ignore[method-assign,assignment,func-returns-value]
+    send(run, 10.0, m.PermissionGrant(DVA, "missions", 5))
+    send(run, 12.0, m.GoTo((place(run, 30.0, 12.0),)))
+    send(run, 12.05, m.Emergency(), session=0)
+    send(run, 12.06, m.GoTo((place(run, 12.0, 12.0),)))
+    run.clock.run(14.0)
+    assert robot.controller.mode == "Mission"
+    last_second = [time for time in obeyed if time > 13.0]
+    assert len(last_second) in (9, 10, 11)
