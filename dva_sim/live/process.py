@@ -70,7 +70,7 @@ def run_part(
         options: What to run and where.
         say: Takes a report each second, and one at the end.
         number: Which operator.
-        epoch: Start of the run, shared by its parts [s since 1970].
+        epoch: Start of the run by `time.monotonic`, which all processes of a machine share [s].
         supervised: End when standard input does: whoever started this process is gone.
 
     Raises:

@@ -18,7 +18,7 @@ from dva_sim.errors import DvaSimError
 from dva_sim.live.options import Options
 from dva_sim.live.process import Report
 
-START_WITHIN = 60.0  # for a part to speak, from its start [s]
+SPEAK_WITHIN = 60.0  # for a part to speak, from its start and after each time [s]
 END_WITHIN = 5.0  # for a part to end by itself once it is asked to [s]
 SETTLED_FOR = 3.0  # all parts settled for so long: the run is over [s]
 LOOK = 0.5  # between looks at whether all parts are still there [s]
@@ -37,6 +37,7 @@ class _Child:
     buffer: bytes = b""
     errors: bytes = b""
     latest: Report | None = None
+    heard: float = field(default_factory=time.monotonic)
 
 
 @dataclass
@@ -64,7 +65,7 @@ class Supervisor:
         self._options, self._hear = options, hear
         self._children: list[_Child] = []
         self._selector = selectors.DefaultSelector()
-        self._epoch, self._started = time.time(), time.monotonic()
+        self._epoch = time.monotonic()
         self._interrupted = False
         self._settled_since: float | None = None
 
@@ -122,20 +123,20 @@ class Supervisor:
 
     def _address_of_dva(self) -> str | None:
         """Where the DVA listens, once it does; None if the user ends the run before that."""
-        deadline = time.monotonic() + START_WITHIN
+        deadline = time.monotonic() + SPEAK_WITHIN
         while not self._interrupted:
             self._listen()
             latest = self._children[0].latest
             if latest is not None and latest.dva is not None:
                 return latest.dva
             if time.monotonic() > deadline:
-                raise PartFailed(f"the DVA said nothing within {START_WITHIN:g} s")
+                raise PartFailed(f"the DVA said nothing within {SPEAK_WITHIN:g} s")
         return None
 
     def _watch(self, limit: float) -> str:
         while not self._interrupted:
             self._listen()
-            if time.monotonic() - self._started > limit or self._some_are_done():
+            if time.monotonic() - self._epoch > limit or self._some_are_done():
                 return "time is up"
             if self._all_settled():
                 return "settled"
@@ -168,6 +169,8 @@ class Supervisor:
                 said = child.errors.decode(errors="replace").strip().splitlines()
                 why = said[-1].removeprefix("dva-sim: ") if said else f"exit code {code}"
                 raise PartFailed(f"{child.name} has ended by itself: {why}")
+            if code is None and time.monotonic() - child.heard > SPEAK_WITHIN:
+                raise PartFailed(f"{child.name} has said nothing for {SPEAK_WITHIN:g} s")
 
     def _read(self, wait: float) -> None:
         for key, _ in self._selector.select(wait):
@@ -182,7 +185,7 @@ class Supervisor:
     def _take_line(self, child: _Child, data: bytes) -> None:
         *lines, child.buffer = (child.buffer + data).split(b"\n")
         for line in lines:
-            child.latest = Report(**json.loads(line))
+            child.latest, child.heard = Report(**json.loads(line)), time.monotonic()
             self._hear(child.name, child.latest)
 
     @staticmethod

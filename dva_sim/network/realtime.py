@@ -25,7 +25,7 @@ class LiveClock(Clock):
     Times are seconds since `epoch`, taken from a clock that never steps back.
 
     Args:
-        epoch: The run's start in seconds since 1970 [s]; processes that share it share
+        epoch: The run's start by `time.monotonic` [s]; processes of a machine that share it share
             their time. Default: now.
 
     Attributes:
@@ -34,7 +34,7 @@ class LiveClock(Clock):
 
     def __init__(self, epoch: float | None = None) -> None:
         super().__init__()
-        elapsed = 0.0 if epoch is None else time.time() - epoch
+        elapsed = 0.0 if epoch is None else time.monotonic() - epoch
         self._origin = time.monotonic_ns() // 1000 - round(elapsed * US)
         self._poller = zmq.Poller()
         self._handlers: dict[Any, Callable[[], object]] = {}
