@@ -15,6 +15,17 @@ from typing import Any, Final
 import zmq
 
 from dva_sim.errors import DvaSimError
+from dva_sim.network.connections import (
+    DRAIN,
+    MORE,
+    NOBLOCK,
+    DealerWire,
+    PublisherSocket,
+    ReqWire,
+    SocketSubscription,
+    SocketWire,
+    has_more,
+)
 from dva_sim.network.keys import KeyRing
 from dva_sim.network.patterns import OnReply, Request, Service
 from dva_sim.network.realtime import LiveClock
@@ -24,7 +35,6 @@ DEFAULT_PORT: Final = 5600  # of requests; what is published is on the next one
 LARGEST: Final = 65_536  # ZeroMQ drops who sends longer messages [B]
 LARGEST_TOPIC: Final = 512  # the same of a subscriber [B]
 LARGEST_PICTURE: Final = 2_000_000  # the same of a publisher [B]
-DRAIN: Final = 64  # messages read from one socket before others have their turn
 LINGER: Final = 200  # for last words when a node leaves [ms]
 LOOK_ASIDE: Final = 0.05  # between looks at handshakes [s]
 RETRY: Final = 5.0  # after ZeroMQ gave up to connect [s]
@@ -32,12 +42,6 @@ PORT_TRIES: Final = 50
 MOST_SOCKETS: Final = 60_000
 
 NOBODY: Final = "nobody"  # whose key it is where keys are on and there is none
-
-# As plain numbers: the arithmetic of pyzmq's enumerations costs more than a system call.
-NOBLOCK: Final = int(zmq.NOBLOCK)
-MORE: Final = int(zmq.NOBLOCK | zmq.SNDMORE)
-EVENTS: Final = int(zmq.EVENTS)
-POLLIN: Final = int(zmq.POLLIN)
 
 
 class NetworkError(DvaSimError):
@@ -81,7 +85,7 @@ class SocketNetwork:
         self._addresses: dict[str, str] = {}
         self._services: dict[str, Service] = {}
         self._routers: dict[str, Socket] = {}
-        self._publishers: dict[str, _Publisher] = {}
+        self._publishers: dict[str, PublisherSocket] = {}
         self._clients: dict[Socket, tuple[str, str]] = {}
 
     # --- who is where ------------------------------------------------------------------
@@ -139,7 +143,7 @@ class SocketNetwork:
             self._discard(router, publisher)
             raise NetworkError(f"found no two free ports in a row on {host}")
         self._routers[node] = router
-        self._publishers[node] = _Publisher(publisher)
+        self._publishers[node] = PublisherSocket(publisher)
         self.clock.watch(router, lambda: self._requests(node, router))
         self.introduce(node, f"{host}:{chosen}")
         return self._addresses[node]
@@ -170,9 +174,9 @@ class SocketNetwork:
         """See `Transport`; the node must have joined."""
         self._services[node] = service
 
-    def connect(self, node: str, peer: str, on_reply: OnReply, pipelined: bool) -> _Wire:
+    def connect(self, node: str, peer: str, on_reply: OnReply, pipelined: bool) -> SocketWire:
         """See `Transport`: by a REQ socket, or by a DEALER."""
-        return (_DealerWire if pipelined else _ReqWire)(self, node, peer, on_reply)
+        return (DealerWire if pipelined else ReqWire)(self, node, peer, on_reply)
 
     def _requests(self, node: str, router: Socket) -> None:
         """Hand the requests that have arrived to the service of a node."""
@@ -183,7 +187,7 @@ class SocketNetwork:
             else:
                 frames, sender = router.recv_multipart(NOBLOCK), None
             self._request(node, router, frames, sender)
-            if not _has_more(router):
+            if not has_more(router):
                 return
 
     def _request(self, node: str, router: Socket, frames: list[bytes], sender: str | None) -> None:
@@ -224,9 +228,9 @@ class SocketNetwork:
 
     def subscribe(
         self, node: str, publisher: str, topic: str, handler: Callable[[Any], object]
-    ) -> _Subscription:
+    ) -> SocketSubscription:
         """See `Transport`."""
-        return _Subscription(self, node, publisher, topic, handler)
+        return SocketSubscription(self, node, publisher, topic, handler)
 
     # --- sockets -----------------------------------------------------------------------
 
@@ -302,24 +306,6 @@ class SocketNetwork:
         self.clock.call_after(RETRY, self._retry, node, peer)
 
 
-def _has_more(socket: Socket) -> bool:
-    """Whether something can be read: asking costs a third of trying in vain."""
-    return bool(socket.getsockopt(EVENTS) & POLLIN)  # type: ignore[operator]
-
-
-def _next_of(socket: Socket) -> list[bytes] | None:
-    """The next message; None if all are read, or the last one has led to closing the socket."""
-    return None if socket.closed or not _has_more(socket) else _receive(socket)
-
-
-def _receive(socket: Socket) -> list[bytes] | None:
-    """A message, if there is one: what a REQ socket had may be the copy of a reply."""
-    try:
-        return socket.recv_multipart(NOBLOCK)
-    except zmq.Again:
-        return None
-
-
 def _text(option: object) -> str:
     """The text of a socket option, which pyzmq gives as bytes."""
     return option.decode() if isinstance(option, bytes) else str(option)
@@ -330,131 +316,3 @@ def _bind(router: Socket, host: str, port: int) -> int:
         router.bind(f"tcp://{host}:{port}")
         return port
     return router.bind_to_random_port(f"tcp://{host}", 20_000, 60_000)
-
-
-class _Publisher:
-    """An XPUB socket, and what its subscribers want."""
-
-    def __init__(self, socket: Socket) -> None:
-        self.socket = socket
-        self._topics: set[str] = set()
-
-    def wanted(self, topic: str) -> bool:
-        """Whether anybody has subscribed to a topic."""
-        self.hear()
-        return any(topic.startswith(known) for known in self._topics)
-
-    def hear(self) -> None:
-        """Who came or went: XPUB tells of the first subscriber and of the last for a topic."""
-        with suppress(zmq.Again):
-            while _has_more(self.socket):
-                said = self.socket.recv(NOBLOCK)
-                topic = said[1:].decode(errors="replace")
-                if said[:1] == b"\x01" and len(self._topics) < 10_000:
-                    self._topics.add(topic)
-                elif said[:1] == b"\x00":
-                    self._topics.discard(topic)
-
-
-class _Wire:
-    """One connection to the service of a peer, as far as REQ and DEALER agree."""
-
-    kind: int
-
-    def __init__(self, network: SocketNetwork, node: str, peer: str, on_reply: OnReply) -> None:
-        self._network, self._on_reply = network, on_reply
-        self._socket = network.client(self.kind, node, peer)
-        self._configure()
-        network.clock.watch(self._socket, self._replies)
-
-    def _configure(self) -> None:
-        """Set the options of this kind of socket."""
-
-    def send(self, tag: int, data: bytes) -> None:
-        """See `Wire`."""
-        raise NotImplementedError
-
-    def close(self) -> None:
-        """See `Wire`."""
-        self._network.close_client(self._socket)
-
-    def _replies(self) -> None:
-        for _ in range(DRAIN):
-            frames = _next_of(self._socket)
-            if frames is None:
-                return
-            self._reply(frames)
-
-    def _reply(self, frames: list[bytes]) -> None:
-        raise NotImplementedError
-
-
-class _ReqWire(_Wire):
-    """A REQ socket: libzmq itself keeps requests and replies in step."""
-
-    kind = zmq.REQ
-
-    def _configure(self) -> None:
-        # A doubled reply must not be taken for the answer to the next request.
-        self._socket.setsockopt(zmq.REQ_CORRELATE, 1)
-        self._tag = 0
-
-    def send(self, tag: int, data: bytes) -> None:
-        """See `Wire`; the last one sent must have been answered."""
-        self._tag = tag
-        self._network.send(self._socket, [data])
-
-    def _replies(self) -> None:
-        """There is one at most: asking whether there are more would delay every command."""
-        frames = _receive(self._socket)
-        if frames is not None:
-            self._reply(frames)
-
-    def _reply(self, frames: list[bytes]) -> None:
-        if len(frames) == 1:
-            self._on_reply(self._tag, frames[0])
-
-
-class _DealerWire(_Wire):
-    """A DEALER socket: the tag travels in front of the request, and comes back."""
-
-    kind = zmq.DEALER
-
-    def send(self, tag: int, data: bytes) -> None:
-        """See `Wire`."""
-        self._network.send(self._socket, [tag.to_bytes(8, "big"), b"", data])
-
-    def _reply(self, frames: list[bytes]) -> None:
-        if len(frames) == 3 and len(frames[0]) == 8 and not frames[1]:
-            self._on_reply(int.from_bytes(frames[0], "big"), frames[2])
-
-
-class _Subscription:
-    """A SUB socket; see `Subscription`."""
-
-    def __init__(
-        self,
-        network: SocketNetwork,
-        node: str,
-        publisher: str,
-        topic: str,
-        handler: Callable[[Any], object],
-    ) -> None:
-        self._network, self._handler = network, handler
-        self._socket = network.client(zmq.SUB, node, publisher)
-        self._socket.subscribe(topic)
-        network.clock.watch(self._socket, self._hear)
-
-    def close(self) -> None:
-        """See `Subscription`."""
-        self._network.close_client(self._socket)
-
-    def _hear(self) -> None:
-        for _ in range(DRAIN):
-            frames = _next_of(self._socket)
-            if frames is None:
-                return
-            if len(frames) == 2:
-                self._handler(frames[1])
-            else:
-                self._network.counters["publications of another form"] += 1
