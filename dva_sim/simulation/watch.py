@@ -40,7 +40,9 @@ def broken_rules(
     spec, speed, turn_rate = robot.body.spec, robot.body.speed, robot.body.turn_rate
     mode = robot.controller.mode
     stopping = spec.max_speed / spec.max_deceleration + 4 * spec.motor_time_constant
-    if mode is not Mode.MISSION and abs(speed) > MOVING and not robot.body.in_contact:
+    # What another robot has pushed moves on, until its own brakes have stopped it.
+    pushed = robot.body.last_touch + stopping >= now
+    if mode is not Mode.MISSION and abs(speed) > MOVING and not pushed:
         allowed = max(_allowed_until(drive, config), last_mission)
         if now > allowed + stopping:
             yield "S1", f"moves at {speed:.2f} m/s, {now - allowed:.1f} s after it had to stop"
@@ -51,7 +53,7 @@ def broken_rules(
             yield "S3", "obeys a session from before the emergency"
     # Comparisons that a nan fails, too.
     within = abs(speed) <= spec.max_speed * SLACK and abs(turn_rate) <= spec.max_turn_rate * SLACK
-    if not within and not robot.body.in_contact:
+    if not within and not pushed:
         yield "S4", f"moves at {speed:.2f} m/s and {turn_rate:.2f} rad/s"
 
 

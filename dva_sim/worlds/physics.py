@@ -100,6 +100,11 @@ class RobotBody:
         return self._touching > 0
 
     @property
+    def last_touch(self) -> float:
+        """When it last touched anything [s]; the time of the last tick while it still does."""
+        return self._world.time if self.in_contact else self._last_touch
+
+    @property
     def speed(self) -> float:
         """Measured speed along the heading [m/s]."""
         velocity, angle = _get_velocity(self.body), _get_angle(self.body)
@@ -212,6 +217,11 @@ class World:
         """The first tick that begins at `time` [s] or later."""
         return math.inf if time == math.inf else -(round(-max(time, 0.0) * US) // self._tick_us)
 
+    @property
+    def time(self) -> float:
+        """Of the last whole tick [s]."""
+        return self._tick * self.dt
+
     def next_tick(self) -> int:
         """The first tick that a set point given now can reach."""
         return max(self._tick, -(-self._now_us // self._tick_us))
@@ -238,7 +248,7 @@ class World:
 
     def _begin(self, arbiter: pymunk.Arbiter, space: pymunk.Space, data: object) -> None:
         """A scrape along a ragged wall is one contact, however many segments it has."""
-        now = self._tick * self.dt
+        now = self.time
         for robot in self._robots_of(arbiter):
             if not robot._touching and now - robot._last_touch > SAME_CONTACT:
                 robot.contacts += 1
@@ -251,7 +261,7 @@ class World:
     def _separate(self, arbiter: pymunk.Arbiter, space: pymunk.Space, data: object) -> None:
         for robot in self._robots_of(arbiter):
             robot._touching -= 1
-            robot._last_touch = self._tick * self.dt
+            robot._last_touch = self.time
 
 
 def _wall(space: pymunk.Space, x1: float, y1: float, x2: float, y2: float) -> pymunk.Segment:

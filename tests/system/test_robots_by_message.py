@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import math
 
+import pymunk
+
 from dva_sim import scenario as scenarios
+from dva_sim.agents.robot import RobotAgent
 from dva_sim.agents.sensing import topic_of_sensor
 from dva_sim.network.patterns import Request
 from dva_sim.protocol import messages as m
@@ -12,6 +15,7 @@ from dva_sim.protocol.codec import decode
 from dva_sim.simulation.field import PHYSICS_TICK
 from dva_sim.simulation.names import DVA, id_of
 from dva_sim.simulation.run import Run
+from dva_sim.simulation.watch import broken_rules
 
 ROBOT = id_of("robot", 1)
 QUIET = {"events": [{"kind": "fire", "at_s": 500}], "horizon_s": 600}
@@ -148,3 +152,21 @@ def test_a_new_mission_right_after_an_emergency_is_driven_by_one_loop_alone() ->
     assert robot.controller.mode == "Mission"
     last_second = [time for time in obeyed if time > 13.0]
     assert len(last_second) in (9, 10, 11)
+
+
+def rules_broken(run: Run, robot: RobotAgent) -> list[str]:
+    now = run.clock.now
+    return [rule for rule, _ in broken_rules(robot, None, run.scenario.robot, 0.0, now)]
+
+
+def test_a_robot_that_another_has_pushed_breaks_no_rule_but_one_that_drives_on_does() -> None:
+    """It slides until its own brakes have stopped it; after that nothing excuses a motion."""
+    run = staged(**{"robot.count": 2, "operator.count": 2})
+    pushed = run.field.robots[ROBOT]
+    run.clock.run(10.0)
+    run.field.world.advance_to(10.0)
+    pushed.body._last_touch = 10.0
+    pushed.body.body.velocity = pymunk.Vec2d(0.1, 0.0).rotated(pushed.body.body.angle)
+    assert rules_broken(run, pushed) == []
+    pushed.body._last_touch = 5.0
+    assert rules_broken(run, pushed) == ["S1"]
