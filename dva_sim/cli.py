@@ -79,7 +79,9 @@ def live(
         str | None, typer.Option(metavar="HOST:PORT", help="Where the DVA listens.")
     ] = None,
     host: Annotated[str, typer.Option(help="Address of this machine to listen on.")] = "127.0.0.1",
-    port: Annotated[int, typer.Option(help="First port of this part; default: free ones.")] = 0,
+    port: Annotated[
+        int, typer.Option(help="First port, two for each device; default: free ones.")
+    ] = 0,
     keys: Annotated[Path | None, typer.Option(help="Folder of keys: CURVE is on.")] = None,
     record: Annotated[Path | None, typer.Option(help="Folder for the robots' traces.")] = None,
     seconds: Annotated[

@@ -26,7 +26,7 @@ class Options:
         operators: `simulated` people, or `scripted`.
         host: Address of this machine to listen on.
         dva: Address of the DVA, `HOST:PORT`.
-        port: First port of this part's devices; each takes two. 0 for free ones.
+        port: First port of the devices of this run, or part; each takes two. 0 for free ones.
         keys: Folder with the keys of the devices; None to run without.
         record: Folder for a trace of each robot's decisions.
         duration: How long the run lasts [s]; None: to the scenario's horizon.

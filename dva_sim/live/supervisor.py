@@ -17,6 +17,7 @@ from typing import IO
 from dva_sim.errors import DvaSimError
 from dva_sim.live.options import Options
 from dva_sim.live.process import Report
+from dva_sim.scenario import Scenario
 
 SPEAK_WITHIN = 60.0  # for a part to speak, from its start and after each time [s]
 END_WITHIN = 5.0  # for a part to end by itself once it is asked to [s]
@@ -83,12 +84,13 @@ class Supervisor:
             for number in (signal.SIGINT, signal.SIGTERM)
         }
         try:
-            self._start("dva", "dva", self._options.dva)
+            self._start("dva", "dva", self._options.dva, port=self._options.port)
             address = self._address_of_dva()
             if address is not None:
-                self._start("world", "world", address)
+                ports = _ports(self._options.port, scenario)
+                self._start("world", "world", address, port=next(ports))
                 for number in range(1, scenario.operator.count + 1):
-                    self._start(f"operator-{number}", "operator", address, number)
+                    self._start(f"operator-{number}", "operator", address, number, next(ports))
             why = self._watch(limit)
         finally:
             self._end_all()
@@ -99,10 +101,10 @@ class Supervisor:
     def _interrupt(self, *_: object) -> None:
         self._interrupted = True
 
-    def _start(self, name: str, part: str, dva: str | None, number: int = 1) -> None:
+    def _start(self, name: str, part: str, dva: str | None, number: int = 1, port: int = 0) -> None:
         """Start a part; it ends when its standard input does, whatever happens to us."""
         process = subprocess.Popen(
-            [sys.executable, "-m", "dva_sim.live", *self._arguments(part, dva, number)],
+            [sys.executable, "-m", "dva_sim.live", *self._arguments(part, dva, number, port)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
@@ -115,8 +117,8 @@ class Supervisor:
             os.set_blocking(stream.fileno(), False)
             self._selector.register(stream, selectors.EVENT_READ, (child, take))
 
-    def _arguments(self, part: str, dva: str | None, number: int) -> Iterator[str]:
-        told = {**vars(self._options), "dva": dva, "port": 0}
+    def _arguments(self, part: str, dva: str | None, number: int, port: int) -> Iterator[str]:
+        told = {**vars(self._options), "dva": dva, "port": port}
         for key in ("keys", "record"):
             told[key] = None if told[key] is None else str(told[key])
         yield json.dumps({"part": part, "number": number, "epoch": self._epoch, "options": told})
@@ -211,3 +213,12 @@ class Supervisor:
                 if stream is not None:
                     stream.close()
         self._selector.close()
+
+
+def _ports(first: int, scenario: Scenario) -> Iterator[int]:
+    """First ports of the world and of each operator, behind the DVA's two; 0 for free ones."""
+    in_world = scenario.robot.count + scenario.guard.count + len(scenario.events)
+    devices = 1
+    while True:
+        yield first + 2 * devices if first else 0
+        devices += in_world if devices == 1 else 1
