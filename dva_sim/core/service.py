@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import islice
@@ -12,8 +11,9 @@ from numpy.typing import NDArray
 
 from dva_sim.core.dispatch import Policy, Responder, Situation
 from dva_sim.core.events import Event, EventBook, State
-from dva_sim.core.permissions import Grant, Permissions
 from dva_sim.core.registry import GUARD, OPERATOR, ROBOT, Entry, Registry
+from dva_sim.core.send import Send
+from dva_sim.core.sessions import Sessions
 from dva_sim.protocol import messages as m
 
 LIST_BYTES = 7000  # of a device list, the rest of the message apart [B]
@@ -22,14 +22,6 @@ CONSIDERED = 200  # oldest pending events that one decision looks at
 MOST_EVENTS = 10_000
 DECLINED_PAUSE = 10.0  # who declines an order, or is not reached, is not asked again for [s]
 MAX_ATTEMPTS = 4  # orders given for one event before it is escalated
-
-
-@dataclass(frozen=True, slots=True)
-class Send:
-    """A message that the DVA wants delivered: to whom, and what."""
-
-    to: str
-    body: m.Body
 
 
 @dataclass(frozen=True)
@@ -50,7 +42,7 @@ class Desk:
         paces: Expected pace of `guard` and `robot`.
         escalate_after: An event that is left without a responder for so long is escalated [s].
         rng: Luck of policies that use it.
-        permissions: Who may act on what.
+        sessions: Who may act on what, and who has to be told.
     """
 
     policy: Policy
@@ -58,12 +50,10 @@ class Desk:
     paces: dict[str, Pace]
     escalate_after: float
     rng: np.random.Generator
-    permissions: Permissions
+    sessions: Sessions
     registry: Registry = field(default_factory=Registry)
     book: EventBook = field(default_factory=EventBook)
     refused: int = 0
-    _revocations: list[Send] = field(default_factory=list)
-    _unheard: deque[Send] = field(default_factory=lambda: deque(maxlen=1000))
 
     def handle(self, message: m.Message, now: float) -> tuple[m.Reply, list[Send]]:
         """Take a request; the reply goes to the sender, the rest where it says."""
@@ -110,9 +100,7 @@ class Desk:
         for event in list(self.book.in_state(State.PENDING)):
             if now - event.pending_since >= self.escalate_after:
                 self.book.move(event, State.ESCALATED, now)
-        # A robot that could not be told that a session is over is told until it has heard.
-        self._revocations += self._unheard
-        self._unheard.clear()
+        self.sessions.remind()
         return self._and_revocations(self._assign(now))
 
     def undelivered(self, send: Send, now: float) -> list[Send]:
@@ -120,43 +108,25 @@ class Desk:
 
         Nobody set out, so it does not count as an attempt on the event.
         """
-        if isinstance(send.body, m.PermissionGrant):
-            self.permissions.end(send.body.session)
-            over = m.PermissionRevocation(send.to, send.body.holder, send.body.session)
-            self._revocations += [Send(send.to, over), Send(send.body.holder, over)]
-        elif isinstance(send.body, m.PermissionRevocation) and send.to == send.body.device:
-            self._unheard.append(send)
-        elif isinstance(send.body, m.Order):
+        if isinstance(send.body, m.Order):
             event = self.book.events[send.body.event_id]
             self._release_order(event)
             self.registry.entries[send.to].free_from = now + DECLINED_PAUSE
             if event.state in (State.ASSIGNED, State.ON_SCENE):
                 event.attempts -= 1
                 self._reopen(event, now)
+        else:
+            self.sessions.undelivered(send)
         return self._and_revocations([])
 
     def close(self) -> list[Send]:
         """The desk closes: all sessions are over."""
-        held = [*self.permissions.grants.values(), *self.permissions.observers.values()]
-        for holder in dict.fromkeys(grant.holder for grant in held):
-            self._take_back_all(holder)
+        self.sessions.take_back_everything()
         return self._and_revocations([])
 
     def _and_revocations(self, sends: list[Send]) -> list[Send]:
         """What to send, after the word that sessions are over."""
-        revocations, self._revocations = self._revocations, []
-        return revocations + sends
-
-    def _take_back(self, holder: str, robot: str) -> None:
-        """End the right of a device to drive a robot, which it knows of."""
-        for grant in self.permissions.release(holder, robot):
-            self._revocations.append(Send(grant.robot, _over(grant)))
-
-    def _take_back_all(self, holder: str) -> None:
-        """End all rights of a device, and tell it."""
-        for grant in (*self.permissions.release(holder), *self.permissions.forget(holder)):
-            self._revocations.append(Send(grant.robot, _over(grant)))
-            self._revocations.append(Send(grant.holder, _over(grant)))
+        return self.sessions.to_tell() + sends
 
     def _register(
         self, message: m.Message, body: m.Registration, now: float
@@ -193,30 +163,19 @@ class Desk:
     ) -> tuple[m.Reply, list[Send]]:
         """Introduce holder and robot to each other: each is told the other's address."""
         holder = self.registry.entries[message.source].device
-        grant, is_news = self.permissions.request(
-            body.device, holder.id_tag, body.level, body.sensors, holder.address
-        )
-        if grant is None:
+        granted = self.sessions.grant(robot.device, holder, body)
+        if granted is None:
             return self._refuse(message, m.BUSY, f"robot {body.device} is held by another")
-        level, session, sensors = grant.level, grant.session, grant.sensors
-        content = m.Permission(body.device, level, session, robot.device.address, sensors)
-        told = m.PermissionGrant(grant.holder, level, session, holder.address, sensors)
-        sends = [Send(body.device, told)] if is_news else []
+        content, sends = granted
         return m.Reply(message.message_id, m.OK, "", content), sends
 
     def _give_back(
         self, message: m.Message, body: m.PermissionRevocation
     ) -> tuple[m.Reply, list[Send]]:
         """A holder needs its permission no longer; only its own."""
-        both = (
-            self.permissions.grants.get(body.device),
-            self.permissions.observers.get((body.device, message.source)),
-        )
-        mine = {g.session for g in both if g is not None and g.holder == message.source}
-        if body.session not in mine or body.holder != message.source:
+        if body.holder != message.source or not self.sessions.give_back(body):
             return self._refuse(message, m.BAD_SESSION, "that session is not yours, or is over")
-        self.permissions.end(body.session)
-        return m.Reply(message.message_id, m.OK, ""), [Send(body.device, body)]
+        return m.Reply(message.message_id, m.OK, ""), []
 
     def _report(
         self, message: m.Message, body: m.EventReport, now: float
@@ -280,7 +239,7 @@ class Desk:
     def _release(self, device: str, event: Event) -> None:
         """The order for an event is over, and with it the right to drive to it."""
         if event.responder is not None:
-            self._take_back(device, event.responder)
+            self.sessions.take_back(device, event.responder)
         self._release_order(event)
 
     def _release_order(self, event: Event) -> None:
@@ -294,7 +253,7 @@ class Desk:
 
     def _abandon(self, device: str, now: float) -> None:
         """A device is gone: what it held is free, what it was doing is open to others."""
-        self._take_back_all(device)
+        self.sessions.take_back_all(device)
         for event in self.book.in_state(State.ASSIGNED, State.ON_SCENE):
             if device in (event.responder, event.operator):
                 self._release(event.operator or device, event)
@@ -347,7 +306,7 @@ class Desk:
     def _free(self, device_type: str, now: float) -> list[Entry]:
         """Devices of a type that may be given an order."""
         entries = self.registry.of_type(device_type)
-        held = self.permissions.grants
+        held = self.sessions.permissions.grants
         return [
             e
             for e in entries
@@ -394,11 +353,6 @@ class Desk:
 def _escaped(text: str) -> int:
     """How many characters take more room in XML, up to four bytes each."""
     return sum(text.count(sign) for sign in "&<>")
-
-
-def _over(grant: Grant) -> m.PermissionRevocation:
-    """The word that a session is over."""
-    return m.PermissionRevocation(grant.robot, grant.holder, grant.session)
 
 
 def _leave_out_who_failed(

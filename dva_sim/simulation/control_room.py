@@ -12,6 +12,7 @@ from dva_sim.agents.tilt import Phone
 from dva_sim.core.dispatch import POLICIES
 from dva_sim.core.permissions import LOW_BITS, Permissions
 from dva_sim.core.service import Desk, Pace
+from dva_sim.core.sessions import Sessions
 from dva_sim.errors import ConfigError
 from dva_sim.protocol import messages as m
 from dva_sim.scenario import guard_profile, phone_profile, population, robot_profile
@@ -35,7 +36,7 @@ def add_dva(stage: Stage, permissions: Permissions | None = None) -> DvaAgent:
         },
         escalate_after=dispatch.escalate_after_s,
         rng=stage.streams["dva/policy"],
-        permissions=permissions or Permissions(lambda: int(draw.integers(2**LOW_BITS))),
+        sessions=Sessions(permissions or Permissions(lambda: int(draw.integers(2**LOW_BITS)))),
     )
     return DvaAgent(stage.device("dva", 1), desk)
 

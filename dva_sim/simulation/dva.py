@@ -8,7 +8,8 @@ from functools import partial
 from dva_sim.agents.device import HEARTBEAT, STATUS, Device
 from dva_sim.core.events import State
 from dva_sim.core.registry import DETECTOR, GUARD, ROBOT
-from dva_sim.core.service import Desk, Send
+from dva_sim.core.send import Send
+from dva_sim.core.service import Desk
 from dva_sim.network.patterns import Subscription
 from dva_sim.protocol import messages as m
 

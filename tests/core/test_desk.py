@@ -8,7 +8,9 @@ import pytest
 from dva_sim.core.dispatch import POLICIES, Assignment, MinEta, Policy, Situation
 from dva_sim.core.events import Event, EventBook, State
 from dva_sim.core.permissions import Permissions
-from dva_sim.core.service import MAX_ATTEMPTS, Desk, Pace, Send
+from dva_sim.core.send import Send
+from dva_sim.core.service import MAX_ATTEMPTS, Desk, Pace
+from dva_sim.core.sessions import Sessions
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import MAX_BYTES, encode
 
@@ -33,7 +35,9 @@ class Office:
     def __init__(self, policy: Policy | None = None) -> None:
         paces = {"guard": Pace(1.3, 20.0), "robot": Pace(0.35, 4.0)}
         rng = np.random.default_rng(1)
-        self.desk = Desk(policy or MinEta(), crow, paces, 60.0, rng, Permissions(lambda: 7))
+        self.desk = Desk(
+            policy or MinEta(), crow, paces, 60.0, rng, Sessions(Permissions(lambda: 7))
+        )
         self.number = 0
         team = {GUARD: "Guard", ROBOT: "Robot", OPERATOR: "TeleOp", DETECTOR: "Sensor"}
         for id_tag, kind in team.items():
@@ -123,7 +127,7 @@ def test_sessions_only_grow(office: Office) -> None:
         content = office.say(OPERATOR, m.PermissionRequest(ROBOT, "teleoperation"))[0].content
         assert isinstance(content, m.Permission)
         sessions.append(content.session)
-        office.desk.permissions.release(OPERATOR)
+        office.desk.sessions.permissions.release(OPERATOR)
     assert sessions == sorted(set(sessions))
 
 
@@ -276,8 +280,8 @@ def test_a_permission_introduces_holder_and_robot_to_each_other(office: Office) 
 
 def test_a_session_grows_above_and_is_luck_below(office: Office) -> None:
     first = granted(office).session
-    office.desk.permissions.release(OPERATOR)
-    office.desk.permissions.draw = lambda: 2**32 - 1
+    office.desk.sessions.permissions.release(OPERATOR)
+    office.desk.sessions.permissions.draw = lambda: 2**32 - 1
     second = granted(office).session
     assert first & (2**32 - 1) == 7
     assert second & (2**32 - 1) == 2**32 - 1
@@ -297,11 +301,11 @@ def test_a_holder_gives_its_permission_back_and_the_robot_is_told(office: Office
 
 def test_who_reads_sensors_holds_nothing_else_and_needs_no_order(office: Office) -> None:
     driver = granted(office).session
-    office.desk.permissions.draw = lambda: 8
+    office.desk.sessions.permissions.draw = lambda: 8
     reader = granted(office, DETECTOR, "sensors").session
     assert reader != driver
     assert reader >> 32 == driver >> 32  # only the right to drive uses up what makes them grow
-    assert office.desk.permissions.grants[ROBOT].holder == OPERATOR
+    assert office.desk.sessions.permissions.grants[ROBOT].holder == OPERATOR
 
 
 def test_a_silent_holder_loses_its_session_and_both_ends_are_told(office: Office) -> None:
@@ -310,7 +314,7 @@ def test_a_silent_holder_loses_its_session_and_both_ends_are_told(office: Office
     sends = office.desk.tick(11.0)
     over = m.PermissionRevocation(ROBOT, OPERATOR, session)
     assert sends == [Send(ROBOT, over), Send(OPERATOR, over)]
-    assert office.desk.permissions.grants == {}
+    assert office.desk.sessions.permissions.grants == {}
 
 
 def test_a_renewed_registration_changes_nothing_and_a_new_life_ends_what_was_held(
@@ -319,7 +323,7 @@ def test_a_renewed_registration_changes_nothing_and_a_new_life_ends_what_was_hel
     registration = m.Registration("operator", "TeleOp", "192.168.1.9")
     session = granted(office).session
     assert office.say(OPERATOR, registration)[1] == []
-    assert office.desk.permissions.grants[ROBOT].session == session
+    assert office.desk.sessions.permissions.grants[ROBOT].session == session
     office.number = 0  # started anew, it counts its messages from 1 again
     over = m.PermissionRevocation(ROBOT, OPERATOR, session)
     assert office.say(OPERATOR, registration)[1] == [Send(ROBOT, over), Send(OPERATOR, over)]
@@ -336,7 +340,7 @@ def test_a_declined_order_leaves_the_operator_what_it_held_by_itself(office: Off
     session = granted(office).session
     order = office.fire(12)[0]
     assert office.desk.undelivered(order, 1.0) == []
-    assert office.desk.permissions.grants[ROBOT].session == session
+    assert office.desk.sessions.permissions.grants[ROBOT].session == session
 
 
 def test_all_sessions_end_with_the_desk(office: Office) -> None:
@@ -372,11 +376,11 @@ def test_a_robot_is_told_of_a_permission_once_and_again_when_its_holder_moves(
 
 def test_a_grant_that_fails_ends_its_own_session_alone(office: Office) -> None:
     driver = granted(office).session
-    office.desk.permissions.draw = lambda: 8
+    office.desk.sessions.permissions.draw = lambda: 8
     _, sends = office.say(OPERATOR, m.PermissionRequest(ROBOT, "sensors", ("heat_flux",)))
     office.desk.undelivered(sends[0], 1.0)
-    assert office.desk.permissions.grants[ROBOT].session == driver
-    assert office.desk.permissions.observers == {}
+    assert office.desk.sessions.permissions.grants[ROBOT].session == driver
+    assert office.desk.sessions.permissions.observers == {}
 
 
 def test_a_robot_that_could_not_be_told_is_told_again(office: Office) -> None:
@@ -395,7 +399,7 @@ def test_a_copy_of_an_old_registration_ends_nothing(office: Office) -> None:
     later = m.Message(DVA, office.number + 9, OPERATOR, "12:00:11", 0, registration)
     for message in (first, later, first, later):
         assert office.desk.handle(message, 1.0)[1] == []
-    assert office.desk.permissions.grants[ROBOT].holder == OPERATOR
+    assert office.desk.sessions.permissions.grants[ROBOT].holder == OPERATOR
 
 
 def test_a_device_stays_what_it_is(office: Office) -> None:

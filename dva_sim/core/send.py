@@ -1,0 +1,15 @@
+"""What the DVA wants delivered."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from dva_sim.protocol import messages as m
+
+
+@dataclass(frozen=True, slots=True)
+class Send:
+    """A message that the DVA wants delivered: to whom, and what."""
+
+    to: str
+    body: m.Body

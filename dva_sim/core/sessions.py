@@ -1,0 +1,93 @@
+"""Sessions as the DVA keeps them: whom it grants what, and who has to hear that it is over."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, field
+
+from dva_sim.core.permissions import Grant, Permissions
+from dva_sim.core.send import Send
+from dva_sim.protocol import messages as m
+
+MOST_UNHEARD = 1000
+
+
+@dataclass
+class Sessions:
+    """Permissions, and the word about their end.
+
+    Attributes:
+        permissions: Who may act on what.
+    """
+
+    permissions: Permissions
+    _over: list[Send] = field(default_factory=list)
+    _unheard: deque[Send] = field(default_factory=lambda: deque(maxlen=MOST_UNHEARD))
+
+    def grant(
+        self, robot: m.Device, holder: m.Device, wish: m.PermissionRequest
+    ) -> tuple[m.Permission, list[Send]] | None:
+        """What the holder is answered, and the robot told if it is news; None if it is held."""
+        grant, is_news = self.permissions.request(
+            robot.id_tag, holder.id_tag, wish.level, wish.sensors, holder.address
+        )
+        if grant is None:
+            return None
+        level, session, sensors = grant.level, grant.session, grant.sensors
+        told = m.PermissionGrant(holder.id_tag, level, session, holder.address, sensors)
+        content = m.Permission(robot.id_tag, level, session, robot.address, sensors)
+        return content, [Send(robot.id_tag, told)] if is_news else []
+
+    def give_back(self, body: m.PermissionRevocation) -> bool:
+        """A holder needs its session no longer; False if it has no such session."""
+        both = (
+            self.permissions.grants.get(body.device),
+            self.permissions.observers.get((body.device, body.holder)),
+        )
+        mine = {g.session for g in both if g is not None and g.holder == body.holder}
+        if body.session not in mine:
+            return False
+        self.permissions.end(body.session)
+        self._over.append(Send(body.device, body))
+        return True
+
+    def take_back(self, holder: str, robot: str) -> None:
+        """End the right of a device to drive a robot, which it knows of."""
+        for grant in self.permissions.release(holder, robot):
+            self._tell(grant, holder_too=False)
+
+    def take_back_all(self, holder: str) -> None:
+        """End all rights of a device, and tell it."""
+        for grant in (*self.permissions.release(holder), *self.permissions.forget(holder)):
+            self._tell(grant, holder_too=True)
+
+    def take_back_everything(self) -> None:
+        """End all rights of everybody."""
+        held = [*self.permissions.grants.values(), *self.permissions.observers.values()]
+        for holder in dict.fromkeys(grant.holder for grant in held):
+            self.take_back_all(holder)
+
+    def undelivered(self, send: Send) -> None:
+        """A robot did not take a grant, or did not hear that one is over."""
+        body = send.body
+        if isinstance(body, m.PermissionGrant):
+            self.permissions.end(body.session)
+            self._tell(Grant(send.to, body.holder, body.level, body.session), holder_too=True)
+        elif isinstance(body, m.PermissionRevocation) and send.to == body.device:
+            self._unheard.append(send)
+
+    def remind(self) -> None:
+        """Tell the robots again that have not heard."""
+        self._over += self._unheard
+        self._unheard.clear()
+
+    def to_tell(self) -> list[Send]:
+        """Who has to hear now that a session is over; each is given out once."""
+        over, self._over = self._over, []
+        return over
+
+    def _tell(self, grant: Grant, holder_too: bool) -> None:
+        body = m.PermissionRevocation(grant.robot, grant.holder, grant.session)
+        self._over.append(Send(grant.robot, body))
+        if holder_too:
+            self._over.append(Send(grant.holder, body))
