@@ -14,19 +14,25 @@ import struct
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from enum import StrEnum
 
 import zmq
 from zmq.utils import z85
 
 from dva_sim.network.greeting import Greeting
 from dva_sim.network.keys import KeyRing
+from dva_sim.network.refusals import (
+    HANDSHAKE_LIMIT,
+    Reason,
+    Refusal,
+    at_client,
+    at_mismatch,
+    at_server,
+)
 
 # Pause before connecting again, up to twice as long by chance. It doubles while nobody listens,
 # but not while somebody listens and hangs up, so the first one is what limits that storm.
 RECONNECT_FIRST = 250  # [ms]
 RECONNECT_MAX = 4_000  # [ms]
-HANDSHAKE_LIMIT = 10_000  # for the other end to answer, whose loop may be busy [ms]
 PATIENCE = 3  # times that a peer may hang up in the handshake before it is told
 STRANGERS_TOLD = 100  # unknown keys that are told one by one; there can be any number
 EVENTS_AT_ONCE = 1_000  # read from a monitor before the loop has its turn again
@@ -44,49 +50,6 @@ _names = itertools.count()
 
 Socket = zmq.Socket[bytes]
 _Way = tuple[str, str, str]  # from which device to which, at which endpoint
-
-
-class Reason(StrEnum):
-    """Why two ends did not come together; the same word at both, as far as an end can know."""
-
-    UNKNOWN_KEY = "unknown key"
-    WRONG_SERVER_KEY = "wrong server key"
-    PLAIN_CLIENT = "client without keys"
-    PLAIN_SERVER = "server without keys"
-    SILENT = "no answer"
-    CLOSED = "closed"
-    NOT_UNDERSTOOD = "not understood"
-
-
-@dataclass(frozen=True)
-class Refusal:
-    """Two ends that did not come together, as seen from one.
-
-    Attributes:
-        device: Whose socket has noticed.
-        peer: The device it wanted to reach; None at a server, which cannot know.
-        endpoint: Where the server is bound; empty where that is not known.
-        reason: Why.
-        why: The same for people.
-    """
-
-    device: str
-    peer: str | None
-    endpoint: str
-    reason: Reason
-    why: str
-
-    def __str__(self) -> str:
-        if self.peer is None:
-            place = f" at {self.endpoint}" if self.endpoint else ""
-            return f"{self.device}{place} refused a connection: {self.why}"
-        return f"{self.device}: handshake with {self.peer} at {self.endpoint} failed: {self.why}"
-
-    @property
-    def gave_up(self) -> bool:
-        """Whether ZeroMQ makes no further attempt; see `Security.retry`."""
-        final = {Reason.UNKNOWN_KEY, Reason.PLAIN_CLIENT, Reason.PLAIN_SERVER}
-        return self.peer is not None and self.reason in final
 
 
 @dataclass
@@ -130,6 +93,7 @@ class Security:
         tell: Callable[[Refusal], object],
     ) -> None:
         self._context, self._poller, self._ring, self._tell = context, poller, ring, tell
+        self._has_keys = ring is not None
         self._watches: dict[Socket, _Watch] = {}
         self._handshakes: dict[_Way, _Handshake] = {}
         self._greetings: dict[Socket, tuple[_Way, Greeting]] = {}
@@ -189,10 +153,6 @@ class Security:
         else:
             return False
         return True
-
-    def vouches(self, frame: zmq.Frame, source: str) -> bool:
-        """Whether a message at a server may say that it is from `source`; anything without keys."""
-        return self._ring is None or speaks_for(user_of(frame), source)
 
     def trouble(self, device: str, peer: str) -> str | None:
         """What stands between a device and its peer now: for the message after a time-out."""
@@ -303,21 +263,12 @@ class Security:
     def _note_server(self, device: str, endpoint: str, event: int, value: int) -> None:
         """A bad key is told with the question for it; a peer that just leaves is no refusal."""
         if event == zmq.EVENT_HANDSHAKE_FAILED_PROTOCOL:
-            reason, why = self._at_server(device, value)
+            reason, why = at_server(self._has_keys, device, value)
             refusal = Refusal(device, None, endpoint, reason, why)
             self.refused[device, reason] += 1
             if refusal not in self._told:  # few: there are few endpoints and few reasons
                 self._told.add(refusal)
                 self._tell(refusal)
-
-    def _at_server(self, device: str, code: int) -> tuple[Reason, str]:
-        if code == zmq.PROTOCOL_ERROR_ZMTP_MECHANISM_MISMATCH:
-            if self._ring is None:
-                return Reason.PLAIN_SERVER, "the other end has keys switched on, this one has not"
-            return Reason.PLAIN_CLIENT, "the other end has no keys, this one wants them"
-        if code == zmq.PROTOCOL_ERROR_ZMTP_CRYPTOGRAPHIC:
-            return Reason.WRONG_SERVER_KEY, f"the other end has a wrong public key of {device}"
-        return Reason.NOT_UNDERSTOOD, "the other end shakes hands in a way not understood"
 
     def _note_client(self, device: str, peer: str, endpoint: str, event: int, value: int) -> None:
         way = device, peer, endpoint
@@ -327,7 +278,7 @@ class Security:
                 self._end_greeting(socket)
             return
         handshake = self._handshakes.setdefault(way, _Handshake())
-        reason, why = self._at_client(device, peer, event, value)
+        reason, why = at_client(self._has_keys, device, peer, event, value)
         self.refused[device, reason] += 1
         handshake.latest = Refusal(device, peer, endpoint, reason, why)
         if event != zmq.EVENT_HANDSHAKE_FAILED_NO_DETAIL or value == errno.EAGAIN:
@@ -368,7 +319,7 @@ class Security:
             return
         device, peer, endpoint = way
         if greeting.theirs not in (None, greeting.mechanism):
-            reason, why = self._at_mismatch(peer)
+            reason, why = at_mismatch(self._has_keys, peer)
             handshake.latest = Refusal(device, peer, endpoint, reason, why)
         self._tell_once(handshake)
 
@@ -377,34 +328,6 @@ class Security:
         self._poller.unregister(socket)
         socket.close()
 
-    def _at_client(self, device: str, peer: str, event: int, code: int) -> tuple[Reason, str]:
-        if event == zmq.EVENT_HANDSHAKE_FAILED_AUTH:
-            return Reason.UNKNOWN_KEY, f"{peer} does not know the key of {device}"
-        if event == zmq.EVENT_HANDSHAKE_FAILED_NO_DETAIL:
-            return self._at_hang_up(peer, code)
-        if code == zmq.PROTOCOL_ERROR_ZMTP_MECHANISM_MISMATCH:
-            return self._at_mismatch(peer)
-        if code == zmq.PROTOCOL_ERROR_ZMTP_CRYPTOGRAPHIC:
-            return Reason.WRONG_SERVER_KEY, f"what answers does not have the key of {peer}"
-        return Reason.NOT_UNDERSTOOD, "what answers shakes hands in a way not understood"
-
-    def _at_mismatch(self, peer: str) -> tuple[Reason, str]:
-        if self._ring is None:
-            return Reason.PLAIN_CLIENT, f"{peer} wants keys, this end has none"
-        return Reason.PLAIN_SERVER, f"{peer} has no keys switched on, this end has"
-
-    def _at_hang_up(self, peer: str, code: int) -> tuple[Reason, str]:
-        """A server does not say that it cannot read a greeting: it hangs up."""
-        if code == errno.EAGAIN:
-            limit = HANDSHAKE_LIMIT // 1000
-            return Reason.SILENT, f"no answer within {limit} s: is it {peer} who listens there?"
-        if self._ring is None:
-            return Reason.CLOSED, f"it hung up: is it {peer} who listens there?"
-        return (
-            Reason.WRONG_SERVER_KEY,
-            f"it hung up, most likely because the public key of {peer} here is not the one it has",
-        )
-
 
 def user_of(frame: zmq.Frame) -> str | None:
     """Whose key a message came with, as told by its last frame, received with `copy=False`."""
@@ -412,8 +335,3 @@ def user_of(frame: zmq.Frame) -> str | None:
         return str(frame.get("User-Id")) or None
     except zmq.ZMQError:
         return None
-
-
-def speaks_for(user: str | None, source: str) -> bool:
-    """Whether the owner of a key may send a message with this `SourceID`: its own only."""
-    return user is not None and user == source

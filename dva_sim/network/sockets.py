@@ -29,7 +29,8 @@ from dva_sim.network.connections import (
 from dva_sim.network.keys import KeyRing
 from dva_sim.network.patterns import OnReply, Request, Service
 from dva_sim.network.realtime import LiveClock
-from dva_sim.network.security import Refusal, Security, Socket, user_of
+from dva_sim.network.refusals import Refusal
+from dva_sim.network.security import Security, Socket, user_of
 
 DEFAULT_PORT: Final = 5600  # of requests; what is published is on the next one
 LARGEST: Final = 65_536  # ZeroMQ drops who sends longer messages [B]
