@@ -76,7 +76,10 @@ def live(
     number: Annotated[int, typer.Option(help="Which operator, with --only operator.")] = 1,
     operators: Annotated[str, typer.Option(metavar="simulated|scripted")] = "simulated",
     dva: Annotated[
-        str | None, typer.Option(metavar="HOST:PORT", help="Where the DVA listens.")
+        str | None,
+        typer.Option(
+            metavar="HOST:PORT", help="Where the DVA listens; 127.0.0.1:5600 with --only."
+        ),
     ] = None,
     host: Annotated[str, typer.Option(help="Address of this machine to listen on.")] = "127.0.0.1",
     port: Annotated[

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from dva_sim.agents.tilt import Phone, TiltCommand
 from dva_sim.network.patterns import Requester, Transport
+from dva_sim.protocol.codec import encode
 from dva_sim.protocol.exchange import Outbox
 from dva_sim.protocol.messages import SetTeleOp
 from dva_sim.recorder import DriveLog, Issued, Recorder
@@ -97,7 +98,7 @@ class CommandSender:
         issued = Issued(made.time, now, command.sample_age)
         self._recorder.command_issued(message.source, message.message_id, issued)
         self._drive.sent += 1
-        return self._outbox.encoded(message)
+        return encode(message)
 
 
 class PublishedCommands(CommandSender):

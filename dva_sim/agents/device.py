@@ -11,7 +11,7 @@ from dva_sim.network.patterns import Request, Requester, Transport
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode, encode
 from dva_sim.protocol.errors import ProtocolError
-from dva_sim.protocol.exchange import NOON, Outbox, ReplyCache
+from dva_sim.protocol.exchange import NOON, Outbox, ReplyCache, key_of
 from dva_sim.recorder import Recorder
 from dva_sim.worlds.geo import GeoFrame
 
@@ -133,7 +133,7 @@ class Device:
                 self._meet(peer, reply)
                 on_reply(reply)
 
-        requester.request(self.outbox.encoded(message), answered, on_failure)
+        requester.request(encode(message), answered, on_failure)
 
     def _reply_to(self, message: m.Message, data: bytes) -> m.Reply | None:
         """The reply in `data`, if it is one, from the device asked, to this very request."""
@@ -167,7 +167,8 @@ class Device:
             handler: Takes it if it is valid and was not answered before.
             sender: Whose key it came by, if keys are used.
         """
-        known = self._replies.get(sender, data)
+        key = key_of(sender, data)
+        known = self._replies.get(key)
         if known is not None:
             return known
         try:
@@ -180,7 +181,7 @@ class Device:
             self.recorder.counters[f"refused: {m.CODE_NAMES[body.code]}"] += 1
         reply = self.reply(message, body)
         # An emergency acts whenever it comes: a button whose bytes never change must not fail.
-        return reply if urgent(message) else self._replies.put(sender, message.source, data, reply)
+        return reply if urgent(message) else self._replies.put(key, message.source, reply)
 
     def _imposture(self, message: m.Message, sender: str | None) -> m.Reply | None:
         """The refusal of a message that speaks for another device than its key is of.

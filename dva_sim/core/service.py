@@ -110,8 +110,10 @@ class Desk:
         """
         if isinstance(send.body, m.Order):
             event = self.book.events[send.body.event_id]
-            self._release_order(event)
             self.registry.entries[send.to].free_from = now + DECLINED_PAUSE
+            if self._holder(event) != send.to:
+                return self._and_revocations([])  # the order is another's by now
+            self._release_order(event)
             if event.state in (State.ASSIGNED, State.ON_SCENE):
                 event.attempts -= 1
                 self._reopen(event, now)

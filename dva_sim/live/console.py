@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from rich.box import SIMPLE_HEAD
@@ -14,8 +15,10 @@ from dva_sim.core.registry import DETECTOR
 from dva_sim.live.options import Options
 from dva_sim.live.process import Report, run_part
 from dva_sim.live.supervisor import Summary, Supervisor
+from dva_sim.network.sockets import DEFAULT_PORT
 
 STORY_LINES = 12
+DEFAULT_DVA = f"127.0.0.1:{DEFAULT_PORT}"  # of a part that is run alone and told no other
 WIDTH = 120  # where there is no terminal to ask [characters]
 COLUMNS = (
     "heard\ns ago",
@@ -134,6 +137,8 @@ def run_one(part: str, options: Options, number: int) -> None:
         DvaSimError: the scenario, the keys or the ports are not as they should be.
     """
     console, board = _console(), Board()
+    if options.dva is None and (part != "dva" or not options.port):
+        options = replace(options, dva=DEFAULT_DVA)
     with Live(console=console, refresh_per_second=4, transient=True) as screen:
 
         def say(report: Report) -> None:

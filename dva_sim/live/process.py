@@ -17,7 +17,7 @@ from dva_sim.live.options import Options
 from dva_sim.live.parts import DvaPart, Part, make_part
 from dva_sim.network.keys import KeyRing
 from dva_sim.network.realtime import LiveClock
-from dva_sim.network.sockets import DEFAULT_PORT, SocketNetwork, split_address
+from dva_sim.network.sockets import SocketNetwork, split_address
 from dva_sim.recorder import Recorder
 from dva_sim.simulation.names import DVA, id_of
 from dva_sim.simulation.stage import Stage
@@ -213,8 +213,3 @@ class Teller:
             while self._rest:
                 self._rest = self._rest[os.write(self._file, self._rest) :]
         return not self._rest
-
-
-def default_dva() -> str:
-    """Where a DVA is looked for if nobody says where: on this machine, at its usual port."""
-    return f"127.0.0.1:{DEFAULT_PORT}"

@@ -37,10 +37,13 @@ class Outbox:
         """The same as bytes."""
         return encode(self.message(destination, body, now, session))
 
-    @staticmethod
-    def encoded(message: Message) -> bytes:
-        """The bytes of a message made here."""
-        return encode(message)
+
+Key = tuple[str | None, bytes]
+
+
+def key_of(sender: str | None, request: bytes) -> Key:
+    """What a request is known by: whose key it came with, if keys are used, and its bytes."""
+    return sender, blake2b(request, digest_size=16).digest()
 
 
 class ReplyCache:
@@ -58,18 +61,17 @@ class ReplyCache:
 
     def __init__(self, each: int = 64, sources: int = 1024) -> None:
         self._each, self._sources = each, sources
-        self._replies: dict[_Key, bytes] = {}
-        self._order: OrderedDict[str, deque[_Key]] = OrderedDict()
+        self._replies: dict[Key, bytes] = {}
+        self._order: OrderedDict[str, deque[Key]] = OrderedDict()
 
-    def get(self, sender: str | None, request: bytes) -> bytes | None:
+    def get(self, key: Key) -> bytes | None:
         """The reply to the same request, if it was answered before."""
-        return self._replies.get(_key(sender, request))
+        return self._replies.get(key)
 
-    def put(self, sender: str | None, source: str, request: bytes, reply: bytes) -> bytes:
+    def put(self, key: Key, source: str, reply: bytes) -> bytes:
         """Remember a reply to a request of `source`, and return it."""
         keys = self._order.setdefault(source, deque())
         self._order.move_to_end(source)
-        key = _key(sender, request)
         keys.append(key)
         self._replies[key] = reply
         if len(keys) > self._each:
@@ -79,10 +81,3 @@ class ReplyCache:
             for key in forgotten:
                 self._replies.pop(key, None)
         return reply
-
-
-_Key = tuple[str | None, bytes]
-
-
-def _key(sender: str | None, request: bytes) -> _Key:
-    return sender, blake2b(request, digest_size=16).digest()

@@ -411,3 +411,20 @@ def test_a_robot_that_somebody_holds_is_sent_nowhere_by_another(office: Office) 
     office.say(OTHER_OPERATOR, m.Registration("second", "TeleOp", "192.168.1.10"))
     granted(office)
     assert [send.to for send in office.fire(12)] == [GUARD]
+
+
+def test_news_of_an_order_that_is_another_responders_by_now_takes_nothing_from_it(
+    office: Office,
+) -> None:
+    """The first one fell silent and was replaced; its request fails only after three attempts."""
+    late = office.fire(12)[0]
+    assert late.to == OPERATOR
+    office.stands(GUARD, 0, now=10.5)
+    office.status(ROBOT, 10, now=10.5)
+    orders = [send for send in office.desk.tick(11.0) if isinstance(send.body, m.Order)]
+    assert [order.to for order in orders] == [GUARD]
+    office.desk.undelivered(late, 27.0)
+    assert office.event().state is State.ASSIGNED
+    assert office.desk.registry.entries[GUARD].order == 1
+    done = m.OrderProgress(1, "arrived")
+    assert office.say(GUARD, done, 30.0)[0].code == m.OK

@@ -33,11 +33,6 @@ class OperatorAgent:
         robot = self.device.label_of(drive.robot)
         return f"{'reads of' if drive.log.started is None else 'drives'} {robot}"
 
-    @property
-    def drive(self) -> Drive | None:
-        """The drive that is going on."""
-        return self._drive
-
     def put_down(self) -> None:
         """Leave: a drive that is going on ends here, and its robot is told to stop."""
         if self._drive is not None:
