@@ -151,8 +151,12 @@ class RobotAgent:
         if letter.answer is None:
             owner = self.controller.owner
             message = self.device.read(letter.data, owner)
-            if message is not None and message.destination == self.device.id_tag:
+            if message is None:
+                return
+            if message.destination == self.device.id_tag:
                 self._decide(message, letter.arrived)
+            else:
+                self.device.recorder.counters["refused: to another device"] += 1
             return
 
         def decide(message: m.Message) -> m.Reply:

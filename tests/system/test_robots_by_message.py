@@ -11,7 +11,7 @@ from dva_sim.agents.robot import RobotAgent
 from dva_sim.agents.sensing import topic_of_sensor
 from dva_sim.network.patterns import Request
 from dva_sim.protocol import messages as m
-from dva_sim.protocol.codec import decode
+from dva_sim.protocol.codec import decode, encode
 from dva_sim.simulation.field import PHYSICS_TICK
 from dva_sim.simulation.names import DVA, id_of
 from dva_sim.simulation.run import Run
@@ -170,3 +170,13 @@ def test_a_robot_that_another_has_pushed_breaks_no_rule_but_one_that_drives_on_d
     assert rules_broken(run, pushed) == []
     pushed.body._last_touch = 5.0
     assert rules_broken(run, pushed) == ["S1"]
+
+
+def test_a_published_command_to_another_robot_is_counted_and_not_obeyed() -> None:
+    run = staged()
+    robot = run.field.robots[ROBOT]
+    other = m.Message(id_of("robot", 2), 1, DVA, "12:00:00", 5, m.SetTeleOp(0.5, 0.0))
+    robot.inbox.published(encode(other))
+    run.clock.run(1.0)
+    assert run.recorder.counters["refused: to another device"] == 1
+    assert robot.refused == 0
