@@ -32,6 +32,7 @@ positions = st.builds(m.Position, real(-90, 90), real(-180, 180))
 speeds = turn_rates = real(-100, 100)
 shares = real(0, 1)
 kinds = st.sampled_from(["fire", "gas_leak", "flood"])
+tasks = st.sampled_from(["confirm", "contain", "stand_by"])
 levels = st.sampled_from(["teleoperation", "missions", "both", "sensors"])
 
 sessions = st.integers(1, UINT64)
@@ -79,9 +80,9 @@ BODIES: dict[type, st.SearchStrategy[m.Body]] = {
         positions,
         shares,
         shares,
-        st.sampled_from(["detected", "confirmed", "refuted"]),
+        st.sampled_from(["detected", "confirmed", "refuted", "contained"]),
     ),
-    m.Order: st.builds(m.Order, numbers, kinds, positions, st.none() | ids),
+    m.Order: st.builds(m.Order, numbers, kinds, positions, st.none() | ids, tasks),
     m.OrderProgress: st.builds(
         m.OrderProgress,
         numbers,
@@ -92,6 +93,7 @@ BODIES: dict[type, st.SearchStrategy[m.Body]] = {
     ),
     m.TaskBid: st.builds(m.TaskBid, numbers, real(0, 1e6)),
     m.TaskAward: st.builds(m.TaskAward, numbers),
+    m.Relocation: st.builds(m.Relocation, positions),
     m.Reply: st.builds(
         m.Reply, st.integers(0, UINT32), st.integers(0, 999), characters(0, 256), contents
     ),

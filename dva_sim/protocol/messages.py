@@ -241,7 +241,7 @@ class EventReport:
         position: Where it is.
         severity: 0 (harmless) to 1.
         confidence: Of the sender in its finding, 0 to 1.
-        finding: `detected`, `confirmed` or `refuted`.
+        finding: `detected`, `confirmed`, `refuted` or `contained`.
     """
 
     event_id: int | None
@@ -261,12 +261,15 @@ class Order:
         kind: `fire`, `gas_leak` or `flood`.
         position: Where it is.
         device: Id of the robot that an operator shall drive there; None: a guard walks.
+        task: `confirm`: look what is there. `contain`: deal with it. `stand_by`: wait near it,
+            out of danger, for the order to deal with it.
     """
 
     event_id: int
     kind: str
     position: Position
     device: str | None
+    task: str = "confirm"
 
 
 @dataclass(frozen=True, slots=True)
@@ -314,6 +317,13 @@ class TaskAward:
     """The bid is taken: the device shall go to the event, as by an `Order`."""
 
     event_id: int
+
+
+@dataclass(frozen=True, slots=True)
+class Relocation:
+    """The DVA lets an idle guard wait at another place from now on."""
+
+    position: Position
 
 
 @dataclass(frozen=True, slots=True)
@@ -414,6 +424,7 @@ Body = (
     | TaskAnnouncement
     | TaskBid
     | TaskAward
+    | Relocation
     | Reply
 )
 

@@ -104,13 +104,10 @@ def _read_event_report(element: _Element) -> m.EventReport:
 
 
 def _read_order(element: _Element) -> m.Order:
-    number, kind, position, *device = _children(element)
-    return m.Order(
-        _int(number),
-        _str(kind),
-        _read_position(position),
-        _str(device[0]) if device else None,
-    )
+    number, kind, position, *rest = _children(element)
+    device = _str(rest.pop(0)) if rest and rest[0].tag == "DeviceID" else None
+    task = _str(rest[0]) if rest else "confirm"
+    return m.Order(_int(number), _str(kind), _read_position(position), device, task)
 
 
 def _read_order_progress(element: _Element) -> m.OrderProgress:
@@ -176,6 +173,7 @@ _COMMAND_READERS: Final[dict[str, Callable[[_Element], m.Body]]] = {
     "TaskAnnouncement": _read_task_announcement,
     "TaskBid": _read_task_bid,
     "TaskAward": lambda element: m.TaskAward(_int(element[0])),
+    "Relocation": lambda element: m.Relocation(_read_position(element[0])),
 }
 _PAYLOAD_READERS: Final[dict[str, Callable[[_Element], m.Body]]] = {
     "RobotStatus": _read_status,

@@ -79,7 +79,8 @@ _url = _string("CameraUrl", "[!-~]{1,256}", "1 to 256 ASCII characters without s
 _mode = _choice("Mode", "Idle", "Mission", "Teleoperation")
 _level = _choice("Level", "teleoperation", "missions", "both", "sensors")
 _kind = _choice("Kind", "fire", "gas_leak", "flood")
-_finding = _choice("Finding", "detected", "confirmed", "refuted")
+_finding = _choice("Finding", "detected", "confirmed", "refuted", "contained")
+_task = _choice("Task", "confirm", "contain", "stand_by")
 _state = _choice("State", "accepted", "declined", "departed", "arrived", "failed", "done")
 
 _message_id = _integer("MessageID", 1, _UINT32)
@@ -213,9 +214,12 @@ def _write_event_report(body: m.EventReport) -> str:
 
 def _write_order(body: m.Order) -> str:
     device = "" if body.device is None else f"<DeviceID>{_device_id(body.device)}</DeviceID>"
+    # Left out where it is the usual one, so that a receiver of version 1.1 understands it.
+    task = "" if body.task == "confirm" else f"<Task>{_task(body.task)}</Task>"
     return (
         f"<Event><Order><EventID>{_event_id(body.event_id)}</EventID>"
-        f"<Kind>{_kind(body.kind)}</Kind>{_write_position(body.position)}{device}</Order></Event>"
+        f"<Kind>{_kind(body.kind)}</Kind>{_write_position(body.position)}{device}{task}"
+        "</Order></Event>"
     )
 
 
@@ -245,6 +249,10 @@ def _write_task_bid(body: m.TaskBid) -> str:
 def _write_task_award(body: m.TaskAward) -> str:
     number = _event_id(body.event_id)
     return f"<Event><TaskAward><EventID>{number}</EventID></TaskAward></Event>"
+
+
+def _write_relocation(body: m.Relocation) -> str:
+    return f"<Event><Relocation>{_write_position(body.position)}</Relocation></Event>"
 
 
 def _write_reply(body: m.Reply) -> str:
@@ -317,6 +325,7 @@ _WRITERS: Final[dict[type, tuple[str, Callable[[Any], str]]]] = {
     m.TaskAnnouncement: ("SimpleMsg", _write_task_announcement),
     m.TaskBid: ("SimpleMsg", _write_task_bid),
     m.TaskAward: ("SimpleMsg", _write_task_award),
+    m.Relocation: ("SimpleMsg", _write_relocation),
     m.Reply: ("SimpleMsg", _write_reply),
 }
 

@@ -88,6 +88,23 @@ def replace_text(data, element, text):
     return etree.tostring(tree)
 
 
+def test_the_usual_task_of_an_order_is_left_out_and_understood_when_it_is_said():
+    order = m.Order(7, "fire", m.Position(0, 0), None)
+    data = encode(message(order))
+    assert order.task == "confirm"
+    assert b"Task" not in data
+    said = data.replace(b"</Order>", b"<Task>confirm</Task></Order>")
+    assert decode(said) == decode(data) == message(order)
+
+
+@pytest.mark.parametrize("device", [None, ROBOT])
+@pytest.mark.parametrize("task", ["contain", "stand_by"])
+def test_another_task_is_the_last_element_of_an_order(device, task):
+    order = m.Order(7, "fire", m.Position(0, 0), device, task)
+    assert f"<Task>{task}</Task></Order>".encode() in encode(message(order))
+    assert decode(encode(message(order))).body == order
+
+
 @pytest.mark.parametrize("speed", [math.nan, math.inf, -math.inf, 1e300, "fast", None])
 def test_a_speed_that_is_no_bounded_number_is_not_encoded(speed):
     with pytest.raises(ProtocolError):
@@ -109,6 +126,9 @@ def test_a_speed_that_is_no_bounded_number_is_not_encoded(speed):
         m.PermissionRequest(ROBOT.lower(), "both"),
         m.PermissionRequest(ROBOT, "everything"),
         m.OrderProgress(7.5, "done"),
+        m.Order(7, "fire", m.Position(0, 0), None, "run"),
+        m.Order(7, "fire", m.Position(0, 0), None, None),
+        m.Relocation(m.Position(90.5, 0.0)),
         m.Reply(1, m.OK, "", m.SensorInfo("http://a b")),
         m.Reply(1, m.OK, "", "content"),
         "body",
