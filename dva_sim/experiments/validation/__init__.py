@@ -1,0 +1,1 @@
+"""The evidence: worlds whose answer is known exactly, run again and compared."""

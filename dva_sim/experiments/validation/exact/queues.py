@@ -1,0 +1,259 @@
+"""One waiting line, one or more servers: what queueing theory says of it, exactly.
+
+A server is a responder or an operator, a customer an event. Every formula takes rates per
+second and times in seconds, and gives its measures by name:
+
+- `utilisation`: share of time that a server is busy;
+- `delayed`: share of the admitted customers that have to wait;
+- `wait_s`: mean time from arrival to the beginning of service, of those who are served;
+- `stay_s`: mean time from arrival to the end of service, of those who are served;
+- `lost`: share of all customers who find no room.
+
+References:
+    L. Kleinrock, Queueing Systems, vol. 1 (1975); D. Gross et al., Fundamentals of Queueing
+    Theory, 4th ed. (2008).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Measures = dict[str, float]
+Floats = NDArray[np.float64]
+
+
+class Law(Protocol):
+    """What a formula wants to know of a duration."""
+
+    @property
+    def mean(self) -> float:
+        """Expected value [s]."""
+
+    @property
+    def second_moment(self) -> float:
+        """Expected square [s^2]."""
+
+    def transform(self, s: float) -> float:
+        """Laplace transform: the expected value of `exp(-s X)`, for `s >= 0` [1/s]."""
+
+
+def erlang_b(servers: int, load: float) -> float:
+    """Probability that all servers are busy if nobody waits.
+
+    Args:
+        servers: How many there are.
+        load: Arrivals during one mean service time.
+
+    References:
+        Gross et al. (2008), section 3.5; the recursion is their eq. (3.5.6) read upwards.
+    """
+    blocked = 1.0
+    for n in range(1, servers + 1):
+        blocked = load * blocked / (n + load * blocked)
+    return blocked
+
+
+def erlang_c(servers: int, load: float) -> float:
+    """Probability of having to wait if everybody waits; needs `load < servers`.
+
+    References:
+        Gross et al. (2008), section 3.3.
+    """
+    require_stable(load / servers)
+    blocked = erlang_b(servers, load)
+    return servers * blocked / (servers - load * (1 - blocked))
+
+
+def mmc(arrival_rate: float, mean_service_s: float, servers: int) -> Measures:
+    """M/M/c: random arrivals, exponential service, everybody waits, first come first served.
+
+    Beside the usual measures: `wait_50_s`, `wait_90_s` and `wait_95_s`, quantiles of the wait
+    of all customers (0 for those who need not wait).
+
+    References:
+        Gross et al. (2008), section 3.3: a wait beyond `t` has the probability
+        `C exp(-(c mu - lambda) t)`.
+    """
+    load = arrival_rate * mean_service_s
+    delayed = erlang_c(servers, load)
+    drain = servers / mean_service_s - arrival_rate
+    measures = {
+        "utilisation": load / servers,
+        "delayed": delayed,
+        "wait_s": delayed / drain,
+        "stay_s": delayed / drain + mean_service_s,
+    }
+    for percent in (50, 90, 95):
+        beyond = 1 - percent / 100
+        measures[f"wait_{percent}_s"] = max(0.0, math.log(delayed / beyond) / drain)
+    return measures
+
+
+def mmc_wait_beyond(t: float, arrival_rate: float, mean_service_s: float, servers: int) -> float:
+    """Probability that a customer of an M/M/c waits longer than `t` [s]."""
+    drain = servers / mean_service_s - arrival_rate
+    return erlang_c(servers, arrival_rate * mean_service_s) * math.exp(-drain * t)
+
+
+def mgcc(arrival_rate: float, mean_service_s: float, servers: int) -> Measures:
+    """M/G/c/c: who finds all servers busy is lost; only the mean of the service matters.
+
+    References:
+        A. K. Erlang (1917); insensitivity: B. A. Sevastyanov, Theory Probab. Appl. 2 (1957)
+        104-112.
+    """
+    load = arrival_rate * mean_service_s
+    lost = erlang_b(servers, load)
+    return {
+        "lost": lost,
+        "utilisation": load * (1 - lost) / servers,
+        "wait_s": 0.0,
+        "delayed": 0.0,
+        "stay_s": mean_service_s,
+    }
+
+
+def mmck(arrival_rate: float, mean_service_s: float, servers: int, room: int) -> Measures:
+    """M/M/c/K: at most `room` customers inside, in service and waiting; others are lost.
+
+    References:
+        Gross et al. (2008), section 3.4.
+    """
+    if room < servers:
+        raise ValueError(f"room {room} should hold at least the {servers} servers' customers")
+    inside = np.arange(room + 1)
+    busy = np.minimum(inside, servers)
+    chance = birth_death(np.full(room, arrival_rate), busy[1:] / mean_service_s)
+    admitted = 1 - chance[-1]
+    wait = float(chance @ (inside - busy)) / (arrival_rate * admitted)  # Little
+    return {
+        "lost": float(chance[-1]),
+        "utilisation": float(chance @ busy) / servers,
+        "delayed": float(chance[servers:-1].sum()) / admitted,
+        "wait_s": wait,
+        "stay_s": wait + mean_service_s,
+    }
+
+
+def mg1(arrival_rate: float, service: Law) -> Measures:
+    """M/G/1: one server, any law of service, everybody waits.
+
+    References:
+        F. Pollaczek (1930), A. Khinchine (1932); Kleinrock (1975), eq. (5.113).
+    """
+    load = arrival_rate * service.mean
+    require_stable(load)
+    wait = arrival_rate * service.second_moment / (2 * (1 - load))
+    return {
+        "utilisation": load,
+        "delayed": load,
+        "wait_s": wait,
+        "stay_s": wait + service.mean,
+    }
+
+
+def gm1(between: Law, mean_service_s: float) -> Measures:
+    """G/M/1: any law between arrivals, one server with exponential service.
+
+    References:
+        Kleinrock (1975), section 6.4: sigma is the root of `sigma = A*(mu - mu sigma)`
+        in (0, 1), eq. (6.27); mean wait `sigma / (mu (1 - sigma))`, eq. (6.30).
+    """
+    from scipy.optimize import brentq
+
+    require_stable(mean_service_s / between.mean)
+    rate = 1 / mean_service_s
+    # At sigma = 1 the equation always holds; the root sought lies below it.
+    sigma = float(brentq(lambda x: between.transform(rate * (1 - x)) - x, 0.0, 1 - 1e-9))
+    wait = sigma * mean_service_s / (1 - sigma)
+    return {
+        "utilisation": mean_service_s / between.mean,
+        "delayed": sigma,
+        "wait_s": wait,
+        "stay_s": wait + mean_service_s,
+    }
+
+
+def erlang_a(
+    arrival_rate: float, mean_service_s: float, servers: int, mean_patience_s: float
+) -> Measures:
+    """M/M/c+M: who waits gives up after an exponential time.
+
+    Beside the usual measures: `abandoned`, share of all customers who give up, and
+    `wait_all_s`, mean wait of all customers, who gave up included.
+
+    References:
+        C. Palm (1957); A. Mandelbaum & S. Zeltyn, Service engineering in action: the
+        Palm/Erlang-A queue (2007). A customer with `j` places to go until it is served
+        leaves each with rate `c mu + i theta` and is served with `c mu / (c mu + j theta)`.
+    """
+    rate, impatience = 1 / mean_service_s, 1 / mean_patience_s
+    most = _longest_queue(arrival_rate, rate * servers, impatience)
+    inside = np.arange(servers + most + 1)
+    busy = np.minimum(inside, servers)
+    deaths = busy * rate + (inside - busy) * impatience
+    chance = birth_death(np.full(len(inside) - 1, arrival_rate), deaths[1:])
+    abandoned = float(chance @ (inside - busy)) * impatience / arrival_rate
+    place = np.arange(1, most + 2)  # of who arrives when all servers are busy
+    served = servers * rate / (servers * rate + place * impatience)
+    until = np.cumsum(1 / (servers * rate + place * impatience))
+    wait = float(chance[servers:] @ (served * until)) / (1 - abandoned)
+    return {
+        "abandoned": abandoned,
+        "delayed": float(chance[servers:].sum()),
+        "wait_s": wait,
+        "wait_all_s": abandoned * mean_patience_s,
+        "stay_s": wait + mean_service_s,
+        "utilisation": float(chance @ busy) / servers,
+    }
+
+
+def tandem(
+    arrival_rate: float,
+    first_service_s: float,
+    first_servers: int,
+    second_service_s: float,
+    second_servers: int,
+) -> Measures:
+    """Two M/M/c in a row: the second sees random arrivals, as if the first were not there.
+
+    Measures carry the number of their station: `wait_1_s`, `wait_2_s`, `utilisation_1`, ...;
+    `stay_s` is the whole way through.
+
+    References:
+        P. J. Burke, Oper. Res. 4 (1956) 699-704; J. R. Jackson, Oper. Res. 5 (1957) 518-521.
+    """
+    first = mmc(arrival_rate, first_service_s, first_servers)
+    second = mmc(arrival_rate, second_service_s, second_servers)
+    return {
+        "utilisation_1": first["utilisation"],
+        "utilisation_2": second["utilisation"],
+        "delayed_1": first["delayed"],
+        "delayed_2": second["delayed"],
+        "wait_1_s": first["wait_s"],
+        "wait_2_s": second["wait_s"],
+        "stay_s": first["stay_s"] + second["stay_s"],
+    }
+
+
+def birth_death(births: Floats, deaths: Floats) -> Floats:
+    """Stationary probabilities of states 0 to n from the n rates up and the n rates down."""
+    logs = np.concatenate([[0.0], np.cumsum(np.log(births) - np.log(deaths))])
+    weights = np.exp(logs - logs.max())
+    return np.asarray(weights / weights.sum())
+
+
+def _longest_queue(arrival_rate: float, drain: float, impatience: float) -> int:
+    """A queue so long that longer ones do not count: beyond it, leaving is likelier by far."""
+    balance = max(0.0, (arrival_rate - drain) / impatience)
+    return int(balance + 40 * math.sqrt(arrival_rate / impatience + 1) + 100)
+
+
+def require_stable(load: float) -> None:
+    """Refuse a load [share of what the servers can do] that no stationary state belongs to."""
+    if not load < 1:
+        raise ValueError(f"the servers are offered {load:g} of what they can do; below 1 is stable")
