@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
@@ -16,6 +17,8 @@ from dva_sim.agents.operator.person import Population
 from dva_sim.agents.robot import RobotProfile
 from dva_sim.agents.tilt.phone import PhoneProfile
 from dva_sim.config import Config, Document, M, Path_, load_yaml, validate
+from dva_sim.core.access import LEVELS
+from dva_sim.core.rules import Rules
 from dva_sim.errors import ConfigError
 from dva_sim.network.link import LinkConfig
 from dva_sim.worlds.site import Site, load_site, map_site
@@ -112,10 +115,61 @@ class EventConfig(Config):
 
 
 class DispatchConfig(Config):
-    """How the DVA chooses who goes, and when it gives up waiting."""
+    """How the DVA chooses who goes, and the rules that hold whatever is chosen.
+
+    Attributes:
+        policy: By name, or as `my_policy.py:Mine`.
+        options: Of that policy.
+        escalate_after_s: An event that has waited so long for somebody is escalated; 0: at
+            once if nobody is free, `.inf`: never.
+        containment: Whether a confirmed event also needs a guard who deals with it.
+        most_waiting: More events than that do not wait: the newest is escalated at once.
+        merge_distance_m: Reports of one kind nearer than this are one event; 0: never.
+        order_limit_s: Who has not settled an event so long after the order gives it back.
+        bid_within_s: How long an auction takes bids.
+    """
 
     policy: str = "min_eta"
-    escalate_after_s: Positive = 120.0
+    options: dict[str, Any] = Field(default_factory=dict)
+    escalate_after_s: NonNegative = 120.0
+    containment: bool = False
+    most_waiting: Annotated[int, Field(ge=0)] | None = None
+    merge_distance_m: NonNegative = 8.0
+    max_attempts: Annotated[int, Field(ge=1)] = 4
+    order_limit_s: Positive = 900.0
+    bid_within_s: Positive = 2.0
+
+    def rules(self) -> Rules:
+        """As the core wants them."""
+        return Rules(
+            self.escalate_after_s,
+            self.containment,
+            self.most_waiting,
+            self.merge_distance_m,
+            self.max_attempts,
+            self.order_limit_s,
+            self.bid_within_s,
+        )
+
+
+class AccessConfig(Config):
+    """What some devices may ask for, for a time; what no rule allows is refused.
+
+    Attributes:
+        holders: Labels such as `operator-1`; left out: all.
+        robots: Labels such as `robot-1`; left out: all.
+        levels: `teleoperation`, `missions`, `both`, `sensors`.
+        sensors: Names of the sensors that may be read; left out: all.
+        from_s: From when on.
+        until_s: Up to when; what is in use then is revoked.
+    """
+
+    holders: tuple[str, ...] = ()
+    robots: tuple[str, ...] = ()
+    levels: tuple[Literal["teleoperation", "missions", "both", "sensors"], ...] = LEVELS
+    sensors: tuple[str, ...] | None = None
+    from_s: NonNegative = 0.0
+    until_s: Positive = math.inf
 
 
 class Scenario(Config):
@@ -133,6 +187,7 @@ class Scenario(Config):
     camera: CameraConfig = CameraConfig()
     events: Annotated[tuple[EventConfig, ...], Field(min_length=1)] = (EventConfig(kind="fire"),)
     dispatch: DispatchConfig = DispatchConfig()
+    access: tuple[AccessConfig, ...] = ()
     horizon_s: Annotated[float, Field(gt=0, le=86_400)] = 300.0
 
     @property
@@ -217,11 +272,9 @@ def set_key(data: dict[str, Any], key: str, value: Any) -> None:
 def check_names(scenario: Scenario, error: Any) -> None:
     """Refuse a profile, strategy or policy that does not exist, before anything runs."""
     from dva_sim.agents.operator.strategies import STRATEGIES
-    from dva_sim.core.dispatch import POLICIES
 
     choices: dict[Path_, tuple[str, Mapping[str, object]]] = {
         ("operator", "strategy"): (scenario.operator.strategy, STRATEGIES),
-        ("dispatch", "policy"): (scenario.dispatch.policy, POLICIES),
         ("profile",): (scenario.profile, resources.available("agents/phones")),
         ("robot", "profile"): (scenario.robot.profile, resources.available("agents/robots")),
         ("guard", "profile"): (scenario.guard.profile, resources.available("agents/people")),

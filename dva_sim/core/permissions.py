@@ -82,6 +82,17 @@ class Permissions:
         self.count += not only_sensors
         return self.count << LOW_BITS | self.draw()
 
+    def all(self) -> list[Grant]:
+        """Every grant that holds."""
+        return [*self.grants.values(), *self.observers.values()]
+
+    def restore(self, grant: Grant) -> None:
+        """A grant of an earlier life of the DVA holds on."""
+        if grant.level == "sensors":
+            self.observers[grant.robot, grant.holder] = grant
+        else:
+            self.grants[grant.robot] = grant
+
     def end(self, session: int) -> None:
         """A single grant is over, or never began."""
         _drop_session(self.grants, session)

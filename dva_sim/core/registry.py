@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections import deque
+import math
+from collections import OrderedDict, defaultdict, deque
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from dva_sim.protocol.messages import Device, Position, Registration
@@ -11,7 +13,7 @@ ROBOT, GUARD, OPERATOR, DETECTOR = "Robot", "Guard", "TeleOp", "Sensor"
 MAX_DEVICES = 20_000
 
 
-@dataclass
+@dataclass(slots=True)
 class Entry:
     """One registered device.
 
@@ -20,7 +22,6 @@ class Entry:
         last_heard: Time of its last message of any kind [s].
         position: Where it was last known to be.
         mode: Last known mode of a robot.
-        order: Event that it is working on.
         silent: Whether it has been quiet for longer than the time-out.
         registrations: MessageID and timestamp of its last ones.
         free_from: Until then it is given no order, because it declined one [s].
@@ -30,7 +31,6 @@ class Entry:
     last_heard: float
     position: Position | None = None
     mode: str = "Idle"
-    order: int | None = None
     silent: bool = False
     registrations: deque[tuple[int, str]] = field(default_factory=lambda: deque(maxlen=8))
     free_from: float = 0.0
@@ -52,23 +52,33 @@ class Registry:
     Attributes:
         silent_after: How long a device may be quiet before it counts as gone [s].
         most: How many devices there may be.
+        entries: In order of registration.
     """
 
     silent_after: float = 10.0
     most: int = MAX_DEVICES
     entries: dict[str, Entry] = field(default_factory=dict)
+    _of_type: dict[str, dict[str, Entry]] = field(default_factory=lambda: defaultdict(dict))
+    _heard: OrderedDict[str, Entry] = field(default_factory=OrderedDict)  # longest quiet first
+    _changed: dict[str, Entry] = field(default_factory=dict)
 
     def register(self, id_tag: str, request: Registration, now: float) -> Entry | None:
         """Enter a device, or renew its entry; None if the registry is full."""
         device = Device(id_tag, request.label, request.device_type, request.address)
-        known = self.entries.get(id_tag)
-        if known is not None:
-            known.device = device
-            self.heard(id_tag, now)
-            return known
-        if len(self.entries) >= self.most:
-            return None
-        entry = self.entries[id_tag] = Entry(device, now)
+        entry = self.entries.get(id_tag)
+        if entry is None:
+            return self.add(Entry(device, now)) if len(self.entries) < self.most else None
+        if entry.device != device:
+            entry.device = device
+            self._changed[id_tag] = entry
+        self.heard(id_tag, now)
+        return entry
+
+    def add(self, entry: Entry) -> Entry:
+        """Enter a device that was not known."""
+        device = entry.device
+        self.entries[device.id_tag] = self._of_type[device.device_type][device.id_tag] = entry
+        self._heard[device.id_tag] = self._changed[device.id_tag] = entry
         return entry
 
     def heard(self, id_tag: str, now: float) -> Entry | None:
@@ -76,18 +86,32 @@ class Registry:
         entry = self.entries.get(id_tag)
         if entry is not None:
             entry.last_heard, entry.silent = now, False
+            self._heard[id_tag] = entry
+            self._heard.move_to_end(id_tag)
         return entry
 
     def fallen_silent(self, now: float) -> list[Entry]:
         """Devices that have been quiet for longer than the time-out since the last call."""
-        limit = now - self.silent_after
-        gone = [e for e in self.entries.values() if not e.silent and e.last_heard < limit]
-        for entry in gone:
+        limit, gone = now - self.silent_after, []
+        while self._heard:
+            id_tag, entry = next(iter(self._heard.items()))
+            if entry.last_heard >= limit:
+                break
             entry.silent = True
+            gone.append(entry)
+            del self._heard[id_tag]
         return gone
 
-    def of_type(self, device_type: str) -> list[Entry]:
+    def next_silence(self) -> float:
+        """When the device that was heard longest ago will have been quiet for too long [s]."""
+        longest = next(iter(self._heard.values()), None)
+        return math.inf if longest is None else longest.last_heard + self.silent_after
+
+    def of_type(self, device_type: str) -> Iterable[Entry]:
         """Registered devices of a type that are not silent, in order of registration."""
-        return [
-            e for e in self.entries.values() if e.device.device_type == device_type and not e.silent
-        ]
+        return (e for e in self._of_type[device_type].values() if not e.silent)
+
+    def changes(self) -> list[Entry]:
+        """The devices that registered, or moved to another address, since this was last asked."""
+        changed, self._changed = self._changed, {}
+        return list(changed.values())

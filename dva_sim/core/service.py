@@ -2,86 +2,76 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
-from itertools import islice
+from collections import Counter
+from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
-from dva_sim.core.dispatch import Policy, Responder, Situation
-from dva_sim.core.events import Event, EventBook, State
+from dva_sim.core.access import Access
+from dva_sim.core.dispatch import Policy
+from dva_sim.core.dispatcher import Dispatcher
+from dva_sim.core.events import EventBook, State
+from dva_sim.core.ground import Ground, Travel
+from dva_sim.core.orders import Orders
 from dva_sim.core.registry import GUARD, OPERATOR, ROBOT, Entry, Registry
+from dva_sim.core.rules import Rules
 from dva_sim.core.send import Send
 from dva_sim.core.sessions import Sessions
 from dva_sim.protocol import messages as m
 
 LIST_BYTES = 7000  # of a device list, the rest of the message apart [B]
 DEVICE_BYTES = 175  # of one device without its label, at most [B]
-CONSIDERED = 200  # oldest pending events that one decision looks at
-MOST_EVENTS = 10_000
-DECLINED_PAUSE = 10.0  # who declines an order, or is not reached, is not asked again for [s]
-MAX_ATTEMPTS = 4  # orders given for one event before it is escalated
+MOST_LISTED = 64
+
+Answer = tuple[m.Reply, list[Send]]
 
 
-@dataclass(frozen=True)
-class Pace:
-    """What the DVA expects of a kind of responder: travel speed [m/s], mobilisation [s]."""
-
-    speed: float
-    mobilisation: float
-
-
-@dataclass
 class Desk:
     """The DVA core.
 
-    Attributes:
+    Args:
         policy: Advises who goes where.
-        distance: Path length between two positions [m]; infinite if there is no way.
-        paces: Expected pace of `guard` and `robot`.
-        escalate_after: An event that is left without a responder for so long is escalated [s].
+        travel: How far it is, and how long it takes.
+        rules: What holds whatever the policy says.
         rng: Luck of policies that use it.
         sessions: Who may act on what, and who has to be told.
+        ground: What is known of the place.
+        access: Who may ask for what.
+
+    Attributes:
+        registry: Who is there.
+        book: What happens.
+        orders: Who has to do what.
+        dispatcher: Decides who goes.
+        counters: How often what happened.
+        refused: Messages that were refused.
     """
 
-    policy: Policy
-    distance: Callable[[m.Position, m.Position], float]
-    paces: dict[str, Pace]
-    escalate_after: float
-    rng: np.random.Generator
-    sessions: Sessions
-    registry: Registry = field(default_factory=Registry)
-    book: EventBook = field(default_factory=EventBook)
-    refused: int = 0
+    def __init__(
+        self,
+        policy: Policy,
+        travel: Travel,
+        rules: Rules,
+        rng: np.random.Generator,
+        sessions: Sessions,
+        ground: Ground | None = None,
+        access: Access | None = None,
+    ) -> None:
+        self.sessions, self.access = sessions, access or Access()
+        self.registry, self.book = Registry(), EventBook(rules.merge_distance)
+        self.orders = Orders(rules, self.registry, self.book, sessions)
+        self.dispatcher = Dispatcher(policy, travel, self.orders, rng, ground or Ground())
+        self.counters: Counter[str] = self.orders.counters
+        self.refused = 0
+        self._rules = rules
+        self._access_ends = self.access.next_end(-1.0)
 
-    def handle(self, message: m.Message, now: float) -> tuple[m.Reply, list[Send]]:
+    # --- what comes in -----------------------------------------------------------------
+
+    def handle(self, message: m.Message, now: float) -> Answer:
         """Take a request; the reply goes to the sender, the rest where it says."""
         reply, sends = self._handle(message, now)
         return reply, self._and_revocations(sends)
-
-    def _handle(self, message: m.Message, now: float) -> tuple[m.Reply, list[Send]]:
-        body, source = message.body, message.source
-        if isinstance(body, m.Registration):
-            return self._register(message, body, now)
-        entry = self.registry.heard(source, now)
-        if entry is None:
-            text = f"device {source} is not registered"
-            return self._refuse(message, m.NOT_REGISTERED, text)
-        match body:
-            case m.PermissionRequest():
-                return self._permission(message, body)
-            case m.PermissionRevocation():
-                return self._give_back(message, body)
-            case m.EventReport():
-                return self._report(message, body, now)
-            case m.OrderProgress():
-                return self._progress(message, entry, body, now)
-            case m.GetDeviceList():
-                return self._device_list(message)
-            case _:
-                name = type(body).__name__
-                return self._refuse(message, m.NOT_SUPPORTED, f"{name} is not for the DVA")
 
     def note(self, message: m.Message, now: float) -> None:
         """Take a published message: heartbeat or status; nobody waits for an answer."""
@@ -93,261 +83,231 @@ class Desk:
         elif isinstance(message.body, m.PersonStatus):
             entry.position = message.body.position
 
-    def tick(self, now: float) -> list[Send]:
-        """What time brings: silent devices, deadlines, and another look at who is free."""
-        for entry in self.registry.fallen_silent(now):
-            self._abandon(entry.device.id_tag, now)
-        for event in list(self.book.in_state(State.PENDING)):
-            if now - event.pending_since >= self.escalate_after:
-                self.book.move(event, State.ESCALATED, now)
-        self.sessions.remind()
-        return self._and_revocations(self._assign(now))
+    def delivered(self, send: Send, now: float) -> list[Send]:
+        """What was sent was answered with OK."""
+        return self._and_revocations(self.orders.taken_up(send))
 
     def undelivered(self, send: Send, now: float) -> list[Send]:
-        """What was sent did not arrive or was declined: take it back.
-
-        Nobody set out, so it does not count as an attempt on the event.
-        """
-        if isinstance(send.body, m.Order):
-            event = self.book.events[send.body.event_id]
-            self.registry.entries[send.to].free_from = now + DECLINED_PAUSE
-            if self._holder(event) != send.to:
-                return self._and_revocations([])  # the order is another's by now
-            self._release_order(event)
-            if event.state in (State.ASSIGNED, State.ON_SCENE):
-                event.attempts -= 1
-                self._reopen(event, now)
+        """What was sent did not arrive, or was declined: take it back."""
+        body, sends = send.body, list[Send]()
+        if isinstance(body, m.Order | m.TaskAward):
+            sends = self.orders.not_taken_up(send, now)
+        elif isinstance(body, m.TaskAnnouncement):
+            self.dispatcher.auctions.no_bid(body.event_id, send.to)
+            sends = self.dispatcher.decide(now)
+        elif isinstance(body, m.Relocation):
+            self.dispatcher.not_moved(send)
         else:
             self.sessions.undelivered(send)
-        return self._and_revocations([])
+        return self._and_revocations(sends)
+
+    def tick(self, now: float) -> list[Send]:
+        """What time brings: silent devices, deadlines, and another look at who is free."""
+        sends: list[Send] = []
+        for entry in self.registry.fallen_silent(now):
+            sends += self._gone(entry.device.id_tag, now)
+        if now >= self._access_ends:
+            self._end_what_is_no_longer_allowed(now)
+        sends += self.orders.take_back(now)
+        self.sessions.remind()
+        return self._and_revocations(sends + self.dispatcher.decide(now))
+
+    def next_deadline(self) -> float:
+        """When `tick` has something to do at the latest, if nothing else happens [s]."""
+        return min(
+            self.orders.next_deadline(),
+            self.dispatcher.auctions.next_deadline(),
+            self.registry.next_silence(),
+            self._access_ends,
+        )
 
     def close(self) -> list[Send]:
         """The desk closes: all sessions are over."""
         self.sessions.take_back_everything()
         return self._and_revocations([])
 
+    def _handle(self, message: m.Message, now: float) -> Answer:
+        body, source = message.body, message.source
+        if isinstance(body, m.Registration):
+            return self._register(message, body, now)
+        entry = self.registry.heard(source, now)
+        if entry is None:
+            text = f"device {source} is not registered"
+            return self._refuse(message, m.NOT_REGISTERED, text)
+        match body:
+            case m.EventReport():
+                return self._report(message, body, now)
+            case m.OrderProgress():
+                return self._progress(message, body, now)
+            case m.TaskBid():
+                return self._bid(message, body, now)
+            case m.PermissionRequest():
+                return self._permission(message, entry, body, now)
+            case m.PermissionRevocation():
+                return self._give_back(message, body)
+            case m.GetDeviceList():
+                return self._ok(message, m.DeviceList(self._shown()))
+            case _:
+                name = type(body).__name__
+                return self._refuse(message, m.NOT_SUPPORTED, f"{name} is not for the DVA")
+
     def _and_revocations(self, sends: list[Send]) -> list[Send]:
         """What to send, after the word that sessions are over."""
         return self.sessions.to_tell() + sends
 
-    def _register(
-        self, message: m.Message, body: m.Registration, now: float
-    ) -> tuple[m.Reply, list[Send]]:
+    # --- who is there ------------------------------------------------------------------
+
+    def _register(self, message: m.Message, body: m.Registration, now: float) -> Answer:
         known = self.registry.entries.get(message.source)
+        sends: list[Send] = []
         if known is not None and known.device.device_type != body.device_type:
             text = f"{message.source} is registered as {known.device.device_type}"
             return self._refuse(message, m.NOT_PERMITTED, text)
         if known is not None and known.is_new_life(message.message_id, message.timestamp):
-            self._abandon(message.source, now)  # it knows nothing of what it held
+            sends = self._gone(message.source, now)  # it knows nothing of what it held
         entry = self.registry.register(message.source, body, now)
         if entry is None:
             return self._refuse(message, m.BUSY, "the registry is full")
         entry.registrations.append((message.message_id, message.timestamp))
-        return m.Reply(message.message_id, m.OK, ""), []
+        return self._ok(message)[0], sends
+
+    def _gone(self, device: str, now: float) -> list[Send]:
+        """A device is there no more: what it held is free, what it did is open to others."""
+        self.sessions.take_back_all(device)
+        return self.orders.abandon(device, now)
+
+    # --- who may do what ---------------------------------------------------------------
 
     def _permission(
-        self, message: m.Message, body: m.PermissionRequest
-    ) -> tuple[m.Reply, list[Send]]:
+        self, message: m.Message, asker: Entry, body: m.PermissionRequest, now: float
+    ) -> Answer:
         robot = self.registry.entries.get(body.device)
         if robot is None or robot.device.device_type != ROBOT:
             return self._refuse(message, m.UNKNOWN_DEVICE, f"no robot {body.device}")
-        asker = self.registry.entries[message.source]
-        if body.level == "sensors":
-            return self._grant(message, robot, body)
-        if asker.device.device_type != OPERATOR:
-            return self._refuse(message, m.NOT_PERMITTED, "only operators drive robots")
-        if robot.order is not None and robot.order != asker.order:
+        if not self.access.allows(asker.device, robot.device, body.level, now):
+            text = f"{asker.device.label} may not have {body.level} of {robot.device.label}"
+            return self._refuse(message, m.NOT_PERMITTED, text)
+        sensors = self.access.sensors(asker.device, robot.device, body.sensors, now)
+        if body.level == "sensors" and body.sensors and not sensors:
+            text = f"{asker.device.label} may read none of these of {robot.device.label}"
+            return self._refuse(message, m.NOT_PERMITTED, text)
+        if body.level != "sensors" and self._serves_another(body.device, message.source):
             return self._refuse(message, m.BUSY, f"robot {body.device} serves another order")
-        return self._grant(message, robot, body)
-
-    def _grant(
-        self, message: m.Message, robot: Entry, body: m.PermissionRequest
-    ) -> tuple[m.Reply, list[Send]]:
-        """Introduce holder and robot to each other: each is told the other's address."""
-        holder = self.registry.entries[message.source].device
-        granted = self.sessions.grant(robot.device, holder, body)
+        wish = m.PermissionRequest(body.device, body.level, sensors)
+        granted = self.sessions.grant(robot.device, asker.device, wish)
         if granted is None:
             return self._refuse(message, m.BUSY, f"robot {body.device} is held by another")
         content, sends = granted
-        return m.Reply(message.message_id, m.OK, "", content), sends
+        return self._ok(message, content)[0], sends
 
-    def _give_back(
-        self, message: m.Message, body: m.PermissionRevocation
-    ) -> tuple[m.Reply, list[Send]]:
+    def _serves_another(self, robot: str, asker: str) -> bool:
+        engaged = self.orders.engaged
+        return robot in engaged and engaged[robot] is not engaged.get(asker)
+
+    def _give_back(self, message: m.Message, body: m.PermissionRevocation) -> Answer:
         """A holder needs its permission no longer; only its own."""
         if body.holder != message.source or not self.sessions.give_back(body):
             return self._refuse(message, m.BAD_SESSION, "that session is not yours, or is over")
-        return m.Reply(message.message_id, m.OK, ""), []
+        return self._ok(message)
 
-    def _report(
-        self, message: m.Message, body: m.EventReport, now: float
-    ) -> tuple[m.Reply, list[Send]]:
+    def _end_what_is_no_longer_allowed(self, now: float) -> None:
+        """Permissions in use end with the rule that allowed them."""
+        entries = self.registry.entries
+        for grant in self.sessions.permissions.all():
+            holder, robot = entries.get(grant.holder), entries.get(grant.robot)
+            if holder is None or robot is None:
+                continue
+            kept = self.access.sensors(holder.device, robot.device, grant.sensors, now)
+            allowed = self.access.allows(holder.device, robot.device, grant.level, now)
+            if not allowed or kept != grant.sensors:
+                self.counters["permission revoked"] += 1
+                self.sessions.revoke(grant)
+        self._access_ends = self.access.next_end(now)
+
+    # --- what happens ------------------------------------------------------------------
+
+    def _report(self, message: m.Message, body: m.EventReport, now: float) -> Answer:
         if body.event_id is None:
-            if len(self.book.events) >= MOST_EVENTS:
-                return self._refuse(message, m.BUSY, f"{MOST_EVENTS} events are all that fit")
-            self.book.report(body.kind, body.position, body.severity, now)
-            return m.Reply(message.message_id, m.OK, ""), self._assign(now)
-        event = self.book.events.get(body.event_id)
+            return self._sighting(message, body, now)
+        event = self.book.get(body.event_id)
         if event is None:
             return self._refuse(message, m.UNKNOWN_EVENT, f"no event {body.event_id}")
         if message.source not in event.sent:
             return self._refuse(message, m.NOT_PERMITTED, f"was not sent to event {event.number}")
-        if self._holder(event) == message.source:
-            self._arrived(event, now)
-        if event.open and body.finding == "confirmed":
-            self.book.move(event, State.CONFIRMED, now)
-        elif body.finding == "refuted" and event.state is State.ON_SCENE:
-            self.book.move(event, State.REFUTED, now)
-        return m.Reply(message.message_id, m.OK, ""), []
+        sends = self.orders.found(event, message.source, body.finding, now)
+        if event.waits_for is not None:
+            sends = sends + self.dispatcher.decide(now)
+        return self._ok(message)[0], sends
 
-    def _progress(
-        self, message: m.Message, entry: Entry, body: m.OrderProgress, now: float
-    ) -> tuple[m.Reply, list[Send]]:
-        event = self.book.events.get(body.event_id)
-        if event is None or entry.order != body.event_id:
+    def _sighting(self, message: m.Message, body: m.EventReport, now: float) -> Answer:
+        """Somebody who was not sent sees something, or sees it no longer."""
+        if body.finding == "refuted":
+            return self._withdrawal(message, body, now)
+        event = self.book.near(body.kind, body.position)
+        if event is None and self.book.full:
+            return self._refuse(message, m.BUSY, "so many events are open that no more fit")
+        if event is None:
+            contain = self._rules.containment
+            event = self.book.add(body.kind, body.position, body.severity, now, contain)
+        else:
+            self.book.merge(event, body.severity)
+        self.book.note_source(event, message.source, body.confidence)
+        return self._ok(message)[0], self.dispatcher.decide(now)
+
+    def _withdrawal(self, message: m.Message, body: m.EventReport, now: float) -> Answer:
+        """What all who reported it have taken back, before anybody was sent, is over."""
+        source, sends = message.source, list[Send]()
+        for event in self.book.reported_by(source, body.kind, body.position):
+            self.book.take_back(event, source)
+            if event.state is State.PENDING and not event.sources:
+                sends += self.orders.expire(event, now)
+        return self._ok(message)[0], sends
+
+    def _progress(self, message: m.Message, body: m.OrderProgress, now: float) -> Answer:
+        event = self.orders.engaged.get(message.source)
+        if event is None or event.number != body.event_id:
             text = f"device {message.source} has no order for event {body.event_id}"
             return self._refuse(message, m.UNKNOWN_EVENT, text)
-        send: list[Send] = []
+        sends: list[Send] = []
         if body.state == "departed":
-            event.times.setdefault("departed", now)
-        elif body.state == "arrived" and event.open:
-            self._arrived(event, now)
+            self.orders.departed(event, message.source, now)
+        elif body.state == "arrived":
+            self.orders.arrived(event, message.source, now)
         elif body.state in ("done", "failed", "declined"):
-            send = self._order_ends(event, entry, body.state, now)
-        return m.Reply(message.message_id, m.OK, ""), send
+            self.orders.ends(event, message.source, body.state, now)
+            sends = self.dispatcher.decide(now)
+        return self._ok(message)[0], sends
 
-    @staticmethod
-    def _holder(event: Event) -> str | None:
-        """Who was given the order for an event: the operator of a robot, or a guard."""
-        return event.operator or event.responder
+    def _bid(self, message: m.Message, body: m.TaskBid, now: float) -> Answer:
+        auctions = self.dispatcher.auctions
+        if not auctions.bid(body.event_id, message.source, body.arrival_in, now):
+            text = f"no bid was asked for on event {body.event_id}, or it comes too late"
+            return self._refuse(message, m.UNKNOWN_EVENT, text)
+        return self._ok(message)[0], self.dispatcher.decide(now)
 
-    def _arrived(self, event: Event, now: float) -> None:
-        if event.state is State.ASSIGNED:
-            event.times.setdefault("departed", now)
-            event.times["arrived"] = now
-            self.book.move(event, State.ON_SCENE, now)
-        if event.responder is not None:
-            self.registry.entries[event.responder].position = event.position
-
-    def _order_ends(self, event: Event, entry: Entry, state: str, now: float) -> list[Send]:
-        """The responder is free again; an event it could not settle is open to others."""
-        self._release(entry.device.id_tag, event)
-        if state != "done" and event.state in (State.ASSIGNED, State.ON_SCENE):
-            if event.responder is not None:
-                event.failed.add(event.responder)
-            self._reopen(event, now)
-        return self._assign(now)
-
-    def _release(self, device: str, event: Event) -> None:
-        """The order for an event is over, and with it the right to drive to it."""
-        if event.responder is not None:
-            self.sessions.take_back(device, event.responder)
-        self._release_order(event)
-
-    def _release_order(self, event: Event) -> None:
-        for name in (event.responder, event.operator):
-            if name is not None and self.registry.entries[name].order == event.number:
-                self.registry.entries[name].order = None
-
-    def _reopen(self, event: Event, now: float) -> None:
-        out_of_tries = event.attempts >= MAX_ATTEMPTS
-        self.book.move(event, State.ESCALATED if out_of_tries else State.PENDING, now)
-
-    def _abandon(self, device: str, now: float) -> None:
-        """A device is gone: what it held is free, what it was doing is open to others."""
-        self.sessions.take_back_all(device)
-        for event in self.book.in_state(State.ASSIGNED, State.ON_SCENE):
-            if device in (event.responder, event.operator):
-                self._release(event.operator or device, event)
-                self._reopen(event, now)
-                return
-
-    def _assign(self, now: float) -> list[Send]:
-        """Ask the policy, keep what the rules allow, and give the orders."""
-        pending = tuple(islice(self.book.in_state(State.PENDING), CONSIDERED))
-        operators = self._free(OPERATOR, now)
-        responders = self._idle_responders(bool(operators), now)
-        if not pending or not responders:
-            return []
-        situation = self._situation(pending, responders)
-        orders: list[Send] = []
-        taken: set[str] = set()
-        for choice in self.policy.assign(situation, self.rng):
-            if not (0 <= choice.event < len(pending) and 0 <= choice.responder < len(responders)):
-                continue
-            event, responder = pending[choice.event], responders[choice.responder]
-            if event.state is not State.PENDING or responder.device in taken:
-                continue
-            if responder.kind == "robot" and not operators:
-                continue
-            taken.add(responder.device)
-            operator = operators.pop(0).device.id_tag if responder.kind == "robot" else None
-            orders.append(self._order(event, responder.device, operator, now))
-        return orders
-
-    def _order(self, event: Event, responder: str, operator: str | None, now: float) -> Send:
-        self.book.move(event, State.ASSIGNED, now)
-        event.responder, event.operator = responder, operator
-        event.sent.add(operator or responder)
-        self.registry.entries[responder].order = event.number
-        body = m.Order(event.number, event.kind, event.position, responder if operator else None)
-        if operator is None:
-            return Send(responder, body)
-        self.registry.entries[operator].order = event.number
-        return Send(operator, body)
-
-    def _idle_responders(self, operator_free: bool, now: float) -> tuple[Responder, ...]:
-        placed = [e for kind in (GUARD, ROBOT) for e in self._free(kind, now) if e.position]
-        kinds = {GUARD: "guard", ROBOT: "robot"}
-        return tuple(
-            Responder(e.device.id_tag, kinds[e.device.device_type])
-            for e in placed
-            if operator_free or e.device.device_type == GUARD
-        )
-
-    def _free(self, device_type: str, now: float) -> list[Entry]:
-        """Devices of a type that may be given an order."""
-        entries = self.registry.of_type(device_type)
-        held = self.sessions.permissions.grants
-        return [
-            e
-            for e in entries
-            if e.order is None and e.free_from <= now and e.device.id_tag not in held
-        ]
-
-    def _situation(
-        self, pending: tuple[Event, ...], responders: tuple[Responder, ...]
-    ) -> Situation:
-        distance = np.full((len(pending), len(responders)), np.inf)
-        eta = distance.copy()
-        for column, responder in enumerate(responders):
-            where = self.registry.entries[responder.device].position
-            pace = self.paces[responder.kind]
-            for row, event in enumerate(pending):
-                assert where is not None
-                distance[row, column] = self.distance(where, event.position)
-                eta[row, column] = pace.mobilisation + distance[row, column] / pace.speed
-        for row, event in enumerate(pending):
-            _leave_out_who_failed(event, responders, distance[row], eta[row])
-        return Situation(pending, responders, distance, eta)
-
-    def _device_list(self, message: m.Message) -> tuple[m.Reply, list[Send]]:
-        return m.Reply(message.message_id, m.OK, "", m.DeviceList(self._shown())), []
+    # --- answers -----------------------------------------------------------------------
 
     def _shown(self) -> tuple[m.Device, ...]:
         """Devices one can do something with, robots first, as many as fit into a message."""
-        known = [e for e in self.registry.entries.values() if not e.silent]
         shown: list[m.Device] = []
         room = LIST_BYTES
-        for device_type in (ROBOT, OPERATOR, GUARD):
-            for device in (e.device for e in known if e.device.device_type == device_type):
-                room -= DEVICE_BYTES + len(device.label.encode()) + 4 * _escaped(device.label)
-                if room < 0 or len(shown) == 64:
-                    return tuple(shown)
-                shown.append(device)
+        for device in self._listed():
+            room -= DEVICE_BYTES + len(device.label.encode()) + 4 * _escaped(device.label)
+            if room < 0 or len(shown) == MOST_LISTED:
+                break
+            shown.append(device)
         return tuple(shown)
 
-    def _refuse(self, message: m.Message, code: int, text: str) -> tuple[m.Reply, list[Send]]:
+    def _listed(self) -> Iterable[m.Device]:
+        for device_type in (ROBOT, OPERATOR, GUARD):
+            for entry in self.registry.of_type(device_type):
+                yield entry.device
+
+    @staticmethod
+    def _ok(message: m.Message, content: m.DeviceList | m.Permission | None = None) -> Answer:
+        return m.Reply(message.message_id, m.OK, "", content), []
+
+    def _refuse(self, message: m.Message, code: int, text: str) -> Answer:
         self.refused += 1
         return m.Reply(message.message_id, code, text), []
 
@@ -355,15 +315,3 @@ class Desk:
 def _escaped(text: str) -> int:
     """How many characters take more room in XML, up to four bytes each."""
     return sum(text.count(sign) for sign in "&<>")
-
-
-def _leave_out_who_failed(
-    event: Event,
-    responders: tuple[Responder, ...],
-    distance: NDArray[np.float64],
-    eta: NDArray[np.float64],
-) -> None:
-    """A responder that gave an event back goes again only if nobody else can."""
-    failed = np.array([r.device in event.failed for r in responders])
-    if np.isfinite(distance[~failed]).any():
-        distance[failed] = eta[failed] = np.inf

@@ -63,9 +63,13 @@ class Sessions:
 
     def take_back_everything(self) -> None:
         """End all rights of everybody."""
-        held = [*self.permissions.grants.values(), *self.permissions.observers.values()]
-        for holder in dict.fromkeys(grant.holder for grant in held):
+        for holder in dict.fromkeys(grant.holder for grant in self.permissions.all()):
             self.take_back_all(holder)
+
+    def revoke(self, grant: Grant) -> None:
+        """End one permission while it is in use; its holder and the robot hear of it."""
+        self.permissions.end(grant.session)
+        self._tell(grant, holder_too=True)
 
     def undelivered(self, send: Send) -> None:
         """A robot did not take a grant, or did not hear that one is over."""

@@ -16,6 +16,7 @@ from dva_sim.agents.operator.agent import OperatorAgent
 from dva_sim.agents.operator.script import ScriptedOperator, drill
 from dva_sim.agents.robot import RobotAgent
 from dva_sim.agents.trace import Trace
+from dva_sim.core.events import Event
 from dva_sim.core.permissions import LOW_BITS, Permissions
 from dva_sim.errors import ConfigError
 from dva_sim.live.options import PARTS, Options
@@ -65,7 +66,7 @@ class DvaPart:
         # long as that handed out no more than so many a second and the clock was not set back.
         count = int((time.time() - SESSION_EPOCH) * SESSIONS_PER_SECOND)
         permissions = Permissions(lambda: secrets.randbits(LOW_BITS), count=count)
-        self._agent = add_dva(stage, permissions)
+        self._agent = add_dva(stage, permissions, keep_events=False)
         self._agent.desk.registry.most = _devices_that_fit()
         self._agent.start()
         self._stage = stage
@@ -74,7 +75,7 @@ class DvaPart:
     def rows(self) -> list[Row]:
         """See `Part`: what everybody told the DVA."""
         now, desk = self._stage.clock.now, self._agent.desk
-        rows = []
+        rows, engaged = [], desk.orders.engaged
         for id_tag, entry in desk.registry.entries.items():
             beats = self._beats.setdefault(id_tag, Rate()).of(self._agent.beats[id_tag], now)
             rows.append(
@@ -85,22 +86,24 @@ class DvaPart:
                     "heard_s": now - entry.last_heard,
                     "beats_hz": beats,
                     "silent": entry.silent,
-                    "order": entry.order,
+                    "order": engaged[id_tag].number if id_tag in engaged else None,
                 }
             )
         return rows
 
     def events(self) -> list[Row]:
         """The events, as the DVA knows them."""
-        return [
-            {"number": e.number, "kind": e.kind, "state": str(e.state)}
-            for e in self._agent.desk.book.events.values()
-        ]
+        return [{"number": e.number, "kind": e.kind, "state": str(e.state)} for e in self._events()]
 
     def settled(self) -> bool:
         """See `Part`."""
-        events = self._agent.desk.book.events.values()
-        return bool(events) and not any(e.open for e in events)
+        book = self._agent.desk.book
+        return book.total > 0 and not book.open
+
+    def _events(self) -> list[Event]:
+        """The last that were closed, and all that are open."""
+        book = self._agent.desk.book
+        return [*book.closed.values(), *book.open.values()]
 
     def finish(self) -> None:
         """See `Part`: nobody drives any longer by our permission."""

@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import shapely
 
 from dva_sim.agents.operator.agent import OperatorAgent
 from dva_sim.agents.operator.drive import DriverSeat, OperatorSetup
 from dva_sim.agents.operator.person import draw_person
 from dva_sim.agents.operator.strategies import STRATEGIES, Oracle, Reach, Truth
 from dva_sim.agents.tilt import Phone
-from dva_sim.core.dispatch import POLICIES
+from dva_sim.core.access import Access, AccessRule
+from dva_sim.core.dispatch import load_policy
+from dva_sim.core.ground import Floats, Ground, Start, Station
+from dva_sim.core.memory import Memory
 from dva_sim.core.permissions import LOW_BITS, Permissions
-from dva_sim.core.service import Desk, Pace
+from dva_sim.core.service import Desk
 from dva_sim.core.sessions import Sessions
 from dva_sim.errors import ConfigError
 from dva_sim.protocol import messages as m
-from dva_sim.scenario import guard_profile, phone_profile, population, robot_profile
+from dva_sim.scenario import Scenario, guard_profile, phone_profile, population, robot_profile
 from dva_sim.simulation.dva import DvaAgent
 from dva_sim.simulation.stage import Stage
 
@@ -23,28 +29,100 @@ ROBOT_PACE = 0.35  # what the DVA expects of a teleoperated robot [m/s]
 ROBOT_READY = 4.0  # and of its operator [s]
 
 
-def add_dva(stage: Stage, permissions: Permissions | None = None) -> DvaAgent:
-    """The DVA; sessions are drawn by the run's seed where no other `permissions` are given."""
-    dispatch, guards = stage.scenario.dispatch, guard_profile(stage.scenario)
-    draw = stage.streams["dva/sessions"]
+def add_dva(
+    stage: Stage,
+    permissions: Permissions | None = None,
+    memory: Memory | None = None,
+    keep_events: bool = True,
+) -> DvaAgent:
+    """The DVA; sessions are drawn by the run's seed where no other `permissions` are given.
+
+    Args:
+        stage: Where.
+        permissions: Who holds what, if not drawn by the seed.
+        memory: What survives the DVA.
+        keep_events: Whether every event that ever was is kept, for a recording.
+
+    Raises:
+        ConfigError: a policy that cannot be loaded.
+    """
+    dispatch, draw = stage.scenario.dispatch, stage.streams["dva/sessions"]
+    sessions = Sessions(permissions or Permissions(lambda: int(draw.integers(2**LOW_BITS))))
+    policy = load_policy(dispatch.policy, dispatch.options)
     desk = Desk(
-        policy=POLICIES[dispatch.policy](),
-        distance=lambda start, goal: _distance(stage, start, goal),
-        paces={
-            "guard": Pace(guards.walking_mean_mps, guards.mobilisation_s.median),
-            "robot": Pace(ROBOT_PACE, ROBOT_READY),
-        },
-        escalate_after=dispatch.escalate_after_s,
-        rng=stage.streams["dva/policy"],
-        sessions=Sessions(permissions or Permissions(lambda: int(draw.integers(2**LOW_BITS)))),
+        policy,
+        _Ways(stage),
+        dispatch.rules(),
+        stage.streams["dva/policy"],
+        sessions,
+        _ground(stage) if policy.relocates else Ground(),
+        _access(stage.scenario),
     )
-    return DvaAgent(stage.device("dva", 1), desk)
+    return DvaAgent(stage.device("dva", 1), desk, memory, keep_events)
 
 
-def _distance(stage: Stage, start: m.Position, goal: m.Position) -> float:
+class _Ways:
+    """What the DVA expects of ways: the planner's length, and a pace for each kind.
+
+    Args:
+        stage: Where.
+    """
+
+    def __init__(self, stage: Stage) -> None:
+        guards = guard_profile(stage.scenario)
+        self._stage = stage
+        self._paces = {
+            "guard": (guards.walking_mean_mps, guards.mobilisation_s.median),
+            "robot": (ROBOT_PACE, ROBOT_READY),
+        }
+
+    def __call__(
+        self, starts: Sequence[Start], goals: Sequence[m.Position]
+    ) -> tuple[Floats, Floats]:
+        """See `Travel`."""
+        speed = np.array([self._paces[s.kind][0] for s in starts])
+        ready = np.array([0.0 if s.under_way else self._paces[s.kind][1] for s in starts])
+        ways = [[self._length(s.position, goal) for s in starts] for goal in goals]
+        distance = np.array(ways, dtype=np.float64).reshape(len(goals), len(starts))
+        return distance, ready + distance / speed
+
+    def _length(self, start: m.Position, goal: m.Position) -> float:
+        frame = self._stage.site.frame
+        a = frame.to_xy(start.latitude, start.longitude)
+        return self._stage.planner.distance(a, frame.to_xy(goal.latitude, goal.longitude))
+
+
+def _ground(stage: Stage) -> Ground:
+    """Guards wait at their posts; each room is a zone that counts by its floor's area."""
     frame = stage.site.frame
-    a = frame.to_xy(start.latitude, start.longitude)
-    return stage.planner.distance(a, frame.to_xy(goal.latitude, goal.longitude))
+    stations = tuple(
+        Station(f"post {number}", m.Position(*frame.to_latlon(post.x, post.y)))
+        for number, post in enumerate(stage.site.guard_posts, 1)
+    )
+    rooms = [shapely.Polygon(room.polygon) for room in stage.site.rooms]
+    if not stations or not rooms:
+        return Ground()
+    starts = [Start(s.name, "guard", s.position, under_way=True) for s in stations]
+    middles = [room.representative_point() for room in rooms]
+    goals = [m.Position(*frame.to_latlon(middle.x, middle.y)) for middle in middles]
+    area = np.array([room.area for room in rooms])
+    return Ground(None, stations, _Ways(stage)(starts, goals)[1].T, area / area.sum())
+
+
+def _access(scenario: Scenario) -> Access:
+    """Without rules in the scenario everything is allowed to who asks."""
+    rules = [
+        AccessRule(
+            frozenset(rule.holders),
+            frozenset(rule.robots),
+            frozenset(rule.levels),
+            None if rule.sensors is None else frozenset(rule.sensors),
+            rule.from_s,
+            rule.until_s,
+        )
+        for rule in scenario.access
+    ]
+    return Access(rules) if rules else Access()
 
 
 def add_operator(

@@ -6,7 +6,8 @@ from collections import Counter
 from functools import partial
 
 from dva_sim.agents.device import HEARTBEAT, STATUS, Device
-from dva_sim.core.events import State
+from dva_sim.core.events import Event, State
+from dva_sim.core.memory import Memory
 from dva_sim.core.registry import DETECTOR, GUARD, ROBOT
 from dva_sim.core.send import Send
 from dva_sim.core.service import Desk
@@ -25,18 +26,30 @@ class DvaAgent:
 
     Attributes:
         beats: Heartbeats heard, by device.
+        events: Every event there ever was, by number, where `keep_events`.
     """
 
-    def __init__(self, device: Device, desk: Desk) -> None:
+    def __init__(
+        self, device: Device, desk: Desk, memory: Memory | None = None, keep_events: bool = True
+    ) -> None:
         self.device, self.desk = device, desk
-        self._known: dict[int, State] = {}
+        self.events: dict[int, Event] = {}
+        self._memory, self._keep_events = memory, keep_events
+        self._told: dict[int, State] = {}
+        self._problem: str | None = None
         self.beats: Counter[str] = Counter()
         self._heard: dict[tuple[str, str], tuple[str, Subscription]] = {}
         device.serve(self._on_request)
 
     def start(self) -> None:
-        """Begin to look at deadlines."""
-        self.device.clock.every(TICK, self._tick, start=TICK)
+        """Begin to look at deadlines; a memory tells what was going on before."""
+        clock = self.device.clock
+        if self._memory is not None and self._memory.recall(self.desk, clock.now):
+            self.device.tell(f"remembers {len(self.desk.book.open)} open events")
+            for entry in list(self.desk.registry.entries.values()):
+                self._meet(entry.device)
+            self._carry_out(self.desk.orders.again())
+        clock.every(TICK, self._tick, start=clock.now + TICK)
 
     def close(self) -> None:
         """End all sessions: nobody drives by a permission of a DVA that is no more."""
@@ -45,29 +58,31 @@ class DvaAgent:
     def _on_request(self, message: m.Message) -> m.Reply:
         reply, sends = self.desk.handle(message, self.device.clock.now)
         if isinstance(message.body, m.Registration) and reply.code == m.OK:
-            self.device.network.introduce(message.source, message.body.address)
-            self._listen(message.source, message.body)
+            body = message.body
+            self._meet(m.Device(message.source, body.label, body.device_type, body.address))
         self._carry_out(sends)
         return reply
 
-    def _listen(self, source: str, body: m.Registration) -> None:
-        """Subscribe to what a device publishes, anew when it has moved to another address.
+    def _meet(self, device: m.Device) -> None:
+        """Listen to what a device publishes, anew when it has moved to another address.
 
         Detectors only speak when they have something to report.
         """
-        topics = [] if body.device_type == DETECTOR else [HEARTBEAT]
-        if body.device_type in (ROBOT, GUARD):
+        source = device.id_tag
+        self.device.network.introduce(source, device.address)
+        topics = [] if device.device_type == DETECTOR else [HEARTBEAT]
+        if device.device_type in (ROBOT, GUARD):
             topics.append(STATUS)
         for topic in topics:
             address, earlier = self._heard.get((source, topic), ("", None))
-            if address == body.address:
+            if address == device.address:
                 continue
             if earlier is not None:
                 earlier.close()
             heard = self.device.network.subscribe(
                 self.device.id_tag, source, topic, partial(self._on_published, source)
             )
-            self._heard[source, topic] = body.address, heard
+            self._heard[source, topic] = device.address, heard
 
     def _on_published(self, source: str, data: bytes) -> None:
         message = self.device.read(data, source)
@@ -79,6 +94,8 @@ class DvaAgent:
         self._carry_out(self.desk.tick(self.device.clock.now))
 
     def _carry_out(self, sends: list[Send]) -> None:
+        """Keep what has changed, then say it: what was said must not be forgotten."""
+        self._keep_changes()
         for send in sends:
             session = send.body.session if isinstance(send.body, m.PermissionGrant) else 0
             self.device.ask(
@@ -88,24 +105,40 @@ class DvaAgent:
                 lambda send=send: self._undelivered(send),  # type: ignore[misc]
                 session,
             )
-        self._tell_changes()
 
     def _answered(self, send: Send, reply: m.Reply) -> None:
-        # Whoever refuses to hear that a session is over has no such session.
-        if reply.code != m.OK and not isinstance(send.body, m.PermissionRevocation):
+        # Whoever refuses to hear that something is over knows nothing of it.
+        if reply.code == m.OK:
+            self._carry_out(self.desk.delivered(send, self.device.clock.now))
+        elif not isinstance(send.body, m.PermissionRevocation | m.OrderProgress):
             self._undelivered(send)
 
     def _undelivered(self, send: Send) -> None:
         self._carry_out(self.desk.undelivered(send, self.device.clock.now))
 
-    def _tell_changes(self) -> None:
-        """Put each change of an event on the timeline."""
-        for event in self.desk.book.events.values():
-            if self._known.get(event.number) is event.state:
-                continue
-            self._known[event.number] = event.state
-            who = event.operator or event.responder
-            told = f"event {event.number} ({event.kind}) is {event.state}"
-            if event.state is State.ASSIGNED and who:
-                told += f" to {self.device.label_of(who)}"
-            self.device.tell(told)
+    def _keep_changes(self) -> None:
+        """Put each change of an event on the timeline, and all that changed into the memory."""
+        changed = self.desk.book.changes()
+        if self._memory is not None:
+            self._complain(self._memory.keep(self.desk, changed, self.device.clock.now))
+        for event in changed:
+            if self._keep_events:
+                self.events[event.number] = event
+            self._tell(event)
+
+    def _complain(self, problem: str | None) -> None:
+        """Say once what goes wrong with the memory; the DVA works on."""
+        if problem is not None and problem != self._problem:
+            self.device.tell(problem, "link")
+        self._problem = problem
+
+    def _tell(self, event: Event) -> None:
+        if self._told.get(event.number) is event.state:
+            return
+        self._told[event.number] = event.state
+        if not event.open:
+            del self._told[event.number]
+        told = f"event {event.number} ({event.kind}) is {event.state}"
+        if event.state is State.ASSIGNED and event.holder:
+            told += f" to {self.device.label_of(event.holder)}"
+        self.device.tell(told)

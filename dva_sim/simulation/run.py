@@ -87,7 +87,7 @@ class Run:
             stage.site,
             self.recorder,
             self.field.incidents,
-            list(self.dva.desk.book.events.values()),
+            list(self.dva.events.values()),
             self.field.robots,
             stage.labels,
             self.links,
@@ -96,7 +96,7 @@ class Run:
 
     def _settled(self) -> bool:
         """Whether every incident is known and closed, and nobody drives any more."""
-        events = list(self.dva.desk.book.events.values())
+        events = list(self.dva.events.values())
         return (
             bool(events)
             and not any(e.open for e in events)

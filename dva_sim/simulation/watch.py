@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 from dva_sim.agents.modes import Mode
 from dva_sim.agents.robot import RobotAgent
-from dva_sim.core.events import STEPS, EventBook, State
+from dva_sim.core.events import ACT_STEPS, STEPS, EventBook
 from dva_sim.recorder import DriveLog
 from dva_sim.scenario import RobotConfig
 
@@ -73,11 +73,14 @@ def _moved_by_the_past(robot: RobotAgent, drive: DriveLog) -> bool:
 
 
 def broken_event_rules(book: EventBook, deadline: float, now: float) -> Iterator[Broken]:
-    """Events that wait beyond their deadline [s] (S6), or whose times are out of order (S7)."""
-    for event in book.events.values():
-        waited = now - event.pending_since
-        if event.state is State.PENDING and waited > deadline + PENDING_SLACK:
-            yield "S6", f"event {event.number} is pending after {waited:.0f} s"
-        times = [event.times[step] for step in STEPS if step in event.times]
-        if times != sorted(times):
-            yield "S7", f"times of event {event.number} are out of order"
+    """Events that wait beyond their deadline [s] or are miscounted (S6), or out of order (S7)."""
+    if sum(book.counts.values()) != book.total:
+        yield "S6", f"{book.total} events, but {sum(book.counts.values())} in some state"
+    for event in (*book.open.values(), *book.closed.values()):
+        waited = now - event.waiting_since
+        if event.waits_for is not None and waited > deadline + PENDING_SLACK:
+            yield "S6", f"event {event.number} is {event.state} after {waited:.0f} s"
+        for steps in (STEPS, ACT_STEPS):
+            times = [event.times[step] for step in steps if step in event.times]
+            if times != sorted(times):
+                yield "S7", f"times of event {event.number} are out of order"

@@ -1,0 +1,97 @@
+"""Auctions: who was asked for a bid, who has bid what, and whether the time is up."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dva_sim.core.events import Event
+
+
+@dataclass
+class Auction:
+    """One task on offer.
+
+    Attributes:
+        until: When bids are no longer taken [s].
+        asked: Who has not answered yet.
+        arrival: When each bidder would be there [s].
+    """
+
+    until: float
+    asked: set[str]
+    arrival: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass
+class Auctions:
+    """All auctions under way, by number of the event.
+
+    Attributes:
+        bid_within: How long bids are taken [s].
+    """
+
+    bid_within: float
+    running: dict[int, Auction] = field(default_factory=dict)
+
+    def announce(self, event: int, asked: Sequence[str], now: float) -> float:
+        """Begin an auction; how long bids are taken [s]."""
+        self.running[event] = Auction(now + self.bid_within, set(asked))
+        return self.bid_within
+
+    def bid(self, event: int, device: str, arrival_in: float, now: float) -> bool:
+        """Take a bid; False if it was not asked for, or comes too late."""
+        auction = self.running.get(event)
+        if auction is None or now > auction.until or device not in auction.asked:
+            return False
+        auction.asked.discard(device)
+        auction.arrival[device] = now + arrival_in
+        return True
+
+    def no_bid(self, event: int, device: str) -> None:
+        """A device declines to bid, or cannot be reached."""
+        auction = self.running.get(event)
+        if auction is not None:
+            auction.asked.discard(device)
+
+    def stage(self, event: int, now: float) -> Literal["open", "over"] | None:
+        """Whether a task is on auction; an auction that is over without a bid is forgotten."""
+        auction = self.running.get(event)
+        if auction is None:
+            return None
+        if auction.asked and now < auction.until:
+            return "open"
+        if not auction.arrival:
+            del self.running[event]
+            return None
+        return "over"
+
+    def award(self, event: int, device: str) -> bool:
+        """End an auction; whether the device had bid in it."""
+        auction = self.running.pop(event, None)
+        return auction is not None and device in auction.arrival
+
+    def forget(self, event: int) -> None:
+        """The event needs nobody any more."""
+        self.running.pop(event, None)
+
+    def bids(
+        self, events: Sequence[Event], devices: Sequence[str], now: float
+    ) -> NDArray[np.float64]:
+        """Arrival on offer [s from now], shape `(events, devices)`; nan without a bid."""
+        table = np.full((len(events), len(devices)), np.nan)
+        for row, event in enumerate(events):
+            auction = self.running.get(event.number)
+            for column, device in enumerate(devices if auction and auction.arrival else ()):
+                assert auction is not None
+                table[row, column] = auction.arrival.get(device, math.nan) - now
+        return table
+
+    def next_deadline(self) -> float:
+        """When the time of an auction is up [s]."""
+        return min((a.until for a in self.running.values()), default=math.inf)

@@ -1,0 +1,363 @@
+"""The dispatcher: shows the policy what is known, and gives the orders that the rules allow."""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dva_sim.core.auctions import Auctions
+from dva_sim.core.dispatch import MinEta
+from dva_sim.core.dispatch.situation import (
+    Advice,
+    Announcement,
+    Assignment,
+    Cover,
+    Policy,
+    Relocation,
+    Responder,
+    Situation,
+    Task,
+)
+from dva_sim.core.events import Event, State
+from dva_sim.core.ground import Floats, Ground, Start, Travel
+from dva_sim.core.orders import Orders
+from dva_sim.core.registry import GUARD, OPERATOR, ROBOT, Entry
+from dva_sim.core.send import Send
+from dva_sim.protocol import messages as m
+
+CONSIDERED = 1000  # tasks that one decision looks at, those detected longest ago
+SAME_PLACE = 3e-5  # a few metres [deg]
+DECISIONS = 4  # in a row, where one makes the next necessary
+KINDS: dict[str, Literal["guard", "robot"]] = {GUARD: "guard", ROBOT: "robot"}
+
+
+@dataclass
+class _Team:
+    """Who can go: the entries behind `Situation.responders`, and the free operators."""
+
+    entries: list[Entry]
+    engaged: list[Event | None]
+    operators: list[Entry]
+
+    def starts(self) -> list[Start]:
+        """From where they would set out."""
+        return [
+            Start(e.device.id_tag, KINDS[e.device.device_type], e.position, a is not None)
+            for e, a in zip(self.entries, self.engaged, strict=True)
+            if e.position is not None
+        ]
+
+
+@dataclass
+class Dispatcher:
+    """Asks the policy, keeps what the rules allow.
+
+    Attributes:
+        policy: Advises.
+        travel: How far it is from whom to where.
+        orders: Gives the orders.
+        rng: Luck of policies that use it.
+        ground: What is known of the place.
+        last_failure: What the policy did wrong last, in words.
+    """
+
+    policy: Policy
+    travel: Travel
+    orders: Orders
+    rng: np.random.Generator
+    ground: Ground = field(default_factory=Ground)
+    auctions: Auctions = field(init=False)
+    last_failure: str = ""
+    _bound_for: dict[str, int] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.auctions = Auctions(self.orders.rules.bid_within)
+        self._default = MinEta()
+
+    # --- a decision --------------------------------------------------------------------
+
+    def decide(self, now: float) -> list[Send]:
+        """Give the orders that are due now; what finds nobody in time is given up."""
+        sends: list[Send] = []
+        for _ in range(DECISIONS):
+            before = self.orders.counters["preempted"]
+            sends += self._decide(now)
+            if self.orders.counters["preempted"] == before:
+                break
+        return sends + self.orders.give_up(now)
+
+    def _decide(self, now: float) -> list[Send]:
+        if not self.orders.book.open and not self.policy.relocates:
+            return []
+        events = self._tasks()
+        if not events and not self.policy.relocates:
+            return []
+        team = self._team(now)
+        if not team.entries:
+            return []
+        situation = self._situation(events, team, now)
+        return self._carry_out(self._advice(situation), situation, events, team, now)
+
+    def _advice(self, situation: Situation) -> Sequence[Advice]:
+        """The policy's, if it makes sense; else the default's."""
+        try:
+            advice = list(self.policy.advise(situation, self.rng))
+            _check_form(advice, situation)
+        except Exception as error:
+            self.orders.counters["policy failed"] += 1
+            self.last_failure = f"{type(error).__name__}: {error}"
+            return self._default.advise(situation, self.rng)
+        return advice
+
+    def _carry_out(
+        self,
+        advice: Sequence[Advice],
+        situation: Situation,
+        events: list[Event],
+        team: _Team,
+        now: float,
+    ) -> list[Send]:
+        taken: set[int] = set()
+        given: set[int] = set()
+        sends: list[Send] = []
+        for piece in advice:
+            done: list[Send] | None = None
+            if isinstance(piece, Announcement):
+                done = self._announce(situation, events[piece.task], team, piece.task, now)
+            elif piece.responder in taken:
+                pass
+            elif isinstance(piece, Relocation):
+                done = self._relocate(piece, situation, team)
+            elif piece.task not in given:
+                done = self._assign(piece, situation, events, team, now)
+                given.update({piece.task} if done is not None else ())
+            if done is None:
+                self.orders.counters["overruled"] += 1
+            else:
+                sends += done
+                if not isinstance(piece, Announcement):
+                    taken.add(piece.responder)
+        return sends
+
+    def not_moved(self, send: Send) -> None:
+        """A guard did not take a relocation."""
+        self._bound_for.pop(send.to, None)
+
+    # --- what the rules allow ----------------------------------------------------------
+
+    def _assign(
+        self,
+        choice: Assignment,
+        situation: Situation,
+        events: list[Event],
+        team: _Team,
+        now: float,
+    ) -> list[Send] | None:
+        """The orders that an assignment means; None if the rules do not allow it."""
+        task, event = situation.tasks[choice.task], events[choice.task]
+        entry, former = team.entries[choice.responder], team.engaged[choice.responder]
+        if task.engaged is not None or not math.isfinite(
+            situation.eta[choice.task, choice.responder]
+        ):
+            return None
+        if former is not None and not self.orders.may_preempt(former, now):
+            return None
+        is_robot = entry.device.device_type == ROBOT
+        if is_robot and former is None and not team.operators:
+            return None
+        pilot = None
+        if is_robot:
+            pilot = former.operator if former else team.operators.pop(0).device.id_tag
+        if former is not None:
+            self.orders.redirect(former, now)
+        self._bound_for.pop(entry.device.id_tag, None)
+        if task.stage == "contain":
+            return [self.orders.act(event, entry.device.id_tag, now)]
+        award = self.auctions.award(event.number, entry.device.id_tag)
+        return [self.orders.confirm(event, entry.device.id_tag, pilot, now, award)]
+
+    def _announce(
+        self, situation: Situation, event: Event, team: _Team, task: int, now: float
+    ) -> list[Send] | None:
+        """Ask every idle responder that could go there for a bid."""
+        shown = situation.tasks[task]
+        if not self.policy.auctions or shown.auction or shown.stage != "confirm" or not shown.due:
+            return None
+        able = np.isfinite(situation.eta[task])
+        asked = [
+            entry.device.id_tag
+            for entry, engaged, can in zip(team.entries, team.engaged, able, strict=True)
+            if can and engaged is None
+        ]
+        if not asked:
+            return None
+        self.orders.counters["auctions"] += 1
+        within = self.auctions.announce(event.number, asked, now)
+        body = m.TaskAnnouncement(event.number, event.kind, event.position, event.severity, within)
+        return [Send(device, body) for device in asked]
+
+    def _relocate(self, move: Relocation, situation: Situation, team: _Team) -> list[Send] | None:
+        entry, cover = team.entries[move.responder], situation.cover
+        if not self.policy.relocates or cover is None or team.engaged[move.responder] is not None:
+            return None
+        if not math.isfinite(cover.eta[move.responder, move.station]):
+            return None
+        self._bound_for[entry.device.id_tag] = move.station
+        self.orders.counters["relocated"] += 1
+        return [
+            Send(entry.device.id_tag, m.Relocation(self.ground.stations[move.station].position))
+        ]
+
+    # --- what is known -----------------------------------------------------------------
+
+    def _tasks(self) -> list[Event]:
+        """Events that somebody could do something about, detected longest ago first."""
+        book, rules = self.orders.book, self.orders.rules
+        if not (rules.containment or self.policy.preempts):
+            found = list(book.waiting.values())
+        else:
+            found = [e for e in book.open.values() if self._is_task(e)]
+        found.sort(key=operator.attrgetter("number"))
+        return found[:CONSIDERED]
+
+    def _is_task(self, event: Event) -> bool:
+        if event.waits_for is not None:
+            return True
+        stand_by = event.needs_containment and event.actor is None
+        return stand_by or (self.policy.preempts and event.state is State.ASSIGNED)
+
+    def _team(self, now: float) -> _Team:
+        operators = self._free(OPERATOR, now)
+        able = [e for kind in (GUARD, ROBOT) for e in self._free(kind, now) if e.position]
+        entries = [e for e in able if operators or e.device.device_type == GUARD]
+        engaged: list[Event | None] = [None] * len(entries)
+        if self.policy.preempts:
+            for event in self.orders.book.in_state(State.ASSIGNED):
+                entry = self.orders.registry.entries[event.responder or ""]
+                if entry.position and event.taken_up:
+                    entries.append(entry)
+                    engaged.append(event)
+        return _Team(entries, engaged, operators)
+
+    def _free(self, device_type: str, now: float) -> list[Entry]:
+        """Devices of a type that may be given an order."""
+        held, engaged = self.orders.sessions.permissions.grants, self.orders.engaged
+        return [
+            e
+            for e in self.orders.registry.of_type(device_type)
+            if e.free_from <= now and not (e.device.id_tag in engaged or e.device.id_tag in held)
+        ]
+
+    def _situation(self, events: list[Event], team: _Team, now: float) -> Situation:
+        rows = {id(e): row for row, e in enumerate(events)}
+        columns = {id(e): c for c, e in enumerate(team.engaged) if e is not None}
+        tasks = tuple(self._task(e, columns.get(id(e)), now) for e in events)
+        responders = tuple(
+            Responder(e.device.id_tag, KINDS[e.device.device_type], rows.get(id(a)) if a else None)
+            for e, a in zip(team.entries, team.engaged, strict=True)
+        )
+        distance, eta = self._ways(events, tasks, team)
+        names = [r.device for r in responders]
+        preference = self.ground.preference
+        ranks = [preference(e.position, names) for e in events] if preference and events else []
+        bids = self.auctions.bids(events, names, now) if self.policy.auctions else np.empty((0, 0))
+        return Situation(
+            now,
+            tasks,
+            responders,
+            distance,
+            eta,
+            np.array(ranks, dtype=np.float64) if ranks else np.empty((0, 0)),
+            bids,
+            len(team.operators),
+            self._cover(team) if self.policy.relocates else None,
+        )
+
+    def _task(self, event: Event, engaged: int | None, now: float) -> Task:
+        looked_at = event.state in (State.ASSIGNED, State.ON_SCENE)
+        # While somebody is under way to look, what is left to give is standing by.
+        confirm = event.state is State.PENDING or (looked_at and engaged is not None)
+        return Task(
+            event.number,
+            event.kind,
+            "confirm" if confirm else "contain",
+            confirm or event.state is State.CONFIRMED,
+            event.severity,
+            event.confidence,
+            event.times["detected"],
+            event.waiting_since,
+            engaged,
+            self.auctions.stage(event.number, now),
+        )
+
+    def _ways(
+        self, events: list[Event], tasks: Sequence[Task], team: _Team
+    ) -> tuple[Floats, Floats]:
+        starts = team.starts()
+        distance, eta = self.travel(starts, [e.position for e in events])
+        robots = np.array([s.kind == "robot" for s in starts])
+        for row, (event, task) in enumerate(zip(events, tasks, strict=True)):
+            if task.stage == "contain":
+                distance[row, robots] = eta[row, robots] = np.inf
+            if event.failed:
+                _leave_out_who_failed(event, starts, distance[row], eta[row])
+        return distance, eta
+
+    def _cover(self, team: _Team) -> Cover | None:
+        """Where idle guards could wait; who is already sent to wait somewhere is left alone."""
+        ground = self.ground
+        if not ground.stations:
+            return None
+        starts = team.starts()
+        eta = self.travel(starts, [s.position for s in ground.stations])[1].T.copy()
+        bound_for: list[int | None] = []
+        for row, (start, engaged) in enumerate(zip(starts, team.engaged, strict=True)):
+            bound = self._bound_for.get(start.device)
+            if bound is not None and _same_place(ground.stations[bound].position, start.position):
+                del self._bound_for[start.device]
+                bound = None
+            if start.kind != "guard" or engaged is not None:
+                eta[row] = np.inf
+            bound_for.append(bound)
+        names = tuple(s.name for s in ground.stations)
+        return Cover(names, eta, ground.reach, ground.demand, tuple(bound_for))
+
+
+def _check_form(advice: Iterable[Advice], situation: Situation) -> None:
+    """Refuse what is not advice, or names what is not there."""
+    tasks, responders = len(situation.tasks), len(situation.responders)
+    stations = len(situation.cover.stations) if situation.cover else 0
+    for piece in advice:
+        if not isinstance(piece, Advice):
+            raise TypeError(f"{piece!r} is no advice")
+        if not isinstance(piece, Relocation):
+            _check_place("task", piece.task, tasks)
+        if not isinstance(piece, Announcement):
+            _check_place("responder", piece.responder, responders)
+        if isinstance(piece, Relocation):
+            _check_place("station", piece.station, stations)
+
+
+def _check_place(what: str, place: object, count: int) -> None:
+    if isinstance(place, bool) or not 0 <= operator.index(place) < count:  # type: ignore[arg-type]
+        raise IndexError(f"there is no {what} {place!r}; there are {count}")
+
+
+def _same_place(a: m.Position, b: m.Position) -> bool:
+    """Within a few metres."""
+    return abs(a.latitude - b.latitude) + abs(a.longitude - b.longitude) < SAME_PLACE
+
+
+def _leave_out_who_failed(
+    event: Event, starts: Sequence[Start], distance: NDArray[np.float64], eta: NDArray[np.float64]
+) -> None:
+    """A responder that gave an event back goes again only if nobody else can."""
+    failed = np.array([s.device in event.failed for s in starts], dtype=bool)
+    if np.isfinite(distance[~failed]).any():
+        distance[failed] = eta[failed] = np.inf

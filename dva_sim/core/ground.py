@@ -1,0 +1,69 @@
+"""What the core may know of the place: as values, never as a map."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dva_sim.protocol import messages as m
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """From where a responder would set out.
+
+    Attributes:
+        device: Its id.
+        kind: `guard` or `robot`.
+        position: Where it is.
+        under_way: Whether it has set out already, to somewhere else: it needs no mobilisation.
+    """
+
+    device: str
+    kind: str
+    position: m.Position
+    under_way: bool = False
+
+
+class Travel(Protocol):
+    """Given by the world: how far it is, and how long it would take."""
+
+    def __call__(
+        self, starts: Sequence[Start], goals: Sequence[m.Position]
+    ) -> tuple[Floats, Floats]:
+        """Path length [m], and expected time to arrival with mobilisation [s].
+
+        Both of shape `(goals, starts)`; infinite where there is no way.
+        """
+
+
+@dataclass(frozen=True, slots=True)
+class Station:
+    """A place where idle guards may wait."""
+
+    name: str
+    position: m.Position
+
+
+@dataclass(frozen=True)
+class Ground:
+    """Knowledge of the place that does not change.
+
+    Attributes:
+        preference: Place of each device on the list for events at a position, from 0;
+            infinite for who is not on it. None if there are no lists.
+        stations: Where guards may wait.
+        reach: From each station to each zone [s], shape `(stations, zones)`.
+        demand: Share of events expected in each zone, shape `(zones,)`.
+    """
+
+    preference: Callable[[m.Position, Sequence[str]], Sequence[float]] | None = None
+    stations: tuple[Station, ...] = ()
+    reach: Floats = field(default_factory=lambda: np.empty((0, 0)))
+    demand: Floats = field(default_factory=lambda: np.empty(0))

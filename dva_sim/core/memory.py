@@ -1,0 +1,203 @@
+"""What survives the DVA: events, devices and permissions, in a SQLite file.
+
+Detectors report an event once and a holder is granted a robot once, so neither can be rebuilt
+by asking around; hence a file. What comes by itself within seconds is not kept: positions,
+modes, signs of life, auctions. Each change is kept before anything is said because of it, so
+that a DVA that was killed never promised what its next life does not know. After the kill of
+the process nothing is lost; after a power failure the last moments may be.
+"""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+from collections import deque
+from collections.abc import Iterable
+from dataclasses import fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from dva_sim.core.events import KEPT_CLOSED, Event, State
+from dva_sim.core.permissions import Grant
+from dva_sim.core.registry import Entry
+from dva_sim.errors import ConfigError
+from dva_sim.protocol.messages import Device, Position
+
+if TYPE_CHECKING:
+    from dva_sim.core.service import Desk
+
+FORMAT = 1
+_TABLES = """
+CREATE TABLE IF NOT EXISTS about (name TEXT PRIMARY KEY, value INTEGER NOT NULL);
+CREATE TABLE IF NOT EXISTS events (number INTEGER PRIMARY KEY, open INTEGER, data TEXT NOT NULL);
+CREATE TABLE IF NOT EXISTS devices (id TEXT PRIMARY KEY, data TEXT NOT NULL);
+CREATE TABLE IF NOT EXISTS grants (session TEXT PRIMARY KEY, data TEXT NOT NULL);
+"""
+_PLAIN: tuple[str, ...] = (
+    *("number", "kind", "severity", "needs_containment", "reports", "sources"),
+    *("responder", "operator", "actor", "taken_up", "attempts", "preemptions"),
+)
+
+
+class Memory:
+    """The file that a DVA writes down what it must not forget in.
+
+    Args:
+        file: Made if it does not exist.
+        epoch: Added to the desk's time, so that times of different lives agree [s].
+
+    Raises:
+        ConfigError: the file cannot be opened, or is something else.
+    """
+
+    def __init__(self, file: Path | str, epoch: float = 0.0) -> None:
+        self.epoch = epoch
+        self._granted: dict[str, str] = {}
+        self._events: dict[int, Event] = {}
+        self._devices: dict[str, Entry] = {}
+        try:
+            self._file = sqlite3.connect(file, isolation_level=None, timeout=1.0)
+            self._file.execute("PRAGMA journal_mode=WAL")
+            self._file.execute("PRAGMA synchronous=NORMAL")
+            self._file.executescript(_TABLES)
+            self._file.execute("INSERT OR IGNORE INTO about VALUES ('format', ?)", (FORMAT,))
+        except sqlite3.Error as error:
+            raise ConfigError(f"cannot be used as the DVA's memory: {error}", file) from None
+        if self._about("format") != FORMAT:
+            raise ConfigError(f"is not a DVA's memory of format {FORMAT}", file)
+
+    def close(self) -> None:
+        """Put the file away."""
+        self._file.close()
+
+    # --- to the file -------------------------------------------------------------------
+
+    def keep(self, desk: Desk, changed: Iterable[Event], now: float) -> str | None:
+        """Write down what has changed; what went wrong, in words, or None.
+
+        What cannot be written, to a full disk for example, is tried again with the next change.
+        """
+        self._events |= {event.number: event for event in changed}
+        self._devices |= {entry.device.id_tag: entry for entry in desk.registry.changes()}
+        grants = {str(g.session): json.dumps(_plain(g)) for g in desk.sessions.permissions.all()}
+        if not (self._events or self._devices or grants != self._granted):
+            return None
+        try:
+            self._file.execute("BEGIN IMMEDIATE")
+            self._write(desk, grants)
+            self._file.execute("COMMIT")
+        except sqlite3.Error as error:
+            if self._file.in_transaction:
+                self._file.execute("ROLLBACK")
+            return f"cannot keep its memory: {error}"
+        self._events, self._devices, self._granted = {}, {}, grants
+        return None
+
+    def _write(self, desk: Desk, grants: dict[str, str]) -> None:
+        put = self._file.executemany
+        events = (
+            (e.number, e.open, json.dumps(_of_event(e, desk, self.epoch)))
+            for e in self._events.values()
+        )
+        put("INSERT OR REPLACE INTO events VALUES (?, ?, ?)", events)
+        devices = ((i, json.dumps(_of_entry(e))) for i, e in self._devices.items())
+        put("INSERT OR REPLACE INTO devices VALUES (?, ?)", devices)
+        gone = ((s,) for s in self._granted.keys() - grants.keys())
+        put("DELETE FROM grants WHERE session = ?", gone)
+        new = (item for item in grants.items() if self._granted.get(item[0]) != item[1])
+        put("INSERT OR REPLACE INTO grants VALUES (?, ?)", new)
+        count = desk.sessions.permissions.count
+        put("INSERT OR REPLACE INTO about VALUES (?, ?)", [("sessions", count)])
+
+    # --- from the file -----------------------------------------------------------------
+
+    def recall(self, desk: Desk, now: float) -> bool:
+        """Tell a new desk what an earlier one knew; whether there was anything.
+
+        Devices count as heard just now: each has its time-out to show that it is there.
+        """
+        for (data,) in self._file.execute("SELECT data FROM devices ORDER BY rowid"):
+            desk.registry.add(_entry(json.loads(data), now))
+        found = bool(desk.registry.entries)
+        for state, count in self._counts().items():
+            desk.book.counts[state] += count
+        for (data,) in self._file.execute(_RECENT, (KEPT_CLOSED,)):
+            found = True
+            kept = json.loads(data)
+            event = _event(kept, self.epoch)
+            desk.book.restore(event)
+            desk.orders.engaged |= dict.fromkeys(kept["engaged"], event)
+        desk.book.total = sum(desk.book.counts.values())
+        self._recall_grants(desk)
+        desk.registry.changes()
+        desk.book.changes()
+        return found
+
+    def _counts(self) -> dict[State, int]:
+        rows = self._file.execute(
+            "SELECT json_extract(data, '$.state'), count(*) FROM events GROUP BY 1"
+        )
+        return {State(state): count for state, count in rows}
+
+    def _recall_grants(self, desk: Desk) -> None:
+        permissions = desk.sessions.permissions
+        for session, data in self._file.execute("SELECT session, data FROM grants"):
+            self._granted[session] = data
+            permissions.restore(_grant(json.loads(data)))
+        permissions.count = max(permissions.count, self._about("sessions"))
+
+    def _about(self, name: str) -> int:
+        row = self._file.execute("SELECT value FROM about WHERE name = ?", (name,)).fetchone()
+        return int(row[0]) if row else 0
+
+
+_RECENT = """
+SELECT data FROM (
+  SELECT number, data FROM events WHERE open
+  UNION SELECT * FROM (SELECT number, data FROM events WHERE NOT open ORDER BY number DESC LIMIT ?)
+) ORDER BY number
+"""
+
+
+def _of_event(event: Event, desk: Desk, epoch: float) -> dict[str, Any]:
+    engaged = desk.orders.engaged
+    people = (event.responder, event.operator, event.actor)
+    return {name: getattr(event, name) for name in _PLAIN} | {
+        "state": event.state.value,
+        "position": [event.position.latitude, event.position.longitude],
+        "waiting_since": event.waiting_since + epoch,
+        "times": {step: time + epoch for step, time in event.times.items()},
+        "failed": sorted(event.failed),
+        "sent": sorted(event.sent),
+        "engaged": [name for name in people if name and engaged.get(name) is event],
+    }
+
+
+def _event(kept: dict[str, Any], epoch: float) -> Event:
+    return Event(
+        **{name: kept[name] for name in _PLAIN},
+        position=Position(*kept["position"]),
+        state=State(kept["state"]),
+        waiting_since=kept["waiting_since"] - epoch,
+        times={step: time - epoch for step, time in kept["times"].items()},
+        failed=set(kept["failed"]),
+        sent=set(kept["sent"]),
+    )
+
+
+def _plain(value: Device | Grant) -> list[Any]:
+    return [getattr(value, field.name) for field in fields(value)]
+
+
+def _grant(kept: list[Any]) -> Grant:
+    robot, holder, level, session, sensors, address = kept
+    return Grant(robot, holder, level, session, tuple(sensors), address)
+
+
+def _of_entry(entry: Entry) -> dict[str, Any]:
+    return {"device": _plain(entry.device), "registrations": list(entry.registrations)}
+
+
+def _entry(kept: dict[str, Any], now: float) -> Entry:
+    said = deque(((i, t) for i, t in kept["registrations"]), maxlen=8)
+    return Entry(Device(*kept["device"]), now, registrations=said)
