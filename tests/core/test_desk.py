@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
-from dva_sim.core.dispatch import POLICIES, Assignment, MinEta, Policy, Situation
+from dva_sim.core.dispatch import Assignment, MinEta, Policy, Situation
 from dva_sim.core.events import Event, EventBook, State
+from dva_sim.core.ground import Start
 from dva_sim.core.permissions import Permissions
+from dva_sim.core.rules import Rules
 from dva_sim.core.send import Send
-from dva_sim.core.service import MAX_ATTEMPTS, Desk, Pace
+from dva_sim.core.service import Desk
 from dva_sim.core.sessions import Sessions
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import MAX_BYTES, encode
 
+Floats = NDArray[np.float64]
 DVA = "02:00:00:00:00:01"
 ROBOT, OTHER_ROBOT = "02:00:00:01:00:01", "02:00:00:01:00:02"
 GUARD, OPERATOR, OTHER_OPERATOR = "02:00:00:02:00:01", "02:00:00:03:00:01", "02:00:00:03:00:02"
@@ -25,19 +31,24 @@ def east(metres: float) -> m.Position:
     return m.Position(HERE.latitude, HERE.longitude + metres / 87_000)
 
 
-def crow(a: m.Position, b: m.Position) -> float:
-    return abs(a.longitude - b.longitude) * 87_000
+PACES = {"guard": (1.3, 20.0), "robot": (0.35, 4.0)}  # [m/s], [s]
+MAX_ATTEMPTS = 4
+
+
+def crow(starts: Sequence[Start], goals: Sequence[m.Position]) -> tuple[Floats, Floats]:
+    ways = [[abs(s.position.longitude - g.longitude) * 87_000 for s in starts] for g in goals]
+    distance = np.array(ways).reshape(len(goals), len(starts))
+    speed = np.array([PACES[s.kind][0] for s in starts])
+    return distance, np.array([PACES[s.kind][1] for s in starts]) + distance / speed
 
 
 class Office:
     """A desk with a guard at 0 m, a robot at 10 m, an operator and a detector."""
 
     def __init__(self, policy: Policy | None = None) -> None:
-        paces = {"guard": Pace(1.3, 20.0), "robot": Pace(0.35, 4.0)}
-        rng = np.random.default_rng(1)
-        self.desk = Desk(
-            policy or MinEta(), crow, paces, 60.0, rng, Sessions(Permissions(lambda: 7))
-        )
+        rng, rules = np.random.default_rng(1), Rules(escalate_after=60.0)
+        sessions = Sessions(Permissions(lambda: 7))
+        self.desk = Desk(policy or MinEta(), crow, rules, rng, sessions)
         self.number = 0
         team = {GUARD: "Guard", ROBOT: "Robot", OPERATOR: "TeleOp", DETECTOR: "Sensor"}
         for id_tag, kind in team.items():
@@ -64,7 +75,13 @@ class Office:
         return self.say(DETECTOR, body, now)[1]
 
     def event(self, number: int = 1) -> Event:
-        return self.desk.book.events[number]
+        event = self.desk.book.get(number)
+        assert event is not None
+        return event
+
+    def busy(self, *names: str) -> None:
+        """Somebody works on an event that is not ours."""
+        self.desk.orders.engaged |= dict.fromkeys(names, Event(99, "flood", HERE, 0.5))
 
 
 @pytest.fixture
@@ -142,7 +159,7 @@ def test_reports_of_one_kind_near_each_other_are_one_event(office: Office) -> No
     office.fire(12)
     office.fire(15)
     office.fire(12, kind="gas_leak")
-    assert {e.number: e.reports for e in office.desk.book.events.values()} == {1: 2, 2: 1}
+    assert {e.number: e.reports for e in office.desk.book.open.values()} == {1: 2, 2: 1}
 
 
 def test_a_robot_goes_only_with_a_free_operator(office: Office) -> None:
@@ -168,8 +185,7 @@ def test_an_event_runs_its_course_with_its_times_in_order(office: Office) -> Non
         "confirmed": 12.0,
         "closed": 12.0,
     }
-    assert office.desk.registry.entries[ROBOT].order is None
-    assert office.desk.registry.entries[OPERATOR].order is None
+    assert office.desk.orders.engaged == {}
 
 
 def test_a_responder_that_fails_is_replaced(office: Office) -> None:
@@ -179,7 +195,7 @@ def test_a_responder_that_fails_is_replaced(office: Office) -> None:
 
 
 def test_a_responder_that_failed_goes_again_if_nobody_else_can(office: Office) -> None:
-    office.desk.registry.entries[GUARD].order = 99
+    office.busy(GUARD)
     office.fire(12)
     sends = office.say(OPERATOR, m.OrderProgress(1, "failed"), 5.0)[1]
     assert [s.to for s in sends] == [OPERATOR]
@@ -195,8 +211,7 @@ def test_an_event_that_nobody_settles_is_escalated_after_its_attempts(office: Of
 
 
 def test_pending_beyond_its_deadline_means_escalated(office: Office) -> None:
-    for entry in office.desk.registry.entries.values():
-        entry.order = 99
+    office.busy(*office.desk.registry.entries)
     office.fire(12, now=0.0)
     office.desk.registry.silent_after = 1e9
     office.desk.tick(59.9)
@@ -221,41 +236,28 @@ def test_an_order_that_is_not_delivered_leaves_the_event_open_to_others(office: 
     assert office.event().responder is None
 
 
-@pytest.mark.parametrize("name", sorted(POLICIES))
-def test_every_policy_uses_each_responder_once(name: str) -> None:
-    rng = np.random.default_rng(2)
-    for _ in range(50):
-        cost = rng.uniform(1, 100, (4, 3))
-        cost[rng.random((4, 3)) < 0.2] = np.inf
-        events = tuple(Event(i, "fire", HERE, 0.5) for i in range(4))
-        situation = Situation(events, tuple("abc"), cost, cost)  # type: ignore[arg-type]
-        chosen = POLICIES[name]().assign(situation, rng)
-        assert len({c.responder for c in chosen}) == len(chosen) == len({c.event for c in chosen})
-        assert all(np.isfinite(cost[c.event, c.responder]) for c in chosen)
+class Greedy(Policy):
+    """Sends the same responders everywhere."""
 
-
-class Nonsense:
-    """Sends the same responder everywhere, and some that do not exist."""
-
-    def assign(self, situation: Situation, rng: np.random.Generator) -> list[Assignment]:
-        every = range(-1, len(situation.events) + 1)
-        return [Assignment(e, r) for e in every for r in (0, 0, 99, -1)]
+    def advise(self, situation: Situation, rng: np.random.Generator) -> list[Assignment]:
+        every = range(len(situation.tasks))
+        return [Assignment(t, r) for t in every for r in range(len(situation.responders))]
 
 
 def test_the_desk_enforces_the_rules_whatever_a_policy_returns() -> None:
-    office = Office(Nonsense())
+    office = Office(Greedy())
     office.fire(12)
     office.fire(12, kind="gas_leak")
     office.fire(12, kind="flood")
     held = [e.responder for e in office.desk.book.in_state(State.ASSIGNED)]
     assert len(held) == len(set(held)) == 2
-    counts = office.desk.book.counts()
+    counts = office.desk.book.counts
     assert (counts[State.ASSIGNED], counts[State.PENDING]) == (2, 1)
 
 
 def test_a_step_that_does_not_exist_is_refused() -> None:
     book = EventBook()
-    event = book.report("fire", HERE, 0.5, 0.0)
+    event = book.add("fire", HERE, 0.5, 0.0)
     book.move(event, State.ESCALATED, 1.0)
     with pytest.raises(ValueError, match="cannot go from escalated to confirmed"):
         book.move(event, State.CONFIRMED, 2.0)
@@ -425,6 +427,6 @@ def test_news_of_an_order_that_is_another_responders_by_now_takes_nothing_from_i
     assert [order.to for order in orders] == [GUARD]
     office.desk.undelivered(late, 27.0)
     assert office.event().state is State.ASSIGNED
-    assert office.desk.registry.entries[GUARD].order == 1
+    assert office.desk.orders.engaged[GUARD] is office.event()
     done = m.OrderProgress(1, "arrived")
     assert office.say(GUARD, done, 30.0)[0].code == m.OK
