@@ -1,0 +1,153 @@
+"""What a guard makes of what the DVA says. Pure: it takes messages and tells what to do now.
+
+The newest order holds. It takes the place of an older one at once, also of work at an event: so
+the guard and the DVA never disagree on what the guard does. Whom the DVA should not call away is
+for the DVA to know.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from dva_sim.protocol import messages as m
+
+AWARD_WITHIN = 60.0  # after the last bid for so long an award may come [s]
+MOST_ANNOUNCED = 32  # announcements that are remembered; the oldest are forgotten first
+OVER = "done"  # the DVA's word that an order is over
+
+
+@dataclass(frozen=True, eq=False)
+class Errand:
+    """Somewhere to go.
+
+    Attributes:
+        place: Where.
+        order: What is to be done there; None: wait.
+    """
+
+    place: m.Position
+    order: m.Order | None = None
+
+
+class Answer(NamedTuple):
+    """What follows from a message.
+
+    Attributes:
+        code: Reply code; anything but OK means that nothing has changed.
+        text: Why, for people.
+        changed: Whether there is another errand now, or none any more.
+        bid_on: What to offer for.
+    """
+
+    code: int
+    text: str = ""
+    changed: bool = False
+    bid_on: m.TaskAnnouncement | None = None
+
+
+@dataclass
+class GuardDuty:
+    """The decider of one guard.
+
+    Attributes:
+        dva: Id of the DVA: only its orders count.
+        mobilisation: From an order to the first step [s], for who was waiting.
+        errand: What the guard is on now; None while it waits.
+        ready_at: When the guard can set out, or could [s].
+    """
+
+    dva: str
+    mobilisation: float
+    errand: Errand | None = None
+    ready_at: float = 0.0
+    _stands_at: int | None = None
+    _announced: OrderedDict[int, tuple[m.TaskAnnouncement, float]] = field(
+        default_factory=OrderedDict
+    )
+
+    @property
+    def order(self) -> m.Order | None:
+        """The order that the guard has."""
+        return None if self.errand is None else self.errand.order
+
+    def handle(self, message: m.Message, now: float) -> Answer:
+        """Decide on a message that came at `now` [s]."""
+        if message.source != self.dva:
+            return Answer(m.NOT_PERMITTED, "only the DVA gives orders")
+        match message.body:
+            case m.Order(device=None) as order:
+                return self._ordered(order, now)
+            case m.OrderProgress(state=state) as word if state == OVER:
+                return self._stand_down(word)
+            case m.Relocation(position=place):
+                return self._relocated(place, now)
+            case m.TaskAnnouncement() as announcement:
+                return self._heard(announcement, now)
+            case m.TaskAward(event_id=event):
+                return self._awarded(event, now)
+            case _:
+                return Answer(m.NOT_SUPPORTED, "a guard takes orders to walk")
+
+    def is_over(self, at_event: bool = False) -> None:
+        """The errand is done with; the guard waits where it is, which may be at the event."""
+        self._stands_at = self.order.event_id if at_event and self.order else None
+        self.errand = None
+
+    def _ordered(self, order: m.Order, now: float) -> Answer:
+        held = self.order
+        if held is not None and (held.event_id, held.task) == (order.event_id, order.task):
+            return Answer(m.OK, "has it already")
+        return self._set_out(Errand(order.position, order), now)
+
+    def _stand_down(self, word: m.OrderProgress) -> Answer:
+        if self.order is None or self.order.event_id != word.event_id:
+            return Answer(m.OK, "is over already")
+        self.is_over()
+        return Answer(m.OK, changed=True)
+
+    def _relocated(self, place: m.Position, now: float) -> Answer:
+        if self.order is not None:
+            return Answer(m.BUSY, "has an order")
+        if self.errand is not None and self.errand.place == place:
+            return Answer(m.OK, "on the way there already")
+        return self._set_out(Errand(place), now)
+
+    def _set_out(self, errand: Errand, now: float) -> Answer:
+        """Who is under way already, or stands there, need not get ready again."""
+        order = errand.order
+        if self.errand is None:
+            is_there = order is not None and order.event_id == self._stands_at
+            self.ready_at = now if is_there else now + self.mobilisation
+        self.errand, self._stands_at = errand, None
+        return Answer(m.OK, changed=True)
+
+    # --- auctions ----------------------------------------------------------------------
+
+    def _heard(self, announcement: m.TaskAnnouncement, now: float) -> Answer:
+        self._forget(now)
+        until = now + announcement.bid_within + AWARD_WITHIN
+        self._announced[announcement.event_id] = announcement, until
+        self._announced.move_to_end(announcement.event_id)
+        if len(self._announced) > MOST_ANNOUNCED:
+            self._announced.popitem(last=False)
+        return Answer(m.OK, bid_on=announcement if self.order is None else None)
+
+    def _awarded(self, event: int, now: float) -> Answer:
+        """As an order to look; an award comes to who has bid, so an order in between is newer."""
+        held = self.order
+        if held is not None and (held.event_id, held.task) == (event, "confirm"):
+            return Answer(m.OK, "has it already")
+        self._forget(now)
+        if event not in self._announced:
+            return Answer(m.UNKNOWN_EVENT, f"event {event} was not announced, or long ago")
+        if held is not None:
+            return Answer(m.BUSY, "has an order")
+        announced, _ = self._announced.pop(event)
+        order = m.Order(event, announced.kind, announced.position, None)
+        return self._set_out(Errand(order.position, order), now)
+
+    def _forget(self, now: float) -> None:
+        for event in [e for e, (_, until) in self._announced.items() if until < now]:
+            del self._announced[event]
