@@ -99,6 +99,9 @@ class EventConfig(Config):
         at_s: When it starts.
         latest_s: If given, the seed draws the start between `at_s` and this.
         reported: Whether somebody reports it at once; otherwise detectors must notice it.
+        false_alarm: Whether nothing is there: it is reported as it would be, and that is all.
+        reports: How many report it; the others are people who see it a little later, and tell
+            the place a little otherwise.
     """
 
     kind: Literal["fire", "gas_leak", "flood"]
@@ -106,6 +109,8 @@ class EventConfig(Config):
     at_s: NonNegative = 0.0
     latest_s: NonNegative | None = None
     reported: bool = False
+    false_alarm: bool = False
+    reports: Annotated[int, Field(ge=1, le=20)] = 1
 
     @model_validator(mode="after")
     def _in_order(self) -> EventConfig:

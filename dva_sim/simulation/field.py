@@ -14,7 +14,7 @@ from dva_sim.agents.sensing import SensorPort
 from dva_sim.protocol import messages as m
 from dva_sim.recorder import DriveLog
 from dva_sim.scenario import guard_profile, robot_profile
-from dva_sim.simulation.incidents import Incident, draw_incidents
+from dva_sim.simulation.incidents import Hearsay, Incident, draw_incidents
 from dva_sim.simulation.names import DVA
 from dva_sim.simulation.stage import Stage, place_of
 from dva_sim.worlds.hazards import Fire
@@ -31,6 +31,9 @@ class Field:
     Args:
         stage: Where.
 
+    Attributes:
+        contained: When an incident was dealt with [s], by its place in `incidents`.
+
     Raises:
         ConfigError: the site cannot hold the team or the events.
     """
@@ -39,8 +42,10 @@ class Field:
         self.stage = stage
         self.world = World(stage.site, PHYSICS_TICK)
         self.incidents = draw_incidents(stage.scenario.events, stage.site, stage.streams)
+        self.contained: dict[int, float] = {}
         self.robots: dict[str, RobotAgent] = {}
         self.guards: list[GuardAgent] = []
+        self._others = 0
 
     def populate(self) -> None:
         """Put everybody in place and let them register."""
@@ -66,8 +71,8 @@ class Field:
     def in_danger(self, x: float, y: float, now: float) -> bool:
         """Whether a place [m] is within the danger radius of a hazard."""
         return any(
-            now >= i.start and math.dist(i.hazard.position, (x, y)) < i.hazard.danger_radius(now)
-            for i in self.incidents
+            math.dist(i.hazard.position, (x, y)) < i.hazard.danger_radius(now)
+            for i in self._going_on(now)
         )
 
     # --- who is there ------------------------------------------------------------------
@@ -122,7 +127,9 @@ class Field:
         device = stage.device("guard", number)
         luck = stage.streams[f"{device.label}/walker"]
         walker = Walker.draw(guard_profile(stage.scenario), luck)
-        guard = GuardAgent(device, walker, stage.planner, (post.x, post.y), self._is_there)
+        guard = GuardAgent(
+            device, walker, stage.planner, (post.x, post.y), self._is_there, self._contain
+        )
         self.guards.append(guard)
         device.register(guard.start)
 
@@ -131,24 +138,34 @@ class Field:
     def _schedule(self, number: int, incident: Incident) -> None:
         """Detectors are devices too: those that will notice something register and report."""
         stage, kind = self.stage, incident.kind.replace("_", " ")
-        stage.clock.call_at(
-            incident.start,
-            stage.recorder.tell,
-            incident.start,
-            incident.room or "site",
-            f"{kind} breaks out",
-        )
+        if not incident.false_alarm:
+            stage.clock.call_at(
+                incident.start,
+                stage.recorder.tell,
+                incident.start,
+                incident.room or "site",
+                f"{kind} breaks out",
+            )
         if incident.detected == math.inf:
             return
-        device = stage.device("detector", number)
-        device.label = incident.detector.name if incident.detector else "caller"
-        stage.labels[device.id_tag] = device.label
-        device.register()
-        stage.clock.call_at(max(incident.detected, 0.5), self._report, device, incident)
+        label = incident.detector.name if incident.detector else "caller"
+        first = Hearsay(max(incident.detected, 0.5), incident.hazard.position)
+        self._let_report(number, label, first, incident)
+        for other, heard in enumerate(incident.hearsay, 2):
+            # Others are numbered beyond all incidents, so that each has an id of its own.
+            self._others += 1
+            beyond = len(self.incidents) + self._others
+            self._let_report(beyond, f"caller {other} of event {number}", heard, incident)
 
-    def _report(self, device: Device, incident: Incident) -> None:
-        x, y = incident.hazard.position
-        position = m.Position(*self.stage.site.frame.to_latlon(x, y))
+    def _let_report(self, number: int, label: str, what: Hearsay, incident: Incident) -> None:
+        stage = self.stage
+        device = stage.device("detector", number)
+        device.label = stage.labels[device.id_tag] = label
+        device.register()
+        stage.clock.call_at(what.time, self._report, device, incident, what.position)
+
+    def _report(self, device: Device, incident: Incident, place: tuple[float, float]) -> None:
+        position = m.Position(*self.stage.site.frame.to_latlon(*place))
         severity = incident.hazard.severity(self.stage.clock.now)
         body = m.EventReport(None, incident.kind, position, severity, 0.9, "detected")
         device.ask(DVA, body)
@@ -156,8 +173,24 @@ class Field:
 
     # --- what agents may ask of the world ----------------------------------------------
 
+    def _going_on(self, now: float) -> list[Incident]:
+        """What has begun, is real, and was not dealt with yet."""
+        return [
+            incident
+            for number, incident in enumerate(self.incidents)
+            if incident.is_there(now) and now < self.contained.get(number, math.inf)
+        ]
+
     def _spots(self, now: float) -> list[HazardSpot]:
-        return [spot for i in self.incidents if (spot := i.spot(now)) is not None]
+        return [spot for i in self._going_on(now) if (spot := i.spot(now)) is not None]
+
+    def _contain(self, kind: str, x: float, y: float) -> None:
+        """Somebody has dealt with what is at a place [m]: from now on it harms nobody."""
+        now = self.stage.clock.now
+        for number, incident in enumerate(self.incidents):
+            near = math.dist(incident.hazard.position, (x, y)) < SAME_PLACE
+            if incident.kind == kind and near and incident.is_there(now):
+                self.contained.setdefault(number, now)
 
     def _is_there(self, kind: str, x: float, y: float) -> bool:
         spots = self._spots(self.stage.clock.now)
@@ -168,6 +201,6 @@ class Field:
         sees = self.stage.planner.line_of_sight
         return sum(
             i.hazard.heat_flux(now, point)
-            for i in self.incidents
+            for i in self._going_on(now)
             if isinstance(i.hazard, Fire) and sees(point, i.hazard.position)
         )

@@ -18,7 +18,17 @@ REACHABLE = 0.4  # radius that fits through the doors on the way there [m]
 CLEARANCE = 0.7  # around the middle of a hazard, so that a robot can get near [m]
 FAR_ENOUGH = 6.0  # from every base, so that there is a way to go [m]
 TRIES = 200
+HEARSAY_WITHIN = 3.0  # so far from the true place do other people report it [m]
+HEARSAY_LATE = (2.0, 20.0)  # so long after the first report [s]
 DETECTS = {"fire": "smoke", "gas_leak": "gas", "flood": "water"}
+
+
+@dataclass(frozen=True)
+class Hearsay:
+    """What another person reports of an incident: when [s], and where that is told to be [m]."""
+
+    time: float
+    position: tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -32,6 +42,8 @@ class Incident:
         detected: When a detector or a person notices it [s]; infinite if nobody does.
         detector: The detector that does, if one does.
         hazard: How it grows.
+        false_alarm: Nothing is there; the hazard is what those who report it believe in.
+        hearsay: What others report of it after the first report.
     """
 
     kind: str
@@ -40,10 +52,16 @@ class Incident:
     detected: float
     detector: Detector | None
     hazard: Hazard
+    false_alarm: bool = False
+    hearsay: tuple[Hearsay, ...] = ()
+
+    def is_there(self, now: float) -> bool:
+        """Whether it has begun and is real; whether it is over by `now` [s], the field knows."""
+        return now >= self.start and not self.false_alarm
 
     def spot(self, now: float) -> HazardSpot | None:
         """What a camera may see of it at `now` [s]."""
-        if now < self.start:
+        if not self.is_there(now):
             return None
         x, y = self.hazard.position
         return HazardSpot(self.kind, x, y, self.hazard.radius(now))
@@ -55,22 +73,36 @@ def draw_incidents(events: tuple[EventConfig, ...], site: Site, streams: Streams
     Raises:
         ConfigError: a room that the site does not have, or no free place for an event.
     """
-    return [
-        _draw(event, site, streams[f"event-{number}"]) for number, event in enumerate(events, 1)
-    ]
+    return [_draw(event, site, streams, number) for number, event in enumerate(events, 1)]
 
 
-def _draw(event: EventConfig, site: Site, rng: np.random.Generator) -> Incident:
+def _draw(event: EventConfig, site: Site, streams: Streams, number: int) -> Incident:
+    rng = streams[f"event-{number}"]
     start = event.at_s
     if event.latest_s is not None:
         start = float(rng.uniform(event.at_s, event.latest_s))
     x, y = _place(event, site, rng)
     hazard = make_hazard(event.kind, (x, y), start)
     room = site.room_at(x, y) or ""
-    if event.reported:
-        return Incident(event.kind, room, start, start, None, hazard)
-    detector, detected = _first_detector(event.kind, site, hazard)
-    return Incident(event.kind, room, start, detected, detector, hazard)
+    detector, detected = None, start
+    if not event.reported:
+        detector, detected = _first_detector(event.kind, site, hazard)
+    luck = streams[f"event-{number}/hearsay"]
+    hearsay = tuple(_hearsay(detected, (x, y), site, luck) for _ in range(event.reports - 1))
+    return Incident(event.kind, room, start, detected, detector, hazard, event.false_alarm, hearsay)
+
+
+def _hearsay(
+    first: float, place: tuple[float, float], site: Site, luck: np.random.Generator
+) -> Hearsay:
+    """Somewhere free near the true place, in the same room."""
+    time = first + float(luck.uniform(*HEARSAY_LATE))
+    for _ in range(TRIES):
+        far, angle = HEARSAY_WITHIN * luck.uniform(), luck.uniform(0.0, 2.0 * math.pi)
+        x, y = place[0] + far * math.cos(angle), place[1] + far * math.sin(angle)
+        if site.is_free(x, y, REACHABLE) and site.room_at(x, y) == site.room_at(*place):
+            return Hearsay(time, (float(x), float(y)))
+    return Hearsay(time, place)
 
 
 def _place(event: EventConfig, site: Site, rng: np.random.Generator) -> tuple[float, float]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from dva_sim.agents.robot import RobotAgent
 from dva_sim.core.events import Event
@@ -26,6 +26,7 @@ class Recording:
         robots: The robots by id, as they ended.
         labels: Names by id.
         duration: How long the run lasted [s].
+        contained: When incidents were dealt with [s], by their place in `incidents`.
     """
 
     scenario: Scenario
@@ -38,6 +39,7 @@ class Recording:
     labels: dict[str, str]
     links: dict[str, tuple[Link, Link]]
     duration: float
+    contained: dict[int, float] = field(default_factory=dict)
 
     def event_of(self, number: int) -> Event | None:
         """The DVA's event about incident `number`, if it knows of it."""
