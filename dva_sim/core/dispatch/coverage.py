@@ -1,0 +1,105 @@
+"""Idle guards wait where the next event would find them near."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from dva_sim.core.dispatch import options
+from dva_sim.core.dispatch.greedy import Free, serve, waiting
+from dva_sim.core.dispatch.situation import (
+    Advice,
+    Cover,
+    Floats,
+    Policy,
+    Relocation,
+    Situation,
+)
+
+_UNREACHED = 3600.0  # what a zone counts that nobody covers [s]
+
+
+class Coverage(Policy):
+    """As `MinEta`, and idle guards move so that the expected response to the next event falls.
+
+    The expected response is the time from the nearest guard to each zone, weighted by how many
+    events are expected there. The best single move is made, then the best of those that are
+    left, as long as one pays more than `gain_s`.
+
+    It cannot thrash. Each move lowers the expected response by more than `gain_s`, it is never
+    negative, and nothing but moves and a change of who is idle changes it: so the moves come to
+    an end. Who is on its way to a station counts as being there, and is left to arrive.
+
+    Args:
+        gain_s: What a move must bring [s of expected response].
+        there_s: Who can be at a station within that time counts as standing there [s]; it covers
+            the time to get going.
+
+    References:
+        R. L. Church and C. S. ReVelle, Theoretical and empirical links between the p-median,
+        location set-covering, and maximal covering location models, Geographical Analysis 8,
+        1976: the p-median problem, which this improves step by step.
+    """
+
+    relocates = True
+
+    def __init__(self, gain_s: float = 10.0, there_s: float = 30.0) -> None:
+        self.gain_s = options.above("gain_s", gain_s, 0)
+        self.there_s = options.at_least("there_s", there_s, 0)
+
+    def advise(self, situation: Situation, rng: np.random.Generator) -> Sequence[Advice]:
+        """See `Policy`."""
+        chosen = serve(waiting(situation), situation.eta, Free(situation))
+        if situation.cover is None or not situation.cover.stations:
+            return chosen
+        sent = {choice.responder for choice in chosen}
+        guards = [
+            place
+            for place, who in enumerate(situation.responders)
+            if who.kind == "guard" and who.engaged is None and place not in sent
+            if np.isfinite(situation.cover.eta[place]).any()
+        ]
+        return [*chosen, *self._moves(situation.cover, guards)]
+
+    def _moves(self, cover: Cover, guards: Sequence[int]) -> list[Relocation]:
+        """The best move, then the best of those that are left, while one pays."""
+        bound_for = dict(enumerate(cover.bound_for))
+        response = self._response(cover, guards, bound_for)
+        staying = [row for row, guard in enumerate(guards) if bound_for.get(guard) is None]
+        moves = []
+        while staying:
+            gain = _gains(response, staying, cover)
+            gain[~np.isfinite(cover.eta[[guards[row] for row in staying]])] = -np.inf
+            if gain.max() <= self.gain_s:
+                break
+            mover, station = divmod(int(np.argmax(gain)), gain.shape[1])
+            row = staying.pop(mover)
+            response[row] = np.minimum(cover.reach[station], _UNREACHED)
+            moves.append(Relocation(guards[row], station))
+        return moves
+
+    def _response(
+        self, cover: Cover, guards: Sequence[int], bound_for: Mapping[int, int | None]
+    ) -> Floats:
+        """From each guard to each zone [s], shape `(guards, zones)`: by way of a station."""
+        way = cover.eta[list(guards)]
+        way = np.where(way <= self.there_s, 0.0, way)
+        for row, guard in enumerate(guards):
+            station = bound_for.get(guard)
+            if station is not None:
+                way[row] = np.inf
+                way[row, station] = 0.0
+        response: Floats = (way[:, :, None] + cover.reach[None, :, :]).min(axis=1)
+        return np.minimum(response, _UNREACHED)
+
+
+def _gains(response: Floats, movers: Sequence[int], cover: Cover) -> Floats:
+    """By how much each move lowers the expected response [s], shape `(movers, stations)`."""
+    reach = np.minimum(cover.reach, _UNREACHED)
+    now = response.min(axis=0) @ cover.demand
+    gains = np.empty((len(movers), len(reach)))
+    for row, mover in enumerate(movers):
+        others = np.delete(response, mover, axis=0).min(axis=0, initial=_UNREACHED)
+        gains[row] = now - np.minimum(others, reach) @ cover.demand
+    return gains

@@ -1,0 +1,195 @@
+"""The best that could have been done, had one known the future: a reference for small cases."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from dva_sim.core.dispatch.greedy import Free, waiting
+from dva_sim.core.dispatch.situation import Advice, Assignment, Floats, Policy, Situation
+from dva_sim.errors import ConfigError
+
+_AT_ONCE = 1e-6  # [s] times nearer than this are the same
+_INF = float("inf")
+_Step = tuple[int, int, float]  # event, unit, when it is sent [s]
+
+
+@dataclass(frozen=True)
+class Instance:
+    """A day as it will be: events, and units that go out from their base and return to it.
+
+    Attributes:
+        release: When each event becomes known [s], not falling, shape `(events,)`.
+        arrival: From being sent from the base to being there [s], shape `(events, units)`;
+            infinite where a unit cannot go.
+        busy: From being sent to being back and free again [s], same shape.
+    """
+
+    release: Floats
+    arrival: Floats
+    busy: Floats
+
+    def __post_init__(self) -> None:
+        if self.arrival.shape != self.busy.shape or len(self.arrival) != len(self.release):
+            raise ValueError("release, arrival and busy differ in how many events they hold")
+        if (np.diff(self.release) < 0).any():
+            raise ValueError("events should be in order of release")
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Who goes where, and in which order.
+
+    Attributes:
+        tours: Events of each unit in its order, counted from 0.
+        start: When somebody is sent to each event [s]; infinite if nobody can go.
+        release: As of the instance.
+        total: Sum of response times [s], of those events that somebody can go to.
+    """
+
+    tours: tuple[tuple[int, ...], ...]
+    start: tuple[float, ...]
+    release: tuple[float, ...]
+    total: float
+
+
+def solve(instance: Instance) -> Plan:
+    """The plan with the least sum of response times, exactly.
+
+    A plan is an order of events for each unit, in which it is sent as soon as the event is
+    known and it is free; it may wait for an event to come while another one is open. Branch and
+    bound over who is sent next where, in order of time. A branch ends where its bound is no
+    better than what is known. And it ends where another order of the same events was as cheap,
+    not later, and left no unit free later, as nothing that follows could be better.
+
+    Meant for up to about 8 events and 3 units.
+    """
+    return _Search(instance).plan()
+
+
+class _Search:
+    def __init__(self, instance: Instance) -> None:
+        self.release, self.arrival, self.busy = instance.release, instance.arrival, instance.busy
+        self.best = _INF
+        self.steps: tuple[_Step, ...] = ()
+        self.seen: dict[tuple[int, ...], list[tuple[float, ...]]] = {}
+
+    def plan(self) -> Plan:
+        units = self.arrival.shape[1]
+        possible = tuple(np.flatnonzero(np.isfinite(self.arrival).any(axis=1)).tolist())
+        self._extend(possible, (float(self.release.min(initial=0.0)),) * units, 0.0, ())
+        tours: list[list[int]] = [[] for _ in range(units)]
+        start = [_INF] * len(self.release)
+        for event, unit, when in self.steps:
+            tours[unit].append(event)
+            start[event] = when
+        return Plan(tuple(map(tuple, tours)), tuple(start), tuple(self.release.tolist()), self.best)
+
+    def _extend(
+        self,
+        left: tuple[int, ...],
+        free: tuple[float, ...],
+        cost: float,
+        steps: tuple[_Step, ...],
+    ) -> None:
+        if not left:
+            if cost < self.best:
+                self.best, self.steps = cost, steps
+            return
+        last = steps[-1][2] if steps else -_INF
+        if self._dominated(left, (cost, last, *free)):
+            return
+        if cost + self._bound(left, free, last) >= self.best - _AT_ONCE:
+            return
+        for response, event, unit, start in self._branches(left, free, last):
+            back = start + float(self.busy[event, unit])
+            later = (*free[:unit], back, *free[unit + 1 :])
+            others = tuple(e for e in left if e != event)
+            self._extend(others, later, cost + response, (*steps, (event, unit, start)))
+
+    def _branches(
+        self, left: tuple[int, ...], free: tuple[float, ...], last: float
+    ) -> list[tuple[float, int, int, float]]:
+        """Response time, event, unit and start of all that could be sent next, after the last."""
+        found = []
+        for event in left:
+            release, arrival = float(self.release[event]), self.arrival[event].tolist()
+            for unit, since in enumerate(free):
+                start = max(release, since)
+                if start >= last and arrival[unit] < _INF:
+                    found.append((start + arrival[unit] - release, event, unit, start))
+        return sorted(found)
+
+    def _bound(self, left: tuple[int, ...], free: tuple[float, ...], last: float) -> float:
+        """No way to serve the rest has a smaller sum of response times than this.
+
+        Who is p-th on a unit's tour cannot be sent before the unit has done p others, which
+        takes no less than the p quickest of all that are left. The best assignment of events
+        to places on tours, each place once, is then a bound.
+        """
+        from scipy.optimize import linear_sum_assignment
+
+        rows = list(left)
+        before = np.zeros((len(rows), len(free)))  # (places, units)
+        np.cumsum(np.sort(self.busy[rows], axis=0)[:-1], axis=0, out=before[1:])
+        release = self.release[rows, None, None]
+        response = np.maximum(0.0, np.maximum(before + np.array(free), last) - release)
+        response = (response + self.arrival[rows, None, :]).reshape(len(rows), -1)
+        return float(response[linear_sum_assignment(response)].sum())
+
+    def _dominated(self, left: tuple[int, ...], state: tuple[float, ...]) -> bool:
+        """Whether the same events were served at no more cost, with no unit free later."""
+        known = self.seen.setdefault(left, [])
+        if any(all(a <= b for a, b in zip(old, state, strict=True)) for old in known):
+            return True
+        known.append(state)
+        return False
+
+
+class Oracle(Policy):
+    """Follows a plan event by event: a reference that knows the future, not a way to work.
+
+    A unit is held back while something that its plan serves earlier is open or has yet to come.
+    So it keeps to the order of the plan even where the times turn out a little different.
+
+    Args:
+        plan: From `solve`; event number 1 is its first event.
+        devices: Ids of the units, in the plan's order.
+    """
+
+    def __init__(self, plan: Plan | None = None, devices: Sequence[str] = ()) -> None:
+        if plan is None:
+            raise ConfigError(
+                "it needs a plan made with knowledge of the future, so it cannot be named in a "
+                "configuration; should be one of the others"
+            )
+        if len(devices) != len(plan.tours):
+            raise ConfigError(f"the plan is for {len(plan.tours)} units; given {len(devices)}")
+        self.plan = plan
+        self.devices = tuple(devices)
+
+    def advise(self, situation: Situation, rng: np.random.Generator) -> Sequence[Advice]:
+        """See `Policy`."""
+        tasks = {situation.tasks[place].event - 1: place for place in waiting(situation)}
+        places = {who.device: place for place, who in enumerate(situation.responders)}
+        free, chosen = Free(situation), []
+        for device, tour in zip(self.devices, self.plan.tours, strict=True):
+            event = self._next(tour, tasks, situation.now)
+            if event is None or device not in places:
+                continue
+            task, unit = tasks[event], places[device]
+            if unit in free.able(situation.eta[task]):
+                free.take(unit)
+                chosen.append(Assignment(task, unit))
+        return chosen
+
+    def _next(self, tour: Sequence[int], tasks: dict[int, int], now: float) -> int | None:
+        """The first open event of a tour, unless an earlier one has yet to come."""
+        for event in tour:
+            if event in tasks:
+                return event
+            if self.plan.release[event] > now + _AT_ONCE:
+                return None
+        return None

@@ -1,0 +1,85 @@
+"""Robots and people together: the robot looks, the person stands by."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Final
+
+import numpy as np
+
+from dva_sim.core.dispatch import options
+from dva_sim.core.dispatch.greedy import Free, serve, waiting
+from dva_sim.core.dispatch.situation import Advice, Assignment, Floats, Policy, Situation
+
+_KINDS: Final = ("fire", "gas_leak", "flood")
+_REMEMBERED: Final = 1000  # events
+
+
+class HazardTeam(Policy):
+    """Where it is dangerous a robot goes and looks, and a person stands by to act after it.
+
+    A dangerous event is confirmed by the robot that is there first, unless a person would be
+    there much earlier, or there is no robot or operator: then a person goes. While a robot is
+    there, and nothing else waits for a person, one is given the `contain` task already, and
+    waits outside. Harmless kinds, and what is to be contained, go to the earliest.
+
+    It remembers which events it gave to a robot. If that advice was not taken, the event is
+    open again, and what is remembered is what is advised then.
+
+    Args:
+        dangerous: Kinds of events that people should not look at first.
+        extra_s: How much later than a person a robot may be [s].
+    """
+
+    def __init__(
+        self, dangerous: Iterable[str] = ("fire", "gas_leak"), extra_s: float = 60.0
+    ) -> None:
+        self.dangerous = options.some_of("dangerous", dangerous, _KINDS)
+        self.extra_s = options.at_least("extra_s", extra_s, 0)
+        self._by_robot: dict[int, bool] = {}  # event: whether a robot looks at it
+
+    def advise(self, situation: Situation, rng: np.random.Generator) -> Sequence[Advice]:
+        """See `Policy`."""
+        free = Free(situation)
+        chosen: list[Assignment] = []
+        for task in waiting(situation):
+            best = self._best(situation, task, free)
+            if best is not None:
+                free.take(best)
+                chosen.append(Assignment(task, best))
+        self._remember(situation, chosen)
+        return [*chosen, *serve(self._to_stand_by(situation), situation.eta, free)]
+
+    def _best(self, situation: Situation, task: int, free: Free) -> int | None:
+        """Who goes: for a dangerous look a robot, if it is not much later than a person."""
+        eta, what = situation.eta[task], situation.tasks[task]
+        if what.stage != "confirm" or what.kind not in self.dangerous:
+            return free.best(eta)
+        robot = free.best(_only(eta, free.robots))
+        person = free.best(_only(eta, ~free.robots))
+        if robot is None or person is None:
+            return person if robot is None else robot
+        return robot if eta[robot] <= eta[person] + self.extra_s else person
+
+    def _remember(self, situation: Situation, chosen: Sequence[Assignment]) -> None:
+        for task in waiting(situation):
+            self._by_robot.pop(situation.tasks[task].event, None)
+        for choice in chosen:
+            robot = situation.responders[choice.responder].kind == "robot"
+            self._by_robot[situation.tasks[choice.task].event] = robot
+        for event in list(self._by_robot)[:-_REMEMBERED]:
+            del self._by_robot[event]
+
+    def _to_stand_by(self, situation: Situation) -> list[int]:
+        """Tasks that a person can wait for: those of dangerous events that a robot looks at."""
+        return [
+            place
+            for place, task in enumerate(situation.tasks)
+            if task.stage == "contain" and not task.due and task.engaged is None
+            if task.kind in self.dangerous and self._by_robot.get(task.event, False)
+        ]
+
+
+def _only(cost: Floats, who: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> Floats:
+    """The same cost, infinite for all others."""
+    return np.where(who, cost, np.inf)

@@ -1,0 +1,104 @@
+"""The most urgent first: without and with taking somebody away from something less urgent."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from dva_sim.core.dispatch import options
+from dva_sim.core.dispatch.greedy import Free, serve, waiting
+from dva_sim.core.dispatch.situation import Advice, Assignment, Floats, Policy, Situation
+
+_ROUNDING = 1e-9  # severities that differ by the margin as people write it, 0.3 - 0.1 and 0.2
+
+
+class PriorityEta(Policy):
+    """The most urgent task first; the earliest expected arrival.
+
+    Urgency is severity plus a share of the time that a task has waited for somebody. With no
+    ageing this is the non-preemptive priority queue: strictly by severity, first come first
+    served within one severity.
+
+    Args:
+        ageing_per_s: What a second of waiting adds to the severity [1/s]. With 0.002 a
+            harmless event (0) passes the worst one (1) after 500 s.
+    """
+
+    def __init__(self, ageing_per_s: float = 0.002) -> None:
+        self.ageing_per_s = options.at_least("ageing_per_s", ageing_per_s, 0)
+
+    def advise(self, situation: Situation, rng: np.random.Generator) -> Sequence[Advice]:
+        """See `Policy`."""
+        order = _most_urgent_first(situation, self.ageing_per_s)
+        return serve(order, situation.eta, Free(situation))
+
+
+class Preemptive(Policy):
+    """As `PriorityEta`, but who is under way may be sent to something clearly more urgent.
+
+    That happens only if nobody idle can serve the task well: not at all, or much later. What
+    is left behind waits again, and is seen as such by the next decision.
+
+    It cannot thrash. What counts for taking somebody away is severity alone, which never falls
+    during an event's life. So each redirection raises the severity of what a responder is under
+    way to by at least the margin, and nothing lowers it before it arrives: between two times of
+    being idle nobody is redirected more often than `1 / margin` times.
+
+    Args:
+        margin: By how much the severity must be higher than that of what is left behind.
+        gain_s: How much earlier than anybody idle the redirected one must be there [s].
+        ageing_per_s: As of `PriorityEta`; it orders the tasks, and takes nobody away.
+    """
+
+    preempts = True
+
+    def __init__(
+        self, margin: float = 0.3, gain_s: float = 30.0, ageing_per_s: float = 0.002
+    ) -> None:
+        self.margin = options.above("margin", margin, 0)
+        self.gain_s = options.at_least("gain_s", gain_s, 0)
+        self.ageing_per_s = options.at_least("ageing_per_s", ageing_per_s, 0)
+
+    def advise(self, situation: Situation, rng: np.random.Generator) -> Sequence[Advice]:
+        """See `Policy`."""
+        eta, free, left_behind = situation.eta, Free(situation), _left_behind(situation)
+        chosen = []
+        for task in _most_urgent_first(situation, self.ageing_per_s):
+            idle = free.best(eta[task])
+            before = (np.inf if idle is None else eta[task, idle]) - self.gain_s
+            severity = situation.tasks[task].severity
+            busy = self._under_way(eta[task], left_behind, severity, before)
+            if busy is not None:
+                left_behind[busy] = np.inf
+                chosen.append(Assignment(task, busy))
+            elif idle is not None:
+                free.take(idle)
+                chosen.append(Assignment(task, idle))
+        return chosen
+
+    def _under_way(
+        self, eta: Floats, left_behind: Floats, severity: float, before: float
+    ) -> int | None:
+        """Who is redirected: the earliest of those whose task is clearly less urgent."""
+        may = (severity - left_behind >= self.margin - _ROUNDING) & np.isfinite(eta)
+        if not (may & (eta < before)).any():
+            return None
+        return int(np.argmin(np.where(may, eta, np.inf)))
+
+
+def _most_urgent_first(situation: Situation, ageing_per_s: float) -> list[int]:
+    """Places of the tasks that wait; those of one urgency in the order they came."""
+
+    def urgency(place: int) -> float:
+        task = situation.tasks[place]
+        return task.severity + ageing_per_s * (situation.now - task.waiting_since)
+
+    return sorted(waiting(situation), key=urgency, reverse=True)  # stable, reversed too
+
+
+def _left_behind(situation: Situation) -> Floats:
+    """Severity of what each responder is under way to; infinite for who is idle."""
+    tasks = situation.tasks
+    under_way = (r.engaged for r in situation.responders)
+    return np.array([np.inf if task is None else tasks[task].severity for task in under_way])
