@@ -30,6 +30,9 @@ def run(
     set_: Sets = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the whole study.")] = None,
     jobs: Annotated[int | None, typer.Option(help="Processes; default: all cores.")] = None,
+    limit: Annotated[
+        float, typer.Option(metavar="SECONDS", min=1, help="A run that takes longer has failed.")
+    ] = 600,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Only say what would run.")] = False,
 ) -> None:
     """Run a study, or go on with one that was interrupted, and write its report."""
@@ -39,7 +42,7 @@ def run(
     if dry_run:
         console.plan(study, changes, out, jobs)
         return
-    raise typer.Exit(console.run(study, changes, out, jobs))
+    raise typer.Exit(console.run(study, changes, out, jobs, limit))
 
 
 @app.command()

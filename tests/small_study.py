@@ -7,6 +7,8 @@ import math
 import os
 import signal
 import sys
+import threading
+import time
 from pathlib import Path
 
 from dva_sim.experiments.design import Job
@@ -90,6 +92,24 @@ def deadly_once(mark: Path, job: Job) -> Tables:
     if job.part == "story" and job.index == 2 and job.person == 1 and not mark.exists():
         mark.touch()
         os.kill(os.getpid(), signal.SIGKILL)
+    return cheap(job)
+
+
+def stalls(job: Job) -> Tables:
+    """One run never ends, and takes every exception for its own."""
+    while job.part == "story" and job.index == 2 and job.person == 1:
+        try:
+            time.sleep(0.01)
+        except Exception:
+            continue
+    return cheap(job)
+
+
+def never_comes_back(job: Job) -> Tables:
+    """One run waits below Python, where no exception reaches it."""
+    if job.part == "story" and job.index == 2 and job.person == 1:
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGALRM})
+        threading.Event().wait()
     return cheap(job)
 
 

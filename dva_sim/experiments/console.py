@@ -119,7 +119,7 @@ def _summarise(recording: Recording, took: float) -> None:
 # --- studies ---------------------------------------------------------------------------
 
 
-def run(name: str, pairs: list[str], out: Path | None, jobs: int | None) -> int:
+def run(name: str, pairs: list[str], out: Path | None, jobs: int | None, limit_s: float) -> int:
     """Run a study with a progress bar, then write its report; the exit code."""
     from dva_sim.experiments.episode import rehearse_all
     from dva_sim.experiments.report import write_report
@@ -135,7 +135,13 @@ def run(name: str, pairs: list[str], out: Path | None, jobs: int | None) -> int:
     try:
         with _bar() as bar:
             task = bar.add_task("running", total=before.runs)
-            run_study(study, folder, jobs=jobs, progress=lambda n, _: bar.update(task, completed=n))
+            run_study(
+                study,
+                folder,
+                jobs=jobs,
+                progress=lambda n, _: bar.update(task, completed=n),
+                limit_s=limit_s,
+            )
     except KeyboardInterrupt as stopped:
         say(f"Stopped. {stopped}")
         return INTERRUPTED

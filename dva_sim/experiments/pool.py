@@ -13,43 +13,55 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from functools import partial
 from typing import Any
 
 from dva_sim.experiments.design import Job
 from dva_sim.experiments.journal import Outcome, Tables
+from dva_sim.experiments.limit import RunTooLong, limited
 
 Episode = Callable[[Job], Tables]
 Batches = Generator[list[Outcome], None, None]
 
 DESIGN_COLUMNS = ("part", "cell", "config", "is_reference", "person", "trial", "seed")
+LIMIT_S = 600.0
 _LONGEST_CHUNK = 8  # runs lost at most when everything is killed, for each worker
-_KILLED = "killed the process it ran in, twice (out of memory?)"
+_KILLED = "killed the process it ran in, twice (out of memory, or beyond its limit?)"
+
+_Chunk = Callable[[Sequence[Job]], list[Outcome]]
 
 
-def run_all(jobs: Sequence[Job], episode: Episode, workers: int) -> Batches:
+def run_all(
+    jobs: Sequence[Job], episode: Episode, workers: int, limit_s: float = LIMIT_S
+) -> Batches:
     """Run all jobs, in no particular order, and give their outcomes in batches as they come.
 
     Args:
         jobs: The runs.
         episode: Makes the tables of one run; must be importable by name if `workers` > 1.
         workers: Processes; with one, everything happens in this process.
+        limit_s: A run that takes longer by the wall clock has failed.
     """
     if workers <= 1:
         for job in jobs:
-            yield [perform(job, episode)]
+            yield [perform(job, episode, limit_s)]
         return
+    chunk = partial(_perform_chunk, episode=episode, limit_s=limit_s)
     waiting, suspects = deque(jobs), deque[Job]()
     while waiting or suspects:
-        yield from _alone(suspects, episode)
-        yield from _together(waiting, suspects, episode, workers)
+        yield from _alone(suspects, chunk, episode)
+        yield from _together(waiting, suspects, chunk, episode, workers)
 
 
-def perform(job: Job, episode: Episode) -> Outcome:
+def perform(
+    job: Job, episode: Episode, limit_s: float = LIMIT_S, may_exit: bool = False
+) -> Outcome:
     """Run one job; whatever it raises becomes its outcome."""
     start = time.process_time()
     try:
-        tables = json.dumps(_checked(episode(job), job), separators=(",", ":"), default=_scalar)
-    except Exception as error:
+        with limited(limit_s, may_exit):
+            tables = json.dumps(_checked(episode(job), job), separators=(",", ":"), default=_scalar)
+    except (Exception, RunTooLong) as error:
         text = " ".join(str(error).split())
         return Outcome(job.key, None, error=f"{type(error).__name__}: {text}")
     return Outcome(job.key, tables, time.process_time() - start)
@@ -76,11 +88,13 @@ def _scalar(value: Any) -> Any:
     raise TypeError(f"{type(value).__name__} {value!r} cannot be kept in a table")
 
 
-def _perform_chunk(chunk: Sequence[Job], episode: Episode) -> list[Outcome]:
-    return [perform(job, episode) for job in chunk]
+def _perform_chunk(chunk: Sequence[Job], episode: Episode, limit_s: float) -> list[Outcome]:
+    return [perform(job, episode, limit_s, may_exit=True) for job in chunk]
 
 
-def _together(waiting: deque[Job], suspects: deque[Job], episode: Episode, workers: int) -> Batches:
+def _together(
+    waiting: deque[Job], suspects: deque[Job], run: _Chunk, episode: Episode, workers: int
+) -> Batches:
     """Run what waits until a worker dies; what was under way then becomes suspect."""
     if not waiting:
         return
@@ -90,7 +104,7 @@ def _together(waiting: deque[Job], suspects: deque[Job], episode: Episode, worke
             while waiting and not suspects and len(under_way) < 2 * workers:
                 chunk = _chunk(waiting, workers)
                 try:
-                    under_way[executor.submit(_perform_chunk, chunk, episode)] = chunk
+                    under_way[executor.submit(run, chunk)] = chunk
                 except BrokenProcessPool:
                     suspects.extend(chunk)
             for future in wait(under_way, return_when=FIRST_COMPLETED).done:
@@ -101,14 +115,14 @@ def _together(waiting: deque[Job], suspects: deque[Job], episode: Episode, worke
                     suspects.extend(chunk)
 
 
-def _alone(suspects: deque[Job], episode: Episode) -> Batches:
+def _alone(suspects: deque[Job], run: _Chunk, episode: Episode) -> Batches:
     """Run each suspect in a process of its own, so that a death tells who caused it."""
     while suspects:
         with _executor(1, episode) as executor:
             while suspects:
                 job = suspects.popleft()
                 try:
-                    yield executor.submit(_perform_chunk, [job], episode).result()
+                    yield executor.submit(run, [job]).result()
                 except BrokenProcessPool:
                     yield [Outcome(job.key, None, error=_KILLED)]
                     break

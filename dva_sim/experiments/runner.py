@@ -56,6 +56,7 @@ def run_study(
     jobs: int | None = None,
     episode: Episode | None = None,
     progress: Progress | None = None,
+    limit_s: float = pool.LIMIT_S,
 ) -> Path:
     """Run what the results folder does not hold yet, then write its tables and manifest.
 
@@ -69,6 +70,7 @@ def run_study(
         jobs: Processes; by default one for each core.
         episode: Makes the tables of one run; by default a simulation.
         progress: Called with the number of runs done and of all runs, as they finish.
+        limit_s: A run that takes longer, by the wall clock, has failed.
 
     Returns:
         The results folder.
@@ -86,7 +88,7 @@ def run_study(
     manifest = _manifest(study, cells, todo)
     started, clock = datetime.now(UTC), time.perf_counter()
     with _open(out, manifest) as journal:
-        _run_rest(todo, journal, episode or _simulation(), workers, progress)
+        _run_rest(todo, journal, episode or _simulation(), workers, progress, limit_s)
         write_tables(out, todo, journal)
         manifest["failures"] = _failures(todo, journal)
         _write_json(out / MANIFEST, manifest)
@@ -127,6 +129,7 @@ def _run_rest(
     episode: Episode,
     workers: int,
     progress: Progress | None,
+    limit_s: float,
 ) -> None:
     """Run what is not done; each batch is in the journal before it is counted."""
     distinct = {job.key: job for job in todo}
@@ -136,7 +139,7 @@ def _run_rest(
     tell = progress or (lambda *_: None)
     tell(count, total)
     try:
-        with closing(pool.run_all(rest, episode, min(workers, len(rest)))) as batches:
+        with closing(pool.run_all(rest, episode, min(workers, len(rest)), limit_s)) as batches:
             for batch in batches:
                 journal.add(batch)
                 count += len(batch)

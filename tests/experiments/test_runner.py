@@ -173,6 +173,23 @@ def test_a_run_that_kills_its_process_twice_fails_and_the_others_go_on(tmp_path)
     assert len(results.table("runs")["seed"]) == kit.RUNS - 1
 
 
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_a_run_that_stalls_ends_as_a_failure_at_its_limit(tmp_path, jobs):
+    study = kit.study_in(tmp_path)
+    out = run_study(study, tmp_path / "out", jobs=jobs, episode=kit.stalls, limit_s=1.0)
+    (failure,) = Results.load(out).failures
+    assert failure["error"] == "RunTooLong: took more than its 1 s"
+    assert (failure["part"], failure["cell"], failure["person"]) == ("story", 2, 1)
+
+
+def test_a_run_that_no_exception_reaches_is_ended_with_its_process(tmp_path):
+    study = kit.study_in(tmp_path)
+    out = run_study(study, tmp_path / "out", jobs=2, episode=kit.never_comes_back, limit_s=1.0)
+    (failure,) = Results.load(out).failures
+    assert "beyond its limit" in failure["error"]
+    assert len(Results.load(out).table("runs")["seed"]) == kit.RUNS - 1
+
+
 def test_a_worker_killed_once_changes_nothing(tmp_path, plain):
     mark = tmp_path / "mark"
     episode = functools.partial(kit.deadly_once, mark)
