@@ -127,6 +127,8 @@ class RobotController:
                 return self._stop(message)
             case m.GoTo() | m.CancelMission():
                 return self._mission(message, arrived, moving)
+            case m.TaskAnnouncement() | m.TaskAward():
+                return self._auction(message)
             case m.GetSensorInfo():
                 return Decision(m.OK, content=m.SensorInfo(self.camera_url, self.sensors))
             case _:
@@ -206,6 +208,22 @@ class RobotController:
         if message.session not in {g.session for g in held if body.sensor in g.sensors}:
             return Decision(m.BAD_SESSION, f"session {message.session} is not the current one")
         return Decision(m.OK)
+
+    @property
+    def free(self) -> bool:
+        """Whether it stands idle, and nobody holds it: then it can be sent somewhere."""
+        return self.mode is Mode.IDLE and self.owner is None and self.grant is None
+
+    def _auction(self, message: m.Message) -> Decision:
+        """A task is on offer, or was won. An award moves nothing: an operator has to drive."""
+        if message.source != self.dva:
+            return Decision(m.NOT_PERMITTED, "only the DVA holds auctions")
+        if isinstance(message.body, m.TaskAward) and not self.free:
+            return Decision(m.BUSY, f"in mode {self.mode}, held by {self._holder()}")
+        return Decision(m.OK)
+
+    def _holder(self) -> str:
+        return self.owner or (self.grant.holder if self.grant is not None else "nobody")
 
     def may_read(self, device: str) -> bool:
         """Whether a device holds any permission to read sensors."""

@@ -29,6 +29,9 @@ FRAME = "frame|"  # topic of the camera
 PUBLISHED = ("pub-sub", "latest-wins")  # patterns in which nobody answers a command
 STATUS_PERIOD = 1.0  # [s]
 MISSION_PERIOD = 0.1  # [s]
+EXPECTED_SPEED = 0.35  # of a teleoperated robot, by which it bids, as the DVA expects it [m/s]
+EXPECTED_READY = 4.0  # until its operator begins to drive, as the DVA expects it [s]
+LONGEST_BID = 1e6  # [s]
 STANDING = 0.02  # below this the wheels count as still [m/s, rad/s]
 
 Positive = Annotated[float, Field(gt=0)]
@@ -192,12 +195,23 @@ class RobotAgent:
         match message.body:
             case m.DevSub() as wish:
                 return Decision(*self._sensing.subscribe(message.source, wish))
+            case m.TaskAnnouncement() as announced if self.controller.free:
+                self.device.clock.call_after(0.0, self._bid, announced)
             case m.PermissionGrant(holder=holder, address=str(address)):
                 self.device.network.introduce(holder, address)
             case m.PermissionRevocation(holder=holder):
                 if not self.controller.may_read(holder):
                     self._sensing.end(holder)
         return decision
+
+    def _bid(self, announced: m.TaskAnnouncement) -> None:
+        """Offer to be driven there, by the robot's own map."""
+        place, pose = announced.position, self.body.pose()
+        goal = self.device.frame.to_xy(place.latitude, place.longitude)
+        way = self._planner.distance((pose.x, pose.y), goal)
+        arrival = EXPECTED_READY + way / EXPECTED_SPEED
+        if arrival <= LONGEST_BID:
+            self.device.ask(self.device.dva, m.TaskBid(announced.event_id, arrival))
 
     def _log_command(
         self, message: m.Message, arrived: float, now: float, set_point: SetPoint | None

@@ -1,4 +1,7 @@
-"""An operator at work: takes an order, gets permission, drives, reports, is free again."""
+"""An operator at work: takes an order, gets permission, drives, reports, is free again.
+
+The newest order holds: it takes the place of the present drive, whose robot is stopped first.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +13,8 @@ from dva_sim.recorder import DriveLog
 ASK_AGAIN = 2.0  # when the robot is held by somebody else [s]
 START_TRIES = 20
 START_AGAIN = 1.0  # when the grant may still be on its way to the robot [s]
+STANDSTILL = 1.5  # after a stop, a robot certainly stands; before, it would refuse to start [s]
+REDIRECTED, RECALLED = BY_DVA = "redirected", "recalled"  # how a drive ends by the DVA's word
 
 
 class OperatorAgent:
@@ -22,6 +27,7 @@ class OperatorAgent:
     def __init__(self, seat: DriverSeat) -> None:
         self.device, self._seat = seat.device, seat
         self._drive: Drive | None = None
+        self._next: m.Order | None = None  # what to do when the present drive has ended
         self.device.serve(self._on_request)
 
     @property
@@ -35,30 +41,57 @@ class OperatorAgent:
 
     def put_down(self) -> None:
         """Leave: a drive that is going on ends here, and its robot is told to stop."""
+        self._next = None
         if self._drive is not None:
             self._drive.end("gave up", "the operator leaves")
 
     def _on_request(self, message: m.Message) -> m.Reply:
         if message.source != self.device.dva:
             return m.Reply(message.message_id, m.NOT_PERMITTED, "only the DVA gives orders")
-        if isinstance(message.body, m.PermissionRevocation):
-            return self._on_revocation(message, message.body)
-        return self._on_order(message)
+        match message.body:
+            case m.PermissionRevocation() as body:
+                self._on_revocation(body)
+            case m.Order(device=str(), task="confirm") as order:
+                self._on_order(order)
+            case m.OrderProgress(event_id=event, state="done"):
+                self._on_recall(event)
+            case _:
+                return m.Reply(message.message_id, m.NOT_SUPPORTED, "an operator drives robots")
+        return m.Reply(message.message_id, m.OK, "")
 
-    def _on_revocation(self, message: m.Message, body: m.PermissionRevocation) -> m.Reply:
+    def _on_revocation(self, body: m.PermissionRevocation) -> None:
         """The robot is no longer ours to drive; it has been told, too."""
         drive = self._drive
         if drive is not None and (drive.robot, drive.session) == (body.device, body.session):
             drive.end("gave up", "the permission was revoked")
-        return m.Reply(message.message_id, m.OK, "")
 
-    def _on_order(self, message: m.Message) -> m.Reply:
-        order, device = message.body, self.device
-        if not isinstance(order, m.Order) or order.device is None:
-            return m.Reply(message.message_id, m.NOT_SUPPORTED, "an operator drives robots")
-        if self._drive is not None:
-            return m.Reply(message.message_id, m.BUSY, "driving already")
-        now = device.clock.now
+    @property
+    def _order(self) -> m.Order | None:
+        """The newest order that the DVA has not taken back."""
+        if self._next is not None or self._drive is None:
+            return self._next
+        return None if self._drive.log.outcome in BY_DVA else self._drive.order
+
+    def _on_order(self, order: m.Order) -> None:
+        held = self._order
+        if held is not None and (held.event_id, held.device) == (order.event_id, order.device):
+            return  # the DVA says again what it has said before
+        if self._drive is None:
+            self._take_up(order)
+        else:
+            self._next = order
+            self._drive.end(REDIRECTED)
+
+    def _on_recall(self, event_id: int) -> None:
+        """The DVA says that an order is over."""
+        if self._order is not None and self._order.event_id == event_id:
+            self._next = None
+            if self._drive is not None and self._drive.order.event_id == event_id:
+                self._drive.end(RECALLED)
+
+    def _take_up(self, order: m.Order) -> None:
+        assert order.device is not None
+        device, now = self.device, self.device.clock.now
         log = DriveLog(order.device, device.id_tag, order.event_id, now)
         log.human_delay = self._seat.person.perceptual_delay + self._seat.person.hand_lag
         device.recorder.drives.append(log)
@@ -66,11 +99,16 @@ class OperatorAgent:
         robot = device.label_of(order.device)
         device.tell(f"shall drive {robot} to event {order.event_id}", "order")
         device.clock.call_after(self._seat.person.reading, self._ask_permission, drive)
-        return m.Reply(message.message_id, m.OK, "")
 
     def _ask_permission(self, drive: Drive) -> None:
+        if drive.over:
+            return
+
         def answered(reply: m.Reply) -> None:
-            if isinstance(reply.content, m.Permission):
+            if drive.over:
+                if isinstance(reply.content, m.Permission):
+                    self._give_back(drive.robot, reply.content.session)
+            elif isinstance(reply.content, m.Permission):
                 drive.session = reply.content.session
                 self._turn_on_picture(drive)
                 self._start(drive)
@@ -121,20 +159,43 @@ class OperatorAgent:
         """A drive is over: stop the robot, tell the DVA, be free again."""
         device, order = self.device, drive.order
         device.tell(f"{outcome}{': ' + why if why else ''}", "drive")
-        found = outcome in ("confirmed", "refuted")
+        found, by_dva = outcome in ("confirmed", "refuted"), outcome in BY_DVA
         if found:
             body = m.EventReport(order.event_id, order.kind, order.position, 0.5, 0.95, outcome)
             device.ask(device.dva, body)
 
         def give_back(_: object = None) -> None:
-            device.progress(order.event_id, "done" if found else "failed")
-            self._drive = None
+            if by_dva:
+                self._give_back(drive.robot, drive.session)
+            else:
+                device.progress(order.event_id, "done" if found else "failed")
+            self._be_free(drive)
 
         if outcome == "lost link":
             # Whatever still gets through shall stop the robot; nobody waits for the answer.
             device.ask(drive.robot, m.Emergency(), session=drive.session)
             give_back()
-        elif drive.log.started is None:
+        elif drive.log.started is None and not (drive.session and by_dva):
             give_back()
         else:
             device.ask(drive.robot, m.StopTeleOp(), give_back, give_back, drive.session)
+
+    def _give_back(self, robot: str, session: int) -> None:
+        """A permission is needed no longer, unless the next drive is of the same robot."""
+        if session and (self._order is None or self._order.device != robot):
+            body = m.PermissionRevocation(robot, self.device.id_tag, session)
+            self.device.ask(self.device.dva, body)
+
+    def _be_free(self, drive: Drive) -> None:
+        """The robot was told to stop: what is next?"""
+        if self._next is None:
+            self._drive = None
+        elif drive.session == 0:
+            self._go_on()  # nothing moves
+        else:
+            self.device.clock.call_after(STANDSTILL, self._go_on)
+
+    def _go_on(self) -> None:
+        order, self._drive, self._next = self._next, None, None
+        if order is not None:
+            self._take_up(order)
