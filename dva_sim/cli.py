@@ -90,6 +90,9 @@ def live(
     ] = 0,
     keys: Annotated[Path | None, typer.Option(help="Folder of keys: CURVE is on.")] = None,
     record: Annotated[Path | None, typer.Option(help="Folder for the robots' traces.")] = None,
+    state: Annotated[
+        Path | None, typer.Option(help="File that lets a killed DVA go on where it was.")
+    ] = None,
     seconds: Annotated[
         float | None, typer.Option("--for", metavar="SECONDS", help="Default: the horizon.")
     ] = None,
@@ -101,7 +104,9 @@ def live(
     from dva_sim.live.options import Options
 
     changes = tuple(set_ or ())
-    options = Options(scenario, changes, seed, operators, host, dva, port, keys, record, seconds)
+    options = Options(
+        scenario, changes, seed, operators, host, dva, port, keys, record, state, seconds
+    )
     if only is None:
         console.run_all(options)
     else:
@@ -134,14 +139,20 @@ def check(
     files: Annotated[
         list[str],
         typer.Argument(
-            help="Messages, studies, scenarios, sites, plans, maps, agents; - reads a message."
+            help="Messages, studies, scenarios, sites, plans, maps, agents; - reads a message. "
+            "Or the word policy, and names of policies or mine.py:Mine."
         ),
     ],
+    set_: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="An option of the policies."),
+    ] = None,
 ) -> None:
-    """Tell of each file whether it is valid, and if not where and why."""
+    """Tell of each file whether it is valid, and if not where and why; of a policy, whether
+    it keeps its promises."""
     from dva_sim.checking import console
 
-    raise typer.Exit(console.check(files))
+    raise typer.Exit(console.check(files, set_ or []))
 
 
 @app.command()

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 from dva_sim.errors import DvaSimError
-from dva_sim.live.options import Options
+from dva_sim.live.options import PATHS, Options
 from dva_sim.live.process import Teller, run_part
 
 
@@ -16,7 +16,7 @@ def main(argument: str) -> int:
     told = json.loads(argument)
     options = told["options"]
     options["changes"] = tuple(options["changes"])
-    for key in ("keys", "record"):
+    for key in PATHS:
         options[key] = None if options[key] is None else Path(options[key])
     try:
         run_part(

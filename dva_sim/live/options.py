@@ -12,6 +12,7 @@ from dva_sim.errors import ConfigError
 from dva_sim.scenario import Scenario, build, load
 
 PARTS = ("dva", "world", "operator")
+PATHS = ("keys", "record", "state")  # options that name files
 OPERATORS = ("simulated", "scripted")
 
 
@@ -29,6 +30,7 @@ class Options:
         port: First port of the devices of this run, or part; each takes two. 0 for free ones.
         keys: Folder with the keys of the devices; None to run without.
         record: Folder for a trace of each robot's decisions.
+        state: File in which the DVA keeps what must survive it; None: it keeps nothing.
         duration: How long the run lasts [s]; None: to the scenario's horizon.
     """
 
@@ -41,6 +43,7 @@ class Options:
     port: int = 0
     keys: Path | None = None
     record: Path | None = None
+    state: Path | None = None
     duration: float | None = None
 
     def read(self) -> Scenario:

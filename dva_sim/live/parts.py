@@ -17,6 +17,7 @@ from dva_sim.agents.operator.script import ScriptedOperator, drill
 from dva_sim.agents.robot import RobotAgent
 from dva_sim.agents.trace import Trace
 from dva_sim.core.events import Event
+from dva_sim.core.memory import Memory
 from dva_sim.core.permissions import LOW_BITS, Permissions
 from dva_sim.errors import ConfigError
 from dva_sim.live.options import PARTS, Options
@@ -59,17 +60,26 @@ class Rate:
 
 
 class DvaPart:
-    """The DVA core."""
+    """The DVA core.
 
-    def __init__(self, stage: Stage) -> None:
+    Raises:
+        ConfigError: the file for its memory cannot be used.
+    """
+
+    def __init__(self, stage: Stage, options: Options) -> None:
         # Sessions that no one can guess, and higher than in any earlier life of the DVA, as
         # long as that handed out no more than so many a second and the clock was not set back.
         count = int((time.time() - SESSION_EPOCH) * SESSIONS_PER_SECOND)
         permissions = Permissions(lambda: secrets.randbits(LOW_BITS), count=count)
-        self._agent = add_dva(stage, permissions, keep_events=False)
+        memory = None
+        if options.state is not None:
+            memory = Memory(options.state, epoch=time.time() - stage.clock.now)
+        self._agent = add_dva(stage, permissions, memory, keep_events=False)
         self._agent.desk.registry.most = _devices_that_fit()
         self._agent.start()
         self._stage = stage
+        book = self._agent.desk.book
+        self._settled_before = 0 if book.open else book.total
         self._beats: dict[str, Rate] = {}
 
     def rows(self) -> list[Row]:
@@ -98,7 +108,7 @@ class DvaPart:
     def settled(self) -> bool:
         """See `Part`."""
         book = self._agent.desk.book
-        return book.total > 0 and not book.open
+        return book.total > self._settled_before and not book.open
 
     def _events(self) -> list[Event]:
         """The last that were closed, and all that are open."""
@@ -225,7 +235,7 @@ def make_part(name: str, stage: Stage, options: Options, number: int) -> Part:
         count = stage.scenario.operator.count
         raise ConfigError(f"operator {number}: the scenario has operators 1 to {count}")
     makers: dict[str, Callable[[], Part]] = {
-        "dva": lambda: DvaPart(stage),
+        "dva": lambda: DvaPart(stage, options),
         "world": lambda: WorldPart(stage, options),
         "operator": lambda: OperatorPart(stage, options, number),
     }

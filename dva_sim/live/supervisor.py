@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from typing import IO
 
 from dva_sim.errors import DvaSimError
-from dva_sim.live.options import Options
+from dva_sim.live.options import PATHS, Options
 from dva_sim.live.process import Report
 from dva_sim.scenario import Scenario
 
@@ -119,7 +119,7 @@ class Supervisor:
 
     def _arguments(self, part: str, dva: str | None, number: int, port: int) -> Iterator[str]:
         told = {**vars(self._options), "dva": dva, "port": port}
-        for key in ("keys", "record"):
+        for key in PATHS:
             told[key] = None if told[key] is None else str(told[key])
         yield json.dumps({"part": part, "number": number, "epoch": self._epoch, "options": told})
 

@@ -45,7 +45,8 @@ class DvaAgent:
         """Begin to look at deadlines; a memory tells what was going on before."""
         clock = self.device.clock
         if self._memory is not None and self._memory.recall(self.desk, clock.now):
-            self.device.tell(f"remembers {len(self.desk.book.open)} open events")
+            count = len(self.desk.book.open)
+            self.device.tell(f"remembers {count} open event{'s' * (count != 1)}")
             for entry in list(self.desk.registry.entries.values()):
                 self._meet(entry.device)
             self._carry_out(self.desk.orders.again())

@@ -221,3 +221,19 @@ def test_devices_register_again_at_a_dva_that_was_killed_and_is_back(
         programs.start(*SCRIPTED, "--only", part, *at)
     wait_until(lambda: sessions_of_drives(trace) > {before}, "is driven by a new permission")
     assert max(sessions_of_drives(trace)) != before
+
+
+def test_a_dva_that_was_killed_remembers_its_events_and_goes_on_with_them(
+    programs: Programs, address: str, tmp_path: Path
+) -> None:
+    """The fire is reported once, to the first DVA; the second hears that it is confirmed."""
+    live = ("live", "drive-to-event", "--dva", address)
+    dva = programs.start(*live, "--only", "dva", "--state", "dva.sqlite")
+    world = programs.start(*live, "--only", "world")
+    programs.start(*live, "--only", "operator")
+    world.wait_to_say("is now in mode Teleoperation")
+    dva.send(signal.SIGKILL)
+    assert dva.ends() == -signal.SIGKILL
+    again = programs.start(*live, "--only", "dva", "--state", "dva.sqlite")
+    again.wait_to_say("remembers 1 open event", "event 1 (fire) is confirmed")
+    assert "pending" not in again.said
