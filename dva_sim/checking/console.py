@@ -4,27 +4,75 @@ from __future__ import annotations
 
 import sys
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from dva_sim.checking.files import NotReadError, Verdict, check_file
 from dva_sim.checking.messages import READ_BYTES, check_message
 from dva_sim.checking.schemas import schema_text
+from dva_sim.config import parse_changes
+from dva_sim.errors import ConfigError
 
 STDIN: Final = "-"
+POLICY: Final = "policy"  # as the first name: what follows are policies, not files
 VALID, INVALID, NOT_READ = 0, 1, 2  # exit codes; the highest of all files counts
 _SHOWN: Final = 50  # problems of one file
 
 
-def check(names: Sequence[str]) -> int:
-    """Tell of each file whether it is valid, and if not, why; the exit code."""
-    codes = [_check_one(name) for name in names]
+def check(names: Sequence[str], options: Sequence[str] = ()) -> int:
+    """Tell of each file whether it is valid, and if not, why; the exit code.
+
+    Args:
+        names: Paths of files; or the word `policy`, and names of policies. A file of that name
+            is `./policy`.
+        options: `key=value` pairs for the policies.
+
+    Raises:
+        ConfigError: no policy is named, or options are given for files.
+    """
+    if names and names[0] == POLICY:
+        return _check_policies(names[1:], parse_changes(options))
+    if options:
+        raise ConfigError("--set is for policies: dva-sim check policy NAME --set key=value")
+    return _sum_up("file", [_check_one(name) for name in names])
+
+
+def _check_policies(names: Sequence[str], options: Mapping[str, Any]) -> int:
+    from dva_sim.core.dispatch import known_policies
+
+    if not names:
+        known = ", ".join(known_policies())
+        raise ConfigError(f"check policy: which one? mine.py:Mine, or one of {known}")
+    return _sum_up("policy", [_check_policy(name, options) for name in names])
+
+
+def _check_policy(name: str, options: Mapping[str, Any]) -> int:
+    from dva_sim.checking.policies import try_policy
+    from dva_sim.core.dispatch import load_policy
+
+    try:
+        outcome = try_policy(partial(load_policy, name, options))
+    except ConfigError as error:
+        _say(f"{name}: {error}")
+        return INVALID
+    for text in outcome.broken:
+        _say(f"{name}: {text}")
+    for text in outcome.warnings:
+        _say(f"{name}: warning: {text}")
+    word = f"invalid, breaks {len(outcome.broken)} of its promises" if outcome.broken else "valid"
+    slowest = f"slowest decision {1000 * outcome.slowest:.1f} ms"
+    _say(f"{name}: policy: {word}; {outcome.situations} situations, {slowest}")
+    return INVALID if outcome.broken else VALID
+
+
+def _sum_up(what: str, codes: Sequence[int]) -> int:
     count = Counter(codes)
     words = {VALID: "valid", INVALID: "invalid", NOT_READ: "not read"}
-    files = "1 file" if len(codes) == 1 else f"{len(codes)} files"
+    many = {"file": "files", "policy": "policies"}[what]
     found = ", ".join(f"{count[code]} {word}" for code, word in words.items() if count[code])
-    print(f"{files}: {found}")
+    print(f"{len(codes)} {what if len(codes) == 1 else many}: {found}")
     return max(codes, default=VALID)
 
 

@@ -113,8 +113,8 @@ def _find(name: str, file: str, base: Path | None) -> Path:
     for folder in folders:
         if (folder / file).is_file():
             return (folder / file).resolve()
-    nearest = ", ".join(str(folder) for folder in dict.fromkeys([*folders[:2], *folders[-1:]]))
-    raise ConfigError(f"policy {name!r}: file {file!r} not found; looked in {nearest}")
+    near = ", ".join(dict.fromkeys(str(folder) for folder in [base or Path.cwd(), Path.cwd()]))
+    raise ConfigError(f"policy {name!r}: file {file!r} not found; looked in {near} and {FOLDER}")
 
 
 def _run(path: Path) -> ModuleType:
