@@ -1,0 +1,393 @@
+"""What a guard does for the DVA. It walks one metre a second, gets ready in 10 s, looks for 3 s
+and deals with something in 20 s; its post is at (1.4, 12), the west end of a straight corridor."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from pretended_dva import GUARD, POST, WALKER, PretendedDva
+
+from dva_sim.agents.duty import AWARD_WITHIN, MOST_ANNOUNCED, GuardDuty
+from dva_sim.agents.guard import STAND_BY_FOR, STAND_OFF, GuardAgent, GuardProfile, Walker
+from dva_sim.protocol import messages as m
+from dva_sim.worlds.hazards import KINDS, make_hazard
+
+FAR, FARTHER, NEAR = (21.4, 12.0), (31.4, 12.0), (6.4, 12.0)  # 20, 30 and 5 m from the post [m]
+WALLED_IN = (1000.0, 1000.0)  # no way leads there
+
+
+@pytest.fixture
+def dva() -> PretendedDva:
+    return PretendedDva()
+
+
+@pytest.fixture
+def guard(dva: PretendedDva) -> GuardAgent:
+    return dva.guard()
+
+
+def at(guard: GuardAgent) -> tuple[float, float]:
+    return guard.x, guard.y
+
+
+# --- confirm ---------------------------------------------------------------------------
+
+
+def test_a_guard_goes_there_looks_and_says_what_it_saw_before_it_says_done(
+    dva: PretendedDva, guard: GuardAgent
+) -> None:
+    for event, there, finding in ((1, {"fire"}, "confirmed"), (2, set(), "refuted")):
+        dva.there = there
+        assert dva.order(event, FAR) == m.OK
+        dva.run_for(60.0)
+        assert dva.progress(event) == ["departed", "arrived", finding, "done"]
+
+
+def test_a_guard_sets_out_10_s_after_the_order_and_sees_a_place_from_2_m(
+    dva: PretendedDva, guard: GuardAgent
+) -> None:
+    start = dva.now
+    dva.order(1, FAR)
+    dva.run_for(60.0)
+    assert dva.when(1, "departed") - start == pytest.approx(10.0, abs=0.1)
+    assert dva.when(1, "arrived") - dva.when(1, "departed") == pytest.approx(18.0, abs=1.0)
+    assert dva.when(1, "refuted") - dva.when(1, "arrived") == pytest.approx(3.0, abs=0.1)
+
+
+def test_who_finds_no_way_says_so_and_waits(dva: PretendedDva, guard: GuardAgent) -> None:
+    dva.order(1, WALLED_IN)
+    dva.run_for(11.0)
+    assert dva.progress(1) == ["failed"]
+    assert guard.activity == "waiting"
+
+
+def test_only_the_dva_gives_orders(dva: PretendedDva, guard: GuardAgent) -> None:
+    codes = []
+    stranger = dva.stage.device("operator", 1)
+    place = dva.position(FAR)
+    for body in (
+        m.Order(1, "fire", place, None),
+        m.Relocation(place),
+        m.TaskAnnouncement(1, "fire", place, 0.5, 2.0),
+        m.TaskAward(1),
+        m.OrderProgress(1, "done"),
+    ):
+        stranger.ask(GUARD, body, lambda reply: codes.append(reply.code))
+    dva.run_for(60.0)
+    assert codes == [m.NOT_PERMITTED] * 5
+    assert at(guard) == POST
+    assert dva.told == []
+
+
+def test_a_guard_drives_no_robots(dva: PretendedDva, guard: GuardAgent) -> None:
+    body = m.Order(1, "fire", dva.position(FAR), "02:00:00:01:00:01")
+    assert dva.say(GUARD, body) == m.NOT_SUPPORTED
+
+
+# --- the newest order holds ------------------------------------------------------------
+
+
+def test_a_newer_order_takes_the_place_of_the_older_of_which_nothing_more_is_said(
+    dva: PretendedDva, guard: GuardAgent
+) -> None:
+    dva.order(1, FARTHER)
+    dva.run_for(20.0)
+    assert dva.order(2, NEAR) == m.OK
+    dva.run_for(60.0)
+    assert dva.progress(1) == ["departed"]
+    assert dva.progress(2) == ["departed", "arrived", "refuted", "done"]
+
+
+def test_who_is_under_way_already_need_not_get_ready_again(
+    dva: PretendedDva, guard: GuardAgent
+) -> None:
+    dva.order(1, FARTHER)
+    dva.run_for(20.0)
+    start = dva.now
+    dva.order(2, FAR)
+    dva.run_for(1.0)
+    assert dva.when(2, "departed") - start < 0.1
+
+
+def test_who_is_getting_ready_when_a_newer_order_comes_goes_on_getting_ready(
+    dva: PretendedDva, guard: GuardAgent
+) -> None:
+    start = dva.now
+    dva.order(1, FARTHER)
+    dva.run_for(6.0)
+    dva.order(2, FAR)
+    dva.run_for(20.0)
+    assert dva.when(2, "departed") - start == pytest.approx(10.0, abs=0.1)
+    assert dva.progress(1) == []
+
+
+def test_the_same_order_again_is_answered_ok_and_changes_nothing(
+    dva: PretendedDva, guard: GuardAgent
+) -> None:
+    dva.order(1, FAR)
+    for _ in range(5):
+        dva.run_for(4.0)
+        assert dva.order(1, FAR) == m.OK
+    dva.run_for(60.0)
+    assert dva.progress(1) == ["departed", "arrived", "refuted", "done"]
+    assert dva.when(1, "departed") < 12.0
+
+
+def test_the_newest_order_holds_even_for_who_is_at_work_at_an_event(
+    dva: PretendedDva, guard: GuardAgent
+) -> None:
+    dva.there = {"fire"}
+    dva.order(1, NEAR, "contain")
+    dva.run_until(lambda: guard.activity == "containing")
+    assert dva.order(2, FAR) == m.OK
+    dva.run_for(100.0)
+    assert dva.contained == []
+    assert dva.progress(1) == ["departed", "arrived"]
+    assert dva.progress(2) == ["departed", "arrived", "confirmed", "done"]
+
+
+def test_an_order_that_the_dva_calls_over_is_given_up_without_a_word(
+    dva: PretendedDva, guard: GuardAgent
+) -> None:
+    dva.order(1, FARTHER)
+    dva.run_for(20.0)
+    assert dva.say(GUARD, m.OrderProgress(2, "done")) == m.OK
+    assert guard.activity == "walking"
+    assert dva.say(GUARD, m.OrderProgress(1, "done")) == m.OK
+    here = at(guard)
+    dva.run_for(60.0)
+    assert (at(guard), guard.activity) == (here, "waiting")
+    assert dva.progress(1) == ["departed"]
+
+
+def test_a_guard_can_do_the_same_again_once_it_is_done(
+    dva: PretendedDva, guard: GuardAgent
+) -> None:
+    for _ in range(2):
+        dva.order(1, NEAR)
+        dva.run_for(60.0)
+    assert dva.progress(1) == ["departed", "arrived", "refuted", "done"] * 2
+
+
+# --- stand by, and contain -------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_nobody_who_stands_by_is_in_danger_a_metre_and_a_half_too_near(kind: str) -> None:
+    hazard = make_hazard(kind, (0.0, 0.0), 0.0)
+    assert hazard.danger_radius(1e5) + 1.5 < STAND_OFF == 10.0
+
+
+def test_who_stands_by_stops_10_m_before_the_place_and_reports_its_departure_only(
+    dva: PretendedDva, guard: GuardAgent
+) -> None:
+    dva.order(1, FARTHER, "stand_by")
+    dva.run_for(120.0)
+    assert guard.activity == "standing by"
+    assert STAND_OFF - 1.0 < math.dist(at(guard), FARTHER) <= STAND_OFF
+    assert dva.progress(1) == ["departed"]
+
+
+def test_who_has_looked_from_near_and_shall_stand_by_goes_back_the_way_to_its_post(
+    dva: PretendedDva, guard: GuardAgent
+) -> None:
+    dva.order(1, FARTHER)
+    dva.run_for(60.0)
+    dva.order(1, FARTHER, "stand_by")
+    dva.run_for(20.0)
+    assert guard.activity == "standing by"
+    assert STAND_OFF <= math.dist(at(guard), FARTHER) < STAND_OFF + 1.0
+
+
+def test_who_stands_by_and_shall_contain_goes_at_once(dva: PretendedDva, guard: GuardAgent) -> None:
+    dva.there = {"fire"}
+    dva.order(1, FARTHER, "stand_by")
+    dva.run_for(60.0)
+    start = dva.now
+    assert dva.order(1, FARTHER, "contain") == m.OK
+    dva.run_for(60.0)
+    assert dva.progress(1) == ["departed", "departed", "arrived", "contained", "done"]
+    assert dva.when(1, "arrived") - start == pytest.approx(8.0, abs=1.0)
+    assert dva.when(1, "contained") - dva.when(1, "arrived") == pytest.approx(20.0, abs=0.1)
+    assert dva.contained == [("fire", pytest.approx(FARTHER, abs=1e-6))]
+
+
+def test_who_has_confirmed_and_shall_contain_stands_there_already(
+    dva: PretendedDva, guard: GuardAgent
+) -> None:
+    dva.there = {"fire"}
+    dva.order(1, FAR)
+    dva.run_until(lambda: "done" in dva.progress(1))
+    start = dva.now
+    dva.order(1, FAR, "contain")
+    dva.run_for(30.0)
+    assert dva.when(1, "contained") - start == pytest.approx(20.0, abs=0.1)
+
+
+def test_who_has_confirmed_and_shall_go_elsewhere_gets_ready_again(
+    dva: PretendedDva, guard: GuardAgent
+) -> None:
+    dva.order(1, FAR)
+    dva.run_until(lambda: "done" in dva.progress(1))
+    start = dva.now
+    dva.order(2, FARTHER)
+    dva.run_for(30.0)
+    assert dva.when(2, "departed") - start == pytest.approx(10.0, abs=0.1)
+
+
+def test_who_finds_nothing_to_contain_looks_and_refutes(
+    dva: PretendedDva, guard: GuardAgent
+) -> None:
+    dva.order(1, FAR, "contain")
+    dva.run_for(60.0)
+    assert dva.progress(1) == ["departed", "arrived", "refuted", "done"]
+    assert dva.when(1, "refuted") - dva.when(1, "arrived") == pytest.approx(3.0, abs=0.1)
+    assert dva.contained == []
+
+
+def test_who_stands_by_for_a_quarter_of_an_hour_without_a_word_gives_up(
+    dva: PretendedDva, guard: GuardAgent
+) -> None:
+    dva.order(1, FAR, "stand_by")
+    dva.run_for(30.0 + STAND_BY_FOR)
+    assert STAND_BY_FOR == 900.0
+    assert dva.progress(1) == ["departed", "failed"]
+    assert guard.activity == "waiting"
+
+
+# --- wait elsewhere --------------------------------------------------------------------
+
+
+def test_an_idle_guard_that_is_relocated_walks_there_and_waits(
+    dva: PretendedDva, guard: GuardAgent
+) -> None:
+    place = dva.position(FAR)
+    assert dva.say(GUARD, m.Relocation(place)) == m.OK
+    assert guard.activity == "getting ready"
+    dva.run_for(60.0)
+    assert at(guard) == pytest.approx(FAR, abs=0.01)
+    assert guard.activity == "waiting"
+    assert dva.told == []
+
+
+def test_a_guard_tells_where_it_is_while_it_moves(dva: PretendedDva, guard: GuardAgent) -> None:
+    seen = []
+    hear = lambda data: seen.append(dva.device.read(data).body.activity)  # noqa: E731
+    dva.network.subscribe(dva.device.id_tag, GUARD, "status|", hear)
+    dva.say(GUARD, m.Relocation(dva.position(FAR)))
+    dva.run_for(60.0)
+    assert list(dict.fromkeys(seen)) == ["getting ready", "walking", "waiting"]
+
+
+def test_a_guard_with_an_order_is_not_relocated(dva: PretendedDva, guard: GuardAgent) -> None:
+    dva.order(1, FAR, "stand_by")
+    assert dva.say(GUARD, m.Relocation(dva.position(NEAR))) == m.BUSY
+
+
+def test_an_order_interrupts_a_relocation_and_the_newest_relocation_holds(
+    dva: PretendedDva, guard: GuardAgent
+) -> None:
+    dva.say(GUARD, m.Relocation(dva.position(FARTHER)))
+    dva.run_for(15.0)
+    assert dva.say(GUARD, m.Relocation(dva.position(FAR))) == m.OK
+    dva.run_for(5.0)
+    start = dva.now
+    assert dva.order(1, NEAR) == m.OK
+    dva.run_for(60.0)
+    assert dva.when(1, "departed") - start < 0.1
+    assert dva.progress(1)[-1] == "done"
+    assert math.dist(at(guard), NEAR) <= 2.0
+
+
+# --- auctions --------------------------------------------------------------------------
+
+
+def test_an_idle_guard_bids_what_guards_usually_need_to_get_ready_and_its_own_way(
+    dva: PretendedDva, guard: GuardAgent
+) -> None:
+    assert dva.announce(7, FAR) == m.OK
+    [bid] = dva.bids()
+    assert (bid.event_id, bid.arrival_in) == (7, pytest.approx(12.0 + 20.0, abs=0.5))
+
+
+def test_who_is_under_way_to_another_post_bids_the_way_alone(
+    dva: PretendedDva, guard: GuardAgent
+) -> None:
+    dva.say(GUARD, m.Relocation(dva.position(FARTHER)))
+    dva.run_for(20.0)
+    dva.announce(7, FARTHER)
+    left = math.dist(at(guard), FARTHER)
+    assert dva.bids()[0].arrival_in == pytest.approx(left, abs=0.7)
+
+
+def test_who_has_an_order_or_no_way_hears_of_an_auction_and_bids_nothing(
+    dva: PretendedDva, guard: GuardAgent
+) -> None:
+    assert dva.announce(7, WALLED_IN) == m.OK
+    dva.order(1, FARTHER)
+    assert dva.announce(8, FAR) == m.OK
+    assert dva.bids() == []
+
+
+def test_an_award_is_an_order_to_look_at_what_was_announced(
+    dva: PretendedDva, guard: GuardAgent
+) -> None:
+    dva.announce(7, FAR)
+    assert dva.say(GUARD, m.TaskAward(7)) == m.OK
+    assert dva.say(GUARD, m.TaskAward(7)) == m.OK  # said again
+    dva.run_for(60.0)
+    assert dva.progress(7) == ["departed", "arrived", "refuted", "done"]
+
+
+def test_an_award_of_what_was_never_announced_is_refused(
+    dva: PretendedDva, guard: GuardAgent
+) -> None:
+    assert dva.say(GUARD, m.TaskAward(7)) == m.UNKNOWN_EVENT
+    assert guard.activity == "waiting"
+
+
+def test_an_award_is_no_reason_to_leave_an_order(dva: PretendedDva, guard: GuardAgent) -> None:
+    dva.announce(7, FAR)
+    dva.order(1, NEAR)
+    assert dva.say(GUARD, m.TaskAward(7)) == m.BUSY
+    dva.run_for(60.0)
+    assert dva.progress(1)[-1] == "done"
+
+
+# --- the decider alone -----------------------------------------------------------------
+
+
+def decide(duty: GuardDuty, body: m.Body, now: float = 0.0) -> int:
+    return duty.handle(m.Message(GUARD, 1, duty.dva, "12:00:00", 0, body), now).code
+
+
+def announcement(event: int) -> m.TaskAnnouncement:
+    return m.TaskAnnouncement(event, "fire", m.Position(0.0, 0.0), 0.5, 2.0)
+
+
+def test_an_announcement_is_forgotten_a_minute_after_the_time_for_bids() -> None:
+    for wait, code in ((2.0 + AWARD_WITHIN, m.OK), (2.1 + AWARD_WITHIN, m.UNKNOWN_EVENT)):
+        duty = GuardDuty("02:00:00:00:00:01", 10.0)
+        decide(duty, announcement(7))
+        assert decide(duty, m.TaskAward(7), wait) == code
+
+
+def test_of_many_announcements_the_newest_32_are_remembered() -> None:
+    duty = GuardDuty("02:00:00:00:00:01", 10.0)
+    for event in range(1, 1001):
+        decide(duty, announcement(event))
+    assert len(duty._announced) == MOST_ANNOUNCED == 32
+    assert decide(duty, m.TaskAward(968)) == m.UNKNOWN_EVENT
+    assert decide(duty, m.TaskAward(969)) == m.OK
+
+
+def test_how_a_guard_walks_and_looks_does_not_depend_on_how_long_it_would_contain() -> None:
+    usual = GuardProfile()
+    slow = usual.model_copy(
+        update={"contain_s": usual.contain_s.model_copy(update={"median": 9e9})}
+    )
+    one, other = (Walker.draw(p, np.random.default_rng(3)) for p in (usual, slow))
+    assert (one.speed, one.mobilisation, one.look) == (other.speed, other.mobilisation, other.look)
+    assert one.usual_mobilisation == WALKER.usual_mobilisation + 33.0 == 45.0

@@ -1,0 +1,171 @@
+"""A DVA that says what a test wants it to say, and notes what it is told, in virtual time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+from dva_sim import scenario as scenarios
+from dva_sim.agents.guard import GuardAgent, Walker
+from dva_sim.agents.operator.agent import OperatorAgent
+from dva_sim.clock import Clock
+from dva_sim.network.link import ConstantRate, Link, LinkConfig
+from dva_sim.network.virtual import VirtualNetwork
+from dva_sim.protocol import messages as m
+from dva_sim.recorder import Recorder
+from dva_sim.simulation.control_room import add_operator
+from dva_sim.simulation.field import Field
+from dva_sim.simulation.names import id_of
+from dva_sim.simulation.stage import Stage
+from dva_sim.streams import Streams
+
+GUARD, ROBOT, OTHER_ROBOT = id_of("guard", 1), id_of("robot", 1), id_of("robot", 2)
+OPERATOR = id_of("operator", 1)
+# One metre a second, ten seconds to get ready, three to look, twenty to deal with something.
+WALKER = Walker(speed=1.0, mobilisation=10.0, look=3.0, contain=20.0, usual_mobilisation=12.0)
+POST = (1.4, 12.0)  # at the west end of the main corridor, which is straight [m]
+NOTICED = 0.05  # after this a message has arrived and been answered [s]
+
+Point = tuple[float, float]
+
+
+class Told(NamedTuple):
+    """What the DVA was told: when [s], by whom, and what."""
+
+    time: float
+    source: str
+    body: m.Body
+
+
+class PretendedDva:
+    """Everybody but a real DVA.
+
+    Args:
+        robots: How many robots there are.
+
+    Attributes:
+        told: What was told, but for registrations.
+        there: Kinds of what is there, wherever a guard of this DVA looks.
+        contained: What guards have dealt with: kind and place.
+    """
+
+    def __init__(self, robots: int = 0) -> None:
+        config = LinkConfig(delay_s=0.001)
+        links = [Link(config, ConstantRate(config.rate_bps), Streams(1), way) for way in "ab"]
+        self.network = VirtualNetwork(Clock(), lambda *_: (links[0], links[1]))
+        changes = {"robot.count": robots, "guard.count": 1}
+        scenario = scenarios.build(scenarios.load("drive-to-event"), changes)
+        self.stage = Stage(scenario, 1, self.network, Recorder())
+        self.field = Field(self.stage)
+        for number in range(1, robots + 1):
+            self.field._add_robot(number)
+        self.device = self.stage.device("dva", 1)
+        self.device.serve(self._hear)
+        self.told: list[Told] = []
+        self.there: set[str] = set()
+        self.contained: list[tuple[str, Point]] = []
+        self.sessions: dict[str, m.PermissionGrant] = {}
+        self._last_session = 0
+
+    # --- who is there ------------------------------------------------------------------
+
+    def guard(self, position: Point = POST, walker: Walker = WALKER) -> GuardAgent:
+        """A guard who sees what is in `there`."""
+        device, planner = self.stage.device("guard", 1), self.stage.planner
+        guard = GuardAgent(
+            device, walker, planner, position, lambda kind, *_: kind in self.there, self._contained
+        )
+        device.register(guard.start)
+        self.run_for(1.0)
+        return guard
+
+    def operator(self) -> OperatorAgent:
+        """An operator of the scenario's population."""
+        operator = add_operator(self.stage, 1)
+        self.run_for(2.0)
+        return operator
+
+    def _contained(self, kind: str, x: float, y: float) -> None:
+        self.contained.append((kind, (x, y)))
+        self.there.discard(kind)
+
+    # --- time --------------------------------------------------------------------------
+
+    @property
+    def now(self) -> float:
+        return self.network.clock.now
+
+    def run_for(self, seconds: float) -> None:
+        self.network.clock.run(self.now + seconds)
+
+    def run_until(self, condition: Callable[[], object], limit: float = 1200.0) -> None:
+        end = self.now + limit
+        while not condition():
+            assert self.now < end, f"has not come true within {limit} s"
+            self.run_for(0.1)
+
+    # --- what is said ------------------------------------------------------------------
+
+    def say(self, to: str, body: m.Body) -> int:
+        """Tell somebody something: the code it is answered with, or -1 for no answer yet."""
+        codes = [-1]
+        self.device.ask(to, body, lambda reply: codes.append(reply.code))
+        self.run_for(NOTICED)
+        return codes[-1]
+
+    def order(
+        self, event: int, place: Point, task: str = "confirm", robot: str | None = None
+    ) -> int:
+        """Order the guard, or the operator of a robot, to an event of kind fire."""
+        body = m.Order(event, "fire", self.position(place), robot, task)
+        return self.say(GUARD if robot is None else OPERATOR, body)
+
+    def announce(self, event: int, place: Point, to: str = GUARD, within: float = 2.0) -> int:
+        """Put an event of kind fire up for auction."""
+        return self.say(to, m.TaskAnnouncement(event, "fire", self.position(place), 0.5, within))
+
+    def position(self, place: Point) -> m.Position:
+        return m.Position(*self.stage.site.frame.to_latlon(*place))
+
+    def progress(self, event: int) -> list[str]:
+        """What was told of an event: states of the order, and findings, in this order."""
+        return [
+            told.body.state if isinstance(told.body, m.OrderProgress) else told.body.finding
+            for told in self.told
+            if isinstance(told.body, m.OrderProgress | m.EventReport)
+            and told.body.event_id == event
+        ]
+
+    def when(self, event: int, word: str) -> float:
+        """When a state or finding of an event was told first [s]."""
+        return next(
+            told.time
+            for told in self.told
+            if word in (getattr(told.body, "state", None), getattr(told.body, "finding", None))
+            and getattr(told.body, "event_id", None) == event
+        )
+
+    def bids(self) -> list[m.TaskBid]:
+        return [told.body for told in self.told if isinstance(told.body, m.TaskBid)]
+
+    # --- what it hears -----------------------------------------------------------------
+
+    def _hear(self, message: m.Message) -> m.Reply:
+        body = message.body
+        if not isinstance(body, m.Registration):
+            self.told.append(Told(self.now, message.source, body))
+        if isinstance(body, m.PermissionRequest):
+            return m.Reply(message.message_id, m.OK, "", self._permit(message.source, body))
+        if isinstance(body, m.PermissionRevocation) and self.sessions.pop(body.device, None):
+            self.device.ask(body.device, body)
+        return m.Reply(message.message_id, m.OK, "")
+
+    def _permit(self, holder: str, body: m.PermissionRequest) -> m.Permission:
+        """As the real one: who asks again for what it holds gets the same session."""
+        held = self.sessions.get(body.device)
+        if held is None or held.holder != holder:
+            self._last_session += 1
+            held = m.PermissionGrant(holder, body.level, self._last_session)
+            self.sessions[body.device] = held
+            self.device.ask(body.device, held, session=held.session)
+        return m.Permission(body.device, body.level, held.session)
