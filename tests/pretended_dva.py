@@ -24,7 +24,7 @@ OPERATOR = id_of("operator", 1)
 # One metre a second, ten seconds to get ready, three to look, twenty to deal with something.
 WALKER = Walker(speed=1.0, mobilisation=10.0, look=3.0, contain=20.0, usual_mobilisation=12.0)
 POST = (1.4, 12.0)  # at the west end of the main corridor, which is straight [m]
-NOTICED = 0.05  # after this a message has arrived and been answered [s]
+SETTLED = 0.01  # after this, what somebody said in answer has arrived [s]
 
 Point = tuple[float, float]
 
@@ -107,11 +107,14 @@ class PretendedDva:
     # --- what is said ------------------------------------------------------------------
 
     def say(self, to: str, body: m.Body) -> int:
-        """Tell somebody something: the code it is answered with, or -1 for no answer yet."""
-        codes = [-1]
+        """Tell somebody something: the code it is answered with."""
+        codes: list[int] = []
         self.device.ask(to, body, lambda reply: codes.append(reply.code))
-        self.run_for(NOTICED)
-        return codes[-1]
+        end = self.now + 1.0
+        while not codes and self.now < end:
+            self.run_for(0.002)
+        self.run_for(SETTLED)
+        return codes[0]
 
     def order(
         self, event: int, place: Point, task: str = "confirm", robot: str | None = None
