@@ -227,9 +227,9 @@ class Orders:
         rules, waiting = self.rules, self.book.waiting
         ends = min(self._pauses, default=math.inf) if waiting else math.inf
         if math.isfinite(rules.escalate_after):
-            ends = min(ends, *(self._wait_ends(e) for e in waiting.values()))
+            ends = min([ends, *(self._wait_ends(e) for e in waiting.values())])
         if math.isfinite(rules.order_limit):
-            ends = min(ends, *(self._order_ends(e) for e in self.engaged.values()))
+            ends = min([ends, *(self._order_ends(e) for e in self.engaged.values())])
         return ends
 
     def _wait_ends(self, event: Event) -> float:
