@@ -8,6 +8,7 @@ for the DVA to know.
 from __future__ import annotations
 
 from collections import OrderedDict
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -54,12 +55,14 @@ class GuardDuty:
     Attributes:
         dva: Id of the DVA: only its orders count.
         mobilisation: From an order to the first step [s], for who was waiting.
+        is_at: Whether the guard stands at a place.
         errand: What the guard is on now; None while it waits.
         ready_at: When the guard can set out, or could [s].
     """
 
     dva: str
     mobilisation: float
+    is_at: Callable[[m.Position], bool] = lambda place: False
     errand: Errand | None = None
     ready_at: float = 0.0
     _stands_at: int | None = None
@@ -112,6 +115,8 @@ class GuardDuty:
             return Answer(m.BUSY, "has an order")
         if self.errand is not None and self.errand.place == place:
             return Answer(m.OK, "on the way there already")
+        if self.errand is None and self.is_at(place):
+            return Answer(m.OK, "stands there already")
         return self._set_out(Errand(place), now)
 
     def _set_out(self, errand: Errand, now: float) -> Answer:

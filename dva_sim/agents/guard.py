@@ -22,6 +22,7 @@ STATUS_PERIOD, FIRST_STATUS = 2.0, 0.5  # of where a guard is [s]
 STEP = 0.5  # how often a walking guard's place is looked at [s]
 SLOWEST, FASTEST = 0.6, 2.2  # [m/s]
 NEAR_ENOUGH = 2.0  # from where a guard sees what there is, if nothing stands between [m]
+HERE = 1.0  # who is so near a place stands at it [m]
 STAND_OFF = 10.0
 """Who stands by waits so far from the place [m]: no hazard is dangerous beyond 7 m, one step may
 lead a metre too far, and a place is reported a metre or two wrong."""
@@ -114,7 +115,7 @@ class GuardAgent:
         self.heading = 0.0
         self.activity = "waiting"
         self._is_there, self._contain = is_there, contain
-        self._duty = GuardDuty(device.dva, walker.mobilisation)
+        self._duty = GuardDuty(device.dva, walker.mobilisation, self._stands_at)
         device.serve(self._on_request)
 
     def start(self) -> None:
@@ -185,6 +186,9 @@ class GuardAgent:
         if math.dist((self.x, self.y), place) < STAND_OFF:
             return self._post, lambda at: math.dist(at, place) >= STAND_OFF  # too near: back off
         return place, lambda at: math.dist(at, place) <= STAND_OFF
+
+    def _stands_at(self, place: m.Position) -> bool:
+        return math.dist((self.x, self.y), self._xy(place)) < HERE
 
     def _sees(self, at: Point, place: Point) -> bool:
         """Whether a place is near, and nothing stands between."""

@@ -281,6 +281,15 @@ def test_a_guard_tells_where_it_is_while_it_moves(dva: PretendedDva, guard: Guar
     assert list(dict.fromkeys(seen)) == ["getting ready", "walking", "waiting"]
 
 
+def test_who_stands_there_already_does_not_even_get_ready(
+    dva: PretendedDva, guard: GuardAgent
+) -> None:
+    assert dva.say(GUARD, m.Relocation(dva.position((POST[0] + 0.9, POST[1])))) == m.OK
+    assert guard.activity == "waiting"
+    assert dva.say(GUARD, m.Relocation(dva.position((POST[0] + 1.1, POST[1])))) == m.OK
+    assert guard.activity == "getting ready"
+
+
 def test_a_guard_with_an_order_is_not_relocated(dva: PretendedDva, guard: GuardAgent) -> None:
     dva.order(1, FAR, "stand_by")
     assert dva.say(GUARD, m.Relocation(dva.position(NEAR))) == m.BUSY
