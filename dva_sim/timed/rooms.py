@@ -1,0 +1,182 @@
+"""A site as the timed world sees it: a few places in each room, and planned ways between them.
+
+Ways between places that stay are planned once per process. From half-way, where planning
+each time would cost more than the rest of the run, the way leads straight to what is in sight
+- the goal, a door, or either end of the leg - and on from there.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import Literal
+
+import numpy as np
+
+from dva_sim.errors import ConfigError
+from dva_sim.streams import Streams
+from dva_sim.timed.laws import Law
+from dva_sim.timed.places import APART, Place, Terrain
+from dva_sim.timed.scenario import Point
+from dva_sim.worlds.planning import Planner
+from dva_sim.worlds.site import FOOTPRINT, Detector, Pose, Site, load_site
+
+CLEARANCE = 0.4  # radius that must fit where an event happens [m]
+DETECTS = {"fire": "smoke", "gas_leak": "gas", "flood": "water"}
+
+
+class _Ways:
+    """Lengths of ways on a site, kept for the next run in this process."""
+
+    def __init__(self, site: Site) -> None:
+        self.planner = Planner(site, FOOTPRINT)
+        self._lengths: dict[tuple[Point, Point], float] = {}
+
+    def length(self, a: Point, b: Point) -> float:
+        """The way is as long there as back [m]."""
+        pair = (a, b) if a <= b else (b, a)
+        length = self._lengths.get(pair)
+        if length is None:
+            length = self._lengths[pair] = self.planner.distance(*pair) if a != b else 0.0
+        return length
+
+
+@lru_cache(maxsize=8)
+def _ways_of(site: Site) -> _Ways:
+    return _Ways(site)
+
+
+@lru_cache(maxsize=8)
+def _spots_of(site: Site, count: int) -> tuple[tuple[Point, ...], ...]:
+    """The same places in every run: they belong to the site."""
+    luck = Streams(0)
+    return tuple(
+        tuple(site.sample_free(rng, CLEARANCE, room.name) for _ in range(count))
+        for room in site.rooms
+        for rng in [luck.fresh(f"spots/{room.name}")]
+    )
+
+
+class Rooms(Terrain):
+    """A site.
+
+    Args:
+        name: Name or path.
+        spots: Places in each room.
+        way: How ways are measured.
+
+    Raises:
+        ConfigError: the site cannot be read, or has no rooms.
+    """
+
+    placed = True
+
+    def __init__(
+        self, name: str, spots: int, way: Literal["none", "straight", "path"] | Law
+    ) -> None:
+        self.site = load_site(name)
+        if not self.site.rooms:
+            raise ConfigError(f"site {name!r} has no rooms: events need them")
+        super().__init__([room.name for room in self.site.rooms], self.site.frame, APART)
+        self._ways, self._way = _ways_of(self.site), way
+        self._spots = [
+            [self.fix(x, y, zone) for x, y in points]
+            for zone, points in enumerate(_spots_of(self.site, spots))
+        ]
+        ends = self.site.doors.reshape(-1, 2, 2).mean(axis=1).tolist()
+        self._doors: list[Point] = [(x, y) for x, y in ends]
+
+    # --- places ------------------------------------------------------------------------
+
+    def event_place(self, zone: int, u: float, v: float) -> Place:
+        """See `Terrain`."""
+        if zone < 0:
+            zone, u = int(u * len(self._spots)), u * len(self._spots) % 1.0
+        spots = self._spots[zone]
+        return self.apart(spots[int(u * len(spots))])
+
+    def named(self, name: str, number: int) -> Place:
+        """See `Terrain`."""
+        what, _, given = name.partition("-")
+        if name in self.zones or what not in ("post", "robot_base"):
+            return super().named(name, number)
+        poses = self.site.guard_posts if what == "post" else self.site.robot_bases
+        if not poses or int(given or 1) > len(poses):
+            wanted = f"no {name!r}: there are {len(poses)}"
+            raise ConfigError(f"site {self.site.name!r} has {wanted}")
+        return self._base(poses[((int(given) if given else number) - 1) % len(poses)])
+
+    def _base(self, pose: Pose) -> Place:
+        room = self.site.room_at(pose.x, pose.y)
+        return self.fix(pose.x, pose.y, self.zones.index(room) if room else -1)
+
+    def centre(self, zone: int) -> Place:
+        """See `Terrain`: the first of its places."""
+        return self._spots[zone][0]
+
+    def spots(self, zone: int) -> list[Place]:
+        """See `Terrain`."""
+        return self._spots[zone]
+
+    def anywhere(self, rng: np.random.Generator) -> Place:
+        """See `Terrain`."""
+        x, y = self.site.sample_free(rng, CLEARANCE)
+        return self.fix(x, y)
+
+    def default_base(self, kind: str) -> str | None:
+        """See `Terrain`."""
+        return "post" if kind == "guard" else "robot_base"
+
+    # --- ways --------------------------------------------------------------------------
+
+    def length(self, a: Place, b: Place) -> float:
+        """See `Terrain`."""
+        if self._way == "straight":
+            return math.hypot(a.x - b.x, a.y - b.y)
+        if self._way != "path":
+            return 0.0
+        if a.fixed is not None and b.fixed is not None:
+            return self._ways.length(a.fixed.point, b.fixed.point)
+        if b.fixed is None:
+            a, b = b, a
+        return self._from_half_way(a.point, b)
+
+    def _from_half_way(self, start: Point, goal: Place) -> float:
+        sees = self._ways.planner.line_of_sight
+        if sees(start, goal.point):
+            return math.dist(start, goal.point)
+        end = goal.fixed.point if goal.fixed is not None else goal.point
+        ways = [
+            math.dist(start, door) + self._ways.length(door, end)
+            for door in self._doors
+            if sees(start, door)
+        ]
+        return min(ways, default=math.inf) if ways else self._ways.planner.distance(start, end)
+
+    def along(self, a: Place, b: Place, gone: float) -> Place:
+        """See `Terrain`."""
+        if self._way == "none" or gone >= self.length(a, b):
+            return b
+        if self._way == "straight":
+            share = gone / self.length(a, b)
+            return self.place(a.x + share * (b.x - a.x), a.y + share * (b.y - a.y))
+        points = self._ways.planner.path(a.point, b.point)
+        if points is None:
+            return b
+        reached = np.r_[0.0, np.cumsum(np.hypot(*np.diff(points, axis=0).T))]
+        at = gone * reached[-1] / max(self.length(a, b), 1e-9)
+        x, y = np.interp(at, reached, points[:, 0]), np.interp(at, reached, points[:, 1])
+        return self.place(float(x), float(y))
+
+    # --- detectors ---------------------------------------------------------------------
+
+    def detectors(self, kind: str) -> list[tuple[Detector, str | None]]:
+        """The detectors for a kind of event, each with its room.
+
+        Raises:
+            ConfigError: there is none.
+        """
+        fitting = [d for d in self.site.detectors if d.kind == DETECTS[kind]]
+        if not fitting:
+            raise ConfigError(f"site {self.site.name!r} has no {DETECTS[kind]} detectors")
+        return [(d, self.site.room_at(d.x, d.y)) for d in fitting]

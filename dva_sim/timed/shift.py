@@ -1,0 +1,474 @@
+"""A shift: the world of one timed run, around the DVA's own desk."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from dva_sim.clock import Clock
+from dva_sim.core.dispatch import Policy
+from dva_sim.core.events import Event, State
+from dva_sim.core.ground import Ground, Start
+from dva_sim.core.permissions import Permissions
+from dva_sim.core.registry import DETECTOR, GUARD, OPERATOR, ROBOT
+from dva_sim.core.rules import Rules
+from dva_sim.core.service import Desk
+from dva_sim.core.sessions import Sessions
+from dva_sim.protocol import messages as m
+from dva_sim.streams import Streams
+from dva_sim.timed import knowledge
+from dva_sim.timed.balance import check
+from dva_sim.timed.demand import CALLERS, Demand
+from dva_sim.timed.incident import Incident
+from dva_sim.timed.laws import Law
+from dva_sim.timed.ledger import CODES, STEPS_IN_ORDER, Floats, Ledger, Level, Slices
+from dva_sim.timed.luck import Draws, times
+from dva_sim.timed.mail import Mail
+from dva_sim.timed.places import Place, Terrain, terrain_of
+from dva_sim.timed.recording import TimedRecording, UnitRecord
+from dva_sim.timed.scenario import Group, TimedScenario, limit_of
+from dva_sim.timed.units import Job, Operator, Unit
+
+ADDRESS = "192.168.1.9"  # in the registration, where nobody has a real one
+CHECKS = 64  # of the balance in a run
+FASTEST, SLOWEST = 2.0, 0.5  # bounds of a person's speed, by the group's mean
+IDS = {"guard": 1, "robot": 2, "operator": 3, "caller": 4, "second": 5}
+
+
+def id_of(kind: str, number: int) -> str:
+    """The id of the `number`-th device of a kind, from 0."""
+    return f"02:00:01:{IDS[kind]:02X}:{number >> 8:02X}:{number & 0xFF:02X}"
+
+
+class Shift:
+    """Everybody in place at time zero.
+
+    Args:
+        scenario: What the run consists of.
+        seed: Decides all luck.
+        policy: Who decides; made from the scenario by the caller.
+
+    Raises:
+        ConfigError: a site that cannot hold the team.
+    """
+
+    def __init__(self, scenario: TimedScenario, seed: int, policy: Policy) -> None:
+        self.scenario, self.seed = scenario, seed
+        self.clock, self.streams = Clock(), Streams(seed)
+        self.terrain: Terrain = terrain_of(scenario)
+        slices = Slices(scenario.warm_up_s, scenario.horizon_s, scenario.batches)
+        self.slices = slices
+        self.ledger = Ledger(len(scenario.demand), slices, scenario.keep == "events")
+        self.waiting = [Level(slices) for _ in scenario.demand]
+        self.served = [Level(slices) for _ in scenario.demand]
+        self.demand = Demand(
+            scenario, self.streams, self.terrain, self.clock, self._happens, self._noticed
+        )
+        self.units: list[Unit] = []
+        self.by_device: dict[str, Unit] = {}
+        self.numbers: dict[str, int] = {}
+        self._hire()
+        self.desk = self._open_desk(policy)
+        self.mail = Mail(self.desk, self.clock, self._changed, self._tell_who_moves)
+        self.records = [UnitRecord(unit.name, unit.kind) for unit in self.units]
+        self.operators: list[Operator] = []
+        self.events: dict[int, list[Incident]] = {}
+        self.reports: dict[int, int] = {}
+        self.unnoticed: dict[int, Incident] = {}
+        self.total, self.settled = 0, Counter[str]()
+        self.violations: Counter[str] = Counter()
+        self.driven: dict[str, float] = {}
+        self._served: set[int] = set()
+        self._moving: dict[Unit, None] = {}
+        self._luck: dict[tuple[str, int, int], Draws[float]] = {}
+        self._register()
+
+    # --- a run ---------------------------------------------------------------------------
+
+    def run(self) -> TimedRecording:
+        """Let time pass until the horizon, or until all is settled."""
+        scenario = self.scenario
+        self.demand.start()
+        for check_number in range(1, CHECKS + 1):
+            self.clock.run(scenario.horizon_s * check_number / CHECKS)
+            check(self)
+            if self.demand.exhausted and not self.events and not self.unnoticed:
+                break
+        peek = self.clock.env.peek
+        while scenario.drain and (self.events or self.unnoticed) and peek() < math.inf:
+            self.clock.run(self.clock.now + max(1.0, scenario.horizon_s / CHECKS))
+            check(self)
+        return self._close()
+
+    def _close(self) -> TimedRecording:
+        now, scenario = self.clock.now, self.scenario
+        for level in (*self.waiting, *self.served):
+            level.advance(now)
+        for unit in self.units:
+            if unit.job is not None:
+                self.spent(unit, unit.job.phase, unit.since)
+                self.freed(unit, unit.job)
+        for incidents in self.events.values():
+            for incident in incidents:
+                assert incident.event is not None
+                self.ledger.write(incident, CODES[incident.event.state.value], self.numbers)
+        for incident in self.unnoticed.values():
+            self.ledger.write(incident, CODES["unnoticed"], self.numbers)
+        counters = Counter(self.desk.counters)
+        counters.update({f"refused {text}": n for text, n in self.mail.refused.items()})
+        for unit, record in zip(self.units, self.records, strict=True):
+            record.distance, record.jobs = unit.distance, unit.jobs
+        return TimedRecording(
+            scenario,
+            self.seed,
+            self.terrain.zones,
+            scenario.stream_names,
+            [unit.name for unit in self.units],
+            self.ledger.columns() if scenario.keep == "events" else {},
+            self.ledger.cells,
+            self.ledger.outcomes,
+            np.array([level.areas for level in self.waiting]),
+            np.array([level.areas for level in self.served]),
+            self.records,
+            [self.driven[operator.device] for operator in self.operators],
+            counters,
+            self.violations,
+            self.total,
+            self.mail.sent,
+            now,
+            max(0.0, min(now, scenario.horizon_s) - scenario.warm_up_s),
+        )
+
+    # --- who is there --------------------------------------------------------------------
+
+    def _hire(self) -> None:
+        of_kind: Counter[str] = Counter()
+        stations = knowledge.stations(self.scenario, self.terrain)
+        self.stations = stations
+        for group in self.scenario.responders:
+            for name in self.scenario.members(group):
+                of_kind[group.kind] += 1
+                base = self._base(group, name, of_kind[group.kind], stations)
+                device = id_of(group.kind, of_kind[group.kind])
+                speed = self._speed(group, name)
+                unit = Unit(self, len(self.units), name, device, group, base, speed)
+                self.units.append(unit)
+                self.by_device[device] = unit
+                self.numbers[device] = unit.number
+
+    def _base(self, group: Group, name: str, number: int, stations: dict[str, Place]) -> Place:
+        base: Any = group.base
+        if base is None:
+            base = self.terrain.default_base(group.kind)
+        if base is None:
+            return self.terrain.origin()
+        if base == "random":
+            return self.terrain.anywhere(self.streams.fresh(f"{name}/base"))
+        if base in stations:
+            return stations[base]
+        return knowledge.place_of(self.terrain, base, number)
+
+    def _speed(self, group: Group, name: str) -> float:
+        if not group.speed_sd_mps:
+            return group.speed_mps
+        speed = self.streams.fresh(f"{name}/speed").normal(group.speed_mps, group.speed_sd_mps)
+        return float(np.clip(speed, SLOWEST * group.speed_mps, FASTEST * group.speed_mps))
+
+    def _open_desk(self, policy: Policy) -> Desk:
+        config = self.scenario.dispatch
+        merge = config.merge_distance_m
+        if merge is None:
+            merge = 8.0 if self.scenario.site else 0.0
+        rules = Rules(
+            escalate_after=limit_of(config.escalate_after_s),
+            containment=config.containment,
+            most_waiting=config.most_waiting,
+            merge_distance=merge,
+            max_attempts=config.max_attempts,
+            order_limit=limit_of(config.order_limit_s),
+            bid_within=config.bid_within_s,
+        )
+        sessions = Sessions(Permissions(lambda: 0))
+        ground = knowledge.ground_of(self) if policy.relocates or config.preferences else Ground()
+        desk = Desk(policy, self._travel, rules, self.streams["dva/policy"], sessions, ground)
+        desk.registry.silent_after = math.inf
+        return desk
+
+    def _register(self) -> None:
+        """Everybody makes itself known; who is on duty later shows no place until then."""
+        types = {"guard": GUARD, "robot": ROBOT}
+        for number, stream in enumerate(self.scenario.demand):
+            callers = CALLERS if stream.patience or stream.repeats else 1
+            for kind in ("caller", "second") if stream.repeats else ("caller",):
+                for caller in range(callers):
+                    self._enter(id_of(kind, number * CALLERS + caller), kind, DETECTOR)
+        for unit in self.units:
+            self._enter(unit.device, unit.name, types[unit.kind])
+            self.mail.takers[unit.device] = unit
+        robots = {unit.device: unit for unit in self.units if unit.kind == "robot"}
+        for number in range(self.scenario.operators.count):
+            operator = Operator(id_of("operator", number), robots)
+            self.operators.append(operator)
+            self.driven[operator.device] = 0.0
+            self._enter(operator.device, f"operator-{number + 1}", OPERATOR)
+            self.mail.takers[operator.device] = operator
+        self.mail.carry()
+        for start in sorted({group.from_s for group in self.scenario.responders}):
+            on_duty = [unit for unit in self.units if unit.group.from_s == start]
+            self.clock.call_at(start, self._begin_shift, on_duty)
+
+    def _enter(self, device: str, label: str, device_type: str) -> None:
+        self.mail.say(device, m.Registration(label, device_type, ADDRESS))
+
+    def _begin_shift(self, units: list[Unit]) -> None:
+        for unit in units:
+            self.stands(unit, "waiting")
+        self.mail.tick()
+
+    # --- what happens --------------------------------------------------------------------
+
+    def _happens(self, incident: Incident) -> None:
+        self.total += 1
+        self.unnoticed[incident.number] = incident
+        self.terrain.remember(incident.place)
+
+    def _noticed(self, incident: Incident) -> None:
+        """The first report; later ones and the withdrawal are luck of the event, too."""
+        luck = self.demand.luck[incident.stream]
+        incident.noticed = self.clock.now
+        self._report(incident, "caller")
+        repeat = luck.repeat_after(incident.index)
+        if repeat is not None:
+            self.clock.call_after(repeat, self._report_again, incident)
+        if self.scenario.demand[incident.stream].patience is not None:
+            patience = luck.patience[incident.index]
+            self.clock.call_after(patience, self._take_back, incident)
+
+    def _report(self, incident: Incident, kind: str) -> None:
+        stream = self.scenario.demand[incident.stream]
+        caller = incident.index % CALLERS if stream.patience or stream.repeats else 0
+        source = id_of(kind, incident.stream * CALLERS + caller)
+        incident.sources.append(source)
+        self.mail.say(source, incident.report("detected"), incident)
+        self.mail.carry()
+
+    def _report_again(self, incident: Incident) -> None:
+        """Who comes when it is over sees nothing to report."""
+        if incident.event is not None and incident.event.open:
+            self._report(incident, "second")
+
+    def _take_back(self, incident: Incident) -> None:
+        if incident.event is not None and incident.event.open:
+            for source in incident.sources:
+                self.mail.say(source, incident.report("refuted"))
+            self.mail.carry()
+
+    # --- what the DVA has done -----------------------------------------------------------
+
+    def _changed(self, about: object) -> None:
+        """Follow the events of the DVA."""
+        now = self.clock.now
+        for event in self.desk.book.changes():
+            known = self.reports.get(event.number, 0)
+            if event.reports > known:
+                self.reports[event.number] = event.reports
+                if isinstance(about, Incident):
+                    self._reported(about, event, now)
+            self._follow(event, now)
+        if isinstance(about, Incident) and about.event is None:
+            self._settle(about, "refused", now)
+
+    def _reported(self, incident: Incident, event: Event, now: float) -> None:
+        """Now it is known as what the DVA knows an incident."""
+        if incident.event is not None:
+            return  # reported again
+        incident.event = event
+        self.unnoticed.pop(incident.number)
+        incidents = self.events.get(event.number)
+        if incidents is None:
+            self.events[event.number] = [incident]
+            self.waiting[incident.stream].change(1, now)
+        else:
+            incident.shared = True
+            incidents.append(incident)
+
+    def _follow(self, event: Event, now: float) -> None:
+        incidents = self.events.get(event.number)
+        if incidents is None:
+            return
+        stream = incidents[0].stream
+        waits = event.waits_for is not None
+        if not event.open:
+            at_last = self.served if event.number in self._served else self.waiting
+            at_last[stream].change(-1, now)
+            self._served.discard(event.number)
+            self._end(event, now)
+        elif waits == (event.number in self._served):
+            self.waiting[stream].change(1 if waits else -1, now)
+            self.served[stream].change(-1 if waits else 1, now)
+            (self._served.discard if waits else self._served.add)(event.number)
+
+    def _end(self, event: Event, now: float) -> None:
+        given_up = event.state in (State.ESCALATED, State.EXPIRED)
+        del self.reports[event.number]
+        for incident in self.events.pop(event.number):
+            if given_up:
+                incident.over = min(incident.over, now)
+            self._settle(incident, event.state.value, now)
+
+    def _settle(self, incident: Incident, outcome: str, now: float) -> None:
+        """An incident is closed: count it, and let its source make the next."""
+        if outcome == "refused":
+            self.unnoticed.pop(incident.number)
+        self.settled[outcome] += 1
+        if incident.event is not None and not in_order(incident):
+            self.violations["times are out of order"] += 1
+        self.ledger.write(incident, CODES[outcome], self.numbers)
+        self.terrain.forget(incident.place)
+        self.demand.closed(incident, now)
+
+    def _travel(
+        self, starts: Sequence[Start], goals: Sequence[m.Position]
+    ) -> tuple[Floats, Floats]:
+        return knowledge.travel(self, starts, goals)
+
+    def _tell_who_moves(self) -> None:
+        """Before each decision the DVA hears where those are who move and may be called."""
+        for unit in self._moving:
+            self._publish(unit, unit.here(), "walking")
+
+    # --- what units may ask, and tell: see `units.World` -----------------------------------
+
+    @property
+    def now(self) -> float:
+        """Time [s]."""
+        return self.clock.now
+
+    def after(self, delay: float, action: Any, *args: Any) -> None:
+        """Do something later [s]; what it says is heard when it is done."""
+        self.clock.call_after(delay, self._do, action, args)
+
+    def _do(self, action: Any, args: tuple[Any, ...]) -> None:
+        action(*args)
+        self.mail.carry()
+
+    def say(self, source: str, body: m.Body) -> None:
+        """Say something to the DVA."""
+        self.mail.say(source, body)
+
+    def stands(self, unit: Unit, activity: str) -> None:
+        """Publish where a unit is."""
+        self._publish(unit, unit.here(), activity)
+
+    def _publish(self, unit: Unit, place: Place, activity: str) -> None:
+        if unit.group.from_s > self.clock.now:
+            return
+        if place.fixed is None:
+            self.terrain.remember(place)  # the DVA asks about it at once
+        if unit.kind == "guard":
+            self.mail.publish(unit.device, m.PersonStatus(activity, place.position))
+        else:
+            mode = "Idle" if unit.job is None else "Teleoperation"
+            body = m.RobotStatus(mode, place.position, 0.0, 0.0, 0.0, round(self.now * 1000.0))
+            self.mail.publish(unit.device, body)
+
+    def incident_at(self, event: int) -> Incident:
+        """What an event of the DVA really is: the first of what was reported as it."""
+        return self.events[event][0]
+
+    def length(self, a: Place, b: Place) -> float:
+        """Length of the way [m]; infinite if there is none."""
+        return self.terrain.length(a, b)
+
+    def place_at(self, position: m.Position) -> Place:
+        """The place a message speaks of."""
+        return self.terrain.known_at(position)
+
+    def along(self, a: Place, b: Place, gone: float) -> Place:
+        """Where somebody is who has gone so far [m]."""
+        return self.terrain.along(a, b, gone)
+
+    def mobilisation(self, unit: Unit, incident: Incident) -> float:
+        """What it takes this unit this time to get ready [s]."""
+        return self._drawn("mobilisation", unit.group.mobilisation, incident, unit.number)
+
+    def trip(self, unit: Unit, start: Place, goal: Place) -> float:
+        """Time to get somewhere [s]; infinite if there is no way."""
+        way = self.scenario.way
+        if isinstance(way, str):
+            return self.terrain.length(start, goal) / unit.speed
+        if goal.about is None:
+            return 0.0  # back
+        return self._drawn("travel", way, goal.about, unit.number)
+
+    def look(self, unit: Unit, incident: Incident) -> float:
+        """From arrival to being sure [s]: luck of the event, whoever looks."""
+        law = self.scenario.demand[incident.stream].look
+        return self._drawn("look", law or unit.group.look, incident)
+
+    def act(self, unit: Unit, incident: Incident) -> float:
+        """What it takes to contain it [s]: luck of the event, whoever does it."""
+        law = self.scenario.demand[incident.stream].act
+        return self._drawn("act", law or unit.group.act, incident)
+
+    def _drawn(self, purpose: str, law: Law, incident: Incident, unit: int = -1) -> float:
+        key = purpose, incident.stream, unit
+        draws = self._luck.get(key)
+        if draws is None:
+            stream = self.scenario.stream_names[incident.stream]
+            name = f"demand/{stream}/{purpose}"
+            if unit >= 0:
+                name += f"/{self.units[unit].name}"
+            draws = self._luck[key] = times(self.streams, name, law)
+        return draws[incident.index]
+
+    def needs_people(self, incident: Incident) -> bool:
+        """Whether a person will be called to contain it."""
+        return self.scenario.dispatch.containment and incident.true and self._is_open(incident)
+
+    def _is_open(self, incident: Incident) -> bool:
+        return incident.event is not None and incident.event.open
+
+    def spent(self, unit: Unit, phase: str, since: float) -> None:
+        """A unit has been at something until now; what lies in the measured time counts."""
+        seconds = self._measured(since)
+        if seconds > 0.0:
+            self.records[unit.number].spent[phase] += seconds
+
+    def freed(self, unit: Unit, job: Job) -> None:
+        """A job is over: so is the work of the operator who drove."""
+        if job.voice in self.driven:
+            self.driven[job.voice] += self._measured(job.begun)
+
+    def _measured(self, since: float) -> float:
+        return max(0.0, min(self.clock.now, self.slices.end) - max(since, self.slices.start))
+
+    def exposed(self, unit: Unit, stage: str, seconds: float) -> None:
+        """A guard has been within a danger radius for so long."""
+        if seconds > 0.0 and self.slices.of(self.clock.now) is not None:
+            self.records[unit.number].exposure[stage] += seconds
+
+    def moving(self, unit: Unit, moves: bool) -> None:
+        """A unit begins or ceases to move; the DVA is told of those it might call."""
+        if moves and (unit.job is None or self.desk.dispatcher.policy.preempts):
+            self._moving[unit] = None
+        else:
+            self._moving.pop(unit, None)
+
+
+def in_order(incident: Incident) -> bool:
+    """Whether the times of an incident's event follow each other (S7)."""
+    event = incident.event
+    assert event is not None
+    last = event.times["detected"] if incident.shared else incident.occurred
+    for step in STEPS_IN_ORDER:
+        time = event.times.get(step)
+        if time is not None:
+            if time < last:
+                return False
+            last = time
+    return True
