@@ -11,7 +11,6 @@ from typing import Any, Final
 
 from PIL import Image
 
-from dva_sim import scenario as scenarios
 from dva_sim.agents.guard import GuardProfile
 from dva_sim.agents.operator.person import Population
 from dva_sim.agents.robot import RobotProfile
@@ -21,9 +20,10 @@ from dva_sim.config import Config, Document, Path_, validate
 from dva_sim.errors import ConfigError
 from dva_sim.experiments import design
 from dva_sim.experiments.design import Cell
+from dva_sim.experiments.models import model_for, model_of
 from dva_sim.experiments.study import Study, load_study
 from dva_sim.scenario import Scenario
-from dva_sim.simulation import rehearse
+from dva_sim.timed.scenario import TimedScenario
 from dva_sim.worlds.geo import GeoFrame
 from dva_sim.worlds.maps import RosMap
 from dva_sim.worlds.plan import read_plan
@@ -76,8 +76,10 @@ def check_plan(path: Path) -> list[Problem]:
 def recognise(document: Document) -> Kind | None:
     """The kind that knows most of the keys; among equals, the one whose folder it lies in."""
     keys = document.data.keys() - {"description"}
-    shared = {kind.name: len(keys & kind.model.model_fields.keys()) for kind in KINDS}
-    likely = [kind for kind in KINDS if shared[kind.name] == max(shared.values())]
+    timed = document.data.get("model") == "timed"
+    kinds = [kind for kind in KINDS if timed or kind.model is not TimedScenario]
+    shared = {kind.name: len(keys & kind.model.model_fields.keys()) for kind in kinds}
+    likely = [kind for kind in kinds if shared[kind.name] == max(shared.values())]
     if len(likely) == 1:
         return likely[0]
     folder = document.file.resolve().parent.as_posix()
@@ -140,7 +142,7 @@ def _check_study(document: Document) -> Iterator[ConfigError]:
     study = load_study(document.file)
     for cell in design.cells(study):
         try:
-            rehearse(cell.scenario, study.seed)
+            model_for(cell.scenario).rehearse(cell.scenario, study.seed)
         except ConfigError as error:
             yield _blamed_in_cell(document, cell, error)
 
@@ -156,7 +158,8 @@ def _blamed_in_cell(document: Document, cell: Cell, error: ConfigError) -> Confi
 
 
 def _check_scenario(document: Document) -> Iterator[ConfigError]:
-    rehearse(scenarios.build(document), seed=1)
+    model = model_of(document)
+    model.rehearse(model.build(document, {}), seed=1)
     return iter(())
 
 
@@ -195,6 +198,7 @@ def _frame_of(path: Path) -> GeoFrame:
 KINDS: Final = (
     Kind("study", Study, "experiments", _check_study),
     Kind("scenario", Scenario, "experiments/scenarios", _check_scenario),
+    Kind("timed scenario", TimedScenario, "experiments/scenarios", _check_scenario),
     Kind("site", SiteFile, "worlds", _check_site),
     Kind("ROS map", RosMap, "worlds", _check_map),
     Kind("robot", RobotProfile, "agents/robots", _check_model(RobotProfile)),

@@ -127,14 +127,14 @@ def _misshapen(policy: Policy, situation: Situation, advice: Sequence[Any]) -> I
         Announcement: {"task": len(situation.tasks)},
         Relocation: {"responder": len(situation.responders), "station": stations},
     }
-    allowed = {Announcement: policy.auctions, Relocation: policy.relocates}
     for piece in advice:
         if type(piece) not in wanted:
             yield "gives something that is no advice", f"a {type(piece).__name__} "
             continue
-        if not allowed.get(type(piece), True):
-            flag = "auctions" if isinstance(piece, Announcement) else "relocates"
-            yield f"gives a {type(piece).__name__} without `{flag} = True`", ""
+        if isinstance(piece, Announcement) and not policy.auctions:
+            yield "announces a task without `auctions = True`", ""
+        if isinstance(piece, Relocation) and not policy.relocates:
+            yield "relocates somebody without `relocates = True`", ""
         for name, count in wanted[type(piece)].items():
             if not _is_place(place := getattr(piece, name), count):
                 yield f"names a {name} that is not there", f"{place!r} of {count} "

@@ -38,11 +38,12 @@ def _json_schema(kind: str) -> dict[str, Any]:
     from dva_sim.agents.tilt.phone import PhoneProfile
     from dva_sim.experiments.study import Study
     from dva_sim.scenario import Scenario
+    from dva_sim.timed.scenario import TimedScenario
     from dva_sim.worlds.site import SiteFile
 
     kinds: dict[str, Any] = {
         "study": Study,
-        "scenario": Scenario,
+        "scenario": Scenario | TimedScenario,
         "site": SiteFile,
         "agent": RobotProfile | PhoneProfile | GuardProfile | Population,
     }

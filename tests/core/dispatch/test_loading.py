@@ -1,0 +1,122 @@
+"""Policies by name, by file, and from installed packages."""
+
+from importlib.metadata import EntryPoint, EntryPoints
+
+import pytest
+from small_situations import RNG, situation
+
+from dva_sim.core.dispatch import POLICIES, MinEta, Policy, known_policies, load_policy, loading
+from dva_sim.errors import ConfigError
+
+MINE = """
+from dataclasses import dataclass
+from dva_sim.core.dispatch import Assignment, Policy
+
+class Mine(Policy):
+    def __init__(self, pace: float = 1.0) -> None:
+        self.pace = 2 / pace
+    def advise(self, situation, rng):
+        return [Assignment(0, 1)]
+
+class Nothing(Policy): pass
+class Other: pass
+"""
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine.py").write_text(MINE)
+    return tmp_path
+
+
+@pytest.mark.parametrize("name", sorted(POLICIES.keys() - {"oracle"}))
+def test_every_name_makes_a_policy(name):
+    assert isinstance(load_policy(name, {}), Policy)
+    assert name in known_policies()
+
+
+def test_a_class_in_a_file_is_found_beside_who_names_it_and_in_the_working_folder(folder):
+    assert load_policy("mine.py:Mine", {"pace": 4}).pace == 0.5
+    (folder / "sub").mkdir()
+    (folder / "sub" / "mine.py").write_text(MINE.replace("2 / pace", "9"))
+    assert load_policy("mine.py:Mine", base=folder / "sub").pace == 9
+    advice = load_policy("mine.py:Mine").advise(situation("gg", [[1, 2]]), RNG)
+    assert advice[0].responder == 1
+
+
+def test_two_files_of_one_name_do_not_meet_and_a_changed_one_is_read_again(folder):
+    other = folder / "other"
+    other.mkdir()
+    (other / "mine.py").write_text(MINE)
+    first, second = load_policy("mine.py:Mine"), load_policy("other/mine.py:Mine")
+    assert type(first) is not type(second)
+    assert type(first).__module__ != type(second).__module__
+    (folder / "mine.py").write_text(MINE.replace("2 / pace", "3 / pace"))
+    assert load_policy("mine.py:Mine").pace == 3.0
+
+
+def test_the_shipped_example_is_found_from_anywhere(folder):
+    assert load_policy("patrol.py:Patrol", {"step": 2}).step == 2
+    assert load_policy("agents/policies/patrol.py:Patrol").relocates
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "said"),
+    [
+        ("min_ate", {}, "policy 'min_ate' is unknown; known: auction, batch_optimal, "),
+        ("oracle", {}, "policy 'oracle': it needs a plan made with knowledge of the future"),
+        ("min_eta", {"pace": 1}, "policy 'min_eta' has no option 'pace'; it has none"),
+        ("preemptive", {"gain": 1}, "'gain'; known: margin, gain_s, ageing_per_s"),
+        ("preemptive", {"margin": 0}, "option 'margin' is 0; should be a number above 0"),
+        ("preemptive", {"margin": True}, "option 'margin' is True; should be a number above 0"),
+        ("priority_eta", {"ageing_per_s": "x"}, "'ageing_per_s' is 'x'; should be a number of at"),
+        ("coverage", {"gain_s": float("nan")}, "'gain_s' is nan; should be a number above 0"),
+        ("batch_optimal", {"objective": "cost"}, "'objective' is 'cost'; should be one of dist"),
+        ("hazard_team", {"dangerous": "fire"}, "is 'fire'; should be a list of some of fire, flo"),
+        ("hazard_team", {"dangerous": ["ice"]}, "'dangerous' is ['ice']; should be a list"),
+        ("hazard_team", {"dangerous": [["fire"]]}, "should be a list of some of"),
+        ("mine.py", {}, "policy 'mine.py' should name a class too, as mine.py:Mine"),
+        ("none.py:Mine", {}, "policy 'none.py:Mine': file 'none.py' not found; looked in /"),
+        ("mine.py:Yours", {}, "policy 'mine.py:Yours': there is no class 'Yours' in /"),
+        ("mine.py:Other", {}, "'mine.py:Other' is not a policy; should be a class derived from"),
+        ("mine.py:dataclass", {}, "'mine.py:dataclass' is not a policy"),
+        ("mine.py:Nothing", {}, "'mine.py:Nothing' has no advise(situation, rng)"),
+        ("mine.py:Mine", {"speed": 1}, "'mine.py:Mine' has no option 'speed'; known: pace"),
+        ("mine.py:Mine", {"pace": 0}, "cannot be made: ZeroDivisionError: division by zero"),
+    ],
+)  # fmt: skip
+def test_a_mistake_is_one_clear_line(folder, name, options, said):
+    with pytest.raises(ConfigError) as caught:
+        load_policy(name, options)
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("x = 1\nclass A(:\n", "bad.py:2: is not valid Python: invalid syntax"),
+        ("\nimport no_such_thing\n", "bad.py:2: cannot be loaded: ModuleNotFoundError: No module"),
+        ("def f():\n  1 / 0\nf()\n", "bad.py:2: cannot be loaded: ZeroDivisionError: division"),
+        ("raise SystemExit\n", "bad.py:1: cannot be loaded: SystemExit"),
+        ("x = '\0'\n", "source code string cannot contain null bytes"),
+    ],
+)
+def test_a_file_that_cannot_be_loaded_is_told_with_its_line(folder, text, said):
+    (folder / "bad.py").write_text(text)
+    with pytest.raises(ConfigError) as caught:
+        load_policy("bad.py:A")
+    assert said in str(caught.value)
+
+
+def test_an_installed_package_can_offer_policies(monkeypatch):
+    def offered(group):
+        entries = {"theirs": "dva_sim.core.dispatch:MinEta", "gone": "no_such_package:X"}
+        return EntryPoints(EntryPoint(name, value, group) for name, value in entries.items())
+
+    monkeypatch.setattr(loading, "entry_points", offered)
+    assert isinstance(load_policy("theirs"), MinEta)
+    assert {"theirs", "min_eta"} < set(known_policies())
+    with pytest.raises(ConfigError, match="no_such_package:X cannot be loaded: ModuleNotFound"):
+        load_policy("gone")
