@@ -35,6 +35,11 @@ class AccessRule:
     since: float = 0.0
     until: float = math.inf
 
+    @property
+    def includes(self) -> frozenset[str]:
+        """The levels, where `both` stands for the two that it is made of."""
+        return self.levels.union(*(_INCLUDES.get(level, ()) for level in self.levels))
+
     def is_about(self, holder: Device, robot: Device, now: float) -> bool:
         """Whether it says something about these two now."""
         right = not self.holders or holder.label in self.holders
@@ -60,7 +65,7 @@ class Access:
             return False
         wanted = _INCLUDES.get(level, {level})
         rules = (r for r in self.rules if r.is_about(holder, robot, now))
-        return any(wanted <= r.levels or level in r.levels for r in rules)
+        return any(wanted <= r.includes for r in rules)
 
     def sensors(
         self, holder: Device, robot: Device, wanted: Sequence[str], now: float

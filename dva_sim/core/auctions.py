@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.core.events import Event
+from dva_sim.core.events import Event, EventBook, State
 
 
 @dataclass
@@ -19,7 +19,7 @@ class Auction:
 
     Attributes:
         until: When bids are no longer taken [s].
-        asked: Who has not answered yet.
+        asked: Who may still answer; nobody once the time is up.
         arrival: When each bidder would be there [s].
     """
 
@@ -59,26 +59,32 @@ class Auctions:
         if auction is not None:
             auction.asked.discard(device)
 
-    def stage(self, event: int, now: float) -> Literal["open", "over"] | None:
-        """Whether a task is on auction; an auction that is over without a bid is forgotten."""
+    def close(self, book: EventBook, now: float) -> None:
+        """Forget what needs nobody to look any more, take no more bids where the time is up."""
+        for number, auction in list(self.running.items()):
+            event = book.open.get(number)
+            if event is None or event.state is not State.PENDING:
+                del self.running[number]
+            elif now >= auction.until:
+                auction.asked.clear()
+
+    def forget_useless(self, idle: Collection[str]) -> None:
+        """Forget auctions that are over without a bid from anybody who is still idle."""
+        for number, auction in list(self.running.items()):
+            if not auction.asked and auction.arrival.keys().isdisjoint(idle):
+                del self.running[number]
+
+    def stage(self, event: int) -> Literal["open", "over"] | None:
+        """Whether a task is on auction."""
         auction = self.running.get(event)
         if auction is None:
             return None
-        if auction.asked and now < auction.until:
-            return "open"
-        if not auction.arrival:
-            del self.running[event]
-            return None
-        return "over"
+        return "open" if auction.asked else "over"
 
     def award(self, event: int, device: str) -> bool:
         """End an auction; whether the device had bid in it."""
         auction = self.running.pop(event, None)
         return auction is not None and device in auction.arrival
-
-    def forget(self, event: int) -> None:
-        """The event needs nobody any more."""
-        self.running.pop(event, None)
 
     def bids(
         self, events: Sequence[Event], devices: Sequence[str], now: float
@@ -94,4 +100,4 @@ class Auctions:
 
     def next_deadline(self) -> float:
         """When the time of an auction is up [s]."""
-        return min((a.until for a in self.running.values()), default=math.inf)
+        return min((a.until for a in self.running.values() if a.asked), default=math.inf)

@@ -34,6 +34,7 @@ from dva_sim.protocol import messages as m
 CONSIDERED = 1000  # tasks that one decision looks at, those detected longest ago
 SAME_PLACE = 3e-5  # a few metres [deg]
 DECISIONS = 4  # in a row, where one makes the next necessary
+LATE, SETTLED = 2.0, 60.0  # who has not come to wait within twice its time and so long [s] does not
 KINDS: dict[str, Literal["guard", "robot"]] = {GUARD: "guard", ROBOT: "robot"}
 
 
@@ -44,6 +45,11 @@ class _Team:
     entries: list[Entry]
     engaged: list[Event | None]
     operators: list[Entry]
+
+    def idle(self) -> set[str]:
+        """Ids of those who do nothing."""
+        pairs = zip(self.entries, self.engaged, strict=True)
+        return {entry.device.id_tag for entry, event in pairs if event is None}
 
     def starts(self) -> list[Start]:
         """From where they would set out."""
@@ -74,7 +80,7 @@ class Dispatcher:
     ground: Ground = field(default_factory=Ground)
     auctions: Auctions = field(init=False)
     last_failure: str = ""
-    _bound_for: dict[str, int] = field(default_factory=dict)
+    _bound_for: dict[str, tuple[int, float]] = field(default_factory=dict)  # station, until
 
     def __post_init__(self) -> None:
         self.auctions = Auctions(self.orders.rules.bid_within)
@@ -85,6 +91,7 @@ class Dispatcher:
     def decide(self, now: float) -> list[Send]:
         """Give the orders that are due now; what finds nobody in time is given up."""
         sends: list[Send] = []
+        self.auctions.close(self.orders.book, now)
         for _ in range(DECISIONS):
             before = self.orders.counters["preempted"]
             sends += self._decide(now)
@@ -101,6 +108,7 @@ class Dispatcher:
         team = self._team(now)
         if not team.entries:
             return []
+        self.auctions.forget_useless(team.idle())
         situation = self._situation(events, team, now)
         return self._carry_out(self._advice(situation), situation, events, team, now)
 
@@ -133,7 +141,7 @@ class Dispatcher:
             elif piece.responder in taken:
                 pass
             elif isinstance(piece, Relocation):
-                done = self._relocate(piece, situation, team)
+                done = self._relocate(piece, situation, team, now)
             elif piece.task not in given:
                 done = self._assign(piece, situation, events, team, now)
                 given.update({piece.task} if done is not None else ())
@@ -145,9 +153,9 @@ class Dispatcher:
                     taken.add(piece.responder)
         return sends
 
-    def not_moved(self, send: Send) -> None:
-        """A guard did not take a relocation."""
-        self._bound_for.pop(send.to, None)
+    def not_moved(self, guard: str) -> None:
+        """A guard did not take a relocation, or has forgotten it."""
+        self._bound_for.pop(guard, None)
 
     # --- what the rules allow ----------------------------------------------------------
 
@@ -174,27 +182,23 @@ class Dispatcher:
         pilot = None
         if is_robot:
             pilot = former.operator if former else team.operators.pop(0).device.id_tag
-        if former is not None:
-            self.orders.redirect(former, now)
+        sends = self.orders.redirect(former, now) if former else []
         self._bound_for.pop(entry.device.id_tag, None)
         if task.stage == "contain":
-            return [self.orders.act(event, entry.device.id_tag, now)]
+            return [*sends, self.orders.act(event, entry.device.id_tag, now)]
         award = self.auctions.award(event.number, entry.device.id_tag)
-        return [self.orders.confirm(event, entry.device.id_tag, pilot, now, award)]
+        return [*sends, self.orders.confirm(event, entry.device.id_tag, pilot, now, award)]
 
     def _announce(
         self, situation: Situation, event: Event, team: _Team, task: int, now: float
     ) -> list[Send] | None:
         """Ask every idle responder that could go there for a bid."""
-        shown = situation.tasks[task]
-        if not self.policy.auctions or shown.auction or shown.stage != "confirm" or not shown.due:
+        on_offer = event.number in self.auctions.running
+        if not self.policy.auctions or on_offer or event.state is not State.PENDING:
             return None
-        able = np.isfinite(situation.eta[task])
-        asked = [
-            entry.device.id_tag
-            for entry, engaged, can in zip(team.entries, team.engaged, able, strict=True)
-            if can and engaged is None
-        ]
+        idle = team.idle() - self.orders.engaged.keys()
+        able = zip(situation.responders, np.isfinite(situation.eta[task]), strict=True)
+        asked = [who.device for who, can in able if can and who.device in idle]
         if not asked:
             return None
         self.orders.counters["auctions"] += 1
@@ -202,17 +206,19 @@ class Dispatcher:
         body = m.TaskAnnouncement(event.number, event.kind, event.position, event.severity, within)
         return [Send(device, body) for device in asked]
 
-    def _relocate(self, move: Relocation, situation: Situation, team: _Team) -> list[Send] | None:
-        entry, cover = team.entries[move.responder], situation.cover
+    def _relocate(
+        self, move: Relocation, situation: Situation, team: _Team, now: float
+    ) -> list[Send] | None:
+        """Let an idle guard wait elsewhere, unless it is on its way there already."""
+        guard, cover = team.entries[move.responder].device.id_tag, situation.cover
         if not self.policy.relocates or cover is None or team.engaged[move.responder] is not None:
             return None
-        if not math.isfinite(cover.eta[move.responder, move.station]):
+        eta = float(cover.eta[move.responder, move.station])
+        if not math.isfinite(eta) or cover.bound_for[move.responder] == move.station:
             return None
-        self._bound_for[entry.device.id_tag] = move.station
+        self._bound_for[guard] = move.station, now + LATE * eta + SETTLED
         self.orders.counters["relocated"] += 1
-        return [
-            Send(entry.device.id_tag, m.Relocation(self.ground.stations[move.station].position))
-        ]
+        return [Send(guard, m.Relocation(self.ground.stations[move.station].position))]
 
     # --- what is known -----------------------------------------------------------------
 
@@ -229,8 +235,15 @@ class Dispatcher:
     def _is_task(self, event: Event) -> bool:
         if event.waits_for is not None:
             return True
-        stand_by = event.needs_containment and event.actor is None
-        return stand_by or (self.policy.preempts and event.state is State.ASSIGNED)
+        if event.needs_containment and event.actor is None:
+            return True
+        return self.policy.preempts and self._is_under_way(event)
+
+    def _is_under_way(self, event: Event) -> bool:
+        """Whether its responder has heard of it and is not there yet."""
+        if event.state is not State.ASSIGNED or not event.taken_up or event.responder is None:
+            return False
+        return self.orders.registry.entries[event.responder].position is not None
 
     def _team(self, now: float) -> _Team:
         operators = self._free(OPERATOR, now)
@@ -238,11 +251,9 @@ class Dispatcher:
         entries = [e for e in able if operators or e.device.device_type == GUARD]
         engaged: list[Event | None] = [None] * len(entries)
         if self.policy.preempts:
-            for event in self.orders.book.in_state(State.ASSIGNED):
-                entry = self.orders.registry.entries[event.responder or ""]
-                if entry.position and event.taken_up:
-                    entries.append(entry)
-                    engaged.append(event)
+            for event in filter(self._is_under_way, self.orders.book.open.values()):
+                entries.append(self.orders.registry.entries[event.responder or ""])
+                engaged.append(event)
         return _Team(entries, engaged, operators)
 
     def _free(self, device_type: str, now: float) -> list[Entry]:
@@ -257,7 +268,7 @@ class Dispatcher:
     def _situation(self, events: list[Event], team: _Team, now: float) -> Situation:
         rows = {id(e): row for row, e in enumerate(events)}
         columns = {id(e): c for c, e in enumerate(team.engaged) if e is not None}
-        tasks = tuple(self._task(e, columns.get(id(e)), now) for e in events)
+        tasks = tuple(self._task(e, columns.get(id(e))) for e in events)
         responders = tuple(
             Responder(e.device.id_tag, KINDS[e.device.device_type], rows.get(id(a)) if a else None)
             for e, a in zip(team.entries, team.engaged, strict=True)
@@ -271,18 +282,17 @@ class Dispatcher:
             now,
             tasks,
             responders,
-            distance,
-            eta,
-            np.array(ranks, dtype=np.float64) if ranks else np.empty((0, 0)),
-            bids,
+            _sealed(distance),
+            _sealed(eta),
+            _sealed(np.array(ranks, dtype=np.float64) if ranks else np.empty((0, 0))),
+            _sealed(bids),
             len(team.operators),
-            self._cover(team) if self.policy.relocates else None,
+            self._cover(team, now) if self.policy.relocates else None,
         )
 
-    def _task(self, event: Event, engaged: int | None, now: float) -> Task:
-        looked_at = event.state in (State.ASSIGNED, State.ON_SCENE)
+    def _task(self, event: Event, engaged: int | None) -> Task:
         # While somebody is under way to look, what is left to give is standing by.
-        confirm = event.state is State.PENDING or (looked_at and engaged is not None)
+        confirm = event.state is State.PENDING or engaged is not None
         return Task(
             event.number,
             event.kind,
@@ -293,14 +303,15 @@ class Dispatcher:
             event.times["detected"],
             event.waiting_since,
             engaged,
-            self.auctions.stage(event.number, now),
+            self.auctions.stage(event.number),
         )
 
     def _ways(
         self, events: list[Event], tasks: Sequence[Task], team: _Team
     ) -> tuple[Floats, Floats]:
         starts = team.starts()
-        distance, eta = self.travel(starts, [e.position for e in events])
+        goals = [e.position for e in events]
+        distance, eta = (ways.copy() for ways in self.travel(starts, goals))
         robots = np.array([s.kind == "robot" for s in starts])
         for row, (event, task) in enumerate(zip(events, tasks, strict=True)):
             if task.stage == "contain":
@@ -309,8 +320,8 @@ class Dispatcher:
                 _leave_out_who_failed(event, starts, distance[row], eta[row])
         return distance, eta
 
-    def _cover(self, team: _Team) -> Cover | None:
-        """Where idle guards could wait; who is already sent to wait somewhere is left alone."""
+    def _cover(self, team: _Team, now: float) -> Cover | None:
+        """Where idle guards could wait, and where they are on their way to already."""
         ground = self.ground
         if not ground.stations:
             return None
@@ -318,15 +329,19 @@ class Dispatcher:
         eta = self.travel(starts, [s.position for s in ground.stations])[1].T.copy()
         bound_for: list[int | None] = []
         for row, (start, engaged) in enumerate(zip(starts, team.engaged, strict=True)):
-            bound = self._bound_for.get(start.device)
-            if bound is not None and _same_place(ground.stations[bound].position, start.position):
+            bound, until = self._bound_for.get(start.device, (None, math.inf))
+            there = bound is not None and _same_place(
+                ground.stations[bound].position, start.position
+            )
+            if there or now > until:
                 del self._bound_for[start.device]
                 bound = None
             if start.kind != "guard" or engaged is not None:
                 eta[row] = np.inf
             bound_for.append(bound)
         names = tuple(s.name for s in ground.stations)
-        return Cover(names, eta, ground.reach, ground.demand, tuple(bound_for))
+        reach, demand = _sealed(ground.reach), _sealed(ground.demand)
+        return Cover(names, _sealed(eta), reach, demand, tuple(bound_for))
 
 
 def _check_form(advice: Iterable[Advice], situation: Situation) -> None:
@@ -347,6 +362,13 @@ def _check_form(advice: Iterable[Advice], situation: Situation) -> None:
 def _check_place(what: str, place: object, count: int) -> None:
     if isinstance(place, bool) or not 0 <= operator.index(place) < count:  # type: ignore[arg-type]
         raise IndexError(f"there is no {what} {place!r}; there are {count}")
+
+
+def _sealed(array: Floats) -> Floats:
+    """The same array, which a policy cannot change."""
+    view = array.view()
+    view.flags.writeable = False
+    return view
 
 
 def _same_place(a: m.Position, b: m.Position) -> bool:

@@ -59,7 +59,8 @@ class Event:
         responder: Device that goes there to confirm it: a guard or a robot.
         operator: Device that drives the robot, if a robot goes.
         actor: Guard that deals with it once it is confirmed, or stands by to.
-        taken_up: Whether its present order was answered with OK.
+        taken_up: Whether its present order to look was answered with OK.
+        act_taken_up: The same of the order to deal with it, or to stand by.
         attempts: Orders taken up for it.
         preemptions: How often its responder was sent elsewhere.
         waiting_since: Since when it has waited for somebody [s]; an order that nobody took
@@ -81,6 +82,7 @@ class Event:
     operator: str | None = None
     actor: str | None = None
     taken_up: bool = False
+    act_taken_up: bool = False
     attempts: int = 0
     preemptions: int = 0
     waiting_since: float = 0.0

@@ -27,15 +27,20 @@ if TYPE_CHECKING:
     from dva_sim.core.service import Desk
 
 FORMAT = 1
-_TABLES = """
+OPEN_WITHIN = 1.0  # that long somebody else may have the file to itself when it is opened [s]
+WRITE_WITHIN_MS = 50  # and when something is written; the DVA stands still meanwhile
+_TABLES = f"""
+BEGIN IMMEDIATE;
 CREATE TABLE IF NOT EXISTS about (name TEXT PRIMARY KEY, value INTEGER NOT NULL);
 CREATE TABLE IF NOT EXISTS events (number INTEGER PRIMARY KEY, open INTEGER, data TEXT NOT NULL);
 CREATE TABLE IF NOT EXISTS devices (id TEXT PRIMARY KEY, data TEXT NOT NULL);
 CREATE TABLE IF NOT EXISTS grants (session TEXT PRIMARY KEY, data TEXT NOT NULL);
+INSERT OR IGNORE INTO about VALUES ('format', {FORMAT});
+COMMIT;
 """
 _PLAIN: tuple[str, ...] = (
     *("number", "kind", "severity", "needs_containment", "reports", "sources"),
-    *("responder", "operator", "actor", "taken_up", "attempts", "preemptions"),
+    *("responder", "operator", "actor", "taken_up", "act_taken_up", "attempts", "preemptions"),
 )
 
 
@@ -53,18 +58,43 @@ class Memory:
     def __init__(self, file: Path | str, epoch: float = 0.0) -> None:
         self.epoch = epoch
         self._granted: dict[str, str] = {}
+        self._grant_changes = 0
         self._events: dict[int, Event] = {}
         self._devices: dict[str, Entry] = {}
+        self._path = file
         try:
-            self._file = sqlite3.connect(file, isolation_level=None, timeout=1.0)
+            self._file = sqlite3.connect(file, isolation_level=None, timeout=OPEN_WITHIN)
+        except sqlite3.Error as error:
+            raise self._useless(error) from None
+        try:
+            self._open()
+        except BaseException:
+            self._file.close()
+            raise
+
+    def _open(self) -> None:
+        """See that it is a memory; a file that is something else stays as it is."""
+        try:
+            (tables,) = self._file.execute("SELECT count(*) FROM sqlite_master").fetchone()
+            is_ours = not tables or self._about("format") == FORMAT
+        except (sqlite3.OperationalError, ValueError) as error:
+            if "no such" not in str(error):
+                raise self._useless(error) from None
+            is_ours = False
+        except sqlite3.Error as error:
+            raise self._useless(error) from None
+        if not is_ours:
+            raise ConfigError(f"is not a DVA's memory of format {FORMAT}", self._path)
+        try:
             self._file.execute("PRAGMA journal_mode=WAL")
             self._file.execute("PRAGMA synchronous=NORMAL")
             self._file.executescript(_TABLES)
-            self._file.execute("INSERT OR IGNORE INTO about VALUES ('format', ?)", (FORMAT,))
+            self._file.execute(f"PRAGMA busy_timeout={WRITE_WITHIN_MS}")
         except sqlite3.Error as error:
-            raise ConfigError(f"cannot be used as the DVA's memory: {error}", file) from None
-        if self._about("format") != FORMAT:
-            raise ConfigError(f"is not a DVA's memory of format {FORMAT}", file)
+            raise self._useless(error) from None
+
+    def _useless(self, error: Exception) -> ConfigError:
+        return ConfigError(f"cannot be used as the DVA's memory: {error}", self._path)
 
     def close(self) -> None:
         """Put the file away."""
@@ -79,9 +109,13 @@ class Memory:
         """
         self._events |= {event.number: event for event in changed}
         self._devices |= {entry.device.id_tag: entry for entry in desk.registry.changes()}
-        grants = {str(g.session): json.dumps(_plain(g)) for g in desk.sessions.permissions.all()}
-        if not (self._events or self._devices or grants != self._granted):
+        permissions = desk.sessions.permissions
+        changes = permissions.changes
+        if not (self._events or self._devices or changes != self._grant_changes):
             return None
+        grants = self._granted
+        if changes != self._grant_changes:
+            grants = {str(g.session): json.dumps(_plain(g)) for g in permissions.all()}
         try:
             self._file.execute("BEGIN IMMEDIATE")
             self._write(desk, grants)
@@ -91,6 +125,7 @@ class Memory:
                 self._file.execute("ROLLBACK")
             return f"cannot keep its memory: {error}"
         self._events, self._devices, self._granted = {}, {}, grants
+        self._grant_changes = changes
         return None
 
     def _write(self, desk: Desk, grants: dict[str, str]) -> None:
@@ -102,10 +137,11 @@ class Memory:
         put("INSERT OR REPLACE INTO events VALUES (?, ?, ?)", events)
         devices = ((i, json.dumps(_of_entry(e))) for i, e in self._devices.items())
         put("INSERT OR REPLACE INTO devices VALUES (?, ?)", devices)
-        gone = ((s,) for s in self._granted.keys() - grants.keys())
-        put("DELETE FROM grants WHERE session = ?", gone)
-        new = (item for item in grants.items() if self._granted.get(item[0]) != item[1])
-        put("INSERT OR REPLACE INTO grants VALUES (?, ?)", new)
+        if grants is not self._granted:
+            gone = ((s,) for s in self._granted.keys() - grants.keys())
+            put("DELETE FROM grants WHERE session = ?", gone)
+            new = (item for item in grants.items() if self._granted.get(item[0]) != item[1])
+            put("INSERT OR REPLACE INTO grants VALUES (?, ?)", new)
         count = desk.sessions.permissions.count
         put("INSERT OR REPLACE INTO about VALUES (?, ?)", [("sessions", count)])
 
@@ -115,7 +151,18 @@ class Memory:
         """Tell a new desk what an earlier one knew; whether there was anything.
 
         Devices count as heard just now: each has its time-out to show that it is there.
+
+        Raises:
+            ConfigError: what the file holds makes no sense.
         """
+        try:
+            found = self._recall(desk, now)
+        except (sqlite3.Error, ValueError, KeyError, TypeError) as error:
+            raise self._useless(error) from None
+        desk.check_access(now)
+        return found
+
+    def _recall(self, desk: Desk, now: float) -> bool:
         for (data,) in self._file.execute("SELECT data FROM devices ORDER BY rowid"):
             desk.registry.add(_entry(json.loads(data), now))
         found = bool(desk.registry.entries)
@@ -144,6 +191,7 @@ class Memory:
         for session, data in self._file.execute("SELECT session, data FROM grants"):
             self._granted[session] = data
             permissions.restore(_grant(json.loads(data)))
+        self._grant_changes = permissions.changes
         permissions.count = max(permissions.count, self._about("sessions"))
 
     def _about(self, name: str) -> int:

@@ -57,7 +57,9 @@ class Orders:
 
     def act(self, event: Event, guard: str, now: float) -> Send:
         """Send a person to deal with an event, or to stand by until it is confirmed."""
-        event.actor = guard
+        event.actor, event.act_taken_up = guard, False
+        for step in ("act_departed", "act_arrived"):
+            event.times.pop(step, None)
         event.times["act_assigned"] = now
         event.sent.add(guard)
         self.engaged[guard] = event
@@ -69,14 +71,14 @@ class Orders:
         task = "contain" if event.state is State.CONFIRMED else "stand_by"
         return Send(event.actor, m.Order(event.number, event.kind, event.position, None, task))
 
-    def redirect(self, event: Event, now: float) -> None:
+    def redirect(self, event: Event, now: float) -> list[Send]:
         """Take back an order because its responder has to go elsewhere; that is no attempt."""
         self._free(event, event.responder, event.operator)
         event.preemptions += 1
+        event.attempts -= event.taken_up
         self.counters["preempted"] += 1
-        since = event.waiting_since
         self.book.move(event, State.PENDING, now)
-        event.waiting_since = since
+        return self._stand_down(event)
 
     def again(self) -> list[Send]:
         """Every order that stands, to be said again by a desk that was started anew."""
@@ -92,15 +94,26 @@ class Orders:
 
     def taken_up(self, send: Send) -> list[Send]:
         """Somebody has answered an order or an award with OK."""
-        body = send.body
-        event = self.book.open.get(body.event_id) if isinstance(body, _ORDERS) else None
+        event = self._meant(send)
         if event is None:
             return []
-        if isinstance(body, m.TaskAward) and send.to == event.responder and event.operator:
-            return [self._order_to_confirm(event)]
-        if send.to == event.holder:
+        if isinstance(send.body, m.TaskAward) and send.to == event.responder and event.operator:
+            if _somebody_looks(event):
+                return [self._order_to_confirm(event)]
+            self._release(event)  # settled meanwhile, and its operator has not heard of it
+        elif _is_to_act(send.body):
+            event.act_taken_up |= send.to == event.actor
+            self.book.touch(event)
+        elif send.to == event.holder and _somebody_looks(event):
             self._noted_as_taken_up(event)
         return []
+
+    def _meant(self, send: Send) -> Event | None:
+        """What an order that was sent is about, if whom it went to still works on that."""
+        event = self.engaged.get(send.to)
+        body = send.body
+        right = event is not None and isinstance(body, _ORDERS) and body.event_id == event.number
+        return event if right else None
 
     def _noted_as_taken_up(self, event: Event) -> None:
         if not event.taken_up:
@@ -110,40 +123,40 @@ class Orders:
 
     def not_taken_up(self, send: Send, now: float) -> list[Send]:
         """An order was declined, or did not arrive: nobody set out, so it is no attempt."""
-        body = send.body
-        assert isinstance(body, _ORDERS)
+        event = self._meant(send)
+        to_act, looks = _is_to_act(send.body), event is not None and _somebody_looks(event)
+        if event is not None and looks and not to_act and "departed" in event.times:
+            return []  # only the answer was lost
         self._pause(send.to, now)
-        event = self.book.open.get(body.event_id)
-        if event is None:
-            return []
-        if send.to == event.actor and not isinstance(body, m.TaskAward):
-            return self._actor_gone(event)
-        stands = event.state in (State.ASSIGNED, State.ON_SCENE)
-        if not stands or send.to not in (event.holder, event.responder):
+        if event is None or to_act != (send.to == event.actor):
             return []  # the order is another's by now
-        since = event.waiting_since
+        if to_act:
+            return self._actor_gone(event, now)
         self._free(event, event.responder, event.operator)
-        self._reopen(event, now)
-        event.waiting_since = since
-        return []
+        return self._reopen(event, now) if looks else []
 
     # --- what those who have them say ---------------------------------------------------
+
+    def has_order(self, event: Event, device: str) -> bool:
+        """Whether a device may say how an order stands; a robot leaves that to its operator."""
+        return self.engaged.get(device) is event and device in (event.holder, event.actor)
 
     def departed(self, event: Event, device: str, now: float) -> None:
         """Somebody has set out."""
         if device == event.actor:
+            event.act_taken_up = True
             event.times.setdefault("act_departed", now)
         elif event.state is State.ASSIGNED:
             self._noted_as_taken_up(event)
             event.times.setdefault("departed", now)
+        self.book.touch(event)
 
     def arrived(self, event: Event, device: str, now: float) -> None:
         """Somebody is there."""
+        self.departed(event, device, now)
         if device == event.actor:
             event.times.setdefault("act_arrived", now)
         elif event.state is State.ASSIGNED:
-            self._noted_as_taken_up(event)
-            event.times.setdefault("departed", now)
             event.times["arrived"] = now
             self.book.move(event, State.ON_SCENE, now)
         name = device if device == event.actor else event.responder
@@ -152,38 +165,45 @@ class Orders:
 
     def found(self, event: Event, device: str, finding: str, now: float) -> list[Send]:
         """What somebody who was sent has found, or done."""
-        if device in (event.holder, event.actor):
-            self.arrived(event, device, now)
         if not event.open:
             return []
+        if self.has_order(event, device):
+            self.arrived(event, device, now)
         if finding == "contained" and event.state is State.CONFIRMED:
             self.book.move(event, State.CONTAINED, now)
-        elif finding == "confirmed" and event.state is not State.CONFIRMED:
+            return self._stand_down(event, but=device)
+        if finding == "confirmed" and event.state is not State.CONFIRMED:
             self.book.move(event, State.CONFIRMED, now)
             if event.open and event.actor is not None:
                 return [self._order_to_act(event)]
             return self._stand_down(event)
-        elif finding == "refuted" and State.REFUTED in NEXT[event.state]:
+        if finding == "refuted" and State.REFUTED in NEXT[event.state]:
             self.book.move(event, State.REFUTED, now)
             return self._stand_down(event, but=device)
         return []
 
-    def ends(self, event: Event, device: str, state: str, now: float) -> None:
+    def ends(self, event: Event, device: str, state: str, now: float) -> list[Send]:
         """Somebody is free again; an event it could not settle is open to others."""
+        if state == "declined":
+            self._pause(device, now)
         if device == event.actor:
-            self._free(event, device)
-            if event.open:
-                self._actor_failed(event, now)
-            return
-        if device != event.holder:
-            self._free(event, device)
-            return
+            return self._act_ends(event, device, state != "declined", now)
         self._release(event)
-        if event.state in (State.ASSIGNED, State.ON_SCENE):
-            if event.responder is not None and state != "declined":
-                self._noted_as_taken_up(event)
-                event.failed.add(event.responder)
-            self._reopen(event, now)
+        if not _somebody_looks(event):
+            return []
+        if event.responder is not None and state != "declined":
+            self._noted_as_taken_up(event)
+            event.failed.add(event.responder)
+        return self._reopen(event, now)
+
+    def _act_ends(self, event: Event, device: str, tried: bool, now: float) -> list[Send]:
+        if not event.open:
+            self._free(event, device)
+            return []
+        if tried:
+            event.act_taken_up = True
+            event.failed.add(device)
+        return self._actor_gone(event, now)
 
     # --- taken back --------------------------------------------------------------------
 
@@ -192,79 +212,75 @@ class Orders:
         event = self.engaged.get(device)
         if event is None:
             return []
-        if device == event.actor:
-            return self._actor_gone(event)
+        if device == event.actor and event.open:
+            return self._actor_gone(event, now)
+        self._free(event, device)
         if device not in (event.responder, event.operator):
-            self._free(event, device)
             return []
         self._release(event)
-        if event.state in (State.ASSIGNED, State.ON_SCENE):
-            self._reopen(event, now)
-        return []
+        return self._reopen(event, now) if _somebody_looks(event) else []
 
     def give_up(self, now: float) -> list[Send]:
         """Escalate what has waited too long, and the newest of more than may wait."""
-        rules, waiting = self.rules, self.book.waiting
-        late: list[Event] = []
-        if waiting and now >= rules.escalate_after:
-            late = [e for e in waiting.values() if self._wait_ends(e) <= now]
-        if rules.most_waiting is not None and len(waiting) - len(late) > rules.most_waiting:
-            left = [e for e in waiting.values() if e not in late]
-            late += left[rules.most_waiting :]
-        return [send for event in late for send in self.escalate(event, now)]
+        most, waiting = self.rules.most_waiting, self.book.waiting
+        late = {n: e for n, e in waiting.items() if self._wait_ends(e) <= now}
+        if most is not None and len(waiting) - len(late) > most:
+            left = sorted(waiting.keys() - late.keys())
+            late |= {number: waiting[number] for number in left[most:]}
+        return [send for event in late.values() for send in self.escalate(event, now)]
 
     def take_back(self, now: float) -> list[Send]:
         """Orders that were not carried out in time are open to others."""
+        self._pauses = [until for until in self._pauses if until > now]
         if math.isinf(self.rules.order_limit):
             return []
-        late = {e.number: e for e in self.engaged.values() if self._order_ends(e) <= now}
-        sends = [send for event in late.values() for send in self._take_back(event, now)]
-        self._pauses = [until for until in self._pauses if until > now]
+        late = [d for d, e in self.engaged.items() if self._order_ends(d, e) <= now]
+        sends: list[Send] = []
+        for device in late:
+            if device in self.engaged:  # a robot is free with its operator
+                sends += self._take_back(device, self.engaged[device], now)
         return sends
 
     def next_deadline(self) -> float:
         """When something will have waited, or taken, too long [s]."""
         rules, waiting = self.rules, self.book.waiting
-        ends = min(self._pauses, default=math.inf) if waiting else math.inf
+        ends = [min(self._pauses, default=math.inf) if waiting else math.inf]
         if math.isfinite(rules.escalate_after):
-            ends = min([ends, *(self._wait_ends(e) for e in waiting.values())])
+            ends += (self._wait_ends(e) for e in waiting.values())
         if math.isfinite(rules.order_limit):
-            ends = min([ends, *(self._order_ends(e) for e in self.engaged.values())])
-        return ends
+            ends += (self._order_ends(d, e) for d, e in self.engaged.items())
+        return min(ends)
 
     def _wait_ends(self, event: Event) -> float:
-        if event.waits_for is None:
-            return math.inf
         return event.waiting_since + self.rules.escalate_after
 
-    def _order_ends(self, event: Event) -> float:
-        """When whoever is at it counts as having failed; standing by is no work."""
-        if event.state in (State.ASSIGNED, State.ON_SCENE):
-            return event.times["assigned"] + self.rules.order_limit
-        if event.state is State.CONFIRMED and event.actor is not None:
-            begun = max(event.times["act_assigned"], event.times["confirmed"])
-            return begun + self.rules.order_limit
-        return math.inf if event.open else event.times["closed"] + self.rules.order_limit
+    def _order_ends(self, device: str, event: Event) -> float:
+        """When who is at it counts as having failed; standing by is no work.
 
-    def _take_back(self, event: Event, now: float) -> list[Send]:
+        Who has found something says `done` soon; so long after the finding, that was lost.
+        """
+        times = event.times
+        if not event.open:
+            begun = times["closed"]
+        elif device == event.actor:
+            begun = max(times["act_assigned"], times.get("confirmed", math.inf))
+        else:
+            begun = times.get("assigned" if _somebody_looks(event) else "confirmed", math.inf)
+        return begun + self.rules.order_limit
+
+    def _take_back(self, device: str, event: Event, now: float) -> list[Send]:
         self.counters["order took too long"] += 1
-        if not event.open:  # its last word must have been lost
-            self._release(event)
-            self._free(event, event.actor)
-            return []
         over = m.OrderProgress(event.number, OVER)
-        if event.state is State.CONFIRMED:
-            assert event.actor is not None
-            sends = [Send(event.actor, over)]
-            self._free(event, event.actor)
-            self._actor_failed(event, now)
-            return sends
+        if event.open and device == event.actor:
+            return [Send(device, over), *self._act_ends(event, device, True, now)]
+        self._free(event, device)
+        if device in (event.responder, event.operator):
+            self._release(event)
+        if not _somebody_looks(event):
+            return []  # its last word must have been lost
         assert event.responder is not None
-        sends = [Send(event.holder or event.responder, over)]
         event.failed.add(event.responder)
-        self._release(event)
-        self._reopen(event, now)
-        return sends
+        return [Send(event.operator or event.responder, over), *self._reopen(event, now)]
 
     def may_preempt(self, event: Event, now: float) -> bool:
         """Whether a responder may be called away: not from a scene, nor past the deadline."""
@@ -301,34 +317,43 @@ class Orders:
                 del self.engaged[name]
                 self.book.touch(event)
 
-    def _reopen(self, event: Event, now: float) -> None:
-        event.waiting_since = now
-        if event.attempts < self.rules.max_attempts:
-            self.book.move(event, State.PENDING, now)
-        else:
-            self.book.move(event, State.ESCALATED, now)
+    def _reopen(self, event: Event, now: float) -> list[Send]:
+        """Somebody else has to look, if that is not given up."""
+        state = State.PENDING if self._goes_on(event, event.taken_up, now) else State.ESCALATED
+        self.book.move(event, state, now)
+        return self._stand_down(event)
 
-    def _actor_gone(self, event: Event) -> list[Send]:
-        """Who should have dealt with it is not there: somebody else has to."""
+    def _goes_on(self, event: Event, taken_up: bool, now: float) -> bool:
+        """Whether an event may wait again for somebody after an order came to nothing.
+
+        Where nobody took the order up it has waited all the time: so nobody can keep an event
+        from its deadline by not answering.
+        """
+        if not taken_up and now > self._wait_ends(event):
+            return False
+        if taken_up:
+            event.waiting_since = now
+        return event.attempts < self.rules.max_attempts
+
+    def _actor_gone(self, event: Event, now: float) -> list[Send]:
+        """Who should have dealt with it does not: somebody else has to."""
+        taken_up, event.act_taken_up = event.act_taken_up, False
         self._free(event, event.actor)
         event.actor = None
-        if event.open:
-            self.book.touch(event)
+        self.book.touch(event)
+        if event.state is State.CONFIRMED and event.open:
+            event.attempts += taken_up
+            if not self._goes_on(event, taken_up, now):
+                self.book.move(event, State.ESCALATED, now)
         return []
 
-    def _actor_failed(self, event: Event, now: float) -> None:
-        event.actor = None
-        event.attempts += 1
-        event.waiting_since = now
-        if event.state is State.CONFIRMED and event.attempts >= self.rules.max_attempts:
-            self.book.move(event, State.ESCALATED, now)
-        else:
-            self.book.touch(event)
-
     def _stand_down(self, event: Event, but: str | None = None) -> list[Send]:
-        """Who stands by, or was to deal with an event that is over, is free again."""
-        actor = event.actor
-        if actor is None or event.open or actor == but:
+        """Who stands by, or was to deal with an event, is free again if that is over.
+
+        So it is where nobody looks any longer: who stands by may be the one to look.
+        """
+        actor, needed = event.actor, event.open and event.state is not State.PENDING
+        if actor is None or needed or actor == but:
             return []
         self._free(event, actor)
         event.actor = None
@@ -336,3 +361,13 @@ class Orders:
 
 
 _ORDERS = (m.Order, m.TaskAward)
+
+
+def _is_to_act(body: m.Body) -> bool:
+    """Whether it is an order to deal with something, or to stand by."""
+    return isinstance(body, m.Order) and body.task != "confirm"
+
+
+def _somebody_looks(event: Event) -> bool:
+    """Whether an order to confirm it stands."""
+    return event.state in (State.ASSIGNED, State.ON_SCENE)

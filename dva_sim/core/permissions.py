@@ -41,12 +41,14 @@ class Permissions:
         draw: Gives `LOW_BITS` random bits.
         count: Sessions handed out so far, from any start that is higher than in an earlier
             life of the DVA: it makes sessions grow.
+        changes: How often a grant was made, or ended.
     """
 
     draw: Callable[[], int]
     count: int = 1000
     grants: dict[str, Grant] = field(default_factory=dict)
     observers: dict[tuple[str, str], Grant] = field(default_factory=dict)
+    changes: int = 0
 
     def request(
         self,
@@ -71,6 +73,7 @@ class Permissions:
         same = held is not None and (held.level, held.sensors) == (level, sensors)
         session = held.session if held is not None and same else self._new_session(only_sensors)
         grant = Grant(robot, holder, level, session, sensors, address)
+        self.changes += grant != held
         if only_sensors:
             self.observers[robot, holder] = grant
         else:
@@ -88,6 +91,7 @@ class Permissions:
 
     def restore(self, grant: Grant) -> None:
         """A grant of an earlier life of the DVA holds on."""
+        self.changes += 1
         if grant.level == "sensors":
             self.observers[grant.robot, grant.holder] = grant
         else:
@@ -95,16 +99,21 @@ class Permissions:
 
     def end(self, session: int) -> None:
         """A single grant is over, or never began."""
+        self.changes += 1
         _drop_session(self.grants, session)
         _drop_session(self.observers, session)
 
     def release(self, holder: str, robot: str | None = None) -> list[Grant]:
         """Take back the right to drive from `holder`: of one robot, or of all; what that was."""
-        return _take(self.grants, holder, robot)
+        return self._counted(_take(self.grants, holder, robot))
 
     def forget(self, holder: str, robot: str | None = None) -> list[Grant]:
         """The same for the right to read sensors."""
-        return _take(self.observers, holder, robot)
+        return self._counted(_take(self.observers, holder, robot))
+
+    def _counted(self, taken: list[Grant]) -> list[Grant]:
+        self.changes += len(taken)
+        return taken
 
 
 def _take(grants: dict[K, Grant], holder: str, robot: str | None) -> list[Grant]:

@@ -92,11 +92,9 @@ class Registry:
 
     def fallen_silent(self, now: float) -> list[Entry]:
         """Devices that have been quiet for longer than the time-out since the last call."""
-        limit, gone = now - self.silent_after, []
-        while self._heard:
+        gone = []
+        while self.next_silence() <= now:
             id_tag, entry = next(iter(self._heard.items()))
-            if entry.last_heard >= limit:
-                break
             entry.silent = True
             gone.append(entry)
             del self._heard[id_tag]
@@ -105,7 +103,9 @@ class Registry:
     def next_silence(self) -> float:
         """When the device that was heard longest ago will have been quiet for too long [s]."""
         longest = next(iter(self._heard.values()), None)
-        return math.inf if longest is None else longest.last_heard + self.silent_after
+        if longest is None:
+            return math.inf
+        return math.nextafter(longest.last_heard + self.silent_after, math.inf)  # not before
 
     def of_type(self, device_type: str) -> Iterable[Entry]:
         """Registered devices of a type that are not silent, in order of registration."""

@@ -96,7 +96,7 @@ class Desk:
             self.dispatcher.auctions.no_bid(body.event_id, send.to)
             sends = self.dispatcher.decide(now)
         elif isinstance(body, m.Relocation):
-            self.dispatcher.not_moved(send)
+            self.dispatcher.not_moved(send.to)
         else:
             self.sessions.undelivered(send)
         return self._and_revocations(sends)
@@ -107,7 +107,7 @@ class Desk:
         for entry in self.registry.fallen_silent(now):
             sends += self._gone(entry.device.id_tag, now)
         if now >= self._access_ends:
-            self._end_what_is_no_longer_allowed(now)
+            self.check_access(now)
         sends += self.orders.take_back(now)
         self.sessions.remind()
         return self._and_revocations(sends + self.dispatcher.decide(now))
@@ -174,6 +174,7 @@ class Desk:
     def _gone(self, device: str, now: float) -> list[Send]:
         """A device is there no more: what it held is free, what it did is open to others."""
         self.sessions.take_back_all(device)
+        self.dispatcher.not_moved(device)
         return self.orders.abandon(device, now)
 
     # --- who may do what ---------------------------------------------------------------
@@ -210,7 +211,7 @@ class Desk:
             return self._refuse(message, m.BAD_SESSION, "that session is not yours, or is over")
         return self._ok(message)
 
-    def _end_what_is_no_longer_allowed(self, now: float) -> None:
+    def check_access(self, now: float) -> None:
         """Permissions in use end with the rule that allowed them."""
         entries = self.registry.entries
         for grant in self.sessions.permissions.all():
@@ -265,7 +266,11 @@ class Desk:
 
     def _progress(self, message: m.Message, body: m.OrderProgress, now: float) -> Answer:
         event = self.orders.engaged.get(message.source)
-        if event is None or event.number != body.event_id:
+        if (
+            event is None
+            or event.number != body.event_id
+            or not self.orders.has_order(event, message.source)
+        ):
             text = f"device {message.source} has no order for event {body.event_id}"
             return self._refuse(message, m.UNKNOWN_EVENT, text)
         sends: list[Send] = []
@@ -274,8 +279,8 @@ class Desk:
         elif body.state == "arrived":
             self.orders.arrived(event, message.source, now)
         elif body.state in ("done", "failed", "declined"):
-            self.orders.ends(event, message.source, body.state, now)
-            sends = self.dispatcher.decide(now)
+            sends = self.orders.ends(event, message.source, body.state, now)
+            sends += self.dispatcher.decide(now)
         return self._ok(message)[0], sends
 
     def _bid(self, message: m.Message, body: m.TaskBid, now: float) -> Answer:
