@@ -2,42 +2,34 @@
 
 import json
 import math
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from dva_sim.experiments.validation import exact
+from dva_sim.experiments.validation.exact.transforms import laplace
+from dva_sim.timed.laws import (
+    Constant,
+    Erlang,
+    Exponential,
+    Gamma,
+    Hyperexponential,
+    Lognormal,
+    Uniform,
+    Weibull,
+)
 
 TARGETS = Path(__file__).parents[4] / "shared/targets/dispatch.json"
 
 
-@dataclass
-class Gamma:
-    """A gamma law; shape 1 is exponential, a large shape almost constant."""
-
-    mean: float
-    shape: float = 1.0
-
-    @property
-    def second_moment(self):
-        return self.mean**2 * (1 + 1 / self.shape)
-
-    def transform(self, s):
-        return (1 + s * self.mean / self.shape) ** -self.shape
+def gamma(mean, shape=1.0):
+    """Shape 1 is exponential, a large shape almost constant."""
+    return Gamma(law="gamma", mean_s=mean, shape=shape)
 
 
-@dataclass
-class Fixed:
-    mean: float
-
-    @property
-    def second_moment(self):
-        return self.mean**2
-
-    def transform(self, s):
-        return math.exp(-s * self.mean)
+def fixed(mean):
+    return Constant(mean_s=mean)
 
 
 def stationary(states, moves):
@@ -69,7 +61,10 @@ def test_one_exponential_server_has_the_waits_of_the_textbook():
 def test_the_quantiles_of_the_wait_are_those_of_its_distribution():
     m = exact.mmc(2.4, 1, 3)
     for percent in (50, 90, 95):
-        beyond = exact.mmc_wait_beyond(m[f"wait_{percent}_s"], 2.4, 1, 3)
+        quantile = m[f"wait_{percent}_s"]
+        (beyond,) = (
+            v for k, v in exact.mmc(2.4, 1, 3, at_s=[quantile]).items() if k.startswith("beyond")
+        )
         assert close(beyond, 1 - percent / 100)
 
 
@@ -79,39 +74,34 @@ def test_the_median_wait_is_zero_where_most_do_not_wait():
 
 def test_poisson_arrivals_and_exponential_service_are_special_cases_of_any_law():
     m = exact.mmc(0.7, 1, 1)
-    assert close(exact.mg1(0.7, Gamma(1.0))["wait_s"], m["wait_s"])
-    assert close(exact.gm1(Gamma(1 / 0.7), 1.0)["wait_s"], m["wait_s"], 1e-7)
-    assert close(exact.cobham([0.7], [Gamma(1.0)])["wait_1_s"], m["wait_s"])
+    assert close(exact.mg1(0.7, gamma(1.0))["wait_s"], m["wait_s"])
+    assert close(exact.gm1(gamma(1 / 0.7), 1.0)["wait_s"], m["wait_s"], 1e-7)
+    assert close(exact.cobham([0.7], [gamma(1.0)])["wait_1_s"], m["wait_s"])
     assert close(exact.priorities([0.7], 1, 1)["wait_1_s"], m["wait_s"])
-    assert close(exact.sqm(0.7, Gamma(1.0), side_m=1e-9)["wait_s"], m["wait_s"], 1e-6)
+    assert close(exact.sqm(0.7, gamma(1.0), side_m=1e-9)["wait_s"], m["wait_s"], 1e-6)
 
 
 def test_a_constant_service_halves_the_wait():
-    wait = exact.mg1(0.5, Fixed(1.0))["wait_s"]
+    wait = exact.mg1(0.5, fixed(1.0))["wait_s"]
     assert close(wait, exact.mmc(0.5, 1, 1)["wait_s"] / 2)
 
 
 def test_regular_arrivals_at_half_load_wait_with_probability_0_2032():
-    assert exact.gm1(Fixed(2.0), 1.0)["delayed"] == pytest.approx(0.203188, abs=1e-6)
+    assert exact.gm1(fixed(2.0), 1.0)["delayed"] == pytest.approx(0.203188, abs=1e-6)
 
 
 def test_little_room_is_a_loss_system_and_much_room_is_none():
-    loss = exact.mmck(1.5, 1, servers=3, room=3)
+    loss = exact.mmck(1.5, 1, servers=3, places=0)
     assert close(loss["lost"], exact.mgcc(1.5, 1, 3)["lost"])
     assert loss["wait_s"] == pytest.approx(0, abs=1e-12)
-    endless, roomy = exact.mmc(1.5, 1, 3), exact.mmck(1.5, 1, 3, room=400)
+    endless, roomy = exact.mmc(1.5, 1, 3), exact.mmck(1.5, 1, 3, places=400)
     for name in ("wait_s", "delayed", "utilisation"):
         assert close(roomy[name], endless[name])
 
 
 def test_one_server_with_room_for_k_is_full_with_the_geometric_share():
-    m = exact.mmck(0.5, 1, servers=1, room=4)
+    m = exact.mmck(0.5, 1, servers=1, places=3)
     assert close(m["lost"], 0.5**4 * 0.5 / (1 - 0.5**5))
-
-
-def test_room_for_fewer_than_the_servers_is_refused():
-    with pytest.raises(ValueError, match="room 2 should hold"):
-        exact.mmck(1, 1, servers=3, room=2)
 
 
 def test_patience_without_end_is_no_abandonment_and_none_at_all_is_loss():
@@ -185,7 +175,7 @@ def test_two_priorities_agree_with_the_markov_chain():
 
 def test_the_work_that_waits_is_the_same_in_whatever_order_classes_are_served():
     """Kleinrock's conservation law: the waits weighted by load add up to the same."""
-    rates, laws = [0.2, 0.1, 0.3], [Gamma(1.0, 2), Fixed(2.0), Gamma(0.5)]
+    rates, laws = [0.2, 0.1, 0.3], [gamma(1.0, 2), fixed(2.0), gamma(0.5)]
     loads = [r * law.mean for r, law in zip(rates, laws, strict=True)]
     forwards = exact.cobham(rates, laws)
     backwards = exact.cobham(rates[::-1], laws[::-1])
@@ -345,7 +335,7 @@ def test_the_best_of_all_assignments_agrees_with_trying_them_all():
 def test_a_load_beyond_the_servers_is_refused():
     for formula in (
         lambda: exact.mmc(3.0, 1, 3),
-        lambda: exact.mg1(1.0, Fixed(1.0)),
+        lambda: exact.mg1(1.0, fixed(1.0)),
         lambda: exact.priorities([1.0, 1.0], 1, 2),
         lambda: exact.hypercube([3.0], [[1, 2, 3]], 1),
     ):
@@ -385,5 +375,31 @@ def test_the_formulas_give_the_published_numbers():
     found = [m["utilisation"], m["autonomous"], m["wait_s"]]
     assert found == pytest.approx([t["util"], t["autonomous"], t["wait"]], rel=5e-5)
     t = targets["sqm"]
-    m = exact.sqm(t["lam"], Gamma(float(t["s"].split()[1])))
+    m = exact.sqm(t["lam"], gamma(float(t["s"].split()[1])))
     assert [m["utilisation"], m["response_s"]] == pytest.approx([t["rho"], t["response"]], abs=1e-5)
+
+
+EVERY_LAW = [
+    fixed(2.0),
+    Exponential(law="exponential", mean_s=2.0),
+    Uniform(law="uniform", low_s=1.0, high_s=3.0),
+    Erlang(law="erlang", mean_s=2.0, phases=3),
+    Hyperexponential(law="hyperexponential", mean_s=2.0, squared_cv=4.0),
+    Lognormal(law="lognormal", mean_s=2.0, spread=0.5),
+    gamma(2.0, 0.7),
+    Weibull(law="weibull", mean_s=2.0, shape=0.8),
+]
+
+
+@pytest.mark.parametrize("law", EVERY_LAW, ids=lambda law: law.law)
+def test_a_transform_is_1_at_zero_and_falls_there_by_the_mean(law):
+    assert laplace(law, 0.0) == pytest.approx(1.0, abs=1e-7)
+    slope = (laplace(law, 1e-4) - laplace(law, 0.0)) / 1e-4
+    assert -slope == pytest.approx(law.mean, rel=1e-3)
+
+
+@pytest.mark.parametrize("law", EVERY_LAW, ids=lambda law: law.law)
+def test_a_transform_is_the_mean_over_draws(law):
+    times = law.sample(np.random.default_rng(6), 200_000)
+    values = np.exp(-0.7 * times)
+    assert abs(values.mean() - laplace(law, 0.7)) <= 3.5 * values.std() / math.sqrt(200_000) + 1e-9

@@ -18,7 +18,6 @@ from dva_sim.experiments.validation.exact.queues import (
     mg1,
     mgcc,
     mmc,
-    mmc_wait_beyond,
     mmck,
     tandem,
 )
@@ -59,7 +58,6 @@ __all__ = [
     "mg1",
     "mgcc",
     "mmc",
-    "mmc_wait_beyond",
     "mmck",
     "priorities",
     "sqm",

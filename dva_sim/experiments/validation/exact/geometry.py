@@ -62,7 +62,7 @@ def sqm(arrival_rate: float, service: Law, side_m: float = 1.0, speed_mps: float
     way, square = CENTRE * side_m / speed_mps, side_m**2 / 6 / speed_mps**2
     load = arrival_rate * (2 * way + service.mean)
     require_stable(load)
-    second = 4 * square + 4 * way * service.mean + service.second_moment
+    second = 4 * square + 4 * way * service.mean + service.second
     wait = arrival_rate * second / (2 * (1 - load))
     return {
         "utilisation": load,

@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.experiments.validation.exact.queues import Floats, Measures
+from dva_sim.experiments.validation.exact.queues import Floats, Measures, Memoryless
 
 Ints = NDArray[np.int64]
 
@@ -24,7 +24,7 @@ MOST_UNITS = 8
 def hypercube(
     arrival_rates: Sequence[float],
     preferences: Sequence[Sequence[int]],
-    mean_service_s: float | Sequence[float],
+    mean_service_s: Memoryless | Sequence[Memoryless],
     queue: Literal["infinite", "none"] = "infinite",
 ) -> Measures:
     """Workloads and who serves whom, from the Markov chain of all sets of busy units.

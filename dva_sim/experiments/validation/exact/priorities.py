@@ -9,10 +9,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from dva_sim.experiments.validation.exact.queues import Law, Measures, erlang_c
+from dva_sim.experiments.validation.exact.queues import Law, Measures, Memoryless, erlang_c
 
 
-def priorities(arrival_rates: Sequence[float], mean_service_s: float, servers: int) -> Measures:
+def priorities(
+    arrival_rates: Sequence[float], mean_service_s: Memoryless, servers: int
+) -> Measures:
     """M/M/c, several classes with the same law of service.
 
     References:
@@ -34,7 +36,7 @@ def cobham(arrival_rates: Sequence[float], services: Sequence[Law]) -> Measures:
         where `W_0 = sum lambda_i E[S_i^2] / 2`.
     """
     pairs = list(zip(arrival_rates, services, strict=True))
-    ahead = sum(rate * service.second_moment for rate, service in pairs) / 2
+    ahead = sum(rate * service.second for rate, service in pairs) / 2
     return _by_class(ahead, arrival_rates, [rate * service.mean for rate, service in pairs])
 
 

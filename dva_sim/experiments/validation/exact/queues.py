@@ -17,28 +17,33 @@ References:
 from __future__ import annotations
 
 import math
-from typing import Protocol
+from collections.abc import Sequence
+from typing import Annotated, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+
+from dva_sim.experiments.validation.exact.transforms import laplace
+from dva_sim.timed import laws as timed
 
 Measures = dict[str, float]
 Floats = NDArray[np.float64]
 
 
+Memoryless = Annotated[float, "exponential"]
+"""The mean of a time that must be exponential for the formula to hold [s]."""
+
+
 class Law(Protocol):
-    """What a formula wants to know of a duration."""
+    """What most formulas want to know of a duration."""
 
     @property
     def mean(self) -> float:
         """Expected value [s]."""
 
     @property
-    def second_moment(self) -> float:
+    def second(self) -> float:
         """Expected square [s^2]."""
-
-    def transform(self, s: float) -> float:
-        """Laplace transform: the expected value of `exp(-s X)`, for `s >= 0` [1/s]."""
 
 
 def erlang_b(servers: int, load: float) -> float:
@@ -68,11 +73,14 @@ def erlang_c(servers: int, load: float) -> float:
     return servers * blocked / (servers - load * (1 - blocked))
 
 
-def mmc(arrival_rate: float, mean_service_s: float, servers: int) -> Measures:
+def mmc(
+    arrival_rate: float, mean_service_s: Memoryless, servers: int, at_s: Sequence[float] = ()
+) -> Measures:
     """M/M/c: random arrivals, exponential service, everybody waits, first come first served.
 
     Beside the usual measures: `wait_50_s`, `wait_90_s` and `wait_95_s`, quantiles of the wait
-    of all customers (0 for those who need not wait).
+    of all customers (0 for those who need not wait), and `beyond_T`, the share that waits
+    longer than each time T in `at_s`.
 
     References:
         Gross et al. (2008), section 3.3: a wait beyond `t` has the probability
@@ -90,13 +98,7 @@ def mmc(arrival_rate: float, mean_service_s: float, servers: int) -> Measures:
     for percent in (50, 90, 95):
         beyond = 1 - percent / 100
         measures[f"wait_{percent}_s"] = max(0.0, math.log(delayed / beyond) / drain)
-    return measures
-
-
-def mmc_wait_beyond(t: float, arrival_rate: float, mean_service_s: float, servers: int) -> float:
-    """Probability that a customer of an M/M/c waits longer than `t` [s]."""
-    drain = servers / mean_service_s - arrival_rate
-    return erlang_c(servers, arrival_rate * mean_service_s) * math.exp(-drain * t)
+    return measures | {f"beyond_{t:g}": delayed * math.exp(-drain * t) for t in at_s}
 
 
 def mgcc(arrival_rate: float, mean_service_s: float, servers: int) -> Measures:
@@ -117,14 +119,13 @@ def mgcc(arrival_rate: float, mean_service_s: float, servers: int) -> Measures:
     }
 
 
-def mmck(arrival_rate: float, mean_service_s: float, servers: int, room: int) -> Measures:
-    """M/M/c/K: at most `room` customers inside, in service and waiting; others are lost.
+def mmck(arrival_rate: float, mean_service_s: Memoryless, servers: int, places: int) -> Measures:
+    """M/M/c/K: at most `places` customers wait (K = c + places); others are lost.
 
     References:
         Gross et al. (2008), section 3.4.
     """
-    if room < servers:
-        raise ValueError(f"room {room} should hold at least the {servers} servers' customers")
+    room = servers + places
     inside = np.arange(room + 1)
     busy = np.minimum(inside, servers)
     chance = birth_death(np.full(room, arrival_rate), busy[1:] / mean_service_s)
@@ -147,7 +148,7 @@ def mg1(arrival_rate: float, service: Law) -> Measures:
     """
     load = arrival_rate * service.mean
     require_stable(load)
-    wait = arrival_rate * service.second_moment / (2 * (1 - load))
+    wait = arrival_rate * service.second / (2 * (1 - load))
     return {
         "utilisation": load,
         "delayed": load,
@@ -156,7 +157,7 @@ def mg1(arrival_rate: float, service: Law) -> Measures:
     }
 
 
-def gm1(between: Law, mean_service_s: float) -> Measures:
+def gm1(between: timed.Law, mean_service_s: Memoryless) -> Measures:
     """G/M/1: any law between arrivals, one server with exponential service.
 
     References:
@@ -168,7 +169,7 @@ def gm1(between: Law, mean_service_s: float) -> Measures:
     require_stable(mean_service_s / between.mean)
     rate = 1 / mean_service_s
     # At sigma = 1 the equation always holds; the root sought lies below it.
-    sigma = float(brentq(lambda x: between.transform(rate * (1 - x)) - x, 0.0, 1 - 1e-9))
+    sigma = float(brentq(lambda x: laplace(between, rate * (1 - x)) - x, 0.0, 1 - 1e-9))
     wait = sigma * mean_service_s / (1 - sigma)
     return {
         "utilisation": mean_service_s / between.mean,
@@ -179,7 +180,7 @@ def gm1(between: Law, mean_service_s: float) -> Measures:
 
 
 def erlang_a(
-    arrival_rate: float, mean_service_s: float, servers: int, mean_patience_s: float
+    arrival_rate: float, mean_service_s: Memoryless, servers: int, mean_patience_s: Memoryless
 ) -> Measures:
     """M/M/c+M: who waits gives up after an exponential time.
 
@@ -214,9 +215,9 @@ def erlang_a(
 
 def tandem(
     arrival_rate: float,
-    first_service_s: float,
+    first_service_s: Memoryless,
     first_servers: int,
-    second_service_s: float,
+    second_service_s: Memoryless,
     second_servers: int,
 ) -> Measures:
     """Two M/M/c in a row: the second sees random arrivals, as if the first were not there.

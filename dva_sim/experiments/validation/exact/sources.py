@@ -10,11 +10,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from dva_sim.experiments.validation.exact.queues import Measures, birth_death
+from dva_sim.experiments.validation.exact.queues import Measures, Memoryless, birth_death
 
 
 def finite_source(
-    sources: int, servers: int, mean_autonomous_s: float, mean_service_s: float
+    sources: int, servers: int, mean_autonomous_s: Memoryless, mean_service_s: Memoryless
 ) -> Measures:
     """M/M/c//N: each source works alone for an exponential time, then waits for a server.
 

@@ -1,0 +1,205 @@
+"""Cases played through the real core and policies, spread over processes."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+
+from dva_sim.errors import DvaSimError
+from dva_sim.experiments.design import Job
+from dva_sim.experiments.journal import Outcome, Tables
+from dva_sim.experiments.pool import run_all
+from dva_sim.experiments.validation.cases import Case
+from dva_sim.experiments.validation.controls import controls, inputs
+from dva_sim.experiments.validation.estimation import (
+    Estimate,
+    Verdict,
+    certain,
+    estimate,
+    verdict,
+)
+from dva_sim.experiments.validation.measures import Batches, sums
+from dva_sim.experiments.validation.sample import Floats, Sample, occupied, sample_of
+from dva_sim.scenario import Scenario
+from dva_sim.streams import derive_seed
+from dva_sim.timed import simulate_timed
+from dva_sim.timed.scenario import TimedScenario
+
+Columns = dict[str, Floats]
+
+
+@dataclass(frozen=True)
+class Check:
+    """One comparison.
+
+    Attributes:
+        case: Name of the case.
+        title: What the case is.
+        measure: What was measured.
+        exact: What it should be.
+        found: What it was.
+        verdict: Whether the two agree.
+        source: Where the exact value comes from.
+        events: How many events were played for it.
+        kind: `result`; `input` for what the scenario put in; `identity` for what holds
+            without chance.
+    """
+
+    case: str
+    title: str
+    measure: str
+    exact: float
+    found: Estimate
+    verdict: Verdict
+    source: str
+    events: int
+    kind: str = "result"
+
+    @property
+    def deviation(self) -> float:
+        """How far off, in standard errors; 0 where nothing is left to chance and all is right."""
+        off = self.found.value - self.exact
+        if self.found.error > 0:
+            return off / self.found.error
+        return 0.0 if self.verdict != "differs" else float(np.copysign(np.inf, off))
+
+
+def check_cases(
+    cases: Sequence[Case],
+    seed: int,
+    quick: bool,
+    workers: int,
+    progress: Callable[[int], None] = lambda done: None,
+) -> list[Check]:
+    """Play all cases and compare.
+
+    Args:
+        cases: What to play.
+        seed: Of all luck.
+        quick: Play as little as the cases say for that.
+        workers: Processes.
+        progress: Told how many runs are finished.
+
+    Raises:
+        DvaSimError: a run failed.
+    """
+    jobs = [job for number, case in enumerate(cases) for job in _jobs(case, number, seed, quick)]
+    outcomes: dict[tuple[str, int], Outcome] = {}
+    for batch in run_all(jobs, play, workers):
+        for outcome in batch:
+            if outcome.error is not None:
+                raise DvaSimError(f"a run of case {_case_of(outcome)!r} failed: {outcome.error}")
+            outcomes[outcome.key] = outcome
+        progress(len(outcomes))
+    return [
+        check
+        for number, case in enumerate(cases)
+        for check in _compare(case, _columns(_jobs(case, number, seed, quick), outcomes))
+    ]
+
+
+def play(job: Job) -> Tables:
+    """One run: tops and bottoms of each measure, and the controls, one row per batch."""
+    scenario = cast(TimedScenario, job.scenario)
+    asked = dict(job.cell)
+    sample = sample_of(simulate_timed(scenario, job.seed))
+    batches = Batches(sample, int(str(asked["batches"])))
+    columns: Columns = {"events": batches.count(np.ones(len(sample.stream), dtype=bool))}
+    columns["broken"] = np.full(len(batches.lengths), float(sample.broken))
+    columns["open"] = batches.count(sample.outcome == "open")
+    for name, (area, by_event) in _little(sample, batches).items():
+        columns[f"area {name}"], columns[f"times {name}"] = area, by_event
+    for number, name in enumerate(json.loads(str(asked["measures"]))):
+        columns[f"top {number}"], columns[f"bottom {number}"] = sums(name, batches)
+    for name, (top, bottom) in inputs(batches, scenario).items():
+        columns[f"in {name}"], columns[f"expected {name}"] = top, bottom
+    for name, values in controls(batches, scenario).items():
+        columns[f"control {name}"] = values
+    names, rows = list(columns), np.column_stack(list(columns.values()))
+    return {"batches": [dict(zip(names, row.tolist(), strict=True)) for row in rows]}
+
+
+def runs_of(cases: Sequence[Case], quick: bool) -> int:
+    """How many runs it takes to check all cases."""
+    return sum(case.quick_runs if quick else case.runs for case in cases)
+
+
+def _jobs(case: Case, number: int, seed: int, quick: bool) -> list[Job]:
+    cell = (("batches", case.batches), ("measures", json.dumps(list(case.exact))))
+    scenario = cast(Scenario, case.scenario)
+    return [
+        Job(
+            part=case.name,
+            cell=cell,
+            index=number,
+            person=0,
+            trial=trial,
+            seed=derive_seed("validation", case.name, seed, trial),
+            scenario=scenario,
+            config=case.name,
+        )
+        for trial in range(case.quick_runs if quick else case.runs)
+    ]
+
+
+def _little(sample: Sample, batches: Batches) -> dict[str, tuple[Floats, Floats]]:
+    """How many wait and are served: as the world sums it up, and by the times of the events.
+
+    The first follows what happens as it happens, the second is who came and went when. Their
+    ratio is 1 in every run, not only on average: Little's law, path by path.
+    """
+    sent = np.where(np.isnan(sample.assigned), sample.closed, sample.assigned)
+    acts = np.isfinite(sample.act_assigned)
+    until = np.maximum(sample.confirmed, sample.act_assigned)[acts]
+    waits = occupied(sample.detected, sent, batches.edges)
+    waits += occupied(sample.confirmed[acts], until, batches.edges)
+    stays = occupied(sample.detected, sample.closed, batches.edges)
+    share = batches.lengths / batches.lengths.sum()
+    return {
+        "waiting": (sample.waiting_area * share, waits),
+        "served": (sample.served_area * share, stays - waits),
+    }
+
+
+def _case_of(outcome: Outcome) -> str:
+    return outcome.key[0]
+
+
+def _columns(jobs: Sequence[Job], outcomes: dict[tuple[str, int], Outcome]) -> Columns:
+    """The batches of all runs of a case, run after run."""
+    rows = [row for job in jobs for row in json.loads(outcomes[job.key].tables or "")["batches"]]
+    return {name: np.array([row[name] for row in rows], dtype=float) for name in rows[0]}
+
+
+def _compare(case: Case, columns: Columns) -> list[Check]:
+    """All that a case is judged by: results, what was put in, and what must hold in any case."""
+    known = [values for name, values in columns.items() if name.startswith("control ")]
+    luck = np.column_stack(known) if known else None
+    found = [
+        ("result", measure, exact, estimate(columns[f"top {n}"], columns[f"bottom {n}"], luck))
+        for n, (measure, exact) in enumerate(case.exact.items())
+    ]
+    for name in (name.removeprefix("in ") for name in columns if name.startswith("in ")):
+        share = estimate(columns[f"in {name}"], columns[f"expected {name}"])
+        found.append(("input", f"{name}, share of the expected", 1.0, share))
+    for name in ("waiting", "served"):
+        area, times = columns[f"area {name}"].sum(), columns[f"times {name}"].sum()
+        law = "identity", f"Little's law, {name}", 1.0, certain(area / times if times else 1.0)
+        found.append(law)
+    lost = columns["open"].sum() + columns["broken"].max()
+    found.append(("identity", "events lost, rules broken", 0.0, certain(lost)))
+    return [_check(case, columns, *each) for each in found]
+
+
+def _check(
+    case: Case, columns: Columns, kind: str, measure: str, exact: float, found: Estimate
+) -> Check:
+    judged = verdict(found, exact)
+    if kind == "input" and judged == "too rough":
+        judged = "agrees"  # there is no precision to be had but that of the result
+    events = int(columns["events"].sum())
+    return Check(case.name, case.title, measure, exact, found, judged, case.source, events, kind)
