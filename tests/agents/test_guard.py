@@ -148,6 +148,17 @@ def test_the_newest_order_holds_even_for_who_is_at_work_at_an_event(
     assert dva.progress(2) == ["departed", "arrived", "confirmed", "done"]
 
 
+def test_who_is_called_away_while_looking_says_nothing_of_what_it_sees(
+    dva: PretendedDva, guard: GuardAgent
+) -> None:
+    dva.order(1, NEAR)
+    dva.run_until(lambda: guard.activity == "looking")
+    dva.order(2, FAR)
+    dva.run_for(60.0)
+    assert dva.progress(1) == ["departed", "arrived"]
+    assert dva.progress(2) == ["departed", "arrived", "refuted", "done"]
+
+
 def test_an_order_that_the_dva_calls_over_is_given_up_without_a_word(
     dva: PretendedDva, guard: GuardAgent
 ) -> None:
@@ -255,6 +266,19 @@ def test_who_stands_by_for_a_quarter_of_an_hour_without_a_word_gives_up(
     assert STAND_BY_FOR == 900.0
     assert dva.progress(1) == ["departed", "failed"]
     assert guard.activity == "waiting"
+
+
+def test_who_has_stood_by_once_does_not_give_up_what_it_does_later(
+    dva: PretendedDva, guard: GuardAgent
+) -> None:
+    dva.order(1, FARTHER, "stand_by")
+    dva.run_for(60.0)
+    dva.order(1, FARTHER, "contain")
+    dva.run_for(800.0)
+    dva.order(2, FARTHER, "stand_by")
+    dva.run_for(300.0)
+    assert dva.progress(1) == ["departed", "departed", "arrived", "refuted", "done"]
+    assert (dva.progress(2), guard.activity) == (["departed"], "standing by")
 
 
 # --- wait elsewhere --------------------------------------------------------------------

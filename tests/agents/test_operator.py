@@ -10,7 +10,7 @@ import pytest
 from pretended_dva import OPERATOR, OTHER_ROBOT, ROBOT, PretendedDva
 
 from dva_sim.agents.modes import Mode
-from dva_sim.agents.operator.agent import OperatorAgent
+from dva_sim.agents.operator.agent import STANDSTILL, OperatorAgent
 from dva_sim.protocol import messages as m
 
 EAST, WEST = (30.0, 12.0), (4.0, 12.0)  # both ends of the main corridor [m]
@@ -67,6 +67,19 @@ def test_a_newer_order_for_the_same_robot_stops_it_and_drives_it_elsewhere(
     pose = dva.field.robots[ROBOT].body.pose()
     assert math.dist(pose[:2], WEST) < 2.0
     assert outcomes(dva) == ["redirected", "refuted"]
+
+
+def test_the_next_drive_begins_when_the_robot_certainly_stands(
+    dva: PretendedDva, operator: OperatorAgent
+) -> None:
+    start(dva, 1, EAST)
+    now = dva.now
+    dva.order(2, WEST, robot=ROBOT)
+    dva.run_until(lambda: len(dva.stage.recorder.drives) == 2)
+    before, after = dva.stage.recorder.drives
+    assert before.ended == after.ordered == pytest.approx(now, abs=0.05)
+    assert dva.now - now >= STANDSTILL == 1.5
+    assert abs(dva.field.robots[ROBOT].body.speed) < 0.01
 
 
 def test_who_drives_the_same_robot_on_keeps_its_permission(

@@ -28,6 +28,7 @@ class OperatorAgent:
         self.device, self._seat = seat.device, seat
         self._drive: Drive | None = None
         self._next: m.Order | None = None  # what to do when the present drive has ended
+        self._ordered = 0.0  # when the newest order came [s]
         self.device.serve(self._on_request)
 
     @property
@@ -76,6 +77,7 @@ class OperatorAgent:
         held = self._order
         if held is not None and (held.event_id, held.device) == (order.event_id, order.device):
             return  # the DVA says again what it has said before
+        self._ordered = self.device.clock.now
         if self._drive is None:
             self._take_up(order)
         else:
@@ -91,8 +93,8 @@ class OperatorAgent:
 
     def _take_up(self, order: m.Order) -> None:
         assert order.device is not None
-        device, now = self.device, self.device.clock.now
-        log = DriveLog(order.device, device.id_tag, order.event_id, now)
+        device = self.device
+        log = DriveLog(order.device, device.id_tag, order.event_id, self._ordered)
         log.human_delay = self._seat.person.perceptual_delay + self._seat.person.hand_lag
         device.recorder.drives.append(log)
         drive = self._drive = Drive(self._seat, order, log, self._finish)
