@@ -97,7 +97,9 @@ class Dispatcher:
             sends += self._decide(now)
             if self.orders.counters["preempted"] == before:
                 break
-        return sends + self.orders.give_up(now)
+        sends += self.orders.give_up(now)
+        self.auctions.close(self.orders.book, now)
+        return sends
 
     def _decide(self, now: float) -> list[Send]:
         if not self.orders.book.open and not self.policy.relocates:

@@ -136,7 +136,7 @@ class Memory:
         )
         put("INSERT OR REPLACE INTO events VALUES (?, ?, ?)", events)
         devices = ((i, json.dumps(_of_entry(e))) for i, e in self._devices.items())
-        put("INSERT OR REPLACE INTO devices VALUES (?, ?)", devices)
+        put(_PUT_DEVICE, devices)
         if grants is not self._granted:
             gone = ((s,) for s in self._granted.keys() - grants.keys())
             put("DELETE FROM grants WHERE session = ?", gone)
@@ -199,6 +199,10 @@ class Memory:
         return int(row[0]) if row else 0
 
 
+# Renewed in its place: the order of registration is to last.
+_PUT_DEVICE = """
+INSERT INTO devices VALUES (?, ?) ON CONFLICT (id) DO UPDATE SET data = excluded.data
+"""
 _RECENT = """
 SELECT data FROM (
   SELECT number, data FROM events WHERE open
