@@ -126,7 +126,7 @@ class DispatchConfig(Config):
         policy: By name, or as `my_policy.py:Mine`.
         options: Of that policy.
         escalate_after_s: An event that has waited so long for somebody is escalated; 0: at
-            once if nobody is free, `.inf`: never.
+            once if nobody is free; null: never.
         containment: Whether a confirmed event also needs a guard who deals with it.
         most_waiting: More events than that do not wait: the newest is escalated at once.
         merge_distance_m: Reports of one kind nearer than this are one event; 0: never.
@@ -136,7 +136,7 @@ class DispatchConfig(Config):
 
     policy: str = "min_eta"
     options: dict[str, Any] = Field(default_factory=dict)
-    escalate_after_s: NonNegative = 120.0
+    escalate_after_s: NonNegative | None = 120.0
     containment: bool = False
     most_waiting: Annotated[int, Field(ge=0)] | None = None
     merge_distance_m: NonNegative = 8.0
@@ -146,8 +146,9 @@ class DispatchConfig(Config):
 
     def rules(self) -> Rules:
         """As the core wants them."""
+        never = math.inf
         return Rules(
-            self.escalate_after_s,
+            never if self.escalate_after_s is None else self.escalate_after_s,
             self.containment,
             self.most_waiting,
             self.merge_distance_m,
@@ -166,7 +167,7 @@ class AccessConfig(Config):
         levels: `teleoperation`, `missions`, `both`, `sensors`.
         sensors: Names of the sensors that may be read; left out: all.
         from_s: From when on.
-        until_s: Up to when; what is in use then is revoked.
+        until_s: Up to when; what is in use then is revoked. Left out: for good.
     """
 
     holders: tuple[str, ...] = ()
@@ -174,12 +175,17 @@ class AccessConfig(Config):
     levels: tuple[Literal["teleoperation", "missions", "both", "sensors"], ...] = LEVELS
     sensors: tuple[str, ...] | None = None
     from_s: NonNegative = 0.0
-    until_s: Positive = math.inf
+    until_s: Positive | None = None
 
 
 class Scenario(Config):
-    """Everything one run needs but its seed."""
+    """Everything one run needs but its seed.
 
+    Attributes:
+        model: Tells this kind of scenario from the timed ones.
+    """
+
+    model: Literal["full"] = "full"
     description: str = ""
     site: SiteConfig = SiteConfig()
     robot: RobotConfig = RobotConfig()
@@ -292,6 +298,20 @@ def check_names(scenario: Scenario, error: Any) -> None:
         if given not in known and not Path(given).is_file():
             key = ".".join(str(p) for p in path)
             raise error(f"{key} {given!r} is unknown; known: {', '.join(sorted(known))}", path)
+    check_policy(scenario.dispatch.policy, scenario.dispatch.options, error)
+
+
+def check_policy(policy: str, options: Mapping[str, Any], error: Any) -> None:
+    """Refuse a policy that cannot be loaded, or does not know its options."""
+    from dva_sim.core.dispatch import load_policy
+
+    try:
+        load_policy(policy, options)
+    except ConfigError as problem:
+        if problem.file is not None:
+            raise
+        key = "options" if "option" in problem.problem else "policy"
+        raise error(problem.problem, ("dispatch", key)) from None
 
 
 def site_of(scenario: Scenario, seed: int) -> Site:

@@ -13,8 +13,8 @@ from typing import Any
 from dva_sim import scenario as scenarios
 from dva_sim.config import Document
 from dva_sim.errors import ConfigError
+from dva_sim.experiments.models import AnyScenario, model_for, model_of
 from dva_sim.experiments.study import Level, Part, Study
-from dva_sim.scenario import Scenario
 from dva_sim.streams import derive_seed
 
 REFERENCE = -1
@@ -37,7 +37,7 @@ class Cell:
     part: str
     index: int
     levels: tuple[tuple[str, Level], ...]
-    scenario: Scenario
+    scenario: AnyScenario
     config: str
 
 
@@ -62,7 +62,7 @@ class Job:
     person: int
     trial: int
     seed: int
-    scenario: Scenario
+    scenario: AnyScenario
     config: str
 
     @property
@@ -85,7 +85,7 @@ def cells(study: Study) -> list[Cell]:
     return [cell for name in study.parts for cell in _cells_of(study, name)]
 
 
-def base_scenario(study: Study, part: str) -> Scenario:
+def base_scenario(study: Study, part: str) -> AnyScenario:
     """A part's scenario before any factor has changed it."""
     return _build(study, part, _source(study, study.parts[part]), {})
 
@@ -142,7 +142,9 @@ def _cells_of(study: Study, name: str) -> Iterator[Cell]:
         yield _cell(name, index, tuple(changes.items()), scenario)
 
 
-def _cell(part: str, index: int, levels: tuple[tuple[str, Level], ...], scenario: Scenario) -> Cell:
+def _cell(
+    part: str, index: int, levels: tuple[tuple[str, Level], ...], scenario: AnyScenario
+) -> Cell:
     return Cell(part, index, levels, scenario, stable_hash(scenario.model_dump(mode="json")))
 
 
@@ -150,11 +152,12 @@ def _source(study: Study, part: Part) -> Document:
     return scenarios.load(part.scenario, base=study.folder)
 
 
-def _build(study: Study, part: str, source: Document, changes: Mapping[str, Any]) -> Scenario:
+def _build(study: Study, part: str, source: Document, changes: Mapping[str, Any]) -> AnyScenario:
     """The part's scenario; a mistake in a change is told where the study makes it."""
-    fixed = {**study.changes, "operator.population_seed": study.seed}
+    model = model_of(source)
+    fixed = {**study.changes, **model.set_by_study(study.seed)}
     try:
-        return scenarios.build(source, {**fixed, **changes})
+        return model.build(source, {**fixed, **changes})
     except ConfigError as error:
         blamed = _blamed(study, part, error, changes) if error.file is None else None
         raise (blamed or error) from None
@@ -172,16 +175,11 @@ def _blamed(
 
 def _jobs_of(study: Study, name: str, part_cells: Sequence[Cell]) -> Iterator[Job]:
     # Persons of one cluster follow each other, so that no two clusters share an operator.
-    team = max(1, *(cell.scenario.operator.count for cell in part_cells))
+    team = max(1, *(model_for(cell.scenario).team(cell.scenario) for cell in part_cells))
     trials = study.parts[name].replications or study.replications
     for cell in part_cells:
         for person in range(study.persons):
-            scenario = _driven_by(cell.scenario, person * team)
+            scenario = model_for(cell.scenario).played_by(cell.scenario, person * team)
             for trial in range(trials):
                 seed = derive_seed(study.seed, name, person, trial)
                 yield Job(name, cell.levels, cell.index, person, trial, seed, scenario, cell.config)
-
-
-def _driven_by(scenario: Scenario, person: int) -> Scenario:
-    operator = scenario.operator.model_copy(update={"person": person})
-    return scenario.model_copy(update={"operator": operator})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -118,7 +119,7 @@ def _access(scenario: Scenario) -> Access:
             frozenset(rule.levels),
             None if rule.sensors is None else frozenset(rule.sensors),
             rule.from_s,
-            rule.until_s,
+            math.inf if rule.until_s is None else rule.until_s,
         )
         for rule in scenario.access
     ]

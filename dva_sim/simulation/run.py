@@ -138,7 +138,7 @@ class Run:
         self.field.world.advance_to(now)
         self._watch_robots(now)
         self._watch_guards(now)
-        deadline = self.scenario.dispatch.escalate_after_s
+        deadline = self.scenario.dispatch.rules().escalate_after
         for rule, what in broken_event_rules(self.dva.desk.book, deadline, now):
             self.recorder.violated(rule, now, "dva", what)
 

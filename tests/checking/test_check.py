@@ -93,7 +93,7 @@ def test_the_place_tells_the_kind_where_the_keys_do_not(check, here):
         ("horizon_s: 5\nrobot: {count: 9}\n", "2:9: site 'caparica' has 3 robot bases"),
         ("link:\n  trace_up: no.up\n", "2:3: 'no.up': trace cannot be read"),
         ("site:\n  map: no.yaml\n", "2:3: world 'no.yaml' not found"),
-        ("dispatch: {policy: dice}\n", "1:12: dispatch.policy 'dice' is unknown"),
+        ("dispatch: {policy: dice}\n", "1:12: policy 'dice' is unknown"),
         ("question: what?\nparts:\n  a:\n    scenario: lost\n", "4:5: scenario 'lost' not found"),
         ("question: what?\nparts: {a: {scenario: fire-drill, x: 1}}\n", "2:35: unknown key 'parts"),
         ("name: x\nplan: no.geojson\norigin: {latitude: 1, longitude: 1}\n", "2:1: plan 'no.geo"),

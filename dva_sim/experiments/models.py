@@ -1,0 +1,135 @@
+"""The models that a scenario can be played in, as a study sees them.
+
+`full`: bodies, cameras, persons with phones and every byte on the network. `timed`: travel and
+service times only, a thousand times faster; the DVA's core is the same in both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Protocol
+
+from dva_sim import scenario as scenarios
+from dva_sim.config import Document
+from dva_sim.scenario import Scenario
+from dva_sim.timed import scenario as timed
+from dva_sim.timed.scenario import TimedScenario
+
+AnyScenario = Scenario | TimedScenario
+Tables = dict[str, list[dict[str, Any]]]
+
+
+class Model(Protocol):
+    """What a study does with a scenario."""
+
+    def build(self, source: Document, changes: Mapping[str, Any]) -> AnyScenario:
+        """The scenario of a file, with some keys changed.
+
+        Raises:
+            ConfigError: it is not valid.
+        """
+
+    def set_by_study(self, seed: int) -> dict[str, Any]:
+        """Keys that the study itself sets."""
+
+    def team(self, scenario: AnyScenario) -> int:
+        """How many persons of the population a run takes."""
+
+    def played_by(self, scenario: AnyScenario, person: int) -> AnyScenario:
+        """The scenario with a certain person, by index in the population."""
+
+    def rehearse(self, scenario: AnyScenario, seed: int) -> None:
+        """Find what cannot work before anything runs.
+
+        Raises:
+            ConfigError: what cannot be read or placed.
+        """
+
+    def tables(self, scenario: AnyScenario, seed: int, with_tracks: bool) -> Tables:
+        """Simulate; rows by table."""
+
+
+def model_of(document: Document) -> Model:
+    """The model that a scenario file asks for.
+
+    Raises:
+        ConfigError: there is no such model.
+    """
+    name = document.data.get("model", "full")
+    if name not in MODELS:
+        raise document.error(f"model {name!r} is unknown; known: {', '.join(MODELS)}", ("model",))
+    return MODELS[name]
+
+
+def model_for(scenario: AnyScenario) -> Model:
+    """The model of a scenario that has been read."""
+    return MODELS["timed" if isinstance(scenario, TimedScenario) else "full"]
+
+
+class _Full:
+    def build(self, source: Document, changes: Mapping[str, Any]) -> Scenario:
+        return scenarios.build(source, changes)
+
+    def set_by_study(self, seed: int) -> dict[str, Any]:
+        return {"operator.population_seed": seed}
+
+    def team(self, scenario: AnyScenario) -> int:
+        assert isinstance(scenario, Scenario)
+        return scenario.operator.count
+
+    def played_by(self, scenario: AnyScenario, person: int) -> Scenario:
+        assert isinstance(scenario, Scenario)
+        operator = scenario.operator.model_copy(update={"person": person})
+        return scenario.model_copy(update={"operator": operator})
+
+    def rehearse(self, scenario: AnyScenario, seed: int) -> None:
+        from dva_sim.simulation import rehearse
+
+        assert isinstance(scenario, Scenario)
+        rehearse(scenario, seed)
+
+    def tables(self, scenario: AnyScenario, seed: int, with_tracks: bool) -> Tables:
+        from dva_sim.experiments import metrics
+        from dva_sim.simulation import simulate
+
+        assert isinstance(scenario, Scenario)
+        recording = simulate(scenario, seed)
+        tables: Tables = {
+            "runs": [metrics.run_row(recording)],
+            "events": metrics.event_rows(recording),
+        }
+        if with_tracks:
+            tables["tracks"] = metrics.track_rows(recording)
+        return tables
+
+
+class _Timed:
+    """Its persons are but names for independent runs."""
+
+    def build(self, source: Document, changes: Mapping[str, Any]) -> TimedScenario:
+        return timed.build(source, changes)
+
+    def set_by_study(self, seed: int) -> dict[str, Any]:
+        return {}
+
+    def team(self, scenario: AnyScenario) -> int:
+        return 1
+
+    def played_by(self, scenario: AnyScenario, person: int) -> AnyScenario:
+        return scenario
+
+    def rehearse(self, scenario: AnyScenario, seed: int) -> None:
+        from dva_sim.timed import rehearse_timed
+
+        assert isinstance(scenario, TimedScenario)
+        rehearse_timed(scenario, seed)
+
+    def tables(self, scenario: AnyScenario, seed: int, with_tracks: bool) -> Tables:
+        from dva_sim.experiments.dispatch import measures
+        from dva_sim.timed import simulate_timed
+
+        assert isinstance(scenario, TimedScenario)
+        return measures.tables(simulate_timed(scenario, seed))
+
+
+MODELS: dict[str, Model] = {"full": _Full(), "timed": _Timed()}
