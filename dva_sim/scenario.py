@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -260,9 +260,20 @@ def build(
             return ConfigError(problem)
         return document.error(problem, path)
 
+    locate_policy(data, [document.file.parent] if document else [])
     scenario = validate(Scenario, data, error)
     check_names(scenario, error)
     return scenario
+
+
+def locate_policy(data: dict[str, Any], folders: Sequence[Path]) -> None:
+    """Let a policy in a file beside the one that names it be found from anywhere."""
+    dispatch = data.get("dispatch")
+    named = dispatch.get("policy") if isinstance(dispatch, dict) else None
+    file, colon, wanted = named.rpartition(":") if isinstance(named, str) else ("", "", "")
+    beside = [folder / file for folder in folders if colon and (folder / file).is_file()]
+    if beside and isinstance(dispatch, dict):
+        dispatch["policy"] = f"{beside[0]}:{wanted}"
 
 
 def set_key(data: dict[str, Any], key: str, value: Any) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import operator
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -34,7 +34,10 @@ from dva_sim.protocol import messages as m
 CONSIDERED = 1000  # tasks that one decision looks at, those detected longest ago
 SAME_PLACE = 3e-5  # a few metres [deg]
 DECISIONS = 4  # in a row, where one makes the next necessary
-LATE, SETTLED = 2.0, 60.0  # who has not come to wait within twice its time and so long [s] does not
+LATE, SETTLED = (
+    2.0,
+    180.0,
+)  # who has not come to wait within twice its time and so long [s] does not
 KINDS: dict[str, Literal["guard", "robot"]] = {GUARD: "guard", ROBOT: "robot"}
 
 
@@ -327,7 +330,7 @@ class Dispatcher:
         ground = self.ground
         if not ground.stations:
             return None
-        starts = team.starts()
+        starts = [replace(start, under_way=True) for start in team.starts()]  # there is no hurry
         eta = self.travel(starts, [s.position for s in ground.stations])[1].T.copy()
         bound_for: list[int | None] = []
         for row, (start, engaged) in enumerate(zip(starts, team.engaged, strict=True)):

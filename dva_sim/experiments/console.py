@@ -206,7 +206,7 @@ def list_all() -> None:
     """Everything that can be named in a configuration."""
     from dva_sim.agents.operator.strategies import STRATEGIES
     from dva_sim.agents.tilt import FILTERS
-    from dva_sim.core.dispatch import POLICIES
+    from dva_sim.core.dispatch import known_policies
 
     from_files = {
         "studies": "experiments",
@@ -222,5 +222,5 @@ def list_all() -> None:
     table.add_row("patterns", ", ".join(PATTERNS))
     table.add_row("operators", ", ".join(sorted(STRATEGIES)))
     table.add_row("filters", ", ".join(sorted(FILTERS)))
-    table.add_row("policies", ", ".join(sorted(POLICIES)))
+    table.add_row("policies", ", ".join(known_policies()))
     console.print(table)

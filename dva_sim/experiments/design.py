@@ -115,12 +115,18 @@ def inputs(cells: Iterable[Cell]) -> dict[str, str]:
     """Files that scenarios name by path (maps, traces), with the hash of their contents."""
     dumps = (cell.scenario.model_dump(mode="json") for cell in cells)
     names = sorted({text for dump in dumps for text in _texts(dump) if "." in text})
-    paths = [(name, Path(name)) for name in names if "\n" not in name and len(name) < 1000]
+    short = [name for name in names if "\n" not in name and len(name) < 1000]
+    paths = [(name, Path(_file_of(name))) for name in short]
     return {
         name: hashlib.sha256(path.read_bytes()).hexdigest()[:16]
         for name, path in paths
         if path.is_file()
     }
+
+
+def _file_of(name: str) -> str:
+    """The file of a policy that is named as `file.py:Class`; other names are files as they are."""
+    return name.rpartition(":")[0] if ".py:" in name else name
 
 
 def _texts(data: Any) -> Iterator[str]:
@@ -157,10 +163,18 @@ def _build(study: Study, part: str, source: Document, changes: Mapping[str, Any]
     model = model_of(source)
     fixed = {**study.changes, **model.set_by_study(study.seed)}
     try:
-        return model.build(source, {**fixed, **changes})
+        return model.build(source, _located({**fixed, **changes}, study.folder))
     except ConfigError as error:
         blamed = _blamed(study, part, error, changes) if error.file is None else None
         raise (blamed or error) from None
+
+
+def _located(changes: dict[str, Any], folder: Path) -> dict[str, Any]:
+    """A policy in a file beside the study is found from anywhere."""
+    key = "dispatch.policy"
+    named: dict[str, Any] = {"dispatch": {"policy": changes.get(key)}}
+    scenarios.locate_policy(named, [folder])
+    return {**changes, key: named["dispatch"]["policy"]} if key in changes else changes
 
 
 def _blamed(

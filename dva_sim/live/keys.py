@@ -51,12 +51,12 @@ def _ids(name: str) -> Iterator[str]:
 
 
 def _team(scenario: Scenario) -> Iterator[str]:
-    """All devices of a scenario; each event may have a detector."""
+    """All devices of a scenario; each report may have a detector or a caller."""
     counts = {
         "robot": scenario.robot.count,
         "guard": scenario.guard.count,
         "operator": scenario.operator.count,
-        "detector": len(scenario.events),
+        "detector": sum(event.reports for event in scenario.events),
     }
     yield DVA
     for kind, count in counts.items():

@@ -12,6 +12,7 @@ from dva_sim.agents.operator.agent import OperatorAgent
 from dva_sim.agents.operator.drive import DriverSeat, OperatorSetup
 from dva_sim.agents.operator.person import draw_person
 from dva_sim.agents.operator.strategies import STRATEGIES, Oracle, Reach, Truth
+from dva_sim.agents.robot import EXPECTED_READY, EXPECTED_SPEED
 from dva_sim.agents.tilt import Phone
 from dva_sim.core.access import Access, AccessRule
 from dva_sim.core.dispatch import load_policy
@@ -25,9 +26,6 @@ from dva_sim.protocol import messages as m
 from dva_sim.scenario import Scenario, guard_profile, phone_profile, population, robot_profile
 from dva_sim.simulation.dva import DvaAgent
 from dva_sim.simulation.stage import Stage
-
-ROBOT_PACE = 0.35  # what the DVA expects of a teleoperated robot [m/s]
-ROBOT_READY = 4.0  # and of its operator [s]
 
 
 def add_dva(
@@ -74,7 +72,7 @@ class _Ways:
         self._stage = stage
         self._paces = {
             "guard": (guards.walking_mean_mps, guards.mobilisation_s.median),
-            "robot": (ROBOT_PACE, ROBOT_READY),
+            "robot": (EXPECTED_SPEED, EXPECTED_READY),
         }
 
     def __call__(

@@ -14,6 +14,7 @@ from dva_sim.core.service import Desk
 from dva_sim.network.patterns import Subscription
 from dva_sim.protocol import messages as m
 
+MOST_TOLD = 20_000  # events whose last word is remembered, so that none is said twice
 TICK = 1.0  # how often the desk looks at deadlines [s]
 
 
@@ -137,8 +138,8 @@ class DvaAgent:
         if self._told.get(event.number) is event.state:
             return
         self._told[event.number] = event.state
-        if not event.open:
-            del self._told[event.number]
+        if len(self._told) > MOST_TOLD:
+            del self._told[next(iter(self._told))]
         told = f"event {event.number} ({event.kind}) is {event.state}"
         if event.state is State.ASSIGNED and event.holder:
             told += f" to {self.device.label_of(event.holder)}"

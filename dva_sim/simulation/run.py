@@ -92,6 +92,7 @@ class Run:
             stage.labels,
             self.links,
             self.clock.now,
+            contained=self.field.contained,
         )
 
     def _settled(self) -> bool:

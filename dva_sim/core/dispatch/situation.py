@@ -68,8 +68,8 @@ class Cover:
 
     Attributes:
         stations: Names of the places to wait at.
-        eta: From each responder to each station [s], shape `(responders, stations)`;
-            infinite for who cannot be sent to wait.
+        eta: Way from each responder to each station [s], shape `(responders, stations)`,
+            without mobilisation; infinite for who cannot be sent to wait.
         reach: From each station to each zone [s], shape `(stations, zones)`.
         demand: Share of events expected in each zone, shape `(zones,)`; they add up to 1.
         bound_for: Station that each responder is on its way to, to wait there; None if none.
