@@ -180,7 +180,7 @@ class Demand:
     # --- one after the other -------------------------------------------------------------
 
     def _next(self, stream: int, gaps: Draws[float], index: int, last: float) -> None:
-        when = last + gaps[index]
+        when = last + gaps[index] / self._scenario.intensity
         if when <= self._ends(stream):
             self._clock.call_at(when, self._renew, stream, gaps, index, when)
 

@@ -221,6 +221,7 @@ class TimedScenario(Config):
         zones: Named parts of an area: xmin, ymin, xmax, ymax [m].
         travel: `none`: no time; `straight`; `path`: planned on the site; or a law: a time for
             each pair of an event and a responder. Left out, whatever the ground allows best.
+        intensity: Events of every stream with a `between` come so many times as often.
         warm_up_s: Not measured.
         horizon_s: No event after this.
         max_events: No event after so many.
@@ -239,6 +240,7 @@ class TimedScenario(Config):
     operators: Operators = Operators()
     demand: Annotated[tuple[Stream, ...], Field(min_length=1)]
     dispatch: TimedDispatch = TimedDispatch()
+    intensity: Positive = 1.0
     warm_up_s: NonNegative = 0.0
     horizon_s: Annotated[float, Field(gt=0, le=1e11)] = 86_400.0
     max_events: Annotated[int, Field(ge=1)] | None = None
