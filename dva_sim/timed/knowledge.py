@@ -26,22 +26,30 @@ def travel(
     point of such a world.
     """
     terrain, units = shift.terrain, [shift.by_device[s.device] for s in starts]
-    places = [terrain.known_at(s.position) for s in starts]
+    places = [
+        unit.place if unit.leg is None else terrain.known_at(s.position)
+        for s, unit in zip(starts, units, strict=True)
+    ]
     ready = [
         0.0 if s.under_way or unit.equipped else unit.group.mobilisation.mean
         for s, unit in zip(starts, units, strict=True)
     ]
-    length = np.empty((len(goals), len(starts)))
-    eta = np.empty((len(goals), len(starts)))
+    if shift.scenario.way == "none":
+        length = np.zeros((len(goals), len(starts)))
+        return length, length + ready
     drawn = not isinstance(shift.scenario.way, str)
-    for row, position in enumerate(goals):
+    lengths, etas = [], []
+    for position in goals:
         goal = terrain.known_at(position)
-        for column, (unit, place) in enumerate(zip(units, places, strict=True)):
-            way = terrain.length(place, goal)
-            seconds = shift.trip(unit, place, goal) if drawn else way / unit.group.speed_mps
-            length[row, column] = way
-            eta[row, column] = ready[column] + seconds
-    return length, eta
+        ways = [terrain.length(place, goal) for place in places]
+        if drawn:
+            trips = [shift.trip(u, at, goal) for u, at in zip(units, places, strict=True)]
+        else:
+            trips = [way / u.group.speed_mps for u, way in zip(units, ways, strict=True)]
+        lengths.append(ways)
+        etas.append([a + b for a, b in zip(ready, trips, strict=True)])
+    shape = len(goals), len(starts)
+    return np.array(lengths).reshape(shape), np.array(etas).reshape(shape)
 
 
 def place_of(terrain: Terrain, where: Point | str, number: int = 1) -> Place:

@@ -55,7 +55,7 @@ class Mail:
         self.sent = 0
         self.refused: Counter[str] = Counter()
         self._waiting: deque[tuple[str, m.Body, object]] = deque()
-        self._numbers: Counter[str] = Counter()
+        self._numbers: dict[str, int] = {}
         self._due = math.inf
 
     def say(self, source: str, body: m.Body, about: object = None) -> None:
@@ -68,16 +68,17 @@ class Mail:
 
     def carry(self) -> None:
         """Bring everything that was said, and what was said in answer, until all is quiet."""
-        waiting, desk = self._waiting, self.desk
+        waiting, desk, now = self._waiting, self.desk, self._clock.now
         while waiting:
             source, body, about = waiting.popleft()
             self._moved()
-            reply, sends = desk.handle(self._message(source, body), self._clock.now)
+            reply, sends = desk.handle(self._message(source, body), now)
             self.sent += 1
             if reply.code != m.OK:
                 self.refused[f"{type(body).__name__}: {m.CODE_NAMES[reply.code]}"] += 1
             self._changed(about)
-            self._deliver(sends)
+            if sends:
+                self._deliver(sends)
         self._look_again()
 
     def tick(self) -> None:
@@ -89,7 +90,7 @@ class Mail:
         self.carry()
 
     def _message(self, source: str, body: m.Body) -> m.Message:
-        number = self._numbers[source] = self._numbers[source] + 1
+        number = self._numbers[source] = self._numbers.get(source, 0) + 1
         return m.Message(DVA, number, source, NOON, 0, body)
 
     def _deliver(self, sends: list[Send]) -> None:
@@ -102,7 +103,7 @@ class Mail:
             taken = taker is not None and taker.take(send.body)
             answer = self.desk.delivered if taken else self.desk.undelivered
             queue.extend(answer(send, now))
-            self._changed(None)
+        self._changed(None)
 
     def _look_again(self) -> None:
         """Be there at the next deadline."""

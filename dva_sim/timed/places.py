@@ -78,14 +78,13 @@ class Terrain:
         return place
 
     def remember(self, place: Place) -> Place:
-        """Know a place by its position, until it is forgotten."""
-        self._known[place.position] = place
-        return place
+        """Know a place by its position, until it is forgotten; a fixed one is known already."""
+        return self._known.setdefault(place.position, place)
 
     def forget(self, place: Place) -> None:
         """The place plays no part any more."""
-        if place.fixed is not place:
-            self._known.pop(place.position, None)
+        if self._known.get(place.position) is place and place.fixed is not place:
+            del self._known[place.position]
 
     def known_at(self, position: m.Position) -> Place:
         """The place that a message speaks of."""
@@ -228,8 +227,10 @@ class Plane(Terrain):
     def along(self, a: Place, b: Place, gone: float) -> Place:
         """See `Terrain`."""
         whole = self.length(a, b)
-        if whole <= 0.0 or gone >= whole:
+        if gone >= whole:
             return b
+        if gone <= 0.0:
+            return a
         share = gone / whole
         return self.place(a.x + share * (b.x - a.x), a.y + share * (b.y - a.y))
 

@@ -15,13 +15,14 @@ import numpy as np
 
 from dva_sim.errors import ConfigError
 from dva_sim.streams import Streams
-from dva_sim.timed.laws import Law
+from dva_sim.timed.laws import Floats, Law
 from dva_sim.timed.places import APART, Place, Terrain
 from dva_sim.timed.scenario import Point
 from dva_sim.worlds.planning import Planner
 from dva_sim.worlds.site import FOOTPRINT, Detector, Pose, Site, load_site
 
 CLEARANCE = 0.4  # radius that must fit where an event happens [m]
+MOST_PATHS = 5000  # kept at a time
 DETECTS = {"fire": "smoke", "gas_leak": "gas", "flood": "water"}
 
 
@@ -31,6 +32,7 @@ class _Ways:
     def __init__(self, site: Site) -> None:
         self.planner = Planner(site, FOOTPRINT)
         self._lengths: dict[tuple[Point, Point], float] = {}
+        self._paths: dict[tuple[Point, Point], Floats | None] = {}
 
     def length(self, a: Point, b: Point) -> float:
         """The way is as long there as back [m]."""
@@ -39,6 +41,14 @@ class _Ways:
         if length is None:
             length = self._lengths[pair] = self.planner.distance(*pair) if a != b else 0.0
         return length
+
+    def path(self, a: Point, b: Point) -> Floats | None:
+        """The way itself: who is under way is asked again and again where it is."""
+        if (a, b) not in self._paths:
+            if len(self._paths) >= MOST_PATHS:
+                self._paths.clear()
+            self._paths[a, b] = self.planner.path(a, b)
+        return self._paths[a, b]
 
 
 @lru_cache(maxsize=8)
@@ -85,6 +95,7 @@ class Rooms(Terrain):
         ]
         ends = self.site.doors.reshape(-1, 2, 2).mean(axis=1).tolist()
         self._doors: list[Point] = [(x, y) for x, y in ends]
+        self._detectors: dict[str, list[tuple[Detector, str | None]]] = {}
 
     # --- places ------------------------------------------------------------------------
 
@@ -155,12 +166,14 @@ class Rooms(Terrain):
 
     def along(self, a: Place, b: Place, gone: float) -> Place:
         """See `Terrain`."""
-        if self._way == "none" or gone >= self.length(a, b):
+        if gone >= self.length(a, b):
             return b
+        if gone <= 0.0:
+            return a
         if self._way == "straight":
             share = gone / self.length(a, b)
             return self.place(a.x + share * (b.x - a.x), a.y + share * (b.y - a.y))
-        points = self._ways.planner.path(a.point, b.point)
+        points = self._ways.path(a.point, b.point)
         if points is None:
             return b
         reached = np.r_[0.0, np.cumsum(np.hypot(*np.diff(points, axis=0).T))]
@@ -176,7 +189,9 @@ class Rooms(Terrain):
         Raises:
             ConfigError: there is none.
         """
-        fitting = [d for d in self.site.detectors if d.kind == DETECTS[kind]]
-        if not fitting:
+        if kind not in self._detectors:
+            fitting = [d for d in self.site.detectors if d.kind == DETECTS[kind]]
+            self._detectors[kind] = [(d, self.site.room_at(d.x, d.y)) for d in fitting]
+        if not self._detectors[kind]:
             raise ConfigError(f"site {self.site.name!r} has no {DETECTS[kind]} detectors")
-        return [(d, self.site.room_at(d.x, d.y)) for d in fitting]
+        return self._detectors[kind]

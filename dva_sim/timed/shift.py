@@ -82,6 +82,8 @@ class Shift:
         self.total, self.settled = 0, Counter[str]()
         self.violations: Counter[str] = Counter()
         self.driven: dict[str, float] = {}
+        self.told: list[m.Position | None] = [None] * len(self.units)
+        self.half_way: dict[Unit, Place] = {}
         self._served: set[int] = set()
         self._moving: dict[Unit, None] = {}
         self._luck: dict[tuple[str, int, int], Draws[float]] = {}
@@ -360,15 +362,23 @@ class Shift:
         """Say something to the DVA."""
         self.mail.say(source, body)
 
+    def says_arrived(self, unit: Unit, job: Job) -> None:
+        """Tell the DVA that a unit is where it was sent; so it knows where the unit is."""
+        event = job.incident.event
+        self.told[unit.number] = None if event is None else event.position
+        self.mail.say(job.voice, m.OrderProgress(job.order.event_id, "arrived"))
+
     def stands(self, unit: Unit, activity: str) -> None:
         """Publish where a unit is."""
         self._publish(unit, unit.here(), activity)
 
     def _publish(self, unit: Unit, place: Place, activity: str) -> None:
-        if unit.group.from_s > self.clock.now:
+        if unit.group.from_s > self.clock.now or self.told[unit.number] is place.position:
             return
-        if place.fixed is None:
-            self.terrain.remember(place)  # the DVA asks about it at once
+        self.told[unit.number] = place.position
+        self.terrain.forget(self.half_way.pop(unit, place))
+        if place.fixed is None and place.about is None:
+            self.half_way[unit] = self.terrain.remember(place)
         if unit.kind == "guard":
             self.mail.publish(unit.device, m.PersonStatus(activity, place.position))
         else:
@@ -441,7 +451,7 @@ class Shift:
 
     def freed(self, unit: Unit, job: Job) -> None:
         """A job is over: so is the work of the operator who drove."""
-        if job.voice in self.driven:
+        if unit.kind == "robot":
             self.driven[job.voice] += self._measured(job.begun)
 
     def _measured(self, since: float) -> float:

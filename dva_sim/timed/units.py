@@ -34,6 +34,9 @@ class World(Protocol):
     def say(self, source: str, body: m.Body) -> None:
         """Say something to the DVA."""
 
+    def says_arrived(self, unit: Unit, job: Job) -> None:
+        """Tell the DVA that a unit is where it was sent."""
+
     def stands(self, unit: Unit, activity: str) -> None:
         """Publish where a unit is."""
 
@@ -248,7 +251,6 @@ class Unit:
     def _depart(self, job: Job) -> None:
         self._turn_to(job, "travel")
         self.equipped = True
-        self.world.say(job.voice, m.OrderProgress(job.order.event_id, "departed"))
         start, goal = self.here(), job.incident.place
         self._stop()
         length, seconds = self.world.length(start, goal), self.world.trip(self, start, goal)
@@ -256,6 +258,8 @@ class Unit:
             self._finish(job, "failed")
             return
         now = self.world.now
+        if seconds > 0.0:  # else the arrival says it all
+            self.world.say(job.voice, m.OrderProgress(job.order.event_id, "departed"))
         if not job.inside and length > 0.0:
             outside = max(0.0, length - job.incident.danger_radius(now + seconds))
             length, seconds = outside, seconds * outside / length
@@ -271,7 +275,7 @@ class Unit:
             self.place = self.world.along(leg.start, incident.place, leg.length)
         else:
             self.place = incident.place
-        self.world.say(job.voice, m.OrderProgress(job.order.event_id, "arrived"))
+        self.world.says_arrived(self, job)
         if job.order.task == "confirm":
             self._turn_to(job, "look")
             self._then(self.world.look(self, incident), self._found, job)
@@ -346,7 +350,8 @@ class Unit:
     def _finish(self, job: Job, state: str) -> None:
         """The order is settled, or given back."""
         world = self.world
-        world.spent(self, job.phase, self.since)
+        if world.now > self.since:
+            world.spent(self, job.phase, self.since)
         world.freed(self, job)
         self.job = None
         self._ticket += 1
@@ -446,10 +451,11 @@ class Unit:
     def _turn_to(self, job: Job, phase: str) -> None:
         """Another phase of the same job begins."""
         world, now = self.world, self.world.now
-        world.spent(self, job.phase, self.since)
-        if self.kind == "guard" and job.phase in ("look", "act"):
-            seconds = exposure.on_scene(job.incident, self.since, now)
-            world.exposed(self, job.phase, seconds)
+        if now > self.since:
+            world.spent(self, job.phase, self.since)
+            if self.kind == "guard" and job.phase in ("look", "act"):
+                seconds = exposure.on_scene(job.incident, self.since, now)
+                world.exposed(self, job.phase, seconds)
         job.phase, self.since = phase, now
 
     def _then(self, delay: float, action: Any, job: Job | None) -> None:
