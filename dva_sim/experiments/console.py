@@ -24,8 +24,11 @@ from dva_sim import resources
 from dva_sim import scenario as scenarios
 from dva_sim.config import parse_changes
 from dva_sim.errors import ConfigError
+from dva_sim.experiments import shifts
+from dva_sim.experiments.models import model_of
 from dva_sim.scenario import Scenario
 from dva_sim.simulation import Recording, simulate
+from dva_sim.timed import TimedScenario
 
 INTERRUPTED = 130  # exit code of a program ended by Ctrl-C
 PATTERNS = ("req-rep", "pipelined", "pub-sub", "latest-wins")
@@ -48,6 +51,12 @@ def episode(
         check_path(video)
     document = scenarios.load(name)
     changes = parse_changes(pairs)
+    scenario = model_of(document).build(document, changes)
+    if isinstance(scenario, TimedScenario):
+        if video is not None or side_by_side is not None:
+            raise ConfigError(f"{name} is a timed scenario: there is nothing to see or to send")
+        shifts.tell(scenario, seed, console)
+        return
     settings: list[dict[str, Any]] = [changes]
     if side_by_side is not None:
         settings = [changes | {"pattern": p} for p in _two_patterns(side_by_side)]

@@ -1,0 +1,95 @@
+"""What the command line tells of a timed run: its events, and what it took to deal with them."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from dva_sim.timed import TimedRecording, TimedScenario, simulate_timed
+from dva_sim.timed.ledger import OUTCOMES
+
+SHOWN = 30  # events in the table; the lines below it count them all
+WORDS = (
+    "detected",
+    "kind",
+    "where",
+    "what came of it",
+    "who looked",
+    "on scene after",
+    "who acted",
+)
+
+
+def tell(scenario: TimedScenario, seed: int, console: Console) -> None:
+    """Run a shift and print it."""
+    started = time.perf_counter()
+    recording = simulate_timed(scenario, seed)
+    took = time.perf_counter() - started
+    console.rule(f"{scenario.dispatch.policy}, seed {seed}")
+    if recording.columns:
+        console.print(_table(recording))
+    for line in _lines(recording):
+        console.print(line, soft_wrap=True)
+    broken = sum(recording.violations.values())
+    console.print(
+        f"{recording.ended:.0f} s simulated in {took:.2f} s, {recording.messages} messages, "
+        f"{broken} rules broken",
+        soft_wrap=True,
+    )
+
+
+def _table(recording: TimedRecording) -> Table:
+    table = Table(box=None, pad_edge=False)
+    for heading in WORDS:
+        right = heading in ("detected", "on scene after")
+        table.add_column(heading, justify="right" if right else "left")
+    columns = recording.columns
+    for row in range(min(SHOWN, len(columns["detected"]))):
+        response = float(columns["arrived"][row] - columns["detected"][row])
+        zone = int(columns["zone"][row])
+        table.add_row(
+            _seconds(float(columns["detected"][row])),
+            recording.streams[int(columns["stream"][row])],
+            recording.zones[zone] if zone >= 0 else "",
+            OUTCOMES[int(columns["outcome"][row])],
+            _who(recording, int(columns["responder"][row])),
+            _seconds(response),
+            _who(recording, int(columns["actor"][row])),
+        )
+    return table
+
+
+def _lines(recording: TimedRecording) -> Iterator[str]:
+    total = recording.count()
+    parts = [f"{n} {name}" for name in OUTCOMES if (n := recording.count(name))]
+    yield f"{total} events measured: {', '.join(parts)}"
+    if recording.columns:
+        columns, here = recording.columns, recording.measured
+        response = (columns["arrived"] - columns["detected"])[here]
+        there = response[np.isfinite(response)]
+        if len(there):
+            median, late = np.percentile(there, [50, 90])
+            yield f"on scene after {median:.1f} s (median), {late:.1f} s (90 % of those reached)"
+    for kind in ("guard", "robot"):
+        units = [n for n, unit in enumerate(recording.units) if unit.kind == kind]
+        if units:
+            shares = ", ".join(f"{100 * recording.utilisation(n):.0f} %" for n in units)
+            yield f"{kind}s at work: {shares}"
+    if recording.exposure:
+        yield f"people in danger: {recording.exposure:.0f} s"
+    if recording.counters:
+        counted = (f"{what} {n}" for what, n in sorted(recording.counters.items()))
+        yield f"counted: {', '.join(counted)}"
+
+
+def _who(recording: TimedRecording, number: int) -> str:
+    return recording.responders[number] if number >= 0 else ""
+
+
+def _seconds(value: float) -> str:
+    return f"{value:.1f} s" if math.isfinite(value) else ""
