@@ -14,15 +14,7 @@ from dva_sim.timed import TimedRecording, TimedScenario, simulate_timed
 from dva_sim.timed.ledger import OUTCOMES
 
 SHOWN = 30  # events in the table; the lines below it count them all
-WORDS = (
-    "detected",
-    "kind",
-    "where",
-    "what came of it",
-    "who looked",
-    "on scene after",
-    "who acted",
-)
+WORDS = ("detected", "kind", "where", "outcome", "looked", "after", "acted")
 
 
 def tell(scenario: TimedScenario, seed: int, console: Console) -> None:
@@ -46,10 +38,10 @@ def tell(scenario: TimedScenario, seed: int, console: Console) -> None:
 def _table(recording: TimedRecording) -> Table:
     table = Table(box=None, pad_edge=False)
     for heading in WORDS:
-        right = heading in ("detected", "on scene after")
-        table.add_column(heading, justify="right" if right else "left")
+        right = heading in ("detected", "after")
+        table.add_column(heading, justify="right" if right else "left", no_wrap=True)
     columns = recording.columns
-    for row in range(min(SHOWN, len(columns["detected"]))):
+    for row in np.argsort(columns["detected"], kind="stable")[:SHOWN]:
         response = float(columns["arrived"][row] - columns["detected"][row])
         zone = int(columns["zone"][row])
         table.add_row(
