@@ -1,0 +1,1 @@
+"""Which policy should send whom: measures, bounds, figures and page of studies of dispatch."""
