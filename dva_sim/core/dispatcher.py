@@ -34,10 +34,7 @@ from dva_sim.protocol import messages as m
 CONSIDERED = 1000  # tasks that one decision looks at, those detected longest ago
 SAME_PLACE = 3e-5  # a few metres [deg]
 DECISIONS = 4  # in a row, where one makes the next necessary
-LATE, SETTLED = (
-    2.0,
-    180.0,
-)  # who has not come to wait within twice its time and so long [s] does not
+LATE, SETTLED = 2.0, 180.0  # within twice its time and so long [s] who was sent to wait is there
 KINDS: dict[str, Literal["guard", "robot"]] = {GUARD: "guard", ROBOT: "robot"}
 
 
@@ -214,16 +211,19 @@ class Dispatcher:
     def _relocate(
         self, move: Relocation, situation: Situation, team: _Team, now: float
     ) -> list[Send] | None:
-        """Let an idle guard wait elsewhere, unless it is on its way there already."""
-        guard, cover = team.entries[move.responder].device.id_tag, situation.cover
+        """Let an idle guard wait elsewhere, unless it is there already, or on its way there."""
+        entry, cover = team.entries[move.responder], situation.cover
         if not self.policy.relocates or cover is None or team.engaged[move.responder] is not None:
+            return None
+        guard, place = entry.device.id_tag, self.ground.stations[move.station].position
+        if entry.position is not None and _same_place(place, entry.position):
             return None
         eta = float(cover.eta[move.responder, move.station])
         if not math.isfinite(eta) or cover.bound_for[move.responder] == move.station:
             return None
         self._bound_for[guard] = move.station, now + LATE * eta + SETTLED
         self.orders.counters["relocated"] += 1
-        return [Send(guard, m.Relocation(self.ground.stations[move.station].position))]
+        return [Send(guard, m.Relocation(place))]
 
     # --- what is known -----------------------------------------------------------------
 

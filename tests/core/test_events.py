@@ -1,0 +1,261 @@
+"""The book of events: reports become events, each in one state, its times in order."""
+
+from __future__ import annotations
+
+import pytest
+from office import DETECTOR, GUARD, HERE, OPERATOR, OTHER_DETECTOR, ROBOT, Office, east
+
+from dva_sim.core.events import KEPT_CLOSED, MOST_SOURCES, EventBook, State
+from dva_sim.core.rules import Rules
+from dva_sim.protocol import messages as m
+
+
+@pytest.fixture
+def office() -> Office:
+    office = Office()
+    office.register(OTHER_DETECTOR, "Sensor")
+    return office
+
+
+def waiting_office() -> Office:
+    """Where nobody is free to go."""
+    office = Office()
+    office.register(OTHER_DETECTOR, "Sensor")
+    office.busy(GUARD, ROBOT, OPERATOR)
+    return office
+
+
+# --- reports -------------------------------------------------------------------------------
+
+
+def test_reports_of_one_kind_within_8_metres_are_one_event(office: Office) -> None:
+    office.fire(12)
+    office.fire(19.9)
+    office.fire(20.1)
+    office.fire(12, kind="gas_leak")
+    assert {e.number: e.reports for e in office.desk.book.open.values()} == {1: 2, 2: 1, 3: 1}
+
+
+def test_where_reports_are_not_merged_each_is_an_event() -> None:
+    office = Office(rules=Rules(merge_distance=0.0))
+    office.fire(12)
+    office.fire(12)
+    assert office.desk.book.total == 2
+
+
+def test_an_event_that_is_over_takes_no_more_reports(office: Office) -> None:
+    office.fire(12)
+    office.finds(OPERATOR, "refuted", 3.0)
+    office.fire(12, now=4.0)
+    assert (office.event(1).reports, office.event(2).reports) == (1, 1)
+
+
+def test_a_report_said_twice_by_one_source_is_not_more_certain(office: Office) -> None:
+    office.fire(12, confidence=0.6)
+    office.fire(12, confidence=0.6)
+    assert office.event().confidence == pytest.approx(0.6)
+    office.fire(12, confidence=0.7)
+    assert office.event().confidence == pytest.approx(0.7)
+
+
+def test_two_sources_of_06_and_05_that_err_independently_make_08(office: Office) -> None:
+    office.fire(12, confidence=0.6)
+    office.fire(12, confidence=0.5, source=OTHER_DETECTOR)
+    assert office.event().confidence == pytest.approx(0.8)
+
+
+def test_an_event_is_as_severe_as_the_worst_report(office: Office) -> None:
+    for severity in (0.3, 0.9, 0.5):
+        office.fire(12, severity=severity)
+    assert office.event().severity == 0.9
+
+
+def test_of_one_event_at_most_64_sources_are_told_apart() -> None:
+    book = EventBook()
+    event = book.add("fire", HERE, 0.5, 0.0)
+    for number in range(MOST_SOURCES + 10):
+        book.note_source(event, str(number), 0.5)
+    assert len(event.sources) == 64
+
+
+def test_when_the_book_is_full_a_report_is_answered_busy_and_one_of_a_known_event_is_not(
+    office: Office, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("dva_sim.core.events.MOST_OPEN", 1)
+    office.fire(12)
+    new = m.EventReport(None, "fire", east(90), 0.5, 0.9, "detected")
+    assert office.say(DETECTOR, new)[0].code == m.BUSY
+    known = m.EventReport(None, "fire", east(12), 0.5, 0.9, "detected")
+    assert office.say(DETECTOR, known)[0].code == m.OK
+    assert office.desk.book.total == 1
+
+
+# --- withdrawal ----------------------------------------------------------------------------
+
+
+def test_what_its_only_source_withdraws_before_anybody_was_sent_has_expired() -> None:
+    office = waiting_office()
+    office.fire(12, now=1.0)
+    office.withdraw(12, now=5.0)
+    assert office.event().state is State.EXPIRED
+    assert office.event().times == {"detected": 1.0, "closed": 5.0}
+    assert office.desk.book.waiting == {}
+
+
+def test_an_event_expires_only_when_the_last_of_its_sources_has_withdrawn_it() -> None:
+    office = waiting_office()
+    office.fire(12, source=DETECTOR)
+    office.fire(14, source=OTHER_DETECTOR)
+    office.withdraw(12, source=DETECTOR)
+    office.withdraw(12, source=DETECTOR)
+    assert office.event().state is State.PENDING
+    assert list(office.event().sources) == [OTHER_DETECTOR]
+    office.withdraw(14, source=OTHER_DETECTOR)
+    assert office.event().state is State.EXPIRED
+
+
+def test_nobody_can_withdraw_what_another_has_reported() -> None:
+    office = waiting_office()
+    office.fire(12)
+    office.withdraw(12, source=OTHER_DETECTOR)
+    assert office.event().state is State.PENDING
+
+
+def test_once_somebody_is_on_the_way_a_withdrawal_ends_nothing(office: Office) -> None:
+    office.fire(12)
+    office.withdraw(12, now=1.0)
+    assert office.event().state is State.ASSIGNED
+    assert office.event().confidence == 0.0
+
+
+def test_a_withdrawal_elsewhere_or_of_another_kind_ends_nothing() -> None:
+    office = waiting_office()
+    office.fire(12, kind="flood")
+    office.fire(90)
+    office.withdraw(12)
+    assert office.desk.book.counts[State.PENDING] == 2
+
+
+# --- states and times ----------------------------------------------------------------------
+
+
+def test_an_event_runs_its_course_with_its_times_in_order(office: Office) -> None:
+    office.fire(12, now=1.0)
+    office.progress(OPERATOR, "departed", 3.0)
+    office.progress(OPERATOR, "arrived", 9.0)
+    assert office.event().state is State.ON_SCENE
+    office.finds(OPERATOR, "confirmed", 12.0)
+    assert office.event().state is State.CONFIRMED
+    office.progress(OPERATOR, "done", 13.0)
+    assert office.event().times == {
+        "detected": 1.0,
+        "assigned": 1.0,
+        "departed": 3.0,
+        "arrived": 9.0,
+        "confirmed": 12.0,
+        "closed": 12.0,
+    }
+    assert office.working == {}
+
+
+def test_every_step_is_a_change_that_the_memory_hears_of(office: Office) -> None:
+    office.fire(12)
+    book = office.desk.book
+    for state in ("departed", "arrived"):
+        book.changes()
+        office.progress(OPERATOR, state, 3.0)
+        assert [event.number for event in book.changes()] == [1]
+
+
+def test_who_finds_something_was_there_even_if_its_arrival_was_lost(office: Office) -> None:
+    office.fire(12, now=1.0)
+    office.finds(OPERATOR, "confirmed", 12.0)
+    times = office.event().times
+    assert [times[step] for step in ("departed", "arrived", "confirmed")] == [12.0, 12.0, 12.0]
+
+
+def test_an_event_that_waits_again_has_not_been_departed_for(office: Office) -> None:
+    office.fire(12, now=1.0)
+    office.progress(OPERATOR, "arrived", 9.0)
+    office.busy(GUARD)
+    office.busy(OPERATOR, ROBOT)
+    office.desk.orders.engaged |= dict.fromkeys((OPERATOR, ROBOT), office.event())
+    office.progress(OPERATOR, "failed", 10.0)
+    assert set(office.event().times) == {"detected", "assigned"}  # to the same again
+
+
+def test_a_step_that_does_not_exist_is_refused() -> None:
+    book = EventBook()
+    event = book.add("fire", HERE, 0.5, 0.0)
+    book.move(event, State.ESCALATED, 1.0)
+    with pytest.raises(ValueError, match="cannot go from escalated to confirmed"):
+        book.move(event, State.CONFIRMED, 2.0)
+
+
+def test_each_event_is_in_one_state_and_the_counts_add_up_to_all() -> None:
+    book = EventBook()
+    for number in range(6):
+        book.add("fire", east(100 * number), 0.5, 0.0)
+    book.move(book.open[2], State.ASSIGNED, 1.0)
+    book.move(book.open[3], State.EXPIRED, 1.0)
+    book.move(book.open[4], State.CONFIRMED, 1.0)
+    assert {s.value: n for s, n in book.counts.items() if n} == {
+        "pending": 3,
+        "assigned": 1,
+        "expired": 1,
+        "confirmed": 1,
+    }
+    assert sum(book.counts.values()) == book.total == 6
+
+
+def test_the_last_1000_closed_events_are_kept() -> None:
+    book = EventBook()
+    for _ in range(KEPT_CLOSED + 1):
+        book.move(book.add("fire", HERE, 0.5, 0.0), State.ESCALATED, 1.0)
+    assert book.get(1) is None
+    assert book.get(2) is not None
+    assert len(book.closed) == 1000
+
+
+# --- findings ------------------------------------------------------------------------------
+
+
+def test_only_who_was_sent_can_tell_what_was_found(office: Office) -> None:
+    office.fire(12)
+    assert office.finds(DETECTOR, "confirmed", 2.0)[0].code == m.NOT_PERMITTED
+    assert office.event().state is State.ASSIGNED
+    assert office.finds(OPERATOR, "confirmed", 3.0)[0].code == m.OK
+    assert office.event().state is State.CONFIRMED
+
+
+def test_of_an_event_that_there_never_was_nobody_can_tell(office: Office) -> None:
+    assert office.finds(OPERATOR, "confirmed", event=5)[0].code == m.UNKNOWN_EVENT
+
+
+def test_what_somebody_found_who_was_sent_earlier_counts_even_late(office: Office) -> None:
+    office.fire(12)
+    office.progress(OPERATOR, "failed", 5.0)
+    assert office.event().responder == GUARD
+    assert office.finds(OPERATOR, "confirmed", 6.0)[0].code == m.OK
+    assert office.event().state is State.CONFIRMED
+    assert "arrived" not in office.event().times  # the guard is still under way
+    assert office.working == {GUARD: 1}
+
+
+def test_a_late_finding_closes_an_event_that_waits(office: Office) -> None:
+    office.busy(GUARD)
+    office.ok(office.fire(12))
+    office.beat(GUARD, now=11.0)
+    office.desk.tick(11.0)
+    assert office.event().state is State.PENDING
+    office.finds(OPERATOR, "confirmed", 12.0)
+    assert office.event().state is State.CONFIRMED
+
+
+def test_a_finding_about_an_event_that_is_over_changes_nothing(office: Office) -> None:
+    office.fire(12)
+    office.finds(OPERATOR, "refuted", 5.0)
+    office.status(ROBOT, 80, now=6.0)
+    assert office.finds(OPERATOR, "confirmed", 7.0)[0].code == m.OK
+    assert office.event().state is State.REFUTED
+    assert office.desk.registry.entries[ROBOT].position == east(80)

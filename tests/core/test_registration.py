@@ -1,0 +1,151 @@
+"""Who is there: registration, a new life, silence, and the device list."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from office import ADDRESS, DETECTOR, DVA, GUARD, OPERATOR, ROBOT, Office
+
+from dva_sim.core.registry import Registry
+from dva_sim.core.send import Send
+from dva_sim.protocol import messages as m
+from dva_sim.protocol.codec import MAX_BYTES, encode
+
+STRANGER = "02:00:00:09:00:09"
+AGAIN = m.Registration("operator", "TeleOp", ADDRESS)
+
+
+@pytest.fixture
+def office() -> Office:
+    return Office()
+
+
+def granted(office: Office) -> int:
+    content = office.say(OPERATOR, m.PermissionRequest(ROBOT, "teleoperation"))[0].content
+    assert isinstance(content, m.Permission)
+    return content.session
+
+
+def listed(office: Office) -> list[str]:
+    content = office.say(OPERATOR, m.GetDeviceList(), 0.0)[0].content
+    assert isinstance(content, m.DeviceList)
+    return [device.id_tag for device in content.devices]
+
+
+def test_who_is_not_registered_is_refused_and_counted(office: Office) -> None:
+    reply, sends = office.say(STRANGER, m.GetDeviceList())
+    assert (reply.code, sends) == (m.NOT_REGISTERED, [])
+    office.beat(STRANGER, now=1.0)
+    assert office.desk.refused == 2
+    assert STRANGER not in office.desk.registry.entries
+
+
+def test_the_device_list_shows_robots_then_operators_then_guards_and_no_detectors(
+    office: Office,
+) -> None:
+    assert listed(office) == [ROBOT, OPERATOR, GUARD]
+
+
+def test_who_is_silent_is_not_on_the_device_list_until_it_is_heard_again(office: Office) -> None:
+    office.beat(OPERATOR, GUARD, now=8.0)
+    office.desk.tick(11.0)
+    assert listed(office) == [OPERATOR, GUARD]
+    office.status(ROBOT, 10, now=12.0)
+    assert listed(office) == [ROBOT, OPERATOR, GUARD]
+
+
+def test_a_list_of_any_devices_fits_into_a_message(office: Office) -> None:
+    for number in range(200):
+        name = ("&" if number % 2 else "\U0001f525") * 64
+        office.say(
+            f"02:00:00:01:01:{number:02X}", m.Registration(name, "Robot", "255.255.255.255:65534")
+        )
+    reply = office.say(OPERATOR, m.GetDeviceList())[0]
+    data = encode(m.Message(OPERATOR, 1, DVA, "12:00:00", 0, reply))
+    assert 5000 < len(data) <= MAX_BYTES
+
+
+def test_a_device_is_silent_only_after_its_timeout_has_passed(office: Office) -> None:
+    office.fire(12)
+    office.desk.tick(10.0)
+    assert office.event().operator == OPERATOR
+    office.say(GUARD, m.GetDeviceList(), 10.0)
+    office.desk.tick(10.1)
+    assert office.event().responder == GUARD
+
+
+@pytest.mark.parametrize("heard", [0.0, 0.1, 1 / 3, 1e6 + 0.7])
+def test_silence_comes_at_the_moment_it_was_announced_for_and_not_before(heard: float) -> None:
+    registry = Registry()
+    registry.register(ROBOT, m.Registration("robot", "Robot", ADDRESS), heard)
+    due = registry.next_silence()
+    assert heard + 10 < due < heard + 10.001
+    assert registry.fallen_silent(heard + 10) == []
+    assert [e.device.id_tag for e in registry.fallen_silent(due)] == [ROBOT]
+    assert registry.next_silence() == math.inf
+
+
+def test_a_device_falls_silent_once(office: Office) -> None:
+    assert len(office.desk.registry.fallen_silent(20.0)) == 4
+    assert office.desk.registry.fallen_silent(30.0) == []
+
+
+def test_a_device_stays_what_it_is(office: Office) -> None:
+    changed = m.Registration("detector", "TeleOp", ADDRESS)
+    assert office.say(DETECTOR, changed)[0].code == m.NOT_PERMITTED
+    assert office.desk.registry.entries[DETECTOR].device.device_type == "Sensor"
+
+
+def test_who_claims_anothers_identity_as_another_type_ends_nothing_of_it(office: Office) -> None:
+    session = granted(office)
+    office.number = 0
+    stolen = m.Registration("evil", "Guard", "10.0.0.66")
+    assert office.say(OPERATOR, stolen)[1] == []
+    assert office.desk.sessions.permissions.grants[ROBOT].session == session
+    assert office.desk.registry.entries[OPERATOR].device.address == ADDRESS
+
+
+def test_a_changed_address_is_known_from_then_on(office: Office) -> None:
+    office.say(OPERATOR, m.Registration("operator", "TeleOp", "10.0.0.7:6000"))
+    assert office.desk.registry.entries[OPERATOR].device.address == "10.0.0.7:6000"
+    assert len(office.desk.registry.entries) == 4
+
+
+def test_a_full_registry_refuses_strangers_and_renews_who_is_known(office: Office) -> None:
+    office.desk.registry.most = 4
+    assert office.say(STRANGER, AGAIN)[0].code == m.BUSY
+    assert office.say(OPERATOR, AGAIN)[0].code == m.OK
+
+
+def test_a_renewed_registration_changes_nothing_and_a_new_life_ends_what_was_held(
+    office: Office,
+) -> None:
+    session = granted(office)
+    assert office.say(OPERATOR, AGAIN)[1] == []
+    assert office.desk.sessions.permissions.grants[ROBOT].session == session
+    office.number = 0  # started anew, it counts its messages from 1 again
+    over = m.PermissionRevocation(ROBOT, OPERATOR, session)
+    assert office.say(OPERATOR, AGAIN)[1] == [Send(ROBOT, over), Send(OPERATOR, over)]
+
+
+def test_a_new_life_knows_nothing_of_its_order(office: Office) -> None:
+    office.ok(office.fire(12))
+    assert office.working == {OPERATOR: 1, ROBOT: 1}
+    office.number = 0
+    office.say(OPERATOR, AGAIN, 5.0)
+    assert office.working == {}
+    assert [send.to for send in office.tick(6.0)] == [OPERATOR]
+
+
+def test_a_copy_of_an_old_registration_ends_nothing(office: Office) -> None:
+    granted(office)
+    first = m.Message(DVA, office.number + 1, OPERATOR, "12:00:01", 0, AGAIN)
+    later = m.Message(DVA, office.number + 9, OPERATOR, "12:00:11", 0, AGAIN)
+    for message in (first, later, first, later):
+        assert office.desk.handle(message, 1.0)[1] == []
+    assert office.desk.sessions.permissions.grants[ROBOT].holder == OPERATOR
+
+
+def test_what_is_not_for_the_dva_is_refused(office: Office) -> None:
+    assert office.say(OPERATOR, m.StartTeleOp())[0].code == m.NOT_SUPPORTED

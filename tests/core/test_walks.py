@@ -1,0 +1,32 @@
+"""Whatever happens in whatever order: no rule is broken, nothing is forgotten, all recovers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from walks import POLICY_NAMES, Walk
+
+# A walk of 400 steps finds what one of 100 does not: orders that come to nothing time and again.
+SHORT, LONG = 100, 400
+
+
+def walk(seed: int, folder: Path, steps: int, policy: str | None = None) -> None:
+    day = Walk(seed, folder, policy)
+    for _ in range(steps):
+        day.step()
+    day.recover()
+    day.memory.close()
+
+
+@pytest.mark.parametrize("policy", POLICY_NAMES)
+def test_a_day_that_goes_wrong_breaks_no_rule_and_ends_well(policy: str, tmp_path: Path) -> None:
+    for seed in range(5):
+        walk(seed, tmp_path, SHORT, policy)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("policy", POLICY_NAMES)
+def test_long_days_that_go_wrong(policy: str, tmp_path: Path) -> None:
+    for seed in range(100, 115):
+        walk(seed, tmp_path, LONG, policy)

@@ -1,0 +1,185 @@
+"""A desk with a small team, for tests: what is said to it, what it wants said, and a plain map."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dva_sim.core.access import Access
+from dva_sim.core.dispatch import MinEta, Policy
+from dva_sim.core.events import Event, State
+from dva_sim.core.ground import Ground, Start
+from dva_sim.core.permissions import Permissions
+from dva_sim.core.rules import Rules
+from dva_sim.core.send import Send
+from dva_sim.core.service import Desk
+from dva_sim.core.sessions import Sessions
+from dva_sim.protocol import messages as m
+
+Floats = NDArray[np.float64]
+DVA = "02:00:00:00:00:01"
+ROBOT, OTHER_ROBOT = "02:00:00:01:00:01", "02:00:00:01:00:02"
+GUARD, OTHER_GUARD = "02:00:00:02:00:01", "02:00:00:02:00:02"
+OPERATOR, OTHER_OPERATOR = "02:00:00:03:00:01", "02:00:00:03:00:02"
+DETECTOR, OTHER_DETECTOR = "02:00:00:04:00:01", "02:00:00:04:00:02"
+TEAM = {GUARD: "Guard", ROBOT: "Robot", OPERATOR: "TeleOp", DETECTOR: "Sensor"}
+HERE = m.Position(38.6612, -9.2058)
+DEGREE_EAST = 87_000.0  # about, at this latitude [m]
+PACES = {"guard": (1.3, 20.0), "robot": (0.35, 4.0)}  # [m/s], [s]
+ESCALATE_AFTER = 60.0  # [s]
+ADDRESS = "192.168.1.9"
+
+
+def east(metres: float) -> m.Position:
+    return m.Position(HERE.latitude, HERE.longitude + metres / DEGREE_EAST)
+
+
+def crow(starts: Sequence[Start], goals: Sequence[m.Position]) -> tuple[Floats, Floats]:
+    """As the crow flies, along the one street there is."""
+    at = np.array([s.position.longitude for s in starts])
+    to = np.array([goal.longitude for goal in goals])
+    distance = np.abs(to[:, None] - at[None, :]) * DEGREE_EAST
+    speed = np.array([PACES[s.kind][0] for s in starts])
+    ready = np.array([0.0 if s.under_way else PACES[s.kind][1] for s in starts])
+    return distance, ready + distance / speed
+
+
+class Office:
+    """A desk with a guard at 0 m, a robot at 10 m, an operator and a detector.
+
+    Everything that the desk wants sent is in `sent` too, in order.
+    """
+
+    def __init__(
+        self,
+        policy: Policy | None = None,
+        rules: Rules | None = None,
+        ground: Ground | None = None,
+        access: Access | None = None,
+    ) -> None:
+        self.policy, self.ground, self.access = policy or MinEta(), ground, access
+        self.rules = rules or Rules(escalate_after=ESCALATE_AFTER)
+        self.number = 0
+        self.sent: list[Send] = []
+        self.desk = self.new_desk()
+        for id_tag, kind in TEAM.items():
+            self.register(id_tag, kind)
+        self.stands(GUARD, 0)
+        self.status(ROBOT, 10)
+
+    def new_desk(self) -> Desk:
+        """A desk of the same kind that knows nobody yet."""
+        sessions = Sessions(Permissions(lambda: 7))
+        rng = np.random.default_rng(1)
+        return Desk(self.policy, crow, self.rules, rng, sessions, self.ground, self.access)
+
+    # --- what devices say --------------------------------------------------------------
+
+    def register(
+        self, id_tag: str, kind: str, at: float | None = None, now: float = 0.0
+    ) -> list[Send]:
+        """A device registers; a guard or robot tells where it is, too [m]."""
+        sends = self.say(id_tag, m.Registration(kind.lower(), kind, ADDRESS), now)[1]
+        if at is not None:
+            (self.stands if kind == "Guard" else self.status)(id_tag, at, now)
+        return sends
+
+    def say(self, source: str, body: m.Body, now: float = 0.0) -> tuple[m.Reply, list[Send]]:
+        self.number += 1
+        session = None if isinstance(body, m.Heartbeat) else 0
+        message = m.Message(DVA, self.number, source, "12:00:00", session, body)
+        reply, sends = self.desk.handle(message, now)
+        self.sent += sends
+        return reply, sends
+
+    def status(self, robot: str, metres: float, now: float = 0.0) -> None:
+        self._publish(robot, m.RobotStatus("Idle", east(metres), 0.0, 0.0, 0.0, 5), now)
+
+    def stands(self, guard: str, metres: float, now: float = 0.0) -> None:
+        self._publish(guard, m.PersonStatus("waiting", east(metres)), now)
+
+    def beat(self, *devices: str, now: float) -> None:
+        """Heartbeats: of these, or of all."""
+        for device in devices or list(self.desk.registry.entries):
+            self._publish(device, m.Heartbeat(), now)
+
+    def _publish(self, source: str, body: m.Body, now: float) -> None:
+        session = None if isinstance(body, m.Heartbeat) else 0
+        self.desk.note(m.Message(DVA, 1, source, "12:00:00", session, body), now)
+
+    def fire(
+        self,
+        metres: float,
+        now: float = 0.0,
+        kind: str = "fire",
+        severity: float = 0.5,
+        source: str = DETECTOR,
+        confidence: float = 0.9,
+    ) -> list[Send]:
+        """Something is detected so far east."""
+        body = m.EventReport(None, kind, east(metres), severity, confidence, "detected")
+        return self.say(source, body, now)[1]
+
+    def withdraw(self, metres: float, now: float = 0.0, source: str = DETECTOR) -> list[Send]:
+        """It is not seen any longer."""
+        return self.say(source, m.EventReport(None, "fire", east(metres), 0, 0, "refuted"), now)[1]
+
+    def finds(
+        self, who: str, finding: str, now: float = 0.0, event: int = 1
+    ) -> tuple[m.Reply, list[Send]]:
+        return self.say(who, m.EventReport(event, "fire", east(12), 0.5, 0.9, finding), now)
+
+    def progress(
+        self, who: str, state: str, now: float = 0.0, event: int = 1
+    ) -> tuple[m.Reply, list[Send]]:
+        return self.say(who, m.OrderProgress(event, state), now)
+
+    def bids(
+        self, who: str, arrival_in: float, now: float = 0.0, event: int = 1
+    ) -> tuple[m.Reply, list[Send]]:
+        return self.say(who, m.TaskBid(event, arrival_in), now)
+
+    # --- what becomes of what was sent -------------------------------------------------
+
+    def ok(self, sends: Sequence[Send], now: float = 0.0) -> list[Send]:
+        """All of it is answered with OK."""
+        return self._after([s for send in sends for s in self.desk.delivered(send, now)])
+
+    def no(self, sends: Sequence[Send], now: float = 0.0) -> list[Send]:
+        """All of it is declined, or does not arrive."""
+        return self._after([s for send in sends for s in self.desk.undelivered(send, now)])
+
+    def tick(self, now: float, alive: bool = True) -> list[Send]:
+        """Time passes; everybody has been heard just before, unless said otherwise."""
+        if alive:
+            self.beat(now=now)
+        return self._after(self.desk.tick(now))
+
+    def _after(self, sends: list[Send]) -> list[Send]:
+        self.sent += sends
+        return sends
+
+    # --- what is so --------------------------------------------------------------------
+
+    def event(self, number: int = 1) -> Event:
+        event = self.desk.book.get(number)
+        assert event is not None
+        return event
+
+    def busy(self, *names: str) -> None:
+        """Somebody is kept by the rest of an event that is not ours."""
+        other = Event(99, "flood", HERE, 0.5, state=State.REFUTED, times={"closed": math.inf})
+        self.desk.orders.engaged |= dict.fromkeys(names, other)
+
+    def idle(self, *names: str) -> None:
+        """And does not any longer."""
+        for name in names:
+            del self.desk.orders.engaged[name]
+
+    @property
+    def working(self) -> dict[str, int]:
+        """Who works on which event."""
+        return {name: event.number for name, event in self.desk.orders.engaged.items()}

@@ -1,0 +1,388 @@
+"""Days that go wrong: a desk at random among devices that fail, lie, vanish and come back."""
+
+from __future__ import annotations
+
+import math
+import random
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from office import DVA, crow, east
+
+from dva_sim.core.access import Access, AccessRule
+from dva_sim.core.dispatch import POLICIES
+from dva_sim.core.events import ACT_STEPS, STEPS, Event, State
+from dva_sim.core.ground import Ground, Station
+from dva_sim.core.memory import Memory
+from dva_sim.core.permissions import Permissions
+from dva_sim.core.rules import Rules
+from dva_sim.core.send import Send
+from dva_sim.core.service import Desk
+from dva_sim.core.sessions import Sessions
+from dva_sim.protocol import messages as m
+
+KINDS = {"Guard": 3, "Robot": 2, "TeleOp": 2, "Sensor": 2}
+DEVICES = {
+    f"02:00:00:{kind_number:02X}:00:{number:02X}": kind
+    for kind_number, (kind, count) in enumerate(KINDS.items(), 1)
+    for number in range(count)
+}
+POLICY_NAMES = sorted(POLICIES.keys() - {"oracle"})
+EPOCH = 2.0**20  # with times in eighths of a second no digit is lost
+LOOKS = (State.ASSIGNED, State.ON_SCENE)
+GROUND = Ground(
+    None,
+    tuple(Station(str(at), east(at)) for at in (0, 50, 100)),
+    np.array([[9.0, 80, 160], [80, 9, 80], [160, 80, 9]]),
+    np.array([0.2, 0.3, 0.5]),
+)
+LIMIT = 100.0  # order limit [s]
+
+
+class Walk:
+    """One day at the desk.
+
+    Args:
+        seed: Of everything that happens.
+        folder: For the memory.
+        policy: By name; any if not given.
+    """
+
+    def __init__(self, seed: int, folder: Path, policy: str | None = None) -> None:
+        self.luck = random.Random(seed)
+        self.file = folder / f"{seed}.sqlite"
+        self.policy = policy or self.luck.choice(POLICY_NAMES)
+        self.rules = Rules(
+            escalate_after=self.luck.choice([0.0, 30.0, 120.0, math.inf]),
+            containment=self.luck.random() < 0.6,
+            most_waiting=self.luck.choice([None, None, 0, 2]),
+            merge_distance=self.luck.choice([0.0, 8.0]),
+            order_limit=LIMIT,
+        )
+        self.access_until = self.luck.choice([math.inf, 300.0])
+        self.now, self.numbers = 0.0, dict.fromkeys(DEVICES, 0)
+        self.alive = dict.fromkeys(DEVICES, True)
+        self.in_flight: list[Send] = []
+        self.desk, self.memory = self._desk(), Memory(self.file, EPOCH)
+        for device in DEVICES:
+            self._register(device)
+            self._status(device)
+        self._take([])
+
+    def _desk(self) -> Desk:
+        sessions = Sessions(Permissions(lambda: self.luck.randrange(2**32)))
+        rng = np.random.default_rng(self.luck.randrange(2**31))
+        holds = AccessRule(until=self.access_until)
+        desk = Desk(
+            POLICIES[self.policy](), crow, self.rules, rng, sessions, GROUND, Access((holds,))
+        )
+        _watch(desk)
+        return desk
+
+    # --- what may happen ---------------------------------------------------------------
+
+    def step(self) -> None:
+        """Something happens, and is written down."""
+        name = self.luck.choices(list(STEPS_OF_A_WALK), list(STEPS_OF_A_WALK.values()))[0]
+        self._take(getattr(self, f"_{name}")() or [])
+        self.check(name)
+
+    def _take(self, sends: list[Send]) -> None:
+        assert self.memory.keep(self.desk, self.desk.book.changes(), self.now) is None
+        self.in_flight += sends
+
+    def say(self, source: str, body: m.Body, number: int | None = None) -> list[Send]:
+        if number is None:
+            number = self.numbers[source] = self.numbers[source] + 1
+        stamp = f"12:00:{self.luck.randrange(60):02d}.{self.luck.randrange(10**6)}"
+        message = m.Message(DVA, number, source, stamp, 0, body)
+        reply, sends = self.desk.handle(message, self.now)
+        assert reply.answers == number
+        return sends
+
+    def _any(self, *kinds: str) -> str:
+        return self.luck.choice([d for d, kind in DEVICES.items() if not kinds or kind in kinds])
+
+    def _some_event(self) -> int:
+        newest = self.desk.book.total
+        known = list(self.desk.book.open) or [newest]
+        return self.luck.choice([*known, *known, max(1, newest), newest + 1])
+
+    def _place(self) -> m.Position:
+        return east(self.luck.choice([0, 5, 20, 40, 60, 99]))
+
+    def _register(self, device: str | None = None) -> list[Send]:
+        device = device or self._any()
+        body = m.Registration(device[-8:], DEVICES[device], "10.0.0.1")
+        return self.say(device, body)
+
+    def _impostor(self) -> list[Send]:
+        body = m.Registration("x", self.luck.choice(list(KINDS)), "10.0.0.66")
+        return self.say(self._any(), body)
+
+    def _restart(self) -> list[Send]:
+        device = self._any()
+        self.numbers[device], self.alive[device] = 0, True
+        return self._register(device)
+
+    def _vanish(self) -> None:
+        self.alive[self._any()] = False
+
+    def _return(self) -> None:
+        self.alive[self._any()] = True
+
+    def _status(self, device: str | None = None) -> None:
+        device = device or self._any("Guard", "Robot")
+        body: m.Body = m.PersonStatus("waiting", self._place())
+        if DEVICES[device] == "Robot":
+            body = m.RobotStatus("Idle", self._place(), 0.0, 0.0, 0.0, 5)
+        self.desk.note(m.Message(DVA, 1, device, "12:00:00", 0, body), self.now)
+
+    def _report(self) -> list[Send]:
+        finding = "refuted" if self.luck.random() < 0.25 else "detected"
+        kind = self.luck.choice(["fire", "flood"])
+        severity, sure = self.luck.random(), self.luck.random()
+        body = m.EventReport(None, kind, self._place(), severity, sure, finding)
+        return self.say(self._any("Sensor", "Guard"), body)
+
+    def _delivered(self) -> list[Send]:
+        return self._answer(self.desk.delivered, keep=0.1)
+
+    def _undelivered(self) -> list[Send]:
+        return self._answer(self.desk.undelivered, keep=0.05)
+
+    def _answer(self, what: Callable[[Send, float], list[Send]], keep: float) -> list[Send]:
+        """Word of something sent comes back, in any order; of a few things twice."""
+        if not self.in_flight:
+            return []
+        place = self.luck.randrange(min(len(self.in_flight), 6))
+        send = self.in_flight[place]
+        if self.luck.random() > keep:
+            del self.in_flight[place]
+        return what(send, self.now)
+
+    def _progress(self) -> list[Send]:
+        """Mostly of who has the order, and mostly about its event."""
+        working = self.desk.orders.engaged
+        device = self._any()
+        if working and self.luck.random() < 0.8:
+            device = self.luck.choice(list(working))
+        number = self._some_event()
+        if device in working and self.luck.random() < 0.8:
+            number = working[device].number
+        states = ["accepted", "departed", "arrived", "done", "failed", "declined"]
+        return self.say(device, m.OrderProgress(number, self.luck.choice(states)))
+
+    def _found(self) -> list[Send]:
+        number = self._some_event()
+        event, device = self.desk.book.get(number), self._any()
+        if event is not None and event.sent and self.luck.random() < 0.8:
+            device = self.luck.choice(sorted(event.sent))
+        finding = self.luck.choice(["confirmed", "confirmed", "refuted", "contained", "detected"])
+        return self.say(device, m.EventReport(number, "fire", self._place(), 0.5, 0.9, finding))
+
+    def _bid(self) -> list[Send]:
+        running = self.desk.dispatcher.auctions.running
+        number = self.luck.choice(list(running)) if running else self._some_event()
+        return self.say(self._any("Guard", "Robot"), m.TaskBid(number, self.luck.random() * 100))
+
+    def _permission(self) -> list[Send]:
+        level = self.luck.choice(["teleoperation", "missions", "both", "sensors"])
+        body = m.PermissionRequest(self._any("Robot", "Guard"), level, ("heat_flux",))
+        return self.say(self._any(), body)
+
+    def _give_back(self) -> list[Send]:
+        held = self.desk.sessions.permissions.all()
+        if not held:
+            return []
+        grant = self.luck.choice(held)
+        return self.say(
+            grant.holder, m.PermissionRevocation(grant.robot, grant.holder, grant.session)
+        )
+
+    def _time(self) -> list[Send]:
+        return self.pass_time(self.luck.choice([0.125, 1.0, 1.0, 2.0, 5.0, 9.0, 12.0, 40.0, 130.0]))
+
+    def _deadline(self) -> list[Send]:
+        due = self.desk.next_deadline()
+        return self.pass_time(min(math.ceil((due - self.now) * 8) / 8, 60.0) if due < 1e9 else 1.0)
+
+    def pass_time(self, seconds: float) -> list[Send]:
+        """Time passes: who is alive is heard, and the desk looks at its deadlines."""
+        self.now += max(seconds, 0.125)
+        for device, alive in self.alive.items():
+            if alive:
+                beat = m.Message(DVA, 1, device, "12:00:00", None, m.Heartbeat())
+                self.desk.note(beat, self.now)
+        sends = self.desk.tick(self.now)
+        assert self.desk.next_deadline() > self.now
+        ends = (e.waiting_since for e in self.desk.book.waiting.values())
+        assert all(self.now < since + self.rules.escalate_after for since in ends)
+        pending = {n for n, e in self.desk.book.open.items() if e.state is State.PENDING}
+        assert self.desk.dispatcher.auctions.running.keys() <= pending
+        return sends
+
+    def _kill(self) -> list[Send]:
+        """The desk is killed, and a new one goes on from the file."""
+        before = snapshot(self.desk)
+        self.memory.close()
+        self.desk, self.memory = self._desk(), Memory(self.file, EPOCH)
+        self.memory.recall(self.desk, self.now)
+        after = snapshot(self.desk)
+        assert after == before, {k: (before[k], after[k]) for k in after if after[k] != before[k]}
+        for device in DEVICES:
+            self._status(device)
+        self.in_flight = [s for s in self.in_flight if self.luck.random() < 0.5]
+        return self.desk.orders.again()
+
+    # --- what must hold ----------------------------------------------------------------
+
+    def check(self, after: str) -> None:
+        """All invariants."""
+        desk, book = self.desk, self.desk.book
+        assert sum(book.counts.values()) == book.total, after
+        for state in State:
+            if state in (State.PENDING, *LOOKS):
+                here = sum(e.state is state for e in book.open.values())
+                assert book.counts[state] == here, (after, state)
+        assert all(event.open for event in book.open.values()), after
+        assert not any(event.open for event in book.closed.values()), after
+        waiting = {n for n, e in book.open.items() if e.waits_for is not None}
+        assert book.waiting.keys() == waiting, after
+        for device, event in desk.orders.engaged.items():
+            assert device in (event.responder, event.operator, event.actor), after
+            assert book.get(event.number) is event, after
+        for event in (*book.open.values(), *book.closed.values()):
+            self._check_event(event, after)
+        looked = [e.responder for e in book.open.values() if e.state in LOOKS]
+        assert len(looked) == len(set(looked)), after
+        assert not desk.dispatcher._bound_for.keys() & desk.orders.engaged.keys(), after
+
+    def _check_event(self, event: Event, after: str) -> None:
+        engaged = self.desk.orders.engaged
+        for steps in (STEPS, ACT_STEPS):
+            times = [event.times[step] for step in steps if step in event.times]
+            assert times == sorted(times), (after, event)
+        assert ("closed" in event.times) != event.open, (after, event)
+        if event.state in LOOKS:
+            assert event.responder is not None, (after, event)
+            assert engaged.get(event.responder) is event, (after, event)
+            is_robot = DEVICES[event.responder] == "Robot"
+            assert is_robot == (event.operator is not None), (after, event)
+            assert event.operator is None or engaged.get(event.operator) is event, (after, event)
+        if event.state is State.PENDING:
+            assert (event.responder, event.operator, event.actor) == (None,) * 3, (after, event)
+        if event.open and event.actor is not None:
+            assert engaged.get(event.actor) is event, (after, event)
+            assert DEVICES[event.actor] == "Guard", (after, event)
+        most = self.rules.max_attempts + ("confirmed" in event.times)  # one to deal with it
+        assert 0 <= event.attempts <= most, (after, event)
+
+    # --- when all is well again --------------------------------------------------------
+
+    def recover(self) -> float:
+        """Everybody does what it is told from now on; how long until no event is open [s]."""
+        began, left = self.now, len(self.desk.book.open)
+        self.in_flight.clear()
+        for device in DEVICES:
+            self.alive[device] = True
+            self._take(self._register(device))
+            self._status(device)
+        for grant in self.desk.sessions.permissions.all():
+            body = m.PermissionRevocation(grant.robot, grant.holder, grant.session)
+            self._take(self.say(grant.holder, body))
+        # What was begun ends by its limit; then each event takes a few seconds of somebody's.
+        bound = 2 * LIMIT + 20.0 + 30.0 * left
+        while self.desk.book.open:
+            self._take(self.pass_time(1.0))
+            while self.in_flight:
+                self._obey(self.in_flight.pop(0))
+            self.check("recovery")
+            assert self.now - began < bound, (self.rules, self.policy, self.desk.book.open)
+        return self.now - began
+
+    def _obey(self, send: Send) -> None:
+        """Somebody gets an order, and carries it out at once."""
+        body = send.body
+        self._take(self.desk.delivered(send, self.now))
+        if isinstance(body, m.TaskAnnouncement):
+            self._take(self.say(send.to, m.TaskBid(body.event_id, 10.0)))
+        elif isinstance(body, m.Order) and body.task == "stand_by":
+            self._take(self.say(send.to, m.OrderProgress(body.event_id, "departed")))
+        elif isinstance(body, m.Order):
+            self._carry_out(send.to, body.event_id, body.task)
+        elif isinstance(body, m.TaskAward) and DEVICES[send.to] == "Guard":
+            self._carry_out(send.to, body.event_id, "confirm")
+
+    def _carry_out(self, who: str, event: int, task: str) -> None:
+        for state in ("departed", "arrived"):
+            self._take(self.say(who, m.OrderProgress(event, state)))
+        finding = "contained" if task == "contain" else "confirmed"
+        self._take(self.say(who, m.EventReport(event, "fire", east(0), 0.5, 1.0, finding)))
+        self._take(self.say(who, m.OrderProgress(event, "done")))
+
+
+STEPS_OF_A_WALK = {
+    "register": 3,
+    "impostor": 1,
+    "restart": 2,
+    "vanish": 1,
+    "return": 2,
+    "status": 3,
+    "report": 12,
+    "delivered": 14,
+    "undelivered": 7,
+    "progress": 14,
+    "found": 8,
+    "bid": 6,
+    "permission": 2,
+    "give_back": 1,
+    "time": 10,
+    "deadline": 3,
+    "kill": 1,
+}
+
+
+def _watch(desk: Desk) -> None:
+    """Nobody gets an order who has one."""
+    confirm, act, orders = desk.orders.confirm, desk.orders.act, desk.orders
+
+    def watched_confirm(
+        event: Event, responder: str, operator: str | None, *args: Any, **named: Any
+    ) -> Send:
+        assert not {responder, operator} & orders.engaged.keys()
+        return confirm(event, responder, operator, *args, **named)
+
+    def watched_act(event: Event, guard: str, now: float) -> Send:
+        assert guard not in orders.engaged
+        assert event.open
+        assert event.needs_containment
+        assert event.actor is None
+        return act(event, guard, now)
+
+    desk.orders.confirm, desk.orders.act = watched_confirm, watched_act  # type: ignore[method-assign]
+
+
+def snapshot(desk: Desk) -> dict[str, Any]:
+    """All that a desk must know again after it was killed."""
+    book, permissions = desk.book, desk.sessions.permissions
+    return {
+        "open": {n: repr(_with_sets_in_order(e)) for n, e in book.open.items()},
+        "closed": {n: repr(_with_sets_in_order(e)) for n, e in sorted(book.closed.items())},
+        "waiting": set(book.waiting),
+        "counts": book.counts,
+        "total": book.total,
+        "engaged": {device: event.number for device, event in desk.orders.engaged.items()},
+        "devices": [entry.device for entry in desk.registry.entries.values()],
+        "grants": permissions.grants,
+        "observers": permissions.observers,
+        "sessions": permissions.count,
+    }
+
+
+def _with_sets_in_order(event: Event) -> dict[str, Any]:
+    fields = {name: getattr(event, name) for name in Event.__slots__}
+    fields["times"] = dict(sorted(event.times.items()))
+    return fields | {"failed": sorted(event.failed), "sent": sorted(event.sent)}
