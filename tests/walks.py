@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,15 @@ import numpy as np
 from office import DVA, crow, east
 
 from dva_sim.core.access import Access, AccessRule
-from dva_sim.core.dispatch import POLICIES
+from dva_sim.core.dispatch import (
+    POLICIES,
+    Advice,
+    Announcement,
+    Assignment,
+    Policy,
+    Relocation,
+    Situation,
+)
 from dva_sim.core.events import ACT_STEPS, STEPS, Event, State
 from dva_sim.core.ground import Ground, Station
 from dva_sim.core.memory import Memory
@@ -29,7 +37,7 @@ DEVICES = {
     for kind_number, (kind, count) in enumerate(KINDS.items(), 1)
     for number in range(count)
 }
-POLICY_NAMES = sorted(POLICIES.keys() - {"oracle"})
+POLICY_NAMES = sorted(POLICIES.keys() - {"oracle"} | {"chaos"})
 EPOCH = 2.0**20  # with times in eighths of a second no digit is lost
 LOOKS = (State.ASSIGNED, State.ON_SCENE)
 GROUND = Ground(
@@ -39,6 +47,28 @@ GROUND = Ground(
     np.array([0.2, 0.3, 0.5]),
 )
 LIMIT = 100.0  # order limit [s]
+
+
+class Chaos(Policy):
+    """Anything at all: sensible, forbidden, or nonsense."""
+
+    preempts = auctions = relocates = True
+
+    def advise(self, situation: Situation, rng: np.random.Generator) -> Sequence[Advice]:
+        luck = random.Random(int(rng.integers(2**32)))
+        tasks, team = len(situation.tasks), len(situation.responders)
+        advice: list[Advice] = []
+        for _ in range(luck.randrange(6)):
+            what = luck.random()
+            if what < 0.7 and tasks:
+                advice.append(Assignment(luck.randrange(tasks), luck.randrange(team)))
+            elif what < 0.85 and tasks:
+                advice.append(Announcement(luck.randrange(tasks)))
+            else:
+                advice.append(Relocation(luck.randrange(team), luck.randrange(3)))
+        if luck.random() < 0.02:
+            advice.append(Assignment(tasks, team))
+        return advice
 
 
 class Walk:
@@ -75,11 +105,12 @@ class Walk:
         sessions = Sessions(Permissions(lambda: self.luck.randrange(2**32)))
         rng = np.random.default_rng(self.luck.randrange(2**31))
         holds = AccessRule(until=self.access_until)
-        desk = Desk(
-            POLICIES[self.policy](), crow, self.rules, rng, sessions, GROUND, Access((holds,))
-        )
+        desk = Desk(self._policy(), crow, self.rules, rng, sessions, GROUND, Access((holds,)))
         _watch(desk)
         return desk
+
+    def _policy(self) -> Policy:
+        return Chaos() if self.policy == "chaos" else POLICIES[self.policy]()
 
     # --- what may happen ---------------------------------------------------------------
 
