@@ -251,9 +251,12 @@ class Dispatcher:
         return self.orders.registry.entries[event.responder].position is not None
 
     def _team(self, now: float) -> _Team:
-        operators = self._free(OPERATOR, now)
-        able = [e for kind in (GUARD, ROBOT) for e in self._free(kind, now) if e.position]
-        entries = [e for e in able if operators or e.device.device_type == GUARD]
+        registry = self.orders.registry
+        entries = self._free(registry.located(GUARD), now)
+        robots = self._free(registry.located(ROBOT), now)
+        operators = self._free(registry.of_type(OPERATOR), now) if robots else []
+        if operators:
+            entries += robots
         engaged: list[Event | None] = [None] * len(entries)
         if self.policy.preempts:
             for event in filter(self._is_under_way, self.orders.book.open.values()):
@@ -261,14 +264,16 @@ class Dispatcher:
                 engaged.append(event)
         return _Team(entries, engaged, operators)
 
-    def _free(self, device_type: str, now: float) -> list[Entry]:
-        """Devices of a type that may be given an order."""
+    def _free(self, entries: Iterable[Entry], now: float) -> list[Entry]:
+        """Those who may be given an order, in order of registration."""
         held, engaged = self.orders.sessions.permissions.grants, self.orders.engaged
-        return [
+        free = [
             e
-            for e in self.orders.registry.of_type(device_type)
-            if e.free_from <= now and not (e.device.id_tag in engaged or e.device.id_tag in held)
+            for e in entries
+            if not e.silent and e.free_from <= now
+            if e.device.id_tag not in engaged and e.device.id_tag not in held
         ]
+        return sorted(free, key=_place)
 
     def _situation(self, events: list[Event], team: _Team, now: float) -> Situation:
         rows = {id(e): row for row, e in enumerate(events)}
@@ -374,6 +379,9 @@ def _sealed(array: Floats) -> Floats:
     view = array.view()
     view.flags.writeable = False
     return view
+
+
+_place = operator.attrgetter("place")
 
 
 def _same_place(a: m.Position, b: m.Position) -> bool:

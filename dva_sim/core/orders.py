@@ -161,7 +161,7 @@ class Orders:
             self.book.move(event, State.ON_SCENE, now)
         name = device if device == event.actor else event.responder
         if name is not None:
-            self.registry.entries[name].position = event.position
+            self.registry.locate(self.registry.entries[name], event.position)
 
     def found(self, event: Event, device: str, finding: str, now: float) -> list[Send]:
         """What somebody who was sent has found, or done."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import OrderedDict, defaultdict, deque
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field
 
 from dva_sim.protocol.messages import Device, Position, Registration
@@ -25,6 +25,7 @@ class Entry:
         silent: Whether it has been quiet for longer than the time-out.
         registrations: MessageID and timestamp of its last ones.
         free_from: Until then it is given no order, because it declined one [s].
+        place: In order of registration, from 0.
     """
 
     device: Device
@@ -34,6 +35,7 @@ class Entry:
     silent: bool = False
     registrations: deque[tuple[int, str]] = field(default_factory=lambda: deque(maxlen=8))
     free_from: float = 0.0
+    place: int = 0
 
     def is_new_life(self, message_id: int, timestamp: str) -> bool:
         """Whether a registration says that the device has started anew: MessageIDs go back.
@@ -53,12 +55,15 @@ class Registry:
         silent_after: How long a device may be quiet before it counts as gone [s].
         most: How many devices there may be.
         entries: In order of registration.
+        version: Grows whenever somebody comes, goes silent, returns, or is called otherwise.
     """
 
     silent_after: float = 10.0
     most: int = MAX_DEVICES
     entries: dict[str, Entry] = field(default_factory=dict)
+    version: int = 0
     _of_type: dict[str, dict[str, Entry]] = field(default_factory=lambda: defaultdict(dict))
+    _located: dict[str, dict[str, Entry]] = field(default_factory=lambda: defaultdict(dict))
     _heard: OrderedDict[str, Entry] = field(default_factory=OrderedDict)  # longest quiet first
     _changed: dict[str, Entry] = field(default_factory=dict)
 
@@ -71,24 +76,33 @@ class Registry:
         if entry.device != device:
             entry.device = device
             self._changed[id_tag] = entry
+            self.version += 1
         self.heard(id_tag, now)
         return entry
 
     def add(self, entry: Entry) -> Entry:
         """Enter a device that was not known."""
-        device = entry.device
+        device, entry.place = entry.device, len(self.entries)
         self.entries[device.id_tag] = self._of_type[device.device_type][device.id_tag] = entry
         self._heard[device.id_tag] = self._changed[device.id_tag] = entry
+        self.version += 1
         return entry
 
     def heard(self, id_tag: str, now: float) -> Entry | None:
         """Note a sign of life; None if the device is not registered."""
         entry = self.entries.get(id_tag)
         if entry is not None:
+            self.version += entry.silent
             entry.last_heard, entry.silent = now, False
             self._heard[id_tag] = entry
             self._heard.move_to_end(id_tag)
         return entry
+
+    def locate(self, entry: Entry, position: Position) -> None:
+        """Note where a device is."""
+        if entry.position is None:
+            self._located[entry.device.device_type][entry.device.id_tag] = entry
+        entry.position = position
 
     def fallen_silent(self, now: float) -> list[Entry]:
         """Devices that have been quiet for longer than the time-out since the last call."""
@@ -96,6 +110,7 @@ class Registry:
         while self.next_silence() <= now:
             id_tag, entry = next(iter(self._heard.items()))
             entry.silent = True
+            self.version += 1
             gone.append(entry)
             del self._heard[id_tag]
         return gone
@@ -110,6 +125,10 @@ class Registry:
     def of_type(self, device_type: str) -> Iterable[Entry]:
         """Registered devices of a type that are not silent, in order of registration."""
         return (e for e in self._of_type[device_type].values() if not e.silent)
+
+    def located(self, device_type: str) -> Collection[Entry]:
+        """Devices of a type of which is known where they are, in any order, silent ones too."""
+        return self._located[device_type].values()
 
     def changes(self) -> list[Entry]:
         """The devices that registered, or moved to another address, since this was last asked."""

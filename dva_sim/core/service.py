@@ -64,6 +64,7 @@ class Desk:
         self.counters: Counter[str] = self.orders.counters
         self.refused = 0
         self._rules = rules
+        self._list: tuple[int, tuple[m.Device, ...]] = (-1, ())
         self._access_ends = self.access.next_end(-1.0)
 
     # --- what comes in -----------------------------------------------------------------
@@ -79,9 +80,10 @@ class Desk:
         if entry is None:
             self.refused += 1
         elif isinstance(message.body, m.RobotStatus):
-            entry.position, entry.mode = message.body.position, message.body.mode
+            self.registry.locate(entry, message.body.position)
+            entry.mode = message.body.mode
         elif isinstance(message.body, m.PersonStatus):
-            entry.position = message.body.position
+            self.registry.locate(entry, message.body.position)
 
     def delivered(self, send: Send, now: float) -> list[Send]:
         """What was sent was answered with OK."""
@@ -294,6 +296,13 @@ class Desk:
 
     def _shown(self) -> tuple[m.Device, ...]:
         """Devices one can do something with, robots first, as many as fit into a message."""
+        version, shown = self._list
+        if version != self.registry.version:
+            shown = self._as_many_as_fit()
+            self._list = self.registry.version, shown
+        return shown
+
+    def _as_many_as_fit(self) -> tuple[m.Device, ...]:
         shown: list[m.Device] = []
         room = LIST_BYTES
         for device in self._listed():
