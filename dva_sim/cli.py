@@ -54,6 +54,21 @@ def report(folder: Annotated[Path, typer.Argument(help="A results folder.")]) ->
 
 
 @app.command()
+def validate(
+    what: Annotated[str, typer.Argument(help="dispatch.")] = "dispatch",
+    out: Annotated[Path | None, typer.Option("-o", "--out", help="Results folder.")] = None,
+    cases: Annotated[str | None, typer.Option(help="A file of cases, by name or path.")] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer runs, wider errors.")] = False,
+    jobs: Annotated[int | None, typer.Option(help="Processes; default: all cores.")] = None,
+    seed: Annotated[int, typer.Option(help="Seed of all luck.")] = 1,
+) -> None:
+    """Play worlds whose answer is known exactly, and compare."""
+    from dva_sim.experiments.validation import console
+
+    raise typer.Exit(console.validate(what, out, cases, quick, jobs, seed))
+
+
+@app.command()
 def episode(
     scenario: Annotated[str, typer.Argument(help="A scenario by name or path.")],
     seed: Annotated[int, typer.Option(help="Seed of the run.")] = 1,

@@ -36,6 +36,7 @@ class CaseConfig(Config):
             such as `$responders.guard.look`.
         measures: What is compared: the measure's name and the formula's name for it, or a
             plain number.
+        loosely: The same, of what no precision is asked for: it only has to agree.
         runs: Seeds; each is a whole run of the scenario.
         quick_runs: The same with `--quick`.
         batches: Parts of equal length that the measured time of each run is cut into.
@@ -47,11 +48,12 @@ class CaseConfig(Config):
     formula: str | None = None
     parameters: dict[str, Any] = Field(default_factory=dict)
     measures: dict[str, str | float]
+    loosely: dict[str, str | float] = Field(default_factory=dict)
     runs: Annotated[int, Field(ge=1, le=100_000)] = 8
     quick_runs: Annotated[int, Field(ge=1)] = 1
     batches: Annotated[int, Field(ge=1, le=10_000)] = 20
 
-    @field_validator("measures", mode="before")
+    @field_validator("measures", "loosely", mode="before")
     @classmethod
     def _same_names(cls, value: Any) -> Any:
         """A list compares each measure with the exact value of the same name."""
@@ -74,6 +76,7 @@ class Case(Config):
         source: Where the exact values come from.
         scenario: What is played.
         exact: The exact value of each measure.
+        loosely: Those of them that no precision is asked for.
         runs: Seeds.
         quick_runs: The same with `--quick`.
         batches: Parts of each run.
@@ -84,6 +87,7 @@ class Case(Config):
     source: str
     scenario: TimedScenario
     exact: dict[str, float]
+    loosely: tuple[str, ...]
     runs: int
     quick_runs: int
     batches: int
@@ -107,7 +111,7 @@ def _case(name: str, config: CaseConfig, document: Document) -> Case:
     try:
         # Waits that the horizon would cut off are played to their end; each event keeps its row.
         scenario = timed.build(config.scenario | {"drain": True, "keep": "events"})
-        for measure in config.measures:
+        for measure in config.measures | config.loosely:
             check_name(measure, scenario)
         exact, source = _exact(config, scenario)
     except (ConfigError, ValueError) as error:
@@ -118,6 +122,7 @@ def _case(name: str, config: CaseConfig, document: Document) -> Case:
         source="; ".join(s for s in (config.source, source) if s),
         scenario=scenario,
         exact=exact,
+        loosely=tuple(config.loosely),
         runs=config.runs,
         quick_runs=min(config.quick_runs, config.runs),
         batches=config.batches,
@@ -128,7 +133,7 @@ def _exact(config: CaseConfig, scenario: TimedScenario) -> tuple[dict[str, float
     """The exact value of each measure, and the formula's sources."""
     known, source = exact_values(config.formula, config.parameters, scenario)
     exact = {}
-    for measure, answer in config.measures.items():
+    for measure, answer in (config.measures | config.loosely).items():
         if isinstance(answer, str):
             if answer not in known:
                 raise ConfigError(f"{answer!r} is not known; known: {', '.join(known) or 'none'}")

@@ -7,9 +7,9 @@ zero too, since each is drawn anew; where it is large, queues were longer than t
 explain.
 
 A queue beside it: the same events at *one* server, as fast as all responders together. Its
-waits follow from the inputs alone (Lindley's recursion), and their mean is known (Pollaczek
-and Khinchine). Where there is one responder only, it is 10 % faster than that one: an exact
-copy would leave nothing to be estimated.
+waits follow from the inputs alone, and their mean is known (Pollaczek and Khinchine; Cobham;
+G/M/1). Where there is one responder only, that server is 10 % faster: an exact copy would leave
+nothing to be estimated.
 
 References:
     S. S. Lavenberg, T. L. Moeller & P. D. Welch, Oper. Res. 30 (1982) 182-202 (work and flow
@@ -19,9 +19,13 @@ References:
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
+from dva_sim.experiments.validation import exact
 from dva_sim.experiments.validation.measures import Batches
+from dva_sim.experiments.validation.recursions import one_server
 from dva_sim.experiments.validation.sample import NOBODY, Floats, Sample
 from dva_sim.timed.laws import Exponential, Law
 from dva_sim.timed.scenario import TimedScenario
@@ -36,8 +40,9 @@ def controls(batches: Batches, scenario: TimedScenario) -> dict[str, Floats]:
     look, square = _looks(sample, scenario)
     found = _beside(batches, scenario)
     found["look"] = batches.total(look, sample.served)
-    if len(counts) == len(scenario.demand):  # no finite sources: arrivals are all luck
+    if counts:
         found["events"] = sum(counts.values(), np.zeros(len(batches.lengths)))
+    if all(stream.between is not None for stream in scenario.demand):
         found |= _products(batches, scenario, look)
     found["look_square"] = batches.total(square, sample.served)
     return found | {f"events@{name}": count for name, count in list(counts.items())[1:]}
@@ -68,7 +73,7 @@ def _counts(batches: Batches, scenario: TimedScenario) -> dict[str, Floats]:
     for number, (name, stream) in enumerate(
         zip(scenario.stream_names, scenario.demand, strict=True)
     ):
-        if stream.between is not None:
+        if stream.between is not None and stream.between.variance > 0:
             came = batches.count(batches.sample.stream == number)
             found[name] = came - batches.lengths / stream.between.mean
     return found
@@ -89,48 +94,73 @@ def _looks(sample: Sample, scenario: TimedScenario) -> tuple[Floats, Floats]:
 
 
 def _beside(batches: Batches, scenario: TimedScenario) -> dict[str, Floats]:
-    """Waits, above their mean, if one fast server had served the same events in their order.
+    """Waits, above their means, if one fast server had served the same events.
 
-    None where events come otherwise than at random, or are not all served.
+    None where not all events are served, or where no formula knows that server's waits.
     """
-    sample, streams, dispatch = batches.sample, scenario.demand, scenario.dispatch
-    between = [s.between for s in streams if isinstance(s.between, Exponential)]
+    sample, dispatch = batches.sample, scenario.dispatch
     limited = dispatch.escalate_after_s is not None or dispatch.most_waiting is not None
-    limited |= dispatch.containment or any(s.patience is not None for s in streams)
-    if limited or len(between) != len(streams) or scenario.way != "none":
+    limited |= any(stream.patience is not None for stream in scenario.demand)
+    lookers = len(sample.units) if len(set(sample.kinds)) == 1 else sample.kinds.count("robot")
+    pace = (FASTER if lookers == 1 else 1.0) / lookers
+    by_rank = dispatch.policy == "priority_eta" and dispatch.options.get("ageing_per_s") == 0
+    if limited or scenario.way != "none":
         return {}
-    pace = (FASTER if len(sample.units) == 1 else 1.0) / len(sample.units)
-    rates = [1 / law.mean for law in between]
-    laws = _look_laws(scenario)
+    ranks = _ranks(scenario) if by_rank else [0] * len(scenario.demand)
+    means = _means(scenario, pace, ranks)
+    if means is None:
+        return {}
+    looks = pace * (sample.confirmed - sample.arrived)
+    waits = one_server(sample.detected, looks, np.array(ranks)[sample.stream])
+    surplus = waits - np.array(means)[sample.stream]
+    every = {f"beside@{n}": sample.stream == n for n in range(len(means))}
+    return {name: batches.total(surplus, which) for name, which in every.items()}
+
+
+def _ranks(scenario: TimedScenario) -> list[int]:
+    """Place of each stream, the most severe first."""
+    severities = [stream.severity for stream in scenario.demand]
+    levels = sorted({s for s in severities if isinstance(s, float)}, reverse=True)
+    return [levels.index(s) if isinstance(s, float) else 0 for s in severities]
+
+
+def _means(scenario: TimedScenario, pace: float, ranks: list[int]) -> list[float] | None:
+    """Mean wait of each stream at one server that takes `pace` of its time for everything."""
+    laws, between = _look_laws(scenario), [s.between for s in scenario.demand]
     if laws is None:
-        return {}
-    load = pace * sum(r * law.mean for r, law in zip(rates, laws, strict=True))
-    square = pace**2 * sum(r * law.second for r, law in zip(rates, laws, strict=True))
-    if load >= 1:
-        return {}
-    mean = square / (2 * (1 - load))  # Pollaczek-Khinchine
-    look = pace * (sample.confirmed - sample.arrived)
-    waits = lindley(np.diff(sample.detected), look[:-1])
-    return {"beside": batches.total(waits - mean, np.ones(len(waits), dtype=bool))}
+        return None
+    if len(laws) == 1 and isinstance(laws[0], Exponential) and between[0] is not None:
+        if laws[0].mean * pace >= between[0].mean:
+            return None
+        return [exact.gm1(between[0], laws[0].mean * pace)["wait_s"]]
+    if not all(isinstance(law, Exponential) for law in between):
+        return None
+    rates = [1 / law.mean for law in between if law is not None]
+    scaled = [Scaled(law.mean * pace, law.second * pace**2) for law in laws]
+    if sum(r * law.mean for r, law in zip(rates, scaled, strict=True)) >= 1:
+        return None
+    if len(set(ranks)) < len(ranks):  # one queue for all
+        means = exact.cobham(rates, scaled)
+        ahead = sum(r * law.second for r, law in zip(rates, scaled, strict=True)) / 2
+        return [ahead / (1 - means["utilisation"])] * len(rates)
+    order = sorted(range(len(ranks)), key=ranks.__getitem__)
+    means = exact.cobham([rates[n] for n in order], [scaled[n] for n in order])
+    return [means[f"wait_{rank + 1}_s"] for rank in ranks]
 
 
-def lindley(gaps: Floats, services: Floats) -> Floats:
-    """Waits at one server, first come first served, the first of them 0.
+@dataclass(frozen=True)
+class Scaled:
+    """A law of which only the moments matter."""
 
-    Args:
-        gaps: From each customer to the next `(n - 1,)`.
-        services: Of all but the last `(n - 1,)`.
-
-    References:
-        D. V. Lindley, Proc. Camb. Phil. Soc. 48 (1952) 277-289.
-    """
-    way = np.concatenate([[0.0], np.cumsum(services - gaps)])
-    return np.asarray(way - np.minimum.accumulate(way))
+    mean: float
+    second: float
 
 
 def _look_laws(scenario: TimedScenario) -> list[Law] | None:
     """How long looking takes for each stream; None if it depends on who looks."""
-    own = {group.look for group in scenario.responders}
+    robots = any(group.kind == "robot" for group in scenario.responders)
+    kind = "robot" if robots else "guard"
+    own = {group.look for group in scenario.responders if group.kind == kind}
     common = own.pop() if len(own) == 1 else None
     laws = [stream.look if stream.look is not None else common for stream in scenario.demand]
     return None if any(law is None for law in laws) else [law for law in laws if law is not None]

@@ -33,7 +33,7 @@ ERRORS = 3.0  # an estimate may be so many standard errors off
 TOLERANCE = 0.005  # or so much, as a share of the exact value
 PRECISION = 0.01  # standard error asked for, as a share of the exact value
 _FOLDS = 10
-_BATCHES_PER_CONTROL = 10  # with fewer, weights are noise
+_BATCHES_PER_CONTROL = 5  # with fewer, weights are noise
 _ROUNDING = 1e-9  # what arithmetic alone may cost
 
 
@@ -102,17 +102,23 @@ def adjusted(values: Floats, controls: Floats) -> Floats:
     return left
 
 
-def verdict(found: Estimate, exact: float) -> Verdict:
+def verdict(found: Estimate, exact: float, precision: float = PRECISION) -> Verdict:
     """Whether an estimate agrees with the exact value.
 
-    `differs`: further off than 3 standard errors and than 0.5 %. `too rough`: the standard
-    error is above 1 % of the exact value, so that agreement says little.
+    Args:
+        found: The estimate.
+        exact: What it should be.
+        precision: Standard error asked for, as a share of the exact value.
+
+    Returns:
+        `differs`: further off than 3 standard errors and than 0.5 %. `too rough`: the standard
+        error is above what is asked for, so that agreement says little.
     """
     rounding = _ROUNDING * max(1.0, abs(exact))
     off = abs(found.value - exact)
     if not off <= max(ERRORS * found.error, TOLERANCE * abs(exact), rounding):
         return "differs"
-    if not found.error <= max(PRECISION * abs(exact), rounding):
+    if not found.error <= max(precision * abs(exact), rounding):
         return "too rough"
     return "agrees"
 
