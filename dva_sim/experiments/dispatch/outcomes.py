@@ -48,7 +48,8 @@ class Incidence:
         place = np.searchsorted(self.times, np.asarray(times, dtype=float), side="right")
         if not self.events:
             return np.full(place.shape, np.nan)
-        return np.r_[0.0, self.shares[cause - 1]][place]
+        found: Floats = np.r_[0.0, self.shares[cause - 1]][place]
+        return found
 
     def restricted_mean(self, limit: float, cause: int = 1) -> float:
         """Mean of the smaller of `limit` [s] and the time to a cause; without it, `limit`.
@@ -108,7 +109,7 @@ def incidence(time: ArrayLike, cause: ArrayLike, causes: int) -> Incidence:
     step = met / np.maximum(at_risk, 1)
     left = np.cumprod(1.0 - step.sum(axis=0))  # Kaplan-Meier of all causes together
     before = np.r_[1.0, left[:-1]] if len(times) else left
-    return Incidence(times, np.cumsum(before * step, axis=1), len(when))
+    return Incidence(times, np.minimum(np.cumsum(before * step, axis=1), 1.0), len(when))
 
 
 def evenness(amounts: ArrayLike) -> float:
