@@ -102,13 +102,13 @@ def adjusted(values: Floats, controls: Floats) -> Floats:
     return left
 
 
-def verdict(found: Estimate, exact: float, precision: float = PRECISION) -> Verdict:
+def verdict(found: Estimate, exact: float, precision: float | None = PRECISION) -> Verdict:
     """Whether an estimate agrees with the exact value.
 
     Args:
         found: The estimate.
         exact: What it should be.
-        precision: Standard error asked for, as a share of the exact value.
+        precision: Standard error asked for, as a share of the exact value; None asks for none.
 
     Returns:
         `differs`: further off than 3 standard errors and than 0.5 %. `too rough`: the standard
@@ -118,7 +118,7 @@ def verdict(found: Estimate, exact: float, precision: float = PRECISION) -> Verd
     off = abs(found.value - exact)
     if not off <= max(ERRORS * found.error, TOLERANCE * abs(exact), rounding):
         return "differs"
-    if not found.error <= max(precision * abs(exact), rounding):
+    if precision is not None and not found.error <= max(precision * abs(exact), rounding):
         return "too rough"
     return "agrees"
 

@@ -133,6 +133,8 @@ def _distributions(curves: dict[str, list[Check]]) -> Drawn:
         found = [p.found.value for p in ordered]
         axes.plot(times, found, "o", color=_COLOURS["agrees"], ms=4, label="simulated")
         axes.set_yscale("log")
+        axes.yaxis.set_major_formatter("{x:g}")
+        axes.yaxis.set_minor_formatter("{x:g}")
         axes.set_title(title)
         axes.set_xlabel("time [s]")
     rows[0][0].set_ylabel("share of events that wait longer")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import cast
@@ -238,6 +237,6 @@ def _check(
     case: Case, columns: Columns, kind: str, measure: str, exact: float, found: Estimate
 ) -> Check:
     strict = kind == "result" and measure not in case.loosely
-    judged = verdict(found, exact, PRECISION if strict else math.inf)
+    judged = verdict(found, exact, PRECISION if strict else None)
     events = int(columns["events"].sum())
     return Check(case.name, case.title, measure, exact, found, judged, case.source, events, kind)

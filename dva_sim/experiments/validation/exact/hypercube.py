@@ -41,6 +41,9 @@ def hypercube(
     Returns:
         `workload_n` of unit n; `share_n_k`, of all calls served those that are class k and
         served by unit n; `utilisation`; `delayed` and `wait_s`, or `lost`.
+
+    References:
+        R. C. Larson, Comput. Oper. Res. 1 (1974) 67-95, solved exactly as a Markov chain.
     """
     units = len(preferences[0])
     if not 1 <= units <= MOST_UNITS:
