@@ -57,7 +57,8 @@ def _foresee(scenario: TimedScenario, seed: int) -> tuple[Shift, list[Incident]]
     patient = scenario.dispatch.model_copy(
         update={"escalate_after_s": None, "most_waiting": None, "policy": "min_eta", "options": {}}
     )
-    shift = Shift(scenario.model_copy(update={"dispatch": patient}), seed, _Nobody())
+    watched = scenario.model_copy(update={"dispatch": patient, "drain": False})
+    shift = Shift(watched, seed, _Nobody())
     shift.run()
     incidents = [each for known in shift.events.values() for each in known]
     if not 0 < len(incidents) <= MOST_EVENTS:
@@ -73,12 +74,11 @@ def _check_small(scenario: TimedScenario) -> None:
     alike = all(g.kind == "guard" and g.after == "return" for g in scenario.responders)
     plain = all(s.sources is None and s.patience is None for s in scenario.demand)
     together = all(g.from_s == 0.0 for g in scenario.responders)
-    apart = not scenario.dispatch.merge_distance_m and not scenario.site
     few = len(scenario.names) <= MOST_UNITS and not scenario.dispatch.containment
     if not (alike and plain and together and few):
         raise ConfigError(
             f"the oracle plans for up to {MOST_UNITS} guards that look and return (after: "
             "return), without containment, patience, finite sources or later shifts"
         )
-    if not apart and scenario.dispatch.merge_distance_m != 0:
+    if scenario.merge_distance:
         raise ConfigError("the oracle needs dispatch.merge_distance_m 0: each report an event")

@@ -14,6 +14,7 @@ from dva_sim.protocol import messages as m
 
 DVA = "02:00:00:00:00:01"
 NOON = "12:00:00"  # for people, who are not here to read it
+TICK = 1.0  # how often the desk looks by itself on a network [s]
 LEAST = 1e-6  # the clock's own step: a deadline is never looked at twice at one time [s]
 
 
@@ -28,13 +29,15 @@ class Mail:
     """Carries messages to the desk and from it, one after the other, at once.
 
     What is said while the desk is busy waits until it is not. The desk looks at deadlines
-    exactly when they are due.
+    exactly when they are due. Where one decision can make the next possible, it also looks again
+    a second after it has sent something, as it would on its network, until nothing is left to say.
 
     Args:
         desk: The DVA's.
         clock: Tells the time.
         changed: Called when the desk has done something, with whom the message was about.
         moved: Called before the desk decides anything, so that it can be told who is where.
+        attentive: Whether one decision can make the next possible.
 
     Attributes:
         takers: Who hears what is sent to an id.
@@ -48,6 +51,7 @@ class Mail:
         clock: Clock,
         changed: Callable[[object], None],
         moved: Callable[[], None],
+        attentive: bool,
     ) -> None:
         self.desk, self._clock = desk, clock
         self._changed, self._moved = changed, moved
@@ -56,7 +60,8 @@ class Mail:
         self.refused: Counter[str] = Counter()
         self._waiting: deque[tuple[str, m.Body, object]] = deque()
         self._numbers: dict[str, int] = {}
-        self._due = math.inf
+        self._due = self._again = math.inf
+        self._attentive = attentive
 
     def say(self, source: str, body: m.Body, about: object = None) -> None:
         """Put a message to the desk into the box; `carry` brings it."""
@@ -97,6 +102,8 @@ class Mail:
         """Hand over what the desk wants delivered, and tell it how that went."""
         queue = deque(sends)
         now = self._clock.now
+        if self._attentive and sends:
+            self._again = now + TICK
         while queue:
             send = queue.popleft()
             taker = self.takers.get(send.to)
@@ -107,7 +114,7 @@ class Mail:
 
     def _look_again(self) -> None:
         """Be there at the next deadline."""
-        due = self.desk.next_deadline()
+        due = min(self.desk.next_deadline(), self._again)
         if due < self._due:
             self._due = max(due, self._clock.now + LEAST)
             self._clock.call_at(self._due, self._on_due, self._due)
@@ -116,7 +123,9 @@ class Mail:
         if due != self._due:
             return  # an earlier one was found meanwhile, and looks for the next
         self._due = math.inf
-        if self.desk.next_deadline() <= self._clock.now + LEAST:
+        now = self._clock.now + LEAST
+        if self.desk.next_deadline() <= now or self._again <= now:
+            self._again = math.inf
             self.tick()
         else:
             self._look_again()

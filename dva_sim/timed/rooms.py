@@ -2,7 +2,7 @@
 
 Ways between places that stay are planned once per process. From half-way, where planning
 each time would cost more than the rest of the run, the way leads straight to what is in sight
-- the goal, a door, or either end of the leg - and on from there.
+- the goal, a door or an opening - and on from there.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from dva_sim.worlds.site import FOOTPRINT, Detector, Pose, Site, load_site
 
 CLEARANCE = 0.4  # radius that must fit where an event happens [m]
 MOST_PATHS = 5000  # kept at a time
+WALL, PASSAGE = 0.05, 0.6  # thickness of a wall, and the least width to pass [m]
 DETECTS = {"fire": "smoke", "gas_leak": "gas", "flood": "water"}
 
 
@@ -67,6 +68,25 @@ def _spots_of(site: Site, count: int) -> tuple[tuple[Point, ...], ...]:
     )
 
 
+@lru_cache(maxsize=8)
+def _passages_of(site: Site) -> tuple[Point, ...]:
+    """Middles of doors, and of where two rooms are open to each other."""
+    import shapely
+
+    walls = shapely.MultiLineString(site.walls.reshape(-1, 2, 2).tolist()).buffer(WALL)
+    doors = [((a + c) / 2, (b + d) / 2) for a, b, c, d in site.doors.tolist()]
+    borders = [shapely.Polygon(room.polygon).exterior for room in site.rooms]
+    for number, border in enumerate(borders):
+        for other in borders[:number]:
+            opening = shapely.line_merge(border.intersection(other.buffer(WALL)).difference(walls))
+            for part in shapely.get_parts(opening):
+                middle = part.interpolate(0.5, normalized=True)
+                near = any(math.dist((middle.x, middle.y), door) < PASSAGE for door in doors)
+                if part.length >= PASSAGE and not near:
+                    doors.append((middle.x, middle.y))
+    return tuple(doors)
+
+
 class Rooms(Terrain):
     """A site.
 
@@ -93,8 +113,7 @@ class Rooms(Terrain):
             [self.fix(x, y, zone) for x, y in points]
             for zone, points in enumerate(_spots_of(self.site, spots))
         ]
-        ends = self.site.doors.reshape(-1, 2, 2).mean(axis=1).tolist()
-        self._doors: list[Point] = [(x, y) for x, y in ends]
+        self._passages = _passages_of(self.site)
         self._detectors: dict[str, list[tuple[Detector, str | None]]] = {}
 
     # --- places ------------------------------------------------------------------------
@@ -153,16 +172,18 @@ class Rooms(Terrain):
         return self._from_half_way(a.point, b)
 
     def _from_half_way(self, start: Point, goal: Place) -> float:
-        sees = self._ways.planner.line_of_sight
+        planner, sees = self._ways.planner, self._ways.planner.line_of_sight
         if sees(start, goal.point):
             return math.dist(start, goal.point)
         end = goal.fixed.point if goal.fixed is not None else goal.point
+        if goal.zone >= 0 and self.site.rooms[goal.zone].contains(*start):
+            return planner.distance(start, end)  # behind a shelf
         ways = [
-            math.dist(start, door) + self._ways.length(door, end)
-            for door in self._doors
-            if sees(start, door)
+            math.dist(start, passage) + self._ways.length(passage, end)
+            for passage in self._passages
+            if sees(start, passage)
         ]
-        return min(ways, default=math.inf) if ways else self._ways.planner.distance(start, end)
+        return min(ways) if ways else planner.distance(start, end)
 
     def along(self, a: Place, b: Place, gone: float) -> Place:
         """See `Terrain`."""

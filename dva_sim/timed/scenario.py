@@ -189,8 +189,8 @@ class TimedDispatch(Config):
         escalate_after_s: How long an event may wait; 0: not at all; `.inf` or null: forever.
         containment: Whether a confirmed event needs a person who deals with it.
         most_waiting: How many events may wait.
-        merge_distance_m: Reports so near each other are one event; left out, 8 m on a site and
-            0 (never) elsewhere.
+        merge_distance_m: Reports so near each other are one event; left out, 8 m on a site,
+            elsewhere 1 m if events are reported twice, and else 0 (never).
         max_attempts: Orders for one event.
         order_limit_s: How long an order may take; left out, without limit.
         bid_within_s: How long bids are taken.
@@ -262,6 +262,13 @@ class TimedScenario(Config):
         return [f"{group.name}-{number}" for number in range(1, group.count + 1)]
 
     @property
+    def merge_distance(self) -> float:
+        """Reports so near each other are one event [m]."""
+        if self.dispatch.merge_distance_m is not None:
+            return self.dispatch.merge_distance_m
+        return 8.0 if self.site else 1.0 if any(s.repeats for s in self.demand) else 0.0
+
+    @property
     def names(self) -> list[str]:
         """Names of all responders, in order."""
         return [name for group in self.responders for name in self.members(group)]
@@ -296,6 +303,8 @@ class TimedScenario(Config):
             raise ValueError("robots need an operator: operators.count is 0")
         if self.dispatch.containment and all(g.kind == "robot" for g in self.responders):
             raise ValueError("containment needs guards: robots only look")
+        if not self.merge_distance and any(s.repeats for s in self.demand):
+            raise ValueError("repeats need dispatch.merge_distance_m above 0, to be known as such")
         if self.warm_up_s >= self.horizon_s:
             raise ValueError(
                 f"warm_up_s {self.warm_up_s:g} should be before horizon_s {self.horizon_s:g}"

@@ -73,7 +73,7 @@ class Shift:
         self.numbers: dict[str, int] = {}
         self._hire()
         self.desk = self._open_desk(policy)
-        self.mail = Mail(self.desk, self.clock, self._changed, self._tell_who_moves)
+        self.mail = self._open_mail(policy)
         self.records = [UnitRecord(unit.name, unit.kind) for unit in self.units]
         self.operators: list[Operator] = []
         self.events: dict[int, list[Incident]] = {}
@@ -86,7 +86,7 @@ class Shift:
         self.half_way: dict[Unit, Place] = {}
         self._served: set[int] = set()
         self._moving: dict[Unit, None] = {}
-        self._luck: dict[tuple[str, int, int], Draws[float]] = {}
+        self._luck: dict[tuple[str, int, str, int], Draws[float]] = {}
         self._register()
 
     # --- a run ---------------------------------------------------------------------------
@@ -100,11 +100,16 @@ class Shift:
             check(self)
             if self.demand.exhausted and not self.events and not self.unnoticed:
                 break
-        peek = self.clock.env.peek
-        while scenario.drain and (self.events or self.unnoticed) and peek() < math.inf:
-            self.clock.run(self.clock.now + max(1.0, scenario.horizon_s / CHECKS))
-            check(self)
+        if scenario.drain:
+            self._drain()
         return self._close()
+
+    def _drain(self) -> None:
+        """Let what is open be closed, as far as anybody will still do anything."""
+        env = self.clock.env
+        while (self.events or self.unnoticed) and env.peek() < math.inf:
+            env.step()
+        check(self)
 
     def _close(self) -> TimedRecording:
         now, scenario = self.clock.now, self.scenario
@@ -182,14 +187,11 @@ class Shift:
 
     def _open_desk(self, policy: Policy) -> Desk:
         config = self.scenario.dispatch
-        merge = config.merge_distance_m
-        if merge is None:
-            merge = 8.0 if self.scenario.site else 0.0
         rules = Rules(
             escalate_after=limit_of(config.escalate_after_s),
             containment=config.containment,
             most_waiting=config.most_waiting,
-            merge_distance=merge,
+            merge_distance=self.scenario.merge_distance,
             max_attempts=config.max_attempts,
             order_limit=limit_of(config.order_limit_s),
             bid_within=config.bid_within_s,
@@ -199,6 +201,12 @@ class Shift:
         desk = Desk(policy, self._travel, rules, self.streams["dva/policy"], sessions, ground)
         desk.registry.silent_after = math.inf
         return desk
+
+    def _open_mail(self, policy: Policy) -> Mail:
+        """One decision leads to the next where orders build on each other, or guards move."""
+        containment = self.scenario.dispatch.containment
+        attentive = containment or policy.preempts or policy.relocates
+        return Mail(self.desk, self.clock, self._changed, self._tell_who_moves, attentive)
 
     def _register(self) -> None:
         """Everybody makes itself known; who is on duty later shows no place until then."""
@@ -404,7 +412,7 @@ class Shift:
 
     def mobilisation(self, unit: Unit, incident: Incident) -> float:
         """What it takes this unit this time to get ready [s]."""
-        return self._drawn("mobilisation", unit.group.mobilisation, incident, unit.number)
+        return self._drawn("mobilisation", unit.group.mobilisation, incident, unit.name)
 
     def trip(self, unit: Unit, start: Place, goal: Place) -> float:
         """Time to get somewhere [s]; infinite if there is no way."""
@@ -413,26 +421,25 @@ class Shift:
             return self.terrain.length(start, goal) / unit.speed
         if goal.about is None:
             return 0.0  # back
-        return self._drawn("travel", way, goal.about, unit.number)
+        return self._drawn("travel", way, goal.about, unit.name)
 
     def look(self, unit: Unit, incident: Incident) -> float:
         """From arrival to being sure [s]: luck of the event, whoever looks."""
-        law = self.scenario.demand[incident.stream].look
-        return self._drawn("look", law or unit.group.look, incident)
+        law = self.scenario.demand[incident.stream].look or unit.group.look
+        return self._drawn("look", law, incident)
 
     def act(self, unit: Unit, incident: Incident) -> float:
         """What it takes to contain it [s]: luck of the event, whoever does it."""
-        law = self.scenario.demand[incident.stream].act
-        return self._drawn("act", law or unit.group.act, incident)
+        law = self.scenario.demand[incident.stream].act or unit.group.act
+        return self._drawn("act", law, incident)
 
-    def _drawn(self, purpose: str, law: Law, incident: Incident, unit: int = -1) -> float:
-        key = purpose, incident.stream, unit
+    def _drawn(self, purpose: str, law: Law, incident: Incident, whose: str = "") -> float:
+        """Draws by the event's index; two laws for one purpose share their luck."""
+        key = purpose, incident.stream, whose, id(law)
         draws = self._luck.get(key)
         if draws is None:
             stream = self.scenario.stream_names[incident.stream]
-            name = f"demand/{stream}/{purpose}"
-            if unit >= 0:
-                name += f"/{self.units[unit].name}"
+            name = f"demand/{stream}/{purpose}/{whose}"
             draws = self._luck[key] = times(self.streams, name, law)
         return draws[incident.index]
 

@@ -154,7 +154,6 @@ class Unit:
         self.jobs: Counter[str] = Counter()
         self._ticket = 0
         self.since = 0.0
-        self._released = -math.inf
         self._ready_at = 0.0
         self._near: Incident | None = None
         self._offers: dict[int, m.TaskAnnouncement] = {}
@@ -188,12 +187,13 @@ class Unit:
             return True
         ready_at = self._drop()
         incident = world.incident_at(order.event_id)
+        at_hand = self.equipped or incident is self._near
         if incident is not self._near:
             self._leave()
         self._near = None
         self.job = job = Job(order, incident, voice, world.now, inside=order.task != "stand_by")
         self.since = world.now
-        if self.equipped or self._released == world.now:
+        if at_hand:
             delay = 0.0
         elif ready_at is not None:
             delay = ready_at - world.now
@@ -285,10 +285,11 @@ class Unit:
             self._turn_to(job, "stand by")
 
     def _enter(self, job: Job) -> None:
-        """From where one stood by into the danger."""
+        """From outside, wherever the growing danger has driven one, into it."""
         self._turn_to(job, "travel")
         goal, now = job.incident.place, self.world.now
-        length = min(self.world.length(self.place, goal), job.incident.danger_radius(now))
+        apart = self.world.length(self.place, goal) > 0.0  # else ways play no part
+        length = job.incident.danger_radius(now) if apart else 0.0
         job.inside = True
         seconds = length / self.speed
         self.leg = Leg(self.place, goal, now, length, now + seconds)
@@ -355,7 +356,6 @@ class Unit:
         world.freed(self, job)
         self.job = None
         self._ticket += 1
-        self._released = world.now
         self.jobs[job.order.task] += state == DONE
         world.stands(self, "waiting")
         world.say(job.voice, m.OrderProgress(job.order.event_id, state))
