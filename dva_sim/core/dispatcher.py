@@ -94,8 +94,11 @@ class Dispatcher:
         self.auctions.close(self.orders.book, now)
         for _ in range(DECISIONS):
             before = self.orders.counters["preempted"]
-            sends += self._decide(now)
-            if self.orders.counters["preempted"] == before:
+            given = self._decide(now)
+            sends += given
+            # Who was called away leaves a task open; an order to look leaves one to stand by.
+            looks = self.orders.rules.containment and any(map(_is_to_look, given))
+            if self.orders.counters["preempted"] == before and not looks:
                 break
         sends += self.orders.give_up(now)
         self.auctions.close(self.orders.book, now)
@@ -352,6 +355,11 @@ class Dispatcher:
         names = tuple(s.name for s in ground.stations)
         reach, demand = _sealed(ground.reach), _sealed(ground.demand)
         return Cover(names, _sealed(eta), reach, demand, tuple(bound_for))
+
+
+def _is_to_look(send: Send) -> bool:
+    body = send.body
+    return isinstance(body, m.TaskAward) or (isinstance(body, m.Order) and body.task == "confirm")
 
 
 def _check_form(advice: Iterable[Advice], situation: Situation) -> None:

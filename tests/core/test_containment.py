@@ -31,7 +31,7 @@ def office() -> Office:
 def standing_by() -> Office:
     """The robot looks, and the guard stands by."""
     office = Office(HazardTeam(), RULES)
-    sends = office.fire(12) + office.tick(1.0)
+    sends = office.fire(12)
     assert [(s.to, s.body.task) for s in sends] == [(OPERATOR, "confirm"), (GUARD, "stand_by")]
     assert office.ok(sends, 1.0) == []
     return office
@@ -243,8 +243,8 @@ def test_who_stands_by_and_gives_up_costs_the_event_nothing(standing_by: Office)
 
 def test_who_declines_to_stand_by_takes_nothing_from_who_looks() -> None:
     office = Office(HazardTeam(), RULES)
-    office.fire(12)
-    office.no(office.tick(1.0), 2.0)
+    stand_by = [send for send in office.fire(12) if send.to == GUARD]
+    office.no(stand_by, 2.0)
     assert office.event().actor is None
     assert office.working == {OPERATOR: 1, ROBOT: 1}
 
