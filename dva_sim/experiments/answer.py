@@ -54,6 +54,7 @@ class Finding:
         smallest_effect: Smallest difference declared to matter, in the measure's unit.
         missed: Runs without confirmation at the last level, per level of `factor`.
         horizon: What such a run counts with [s], if all count with the same.
+        cluster: What the band rests on: persons, or shifts.
     """
 
     measure: str
@@ -71,6 +72,7 @@ class Finding:
     smallest_effect: float | None = None
     missed: tuple[Missed, ...] = ()
     horizon: float | None = None
+    cluster: str = "person"
 
     @property
     def unit(self) -> str:
@@ -138,14 +140,14 @@ def _ruled_out(f: Finding) -> list[str]:
     nowhere = bool((holds_zero == np.isfinite(f.low)).all())
     sentences = [_no_difference(f)] if nowhere else []
     if len(same := np.flatnonzero(holds_zero & (bounds == 0))):
-        sentences.append(f"No person fares differently {_places(f, same)}.")
+        sentences.append(f"No {f.cluster} fares differently {_places(f, same)}.")
     if len(settled := np.flatnonzero(holds_zero & (bounds > 0) & (bounds <= limit))):
         sentences.append(_settled(f, settled, float(bounds[settled].max()), nowhere))
     if len(undecided := np.flatnonzero(holds_zero & (bounds > limit))):
         size = quantity(float(bounds[undecided].max()), f.unit)
         sentences.append(
             f"The question stays open {_places(f, undecided)}: an effect as large as {size} is "
-            "not ruled out, so more persons are needed."
+            f"not ruled out, so more {f.cluster}s are needed."
         )
     return sentences
 
@@ -183,9 +185,9 @@ def _without_band(f: Finding) -> str:
         return "No pair of runs is complete, so the question stays open."
     at = int(there[-1])
     if f.persons < 2:
-        why = "Too few persons to answer: an interval needs at least two, here is one."
+        why = f"Too few {f.cluster}s to answer: an interval needs at least two, here is one."
     else:
-        why = "The difference is the same for every person, so that no interval can be given."
+        why = f"The difference is the same for every {f.cluster}, so that no interval can be given."
     seen = f"{_condition(f, inside=True)}{_comparison(f, f.mean[at])} {_at(f, [at])}"
     return f"{why} In the runs that were made, {seen}."
 
@@ -209,7 +211,8 @@ def _misses(f: Finding) -> list[str]:
 
 
 def _what_is_measured(f: Finding) -> str:
-    excess = ", in excess of the reference run of the same person and trial" if f.in_excess else ""
+    same = f"the same {f.cluster} and trial"
+    excess = f", in excess of the reference run of {same}" if f.in_excess else ""
     return f"Compared is the {measure_name(f.measure)}{excess}, over {_persons(f)}."
 
 
@@ -221,7 +224,7 @@ def _what_the_band_is(f: Finding) -> str:
 
 
 def _persons(f: Finding) -> str:
-    return "one simulated person" if f.persons == 1 else f"{f.persons} simulated persons"
+    return f"one simulated {f.cluster}" if f.persons == 1 else f"{f.persons} simulated {f.cluster}s"
 
 
 def _condition(f: Finding, inside: bool = False) -> str:

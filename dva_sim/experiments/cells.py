@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -41,7 +41,8 @@ class CellTable:
 
 # column of the runs, head, how the runs of a cell become one number, how it is printed
 _Summarise = Callable[[Floats], Any]
-_SUMMARIES: tuple[tuple[str, str, _Summarise, Callable[[float], str]], ...] = (
+Summary = tuple[str, str, _Summarise, Callable[[float], str]]
+_SUMMARIES: tuple[Summary, ...] = (
     ("command_age_p50_s", "command age, median [s]", np.mean, number),
     ("command_rate_hz", "applied commands [Hz]", np.mean, number),
     ("stop_share", "in safe stop", np.mean, percent),
@@ -50,10 +51,11 @@ _SUMMARIES: tuple[tuple[str, str, _Summarise, Callable[[float], str]], ...] = (
 )
 
 
-def cell_table(part: Part, measure: str) -> CellTable:
+def cell_table(part: Part, measure: str, summaries: Sequence[Summary] = _SUMMARIES) -> CellTable:
     """Every cell of a part: size, confirmed share, the measure with its interval, and the rest."""
     settings = list(part.settings())
-    columns = [_counts(part), _confirmed(part), *_measure(part, measure), *_others(part)]
+    columns = [_counts(part), _confirmed(part), *_measure(part, measure)]
+    columns += _others(part, summaries)
     there = [c for c in columns if c is not None]
     names = [factor_name(f.name) for f in part.factors]
     rows = [
@@ -105,10 +107,10 @@ def _measure(part: Part, measure: str) -> list[_Column]:
     return [(f"{name}, median{unit}", medians), (f"its mean (95 % interval){unit}", means)]
 
 
-def _others(part: Part) -> list[_Column]:
+def _others(part: Part, summaries: Sequence[Summary]) -> list[_Column]:
     return [
         (head, [_text(summary, cell, text) for cell in _cells(part, column)])
-        for column, head, summary, text in _SUMMARIES
+        for column, head, summary, text in summaries
         if part.has(column)
     ]
 

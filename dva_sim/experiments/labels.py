@@ -17,6 +17,7 @@ _FACTORS = {
     "command.rate_hz": "wanted command rate",
     "operator.strategy": "operator strategy",
     "dispatch.policy": "dispatch policy",
+    "intensity": "rate of alarms",
 }
 _LEVELS = {
     "req-rep": "REQ/REP",
@@ -36,6 +37,14 @@ _MEASURES = {
     "loop_delay_mean_s": "observation-to-effect delay",
     "response_s": "response time",
     "confirmation_s": "confirmation time",
+    "response_mean_s": "restricted mean time to response",
+    "confirmation_mean_s": "restricted mean time to confirmation",
+    "containment_mean_s": "restricted mean time to containment",
+    "response_p50_s": "median time to response",
+    "response_p90_s": "90th percentile of the time to response",
+    "response_p95_s": "95th percentile of the time to response",
+    "exposure_s": "exposure of people per event",
+    "exposure_look_s": "exposure of people in finding out, per event",
 }
 _UNITS = {"s": "s", "m": "m", "hz": "Hz", "mps": "m/s", "bps": "bit/s", "ns": "N s", "deg": "deg"}
 

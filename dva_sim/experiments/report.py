@@ -14,6 +14,9 @@ from dva_sim.experiments import statistics
 from dva_sim.experiments.answer import Answer, answer
 from dva_sim.experiments.cells import CellTable, cell_table
 from dva_sim.experiments.conditions import conditions, timeout_remark
+from dva_sim.experiments.dispatch import figures as dispatch_figures
+from dva_sim.experiments.dispatch import page as dispatch_page
+from dva_sim.experiments.dispatch.shifts import Shifts, is_dispatch
 from dva_sim.experiments.effects import Part, Table, View, as_floats
 from dva_sim.experiments.figures import Drawn, draw_all
 from dva_sim.experiments.labels import factor_name, level_name, listing
@@ -45,6 +48,8 @@ def write_report(folder: Path) -> Path:
 
 def _draw(view: View, results: Results) -> list[Drawn]:
     tables = {name: results.table(name) for name in _OPTIONAL if results.has(name)}
+    if is_dispatch(view):
+        return dispatch_figures.draw_all(Shifts(view, tables.get("events")))
     scenario = results.manifest.get("scenarios", {}).get(view.part.name, {})
     return draw_all(view, tables, scenario)
 
@@ -61,20 +66,23 @@ def _page(results: Results, runs: Table, view: View | None, drawn: list[Drawn]) 
     manifest, study = results.manifest, results.study
     factors = factors_of(study)
     scenarios = manifest.get("scenarios", {})
+    shifts = Shifts(view) if view is not None and is_dispatch(view) else None
+    stated = dispatch_page.conditions if shifts else conditions
     return _template().render(
         question=study.get("question", "A study without a question"),
         changes=[_as_words(change) for change in manifest.get("set", [])],
-        answer=_answer(view),
+        answer=_answer(view, shifts),
         warnings=_warnings(results, runs),
         parts=list(scenarios),
-        conditions=conditions(scenarios, factors),
+        conditions=stated(scenarios, factors),
         timeout_remark=timeout_remark(next(iter(scenarios.values()), {}), factors),
         factors=[_levels(f.name, f.levels) for f in factors],
         figures=drawn,
-        tables=_tables(study, runs, view),
+        tables=_tables(study, runs, view, shifts),
         persons=study.get("persons"),
         replications=study.get("replications"),
         correlation=_pair_correlation(view),
+        method=dispatch_page.method(shifts, _pair_correlation(view)) if shifts else [],
         manifest=json.dumps(manifest, indent=2, sort_keys=True, ensure_ascii=False),
     )
 
@@ -93,19 +101,26 @@ def _template() -> jinja2.Template:
     return environment.get_template("report.html.j2")
 
 
-def _tables(study: Mapping[str, Any], runs: Table, view: View | None) -> list[CellTable]:
+def _tables(
+    study: Mapping[str, Any], runs: Table, view: View | None, shifts: Shifts | None
+) -> list[CellTable]:
     """A table of cells for each part that has runs."""
     if view is None:
         return []
     names = dict.fromkeys(str(name) for name in runs["part"])
     parts = (Part(runs, name, factors_of(study)) for name in names)
+    if shifts:
+        columns = dispatch_page.SUMMARIES
+        return [cell_table(part, view.measure, columns) for part in parts if len(part)]
     return [cell_table(part, view.measure) for part in parts if len(part)]
 
 
-def _answer(view: View | None) -> Answer:
+def _answer(view: View | None, shifts: Shifts | None) -> Answer:
     if view is None:
         return Answer("No run was completed, so there is nothing to answer with.")
     finding = finding_of(view)
+    if shifts is not None:
+        return dispatch_page.answer_of(finding, shifts)
     if finding is not None:
         return answer(finding)
     return Answer(
