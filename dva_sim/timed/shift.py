@@ -85,6 +85,7 @@ class Shift:
         self.told: list[m.Position | None] = [None] * len(self.units)
         self.half_way: dict[Unit, Place] = {}
         self._served: set[int] = set()
+        self._newest = 0
         self._moving: dict[Unit, None] = {}
         self._luck: dict[tuple[str, int, str, int], Draws[float]] = {}
         self._register()
@@ -281,46 +282,53 @@ class Shift:
 
     def _changed(self, about: object) -> None:
         """Follow the events of the DVA."""
-        now = self.clock.now
-        for event in self.desk.book.changes():
-            known = self.reports.get(event.number, 0)
-            if event.reports > known:
-                self.reports[event.number] = event.reports
-                if isinstance(about, Incident):
-                    self._reported(about, event, now)
-            self._follow(event, now)
+        changes = self.desk.book.changes()
+        if changes:
+            now = self.clock.now
+            for event in changes:
+                if event.number > self._newest or event.number in self.events:
+                    self._match(about, event, now)
+                    self._follow(event, now)
         if isinstance(about, Incident) and about.event is None:
-            self._settle(about, "refused", now)
+            self._settle(about, "refused", self.clock.now)
 
-    def _reported(self, incident: Incident, event: Event, now: float) -> None:
+    def _match(self, about: object, event: Event, now: float) -> None:
+        """Find out what the DVA took a report for."""
+        if event.number > self._newest:
+            self._newest = event.number
+            assert isinstance(about, Incident)
+            self.events[event.number] = [about]
+            self._reported(about, event)
+            self.waiting[about.stream].change(1, now)
+        elif event.reports > self.reports[event.number]:
+            self.reports[event.number] = event.reports
+            if isinstance(about, Incident) and about.event is None:
+                about.shared = True
+                self.events[event.number].append(about)
+                self._reported(about, event)
+
+    def _reported(self, incident: Incident, event: Event) -> None:
         """Now it is known as what the DVA knows an incident."""
-        if incident.event is not None:
-            return  # reported again
         incident.event = event
-        self.unnoticed.pop(incident.number)
-        incidents = self.events.get(event.number)
-        if incidents is None:
-            self.events[event.number] = [incident]
-            self.waiting[incident.stream].change(1, now)
-        else:
-            incident.shared = True
-            incidents.append(incident)
+        self.reports[event.number] = event.reports
+        del self.unnoticed[incident.number]
 
     def _follow(self, event: Event, now: float) -> None:
-        incidents = self.events.get(event.number)
-        if incidents is None:
-            return
-        stream = incidents[0].stream
-        waits = event.waits_for is not None
-        if not event.open:
-            at_last = self.served if event.number in self._served else self.waiting
-            at_last[stream].change(-1, now)
-            self._served.discard(event.number)
+        """Count an event where it stands now: waiting, served or over."""
+        number, book, stream = event.number, self.desk.book, self.events[event.number][0].stream
+        waited = number not in self._served
+        if number not in book.open:
+            (self.waiting if waited else self.served)[stream].change(-1, now)
+            self._served.discard(number)
             self._end(event, now)
-        elif waits == (event.number in self._served):
-            self.waiting[stream].change(1 if waits else -1, now)
-            self.served[stream].change(-1 if waits else 1, now)
-            (self._served.discard if waits else self._served.add)(event.number)
+        elif waited and number not in book.waiting:
+            self.waiting[stream].change(-1, now)
+            self.served[stream].change(1, now)
+            self._served.add(number)
+        elif not waited and number in book.waiting:
+            self.waiting[stream].change(1, now)
+            self.served[stream].change(-1, now)
+            self._served.discard(number)
 
     def _end(self, event: Event, now: float) -> None:
         given_up = event.state in (State.ESCALATED, State.EXPIRED)
@@ -332,8 +340,7 @@ class Shift:
 
     def _settle(self, incident: Incident, outcome: str, now: float) -> None:
         """An incident is closed: count it, and let its source make the next."""
-        if outcome == "refused":
-            self.unnoticed.pop(incident.number)
+        self.unnoticed.pop(incident.number, None)
         self.settled[outcome] += 1
         if incident.event is not None and not in_order(incident):
             self.violations["times are out of order"] += 1
