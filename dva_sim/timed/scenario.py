@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
@@ -18,6 +18,7 @@ from dva_sim.config import Config, Document, Path_, validate
 from dva_sim.errors import ConfigError
 from dva_sim.scenario import set_key
 from dva_sim.timed.laws import ZERO, Constant, Law
+from dva_sim.timed.naming import check_names
 
 Name = Annotated[str, Field(min_length=1, max_length=40)]
 Share = Annotated[float, Field(ge=0, le=1)]
@@ -27,7 +28,6 @@ Limit = Annotated[float, Field(ge=0, allow_inf_nan=True)] | None
 Point = tuple[float, float]
 Box = tuple[float, float, float, float]
 Kind = Literal["fire", "gas_leak", "flood"]
-Error = Callable[[str, Path_], ConfigError]
 
 LOOK_S, ACT_S = Constant(mean_s=0.0), Constant(mean_s=0.0)
 MOST_UNITS = 2000
@@ -365,90 +365,6 @@ def change(data: dict[str, Any], key: str, value: Any) -> None:
         change(inner[int(index)], rest, value)
     else:
         raise ConfigError(f"unknown key {key!r}: {head}.{index} holds no keys")
-
-
-def check_names(scenario: TimedScenario, error: Error) -> None:
-    """Refuse names that mean nothing, before anything runs.
-
-    Raises:
-        ConfigError: an unknown site, zone, responder, station or policy.
-    """
-    zones = zone_names(scenario, error)
-    for number, stream in enumerate(scenario.demand):
-        _known(stream.zones, zones, "zone", ("demand", number, "zones"), error)
-        if stream.notice == "detectors" and scenario.site is None:
-            raise error("notice 'detectors' needs a site", ("demand", number, "notice"))
-    dispatch = scenario.dispatch
-    _known(dispatch.preferences, zones, "zone", ("dispatch", "preferences"), error)
-    for zone, names in dispatch.preferences.items():
-        path = ("dispatch", "preferences", zone)
-        _known(names, scenario.names, "responder", path, error)
-    for zone in sorted({z for s in scenario.demand for z in s.zones or zones}):
-        if dispatch.preferences and zone not in dispatch.preferences:
-            problem = f"preferences has no list for zone {zone!r}"
-            raise error(problem, ("dispatch", "preferences"))
-    _check_places(scenario, zones, error)
-    _check_policy(scenario, error)
-
-
-def zone_names(scenario: TimedScenario, error: Error) -> list[str]:
-    """Names of the zones, in order."""
-    if scenario.site is None:
-        return list(scenario.zones) or ["area" if scenario.area else "here"]
-    from dva_sim.worlds.site import load_site
-
-    try:
-        return [room.name for room in load_site(scenario.site.name).rooms]
-    except ConfigError as problem:
-        if problem.file is not None:
-            raise
-        raise error(problem.problem, ("site", "name")) from None
-
-
-def _known(names: Any, known: list[str], what: str, path: Path_, error: Error) -> None:
-    for name in names:
-        if name not in known:
-            there = ", ".join(known) or "none"
-            raise error(f"{what} {name!r} is unknown; known: {there}", (*path, name))
-
-
-def _check_places(scenario: TimedScenario, zones: list[str], error: Error) -> None:
-    stations = [s.name for s in scenario.dispatch.stations]
-    places: list[tuple[Any, Path_, list[str]]] = [
-        (group.base, ("responders", number, "base"), stations)
-        for number, group in enumerate(scenario.responders)
-    ]
-    places += [
-        (station.at, ("dispatch", "stations", number, "at"), [])
-        for number, station in enumerate(scenario.dispatch.stations)
-    ]
-    for place, path, names in places:
-        if isinstance(place, str) and not _names_place(place, scenario, [*zones, *names]):
-            known = ["random", *(["post", "robot_base"] if scenario.site else []), *names, *zones]
-            raise error(f"place {place!r} is unknown; known: {', '.join(known)}", path)
-
-
-def _names_place(place: str, scenario: TimedScenario, names: list[str]) -> bool:
-    if place in names or place == "random":
-        return True
-    what, _, number = place.partition("-")
-    if scenario.site is None or what not in ("post", "robot_base"):
-        return False
-    return not number or (number.isdigit() and int(number) > 0)
-
-
-def _check_policy(scenario: TimedScenario, error: Error) -> None:
-    from dva_sim.core.dispatch import load_policy
-
-    if scenario.dispatch.policy == "oracle":  # made from the run's own luck
-        return
-    try:
-        load_policy(scenario.dispatch.policy, scenario.dispatch.options)
-    except ConfigError as problem:
-        if problem.file is not None:
-            raise
-        key = "options" if "option" in problem.problem else "policy"
-        raise error(f"dispatch.{key}: {problem.problem}", ("dispatch", key)) from None
 
 
 def limit_of(value: float | None) -> float:

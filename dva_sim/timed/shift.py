@@ -12,36 +12,24 @@ import numpy as np
 from dva_sim.clock import Clock
 from dva_sim.core.dispatch import Policy
 from dva_sim.core.events import Event, State
-from dva_sim.core.ground import Ground, Start
-from dva_sim.core.permissions import Permissions
-from dva_sim.core.registry import DETECTOR, GUARD, OPERATOR, ROBOT
-from dva_sim.core.rules import Rules
-from dva_sim.core.service import Desk
-from dva_sim.core.sessions import Sessions
+from dva_sim.core.ground import Start
 from dva_sim.protocol import messages as m
 from dva_sim.streams import Streams
-from dva_sim.timed import knowledge
+from dva_sim.timed import knowledge, team
 from dva_sim.timed.balance import check
 from dva_sim.timed.demand import CALLERS, Demand
 from dva_sim.timed.incident import Incident
+from dva_sim.timed.jobs import Job
 from dva_sim.timed.laws import Law
 from dva_sim.timed.ledger import CODES, STEPS_IN_ORDER, Floats, Ledger, Level, Slices
 from dva_sim.timed.luck import Draws, times
 from dva_sim.timed.mail import Mail
 from dva_sim.timed.places import Place, Terrain, terrain_of
 from dva_sim.timed.recording import TimedRecording, UnitRecord
-from dva_sim.timed.scenario import Group, TimedScenario, limit_of
-from dva_sim.timed.units import Job, Operator, Unit
+from dva_sim.timed.scenario import TimedScenario
+from dva_sim.timed.units import Unit
 
-ADDRESS = "192.168.1.9"  # in the registration, where nobody has a real one
 CHECKS = 64  # of the balance in a run
-FASTEST, SLOWEST = 2.0, 0.5  # bounds of a person's speed, by the group's mean
-IDS = {"guard": 1, "robot": 2, "operator": 3, "caller": 4, "second": 5}
-
-
-def id_of(kind: str, number: int) -> str:
-    """The id of the `number`-th device of a kind, from 0."""
-    return f"02:00:01:{IDS[kind]:02X}:{number >> 8:02X}:{number & 0xFF:02X}"
 
 
 class Shift:
@@ -68,27 +56,41 @@ class Shift:
         self.demand = Demand(
             scenario, self.streams, self.terrain, self.clock, self._happens, self._noticed
         )
-        self.units: list[Unit] = []
-        self.by_device: dict[str, Unit] = {}
-        self.numbers: dict[str, int] = {}
-        self._hire()
-        self.desk = self._open_desk(policy)
+        self.stations = knowledge.stations(scenario, self.terrain)
+        self.units = team.hire(self, self.streams, self.stations)
+        self.by_device = {unit.device: unit for unit in self.units}
+        self.numbers = {unit.device: unit.number for unit in self.units}
+        self.desk = team.open_desk(self, policy)
         self.mail = self._open_mail(policy)
         self.records = [UnitRecord(unit.name, unit.kind) for unit in self.units]
-        self.operators: list[Operator] = []
         self.events: dict[int, list[Incident]] = {}
         self.reports: dict[int, int] = {}
         self.unnoticed: dict[int, Incident] = {}
         self.total, self.settled = 0, Counter[str]()
         self.violations: Counter[str] = Counter()
-        self.driven: dict[str, float] = {}
+        self.driven = {team.id_of("operator", n): 0.0 for n in range(scenario.operators.count)}
         self.told: list[m.Position | None] = [None] * len(self.units)
         self.half_way: dict[Unit, Place] = {}
         self._served: set[int] = set()
         self._newest = 0
         self._moving: dict[Unit, None] = {}
         self._luck: dict[tuple[str, int, str, int], Draws[float]] = {}
-        self._register()
+        team.register(self)
+        self.mail.carry()
+        for start in sorted({group.from_s for group in scenario.responders}):
+            on_duty = [unit for unit in self.units if unit.group.from_s == start]
+            self.clock.call_at(start, self._begin_shift, on_duty)
+
+    def _open_mail(self, policy: Policy) -> Mail:
+        """One decision leads to the next where orders build on each other, or guards move."""
+        containment = self.scenario.dispatch.containment
+        attentive = containment or policy.preempts or policy.relocates
+        return Mail(self.desk, self.clock, self._changed, self._tell_who_moves, attentive)
+
+    def _begin_shift(self, units: list[Unit]) -> None:
+        for unit in units:
+            self.stands(unit, "waiting")
+        self.mail.tick()
 
     # --- a run ---------------------------------------------------------------------------
 
@@ -142,7 +144,7 @@ class Shift:
             np.array([level.areas for level in self.waiting]),
             np.array([level.areas for level in self.served]),
             self.records,
-            [self.driven[operator.device] for operator in self.operators],
+            list(self.driven.values()),
             counters,
             self.violations,
             self.total,
@@ -150,95 +152,6 @@ class Shift:
             now,
             max(0.0, min(now, scenario.horizon_s) - scenario.warm_up_s),
         )
-
-    # --- who is there --------------------------------------------------------------------
-
-    def _hire(self) -> None:
-        of_kind: Counter[str] = Counter()
-        stations = knowledge.stations(self.scenario, self.terrain)
-        self.stations = stations
-        for group in self.scenario.responders:
-            for name in self.scenario.members(group):
-                of_kind[group.kind] += 1
-                base = self._base(group, name, of_kind[group.kind], stations)
-                device = id_of(group.kind, of_kind[group.kind])
-                speed = self._speed(group, name)
-                unit = Unit(self, len(self.units), name, device, group, base, speed)
-                self.units.append(unit)
-                self.by_device[device] = unit
-                self.numbers[device] = unit.number
-
-    def _base(self, group: Group, name: str, number: int, stations: dict[str, Place]) -> Place:
-        base: Any = group.base
-        if base is None:
-            base = self.terrain.default_base(group.kind)
-        if base is None:
-            return self.terrain.origin()
-        if base == "random":
-            return self.terrain.anywhere(self.streams.fresh(f"{name}/base"))
-        if base in stations:
-            return stations[base]
-        return knowledge.place_of(self.terrain, base, number)
-
-    def _speed(self, group: Group, name: str) -> float:
-        if not group.speed_sd_mps:
-            return group.speed_mps
-        speed = self.streams.fresh(f"{name}/speed").normal(group.speed_mps, group.speed_sd_mps)
-        return float(np.clip(speed, SLOWEST * group.speed_mps, FASTEST * group.speed_mps))
-
-    def _open_desk(self, policy: Policy) -> Desk:
-        config = self.scenario.dispatch
-        rules = Rules(
-            escalate_after=limit_of(config.escalate_after_s),
-            containment=config.containment,
-            most_waiting=config.most_waiting,
-            merge_distance=self.scenario.merge_distance,
-            max_attempts=config.max_attempts,
-            order_limit=limit_of(config.order_limit_s),
-            bid_within=config.bid_within_s,
-        )
-        sessions = Sessions(Permissions(lambda: 0))
-        ground = knowledge.ground_of(self) if policy.relocates or config.preferences else Ground()
-        desk = Desk(policy, self._travel, rules, self.streams["dva/policy"], sessions, ground)
-        desk.registry.silent_after = math.inf
-        return desk
-
-    def _open_mail(self, policy: Policy) -> Mail:
-        """One decision leads to the next where orders build on each other, or guards move."""
-        containment = self.scenario.dispatch.containment
-        attentive = containment or policy.preempts or policy.relocates
-        return Mail(self.desk, self.clock, self._changed, self._tell_who_moves, attentive)
-
-    def _register(self) -> None:
-        """Everybody makes itself known; who is on duty later shows no place until then."""
-        types = {"guard": GUARD, "robot": ROBOT}
-        for number, stream in enumerate(self.scenario.demand):
-            callers = CALLERS if stream.patience or stream.repeats else 1
-            for kind in ("caller", "second") if stream.repeats else ("caller",):
-                for caller in range(callers):
-                    self._enter(id_of(kind, number * CALLERS + caller), kind, DETECTOR)
-        for unit in self.units:
-            self._enter(unit.device, unit.name, types[unit.kind])
-            self.mail.takers[unit.device] = unit
-        robots = {unit.device: unit for unit in self.units if unit.kind == "robot"}
-        for number in range(self.scenario.operators.count):
-            operator = Operator(id_of("operator", number), robots)
-            self.operators.append(operator)
-            self.driven[operator.device] = 0.0
-            self._enter(operator.device, f"operator-{number + 1}", OPERATOR)
-            self.mail.takers[operator.device] = operator
-        self.mail.carry()
-        for start in sorted({group.from_s for group in self.scenario.responders}):
-            on_duty = [unit for unit in self.units if unit.group.from_s == start]
-            self.clock.call_at(start, self._begin_shift, on_duty)
-
-    def _enter(self, device: str, label: str, device_type: str) -> None:
-        self.mail.say(device, m.Registration(label, device_type, ADDRESS))
-
-    def _begin_shift(self, units: list[Unit]) -> None:
-        for unit in units:
-            self.stands(unit, "waiting")
-        self.mail.tick()
 
     # --- what happens --------------------------------------------------------------------
 
@@ -262,7 +175,7 @@ class Shift:
     def _report(self, incident: Incident, kind: str) -> None:
         stream = self.scenario.demand[incident.stream]
         caller = incident.index % CALLERS if stream.patience or stream.repeats else 0
-        source = id_of(kind, incident.stream * CALLERS + caller)
+        source = team.id_of(kind, incident.stream * CALLERS + caller)
         incident.sources.append(source)
         self.mail.say(source, incident.report("detected"), incident)
         self.mail.carry()
@@ -348,9 +261,8 @@ class Shift:
         self.terrain.forget(incident.place)
         self.demand.closed(incident, now)
 
-    def _travel(
-        self, starts: Sequence[Start], goals: Sequence[m.Position]
-    ) -> tuple[Floats, Floats]:
+    def travel(self, starts: Sequence[Start], goals: Sequence[m.Position]) -> tuple[Floats, Floats]:
+        """What the DVA is told of ways: see `core.ground.Travel`."""
         return knowledge.travel(self, starts, goals)
 
     def _tell_who_moves(self) -> None:
