@@ -173,7 +173,11 @@ def _half_hold(gaps: NDArray[np.float64]) -> float:
 
 
 def event_rows(recording: Recording) -> list[Row]:
-    """One row per event that happened, in order; none is left out (S6)."""
+    """One row per event that happened, in order; none is left out (S6).
+
+    The columns `outcome`, `confirmation_s`, `closing_s` and `watched_s` are what competing
+    outcomes are estimated from, as for the timed model: see `dispatch.measures.fates`.
+    """
     return [_event_row(recording, number) for number in range(len(recording.incidents))]
 
 
@@ -190,7 +194,7 @@ def _event_row(recording: Recording, number: int) -> Row:
         "t_occurred_s": incident.start,
     }
     times = event.times if event else {}
-    for step in ("detected", "assigned", "departed", "arrived", "confirmed"):
+    for step in ("detected", "assigned", "departed", "arrived", "confirmed", "contained", "closed"):
         row[f"t_{step}_s"] = times.get(step, NAN)
     if event is not None:
         row["outcome"] = outcome_of(event)
@@ -199,6 +203,9 @@ def _event_row(recording: Recording, number: int) -> Row:
             row["responder"] = recording.labels[event.responder]
     row["response_s"] = row["t_arrived_s"] - row["t_detected_s"]
     row["confirmation_s"] = row["t_confirmed_s"] - row["t_detected_s"]
+    row["containment_s"] = row["t_contained_s"] - row["t_detected_s"]
+    row["closing_s"] = row["t_closed_s"] - row["t_detected_s"]
+    row["watched_s"] = recording.duration - row["t_detected_s"]
     return row
 
 

@@ -22,6 +22,7 @@ from dva_sim.experiments.figures.style import (
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 # Okabe & Ito's colours and three more; the mark helps where two are near.
 LOOKS: dict[str, tuple[str, str]] = {
@@ -53,8 +54,8 @@ _QUANTILES = (0.5, 0.9, 0.95)
 def draw_all(shifts: Shifts) -> list[Drawn]:
     """Every figure that the tables have the columns for, in the order of the report."""
     with styled():
-        drawn = [trade(shifts), fates_in_time(shifts), way(shifts), percentiles(shifts)]
-        drawn.append(burden(shifts))
+        drawn = [trade(shifts), stages(shifts), fates_in_time(shifts), way(shifts)]
+        drawn += [percentiles(shifts), burden(shifts)]
     return [figure for figure in drawn if figure is not None]
 
 
@@ -73,14 +74,44 @@ def trade(shifts: Shifts) -> Drawn | None:
     """Response against exposure, a mark for each policy, a panel for each load."""
     if not shifts.can_spare:
         return None
-    exposure, response = shifts.means("exposure_look_s"), shifts.means("response_mean_s")
+    label = "Exposure of people in finding out what it is [s per event]"
+    figure = _scatter(shifts, "exposure_look_s", label)
+    title = "The trade: how soon somebody is there, against how long people stand in danger"
+    caption = (
+        "Down and to the left is better; the line joins the policies that no other beats on both. "
+        f"Response is the mean of min(time, {shifts.follow:g} s) over all events. Exposure is "
+        "guards' time within the danger radius on the way to look, looking and leaving; containing "
+        f"comes on top and costs about {_act(shifts):.0f} s per event whoever was sent. "
+        f"{_bars_words(shifts)}"
+    )
+    return finish(figure, "trade", title, caption)
+
+
+def stages(shifts: Shifts) -> Drawn | None:
+    """Response against containment: who looks first contains later."""
+    if not shifts.view.part.has("containment_mean_s"):
+        return None
+    figure = _scatter(shifts, "containment_mean_s", "Restricted mean time to containment [s]")
+    title = "Looking first or containing first: response against containment"
+    caption = (
+        "Down and to the left is better; the line joins the policies that no other beats on both. "
+        f"Both are means of min(time, {shifts.follow:g} s) from the report: of all events until "
+        "somebody is on scene, and of the true ones until a person has dealt with them. The same "
+        f"guards do both. {_bars_words(shifts)}"
+    )
+    return finish(figure, "stages", title, caption)
+
+
+def _scatter(shifts: Shifts, column: str, label: str) -> Figure:
+    """Response over another measure, both better where smaller."""
+    across, response = shifts.means(column), shifts.means("response_mean_s")
     figure, (axes,) = panels(1, len(shifts.stops), 4.0)
-    halves = [_half_widths(shifts, c) for c in ("exposure_look_s", "response_mean_s")]
+    halves = [_half_widths(shifts, c) for c in (column, "response_mean_s")]
     for stop, ax in enumerate(axes):
         for number, policy in enumerate(shifts.policies):
             colour, mark = look(policy, shifts.policies)
             ax.errorbar(
-                exposure[number, stop],
+                across[number, stop],
                 response[number, stop],
                 xerr=halves[0][number, stop],
                 yerr=halves[1][number, stop],
@@ -91,23 +122,21 @@ def trade(shifts: Shifts) -> Drawn | None:
                 lw=1,
                 label=policy,
             )
-        _frontier(ax, exposure[:, stop], response[:, stop])
+        _frontier(ax, across[:, stop], response[:, stop])
         ax.set_title(capital(shifts.titles[stop]))
         ax.grid(True, axis="both")
         ax.margins(0.1)
     axes[0].set_ylabel("Restricted mean time to response [s]")
-    axes[len(axes) // 2].set_xlabel("Exposure of people in finding out what it is [s per event]")
+    axes[len(axes) // 2].set_xlabel(label)
     _key(figure, axes[0])
-    title = "The trade: how soon somebody is there, against how long people stand in danger"
-    caption = (
-        "Down and to the left is better; the line joins the policies that no other beats on both. "
-        f"Response is the mean of min(time, {shifts.follow:g} s) over all events. Exposure is "
-        "guards' time within the danger radius on the way to look, looking and leaving; containing "
-        f"comes on top and costs about {_act(shifts):.0f} s per event whoever was sent. "
+    return figure
+
+
+def _bars_words(shifts: Shifts) -> str:
+    return (
         f"Bars: 95 % interval of the difference against {shifts.baseline}, paired by shift, for "
         "all policies and loads at once. The axes differ from panel to panel."
     )
-    return finish(figure, "trade", title, caption)
 
 
 def _act(shifts: Shifts) -> float:
@@ -253,13 +282,15 @@ def percentiles(shifts: Shifts) -> Drawn | None:
             ):
                 mark = "o" if reached else ">"
                 ax.plot(x, row, mark, ms=6, mfc=colour if fill else "white", mec=colour)
-            missing |= not np.isfinite(value).all()
+            missing |= not np.isfinite(high).all()
         _policy_axis(ax, names, capital(shifts.titles[stop]))
         ax.set_xlim(0, None)
     axes[len(axes) // 2].set_xlabel(
         "Time to response by 50 % (filled), 90 % and 95 % of all events [s]"
     )
-    never = f" An arrow: not reached within {shifts.follow:g} s." if missing else ""
+    never = (
+        f" An arrow, or a bar up to {shifts.follow:g} s: perhaps not reached." if missing else ""
+    )
     caption = (
         "Over all events of the cohort, those that nobody ever reached counting as infinitely "
         f"late.{never} Broad bars: 95 % interval of each percentile alone, shifts drawn anew. "

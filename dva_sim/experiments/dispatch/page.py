@@ -91,6 +91,8 @@ def _price(finding: Finding, shifts: Shifts) -> list[str]:
 
 def _notes(shifts: Shifts) -> list[str]:
     notes = [_quickest(shifts)]
+    if shifts.view.part.has("contained_share"):
+        notes.append(_contained(shifts))
     if shifts.target is not None:
         notes.append(_progress(shifts))
     if shifts.loads[0] is not None:
@@ -119,6 +121,21 @@ def _quickest(shifts: Shifts) -> str:
         words += f", not to be told from {listing(equal)}" if equal else ", ahead of all others"
         sentences.append(f"at {title} {words}" if title else words)
     return f"The least mean time to response has, {'; '.join(sentences)}."
+
+
+def _contained(shifts: Shifts) -> str:
+    """What the quickest to look pays in containment, against who contains most."""
+    response, share = shifts.means("response_mean_s"), shifts.means("contained_share")
+    parts = []
+    for stop, title in enumerate(shifts.titles):
+        chosen = dict.fromkeys([int(response[:, stop].argmin()), int(share[:, stop].argmax())])
+        words = [f"{percent(share[i, stop])} under {shifts.policies[i]}" for i in chosen]
+        parts.append(f"at {title} {listing(words)}")
+    return (
+        "The same guards look and contain, so one may be paid with the other. Of the true events, "
+        f"contained within {shifts.follow:g} s, the quickest to respond first, then who contains "
+        f"most: {'; '.join(parts)}."
+    )
 
 
 def _progress(shifts: Shifts) -> str:
