@@ -30,6 +30,7 @@ TOLD = {
     "input": "checks of what the scenarios put in agree",
     "identity": "identities hold (Little's law, conservation, scaling, the oracle, ...)",
 }
+WIDTH = 110  # of the table at least, also in a file
 INTERRUPTED = 130  # exit code of a program ended by Ctrl-C
 STYLES = {"agrees": "green", "too rough": "yellow", "differs": "bold red"}
 
@@ -96,7 +97,7 @@ def _tell(checks: Sequence[Check], quick: bool) -> None:
     table.add_column("case", no_wrap=True)
     for head in output.HEADS:
         side: Literal["left", "right"] = "left" if head in ("measure", "verdict") else "right"
-        table.add_column(head, justify=side, no_wrap=head != "measure")
+        table.add_column(head, justify=side, no_wrap=True)
     last = ""
     for check in checks:
         if check.kind != "result" and check.verdict == "agrees":
@@ -105,7 +106,7 @@ def _tell(checks: Sequence[Check], quick: bool) -> None:
         shown = f"[{STYLES[verdict]}]{verdict}[/]"
         table.add_row(escape(check.case) if check.case != last else "", *map(escape, cells), shown)
         last = check.case
-    console.print(table)
+    console.print(table, width=max(console.width, WIDTH), crop=False, soft_wrap=False)
     for kind, told in TOLD.items():
         count = sum(c.kind == kind and c.verdict == "agrees" for c in checks)
         say(f"{count} {told}")

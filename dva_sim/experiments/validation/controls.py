@@ -8,7 +8,7 @@ explain.
 
 A queue beside it: the same events at *one* server, as fast as all responders together. Its
 waits follow from the inputs alone, and their mean is known (Pollaczek and Khinchine; Cobham;
-G/M/1). Where there is one responder only, that server is 10 % faster: an exact copy would leave
+G/M/1). Where there is one responder only, that server is 5 % faster: an exact copy would leave
 nothing to be estimated.
 
 References:
@@ -31,7 +31,7 @@ from dva_sim.timed.laws import Exponential, Law
 from dva_sim.timed.scenario import TimedScenario
 
 FADING = (3.0, 10.0, 30.0, 100.0)  # [events]
-FASTER = 0.9  # what the one server beside one responder takes of its time
+FASTER = 0.95  # what the one server beside one responder takes of its time
 
 
 def controls(batches: Batches, scenario: TimedScenario) -> dict[str, Floats]:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 _COLOURS = {"agrees": "#0072B2", "too rough": "#E69F00", "differs": "#D55E00"}
 _ROW = 0.155  # [in], a line of small print
 _LIMIT = 4.5  # standard errors shown; what is further off stands at the edge
+_SHOWN = 0.95  # of the intervals fit in the picture of relative errors
 _BEYOND = "wait_beyond/"
 _LEAST_POINTS = 3
 
@@ -70,6 +71,9 @@ def _relative(checks: Sequence[Check]) -> Drawn:
         colour = _COLOURS[check.verdict]
         axes.plot([value - half, value + half], [y, y], color=colour, lw=1.2)
         axes.plot([value], [y], "o", color=colour, ms=3.5)
+    reach = [abs(c.found.value / c.exact - 1) + 1.96 * c.found.error / abs(c.exact) for c in shown]
+    limit = 110 * float(np.quantile(reach, _SHOWN)) + 100 * TOLERANCE
+    axes.set_xlim(-limit, limit)
     for verdict in dict.fromkeys(c.verdict for c in shown):
         axes.plot([], [], "o-", color=_COLOURS[verdict], ms=3.5, lw=1.2, label=verdict)
     axes.set_xlabel("simulated against exact [%]")
@@ -77,7 +81,7 @@ def _relative(checks: Sequence[Check]) -> Drawn:
     text = (
         "The same comparisons as a share of the exact value, with 95 % intervals. The band is "
         f"{100 * TOLERANCE:g} % either way; an interval wider than ±{196 * PRECISION:.2g} % is "
-        "too rough."
+        "too rough, where precision is asked for. The widest go on beyond the edge."
     )
     return finish(figure, "relative", "How far off, as a share of the exact value", text)
 
