@@ -242,10 +242,17 @@ class Dispatcher:
 
     def _is_task(self, event: Event) -> bool:
         if event.waits_for is not None:
-            return True
+            return not self._finder_is_there(event)
         if event.needs_containment and event.actor is None:
             return True
         return self.policy.preempts and self._is_under_way(event)
+
+    def _finder_is_there(self, event: Event) -> bool:
+        """Whether a guard has just confirmed it and is about to be free to deal with it."""
+        finder = event.responder
+        if event.state is not State.CONFIRMED or event.operator is not None or finder is None:
+            return False
+        return self.orders.engaged.get(finder) is event
 
     def _is_under_way(self, event: Event) -> bool:
         """Whether its responder has heard of it and is not there yet."""
