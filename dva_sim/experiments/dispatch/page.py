@@ -65,7 +65,8 @@ def answer_of(finding: Finding | None, shifts: Shifts) -> Answer:
         finding = replace(finding, over="load", levels=tuple(loads))
     found = answer(replace(finding, cluster="shift"))
     price = _price(finding, shifts)
-    lead = " ".join([capital(found.lead), *price])
+    first = capital(found.lead) if found.lead.startswith("no ") else found.lead  # not a name
+    lead = " ".join([first, *price])
     return Answer(lead, [*_notes(shifts), *found.notes])
 
 
