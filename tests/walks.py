@@ -289,7 +289,7 @@ class Walk:
             self._check_event(event, after)
         looked = [e.responder for e in book.open.values() if e.state in LOOKS]
         assert len(looked) == len(set(looked)), after
-        assert not desk.dispatcher._bound_for.keys() & desk.orders.engaged.keys(), after
+        assert not desk.dispatcher.lookout._bound_for.keys() & desk.orders.engaged.keys(), after
 
     def _check_event(self, event: Event, after: str) -> None:
         engaged = self.desk.orders.engaged

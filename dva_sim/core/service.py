@@ -98,7 +98,7 @@ class Desk:
             self.dispatcher.auctions.no_bid(body.event_id, send.to)
             sends = self.dispatcher.decide(now)
         elif isinstance(body, m.Relocation):
-            self.dispatcher.not_moved(send.to)
+            self.dispatcher.lookout.forget_move(send.to)
         else:
             self.sessions.undelivered(send)
         return self._and_revocations(sends)
@@ -176,7 +176,7 @@ class Desk:
     def _gone(self, device: str, now: float) -> list[Send]:
         """A device is there no more: what it held is free, what it did is open to others."""
         self.sessions.take_back_all(device)
-        self.dispatcher.not_moved(device)
+        self.dispatcher.lookout.forget_move(device)
         return self.orders.abandon(device, now)
 
     # --- who may do what ---------------------------------------------------------------

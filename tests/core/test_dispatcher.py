@@ -171,7 +171,7 @@ def test_nobody_is_sent_where_there_is_no_way() -> None:
         return np.full_like(distance, np.inf), np.full_like(eta, np.inf)
 
     office = Office(Advising(everything))
-    office.desk.dispatcher.travel = walled
+    office.desk.dispatcher.lookout.travel = walled
     assert office.fire(12) == []
     assert office.desk.counters["overruled"] == 2
 
@@ -257,7 +257,9 @@ def test_a_map_that_hands_out_its_own_tables_keeps_them() -> None:
     table = np.zeros((1, 3)), np.ones((1, 3))
     office = Office(rules=Rules(containment=True))
     office.register(OTHER_GUARD, "Guard", 80)
-    office.desk.dispatcher.travel = lambda starts, goals: tuple(t[:, : len(starts)] for t in table)
+    office.desk.dispatcher.lookout.travel = lambda starts, goals: tuple(
+        t[:, : len(starts)] for t in table
+    )
     office.fire(12)
     office.finds(GUARD, "confirmed", 3.0)
     office.progress(GUARD, "done", 3.0)
