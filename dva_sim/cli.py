@@ -172,7 +172,7 @@ def check(
 
 @app.command()
 def schema(
-    kind: Annotated[str, typer.Argument(help="message, study, scenario, site or agent.")],
+    kind: Annotated[str, typer.Argument(help="message, study, scenario, cases, site or agent.")],
 ) -> None:
     """Print the schema of a kind of file: XSD for messages, else JSON Schema."""
     from dva_sim.checking import console

@@ -22,6 +22,7 @@ from dva_sim.experiments import design
 from dva_sim.experiments.design import Cell
 from dva_sim.experiments.models import model_for, model_of
 from dva_sim.experiments.study import Study, load_study
+from dva_sim.experiments.validation.cases import CaseFile, load_cases
 from dva_sim.scenario import Scenario
 from dva_sim.timed.scenario import TimedScenario
 from dva_sim.worlds.geo import GeoFrame
@@ -163,6 +164,11 @@ def _check_scenario(document: Document) -> Iterator[ConfigError]:
     return iter(())
 
 
+def _check_cases(document: Document) -> Iterator[ConfigError]:
+    load_cases(document.file)
+    return iter(())
+
+
 def _check_site(document: Document) -> Iterator[ConfigError]:
     load_site(document.file)
     return iter(())
@@ -199,6 +205,7 @@ KINDS: Final = (
     Kind("study", Study, "experiments", _check_study),
     Kind("scenario", Scenario, "experiments/scenarios", _check_scenario),
     Kind("timed scenario", TimedScenario, "experiments/scenarios", _check_scenario),
+    Kind("validation cases", CaseFile, "experiments/validation", _check_cases),
     Kind("site", SiteFile, "worlds", _check_site),
     Kind("ROS map", RosMap, "worlds", _check_map),
     Kind("robot", RobotProfile, "agents/robots", _check_model(RobotProfile)),

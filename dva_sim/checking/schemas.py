@@ -9,7 +9,7 @@ from typing import Any, Final
 from dva_sim.checking.forms import schema_file
 from dva_sim.errors import ConfigError
 
-KINDS: Final = ("message", "study", "scenario", "site", "agent")
+KINDS: Final = ("message", "study", "scenario", "cases", "site", "agent")
 _DIALECT: Final = "https://json-schema.org/draft/2020-12/schema"
 
 
@@ -37,6 +37,7 @@ def _json_schema(kind: str) -> dict[str, Any]:
     from dva_sim.agents.robot import RobotProfile
     from dva_sim.agents.tilt.phone import PhoneProfile
     from dva_sim.experiments.study import Study
+    from dva_sim.experiments.validation.cases import CaseFile
     from dva_sim.scenario import Scenario
     from dva_sim.timed.scenario import TimedScenario
     from dva_sim.worlds.site import SiteFile
@@ -44,6 +45,7 @@ def _json_schema(kind: str) -> dict[str, Any]:
     kinds: dict[str, Any] = {
         "study": Study,
         "scenario": Scenario | TimedScenario,
+        "cases": CaseFile,
         "site": SiteFile,
         "agent": RobotProfile | PhoneProfile | GuardProfile | Population,
     }

@@ -125,11 +125,11 @@ class _Timed:
         rehearse_timed(scenario, seed)
 
     def tables(self, scenario: AnyScenario, seed: int, with_tracks: bool) -> Tables:
-        from dva_sim.experiments.dispatch import measures
+        from dva_sim.experiments.dispatch.measures import tables
         from dva_sim.timed import simulate_timed
 
         assert isinstance(scenario, TimedScenario)
-        return measures.tables(simulate_timed(scenario, seed))
+        return tables(simulate_timed(scenario, seed))
 
 
 MODELS: dict[str, Model] = {"full": _Full(), "timed": _Timed()}

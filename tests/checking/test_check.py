@@ -48,7 +48,8 @@ def test_all_that_is_shipped_is_valid(check):
     assert lines[-1] == f"{len(files)} files: {len(files)} valid"
     kinds = {line.split(": ")[1] for line in lines[:-1]}
     agents = {"robot", "phone", "guard", "operators"}
-    assert kinds == {"study", "scenario", "site", "plan", "message"} | agents
+    runs = {"study", "scenario", "timed scenario", "validation cases"}
+    assert kinds == {"site", "plan", "message"} | runs | agents
 
 
 def test_the_kind_is_told_by_the_keys_wherever_the_file_lies(check):

@@ -14,6 +14,7 @@ ROOT = Path(__file__).parents[2]
 SHIPPED = {
     "study": sorted(ROOT.glob("experiments/*.yaml")),
     "scenario": sorted(ROOT.glob("experiments/scenarios/*.yaml")),
+    "cases": sorted(ROOT.glob("experiments/validation/*.yaml")),
     "site": sorted(ROOT.glob("worlds/*.yaml")),
     "agent": sorted(ROOT.glob("agents/*/*.yaml")),
 }
@@ -28,7 +29,14 @@ TYPES = {
 }
 
 
-SILENT = {"$schema", "$defs", "title", "description", "default"}
+SILENT = {"$schema", "$defs", "title", "description", "default", "discriminator"}
+
+ONLY_FOR = {
+    (int, float): {"minimum", "maximum", "exclusiveMinimum", "exclusiveMaximum"},
+    str: {"minLength", "maxLength"},
+    list: {"items", "prefixItems", "minItems", "maxItems"},
+    dict: {"properties", "required", "additionalProperties", "minProperties"},
+}  # keywords that say nothing of values of another type
 
 
 class Validator:
@@ -40,6 +48,8 @@ class Validator:
     def accepts(self, data, schema=None):
         schema = self.schema if schema is None else schema
         keywords = schema.keys() - SILENT
+        for kind, words in ONLY_FOR.items():
+            keywords -= words if not isinstance(data, kind) else set()
         return all(getattr(self, "_" + word.strip("$"))(data, schema) for word in sorted(keywords))
 
     def _ref(self, data, schema):
@@ -47,6 +57,9 @@ class Validator:
 
     def _anyOf(self, data, schema):  # noqa: N802
         return any(self.accepts(data, inner) for inner in schema["anyOf"])
+
+    def _oneOf(self, data, schema):  # noqa: N802
+        return sum(self.accepts(data, inner) for inner in schema["oneOf"]) == 1
 
     def _type(self, data, schema):
         flag = isinstance(data, bool) and schema["type"] in ("integer", "number")
@@ -70,6 +83,12 @@ class Validator:
     def _exclusiveMaximum(self, data, schema):  # noqa: N802
         return data < schema["exclusiveMaximum"]
 
+    def _minLength(self, data, schema):  # noqa: N802
+        return len(data) >= schema["minLength"]
+
+    def _maxLength(self, data, schema):  # noqa: N802
+        return len(data) <= schema["maxLength"]
+
     def _minItems(self, data, schema):  # noqa: N802
         return len(data) >= schema["minItems"]
 
@@ -90,9 +109,7 @@ class Validator:
 
     def _properties(self, data, schema):
         known = schema["properties"]
-        return isinstance(data, dict) and all(
-            self.accepts(data[key], known[key]) for key in data if key in known
-        )
+        return all(self.accepts(data[key], known[key]) for key in data if key in known)
 
     def _additionalProperties(self, data, schema):  # noqa: N802
         others = [value for key, value in data.items() if key not in schema.get("properties", {})]
