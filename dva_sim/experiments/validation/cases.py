@@ -53,7 +53,12 @@ class CaseConfig(Config):
     quick_runs: Annotated[int, Field(ge=1)] = 1
     batches: Annotated[int, Field(ge=1, le=10_000)] = 20
 
-    @field_validator("measures", "loosely", mode="before")
+    @field_validator(
+        "measures",
+        "loosely",
+        mode="before",
+        json_schema_input_type=dict[str, str | float] | list[str],
+    )
     @classmethod
     def _same_names(cls, value: Any) -> Any:
         """A list compares each measure with the exact value of the same name."""
