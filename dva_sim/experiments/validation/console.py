@@ -106,7 +106,8 @@ def _tell(checks: Sequence[Check], quick: bool) -> None:
         shown = f"[{STYLES[verdict]}]{verdict}[/]"
         table.add_row(escape(check.case) if check.case != last else "", *map(escape, cells), shown)
         last = check.case
-    console.print(table, width=max(console.width, WIDTH), crop=False, soft_wrap=False)
+    # A narrow terminal breaks its lines; better than numbers that are cut off.
+    Console(highlight=False, width=max(console.width, WIDTH)).print(table)
     for kind, told in TOLD.items():
         count = sum(c.kind == kind and c.verdict == "agrees" for c in checks)
         say(f"{count} {told}")

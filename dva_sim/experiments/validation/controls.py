@@ -38,13 +38,14 @@ def controls(batches: Batches, scenario: TimedScenario) -> dict[str, Floats]:
     """Each control's value in each batch, the most telling first; all have mean zero."""
     sample, counts = batches.sample, _counts(batches, scenario)
     look, square = _looks(sample, scenario)
-    found = _beside(batches, scenario)
-    found["look"] = batches.total(look, sample.served)
+    beside = _beside(batches, scenario)
+    found = beside | {"look": batches.total(look, sample.served)}
     if counts:
         found["events"] = sum(counts.values(), np.zeros(len(batches.lengths)))
-    if all(stream.between is not None for stream in scenario.demand):
-        found |= _products(batches, scenario, look)
-    found["look_square"] = batches.total(square, sample.served)
+    if not beside:  # which tells all that the others would, and has no such long tails
+        if all(stream.between is not None for stream in scenario.demand):
+            found |= _products(batches, scenario, look)
+        found["look_square"] = batches.total(square, sample.served)
     return found | {f"events@{name}": count for name, count in list(counts.items())[1:]}
 
 

@@ -126,6 +126,8 @@ def _curves(checks: Sequence[Check]) -> dict[str, list[Check]]:
 
 def _distributions(curves: dict[str, list[Check]]) -> Drawn:
     """Share of waits beyond a time, on a logarithmic scale."""
+    from matplotlib.ticker import LogLocator
+
     figure, rows = panels(1, len(curves), 3.0, sharey=True)
     for axes, (title, points) in zip(rows[0], curves.items(), strict=True):
         ordered = sorted(points, key=_time)
@@ -137,8 +139,9 @@ def _distributions(curves: dict[str, list[Check]]) -> Drawn:
         found = [p.found.value for p in ordered]
         axes.plot(times, found, "o", color=_COLOURS["agrees"], ms=4, label="simulated")
         axes.set_yscale("log")
+        axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axes.yaxis.set_major_formatter("{x:g}")
-        axes.yaxis.set_minor_formatter("{x:g}")
+        axes.yaxis.set_minor_formatter("")
         axes.set_title(title)
         axes.set_xlabel("time [s]")
     rows[0][0].set_ylabel("share of events that wait longer")
