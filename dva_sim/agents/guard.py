@@ -54,7 +54,7 @@ class GuardProfile(Config):
     walking_sd_mps: Annotated[float, Field(ge=0)] = 0.26
     mobilisation_s: Trait = Trait(median=45.0, spread=0.45)
     confirm_look_s: Trait = Trait(median=3.0, spread=0.3)
-    contain_s: Trait = Trait(median=60.0, spread=0.4)
+    contain_s: Trait = Trait(median=120.0, spread=0.5)
 
 
 @dataclass(frozen=True)
