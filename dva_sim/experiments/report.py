@@ -48,10 +48,17 @@ def write_report(folder: Path) -> Path:
 
 def _draw(view: View, results: Results) -> list[Drawn]:
     tables = {name: results.table(name) for name in _OPTIONAL if results.has(name)}
-    if is_dispatch(view):
-        return dispatch_figures.draw_all(Shifts(view, tables.get("events")))
+    if shifts := _shifts(view, results):
+        return dispatch_figures.draw_all(shifts)
     scenario = results.manifest.get("scenarios", {}).get(view.part.name, {})
     return draw_all(view, tables, scenario)
+
+
+def _shifts(view: View | None, results: Results) -> Shifts | None:
+    """The runs as shifts, where a study compares policies of dispatch on them."""
+    if view is None or not is_dispatch(view):
+        return None
+    return Shifts(view, results.table("events") if results.has("events") else None)
 
 
 def _write_figures(folder: Path, drawn: list[Drawn]) -> None:
@@ -66,7 +73,7 @@ def _page(results: Results, runs: Table, view: View | None, drawn: list[Drawn]) 
     manifest, study = results.manifest, results.study
     factors = factors_of(study)
     scenarios = manifest.get("scenarios", {})
-    shifts = Shifts(view) if view is not None and is_dispatch(view) else None
+    shifts = _shifts(view, results)
     stated = dispatch_page.conditions if shifts else conditions
     return _template().render(
         question=study.get("question", "A study without a question"),
@@ -108,11 +115,16 @@ def _tables(
     if view is None:
         return []
     names = dict.fromkeys(str(name) for name in runs["part"])
-    parts = (Part(runs, name, factors_of(study)) for name in names)
-    if shifts:
-        columns = dispatch_page.SUMMARIES
-        return [cell_table(part, view.measure, columns) for part in parts if len(part)]
-    return [cell_table(part, view.measure) for part in parts if len(part)]
+    parts = [Part(runs, name, factors_of(study)) for name in names]
+    return [_cells(part, view, shifts) for part in parts if len(part)]
+
+
+def _cells(part: Part, view: View, shifts: Shifts | None) -> CellTable:
+    if shifts is None:
+        return cell_table(part, view.measure)
+    if part.name == view.part.name:
+        return dispatch_page.cells(shifts)
+    return cell_table(part, view.measure, dispatch_page.SUMMARIES)
 
 
 def _answer(view: View | None, shifts: Shifts | None) -> Answer:

@@ -333,7 +333,7 @@ def burden(shifts: Shifts) -> Drawn | None:
         "measured time with an order. Evenness: Jain's index of the guards' busy time, 1 if all "
         "work the same. On the right, the restricted mean response in the worst zone over that in "
         f"the best, of zones with at least {measures.FEWEST_IN_ZONE} events in the shift: chance "
-        "alone lifts it above 1, the same for all policies."
+        "alone lifts it above 1, under every policy."
     )
     return finish(figure, "burden", title, caption)
 

@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from dva_sim.experiments.answer import Answer, Finding, answer
-from dva_sim.experiments.dispatch.outcomes import Floats
-from dva_sim.experiments.dispatch.shifts import BEST, Shifts
-from dva_sim.experiments.effects import Factor
+from dva_sim.experiments.cells import CellTable, Summary, cell_table
+from dva_sim.experiments.dispatch.percentiles import pooled
+from dva_sim.experiments.dispatch.shifts import BEST, POLICY, Shifts
+from dva_sim.experiments.effects import Factor, Setting
 from dva_sim.experiments.figures.style import capital
 from dva_sim.experiments.labels import listing, number, percent
 
-Summary = tuple[str, str, Callable[[Floats], Any], Callable[[float], str]]
-
 SUMMARIES: tuple[Summary, ...] = (
-    ("response_p50_s", "response, p50 [s]", np.mean, number),
-    ("response_p90_s", "p90 [s]", np.mean, number),
-    ("response_p95_s", "p95 [s]", np.mean, number),
     ("on_scene_share", "on scene by T", np.mean, percent),
     ("confirmation_mean_s", "time to confirmation [s]", np.mean, number),
     ("confirmed_share", "confirmed", np.mean, percent),
@@ -48,6 +44,40 @@ SUMMARIES: tuple[Summary, ...] = (
     ("policy_failed", "policy failed", np.sum, number),
     ("violations", "violations", np.sum, number),
 )
+
+
+PERCENTILES = (50, 90, 95)
+
+
+def cells(shifts: Shifts) -> CellTable:
+    """Every cell of the part the answer speaks of, with percentiles over all its events.
+
+    Percentiles are pooled: the mean of the shifts' own would leave out the shifts that do not
+    reach them, which are the worst.
+    """
+    part = shifts.view.part
+    table = cell_table(part, shifts.view.measure, SUMMARIES)
+    if not shifts.events:
+        return table
+    at = table.heads.index(next(head for _, head, _, _ in SUMMARIES if head in table.heads))
+    rows = []
+    for setting, row in zip(part.settings(), table.rows, strict=True):
+        found = _percentiles(shifts, setting)
+        rows.append([*row[:at], *found, *row[at:]])
+    heads = [f"response, p{q} [s]" for q in PERCENTILES]
+    return replace(table, heads=[*table.heads[:at], *heads, *table.heads[at:]], rows=rows)
+
+
+def _percentiles(shifts: Shifts, setting: Setting) -> list[str]:
+    """Of one cell; a dash in the panels of other factors, which `events_of` does not hold."""
+    view, panel = shifts.view, shifts.view.panels[0]
+    if any(setting[name] != level for name, level in panel.items()):
+        return ["–" for _ in PERCENTILES]
+    stop = view.stops.index(setting[view.over.name]) if view.over else 0
+    events = shifts.events_of(str(setting[POLICY]), stop)
+    values = pooled(events, [q / 100 for q in PERCENTILES], shifts.follow)[0]
+    over = f"> {shifts.follow:g}"
+    return [over if np.isposinf(value) else number(float(value)) for value in values]
 
 
 # --- the answer ------------------------------------------------------------------------------
