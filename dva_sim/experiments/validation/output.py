@@ -20,7 +20,7 @@ from dva_sim.experiments.validation.estimation import (
     expected_alarms,
 )
 from dva_sim.experiments.validation.pictures import draw_all
-from dva_sim.experiments.validation.play import Check
+from dva_sim.experiments.validation.play import LOOK_AGAIN, Check
 
 NAME = "dispatch"
 
@@ -71,6 +71,13 @@ def notes(checks: Sequence[Check], quick: bool) -> list[str]:
         f"{expected_alarms(len(by_chance)):.1f} of them lie beyond {ERRORS:g} standard errors "
         f"on average. Here {off} do."
     ]
+    again = {c.case: c.again for c in checks if c.again}
+    if again:
+        shown = "; ".join(f"{case} ({why})" for case, why in again.items())
+        found.append(
+            f"Differed at first, so played again, {LOOK_AGAIN} times as long in all, and judged "
+            f"by all runs together: {shown}."
+        )
     rough = Counter(c.verdict for c in checks)["too rough"]
     if rough:
         why = "as is to be expected of a quick run" if quick else "so more runs are needed"
@@ -132,7 +139,7 @@ def _page(checks: Sequence[Check], drawn: list[Drawn], conditions: dict[str, str
         conditions=conditions,
         figures=[(d, _data_uri(d.svg)) for d in drawn],
         groups=_groups(checks),
-        rule=(ERRORS, 100 * TOLERANCE, 100 * PRECISION),
+        rule=(ERRORS, 100 * TOLERANCE, 100 * PRECISION, LOOK_AGAIN),
     )
 
 

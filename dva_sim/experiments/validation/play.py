@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import cast
 
 import numpy as np
@@ -50,6 +50,8 @@ class Check:
         events: How many events were played for it.
         kind: `result`; `input` for what the scenario put in; `identity` for what holds
             without chance.
+        again: What differed at first, so that the case was played again, longer; empty if
+            nothing did.
     """
 
     case: str
@@ -61,6 +63,7 @@ class Check:
     source: str
     events: int
     kind: str = "result"
+    again: str = ""
 
     @property
     def deviation(self) -> float:
@@ -100,10 +103,12 @@ def check_cases(
     for case in cases:
         runs = _runs(case, quick)
         found = _compare(case, _columns(_jobs(case, seed, runs), outcomes))
-        if any(c.verdict == "differs" and c.found.error > 0 for c in found):
+        off = [c for c in found if c.verdict == "differs" and c.found.error > 0]
+        if off:
             again = _jobs(case, seed, LOOK_AGAIN * runs)
             _perform(again[runs:], workers, outcomes, lambda done: None)
-            found = _compare(case, _columns(again, outcomes))
+            why = ", ".join(f"{c.measure} {c.deviation:+.2f} SE" for c in off)
+            found = [replace(c, again=why) for c in _compare(case, _columns(again, outcomes))]
         checks += found
     return checks
 

@@ -95,6 +95,7 @@ def test_a_case_that_seems_to_differ_is_played_again_and_longer(tmp_path):
     path = a_file(tmp_path, measures="{utilisation: 0.6}", source="wrong on purpose")
     (check,) = (c for c in check_cases(load_cases(path), 1, True, 1) if c.measure == "utilisation")
     assert check.found.batches == 4 * 2 * 10
+    assert check.again.startswith("utilisation -")
     assert check.verdict == "differs"
 
 
