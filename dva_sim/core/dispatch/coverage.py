@@ -33,8 +33,7 @@ class Coverage(Policy):
 
     Args:
         gain_s: What a move must bring [s of expected response].
-        there_s: Who can be at a station within that time counts as standing there [s]; it covers
-            the time to get going.
+        there_s: Who is no further from a station than that counts as standing there [s].
 
     References:
         R. L. Church and C. S. ReVelle, Theoretical and empirical links between the p-median,
@@ -44,7 +43,7 @@ class Coverage(Policy):
 
     relocates = True
 
-    def __init__(self, gain_s: float = 10.0, there_s: float = 30.0) -> None:
+    def __init__(self, gain_s: float = 2.0, there_s: float = 3.0) -> None:
         self.gain_s = options.above("gain_s", gain_s, 0)
         self.there_s = options.at_least("there_s", there_s, 0)
 

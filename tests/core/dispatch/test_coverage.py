@@ -34,8 +34,9 @@ def test_who_is_on_its_way_counts_as_there_and_is_left_alone():
     assert advice("gg", stands, [0.5, 0.5], bound_for=(None, 1)) == []
 
 
-def test_the_time_to_get_going_is_no_reason_to_be_sent_where_one_is():
-    assert advice("g", [[20, 120]], [0.9, 0.1]) == []
+def test_who_is_a_few_steps_away_counts_as_there():
+    assert advice("g", [[3, 103]], [0.9, 0.1], gain_s=1) == []
+    assert advice("g", [[3.1, 103]], [0.9, 0.1], gain_s=1) == [Relocation(0, 0)]
 
 
 def test_tasks_come_first_and_who_is_sent_does_not_move():
@@ -71,7 +72,7 @@ def test_the_moves_come_to_an_end_while_guards_walk(seed):
     reach = 20 + _far(stations, zones) / 1.3
     bound, moves, last, policy = [None] * 4, 0, 0, Coverage(gain_s=5)
     for step in range(200):
-        eta = 20 + _far(guards, stations) / 1.3
+        eta = _far(guards, stations) / 1.3
         seen = situation("gggg", [], cover=cover(eta, reach, demand, tuple(bound)))
         for move in policy.advise(seen, RNG):
             assert bound[move.responder] is None
