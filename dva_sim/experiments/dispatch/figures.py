@@ -234,7 +234,7 @@ def way(shifts: Shifts) -> Drawn | None:
         ax.axvline(100, color=INK, lw=0.8)
         ax.axvline(0, color=SOFT, lw=0.8, ls=":")
         _policy_axis(ax, names, capital(shifts.titles[stop]))
-    target = "the oracle" if shifts.target == BEST else "the bound"
+    target = "the oracle" if shifts.target == BEST else "a fresh unit at every base"
     axes[len(axes) // 2].set_xlabel(f"Share of the way from {FLOOR} to {target} [%]")
     title = (
         f"How much of what can be gained in response each policy gains: 0 is {FLOOR}, 100 {target}"

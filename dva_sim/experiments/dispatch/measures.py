@@ -209,6 +209,8 @@ def _fates(events: Columns, follow: float) -> Row:
     shares = {fate: float(curve.at(follow, 1 + i)) for i, fate in enumerate(FATES)}
     row: Row = {f"{fate}_share": share for fate, share in shares.items()}
     row["open_share"] = max(0.0, 1.0 - sum(shares.values()))
+    later = (events["outcome"] == "escalated") & (events["confirmation_s"] <= follow)
+    row["escalated_later_share"] = _mean(later & (events["closing_s"] <= follow))
     true = only(events, events["is_true"])
     row["confirmed_of_true_share"] = float(reaching(true, "confirmation_s").at(follow))
     return row
