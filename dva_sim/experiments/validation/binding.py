@@ -43,11 +43,16 @@ def exact_values(
         if key not in hints or key == "return":
             known = ", ".join(inspect.signature(formula).parameters)
             raise ConfigError(f"formula {name!r} has no parameter {key!r}; it has {known}")
-        given[key] = _suited(key, hints[key], _resolved(value, scenario), scenario)
+        suited = _suited(key, hints[key], _resolved(value, scenario), scenario)
+        given[key] = _checked(key, hints[key], suited, value)
     for key, parameter in inspect.signature(formula).parameters.items():
         if parameter.default is parameter.empty and key not in given:
             raise ConfigError(f"formula {name!r} needs the parameter {key!r}")
-    return formula(**given), _references(formula)
+    try:
+        return formula(**given), _references(formula)
+    except (ArithmeticError, LookupError, TypeError) as error:
+        problem = f"formula {name!r} does not hold for these parameters: {error}"
+        raise ConfigError(problem) from error
 
 
 def _resolved(value: Any, scenario: TimedScenario) -> Any:
@@ -90,8 +95,7 @@ def _suited(key: str, hint: Any, value: Any, scenario: TimedScenario) -> Any:
         return _preferences(value, scenario)
     if isinstance(value, list):
         return [_suited(key, hint, item, scenario) for item in value]
-    wants_law = _mentions(hint, lambda h: h in _LAWS or getattr(h, "__name__", "") == "Law")
-    if wants_law:
+    if _wants_law(hint):
         return _law(key, value)
     if isinstance(value, dict):
         value = _law(key, value)
@@ -103,6 +107,21 @@ def _suited(key: str, hint: Any, value: Any, scenario: TimedScenario) -> Any:
         given = getattr(value, "law", value)
         raise ConfigError(f"{key} needs an exponential law, not {given}")
     return 1 / value.mean if is_rate else value.mean
+
+
+def _checked(key: str, hint: Any, value: Any, said: Any) -> Any:
+    """A parameter, if it is of the kind that the formula wants."""
+    if _wants_law(hint):
+        return value
+    try:
+        return TypeAdapter(hint).validate_python(value)
+    except ValidationError as error:
+        problem = error.errors(include_url=False)[0]["msg"]
+        raise ConfigError(f"{key} {said!r} does not fit: {problem}") from None
+
+
+def _wants_law(hint: Any) -> bool:
+    return _mentions(hint, lambda h: h in _LAWS or getattr(h, "__name__", "") == "Law")
 
 
 def _law(key: str, value: Any) -> laws.Law:

@@ -19,14 +19,18 @@ References:
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dva_sim.experiments.validation import exact
+from dva_sim.experiments.validation.exact.transforms import laplace
 from dva_sim.experiments.validation.measures import Batches
 from dva_sim.experiments.validation.recursions import one_server
-from dva_sim.experiments.validation.sample import NOBODY, Floats, Sample
+from dva_sim.experiments.validation.sample import Floats, Sample
 from dva_sim.timed.laws import Exponential, Law
 from dva_sim.timed.scenario import TimedScenario
 
@@ -52,20 +56,55 @@ def controls(batches: Batches, scenario: TimedScenario) -> dict[str, Floats]:
 def inputs(batches: Batches, scenario: TimedScenario) -> dict[str, tuple[Floats, Floats]]:
     """What was put in, and what the scenario lets expect of it: events and looking time.
 
-    A control takes the luck of the inputs off; that the inputs are right must be seen apart.
+    A control takes the luck of the inputs off; that the inputs are right must be seen apart:
+    their means, and their shapes by one value of the Laplace transform. That is a mean of
+    numbers between 0 and 1, so that even long tails leave it an honest error.
     """
-    found = {}
+    found: dict[str, tuple[Floats, Floats]] = {}
+    sample = batches.sample
     for name, surplus in _counts(batches, scenario).items():
         number = scenario.stream_names.index(name)
-        came = batches.count(batches.sample.stream == number)
+        came = batches.count(sample.stream == number)
         found[f"events of {name}"] = came, came - surplus
-    sample = batches.sample
+        law = scenario.demand[number].between
+        assert law is not None
+        gaps, known = _gaps(sample, number)
+        found[f"gaps of {name}, transform"] = _transforms(batches, [(law, gaps, known)])
     took = np.where(sample.served, sample.confirmed - sample.arrived, 0.0)
     looks = batches.total(took, sample.served)
     expected = looks - batches.total(_looks(sample, scenario)[0], sample.served)
     if expected.any():
         found["looking"] = looks, expected
+        laws = _look_law_of(sample, scenario)
+        each = [(law, took, which) for law, which in laws if law.variance > 0]
+        if each:
+            found["looking, transform"] = _transforms(batches, each)
     return found
+
+
+def _transforms(
+    batches: Batches, parts: list[tuple[Law, Floats, NDArray[np.bool_]]]
+) -> tuple[Floats, Floats]:
+    """Sum of exp(-time / mean) over some times, and what their laws let expect of it."""
+    seen = expected = np.zeros(len(batches.lengths))
+    for law, times, which in parts:
+        seen = seen + batches.total(np.exp(-times / law.mean), which)
+        expected = expected + _transform(law) * batches.count(which)
+    return seen, expected
+
+
+@cache
+def _transform(law: Law) -> float:
+    return laplace(law, 1 / law.mean)
+
+
+def _gaps(sample: Sample, number: int) -> tuple[Floats, NDArray[np.bool_]]:
+    """From the event before of the same stream to each event, and where that is known."""
+    gaps, known = np.zeros(len(sample.stream)), np.zeros(len(sample.stream), dtype=bool)
+    places = np.flatnonzero(sample.stream == number)[1:]
+    gaps[places] = np.diff(sample.detected[sample.stream == number])
+    known[places] = True
+    return gaps, known
 
 
 def _counts(batches: Batches, scenario: TimedScenario) -> dict[str, Floats]:
@@ -80,18 +119,25 @@ def _counts(batches: Batches, scenario: TimedScenario) -> dict[str, Floats]:
     return found
 
 
-def _looks(sample: Sample, scenario: TimedScenario) -> tuple[Floats, Floats]:
-    """How much longer than its mean each look took, and its square; 0 where nobody looked."""
+def _look_law_of(
+    sample: Sample, scenario: TimedScenario
+) -> Iterator[tuple[Law, NDArray[np.bool_]]]:
+    """Each law of looking, and which of the events that were looked at it is the law of."""
     groups = {group.name: group.look for group in scenario.responders}
-    means, variances = np.zeros(len(sample.stream)), np.zeros(len(sample.stream))
     for number, stream in enumerate(scenario.demand):
         for unit, group in enumerate(sample.groups):
             law: Law = stream.look if stream.look is not None else groups[group]
-            which = (sample.stream == number) & (sample.unit == unit)
-            means[which], variances[which] = law.mean, law.variance
-    looked = sample.served & (sample.unit != NOBODY)
-    surplus = np.where(looked, sample.confirmed - sample.arrived - means, 0.0)
-    return surplus, np.where(looked, surplus**2 - variances, 0.0)
+            yield law, sample.served & (sample.stream == number) & (sample.unit == unit)
+
+
+def _looks(sample: Sample, scenario: TimedScenario) -> tuple[Floats, Floats]:
+    """How much longer than its mean each look took, and its square; 0 where nobody looked."""
+    surplus, square = np.zeros(len(sample.stream)), np.zeros(len(sample.stream))
+    took = sample.confirmed - sample.arrived
+    for law, which in _look_law_of(sample, scenario):
+        surplus[which] = took[which] - law.mean
+        square[which] = surplus[which] ** 2 - law.variance
+    return surplus, square
 
 
 def _beside(batches: Batches, scenario: TimedScenario) -> dict[str, Floats]:

@@ -7,13 +7,14 @@ A run is cut into batches, long enough to be almost independent; a measure is a 
 How many came and how long looking takes *on average* is known: it is in the scenario. So what
 is explained by the luck of the inputs can be taken off, and much smaller errors remain. The
 weights come from regression, on *other* batches than the ones they are used on: what is taken
-off a batch has mean zero whatever the weights are, so nothing is biased. Nothing else is
-fitted, and nothing is tuned: an implementation that is wrong stays wrong. A wrong *input* would
-be taken off too; therefore the inputs' own means are checked, as checks of their own.
+off a batch has mean zero whatever the weights are, so nothing is biased. But a wrong *input*
+would be taken off too, and a control whose mean comes from a wrong formula would hide that it
+is wrong. Therefore the means and shapes of the inputs are checks of their own, and the
+estimate *without* controls has to agree as well.
 
 References:
     S. S. Lavenberg & P. D. Welch, Manage. Sci. 27 (1981) 322-335 (control variates);
-    A. N. Avramidis & J. R. Wilson, Oper. Res. 41 (1993) 979-989 (splitting: weights from
+    A. N. Avramidis & J. R. Wilson, Oper. Res. Lett. 14 (1993) 187-198 (splitting: weights from
     other batches); W. G. Cochran, Sampling Techniques, 3rd ed. (1977), chapter 6 (ratios).
 """
 
@@ -21,6 +22,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cache
 from typing import Literal
 
 import numpy as np
@@ -32,6 +34,7 @@ Verdict = Literal["agrees", "too rough", "differs"]
 ERRORS = 3.0  # an estimate may be so many standard errors off
 TOLERANCE = 0.005  # or so much, as a share of the exact value
 PRECISION = 0.01  # standard error asked for, as a share of the exact value
+MANY = 100  # batches whose own spread is known well enough
 _FOLDS = 10
 _BATCHES_PER_CONTROL = 5  # with fewer, weights are noise
 _ROUNDING = 1e-9  # what arithmetic alone may cost
@@ -111,21 +114,36 @@ def verdict(found: Estimate, exact: float, precision: float | None = PRECISION) 
         precision: Standard error asked for, as a share of the exact value; None asks for none.
 
     Returns:
-        `differs`: further off than 3 standard errors and than 0.5 %. `too rough`: the standard
-        error is above what is asked for, so that agreement says little.
+        `differs`: further off than 3 standard errors (as many more as Student's t asks for
+        with few batches) and than 0.5 %, with controls or without them. `too rough`: the standard error is above what is asked for, so that agreement
+        says little.
     """
     rounding = _ROUNDING * max(1.0, abs(exact))
-    off = abs(found.value - exact)
-    if not off <= max(ERRORS * found.error, TOLERANCE * abs(exact), rounding):
-        return "differs"
+    errors = _errors_allowed(found.batches)
+    for value, error in ((found.value, found.error), (found.plain, found.plain_error)):
+        if not abs(value - exact) <= max(errors * error, TOLERANCE * abs(exact), rounding):
+            return "differs"
     if precision is not None and not found.error <= max(precision * abs(exact), rounding):
         return "too rough"
     return "agrees"
 
 
+@cache
+def _errors_allowed(batches: int) -> float:
+    """Standard errors that a right estimate from so many batches may be off."""
+    if not 1 < batches < MANY:
+        return ERRORS
+    from scipy import special
+
+    return float(special.stdtrit(batches - 1, 1 - math.erfc(ERRORS / math.sqrt(2)) / 2))
+
+
 def expected_alarms(checks: int) -> float:
-    """How many of so many right checks lie beyond 3 standard errors all the same, on average."""
-    return checks * math.erfc(ERRORS / math.sqrt(2))
+    """How many of so many right checks differ all the same, on average, at most.
+
+    Each may by either of its two estimates.
+    """
+    return 2 * checks * math.erfc(ERRORS / math.sqrt(2))
 
 
 def _error(values: Floats) -> float:

@@ -137,6 +137,9 @@ def play(job: Job) -> Tables:
     columns: Columns = {"events": batches.count(np.ones(len(sample.stream), dtype=bool))}
     columns["broken"] = np.full(len(batches.lengths), float(sample.broken))
     columns["open"] = batches.count(sample.outcome == "open")
+    share = batches.lengths / batches.lengths.sum()
+    columns["worked"] = sum(sample.worked) * share
+    columns["had work"] = occupied(sample.busy_from, sample.busy_until, batches.edges)
     for name, (area, by_event) in _little(sample, batches).items():
         columns[f"area {name}"], columns[f"times {name}"] = area, by_event
     for number, name in enumerate(json.loads(str(asked["measures"]))):
@@ -233,6 +236,9 @@ def _compare(case: Case, columns: Columns) -> list[Check]:
         area, times = columns[f"area {name}"].sum(), columns[f"times {name}"].sum()
         law = "identity", f"Little's law, {name}", 1.0, certain(area / times if times else 1.0)
         found.append(law)
+    worked, had = columns["worked"].sum(), columns["had work"].sum()
+    same = certain(worked / had if had else 1.0)
+    found.append(("identity", "work by the units over work by the events", 1.0, same))
     lost = columns["open"].sum() + columns["broken"].max()
     found.append(("identity", "events lost, rules broken", 0.0, certain(lost)))
     return [_check(case, columns, *each) for each in found]

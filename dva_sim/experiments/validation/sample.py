@@ -47,6 +47,8 @@ class Sample:
         waiting_area: Integral over the measured time of how many events wait, as the world
             itself has summed it up [s].
         served_area: The same of those that somebody is at.
+        worked: Busy time of each unit in the measured time, as the unit itself has summed it
+            up [s] `(k,)`.
         broken: Rules of the core that were broken, policies that failed or were overruled.
     """
 
@@ -73,6 +75,7 @@ class Sample:
     busy_until: Floats
     waiting_area: float = 0.0
     served_area: float = 0.0
+    worked: tuple[float, ...] = ()
     broken: int = 0
 
     @property
@@ -139,6 +142,7 @@ def sample_of(recording: TimedRecording) -> Sample:
         busy_until=busy_until,
         waiting_area=float(recording.waiting.sum()),
         served_area=float(recording.served.sum()),
+        worked=tuple(unit.busy for unit in recording.units),
         broken=sum(recording.violations.values())
         + recording.counters["policy failed"]
         + recording.counters["overruled"],

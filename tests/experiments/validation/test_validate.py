@@ -87,7 +87,7 @@ def test_the_number_of_processes_changes_nothing(tmp_path):
 def test_what_holds_without_chance_is_judged_to_the_last_digit(tmp_path):
     checks = check_cases(load_cases(a_file(tmp_path)), 1, True, 1)
     exact = [c for c in checks if c.kind == "identity"]
-    assert [c.found.error for c in exact] == [0.0, 0.0, 0.0]
+    assert [c.found.error for c in exact] == [0.0] * 4
     assert all(c.verdict == "agrees" for c in exact)
 
 

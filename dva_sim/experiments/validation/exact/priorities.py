@@ -18,8 +18,8 @@ def priorities(
     """M/M/c, several classes with the same law of service.
 
     References:
-        R. H. Davis, Oper. Res. 14 (1966) 133-136; O. Kella & U. Yechiali, Nav. Res. Logist.
-        32 (1985) 489-497: `W_k = C / (c mu (1 - sigma_(k-1)) (1 - sigma_k))`, where C is
+        R. H. Davis, Oper. Res. 14 (1966) 133-136; O. Kella & U. Yechiali, Stochastic
+        Models 1 (1985) 257-262: `W_k = C / (c mu (1 - sigma_(k-1)) (1 - sigma_k))`, where C is
         Erlang's probability of waiting and sigma_k the load of classes 1 to k.
     """
     load = sum(arrival_rates) * mean_service_s

@@ -54,7 +54,7 @@ def erlang_b(servers: int, load: float) -> float:
         load: Arrivals during one mean service time.
 
     References:
-        Gross et al. (2008), section 3.5; the recursion is their eq. (3.5.6) read upwards.
+        Gross et al. (2008), chapter 2 (Erlang's loss formula), by the usual recursion.
     """
     blocked = 1.0
     for n in range(1, servers + 1):
@@ -66,7 +66,7 @@ def erlang_c(servers: int, load: float) -> float:
     """Probability of having to wait if everybody waits; needs `load < servers`.
 
     References:
-        Gross et al. (2008), section 3.3.
+        Gross et al. (2008), chapter 2 (several servers).
     """
     require_stable(load / servers)
     blocked = erlang_b(servers, load)
@@ -83,7 +83,7 @@ def mmc(
     longer than each time T in `at_s`.
 
     References:
-        Gross et al. (2008), section 3.3: a wait beyond `t` has the probability
+        Gross et al. (2008), chapter 2: a wait beyond `t` has the probability
         `C exp(-(c mu - lambda) t)`.
     """
     load = arrival_rate * mean_service_s
@@ -123,7 +123,7 @@ def mmck(arrival_rate: float, mean_service_s: Memoryless, servers: int, places: 
     """M/M/c/K: at most `places` customers wait (K = c + places); others are lost.
 
     References:
-        Gross et al. (2008), section 3.4.
+        Gross et al. (2008), chapter 2 (a limited queue).
     """
     room = servers + places
     inside = np.arange(room + 1)

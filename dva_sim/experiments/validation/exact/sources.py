@@ -22,7 +22,7 @@ def finite_source(
     alone), `delayed`, `wait_s`, `stay_s`, `throughput` (services per second).
 
     References:
-        Gross et al., Fundamentals of Queueing Theory (2008), section 3.6 (machine repair).
+        Gross et al., Fundamentals of Queueing Theory, 4th ed. (2008), chapter 2 (finite source).
         Who asks for service sees the system as it is with one source less.
     """
     needy = np.arange(sources + 1)
