@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import Field, model_validator
 
@@ -24,6 +24,9 @@ from dva_sim.network.link import LinkConfig
 from dva_sim.worlds.site import Site, load_site, map_site
 
 FOLDER = "experiments/scenarios"
+
+C = TypeVar("C", bound=Config)
+Error = Callable[[str, Path_], ConfigError]
 
 Positive = Annotated[float, Field(gt=0)]
 NonNegative = Annotated[float, Field(ge=0)]
@@ -248,22 +251,41 @@ def build(
     Raises:
         ConfigError: an unknown key, a wrong type, a value out of range, a missing profile.
     """
+    return resolve(Scenario, source, changes or {}, check_names)
+
+
+def resolve(
+    model: type[C],
+    source: Document | Mapping[str, Any],
+    changes: Mapping[str, Any],
+    check: Callable[[C, Error], object],
+) -> C:
+    """A configuration with some keys changed, whose mistakes are told with their place.
+
+    Args:
+        model: What it is.
+        source: A document or plain data.
+        changes: New values by dotted key; a number chooses an item of a list.
+        check: Looks at what the model alone cannot judge.
+
+    Raises:
+        ConfigError: an unknown key, a wrong type, a value out of range, or what `check` finds.
+    """
     document = source if isinstance(source, Document) else None
     data = copy.deepcopy(dict(document.data if document else source))  # type: ignore[arg-type]
-    changed = dict(changes or {})
-    for key, value in changed.items():
+    for key, value in changes.items():
         set_key(data, key, value)
 
     def error(problem: str, path: Path_) -> ConfigError:
         dotted = ".".join(str(p) for p in path)
-        if document is None or any(dotted == k or dotted.startswith(k + ".") for k in changed):
+        if document is None or any(dotted == k or dotted.startswith(k + ".") for k in changes):
             return ConfigError(problem)
         return document.error(problem, path)
 
     locate_policy(data, [document.file.parent] if document else [])
-    scenario = validate(Scenario, data, error)
-    check_names(scenario, error)
-    return scenario
+    made = validate(model, data, error)
+    check(made, error)
+    return made
 
 
 def locate_policy(data: dict[str, Any], folders: Sequence[Path]) -> None:
@@ -280,18 +302,31 @@ def set_key(data: dict[str, Any], key: str, value: Any) -> None:
     """Change one value by dotted key, making the mappings on the way.
 
     Raises:
-        ConfigError: a part of the key names something that holds no keys.
+        ConfigError: a part of the key names something that is not there, or holds no keys.
     """
-    *parents, last = key.split(".")
-    for parent in parents:
-        inner = data.setdefault(parent, {})
-        if not isinstance(inner, dict):
-            raise ConfigError(f"unknown key {key!r}: {parent!r} holds no keys")
-        data = inner
-    data[last] = value
+    node: Any = data
+    above, names = "", key.split(".")
+    for depth, name in enumerate(names, 1):
+        place: Any = _place_in(node, name, above, key)
+        if depth == len(names):
+            node[place] = value
+        else:
+            node = node[place] if isinstance(node, list) else node.setdefault(place, {})
+            above = name
 
 
-def check_names(scenario: Scenario, error: Any) -> None:
+def _place_in(node: Any, name: str, above: str, key: str) -> str | int:
+    """Where a part of a dotted key leads: a key of a mapping, or an item of a list."""
+    if isinstance(node, dict):
+        return name
+    if not isinstance(node, list):
+        raise ConfigError(f"unknown key {key!r}: {above!r} holds no keys")
+    if not name.isdigit() or int(name) >= len(node):
+        raise ConfigError(f"unknown key {key!r}: {above!r} has items 0 to {len(node) - 1}")
+    return int(name)
+
+
+def check_names(scenario: Scenario, error: Error) -> None:
     """Refuse a profile, strategy or policy that does not exist, before anything runs."""
     from dva_sim.agents.operator.strategies import STRATEGIES
 
@@ -312,7 +347,7 @@ def check_names(scenario: Scenario, error: Any) -> None:
     check_policy(scenario.dispatch.policy, scenario.dispatch.options, error)
 
 
-def check_policy(policy: str, options: Mapping[str, Any], error: Any) -> None:
+def check_policy(policy: str, options: Mapping[str, Any], error: Error) -> None:
     """Refuse a policy that cannot be loaded, or does not know its options."""
     from dva_sim.core.dispatch import load_policy
 

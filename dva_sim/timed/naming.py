@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from dva_sim.config import Path_
 from dva_sim.errors import ConfigError
+from dva_sim.scenario import Error, check_policy
 
 if TYPE_CHECKING:
     from dva_sim.timed.scenario import TimedScenario
-
-Error = Callable[[str, Path_], ConfigError]
 
 
 def check_names(scenario: TimedScenario, error: Error) -> None:
@@ -35,7 +33,8 @@ def check_names(scenario: TimedScenario, error: Error) -> None:
             problem = f"preferences has no list for zone {zone!r}"
             raise error(problem, ("dispatch", "preferences"))
     _check_places(scenario, zones, error)
-    _check_policy(scenario, error)
+    if dispatch.policy != "oracle":  # which is made from the run's own luck
+        check_policy(dispatch.policy, dispatch.options, error)
 
 
 def zone_names(scenario: TimedScenario, error: Error) -> list[str]:
@@ -82,17 +81,3 @@ def _names_place(place: str, scenario: TimedScenario, names: list[str]) -> bool:
     if scenario.site is None or what not in ("post", "robot_base"):
         return False
     return not number or (number.isdigit() and int(number) > 0)
-
-
-def _check_policy(scenario: TimedScenario, error: Error) -> None:
-    from dva_sim.core.dispatch import load_policy
-
-    if scenario.dispatch.policy == "oracle":  # made from the run's own luck
-        return
-    try:
-        load_policy(scenario.dispatch.policy, scenario.dispatch.options)
-    except ConfigError as problem:
-        if problem.file is not None:
-            raise
-        key = "options" if "option" in problem.problem else "policy"
-        raise error(f"dispatch.{key}: {problem.problem}", ("dispatch", key)) from None

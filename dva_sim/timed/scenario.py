@@ -7,16 +7,14 @@ scenario of this kind, and so is a shift on a site with guards, robots and opera
 
 from __future__ import annotations
 
-import copy
 import math
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
-from dva_sim.config import Config, Document, Path_, validate
-from dva_sim.errors import ConfigError
-from dva_sim.scenario import set_key
+from dva_sim.config import Config, Document
+from dva_sim.scenario import resolve
 from dva_sim.timed.laws import ZERO, Constant, Law
 from dva_sim.timed.naming import check_names
 
@@ -325,46 +323,7 @@ def build(
     Raises:
         ConfigError: an unknown key or name, a wrong type, a value out of range.
     """
-    document = source if isinstance(source, Document) else None
-    data = copy.deepcopy(dict(document.data if document else source))  # type: ignore[arg-type]
-    changed = dict(changes or {})
-    for key, value in changed.items():
-        change(data, key, value)
-
-    def error(problem: str, path: Path_) -> ConfigError:
-        dotted = ".".join(str(p) for p in path)
-        if document is None or any(dotted == k or dotted.startswith(k + ".") for k in changed):
-            return ConfigError(problem)
-        return document.error(problem, path)
-
-    scenario = validate(TimedScenario, data, error)
-    check_names(scenario, error)
-    return scenario
-
-
-def change(data: dict[str, Any], key: str, value: Any) -> None:
-    """Change one value by dotted key; a number steps into a list.
-
-    Raises:
-        ConfigError: a part of the key names something that is not there.
-    """
-    head, dot, rest = key.partition(".")
-    inner = data.get(head)
-    if not dot or not isinstance(inner, list):
-        if dot and isinstance(inner, dict):
-            change(inner, rest, value)
-        else:
-            set_key(data, key, value)
-        return
-    index, dot, rest = rest.partition(".")
-    if not index.isdigit() or int(index) >= len(inner):
-        raise ConfigError(f"unknown key {key!r}: {head!r} has items 0 to {len(inner) - 1}")
-    if not dot:
-        inner[int(index)] = value
-    elif isinstance(inner[int(index)], dict):
-        change(inner[int(index)], rest, value)
-    else:
-        raise ConfigError(f"unknown key {key!r}: {head}.{index} holds no keys")
+    return resolve(TimedScenario, source, changes or {}, check_names)
 
 
 def limit_of(value: float | None) -> float:

@@ -115,8 +115,8 @@ def verdict(found: Estimate, exact: float, precision: float | None = PRECISION) 
 
     Returns:
         `differs`: further off than 3 standard errors (as many more as Student's t asks for
-        with few batches) and than 0.5 %, with controls or without them. `too rough`: the standard error is above what is asked for, so that agreement
-        says little.
+        with few batches) and than 0.5 %, with controls or without them. `too rough`: the
+        standard error is above what is asked for, so that agreement says little.
     """
     rounding = _ROUNDING * max(1.0, abs(exact))
     errors = _errors_allowed(found.batches)
