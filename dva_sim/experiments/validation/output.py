@@ -67,9 +67,9 @@ def notes(checks: Sequence[Check], quick: bool) -> list[str]:
     by_chance = [c for c in checks if c.found.error > 0]
     off = sum(abs(c.deviation) > ERRORS for c in by_chance)
     found = [
-        f"{len(by_chance)} of the checks leave something to chance; if everything is right "
-        f"{expected_alarms(len(by_chance)):.1f} of them lie beyond {ERRORS:g} standard errors "
-        f"on average. Here {off} do."
+        f"{len(by_chance)} of the checks leave something to chance; if everything is right, up to "
+        f"{expected_alarms(len(by_chance)):.1f} of them differ all the same, on average. "
+        f"Here {off} lie beyond {ERRORS:g} standard errors."
     ]
     again = {c.case: c.again for c in checks if c.again}
     if again:
