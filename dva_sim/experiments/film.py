@@ -214,6 +214,7 @@ class _HazardPatch:
 
         self._incident = recording.incidents[number]
         self._position = self._incident.hazard.position
+        self._over = recording.contained.get(number, math.inf)
         colour = HAZARD_COLOURS[self._incident.kind]
         self._area = Circle(self._position, 0.0, fc=colour, ec=colour, alpha=0.35, animated=True)
         ax.add_patch(self._area)
@@ -224,7 +225,7 @@ class _HazardPatch:
 
     def show(self, time: float) -> list[Artist]:
         """The hazard at a moment [s]."""
-        if time < self._incident.start:
+        if not self._incident.is_there(time) or time >= self._over:
             return []
         self._area.set_radius(max(0.15, self._incident.hazard.radius(time)))
         return [self._area, self._mark]

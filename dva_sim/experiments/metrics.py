@@ -210,7 +210,7 @@ def _event_row(recording: Recording, number: int) -> Row:
 
 
 def outcome_of(event: Event) -> str:
-    """`confirmed`, `refuted`, `escalated`, `expired`, or `open` at the horizon."""
+    """`confirmed`, `contained`, `refuted`, `escalated`, `expired`, or `open` at the horizon."""
     return "open" if event.open else event.state.value
 
 

@@ -53,7 +53,7 @@ _FATES = {
 def fates(outcome: NDArray[Any], responder_kind: NDArray[Any]) -> NDArray[np.str_]:
     """What became of each event, in words of `_FATES`; outcomes it does not know are `other`."""
     words = np.char.add("confirmed by a ", responder_kind.astype(str))
-    words = np.where(outcome == "confirmed", words, outcome.astype(str))
+    words = np.where(np.isin(outcome, ("confirmed", "contained")), words, outcome.astype(str))
     words = np.where(words == "open", "open at the end", words)
     return np.where(np.isin(words, list(_FATES)), words, "other")
 
