@@ -108,7 +108,7 @@ def _summarise(recording: Recording, took: float) -> None:
     for row in event_rows(recording):
         response = f", on scene {row['response_s']:.1f} s after detection"
         known = row["response_s"] == row["response_s"]
-        by = ", confirmed by" if row["outcome"] == "contained" else " by"
+        by = " by" if row["outcome"] in ("confirmed", "refuted") else ", looked at by"
         who = f"{by} {row['responder']}" if row["responder"] else ""
         say(f"{row['kind']}: {row['outcome']}{who}{response if known else ''}")
     row = drive_measures(recording)
