@@ -410,6 +410,7 @@ def snapshot(desk: Desk) -> dict[str, Any]:
         "grants": permissions.grants,
         "observers": permissions.observers,
         "sessions": permissions.count,
+        "untold": desk.sessions.untold,
     }
 
 

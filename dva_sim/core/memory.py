@@ -21,7 +21,7 @@ from dva_sim.core.events import KEPT_CLOSED, Event, State
 from dva_sim.core.permissions import Grant
 from dva_sim.core.registry import Entry
 from dva_sim.errors import ConfigError
-from dva_sim.protocol.messages import Device, Position
+from dva_sim.protocol.messages import Device, PermissionRevocation, Position
 
 if TYPE_CHECKING:
     from dva_sim.core.service import Desk
@@ -35,6 +35,7 @@ CREATE TABLE IF NOT EXISTS about (name TEXT PRIMARY KEY, value INTEGER NOT NULL)
 CREATE TABLE IF NOT EXISTS events (number INTEGER PRIMARY KEY, open INTEGER, data TEXT NOT NULL);
 CREATE TABLE IF NOT EXISTS devices (id TEXT PRIMARY KEY, data TEXT NOT NULL);
 CREATE TABLE IF NOT EXISTS grants (session TEXT PRIMARY KEY, data TEXT NOT NULL);
+CREATE TABLE IF NOT EXISTS untold (session TEXT PRIMARY KEY, data TEXT NOT NULL);
 INSERT OR IGNORE INTO about VALUES ('format', {FORMAT});
 COMMIT;
 """
@@ -57,8 +58,8 @@ class Memory:
 
     def __init__(self, file: Path | str, epoch: float = 0.0) -> None:
         self.epoch = epoch
-        self._granted: dict[str, str] = {}
-        self._grant_changes = 0
+        self._sessions: dict[str, dict[str, str]] = {"grants": {}, "untold": {}}
+        self._session_changes = 0
         self._events: dict[int, Event] = {}
         self._devices: dict[str, Entry] = {}
         self._path = file
@@ -109,26 +110,23 @@ class Memory:
         """
         self._events |= {event.number: event for event in changed}
         self._devices |= {entry.device.id_tag: entry for entry in desk.registry.changes()}
-        permissions = desk.sessions.permissions
-        changes = permissions.changes
-        if not (self._events or self._devices or changes != self._grant_changes):
+        changes = _session_changes(desk)
+        if not (self._events or self._devices or changes != self._session_changes):
             return None
-        grants = self._granted
-        if changes != self._grant_changes:
-            grants = {str(g.session): json.dumps(_plain(g)) for g in permissions.all()}
+        sessions = self._sessions if changes == self._session_changes else _of_sessions(desk)
         try:
             self._file.execute("BEGIN IMMEDIATE")
-            self._write(desk, grants)
+            self._write(desk, sessions)
             self._file.execute("COMMIT")
         except sqlite3.Error as error:
             if self._file.in_transaction:
                 self._file.execute("ROLLBACK")
             return f"cannot keep its memory: {error}"
-        self._events, self._devices, self._granted = {}, {}, grants
-        self._grant_changes = changes
+        self._events, self._devices, self._sessions = {}, {}, sessions
+        self._session_changes = changes
         return None
 
-    def _write(self, desk: Desk, grants: dict[str, str]) -> None:
+    def _write(self, desk: Desk, sessions: dict[str, dict[str, str]]) -> None:
         put = self._file.executemany
         events = (
             (e.number, e.open, json.dumps(_of_event(e, desk, self.epoch)))
@@ -137,11 +135,13 @@ class Memory:
         put("INSERT OR REPLACE INTO events VALUES (?, ?, ?)", events)
         devices = ((i, json.dumps(_of_entry(e))) for i, e in self._devices.items())
         put(_PUT_DEVICE, devices)
-        if grants is not self._granted:
-            gone = ((s,) for s in self._granted.keys() - grants.keys())
-            put("DELETE FROM grants WHERE session = ?", gone)
-            new = (item for item in grants.items() if self._granted.get(item[0]) != item[1])
-            put("INSERT OR REPLACE INTO grants VALUES (?, ?)", new)
+        for table, now in sessions.items():
+            before = self._sessions[table]
+            put(
+                f"DELETE FROM {table} WHERE session = ?", ((s,) for s in before.keys() - now.keys())
+            )
+            new = now.items() - before.items()
+            put(f"INSERT OR REPLACE INTO {table} VALUES (?, ?)", sorted(new))
         count = desk.sessions.permissions.count
         put("INSERT OR REPLACE INTO about VALUES (?, ?)", [("sessions", count)])
 
@@ -175,7 +175,7 @@ class Memory:
             desk.book.restore(event)
             desk.orders.engaged |= dict.fromkeys(kept["engaged"], event)
         desk.book.total = sum(desk.book.counts.values())
-        self._recall_grants(desk)
+        self._recall_sessions(desk)
         desk.registry.changes()
         desk.book.changes()
         return found
@@ -186,12 +186,15 @@ class Memory:
         )
         return {State(state): count for state, count in rows}
 
-    def _recall_grants(self, desk: Desk) -> None:
+    def _recall_sessions(self, desk: Desk) -> None:
         permissions = desk.sessions.permissions
-        for session, data in self._file.execute("SELECT session, data FROM grants"):
-            self._granted[session] = data
+        for table, kept in self._sessions.items():
+            kept |= self._file.execute(f"SELECT session, data FROM {table} ORDER BY rowid")
+        for data in self._sessions["grants"].values():
             permissions.restore(_grant(json.loads(data)))
-        self._grant_changes = permissions.changes
+        for data in self._sessions["untold"].values():
+            desk.sessions.tell_robot(PermissionRevocation(*json.loads(data)))
+        self._session_changes = _session_changes(desk)
         permissions.count = max(permissions.count, self._about("sessions"))
 
     def _about(self, name: str) -> int:
@@ -237,7 +240,25 @@ def _event(kept: dict[str, Any], epoch: float) -> Event:
     )
 
 
-def _plain(value: Device | Grant) -> list[Any]:
+def _session_changes(desk: Desk) -> int:
+    return desk.sessions.permissions.changes + desk.sessions.changes
+
+
+def _of_sessions(desk: Desk) -> dict[str, dict[str, str]]:
+    """What holds, and which robots have not heard of what is over, by session."""
+    grants = desk.sessions.permissions.all()
+    untold = [(s, send.body) for s, send in desk.sessions.untold.items()]
+    return {
+        "grants": {str(g.session): json.dumps(_plain(g)) for g in grants},
+        "untold": {
+            str(session): json.dumps(_plain(body))
+            for session, body in untold
+            if isinstance(body, PermissionRevocation)
+        },
+    }
+
+
+def _plain(value: Device | Grant | PermissionRevocation) -> list[Any]:
     return [getattr(value, field.name) for field in fields(value)]
 
 

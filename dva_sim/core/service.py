@@ -87,6 +87,7 @@ class Desk:
 
     def delivered(self, send: Send, now: float) -> list[Send]:
         """What was sent was answered with OK."""
+        self.sessions.heard(send)
         return self._and_revocations(self.orders.taken_up(send))
 
     def undelivered(self, send: Send, now: float) -> list[Send]:
@@ -122,6 +123,10 @@ class Desk:
             self.registry.next_silence(),
             self._access_ends,
         )
+
+    def go_on(self) -> list[Send]:
+        """What to say again after what an earlier life knew was recalled."""
+        return self._and_revocations(self.orders.again())
 
     def close(self) -> list[Send]:
         """The desk closes: all sessions are over."""

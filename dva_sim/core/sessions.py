@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections import deque
 from dataclasses import dataclass, field
 
 from dva_sim.core.permissions import Grant, Permissions
 from dva_sim.core.send import Send
 from dva_sim.protocol import messages as m
 
-MOST_UNHEARD = 1000
+MOST_UNTOLD = 1000
 
 
 @dataclass
@@ -18,11 +17,16 @@ class Sessions:
 
     Attributes:
         permissions: Who may act on what.
+        untold: By session: what a robot has not said to have heard yet. Until then it may
+            still obey whom it should not.
+        changes: How often `untold` has changed.
     """
 
     permissions: Permissions
+    untold: dict[int, Send] = field(default_factory=dict)
+    changes: int = 0
     _over: list[Send] = field(default_factory=list)
-    _unheard: deque[Send] = field(default_factory=lambda: deque(maxlen=MOST_UNHEARD))
+    _unheard: list[Send] = field(default_factory=list)
 
     def grant(
         self, robot: m.Device, holder: m.Device, wish: m.PermissionRequest
@@ -48,7 +52,7 @@ class Sessions:
         if body.session not in mine:
             return False
         self.permissions.end(body.session)
-        self._over.append(Send(body.device, body))
+        self.tell_robot(body)
         return True
 
     def take_back(self, holder: str, robot: str) -> None:
@@ -80,10 +84,25 @@ class Sessions:
         elif isinstance(body, m.PermissionRevocation) and send.to == body.device:
             self._unheard.append(send)
 
+    def heard(self, send: Send) -> None:
+        """A robot knows that a session is over."""
+        body = send.body
+        if isinstance(body, m.PermissionRevocation) and send.to == body.device:
+            self.changes += self.untold.pop(body.session, None) is not None
+
     def remind(self) -> None:
         """Tell the robots again that have not heard."""
-        self._over += self._unheard
+        known = self.untold.values()
+        self._over += [send for send in dict.fromkeys(self._unheard) if send in known]
         self._unheard.clear()
+
+    def tell_robot(self, body: m.PermissionRevocation) -> None:
+        """A robot has to hear that a session is over, and is told until it has."""
+        self.changes += 1
+        self.untold[body.session] = Send(body.device, body)
+        self._over.append(self.untold[body.session])
+        if len(self.untold) > MOST_UNTOLD:
+            del self.untold[next(iter(self.untold))]
 
     def to_tell(self) -> list[Send]:
         """Who has to hear now that a session is over; each is given out once."""
@@ -92,6 +111,6 @@ class Sessions:
 
     def _tell(self, grant: Grant, holder_too: bool) -> None:
         body = m.PermissionRevocation(grant.robot, grant.holder, grant.session)
-        self._over.append(Send(grant.robot, body))
+        self.tell_robot(body)
         if holder_too:
             self._over.append(Send(grant.holder, body))

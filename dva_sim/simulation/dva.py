@@ -50,7 +50,7 @@ class DvaAgent:
             self.device.tell(f"remembers {count} open event{'s' * (count != 1)}")
             for entry in list(self.desk.registry.entries.values()):
                 self._meet(entry.device)
-            self._carry_out(self.desk.orders.again())
+            self._carry_out(self.desk.go_on())
         clock.every(TICK, self._tick, start=clock.now + TICK)
 
     def close(self) -> None:
@@ -109,10 +109,10 @@ class DvaAgent:
             )
 
     def _answered(self, send: Send, reply: m.Reply) -> None:
-        # Whoever refuses to hear that something is over knows nothing of it.
-        if reply.code == m.OK:
+        # Whoever refuses to hear that something is over knows nothing of it: it is over there.
+        if reply.code == m.OK or isinstance(send.body, m.PermissionRevocation | m.OrderProgress):
             self._carry_out(self.desk.delivered(send, self.device.clock.now))
-        elif not isinstance(send.body, m.PermissionRevocation | m.OrderProgress):
+        else:
             self._undelivered(send)
 
     def _undelivered(self, send: Send) -> None:

@@ -148,6 +148,38 @@ def test_a_permission_that_no_rule_allows_any_longer_ends_when_it_is_remembered(
     assert next_life(office, file, 1.0).tick(1.0) == [Send(ROBOT, over), Send(OPERATOR, over)]
 
 
+def killed_before_the_robot_hears(file: Path) -> tuple[Office, Memory, Send]:
+    """A session was ended, which was kept; what the robot said to that, nobody knows."""
+    office, memory = Office(), Memory(file)
+    content = office.say(OPERATOR, m.PermissionRequest(ROBOT, "teleoperation"))[0].content
+    assert isinstance(content, m.Permission)
+    over = m.PermissionRevocation(ROBOT, OPERATOR, content.session)
+    assert office.say(OPERATOR, over)[1] == [Send(ROBOT, over)]
+    keep(office, memory)
+    return office, memory, Send(ROBOT, over)
+
+
+def test_a_robot_that_has_not_heard_of_an_end_is_told_by_the_next_life(file: Path) -> None:
+    office, memory, untold = killed_before_the_robot_hears(file)
+    memory.close()
+    assert next_life(office, file, 1.0).go_on() == [untold]
+
+
+def test_a_robot_that_did_not_answer_is_told_by_every_life_until_it_does(file: Path) -> None:
+    office, memory, untold = killed_before_the_robot_hears(file)
+    for life in range(3):
+        office.no([untold], life)
+        keep(office, memory)
+        memory.close()
+        assert next_life(office, file, life).go_on() == [untold]
+        memory = Memory(file)
+        memory.recall(office.new_desk(), life)
+    office.ok([untold], 3.0)
+    keep(office, memory)
+    memory.close()
+    assert next_life(office, file, 4.0).go_on() == []
+
+
 def test_what_has_not_changed_is_not_written_again(file: Path) -> None:
     office, memory = Office(), Memory(file)
     office.fire(12)
