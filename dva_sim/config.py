@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import difflib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -17,6 +18,8 @@ from dva_sim.errors import ConfigError
 
 Path_ = tuple[str | int, ...]
 M = TypeVar("M", bound=BaseModel)
+Fail = Callable[[str, Path_], ConfigError]
+"""Makes the error for a problem at a key path."""
 
 
 class Config(BaseModel):
@@ -140,10 +143,74 @@ def parse_changes(pairs: Iterable[str]) -> dict[str, Any]:
     return changes
 
 
+def build(
+    model: type[M],
+    source: Document | Mapping[str, Any],
+    changes: Mapping[str, Any],
+    check: Callable[[M, Fail], object],
+    locate: Callable[[dict[str, Any], Sequence[Path]], object],
+) -> M:
+    """A configuration with some keys changed, whose mistakes are told with their place.
+
+    Args:
+        model: What it is.
+        source: A document or plain data.
+        changes: New values by dotted key; a number chooses an item of a list.
+        check: Looks at what the model alone cannot judge.
+        locate: Lets files that the data names be found from the folders given.
+
+    Raises:
+        ConfigError: an unknown key, a wrong type, a value out of range, or what `check` finds.
+    """
+    document = source if isinstance(source, Document) else None
+    data = copy.deepcopy(dict(document.data if document else source))  # type: ignore[arg-type]
+    for key, value in changes.items():
+        set_key(data, key, value)
+
+    def error(problem: str, path: Path_) -> ConfigError:
+        dotted = ".".join(str(p) for p in path)
+        if document is None or any(dotted == k or dotted.startswith(k + ".") for k in changes):
+            return ConfigError(problem)
+        return document.error(problem, path)
+
+    locate(data, [document.file.parent] if document else [])
+    made = validate(model, data, error)
+    check(made, error)
+    return made
+
+
+def set_key(data: dict[str, Any], key: str, value: Any) -> None:
+    """Change one value by dotted key, making the mappings on the way.
+
+    Raises:
+        ConfigError: a part of the key names something that is not there, or holds no keys.
+    """
+    node: Any = data
+    above, names = "", key.split(".")
+    for depth, name in enumerate(names, 1):
+        place: Any = _place_in(node, name, above, key)
+        if depth == len(names):
+            node[place] = value
+        else:
+            node = node[place] if isinstance(node, list) else node.setdefault(place, {})
+            above = name
+
+
+def _place_in(node: Any, name: str, above: str, key: str) -> str | int:
+    """Where a part of a dotted key leads: a key of a mapping, or an item of a list."""
+    if isinstance(node, dict):
+        return name
+    if not isinstance(node, list):
+        raise ConfigError(f"unknown key {key!r}: {above!r} holds no keys")
+    if not name.isdigit() or int(name) >= len(node):
+        raise ConfigError(f"unknown key {key!r}: {above!r} has items 0 to {len(node) - 1}")
+    return int(name)
+
+
 def validate(
     model: type[M],
     data: Mapping[str, Any],
-    error: Callable[[str, Path_], ConfigError] | None = None,
+    error: Fail | None = None,
 ) -> M:
     """Build `model` from `data`.
 

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from dva_sim.config import Path_
+from dva_sim.config import Fail, Path_
 from dva_sim.errors import ConfigError
-from dva_sim.scenario import Error, check_policy
+from dva_sim.scenario import check_policy
 
 if TYPE_CHECKING:
     from dva_sim.timed.scenario import TimedScenario
 
 
-def check_names(scenario: TimedScenario, error: Error) -> None:
+def check_names(scenario: TimedScenario, error: Fail) -> None:
     """Refuse names that mean nothing, before anything runs.
 
     Raises:
@@ -37,7 +37,7 @@ def check_names(scenario: TimedScenario, error: Error) -> None:
         check_policy(dispatch.policy, dispatch.options, error)
 
 
-def zone_names(scenario: TimedScenario, error: Error) -> list[str]:
+def zone_names(scenario: TimedScenario, error: Fail) -> list[str]:
     """Names of the zones, in order."""
     if scenario.site is None:
         return list(scenario.zones) or ["area" if scenario.area else "here"]
@@ -51,14 +51,14 @@ def zone_names(scenario: TimedScenario, error: Error) -> list[str]:
         raise error(problem.problem, ("site", "name")) from None
 
 
-def _known(names: Any, known: list[str], what: str, path: Path_, error: Error) -> None:
+def _known(names: Any, known: list[str], what: str, path: Path_, error: Fail) -> None:
     for name in names:
         if name not in known:
             there = ", ".join(known) or "none"
             raise error(f"{what} {name!r} is unknown; known: {there}", (*path, name))
 
 
-def _check_places(scenario: TimedScenario, zones: list[str], error: Error) -> None:
+def _check_places(scenario: TimedScenario, zones: list[str], error: Fail) -> None:
     stations = [s.name for s in scenario.dispatch.stations]
     places: list[tuple[Any, Path_, list[str]]] = [
         (group.base, ("responders", number, "base"), stations)

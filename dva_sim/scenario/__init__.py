@@ -1,0 +1,31 @@
+"""What one run consists of: site, team, network, phone, events; units are in the keys."""
+
+from dva_sim.scenario.names import check_policy, locate_policy
+from dva_sim.scenario.parts import EventConfig, RobotConfig
+from dva_sim.scenario.profiles import (
+    guard_profile,
+    phone_profile,
+    population,
+    robot_profile,
+    site_of,
+)
+from dva_sim.scenario.rules import AccessConfig, DispatchConfig
+from dva_sim.scenario.scenario import FOLDER, Scenario, build, load
+
+__all__ = [
+    "FOLDER",
+    "AccessConfig",
+    "DispatchConfig",
+    "EventConfig",
+    "RobotConfig",
+    "Scenario",
+    "build",
+    "check_policy",
+    "guard_profile",
+    "load",
+    "locate_policy",
+    "phone_profile",
+    "population",
+    "robot_profile",
+    "site_of",
+]

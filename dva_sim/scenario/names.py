@@ -1,0 +1,58 @@
+"""What a scenario names, and whether it is there."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from dva_sim import resources
+from dva_sim.config import Fail, Path_
+from dva_sim.errors import ConfigError
+
+if TYPE_CHECKING:
+    from dva_sim.scenario.scenario import Scenario
+
+
+def locate_policy(data: dict[str, Any], folders: Sequence[Path]) -> None:
+    """Let a policy in a file beside the one that names it be found from anywhere."""
+    dispatch = data.get("dispatch")
+    named = dispatch.get("policy") if isinstance(dispatch, dict) else None
+    file, colon, wanted = named.rpartition(":") if isinstance(named, str) else ("", "", "")
+    beside = [folder / file for folder in folders if colon and (folder / file).is_file()]
+    if beside and isinstance(dispatch, dict):
+        dispatch["policy"] = f"{beside[0]}:{wanted}"
+
+
+def check_names(scenario: Scenario, error: Fail) -> None:
+    """Refuse a profile, strategy or policy that does not exist, before anything runs."""
+    from dva_sim.agents.operator.strategies import STRATEGIES
+
+    choices: dict[Path_, tuple[str, Mapping[str, object]]] = {
+        ("operator", "strategy"): (scenario.operator.strategy, STRATEGIES),
+        ("profile",): (scenario.profile, resources.available("agents/phones")),
+        ("robot", "profile"): (scenario.robot.profile, resources.available("agents/robots")),
+        ("guard", "profile"): (scenario.guard.profile, resources.available("agents/people")),
+        ("operator", "population"): (
+            scenario.operator.population,
+            resources.available("agents/people"),
+        ),
+    }
+    for path, (given, known) in choices.items():
+        if given not in known and not Path(given).is_file():
+            key = ".".join(str(p) for p in path)
+            raise error(f"{key} {given!r} is unknown; known: {', '.join(sorted(known))}", path)
+    check_policy(scenario.dispatch.policy, scenario.dispatch.options, error)
+
+
+def check_policy(policy: str, options: Mapping[str, Any], error: Fail) -> None:
+    """Refuse a policy that cannot be loaded, or does not know its options."""
+    from dva_sim.core.dispatch import load_policy
+
+    try:
+        load_policy(policy, options)
+    except ConfigError as problem:
+        if problem.file is not None:
+            raise
+        key = "options" if "option" in problem.problem else "policy"
+        raise error(problem.problem, ("dispatch", key)) from None

@@ -1,0 +1,102 @@
+"""What a scenario consists of, part by part; units are in the keys."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from dva_sim.config import Config
+
+Positive = Annotated[float, Field(gt=0)]
+NonNegative = Annotated[float, Field(ge=0)]
+
+
+class SiteConfig(Config):
+    """Where it happens: a site by name or path, or a bare map in ROS map_server form."""
+
+    name: str = "caparica"
+    map: str | None = None
+
+
+class RobotConfig(Config):
+    """The robots: how many, which kind, and the limits that keep them safe."""
+
+    profile: str = "servrobot"
+    count: Annotated[int, Field(ge=0, le=50)] = 1
+    processing_s: Annotated[float, Field(ge=0, le=10)] = 0.05
+    watchdog_s: Annotated[float, Field(gt=0, le=60)] = 3.0
+    max_age_s: Annotated[float, Field(gt=0, le=120)] = 6.0
+
+
+class GuardConfig(Config):
+    """The guards: how many, and from which profile they are drawn."""
+
+    profile: str = "guard"
+    count: Annotated[int, Field(ge=0, le=200)] = 0
+
+
+class OperatorConfig(Config):
+    """The operators: how they drive, and which simulated person each is.
+
+    Attributes:
+        person: Index of the first operator's person in the population; the next operator
+            is the next person.
+        population_seed: Draws the population; a study gives its own seed.
+    """
+
+    strategy: str = "pursuit"
+    count: Annotated[int, Field(ge=0, le=50)] = 1
+    population: str = "operators"
+    person: Annotated[int, Field(ge=0)] = 0
+    population_seed: Annotated[int, Field(ge=0)] = 1
+
+
+class CommandConfig(Config):
+    """How commands are sent, the same for every pattern.
+
+    Attributes:
+        window: How many requests may be unanswered at once under `pipelined`.
+    """
+
+    rate_hz: Annotated[float, Field(gt=0, le=100)] = 10.0
+    timeout_s: Annotated[float, Field(gt=0, le=120)] = 9.0
+    attempts: Annotated[int, Field(ge=1, le=10)] = 3
+    window: Annotated[int, Field(ge=2, le=1000)] = 8
+
+
+class CameraConfig(Config):
+    """The robots' cameras: what a frame costs and what it can show."""
+
+    rate_hz: Annotated[float, Field(gt=0, le=60)] = 10.0
+    frame_bytes: Annotated[int, Field(ge=100, le=1_000_000)] = 12_000
+    field_of_view_deg: Annotated[float, Field(gt=10, le=360)] = 70.0
+    range_m: Positive = 6.0
+
+
+class EventConfig(Config):
+    """A fire, a gas leak or a flood.
+
+    Attributes:
+        room: Where, by name; left out, the run's seed chooses a room.
+        at_s: When it starts.
+        latest_s: If given, the seed draws the start between `at_s` and this.
+        reported: Whether somebody reports it at once; otherwise detectors must notice it.
+        false_alarm: Whether nothing is there: it is reported as it would be, and that is all.
+        reports: How many report it; the others are people who see it a little later, and tell
+            the place a little otherwise.
+    """
+
+    kind: Literal["fire", "gas_leak", "flood"]
+    room: str | None = None
+    at_s: NonNegative = 0.0
+    latest_s: NonNegative | None = None
+    reported: bool = False
+    false_alarm: bool = False
+    reports: Annotated[int, Field(ge=1, le=20)] = 1
+
+    @model_validator(mode="after")
+    def _in_order(self) -> EventConfig:
+        if self.latest_s is not None and self.latest_s < self.at_s:
+            raise ValueError(f"latest_s {self.latest_s:g} is before at_s {self.at_s:g}")
+        return self

@@ -1,0 +1,55 @@
+"""The site and the profiles that a scenario names."""
+
+from __future__ import annotations
+
+from functools import cache
+
+from dva_sim import resources
+from dva_sim.agents.guard import GuardProfile
+from dva_sim.agents.operator.person import Population
+from dva_sim.agents.robot import RobotProfile
+from dva_sim.agents.tilt.phone import PhoneProfile
+from dva_sim.config import Config, M, load_yaml, validate
+from dva_sim.scenario.scenario import Scenario
+from dva_sim.worlds.site import Site, load_site, map_site
+
+
+def site_of(scenario: Scenario, seed: int) -> Site:
+    """The site a scenario plays on; a bare map places its bases by `seed`."""
+    if scenario.site.map is None:
+        return load_site(scenario.site.name)
+    team = max(1, scenario.robot.count), max(1, scenario.guard.count)
+    return map_site(scenario.site.map, seed, robots=team[0], guards=team[1])
+
+
+def robot_profile(scenario: Scenario) -> RobotProfile:
+    """Mass, size and limits of the scenario's robots."""
+    return _profile(RobotProfile, scenario.robot.profile, "agents/robots")
+
+
+def phone_profile(scenario: Scenario) -> PhoneProfile:
+    """The tilt phone the operators hold."""
+    return _profile(PhoneProfile, scenario.profile, "agents/phones")
+
+
+def guard_profile(scenario: Scenario) -> GuardProfile:
+    """How the scenario's guards are drawn."""
+    return _profile(GuardProfile, scenario.guard.profile, "agents/people")
+
+
+def population(scenario: Scenario) -> Population:
+    """The population that the scenario's operators are drawn from."""
+    return _profile(Population, scenario.operator.population, "agents/people")
+
+
+def _profile(model: type[M], name: str, folder: str) -> M:
+    profile = _read_profile(model, name, folder)
+    assert isinstance(profile, model)
+    return profile
+
+
+@cache
+def _read_profile(model: type[Config], name: str, folder: str) -> Config:
+    """A profile, read once per process: reading costs more than a short run."""
+    document = load_yaml(resources.find(name, folder))
+    return validate(model, document.data, document.error)
