@@ -36,9 +36,11 @@ NAMES = {
     "holder": "HolderID",
     "label": "DeviceLabel",
     "message_id": "MessageID",
+    "mission_id": "MissionID",
     "name": "SensorName",
     "sensor": "SensorName",
     "source": "SourceID",
+    "values": "Value",
     "waypoints": "Waypoint",
 }
 

@@ -40,12 +40,22 @@ sensor_names = st.lists(names, max_size=4).map(tuple)
 sensors = st.builds(m.Sensor, names, names)
 granted = levels, sessions, st.none() | addresses, sensor_names
 
+measured = st.lists(real(-1e8, 1e8), min_size=1, max_size=40).map(tuple)
+mission_states = st.sampled_from(["none", "under_way", "waiting", "replanning", "done", "failed"])
+mission_statuses = st.builds(
+    m.MissionStatus,
+    st.integers(0, UINT32),
+    mission_states,
+    st.integers(0, 64),
+    characters(0, 256),
+)
 devices = st.builds(m.Device, ids, names, names, addresses)
 contents = st.one_of(
     st.none(),
     st.builds(m.DeviceList, st.lists(devices, max_size=6).map(tuple)),
     st.builds(m.SensorInfo, urls, st.lists(sensors, max_size=4).map(tuple)),
     st.builds(m.Permission, ids, *granted),
+    mission_statuses,
 )
 BODIES: dict[type, st.SearchStrategy[m.Body]] = {
     m.Emergency: st.builds(m.Emergency),
@@ -65,9 +75,16 @@ BODIES: dict[type, st.SearchStrategy[m.Body]] = {
     ),
     m.PersonStatus: st.builds(m.PersonStatus, names, positions),
     m.GoTo: st.builds(m.GoTo, st.lists(positions, min_size=1, max_size=40).map(tuple)),
+    m.Patrol: st.builds(
+        m.Patrol, st.lists(positions, min_size=1, max_size=40).map(tuple), st.integers(0, 1000)
+    ),
+    m.Inspect: st.builds(m.Inspect, numbers, kinds, positions),
+    m.ReturnToBase: st.builds(m.ReturnToBase),
     m.CancelMission: st.builds(m.CancelMission),
+    m.GetMissionStatus: st.builds(m.GetMissionStatus),
+    m.MissionStatus: mission_statuses,
     m.GetSensorInfo: st.builds(m.GetSensorInfo),
-    m.SensorValue: st.builds(m.SensorValue, names, real(-1e8, 1e8), names, ticks),
+    m.SensorValue: st.builds(m.SensorValue, names, measured, names, ticks),
     m.GetDeviceList: st.builds(m.GetDeviceList),
     m.DevSub: st.builds(m.DevSub, names, real(0, 1000)),
     m.PermissionRequest: st.builds(m.PermissionRequest, ids, levels, sensor_names),

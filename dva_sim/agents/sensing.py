@@ -15,10 +15,10 @@ FASTEST, SLOWEST = 20.0, 0.02  # values that a robot gives [Hz]
 
 @dataclass(frozen=True)
 class SensorPort:
-    """A sensor: the unit of its values, and how it is read at a time [s]."""
+    """A sensor: the unit of its values, and how they are read at a time [s]: 1 to 360."""
 
     unit: str
-    read: Callable[[float], float]
+    read: Callable[[float], tuple[float, ...]]
 
 
 def topic_of_sensor(sensor: str, subscriber: str) -> str:

@@ -138,8 +138,63 @@ class GoTo:
 
 
 @dataclass(frozen=True, slots=True)
+class Patrol:
+    """Visit these places in this order, 1 to 64 of them, and begin anew.
+
+    Attributes:
+        waypoints: The places of one lap.
+        laps: How many laps, up to 1000; 0: until the mission is cancelled.
+    """
+
+    waypoints: tuple[Position, ...]
+    laps: int
+
+
+@dataclass(frozen=True, slots=True)
+class Inspect:
+    """Go to where the place of an event can be seen, face it, and say what is in view.
+
+    Attributes:
+        event_id: The event.
+        kind: `fire`, `gas_leak` or `flood`.
+        position: Where it is.
+    """
+
+    event_id: int
+    kind: str
+    position: Position
+
+
+@dataclass(frozen=True, slots=True)
+class ReturnToBase:
+    """Go back to where the robot stood when it was switched on."""
+
+
+@dataclass(frozen=True, slots=True)
 class CancelMission:
     """Give up the mission and stand idle."""
+
+
+@dataclass(frozen=True, slots=True)
+class GetMissionStatus:
+    """Ask a robot how its newest mission stands; answered with `MissionStatus`."""
+
+
+@dataclass(frozen=True, slots=True)
+class MissionStatus:
+    """How the newest mission of a robot stands: published when it changes, and told if asked.
+
+    Attributes:
+        mission_id: MessageID of the message that began it; 0 if there was none.
+        mission_state: `none`, `under_way`, `waiting`, `replanning`, `done` or `failed`.
+        waypoints_left: Places still to be visited, of the present lap; at most 64.
+        reason: Why, in words, up to 256 characters; may be empty.
+    """
+
+    mission_id: int
+    mission_state: str
+    waypoints_left: int
+    reason: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,13 +208,13 @@ class SensorValue:
 
     Attributes:
         sensor: Its name, up to 64 characters.
-        value: In the unit.
+        values: In the unit; one, or up to 360 of a sensor that looks many ways at once.
         unit: Such as `kW/m2`, up to 64 characters.
         tick: The robot's own clock when it was measured [ms].
     """
 
     sensor: str
-    value: float
+    values: tuple[float, ...]
     unit: str
     tick: int
 
@@ -397,7 +452,7 @@ class Reply:
     answers: int
     code: int
     text: str
-    content: DeviceList | SensorInfo | Permission | None = None
+    content: DeviceList | SensorInfo | Permission | MissionStatus | None = None
 
 
 Body = (
@@ -410,7 +465,12 @@ Body = (
     | RobotStatus
     | PersonStatus
     | GoTo
+    | Patrol
+    | Inspect
+    | ReturnToBase
     | CancelMission
+    | GetMissionStatus
+    | MissionStatus
     | GetSensorInfo
     | SensorValue
     | GetDeviceList

@@ -57,12 +57,27 @@ def _read_person_status(element: _Element) -> m.PersonStatus:
 
 
 def _read_sensor_value(element: _Element) -> m.SensorValue:
-    sensor, value, unit, tick = _children(element)
-    return m.SensorValue(_str(sensor), _float(value), _str(unit), _int(tick))
+    sensor, *values, unit, tick = _children(element)
+    return m.SensorValue(_str(sensor), tuple(map(_float, values)), _str(unit), _int(tick))
 
 
 def _read_go_to(element: _Element) -> m.GoTo:
     return m.GoTo(tuple(_read_position(waypoint) for waypoint in element))
+
+
+def _read_patrol(element: _Element) -> m.Patrol:
+    *waypoints, laps = _children(element)
+    return m.Patrol(tuple(map(_read_position, waypoints)), _int(laps))
+
+
+def _read_inspect(element: _Element) -> m.Inspect:
+    number, kind, position = _children(element)
+    return m.Inspect(_int(number), _str(kind), _read_position(position))
+
+
+def _read_mission_status(element: _Element) -> m.MissionStatus:
+    mission, state, left, reason = _children(element)
+    return m.MissionStatus(_int(mission), _str(state), _int(left), _str(reason))
 
 
 def _read_dev_sub(element: _Element) -> m.DevSub:
@@ -154,13 +169,19 @@ _CONTENT_READERS: Final[dict[str, Callable[[_Element], Any]]] = {
     "DeviceList": _read_device_list,
     "SensorInfo": _read_sensor_info,
     "Permission": _read_permission,
+    "MissionStatus": _read_mission_status,
 }
 _COMMAND_READERS: Final[dict[str, Callable[[_Element], m.Body]]] = {
     "StartTeleOp": lambda element: m.StartTeleOp(),
     "SetTeleOp": _read_set_teleop,
     "StopTeleOp": lambda element: m.StopTeleOp(),
     "GoTo": _read_go_to,
+    "Patrol": _read_patrol,
+    "Inspect": _read_inspect,
+    "ReturnToBase": lambda element: m.ReturnToBase(),
     "CancelMission": lambda element: m.CancelMission(),
+    "GetMissionStatus": lambda element: m.GetMissionStatus(),
+    "MissionStatus": _read_mission_status,
     "GetSensorInfo": lambda element: m.GetSensorInfo(),
     "SensorValue": _read_sensor_value,
     "GetDeviceList": lambda element: m.GetDeviceList(),

@@ -81,6 +81,9 @@ _level = _choice("Level", "teleoperation", "missions", "both", "sensors")
 _kind = _choice("Kind", "fire", "gas_leak", "flood")
 _finding = _choice("Finding", "detected", "confirmed", "refuted", "contained")
 _task = _choice("Task", "confirm", "contain", "stand_by")
+_mission_state = _choice(
+    "MissionState", "none", "under_way", "waiting", "replanning", "done", "failed"
+)
 _state = _choice("State", "accepted", "declined", "departed", "arrived", "failed", "done")
 
 _message_id = _integer("MessageID", 1, _UINT32)
@@ -90,6 +93,9 @@ _session = _integer("Session", 1, _UINT64)
 _event_id = _integer("EventID", 1, _UINT32)
 _code = _integer("Code", 0, 999)
 _tick = _integer("a tick", 0, 2**53 - 1)
+_mission_id = _integer("MissionID", 0, _UINT32)
+_laps = _integer("Laps", 0, 1000)
+_waypoints_left = _integer("WaypointsLeft", 0, 64)
 
 _speed = _real("Speed", -100.0, 100.0)
 _turn_rate = _real("TurnRate", -100.0, 100.0)
@@ -143,18 +149,49 @@ def _write_person_status(body: m.PersonStatus) -> str:
 
 
 def _write_sensor_value(body: m.SensorValue) -> str:
+    if not 1 <= len(body.values) <= 360:
+        raise _bad(f"SensorValue must have 1 to 360 values, not {len(body.values)}")
+    values = "".join([f"<Value>{_measured(value)}</Value>" for value in body.values])
     return (
         f"<Sensor><SensorValue><SensorName>{_name(body.sensor)}</SensorName>"
-        f"<Value>{_measured(body.value)}</Value><Unit>{_name(body.unit)}</Unit>"
+        f"{values}<Unit>{_name(body.unit)}</Unit>"
         f"<Tick>{_tick(body.tick)}</Tick></SensorValue></Sensor>"
     )
 
 
 def _write_go_to(body: m.GoTo) -> str:
-    if not 1 <= len(body.waypoints) <= 64:
-        raise _bad(f"GoTo must have 1 to 64 waypoints, not {len(body.waypoints)}")
-    way = "".join(_write_position(at, "Waypoint") for at in body.waypoints)
-    return f"<Mission><GoTo>{way}</GoTo></Mission>"
+    return f"<Mission><GoTo>{_write_waypoints(body.waypoints)}</GoTo></Mission>"
+
+
+def _write_waypoints(waypoints: tuple[m.Position, ...]) -> str:
+    if not 1 <= len(waypoints) <= 64:
+        raise _bad(f"a mission must have 1 to 64 waypoints, not {len(waypoints)}")
+    return "".join(_write_position(at, "Waypoint") for at in waypoints)
+
+
+def _write_patrol(body: m.Patrol) -> str:
+    way = _write_waypoints(body.waypoints)
+    return f"<Mission><Patrol>{way}<Laps>{_laps(body.laps)}</Laps></Patrol></Mission>"
+
+
+def _write_inspect(body: m.Inspect) -> str:
+    return (
+        f"<Mission><Inspect><EventID>{_event_id(body.event_id)}</EventID>"
+        f"<Kind>{_kind(body.kind)}</Kind>{_write_position(body.position)}</Inspect></Mission>"
+    )
+
+
+def _write_mission(body: m.MissionStatus) -> str:
+    return f"<Mission>{_write_mission_status(body)}</Mission>"
+
+
+def _write_mission_status(body: m.MissionStatus) -> str:
+    return (
+        f"<MissionStatus><MissionID>{_mission_id(body.mission_id)}</MissionID>"
+        f"<MissionState>{_mission_state(body.mission_state)}</MissionState>"
+        f"<WaypointsLeft>{_waypoints_left(body.waypoints_left)}</WaypointsLeft>"
+        f"<Reason>{_text(body.reason)}</Reason></MissionStatus>"
+    )
 
 
 def _write_dev_sub(body: m.DevSub) -> str:
@@ -300,6 +337,7 @@ _CONTENT_WRITERS: Final[dict[type, Callable[[Any], str]]] = {
     m.DeviceList: _write_device_list,
     m.SensorInfo: _write_sensor_info,
     m.Permission: _write_permission,
+    m.MissionStatus: _write_mission_status,
 }
 _WRITERS: Final[dict[type, tuple[str, Callable[[Any], str]]]] = {
     m.Emergency: ("EmergencyMsg", _always("")),
@@ -311,7 +349,15 @@ _WRITERS: Final[dict[type, tuple[str, Callable[[Any], str]]]] = {
     m.RobotStatus: ("SimpleMsg", _write_status),
     m.PersonStatus: ("SimpleMsg", _write_person_status),
     m.GoTo: ("SimpleMsg", _write_go_to),
+    m.Patrol: ("SimpleMsg", _write_patrol),
+    m.Inspect: ("SimpleMsg", _write_inspect),
+    m.ReturnToBase: ("SimpleMsg", _always("<Mission><ReturnToBase></ReturnToBase></Mission>")),
     m.CancelMission: ("SimpleMsg", _always("<Mission><CancelMission></CancelMission></Mission>")),
+    m.GetMissionStatus: (
+        "SimpleMsg",
+        _always("<Mission><GetMissionStatus></GetMissionStatus></Mission>"),
+    ),
+    m.MissionStatus: ("SimpleMsg", _write_mission),
     m.GetSensorInfo: ("SimpleMsg", _always("<Sensor><GetSensorInfo></GetSensorInfo></Sensor>")),
     m.SensorValue: ("SimpleMsg", _write_sensor_value),
     m.GetDeviceList: ("SimpleMsg", _always("<Access><GetDeviceList></GetDeviceList></Access>")),

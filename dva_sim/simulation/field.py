@@ -91,9 +91,9 @@ class Field:
             clock_offset=float(stage.streams[f"{label}/clock"].uniform(10.0, 100_000.0)),
         )
 
-        def heat_flux(now: float) -> float:
+        def heat_flux(now: float) -> tuple[float]:
             self.world.advance_to(now)
-            return self._heat_at(body.pose()[:2], now)
+            return (self._heat_at(body.pose()[:2], now),)
 
         sensors = {HEAT: SensorPort("kW/m2", heat_flux)}
         robot = RobotAgent(

@@ -38,7 +38,7 @@ def test_what_is_encoded_is_valid_and_decodes_to_the_same_message(sent):
         ("Frequency", 0.0, 1000.0, lambda x: m.DevSub("smoke", x)),
         ("BidWithin", 0.0, 1e6, lambda x: m.TaskAnnouncement(1, "fire", m.Position(0, 0), 0, x)),
         ("ArrivalIn", 0.0, 1e6, lambda x: m.TaskBid(1, x)),
-        ("Value", -1e8, 1e8, lambda x: m.SensorValue("heat_flux", x, "kW/m2", 1)),
+        ("Value", -1e8, 1e8, lambda x: m.SensorValue("heat_flux", (x,), "kW/m2", 1)),
         ("Severity", 0.0, 1.0, lambda x: report(x, 0.5)),
         ("Confidence", 0.0, 1.0, lambda x: report(0.5, x)),
     ],
@@ -64,6 +64,9 @@ def test_codec_and_schema_agree_on_the_bounds_of_numbers(element, low, high, bod
         ("EventID", 1, 2**32 - 1, lambda n: message(m.OrderProgress(n, "done"))),
         ("Session", 1, 2**64 - 1, lambda n: message(m.PermissionGrant(TABLET, "both", n))),
         ("SeenTick", 0, 2**53 - 1, lambda n: message(m.SetTeleOp(0.0, 0.0, n))),
+        ("Laps", 0, 1000, lambda n: message(m.Patrol((HERE,), n))),
+        ("MissionID", 0, 2**32 - 1, lambda n: message(m.MissionStatus(n, "done", 0, ""))),
+        ("WaypointsLeft", 0, 64, lambda n: message(m.MissionStatus(7, "under_way", n, ""))),
     ],
 )
 def test_codec_and_schema_agree_on_the_bounds_of_integers(element, low, high, build):
@@ -76,6 +79,7 @@ def test_codec_and_schema_agree_on_the_bounds_of_integers(element, low, high, bu
 
 
 STOP = m.StopTeleOp()
+HERE = m.Position(38.661254, -9.204932)
 
 
 def report(severity, confidence):
@@ -123,6 +127,15 @@ def test_a_speed_that_is_no_bounded_number_is_not_encoded(speed):
         m.Registration("tablet", "TeleOp", "192.168.1.48\n"),
         m.GoTo(()),
         m.GoTo((m.Position(0.0, 0.0),) * 65),
+        m.Patrol((), 1),
+        m.Patrol((m.Position(0.0, 0.0),) * 65, 1),
+        m.Patrol((m.Position(0.0, 0.0),), 1.5),
+        m.Inspect(0, "fire", m.Position(0.0, 0.0)),
+        m.Inspect(7, "burglary", m.Position(0.0, 0.0)),
+        m.MissionStatus(7, "lost", 0, ""),
+        m.MissionStatus(7, "failed", 0, "two\nlines"),
+        m.SensorValue("lidar", (), "m", 0),
+        m.SensorValue("lidar", (1.0,) * 361, "m", 0),
         m.PermissionRequest(ROBOT.lower(), "both"),
         m.PermissionRequest(ROBOT, "everything"),
         m.OrderProgress(7.5, "done"),
@@ -153,6 +166,20 @@ def test_a_device_list_longer_than_a_message_is_not_encoded():
     assert decode(encode(message(fits))).body == fits
     with pytest.raises(ProtocolError, match=str(MAX_BYTES)):
         encode(message(m.Reply(1, m.OK, "", m.DeviceList((device,) * 64))))
+
+
+def test_a_whole_turn_of_a_lidar_fits_into_a_message_in_millimetres():
+    """360 values of up to 99.999 m, with the longest names that a sensor usually has."""
+    turn = tuple(round(10.0 + 0.25 * i + 0.001, 3) for i in range(360))
+    assert max(turn) < 100.0
+    sent = message(m.SensorValue("lidar", turn, "m", 2**53 - 1), session=0)
+    assert len(encode(sent)) < MAX_BYTES
+    assert decode(encode(sent)) == sent
+
+
+def test_one_value_is_said_as_it_was_in_version_1_2():
+    data = encode(message(m.SensorValue("heat_flux", (1.25,), "kW/m2", 86320)))
+    assert b"<Value>1.25</Value><Unit>kW/m2</Unit>" in data
 
 
 def test_markup_in_a_label_arrives_as_it_was():

@@ -41,7 +41,7 @@ def test_there_is_a_valid_sample_of_every_body_and_content():
     bodies = [decode(path.read_bytes()).body for path in VALID]
     contents = {type(body.content) for body in bodies if isinstance(body, m.Reply)}
     assert {type(body) for body in bodies} == set(get_args(m.Body))
-    assert contents == {type(None), m.DeviceList, m.SensorInfo, m.Permission}
+    assert contents == {type(None), m.DeviceList, m.SensorInfo, m.Permission, m.MissionStatus}
 
 
 def test_every_invalid_sample_is_explained():
