@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections import OrderedDict
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from functools import lru_cache
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,14 @@ Floats = NDArray[np.float64]
 T = TypeVar("T")
 
 
+class Disc(NamedTuple):
+    """A round thing that stands in the way: its middle and radius [m]."""
+
+    x: float
+    y: float
+    radius: float
+
+
 class Planner:
     """Plans ways on a site and says what can be seen.
 
@@ -45,17 +53,28 @@ class Planner:
         self._ends = site.walls.reshape(-1, 2).T
         self._roadmap = _roadmap(site.grid, clearance)
 
-    def path(self, start: Point, goal: Point) -> Floats | None:
+    def path(self, start: Point, goal: Point, avoid: Sequence[Disc] = ()) -> Floats | None:
         """A way from `start` to `goal` [m].
 
         It keeps the clearance except near ends that are closer to a wall, and runs in the
         middle of doors and corridors.
 
+        Args:
+            start: From where.
+            goal: Where to.
+            avoid: What the plan of the site does not show, but stands there now. A way around
+                it costs a new map, some hundredths of a second: ask only when blocked.
+
         Returns:
             Points about `STEP` apart, shape `(n, 2)`, or None if there is no way.
         """
-        way = self._roadmap.way(_plain(start), _plain(goal), self.line_of_sight)
+        roadmap = self._roadmap.around(avoid) if avoid else self._roadmap
+        way = roadmap.way(_plain(start), _plain(goal), self.line_of_sight)
         return None if way is None else way.copy()
+
+    def room_at(self, points: Floats) -> Floats:
+        """How far the nearest wall is from each of many points `(n, 2)` [m]."""
+        return self._roadmap.room_at(points)
 
     def distance(self, start: Point, goal: Point) -> float:
         """Length of that way [m]; infinite if there is none."""
@@ -81,7 +100,7 @@ def _plain(point: Point) -> Point:
 
 @lru_cache(maxsize=8)
 def _roadmap(grid: OccupancyGrid, clearance: float) -> Roadmap:
-    return Roadmap(grid, clearance)
+    return Roadmap(grid, clearance, grid.clearance)
 
 
 class Roadmap:
@@ -90,16 +109,17 @@ class Roadmap:
     So a door stays passable, and is passed in its middle, wherever it lies on the lattice.
 
     Args:
-        grid: What is free.
+        grid: How the cells lie.
         clearance: Radius that must fit [m].
+        room: How far from what is not free each cell is, as the shape of the grid [m].
     """
 
-    def __init__(self, grid: OccupancyGrid, clearance: float) -> None:
+    def __init__(self, grid: OccupancyGrid, clearance: float, room: Floats) -> None:
         self._grid, self._clearance = grid, clearance
         block = max(1, round(CELL / grid.resolution))
         shape = -(-np.array(grid.cells.shape) // block)
         padding = [(0, int(n * block - k)) for n, k in zip(shape, grid.cells.shape, strict=True)]
-        split = np.pad(grid.clearance, padding).reshape(shape[0], block, shape[1], block)
+        split = np.pad(room, padding).reshape(shape[0], block, shape[1], block)
         blocks = split.swapaxes(1, 2).reshape(shape[0], shape[1], block * block)
         best = blocks.argmax(axis=2)
         rows = np.arange(shape[0])[:, None] * block + best // block
@@ -112,9 +132,24 @@ class Roadmap:
         cos, sin = math.cos(grid.origin.heading), math.sin(grid.origin.heading)
         self._corner = np.array([grid.origin.x, grid.origin.y])
         self._turn = np.array([[cos, -sin], [sin, cos]]) / grid.resolution
-        self._clearances = grid.clearance.ravel()
+        self._clearances = room.ravel()
         self._fields: OrderedDict[Hashable, tuple[Floats, NDArray[np.int32]]] = OrderedDict()
         self._ways: OrderedDict[Hashable, Floats | None] = OrderedDict()
+
+    def around(self, discs: Sequence[Disc]) -> Roadmap:
+        """The same floor with some things standing on it."""
+        room = self._grid.clearance.copy()
+        rows, columns = room.shape
+        for x, y, radius in discs:
+            row, column = self._grid.to_cell(x, y)
+            reach = math.ceil((radius + COMFORT) / self._grid.resolution)
+            top, bottom = np.clip([row - reach, row + reach], 0, rows)
+            left, right = np.clip([column - reach, column + reach], 0, columns)
+            near = np.mgrid[top:bottom, left:right] + 0.5
+            gaps = np.hypot(*np.moveaxis(self._grid.to_xy(*near) - (x, y), -1, 0)) - radius
+            here = room[top:bottom, left:right]
+            np.minimum(here, np.maximum(gaps, 0.0), out=here)
+        return Roadmap(self._grid, self._clearance, room)
 
     def _connect(self) -> object:
         """Eight neighbours, where their free discs overlap: then nothing is between them."""
@@ -175,8 +210,8 @@ class Roadmap:
                 return int(self._nodes[index])
         return None
 
-    def _room_at(self, points: Floats) -> Floats:
-        """Clearance at many points `(n, 2)` [m]."""
+    def room_at(self, points: Floats) -> Floats:
+        """Room at many points `(n, 2)` [m]."""
         column, row = ((points - self._corner) @ self._turn).T.astype(np.intp)
         cells = row * self._grid.cells.shape[1] + column
         return np.asarray(self._clearances.take(cells, mode="clip"))
@@ -185,14 +220,14 @@ class Roadmap:
         """Cost of the straight line a-b; infinite where it does not keep the clearance."""
         length = math.hypot(b[0] - a[0], b[1] - a[1])
         samples = np.linspace(a, b, 2 + int(length / self._grid.resolution))
-        room = self._room_at(samples)
+        room = self.room_at(samples)
         if room[1:-1].min(initial=math.inf) < self._clearance:
             return math.inf
         return length * float(_price(room).mean())
 
     def _shorten(self, points: Floats) -> Floats:
         """Cut corners where the straight line costs no more than the way around."""
-        price, length = _price(self._room_at(points)), np.hypot(*np.diff(points, axis=0).T)
+        price, length = _price(self.room_at(points)), np.hypot(*np.diff(points, axis=0).T)
         total = np.r_[0.0, np.cumsum(0.5 * length * (price[1:] + price[:-1]))]
         kept, i = [0], 0
         while i < len(points) - 1:
@@ -207,11 +242,11 @@ class Roadmap:
 
     def _relax(self, points: Floats) -> Floats:
         """Round the corners: each point moves between its neighbours if room allows."""
-        room = np.minimum(self._room_at(points), COMFORT)
+        room = np.minimum(self.room_at(points), COMFORT)
         for half in range(2 * ROUNDS):
             these = np.arange(1 + half % 2, len(points) - 1, 2)
             moved = 0.5 * points[these] + 0.25 * (points[these - 1] + points[these + 1])
-            new = np.minimum(self._room_at(moved), COMFORT)
+            new = np.minimum(self.room_at(moved), COMFORT)
             good = new >= np.minimum(0.9 * room[these], self._clearance + SPARE)
             points[these[good]] = moved[good]
         return points

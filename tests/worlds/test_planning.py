@@ -7,7 +7,7 @@ import pytest
 
 from dva_sim.worlds.geo import GeoFrame, Pose
 from dva_sim.worlds.maps import UNKNOWN, OccupancyGrid, rasterise
-from dva_sim.worlds.planning import Planner
+from dva_sim.worlds.planning import Disc, Planner
 from dva_sim.worlds.site import Site, load_site, map_site
 
 MAPS = Path(__file__).parents[3] / "shared" / "maps"
@@ -128,3 +128,25 @@ def test_on_a_recorded_map_all_bases_reach_each_other():
     planner = Planner(site, 0.3)
     for base in site.robot_bases:
         assert math.isfinite(planner.distance(base[:2], site.guard_posts[0][:2]))
+
+
+def test_a_way_keeps_its_clearance_from_what_the_plan_does_not_show():
+    planner = Planner(make_site([]), 0.3)
+    start, goal = (1.5, 5.0), (8.5, 5.0)
+    around = densely(planner.path(start, goal, [Disc(5.0, 5.0, 0.4), Disc(5.0, 6.0, 0.4)]))
+    for y in (5.0, 6.0):
+        assert np.hypot(*(around - (5.0, y)).T).min() > 0.4 + 0.3 - 0.1
+    assert length(around) < 1.15 * math.dist(start, goal)
+    assert length(planner.path(start, goal)) == pytest.approx(7.0, rel=0.01)  # nothing is kept
+
+
+def test_who_stands_in_the_only_door_leaves_no_way_and_one_beside_the_plan_changes_nothing():
+    planner = Planner(make_site(with_door(5.0, 1.0)), 0.3)
+    assert planner.path((1, 5), (9, 5), [Disc(5.0, 5.0, 0.3)]) is None
+    assert len(planner.path((1, 5), (9, 5), [Disc(500.0, 5.0, 0.3)])) > 2
+
+
+def test_the_room_around_a_point_is_its_distance_from_the_nearest_wall():
+    planner = Planner(make_site([]), 0.3)
+    room = planner.room_at(np.array([(5.0, 5.0), (5.0, 1.0), (9.5, 5.0)]))
+    assert room == pytest.approx([5.0, 1.0, 0.5], abs=0.06)
