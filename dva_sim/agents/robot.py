@@ -4,9 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Annotated
-
-from pydantic import Field
 
 from dva_sim.agents.camera import Frame, HazardSpot, Observation, View
 from dva_sim.agents.commands import topic_of
@@ -18,11 +15,10 @@ from dva_sim.agents.operator.strategies import Intent, Pursuit, Reach
 from dva_sim.agents.sensing import SensorDesk, SensorPort
 from dva_sim.agents.steering import Route
 from dva_sim.agents.trace import LEASE_ENDS, MISSION_ENDS, Trace
-from dva_sim.config import Config
 from dva_sim.network.patterns import Subscription
 from dva_sim.protocol import messages as m
 from dva_sim.recorder import DriveLog
-from dva_sim.worlds.physics import DriveSpec, RobotBody, World
+from dva_sim.worlds.physics import RobotBody, World
 from dva_sim.worlds.planning import Planner
 
 FRAME = "frame|"  # topic of the camera
@@ -33,35 +29,6 @@ EXPECTED_SPEED = 0.35  # of a teleoperated robot, by which it bids, as the DVA e
 EXPECTED_READY = 4.0  # until its operator begins to drive, as the DVA expects it [s]
 LONGEST_BID = 1e6  # [s]
 STANDING = 0.02  # below this the wheels count as still [m/s, rad/s]
-
-Positive = Annotated[float, Field(gt=0)]
-
-
-class RobotProfile(Config):
-    """Body and motors of a kind of robot."""
-
-    description: str = ""
-    mass_kg: Positive = 60.0
-    radius_m: Positive = 0.30
-    max_speed_mps: Positive = 0.5
-    max_turn_rate_rad_s: Positive = 0.5235987755982988
-    max_acceleration_mps2: Positive = 0.5
-    max_deceleration_mps2: Positive = 1.0
-    max_turn_acceleration_rad_s2: Positive = 1.5
-    motor_time_constant_s: Positive = 0.15
-
-    def drive_spec(self) -> DriveSpec:
-        """The same for the physics."""
-        return DriveSpec(
-            mass=self.mass_kg,
-            radius=self.radius_m,
-            max_speed=self.max_speed_mps,
-            max_turn_rate=self.max_turn_rate_rad_s,
-            max_acceleration=self.max_acceleration_mps2,
-            max_deceleration=self.max_deceleration_mps2,
-            max_turn_acceleration=self.max_turn_acceleration_rad_s2,
-            motor_time_constant=self.motor_time_constant_s,
-        )
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from PIL import Image
 
 from dva_sim.agents.guard import GuardProfile
 from dva_sim.agents.operator.person import Population
-from dva_sim.agents.robot import RobotProfile
+from dva_sim.agents.profile import RobotProfile
 from dva_sim.agents.tilt.phone import PhoneProfile
 from dva_sim.checking.problem import Problem
 from dva_sim.config import Config, Document, Path_, validate

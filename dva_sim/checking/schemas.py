@@ -34,7 +34,7 @@ def _json_schema(kind: str) -> dict[str, Any]:
 
     from dva_sim.agents.guard import GuardProfile
     from dva_sim.agents.operator.person import Population
-    from dva_sim.agents.robot import RobotProfile
+    from dva_sim.agents.profile import RobotProfile
     from dva_sim.agents.tilt.phone import PhoneProfile
     from dva_sim.experiments.study import Study
     from dva_sim.experiments.validation.cases import CaseFile
