@@ -51,6 +51,20 @@ class OccupancyGrid:
         x, y = self.origin.x + cos * u - sin * v, self.origin.y + sin * u + cos * v
         return np.stack([x, y], axis=-1)
 
+    def window(self, points: NDArray[np.float64]) -> tuple[slice, slice]:
+        """Rows and columns of the cells around some points `(n, 2)` [m]."""
+        cells = np.array([self.to_cell(x, y) for x, y in points.tolist()])
+        (top, left), (bottom, right) = cells.min(axis=0), cells.max(axis=0) + 1
+        return slice(max(0, top), max(0, bottom)), slice(max(0, left), max(0, right))
+
+    def middles(self, window: tuple[slice, slice]) -> NDArray[np.float64]:
+        """Middles `(rows, columns, 2)` [m] of the cells in a window."""
+        rows, columns = (
+            np.arange(*part.indices(length)) + 0.5
+            for part, length in zip(window, self.cells.shape, strict=True)
+        )
+        return self.to_xy(*np.meshgrid(rows, columns, indexing="ij"))
+
     def state_at(self, x: float, y: float) -> int:
         """`FREE`, `OCCUPIED` or `UNKNOWN`; outside of the grid nothing is known."""
         row, column = self.to_cell(x, y)
@@ -88,6 +102,17 @@ class OccupancyGrid:
         sizes[0] = 0
         largest: NDArray[np.bool_] = labels == int(np.argmax(sizes))
         return largest
+
+    def floor(self, clearance: float) -> NDArray[np.bool_]:
+        """The connected free cells around `reachable`, up to the walls."""
+        from scipy import ndimage
+
+        labels, _ = ndimage.label(self.cells == FREE)
+        rows, columns = np.nonzero(self.reachable(clearance))
+        if not len(rows):
+            return np.zeros(self.cells.shape, bool)
+        floor: NDArray[np.bool_] = labels == labels[rows[0], columns[0]]
+        return floor
 
 
 def outline(grid: OccupancyGrid, free: NDArray[np.bool_]) -> NDArray[np.float64]:
@@ -239,7 +264,7 @@ def rasterise(floor: Any, walls: NDArray[np.float64], resolution: float) -> Occu
         Pose(float(corner[0]), float(corner[1]), 0.0),
         np.full((rows + 1, columns + 1), UNKNOWN, np.uint8),
     )
-    middles = grid.to_xy(*(np.indices(grid.cells.shape) + 0.5))
+    middles = grid.middles(np.s_[:, :])
     shapely.prepare(floor)
     grid.cells[shapely.contains_xy(floor, middles[..., 0], middles[..., 1])] = FREE
     for x1, y1, x2, y2 in walls:

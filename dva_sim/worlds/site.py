@@ -1,9 +1,8 @@
-"""Sites: where walls, rooms, bases and detectors are, from a drawn plan or a bare ROS map."""
+"""Sites by name: from a drawn plan or a bare ROS map."""
 
 from __future__ import annotations
 
-import difflib
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Annotated
@@ -17,153 +16,17 @@ from dva_sim.config import Config, load_yaml, validate
 from dva_sim.errors import ConfigError
 from dva_sim.streams import Streams
 from dva_sim.worlds.geo import GeoFrame, Pose
-from dva_sim.worlds.maps import FREE, OccupancyGrid, load_ros_map, outline, rasterise
+from dva_sim.worlds.layout import FOOTPRINT, STANDING, Site
+from dva_sim.worlds.maps import OccupancyGrid, load_ros_map, outline, rasterise
+from dva_sim.worlds.parts import Detector, Room
 
-__all__ = ["Detector", "Pose", "Room", "Site", "load_site", "map_site"]
-
-FOOTPRINT = 0.30  # radius that must fit at a robot base [m]
-STANDING = 0.20  # radius that must fit where a person stands [m]
+__all__ = ["FOOTPRINT", "Detector", "Pose", "Room", "Site", "load_site", "map_site"]
 
 # A bare map does not say where on earth it is: the campus in Monte de Caparica.
 DEFAULT_FRAME = GeoFrame(38.6612, -9.2058)
 DESKS = 2  # operator desks on a bare map
 BASE_SPACING = 1.5  # between the bases placed on a bare map [m]
 DETECTOR_SPACING = {"smoke": 8.0, "gas": 10.0, "water": 11.0}  # lattice on a bare map [m]
-
-
-@dataclass(frozen=True, eq=False)
-class Room:
-    """A named part of the floor: its corners `(k, 2)` [m]."""
-
-    name: str
-    polygon: NDArray[np.float64]
-
-    def contains(self, x: float, y: float) -> bool:
-        """Whether a point [m] lies inside: a ray from it crosses the border an odd time."""
-        px, py = self.polygon.T
-        qx, qy = np.roll(px, -1), np.roll(py, -1)
-        spans = (py > y) != (qy > y)
-        px, py, qx, qy = px[spans], py[spans], qx[spans], qy[spans]
-        crossings = px + (y - py) * (qx - px) / (qy - py) > x
-        return bool(np.count_nonzero(crossings) % 2)
-
-
-@dataclass(frozen=True)
-class Detector:
-    """A fixed detector: `kind` is smoke, gas or water; position [m]."""
-
-    name: str
-    kind: str
-    x: float
-    y: float
-
-
-@dataclass(frozen=True, eq=False)
-class Site:
-    """A place where robots and people work.
-
-    Attributes:
-        name: Name of the site or of the map.
-        frame: Where on earth its plane lies.
-        walls: Segments x1, y1, x2, y2, shape `(n, 4)` [m].
-        rooms: Named parts of the floor; none on a bare map.
-        doors: Openings in the walls, shape `(n, 4)` [m].
-        robot_bases: Where robots start.
-        guard_posts: Where guards wait.
-        operator_desks: Where operators sit.
-        detectors: Smoke, gas and water detectors.
-        extent: xmin, ymin, xmax, ymax of everything [m].
-        grid: What is free, occupied and unknown.
-        solids: Corners `(k, 2)` [m] of filled obstacles such as shelves.
-    """
-
-    name: str
-    frame: GeoFrame
-    walls: NDArray[np.float64]
-    rooms: tuple[Room, ...]
-    doors: NDArray[np.float64]
-    robot_bases: tuple[Pose, ...]
-    guard_posts: tuple[Pose, ...]
-    operator_desks: tuple[Pose, ...]
-    detectors: tuple[Detector, ...]
-    extent: tuple[float, float, float, float]
-    grid: OccupancyGrid
-    solids: tuple[NDArray[np.float64], ...] = ()
-    _cache: dict[object, NDArray[np.int64]] = field(default_factory=dict, repr=False)
-
-    def room_at(self, x: float, y: float) -> str | None:
-        """Name of the room around a point [m], or None outside all rooms."""
-        return next((room.name for room in self.rooms if room.contains(x, y)), None)
-
-    def room(self, name: str) -> Room:
-        """The room of that name.
-
-        Raises:
-            ConfigError: there is none; the message lists the rooms.
-        """
-        for room in self.rooms:
-            if room.name == name:
-                return room
-        known = [room.name for room in self.rooms]
-        near = difflib.get_close_matches(name, known, n=1)
-        hint = f"did you mean {near[0]!r}? " if near else ""
-        there = ", ".join(known) or "none (a bare map names no rooms)"
-        raise ConfigError(f"site {self.name!r} has no room {name!r}; {hint}rooms: {there}")
-
-    def is_free(self, x: float, y: float, clearance: float) -> bool:
-        """Whether a disc of radius `clearance` [m] fits at a point [m], to within a cell."""
-        return self.grid.state_at(x, y) == FREE and self.grid.clearance_at(x, y) >= clearance
-
-    def sample_free(
-        self,
-        rng: np.random.Generator,
-        clearance: float,
-        room: str | None = None,
-        near: tuple[float, float] | None = None,
-        within: float = 2.0,
-    ) -> tuple[float, float]:
-        """A random free point that a robot can reach, or somebody slimmer if so asked.
-
-        Args:
-            rng: Source of luck.
-            clearance: Radius that must fit at the point [m]; on the way there no more than a
-                robot's has to, or doors would part the site.
-            room: Only inside this room.
-            near: Only around this point [m] ...
-            within: ... nearer than this [m].
-
-        Raises:
-            ConfigError: no such room, or no free point there.
-        """
-        cells = self._free_cells(clearance, room)
-        columns = self.grid.cells.shape[1]
-        if near is not None and len(cells):
-            middles = self.grid.to_xy(cells // columns + 0.5, cells % columns + 0.5)
-            cells = cells[np.hypot(*(middles - near).T) < within]
-        if not len(cells):
-            where = f"room {room!r} of site {self.name!r}" if room else f"site {self.name!r}"
-            near_text = f" within {within:g} m of {near}" if near else ""
-            raise ConfigError(f"{where} has no free place of {clearance:g} m radius{near_text}")
-        cell = int(cells[rng.integers(len(cells))])
-        jitter = rng.random(2)
-        x, y = self.grid.to_xy(cell // columns + jitter[0], cell % columns + jitter[1]).tolist()
-        return x, y
-
-    def _free_cells(self, clearance: float, room: str | None) -> NDArray[np.int64]:
-        """Flat indices of the cells that `sample_free` chooses from, kept for the next time."""
-        key = clearance, room
-        if key not in self._cache:
-            reached = self.grid.reachable(min(clearance, FOOTPRINT))
-            cells = np.flatnonzero(reached & (self.grid.clearance >= clearance))
-            if room is not None:
-                import shapely
-
-                columns = self.grid.cells.shape[1]
-                middles = self.grid.to_xy(cells // columns + 0.5, cells % columns + 0.5)
-                area = shapely.Polygon(self.room(room).polygon)
-                cells = cells[shapely.contains_xy(area, middles)]
-            self._cache[key] = cells
-        return self._cache[key]
 
 
 class SiteFile(Config):
@@ -257,15 +120,11 @@ def _map_site(path: Path, seed: int, robots: int, guards: int) -> Site:
 @lru_cache(maxsize=4)
 def _bare_map(path: Path) -> Site:
     """All of a map's site that does not depend on the seed."""
-    from scipy import ndimage
-
     grid = load_ros_map(path)
     reached = grid.reachable(FOOTPRINT)
     if not reached.any():
         raise ConfigError(f"has no known-free floor that a robot of {FOOTPRINT:g} m fits on", path)
-    labels, _ = ndimage.label(grid.cells == FREE)
-    rows, columns = np.nonzero(reached)
-    walls = outline(grid, labels == labels[rows[0], columns[0]])
+    walls = outline(grid, grid.floor(FOOTPRINT))
     xy = walls.reshape(-1, 2)
     return Site(
         name=path.stem,

@@ -1,0 +1,233 @@
+"""Bodies of air and what joins them: the rooms of a drawn site, blocks of floor on a bare map."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dva_sim.worlds.maps import OccupancyGrid, segments
+from dva_sim.worlds.parts import CEILING, Compartment, Opening, Room
+
+Floats = NDArray[np.float64]
+Labels = NDArray[np.int16]
+
+NOWHERE = -1  # label of cells in no compartment
+BLOCK = 8.0  # side of a block of a bare map's floor [m]
+LEAST_BLOCK = 4.0  # smaller pieces join their neighbour [m^2]
+LEAST_BORDER = 0.3  # shorter openings without a wall are slips of the pen [m]
+NEAR = 0.05  # rooms this near to each other touch [m]
+PROBES = (0.06, 0.2, 0.35, 0.5)  # how far from a door to look for its rooms [m]
+
+
+class Partition(NamedTuple):
+    """Compartments, what joins them, and for each cell of the grid whose it is, or `NOWHERE`."""
+
+    compartments: tuple[Compartment, ...]
+    openings: tuple[Opening, ...]
+    labels: Labels
+
+
+# --- drawn sites -----------------------------------------------------------------------
+
+
+def of_rooms(
+    grid: OccupancyGrid,
+    rooms: Sequence[Room],
+    walls: Floats,
+    ways: Sequence[tuple[Sequence[float], float, str]],
+) -> Partition:
+    """One compartment for each room that is not outdoors.
+
+    Args:
+        grid: Gives the cells.
+        rooms: All rooms; where two overlap, the first counts.
+        walls: Segments `(n, 4)` [m].
+        ways: Doors and exits: ends x1, y1, x2, y2 [m], height [m], kind.
+    """
+    indoor = [room for room in rooms if not room.outdoor]
+    compartments = [Compartment(r.name, _area(r.polygon), r.ceiling, r.polygon) for r in indoor]
+    doors = [opening for way in ways for opening in _passage(rooms, *way)]
+    borders = _borders(indoor, walls, [ends for ends, _, _ in ways])
+    return Partition(tuple(compartments), (*doors, *borders), _labels(grid, indoor))
+
+
+def _area(polygon: Floats) -> float:
+    x, y = polygon.T
+    return float(abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2)
+
+
+def _passage(
+    rooms: Sequence[Room], ends: Sequence[float], height: float, kind: str
+) -> Iterator[Opening]:
+    """A door with the rooms on both sides; none if it joins a room to itself."""
+    x1, y1, x2, y2 = ends
+    width = math.hypot(x2 - x1, y2 - y1)
+    sides = [_beside(rooms, ends, side / width) for side in (1, -1)]
+    a, b = (None if room is None or room.outdoor else room.name for room in sides)
+    if a is None:
+        a, b = b, None
+    if a is not None and a != b:
+        yield Opening(a, b, x1, y1, x2, y2, width, height, kind)
+
+
+def _beside(rooms: Sequence[Room], ends: Sequence[float], side: float) -> Room | None:
+    """The room on one side of a door's middle."""
+    x1, y1, x2, y2 = ends
+    for far in PROBES:
+        x = (x1 + x2) / 2 - side * far * (y2 - y1)
+        y = (y1 + y2) / 2 + side * far * (x2 - x1)
+        for room in rooms:
+            if room.contains(x, y):
+                return room
+    return None
+
+
+def _borders(
+    rooms: Sequence[Room], walls: Floats, doors: Sequence[Sequence[float]]
+) -> Iterator[Opening]:
+    """Straight pieces of border between two rooms without a wall or a door."""
+    import shapely
+
+    areas = [shapely.Polygon(room.polygon) for room in rooms]
+    lines = np.vstack([walls, np.reshape(doors, (-1, 4))]).reshape(-1, 2, 2)
+    closed: Any = shapely.union_all(shapely.buffer(shapely.linestrings(lines), NEAR))
+    wide = [area.buffer(NEAR, join_style="mitre") for area in areas]
+    first, second = shapely.STRtree(areas).query(wide, predicate="intersects")
+    for a, b in sorted((int(a), int(b)) for a, b in zip(first, second, strict=True) if a < b):
+        free = (areas[a].exterior & wide[b]) - closed
+        for ends in _straight(free).tolist():
+            x1, y1, x2, y2 = _up_to(closed, ends)
+            width = math.hypot(x2 - x1, y2 - y1)
+            if width >= LEAST_BORDER:
+                height = min(rooms[a].ceiling, rooms[b].ceiling)
+                names = rooms[a].name, rooms[b].name
+                yield Opening(*names, x1, y1, x2, y2, width, height, "border")
+
+
+def _straight(lines: Any) -> Floats:
+    """The straight pieces of some lines, `(n, 4)` [m]."""
+    import shapely
+
+    parts = [part for part in shapely.get_parts(lines) if part.geom_type == "LineString"]
+    if not parts:
+        return np.empty((0, 4))
+    merged: Any = shapely.line_merge(shapely.multilinestrings(parts))
+    return segments(merged.simplify(NEAR / 5))
+
+
+def _up_to(closed: Any, ends: Sequence[float]) -> tuple[float, float, float, float]:
+    """An opening lengthened where it was cut `NEAR` a wall."""
+    import shapely
+
+    a, b = np.array(ends[:2]), np.array(ends[2:])
+    along = (b - a) / np.hypot(*(b - a)) * NEAR
+    a, b = (
+        end + way if closed.distance(shapely.Point(end)) < 1e-6 else end
+        for end, way in ((a, -along), (b, along))
+    )
+    return float(a[0]), float(a[1]), float(b[0]), float(b[1])
+
+
+def _labels(grid: OccupancyGrid, rooms: Sequence[Room]) -> Labels:
+    """Whose each cell is."""
+    import shapely
+
+    labels = np.full(grid.cells.shape, NOWHERE, np.int16)
+    for number, room in reversed(list(enumerate(rooms))):
+        box = grid.window(room.polygon)
+        middles = grid.middles(box)
+        area = shapely.Polygon(room.polygon)
+        shapely.prepare(area)
+        inside = shapely.intersects_xy(area, middles[..., 0], middles[..., 1])
+        labels[box][inside] = number
+    return labels
+
+
+# --- bare maps -------------------------------------------------------------------------
+
+
+def of_floor(grid: OccupancyGrid, floor: NDArray[np.bool_]) -> Partition:
+    """Blocks of a floor without rooms, about `BLOCK` wide, parted where a wall parts them.
+
+    Args:
+        grid: Says where the cells lie.
+        floor: Cells of the floor, shape `(rows, columns)`.
+    """
+    labels = _joined(_pieces(floor, grid.resolution), grid.resolution)
+    sizes = np.bincount(labels[labels >= 0], minlength=labels.max() + 1) * grid.resolution**2
+    blocks = tuple(
+        Compartment(f"block {number}", float(size), CEILING, None)
+        for number, size in enumerate(sizes, 1)
+    )
+    return Partition(blocks, tuple(_seams(grid, labels, blocks)), labels)
+
+
+def _pieces(floor: NDArray[np.bool_], resolution: float) -> Labels:
+    """Connected parts of the floor within each block of a lattice."""
+    from scipy import ndimage
+
+    labels = np.full(floor.shape, NOWHERE, np.int16)
+    found = 0
+    rows, columns = (_cuts(length, resolution) for length in floor.shape)
+    for top, bottom in itertools.pairwise(rows):
+        for left, right in itertools.pairwise(columns):
+            part, count = ndimage.label(floor[top:bottom, left:right])
+            labels[top:bottom, left:right][part > 0] = part[part > 0] + (found - 1)
+            found += count
+    return labels
+
+
+def _cuts(length: int, resolution: float) -> list[int]:
+    """Where a side of so many cells is cut into blocks of equal length."""
+    blocks = max(1, round(length * resolution / BLOCK))
+    return [round(length * number / blocks) for number in range(blocks + 1)]
+
+
+def _joined(labels: Labels, resolution: float) -> Labels:
+    """The same with pieces too small given to the neighbour with the longest border."""
+    sizes = np.bincount(labels[labels >= 0]) * resolution**2
+    borders = _borders_between(labels, len(sizes))
+    owner = np.arange(len(sizes))
+    while len(small := np.flatnonzero((sizes < LEAST_BLOCK) & borders.any(axis=1))):
+        piece = small[np.argmin(sizes[small])]
+        taker = int(np.argmax(borders[piece]))
+        sizes[taker] += sizes[piece]
+        borders[taker] += borders[piece]
+        borders[:, taker] += borders[:, piece]
+        borders[piece], borders[:, piece], borders[taker, taker] = 0, 0, 0
+        owner[owner == piece] = taker
+    _, number = np.unique(owner, return_inverse=True)
+    return np.where(labels >= 0, number[labels], NOWHERE).astype(np.int16)
+
+
+def _borders_between(labels: Labels, count: int) -> NDArray[np.int64]:
+    """How many cell edges two pieces share, shape `(count, count)`."""
+    borders = np.zeros((count, count), np.int64)
+    for a, b in ((labels[1:], labels[:-1]), (labels[:, 1:], labels[:, :-1])):
+        touch = (a >= 0) & (b >= 0) & (a != b)
+        np.add.at(borders, (a[touch], b[touch]), 1)
+    return borders + borders.T
+
+
+def _seams(grid: OccupancyGrid, labels: Labels, blocks: Sequence[Compartment]) -> Iterator[Opening]:
+    """Each straight run of cell edges between the same two blocks."""
+    for turned, cells in ((False, labels), (True, labels.T)):
+        low, high = cells[:-1].astype(np.int64), cells[1:].astype(np.int64)
+        code = np.where((low >= 0) & (high >= 0) & (low != high), low * len(blocks) + high, -1)
+        starts = np.diff(code, axis=1, prepend=-1) != 0
+        for row, left in zip(*np.nonzero(starts & (code >= 0)), strict=True):
+            run = np.flatnonzero(code[row, left:] != code[row, left])
+            right = left + (run[0] if len(run) else code.shape[1] - left)
+            width = float(right - left) * grid.resolution
+            if width < LEAST_BORDER:
+                continue
+            ends = ((row + 1, left), (row + 1, right))
+            (x1, y1), (x2, y2) = (grid.to_xy(*(e[::-1] if turned else e)).tolist() for e in ends)
+            a, b = divmod(int(code[row, left]), len(blocks))
+            names = blocks[min(a, b)].name, blocks[max(a, b)].name
+            yield Opening(*names, x1, y1, x2, y2, width, CEILING, "border")

@@ -1,0 +1,178 @@
+"""What a site is made of: rooms, detectors, exits, zones, cameras, radio and its coverage."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Points = NDArray[np.float64]
+CEILING = 3.0  # of a room that does not say [m]
+DOOR_HEIGHT = 2.1  # of a door that does not say [m]
+
+
+def contains(polygon: Points, x: float, y: float) -> bool:
+    """Whether a point [m] lies inside: a ray from it crosses the border an odd time."""
+    px, py = polygon.T
+    qx, qy = np.roll(px, -1), np.roll(py, -1)
+    spans = (py > y) != (qy > y)
+    px, py, qx, qy = px[spans], py[spans], qx[spans], qy[spans]
+    crossings = px + (y - py) * (qx - px) / (qy - py) > x
+    return bool(np.count_nonzero(crossings) % 2)
+
+
+@dataclass(frozen=True, eq=False)
+class Area:
+    """A named part of the plane: its corners `(k, 2)` [m]."""
+
+    name: str
+    polygon: Points
+
+    def contains(self, x: float, y: float) -> bool:
+        """Whether a point [m] lies inside."""
+        return contains(self.polygon, x, y)
+
+
+@dataclass(frozen=True, eq=False)
+class Room(Area):
+    """A named part of the floor, or of the ground outdoors.
+
+    Attributes:
+        ceiling: Height [m]; without meaning outdoors.
+        outdoor: A path or a yard.
+        paved: Outdoors: a path; else grass.
+    """
+
+    ceiling: float = CEILING
+    outdoor: bool = False
+    paved: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class Zone(Area):
+    """A part of the floor with a rule or a purpose: `use` is restricted, charging or assembly."""
+
+    use: str = "restricted"
+
+
+class LinkQuality(NamedTuple):
+    """What a radio link is like somewhere, on top of what it is like anyway.
+
+    Attributes:
+        loss: Probability that a packet is lost, each way.
+        rate_bps: Upper bound of the rate [bit/s].
+        extra_delay_s: One-way delay added [s].
+    """
+
+    loss: float
+    rate_bps: float
+    extra_delay_s: float
+
+
+# Assumed, in the order in which a link fades; nobody measured them on these sites.
+QUALITIES = {
+    "good": LinkQuality(0.0, 20e6, 0.0),
+    "fair": LinkQuality(0.02, 5e6, 0.010),
+    "poor": LinkQuality(0.10, 1e6, 0.050),
+    "none": LinkQuality(1.0, 1e3, 0.0),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Coverage(Area):
+    """Where the radio link has a quality of its own."""
+
+    quality: LinkQuality = QUALITIES["good"]
+
+
+@dataclass(frozen=True)
+class Detector:
+    """A fixed detector: `kind` is smoke, heat, co, gas or water; position [m]."""
+
+    name: str
+    kind: str
+    x: float
+    y: float
+
+
+class Exit(NamedTuple):
+    """A way to safety: its middle [m], the heading outwards [rad], its width [m]."""
+
+    x: float
+    y: float
+    heading: float
+    width: float
+    name: str
+
+    @property
+    def ends(self) -> tuple[float, float, float, float]:
+        """From jamb to jamb: x1, y1, x2, y2 [m], out lying to the left."""
+        dx = self.width / 2 * math.sin(self.heading)
+        dy = -self.width / 2 * math.cos(self.heading)
+        return self.x - dx, self.y - dy, self.x + dx, self.y + dy
+
+
+class FixedCamera(NamedTuple):
+    """A camera on a wall or a mast; angles [rad], how far it shows people [m]."""
+
+    x: float
+    y: float
+    heading: float
+    field_of_view: float
+    range: float
+    name: str
+
+
+class BaseStation(NamedTuple):
+    """An antenna: what it speaks (wifi, lte, nr), where [m]."""
+
+    x: float
+    y: float
+    radio: str
+    name: str
+
+
+@dataclass(frozen=True, eq=False)
+class Compartment:
+    """A body of air: what fills with smoke, gas or water by itself.
+
+    Attributes:
+        name: Of its room; on a bare map the number of a block of the floor.
+        area: Of its floor, solids among it [m^2].
+        ceiling: Height [m].
+        polygon: Corners `(k, 2)` [m], or None where only its cells are known (bare maps).
+    """
+
+    name: str
+    area: float
+    ceiling: float
+    polygon: Points | None
+
+
+class Opening(NamedTuple):
+    """Where air, water and people pass between two compartments.
+
+    Attributes:
+        room_a: Name of a compartment.
+        room_b: Name of the other one; None for outdoors.
+        x1: One end [m].
+        y1: One end [m].
+        x2: The other end [m].
+        y2: The other end [m].
+        width: From end to end [m].
+        height: From the floor [m].
+        kind: door, exit, or border: no wall between the two.
+    """
+
+    room_a: str
+    room_b: str | None
+    x1: float
+    y1: float
+    x2: float
+    y2: float
+    width: float
+    height: float
+    kind: str
