@@ -147,7 +147,7 @@ def build(
     model: type[M],
     source: Document | Mapping[str, Any],
     changes: Mapping[str, Any],
-    check: Callable[[M, Fail], object],
+    complete: Callable[[M, Fail], M],
     locate: Callable[[dict[str, Any], Sequence[Path]], object],
 ) -> M:
     """A configuration with some keys changed, whose mistakes are told with their place.
@@ -156,11 +156,11 @@ def build(
         model: What it is.
         source: A document or plain data.
         changes: New values by dotted key; a number chooses an item of a list.
-        check: Looks at what the model alone cannot judge.
+        complete: Judges what the model alone cannot, and adds what follows from it.
         locate: Lets files that the data names be found from the folders given.
 
     Raises:
-        ConfigError: an unknown key, a wrong type, a value out of range, or what `check` finds.
+        ConfigError: an unknown key, a wrong type, a value out of range, or what `complete` finds.
     """
     document = source if isinstance(source, Document) else None
     data = copy.deepcopy(dict(document.data if document else source))  # type: ignore[arg-type]
@@ -174,9 +174,7 @@ def build(
         return document.error(problem, path)
 
     locate(data, [document.file.parent] if document else [])
-    made = validate(model, data, error)
-    check(made, error)
-    return made
+    return complete(validate(model, data, error), error)
 
 
 def set_key(data: dict[str, Any], key: str, value: Any) -> None:

@@ -50,4 +50,4 @@ def cadence(scenario: Mapping[str, Any], changes: Mapping[str, Level]) -> Cadenc
     period = 1.0 / resolved.command.rate_hz
     if phone.send == "on_change":
         period = min(phone.max_delay_s, 20 / phone.sample_rate_hz)
-    return Cadence(period, resolved.robot.processing_s)
+    return Cadence(period, resolved.robot.processing_s or 0.0)

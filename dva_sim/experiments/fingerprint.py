@@ -15,17 +15,18 @@ _CODE = (
     "core",
     "network",
     "protocol",
+    "scenario",
     "simulation",
+    "timed",
     "worlds",
     "clock.py",
     "recorder.py",
-    "scenario.py",
     "streams.py",
     "experiments/episode.py",
     "experiments/metrics.py",
 )
 _EDITED = ("agents", "protocol", "worlds")
-_SUFFIXES = {".yaml", ".geojson", ".xsd", ".pgm", ".png"}
+_SUFFIXES = {".yaml", ".geojson", ".xsd", ".pgm", ".png", ".py"}
 
 
 def fingerprint() -> str:

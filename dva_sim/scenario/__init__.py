@@ -1,16 +1,17 @@
 """What one run consists of: site, team, network, phone, events; units are in the keys."""
 
+from dva_sim.scenario.building import FOLDER, build, load
 from dva_sim.scenario.names import check_policy, locate_policy
 from dva_sim.scenario.parts import EventConfig, RobotConfig
 from dva_sim.scenario.profiles import (
     guard_profile,
     phone_profile,
     population,
-    robot_profile,
+    robot_profiles,
     site_of,
 )
 from dva_sim.scenario.rules import AccessConfig, DispatchConfig
-from dva_sim.scenario.scenario import FOLDER, Scenario, build, load
+from dva_sim.scenario.scenario import Scenario
 
 __all__ = [
     "FOLDER",
@@ -26,6 +27,6 @@ __all__ = [
     "locate_policy",
     "phone_profile",
     "population",
-    "robot_profile",
+    "robot_profiles",
     "site_of",
 ]

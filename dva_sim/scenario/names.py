@@ -28,20 +28,19 @@ def check_names(scenario: Scenario, error: Fail) -> None:
     """Refuse a profile, strategy or policy that does not exist, before anything runs."""
     from dva_sim.agents.operator.strategies import STRATEGIES
 
-    choices: dict[Path_, tuple[str, Mapping[str, object]]] = {
+    people, robots = resources.available("agents/people"), scenario.robot.profile
+    choices: dict[Path_, tuple[str | tuple[str, ...], Mapping[str, object]]] = {
         ("operator", "strategy"): (scenario.operator.strategy, STRATEGIES),
         ("profile",): (scenario.profile, resources.available("agents/phones")),
-        ("robot", "profile"): (scenario.robot.profile, resources.available("agents/robots")),
-        ("guard", "profile"): (scenario.guard.profile, resources.available("agents/people")),
-        ("operator", "population"): (
-            scenario.operator.population,
-            resources.available("agents/people"),
-        ),
+        ("robot", "profile"): (robots, resources.available("agents/robots")),
+        ("guard", "profile"): (scenario.guard.profile, people),
+        ("operator", "population"): (scenario.operator.population, people),
     }
     for path, (given, known) in choices.items():
-        if given not in known and not Path(given).is_file():
-            key = ".".join(str(p) for p in path)
-            raise error(f"{key} {given!r} is unknown; known: {', '.join(sorted(known))}", path)
+        for name in (given,) if isinstance(given, str) else given:
+            if name not in known and not Path(name).is_file():
+                key = ".".join(str(p) for p in path)
+                raise error(f"{key} {name!r} is unknown; known: {', '.join(sorted(known))}", path)
     check_policy(scenario.dispatch.policy, scenario.dispatch.options, error)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
@@ -13,18 +13,28 @@ NonNegative = Annotated[float, Field(ge=0)]
 
 
 class SiteConfig(Config):
-    """Where it happens: a site by name or path, or a bare map in ROS map_server form."""
+    """Where it happens: a site by name or path, or a bare map in ROS map_server form.
+
+    Attributes:
+        options: Of a site that is generated, such as `{seed: 7, width_m: 80}`.
+    """
 
     name: str = "caparica"
+    options: dict[str, Any] = Field(default_factory=dict)
     map: str | None = None
 
 
 class RobotConfig(Config):
-    """The robots: how many, which kind, and the limits that keep them safe."""
+    """The robots: how many, which kind, and the limits that keep them safe.
 
-    profile: str = "servrobot"
-    count: Annotated[int, Field(ge=0, le=50)] = 1
-    processing_s: Annotated[float, Field(ge=0, le=10)] = 0.05
+    Attributes:
+        profile: One for all, or a list: the first robot has the first, and so on in turn.
+        processing_s: Time a message takes a robot's computer; left out: as its profile says.
+    """
+
+    profile: str | Annotated[tuple[str, ...], Field(min_length=1)] = "servrobot"
+    count: Annotated[int, Field(ge=0, le=1000)] = 1
+    processing_s: Annotated[float, Field(ge=0, le=10)] | None = None
     watchdog_s: Annotated[float, Field(gt=0, le=60)] = 3.0
     max_age_s: Annotated[float, Field(gt=0, le=120)] = 6.0
 
@@ -34,6 +44,13 @@ class GuardConfig(Config):
 
     profile: str = "guard"
     count: Annotated[int, Field(ge=0, le=200)] = 0
+
+
+class BystanderConfig(Config):
+    """People who are there for other reasons: how many, and from which profile they are drawn."""
+
+    profile: str = "bystanders"
+    count: Annotated[int, Field(ge=0, le=1000)] = 0
 
 
 class OperatorConfig(Config):

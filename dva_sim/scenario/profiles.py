@@ -7,7 +7,7 @@ from functools import cache
 from dva_sim import resources
 from dva_sim.agents.guard import GuardProfile
 from dva_sim.agents.operator.person import Population
-from dva_sim.agents.robot import RobotProfile
+from dva_sim.agents.profile import RobotProfile
 from dva_sim.agents.tilt.phone import PhoneProfile
 from dva_sim.config import Config, M, load_yaml, validate
 from dva_sim.scenario.scenario import Scenario
@@ -22,9 +22,12 @@ def site_of(scenario: Scenario, seed: int) -> Site:
     return map_site(scenario.site.map, seed, robots=team[0], guards=team[1])
 
 
-def robot_profile(scenario: Scenario) -> RobotProfile:
-    """Mass, size and limits of the scenario's robots."""
-    return _profile(RobotProfile, scenario.robot.profile, "agents/robots")
+def robot_profiles(scenario: Scenario) -> list[RobotProfile]:
+    """What the scenario's robots are, one after the other."""
+    named = scenario.robot.profile
+    names = (named,) if isinstance(named, str) else named
+    kinds = [_profile(RobotProfile, name, "agents/robots") for name in names]
+    return [kinds[number % len(kinds)] for number in range(scenario.robot.count)]
 
 
 def phone_profile(scenario: Scenario) -> PhoneProfile:

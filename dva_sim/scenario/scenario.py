@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from dva_sim import config, resources
-from dva_sim.config import Config, Document, load_yaml
+from dva_sim.config import Config
 from dva_sim.network.link import LinkConfig
-from dva_sim.scenario.names import check_names, locate_policy
 from dva_sim.scenario.parts import (
+    BystanderConfig,
     CameraConfig,
     CommandConfig,
     EventConfig,
@@ -23,14 +20,15 @@ from dva_sim.scenario.parts import (
 )
 from dva_sim.scenario.rules import AccessConfig, DispatchConfig
 
-FOLDER = "experiments/scenarios"
-
 
 class Scenario(Config):
     """Everything one run needs but its seed.
 
     Attributes:
         model: Tells this kind of scenario from the timed ones.
+        control: How operators use robots. `direct`: they close the loop over the link.
+            `coordinated`: the robot also watches where it drives, and slows by itself.
+            `supervisory`: they name the goal and judge the picture, the robot drives alone.
     """
 
     model: Literal["full"] = "full"
@@ -38,7 +36,9 @@ class Scenario(Config):
     site: SiteConfig = SiteConfig()
     robot: RobotConfig = RobotConfig()
     guard: GuardConfig = GuardConfig()
+    bystander: BystanderConfig = BystanderConfig()
     operator: OperatorConfig = OperatorConfig()
+    control: Literal["direct", "coordinated", "supervisory"] = "direct"
     pattern: Literal["req-rep", "pipelined", "pub-sub", "latest-wins"] = "latest-wins"
     profile: str = "default"
     command: CommandConfig = CommandConfig()
@@ -61,39 +61,3 @@ class Scenario(Config):
         if not self.robot.count and not self.guard.count:
             raise ValueError("nobody can respond: robot.count and guard.count are 0")
         return self
-
-    @model_validator(mode="after")
-    def _timeout_admits_the_delay(self) -> Scenario:
-        """Below four round trips a retry never gets through: the socket opens anew each time."""
-        longest = self.link.delay_s + self.link.jitter_s
-        needed = 8 * longest + self.robot.processing_s
-        if self.robot.count and self.command.timeout_s <= needed:
-            raise ValueError(
-                f"command.timeout_s {self.command.timeout_s:g} s should be above four round "
-                f"trips and the processing time ({needed:g} s), or link.delay_s be shorter"
-            )
-        return self
-
-
-def load(name: str, base: Path | None = None) -> Document:
-    """Read a scenario by name or path; the data is checked by `build`.
-
-    Raises:
-        ConfigError: not found or not YAML.
-    """
-    return load_yaml(resources.find(name, FOLDER, base=base))
-
-
-def build(
-    source: Document | Mapping[str, Any], changes: Mapping[str, Any] | None = None
-) -> Scenario:
-    """A scenario from a file or plain data, with some keys changed.
-
-    Args:
-        source: A document (mistakes are told with their place) or plain data.
-        changes: New values by dotted key, for example `{"link.delay_s": 0.25}`.
-
-    Raises:
-        ConfigError: an unknown key, a wrong type, a value out of range, a missing profile.
-    """
-    return config.build(Scenario, source, changes or {}, check_names, locate_policy)

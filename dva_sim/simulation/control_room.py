@@ -12,6 +12,7 @@ from dva_sim.agents.operator.agent import OperatorAgent
 from dva_sim.agents.operator.drive import DriverSeat, OperatorSetup
 from dva_sim.agents.operator.person import draw_person
 from dva_sim.agents.operator.strategies import STRATEGIES, Oracle, Reach, Truth
+from dva_sim.agents.profile import RobotProfile
 from dva_sim.agents.robot import EXPECTED_READY, EXPECTED_SPEED
 from dva_sim.agents.tilt import Phone
 from dva_sim.core.access import Access, AccessRule
@@ -23,7 +24,7 @@ from dva_sim.core.service import Desk
 from dva_sim.core.sessions import Sessions
 from dva_sim.errors import ConfigError
 from dva_sim.protocol import messages as m
-from dva_sim.scenario import Scenario, guard_profile, phone_profile, population, robot_profile
+from dva_sim.scenario import Scenario, guard_profile, phone_profile, population
 from dva_sim.simulation.dva import DvaAgent
 from dva_sim.simulation.stage import Stage
 
@@ -140,8 +141,8 @@ def add_operator(
     scenario, config = stage.scenario, stage.scenario.operator
     device = stage.device("operator", number)
     person = draw_person(population(scenario), config.population_seed, config.person + number - 1)
-    robot = robot_profile(scenario)
-    reach = Reach(robot.max_speed_mps, robot.max_turn_rate_rad_s)
+    slowest = min(stage.robots, key=lambda robot: robot.max_speed_mps, default=RobotProfile())
+    reach = Reach(slowest.max_speed_mps, slowest.max_turn_rate_rad_s)
     strategy = STRATEGIES[config.strategy](person, reach)
     needs_truth = isinstance(strategy, Oracle)
     if needs_truth and truth is None:

@@ -13,7 +13,7 @@ from dva_sim.agents.robot import FRAME, RobotAgent, RobotSetup
 from dva_sim.agents.sensing import SensorPort
 from dva_sim.protocol import messages as m
 from dva_sim.recorder import DriveLog
-from dva_sim.scenario import guard_profile, robot_profile
+from dva_sim.scenario import guard_profile
 from dva_sim.simulation.incidents import Hearsay, Incident, draw_incidents
 from dva_sim.simulation.names import DVA
 from dva_sim.simulation.stage import Stage, place_of
@@ -82,7 +82,7 @@ class Field:
         base = place_of(stage.site.robot_bases, number, "robot base", stage.site)
         device = stage.device("robot", number)
         label = device.label
-        body = self.world.add_robot(label, robot_profile(scenario).drive_spec(), base)
+        body = self.world.add_robot(label, stage.robots[number - 1].drive_spec(), base)
         controller = RobotController(
             device.id_tag,
             DVA,
@@ -113,7 +113,7 @@ class Field:
         angle = math.radians(camera.field_of_view_deg)
         return RobotSetup(
             scenario.pattern,
-            scenario.robot.processing_s,
+            scenario.robot.processing_s or 0.0,
             camera.rate_hz,
             camera.frame_bytes,
             View(angle, camera.range_m, self.stage.planner.line_of_sight),

@@ -12,12 +12,12 @@ from dva_sim.errors import ConfigError
 from dva_sim.network.patterns import Transport
 from dva_sim.protocol.exchange import NOON
 from dva_sim.recorder import Recorder
-from dva_sim.scenario import Scenario, robot_profile, site_of
+from dva_sim.scenario import Scenario, robot_profiles, site_of
 from dva_sim.simulation.names import DVA, address_of, id_of, label_of
 from dva_sim.streams import Streams
 from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.planning import Planner
-from dva_sim.worlds.site import Site
+from dva_sim.worlds.site import FOOTPRINT, Site
 
 TYPES = {"dva": "DVA", "robot": ROBOT, "guard": GUARD, "operator": OPERATOR, "detector": DETECTOR}
 
@@ -49,7 +49,10 @@ class Stage:
     def __post_init__(self) -> None:
         self.streams = Streams(self.seed)
         self.site = site_of(self.scenario, self.seed)
-        self.planner = planner_of(self.site, robot_profile(self.scenario).radius_m)
+        self.robots = robot_profiles(self.scenario)
+        # One map of ways for all: what the largest robot fits through, people and others do.
+        radius = max((robot.radius_m for robot in self.robots), default=FOOTPRINT)
+        self.planner = planner_of(self.site, radius)
         counts = {
             "robot": self.scenario.robot.count,
             "guard": self.scenario.guard.count,

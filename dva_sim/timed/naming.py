@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from dva_sim.timed.scenario import TimedScenario
 
 
-def check_names(scenario: TimedScenario, error: Fail) -> None:
+def check_names(scenario: TimedScenario, error: Fail) -> TimedScenario:
     """Refuse names that mean nothing, before anything runs.
 
     Raises:
@@ -35,6 +35,7 @@ def check_names(scenario: TimedScenario, error: Fail) -> None:
     _check_places(scenario, zones, error)
     if dispatch.policy != "oracle":  # which is made from the run's own luck
         check_policy(dispatch.policy, dispatch.options, error)
+    return scenario
 
 
 def zone_names(scenario: TimedScenario, error: Fail) -> list[str]:

@@ -1,0 +1,65 @@
+"""How a scenario is read, completed and checked."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from dva_sim import config, resources
+from dva_sim.config import Document, Fail, load_yaml
+from dva_sim.scenario.names import check_names, locate_policy
+from dva_sim.scenario.profiles import robot_profiles
+from dva_sim.scenario.scenario import Scenario
+
+FOLDER = "experiments/scenarios"
+
+
+def load(name: str, base: Path | None = None) -> Document:
+    """Read a scenario by name or path; the data is checked by `build`.
+
+    Raises:
+        ConfigError: not found or not YAML.
+    """
+    return load_yaml(resources.find(name, FOLDER, base=base))
+
+
+def build(
+    source: Document | Mapping[str, Any], changes: Mapping[str, Any] | None = None
+) -> Scenario:
+    """A scenario from a file or plain data, with some keys changed.
+
+    Args:
+        source: A document (mistakes are told with their place) or plain data.
+        changes: New values by dotted key, for example `{"link.delay_s": 0.25}`.
+
+    Raises:
+        ConfigError: an unknown key, a wrong type, a value out of range, a missing profile.
+    """
+    return config.build(Scenario, source, changes or {}, _complete, locate_policy)
+
+
+def _complete(scenario: Scenario, error: Fail) -> Scenario:
+    """With what follows from the profiles; refuses what does not go together."""
+    check_names(scenario, error)
+    processing = {profile.processing_s for profile in robot_profiles(scenario)}
+    longest = scenario.robot.processing_s
+    if longest is None:
+        longest = max(processing, default=0.0)
+        if len(processing) == 1:
+            robot = scenario.robot.model_copy(update={"processing_s": longest})
+            scenario = scenario.model_copy(update={"robot": robot})
+    _check_timeout(scenario, longest, error)
+    return scenario
+
+
+def _check_timeout(scenario: Scenario, processing: float, error: Fail) -> None:
+    """Below four round trips a retry never gets through: the socket opens anew each time."""
+    timeout = scenario.command.timeout_s
+    needed = 8 * (scenario.link.delay_s + scenario.link.jitter_s) + processing
+    if scenario.robot.count and timeout <= needed:
+        problem = (
+            f"command.timeout_s {timeout:g} s should be above four round trips and the "
+            f"processing time ({needed:g} s), or link.delay_s be shorter"
+        )
+        raise error(problem, ("command", "timeout_s"))
