@@ -11,7 +11,7 @@ from dva_sim.agents.camera import HazardSpot
 from dva_sim.errors import ConfigError
 from dva_sim.scenario import EventConfig
 from dva_sim.streams import Streams
-from dva_sim.worlds.hazards import Hazard, make_hazard
+from dva_sim.worlds.hazards import DETECTS, Hazard, first_detection, make_hazard
 from dva_sim.worlds.site import Detector, Site
 
 REACHABLE = 0.4  # radius that fits through the doors on the way there [m]
@@ -20,7 +20,6 @@ FAR_ENOUGH = 6.0  # from every base, so that there is a way to go [m]
 TRIES = 200
 HEARSAY_WITHIN = 3.0  # so far from the true place do other people report it [m]
 HEARSAY_LATE = (2.0, 20.0)  # so long after the first report [s]
-DETECTS = {"fire": "smoke", "gas_leak": "gas", "flood": "water"}
 
 
 @dataclass(frozen=True)
@@ -86,7 +85,7 @@ def _draw(event: EventConfig, site: Site, streams: Streams, number: int) -> Inci
     room = site.room_at(x, y) or ""
     detector, detected = None, start
     if not event.reported:
-        detector, detected = _first_detector(event.kind, site, hazard)
+        detector, detected = first_detection(event.kind, hazard, site)
     luck = streams[f"event-{number}/hearsay"]
     hearsay = tuple(_hearsay(detected, (x, y), site, luck) for _ in range(event.reports - 1))
     return Incident(event.kind, room, start, detected, detector, hazard, event.false_alarm, hearsay)
@@ -122,17 +121,3 @@ def _watched_rooms(kind: str, site: Site) -> list[str | None]:
     """Rooms with a detector for a kind of event; `None`, which is anywhere, if there are none."""
     watched = {site.room_at(d.x, d.y) for d in site.detectors if d.kind == DETECTS[kind]}
     return [room.name for room in site.rooms if room.name in watched] or [None]
-
-
-def _first_detector(kind: str, site: Site, hazard: Hazard) -> tuple[Detector | None, float]:
-    """Who notices first, and when."""
-    best: tuple[Detector | None, float] = None, math.inf
-    here = site.room_at(*hazard.position)
-    for detector in site.detectors:
-        if detector.kind != DETECTS[kind]:
-            continue
-        same_room = site.room_at(detector.x, detector.y) == here
-        when = hazard.detection_time((detector.x, detector.y), same_room)
-        if when < best[1]:
-            best = detector, when
-    return best

@@ -15,7 +15,6 @@ from dva_sim.timed.laws import ZERO
 from dva_sim.timed.luck import Always, Draws, shares, times
 from dva_sim.timed.places import Place, Terrain
 from dva_sim.timed.scenario import Severity, Stream, TimedScenario
-from dva_sim.worlds.hazards import make_hazard
 
 CALLERS = 32  # devices that report a stream's events in turn, where reports are taken back
 
@@ -86,12 +85,7 @@ def _detected_after(incident: Incident, terrain: Terrain) -> float:
     from dva_sim.timed.rooms import Rooms
 
     assert isinstance(terrain, Rooms)
-    here = terrain.zones[incident.place.zone]
-    hazard = make_hazard(incident.kind, incident.place.point, 0.0)
-    return min(
-        hazard.detection_time((d.x, d.y), room == here)
-        for d, room in terrain.detectors(incident.kind)
-    )
+    return terrain.detected_after(incident.kind, incident.place)
 
 
 class Demand:
@@ -136,7 +130,7 @@ class Demand:
 
                 if not isinstance(self._terrain, Rooms):
                     raise ConfigError("notice 'detectors' needs a site")
-                self._terrain.detectors(stream.kind)
+                self._terrain.check_detectors(stream.kind)
 
     def start(self) -> None:
         """Begin."""

@@ -18,13 +18,13 @@ from dva_sim.streams import Streams
 from dva_sim.timed.laws import Floats, Law
 from dva_sim.timed.places import APART, Place, Terrain
 from dva_sim.timed.scenario import Point
+from dva_sim.worlds.hazards import DETECTS, first_detection, make_hazard
 from dva_sim.worlds.planning import Planner
-from dva_sim.worlds.site import FOOTPRINT, Detector, Pose, Site, load_site
+from dva_sim.worlds.site import FOOTPRINT, Pose, Site, load_site
 
 CLEARANCE = 0.4  # radius that must fit where an event happens [m]
 MOST_PATHS = 5000  # kept at a time
 WALL, PASSAGE = 0.05, 0.6  # thickness of a wall, and the least width to pass [m]
-DETECTS = {"fire": "smoke", "gas_leak": "gas", "flood": "water"}
 
 
 class _Ways:
@@ -87,6 +87,12 @@ def _passages_of(site: Site) -> tuple[Point, ...]:
     return tuple(doors)
 
 
+@lru_cache(maxsize=4096)
+def _detected_after(site: Site, kind: str, point: Point) -> float:
+    """Events happen at the same few spots again and again: once per process."""
+    return first_detection(kind, make_hazard(kind, point, 0.0), site)[1]
+
+
 class Rooms(Terrain):
     """A site.
 
@@ -114,7 +120,6 @@ class Rooms(Terrain):
             for zone, points in enumerate(_spots_of(self.site, spots))
         ]
         self._passages = _passages_of(self.site)
-        self._detectors: dict[str, list[tuple[Detector, str | None]]] = {}
 
     # --- places ------------------------------------------------------------------------
 
@@ -204,15 +209,15 @@ class Rooms(Terrain):
 
     # --- detectors ---------------------------------------------------------------------
 
-    def detectors(self, kind: str) -> list[tuple[Detector, str | None]]:
-        """The detectors for a kind of event, each with its room.
+    def check_detectors(self, kind: str) -> None:
+        """See to it that somebody can notice a kind of event.
 
         Raises:
-            ConfigError: there is none.
+            ConfigError: there is no detector for it.
         """
-        if kind not in self._detectors:
-            fitting = [d for d in self.site.detectors if d.kind == DETECTS[kind]]
-            self._detectors[kind] = [(d, self.site.room_at(d.x, d.y)) for d in fitting]
-        if not self._detectors[kind]:
+        if not any(d.kind == DETECTS[kind] for d in self.site.detectors):
             raise ConfigError(f"site {self.site.name!r} has no {DETECTS[kind]} detectors")
-        return self._detectors[kind]
+
+    def detected_after(self, kind: str, place: Place) -> float:
+        """From the outbreak to the first detector that notices it [s]; infinite if none does."""
+        return _detected_after(self.site, kind, place.point)

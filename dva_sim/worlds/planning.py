@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dva_sim.worlds.maps import OccupancyGrid
+from dva_sim.worlds.sight import Sight
 from dva_sim.worlds.site import Site
 
 CELL = 0.2  # side of a planning cell [m]
@@ -48,9 +49,7 @@ class Planner:
     """
 
     def __init__(self, site: Site, clearance: float) -> None:
-        x1, y1, x2, y2 = site.walls.T
-        self._lines = np.stack([y1 - y2, x2 - x1, x1 * y2 - x2 * y1], axis=1)
-        self._ends = site.walls.reshape(-1, 2).T
+        self._sight = Sight(site.walls)
         self._roadmap = _roadmap(site.grid, clearance)
 
     def path(self, start: Point, goal: Point, avoid: Sequence[Disc] = ()) -> Floats | None:
@@ -82,16 +81,8 @@ class Planner:
         return math.inf if way is None else float(np.hypot(*np.diff(way, axis=0).T).sum())
 
     def line_of_sight(self, a: Point, b: Point) -> bool:
-        """Whether no wall stands between two places [m].
-
-        A wall blocks when its ends lie on both sides of the line a-b and a and b on both
-        sides of the wall.
-        """
-        (ax, ay), (bx, by) = a, b
-        sides = self._lines @ np.array([[ax, bx], [ay, by], [1.0, 1.0]])
-        across = np.array([ay - by, bx - ax]) @ self._ends + (ax * by - bx * ay)
-        blocked = (sides[:, 0] * sides[:, 1] < 0) & (across[::2] * across[1::2] < 0)
-        return not blocked.any()
+        """Whether no wall stands between two places [m]."""
+        return self._sight.between(a, b)
 
 
 def _plain(point: Point) -> Point:

@@ -1,0 +1,51 @@
+"""Hazards by the name of their kind, as scenarios give it."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+
+from dva_sim.errors import ConfigError
+from dva_sim.worlds.hazards.base import Hazard, Point
+from dva_sim.worlds.hazards.fire import GROWTH_S, Fire
+from dva_sim.worlds.hazards.flood import Flood
+from dva_sim.worlds.hazards.leak import GASES, GasLeak
+
+KINDS: dict[str, type[Fire] | type[GasLeak] | type[Flood]] = {
+    "fire": Fire,
+    "gas_leak": GasLeak,
+    "flood": Flood,
+}
+CHOICES = {"growth": tuple(GROWTH_S), "gas": tuple(GASES)}
+
+
+def make_hazard(kind: str, position: Point, start: float, **settings: str | float) -> Hazard:
+    """A hazard at a place [m], from `start` [s] on.
+
+    Args:
+        kind: `fire`, `gas_leak` or `flood`.
+        position: Its middle [m].
+        start: [s]
+        settings: What else belongs to its kind: `growth`, `gas`, `rate`, `inflow`, ...
+
+    Raises:
+        ConfigError: a kind or setting that is not known, or a number that is not positive.
+    """
+    if kind not in KINDS:
+        raise ConfigError(f"hazard {kind!r} is not known; known: {', '.join(KINDS)}")
+    known = [field.name for field in fields(KINDS[kind]) if field.name not in ("position", "start")]
+    for name, value in settings.items():
+        if name not in known:
+            problem = f"a {kind} has no setting {name!r}; it has: {', '.join(known)}"
+            raise ConfigError(problem)
+        _check(kind, name, value)
+    return KINDS[kind](position, start, **settings)  # type: ignore[arg-type]
+
+
+def _check(kind: str, name: str, value: str | float) -> None:
+    """One setting of a kind."""
+    choices = CHOICES.get(name)
+    if choices is not None:
+        if value not in choices:
+            raise ConfigError(f"{name} {value!r} is not known; known: {', '.join(choices)}")
+    elif not isinstance(value, int | float) or not 0.0 < value < float("inf"):
+        raise ConfigError(f"{name} of a {kind} is a positive number, not {value!r}")

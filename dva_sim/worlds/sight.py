@@ -1,0 +1,33 @@
+"""What can be seen from where: walls hide what is behind them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Point = tuple[float, float]
+
+
+class Sight:
+    """Lines of sight between walls.
+
+    Args:
+        walls: Segments x1, y1, x2, y2, shape `(n, 4)` [m].
+    """
+
+    def __init__(self, walls: NDArray[np.float64]) -> None:
+        x1, y1, x2, y2 = walls.T
+        self._lines = np.stack([y1 - y2, x2 - x1, x1 * y2 - x2 * y1], axis=1)
+        self._ends = walls.reshape(-1, 2).T
+
+    def between(self, a: Point, b: Point) -> bool:
+        """Whether no wall stands between two places [m].
+
+        A wall blocks when its ends lie on both sides of the line a-b and a and b on both
+        sides of the wall.
+        """
+        (ax, ay), (bx, by) = a, b
+        sides = self._lines @ np.array([[ax, bx], [ay, by], [1.0, 1.0]])
+        across = np.array([ay - by, bx - ax]) @ self._ends + (ax * by - bx * ay)
+        blocked = (sides[:, 0] * sides[:, 1] < 0) & (across[::2] * across[1::2] < 0)
+        return not blocked.any()

@@ -1,0 +1,120 @@
+"""What every kind of hazard promises, and what a fire is in the open."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from dva_sim.errors import ConfigError
+from dva_sim.worlds.hazards import GROWTH_S, KINDS, Fire, Flood, make_hazard
+
+HOURS = range(0, 7200, 10)  # two hours [s]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_before_it_starts_a_hazard_harms_nobody(kind: str) -> None:
+    hazard = make_hazard(kind, (1, 2), 50.0)
+    assert hazard.radius(49.0) == hazard.danger_radius(49.0) == hazard.severity(49.0) == 0.0
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_no_hazard_is_dangerous_beyond_7_m_or_less_than_a_metre(kind: str) -> None:
+    radii = [make_hazard(kind, (1, 2), 0.0).danger_radius(t) for t in HOURS]
+    assert 1.0 <= min(radii) <= max(radii) < 7.0
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_severity_lies_between_0_and_1(kind: str) -> None:
+    severities = [make_hazard(kind, (1, 2), 0.0).severity(t) for t in HOURS]
+    assert min(severities) == 0.0
+    assert max(severities) == 1.0
+
+
+def test_what_is_not_known_is_said_in_one_line() -> None:
+    for kind, settings, message in (
+        ("quake", {}, "hazard 'quake' is not known; known: fire, gas_leak, flood"),
+        ("fire", {"rate": 1.0}, "a fire has no setting 'rate'; it has: growth, peak"),
+        ("fire", {"growth": "quick"}, "known: slow, medium, fast, ultrafast"),
+        ("gas_leak", {"gas": "helium"}, "known: methane, propane, carbon_monoxide"),
+        ("flood", {"inflow": -1.0}, "inflow of a flood is a positive number, not -1.0"),
+    ):
+        with pytest.raises(ConfigError, match=message):
+            make_hazard(kind, (0.0, 0.0), 0.0, **settings)
+
+
+# --- fire ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("growth", "seconds"), GROWTH_S.items())
+def test_a_fire_releases_1055_kilowatts_when_its_class_says(growth: str, seconds: float) -> None:
+    fire = Fire((0, 0), 10.0, growth)
+    assert fire.heat_release(10.0 + seconds) == pytest.approx(1055)
+    assert fire.heat_release(10.0 + seconds / 2) == pytest.approx(1055 / 4)
+
+
+@pytest.mark.parametrize("growth", GROWTH_S)
+def test_a_fire_burns_all_its_fuel_and_no_more(growth: str) -> None:
+    """5 MW burn on 10 m2 of floor, each with 420 MJ of fuel."""
+    times = np.arange(0.0, 4000.0)
+    heat = [Fire((0, 0), 0.0, growth).heat_release(t) for t in times]
+    assert max(heat) == 5000.0
+    assert heat[-1] == 0.0
+    assert np.trapezoid(heat, times) == pytest.approx(10 * 420e3, rel=1e-3)
+
+
+def test_a_fire_dies_down_once_70_percent_of_its_fuel_is_burnt() -> None:
+    times = np.arange(0.0, 4000.0)
+    heat = np.array([Fire((0, 0), 0.0).heat_release(t) for t in times])
+    until = np.flatnonzero(heat == 5000.0).max()
+    assert np.trapezoid(heat[:until], times[:until]) == pytest.approx(0.7 * 4.2e6, rel=0.01)
+
+
+def test_a_fire_burns_500_kilowatts_per_square_metre() -> None:
+    fire = Fire((0, 0), 0.0)
+    assert math.pi * fire.radius(200.0) ** 2 * 500 == pytest.approx(fire.heat_release(200.0))
+
+
+def test_the_heat_of_a_fire_falls_with_the_square_of_the_distance() -> None:
+    """30 % of 1055 kW, spread over a sphere of 10 m: 0.252 kW/m2."""
+    fire = Fire((0.0, 0.0), 0.0)
+    assert fire.heat_flux(300.0, (10.0, 0.0)) == pytest.approx(0.252, abs=0.001)
+    near, far = fire.heat_flux(300.0, (5.0, 0.0)), fire.heat_flux(300.0, (10.0, 0.0))
+    assert near / far == pytest.approx(4.0)
+    assert fire.heat_flux(-1.0, (5.0, 0.0)) == 0.0
+    assert fire.heat_flux(300.0, (0.0, 0.0)) == pytest.approx(0.3 * 500 / 4)  # at the flames
+
+
+def test_the_danger_of_a_fire_ends_where_2_5_kilowatts_per_square_metre_arrive() -> None:
+    fire = Fire((0.0, 0.0), 0.0)
+    for time in (250.0, 400.0, 900.0):
+        radius = fire.danger_radius(time)
+        assert fire.heat_flux(time, (radius, 0.0)) == pytest.approx(2.5)
+    assert fire.danger_radius(10.0) == 2.0
+
+
+# --- leaks and floods ------------------------------------------------------------------
+
+
+def test_what_can_be_seen_of_a_leak_grows_with_the_square_root_of_time() -> None:
+    leak = make_hazard("gas_leak", (0, 0), 0.0)
+    assert leak.radius(20.0) == pytest.approx(2 * leak.radius(5.0))
+
+
+def test_a_leak_is_dangerous_so_far_as_the_leaky_aquifer_says() -> None:
+    """Long after its start a line source q stands at q / (2 pi D h) K0(r sqrt(loss / D))."""
+    from scipy.special import k0
+
+    leak = make_hazard("gas_leak", (0, 0), 0.0)
+    radius, steepness = leak.danger_radius(1e5), math.sqrt(2.0 / 3600.0 / 0.05)
+    share = 0.010 / (2.0 * math.pi * 0.05 * 3.0) * k0(radius * steepness)
+    assert share == pytest.approx(0.2 * 0.044, rel=0.03)
+
+
+def test_a_flood_is_dangerous_where_it_stands_a_tenth_of_a_metre_deep() -> None:
+    """2 L/s leave by the door 1 cm above its threshold; 100 L/s stand 0.13 m deep."""
+    drip, torrent = Flood((0.0, 0.0), 0.0), Flood((0.0, 0.0), 0.0, inflow=0.1)
+    assert drip.danger_radius(3600.0) == 1.0
+    assert torrent.danger_radius(49.0) == 1.0
+    assert torrent.danger_radius(51.0) == pytest.approx(math.sqrt(50.0 / math.pi))
