@@ -7,8 +7,16 @@ the floor, walls and other bodies come on top of what it asks for.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from dva_sim.errors import ConfigError
+from dva_sim.plugins import Plugins
+
+LONGEST_TICK: Final = 0.04  # that profiles are made for [s]
+CREEP: Final = 0.01  # below this a car stands, and its steering turns nothing [m/s]
 
 
 class Drive:
@@ -67,13 +75,105 @@ class Differential(Drive):
         return along, min(max(turn, -self._turn), self._turn)
 
 
+class ThreeWay(Drive):
+    """A model car: the motor by duty, steering that knows only left, straight and right.
+
+    The car follows its front wheels: turn rate = speed / radius, either way or not at all, so it
+    cannot turn on the spot. A wish for a speed and a turn rate is met so:
+
+    - the speed is given to the motor as a whole percentage of the top speed;
+    - the steering goes to the side whose curvature is nearest to turn rate / speed: to a side
+      from half its curvature on, else straight;
+    - a turn rate at no speed moves nothing.
+
+    Args:
+        spec: Mass, size and limits of the car.
+        wheelbase_m: From axle to axle [m].
+        steering_deg: Angle of the front wheels at either side [deg].
+        servo_s: From straight to a side [s].
+
+    References:
+        R. Rajamani: Vehicle Dynamics and Control, 2nd ed., Springer 2012, chapter 2: kinematic
+        (bicycle) model, radius = wheelbase / tan(steering angle).
+    """
+
+    def __init__(
+        self,
+        spec: DriveSpec,
+        wheelbase_m: float = 0.26,
+        steering_deg: float = 25.0,
+        servo_s: float = 0.15,
+    ) -> None:
+        super().__init__(spec)
+        if not wheelbase_m > 0:
+            raise ConfigError(f"option 'wheelbase_m' is {wheelbase_m!r}; should be above 0")
+        if not 0 < steering_deg < 80:
+            raise ConfigError(f"option 'steering_deg' is {steering_deg!r}; should be in (0, 80)")
+        if not servo_s >= 0:
+            raise ConfigError(f"option 'servo_s' is {servo_s!r}; should be at least 0")
+        self.turning_radius = wheelbase_m / math.tan(math.radians(steering_deg))
+        self._most = 1.0 / self.turning_radius  # curvature [1/m]
+        self._servo, self._motor = servo_s, Differential(spec)
+
+    def set_point(self, speed: float, turn_rate: float) -> tuple[float, float]:
+        """The nearest duty and the nearest of three positions."""
+        speed = round(100.0 * speed / self.spec.max_speed) * self.spec.max_speed / 100.0
+        if abs(turn_rate) < 0.5 * self._most * speed or speed == 0.0:
+            return speed, 0.0
+        speed = min(speed, self.spec.max_turn_rate * self.turning_radius)
+        return speed, math.copysign(self._most * speed, turn_rate)
+
+    def accelerations(
+        self, speed: float, turn_rate: float, now_speed: float, now_turn_rate: float, dt: float
+    ) -> tuple[float, float]:
+        """Along like any motor; turning as speed and steering have it at the end of the tick."""
+        along, _ = self._motor.accelerations(speed, 0.0, now_speed, 0.0, dt)
+        rolls = abs(now_speed) > CREEP
+        now = min(max(now_turn_rate / now_speed, -self._most), self._most) if rolls else 0.0
+        wanted = turn_rate / speed if speed > 0.0 else now  # who brakes keeps the wheel
+        step = self._most * dt / self._servo if rolls and self._servo > 0.0 else math.inf
+        curvature = now + min(max(wanted - now, -step), step)
+        return along, ((now_speed + along * dt) * curvature - now_turn_rate) / dt
+
+
+class Guarded(Drive):
+    """A drive of a user, kept within the limits of its robot whatever it answers.
+
+    Attributes:
+        drive: The user's own.
+    """
+
+    def __init__(self, drive: Drive) -> None:
+        super().__init__(drive.spec)
+        self.turning_radius, self.drive = drive.turning_radius, drive
+
+    def set_point(self, speed: float, turn_rate: float) -> tuple[float, float]:
+        """Within the limits; a stop where the answer is not finite."""
+        got = self.drive.set_point(speed, turn_rate)
+        if not all(map(math.isfinite, got)):
+            return 0.0, 0.0
+        most = self.spec.max_turn_rate
+        return min(max(got[0], 0.0), self.spec.max_speed), min(max(got[1], -most), most)
+
+    def accelerations(
+        self, speed: float, turn_rate: float, now_speed: float, now_turn_rate: float, dt: float
+    ) -> tuple[float, float]:
+        """Within the limits, and no faster than they allow; brakes where it is not finite."""
+        spec = self.spec
+        along, turn = self.drive.accelerations(speed, turn_rate, now_speed, now_turn_rate, dt)
+        if not (math.isfinite(along) and math.isfinite(turn)):
+            along, turn = -now_speed / dt, -now_turn_rate / dt
+        along = min(along, (spec.max_speed - now_speed) / dt)
+        return min(max(along, -spec.max_deceleration), spec.max_acceleration), turn
+
+
 @dataclass(frozen=True)
 class DriveSpec:
     """Body and motors of a robot.
 
     Attributes:
         mass: [kg]
-        radius: Of the circular footprint, or of the circle around the corners [m].
+        radius: Of the circular footprint, or of a circle around the corners [m].
         max_speed: Forward only [m/s].
         max_turn_rate: Either way [rad/s].
         max_acceleration: [m/s^2]
@@ -94,3 +194,71 @@ class DriveSpec:
     motor_time_constant: float = 0.15
     corners: tuple[tuple[float, float], ...] = ()
     drive: Callable[[DriveSpec], Drive] = Differential
+
+    @property
+    def inner_radius(self) -> float:
+        """Of the largest circle around the middle that lies within the footprint [m]."""
+        if not self.corners:
+            return self.radius
+        sides = zip(self.corners, (*self.corners[1:], self.corners[0]), strict=True)
+        return min(
+            abs(ax * by - ay * bx) / math.dist((ax, ay), (bx, by)) for (ax, ay), (bx, by) in sides
+        )
+
+    def safe_speed(self, dt: float) -> float:
+        """Up to which a tick of `dt` [s] is short enough that nothing thin is passed [m/s]."""
+        return 0.5 * self.inner_radius / dt
+
+    @property
+    def stopping_distance(self) -> float:
+        """From top speed on a floor that holds [m]: at full brake, and a motor's lag of it."""
+        braking = 0.5 * self.max_speed**2 / self.max_deceleration
+        return braking + self.max_speed * self.motor_time_constant
+
+
+DRIVES: Final[dict[str, Callable[..., Drive]]] = {
+    "differential": Differential,
+    "three_way": ThreeWay,
+}
+
+_PLUGINS: Final = Plugins(
+    "drive",
+    Drive,
+    DRIVES,
+    folder="agents/robots",
+    group="dva_sim.drives",
+    needs="accelerations(speed, turn_rate, now_speed, now_turn_rate, dt)",
+    public="dva_sim.worlds.drives.Drive",
+)
+
+
+def known_drives() -> list[str]:
+    """Names that a profile can use: shipped and installed ones; files come on top."""
+    return _PLUGINS.known()
+
+
+def load_drive(
+    name: str, options: Mapping[str, Any] | None = None, base: Path | None = None
+) -> Callable[[DriveSpec], Drive]:
+    """What makes the motors that `name` means; those of users are kept within the limits.
+
+    Args:
+        name: `differential`, `three_way`, a class in a file such as `mine.py:Mine`, or the name
+            under which an installed package offers one (entry point, `dva_sim.drives`).
+        options: Keyword arguments of its constructor, besides the spec.
+        base: Folder that a file is looked for in first; then the working folder, and
+            `agents/robots`.
+
+    Raises:
+        ConfigError: there is none of that name, its file or package cannot be loaded, or it is
+            not a drive; a bad option is told when it is made.
+    """
+    factory, given = _PLUGINS.find(name, base), dict(options or {})
+    if name in DRIVES and not given:
+        return factory
+
+    def make(spec: DriveSpec) -> Drive:
+        drive = _PLUGINS.make(name, factory, given, spec)
+        return drive if name in DRIVES else Guarded(drive)
+
+    return make

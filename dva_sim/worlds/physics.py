@@ -61,8 +61,11 @@ class World:
         """Place a robot.
 
         Raises:
-            ConfigError: a wall or another robot is in its way.
+            ConfigError: something is in its way, or it is too fast for the length of a tick.
         """
+        if spec.max_speed > spec.safe_speed(self.dt):
+            most = f"should be at most {spec.safe_speed(self.dt):.3g} m/s at {self.dt:g} s a tick"
+            raise ConfigError(f"robot {name!r} is too fast for its size: {most}")
         self._check_place("robot", name, pose, spec.radius)
         robot = RobotBody(self, name, spec, pose)
         self._add(robot)
@@ -82,6 +85,13 @@ class World:
         self._add(person)
         self.people.append(person)
         return person
+
+    def remove(self, person: PersonBody) -> None:
+        """Take somebody away who has left the site; where it was last, it still says."""
+        self.people.remove(person)
+        self._awake.pop(person, None)
+        self.space.remove(person.body, person.shape)
+        del self._by_shape[person.shape]
 
     def _check_place(self, kind: str, name: str, pose: Pose, radius: float) -> None:
         near = self.space.point_query_nearest(

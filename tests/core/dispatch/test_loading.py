@@ -5,7 +5,8 @@ from importlib.metadata import EntryPoint, EntryPoints
 import pytest
 from small_situations import RNG, situation
 
-from dva_sim.core.dispatch import POLICIES, MinEta, Policy, known_policies, load_policy, loading
+from dva_sim import plugins
+from dva_sim.core.dispatch import POLICIES, MinEta, Policy, known_policies, load_policy
 from dva_sim.errors import ConfigError
 
 MINE = """
@@ -115,7 +116,7 @@ def test_an_installed_package_can_offer_policies(monkeypatch):
         entries = {"theirs": "dva_sim.core.dispatch:MinEta", "gone": "no_such_package:X"}
         return EntryPoints(EntryPoint(name, value, group) for name, value in entries.items())
 
-    monkeypatch.setattr(loading, "entry_points", offered)
+    monkeypatch.setattr(plugins, "entry_points", offered)
     assert isinstance(load_policy("theirs"), MinEta)
     assert {"theirs", "min_eta"} < set(known_policies())
     with pytest.raises(ConfigError, match="no_such_package:X cannot be loaded: ModuleNotFound"):

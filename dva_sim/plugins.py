@@ -1,0 +1,176 @@
+"""Classes of users by name: the shipped ones, one in a file, or an installed package's."""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+import sys
+import traceback
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
+from types import ModuleType
+from typing import Any, Generic, TypeVar
+
+from dva_sim import resources
+from dva_sim.errors import ConfigError
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Plugins(Generic[T]):
+    """One kind of thing that users may add.
+
+    Attributes:
+        kind: What it is called: `policy`.
+        base: What its classes derive from.
+        shipped: What we bring, by name.
+        folder: Where files are looked for last: `agents/policies`.
+        group: Entry points of installed packages: `dva_sim.policies`.
+        needs: A method that a class must define, as it is written in a message.
+        public: Where users import `base` from.
+        hidden: Shipped names that a configuration cannot use.
+    """
+
+    kind: str
+    base: type[T]
+    shipped: Mapping[str, Callable[..., T]]
+    folder: str
+    group: str
+    needs: str
+    public: str
+    hidden: frozenset[str] = frozenset()
+
+    def known(self) -> list[str]:
+        """Names that a configuration can use: shipped and installed ones; files come on top."""
+        shipped = self.shipped.keys() - self.hidden
+        return sorted(shipped | {entry.name for entry in entry_points(group=self.group)})
+
+    def find(self, name: str, base: Path | None = None) -> Callable[..., T]:
+        """The class that a name means.
+
+        Args:
+            name: A shipped name, a class in a file such as `mine.py:Mine`, or the name under
+                which an installed package offers one.
+            base: Folder that a file is looked for in first; then the working folder, and
+                `folder`.
+
+        Raises:
+            ConfigError: there is none, or its file or package cannot be loaded, or it is of
+                another kind. The line says what would be right.
+        """
+        return self.shipped.get(name) or self._from_file(name, base) or self._installed(name)
+
+    def make(
+        self, name: str, factory: Callable[..., T], options: Mapping[str, Any], *given: Any
+    ) -> T:
+        """Make one of a class that was found, from options and from what it is always given.
+
+        Raises:
+            ConfigError: an option is unknown or bad, or it cannot be made.
+        """
+        self._check_options(name, factory, options, len(given))
+        try:
+            return factory(*given, **options)
+        except ConfigError as error:
+            raise ConfigError(f"{self.kind} {name!r}: {error}") from None
+        except Exception as error:
+            problem = f"{self.kind} {name!r} cannot be made: {said(error)}"
+            raise ConfigError(problem) from error
+
+    def _check_options(
+        self, name: str, factory: Callable[..., T], options: Mapping[str, Any], given: int
+    ) -> None:
+        parameters = list(inspect.signature(factory).parameters.values())[given:]
+        if any(p.kind is p.VAR_KEYWORD for p in parameters):
+            return
+        known = [p.name for p in parameters if p.kind not in (p.POSITIONAL_ONLY, p.VAR_POSITIONAL)]
+        for option in options:
+            if option not in known:
+                there = f"known: {', '.join(known)}" if known else "it has none"
+                raise ConfigError(f"{self.kind} {name!r} has no option {option!r}; {there}")
+
+    # --- files -------------------------------------------------------------------------
+
+    def _from_file(self, name: str, base: Path | None) -> type[T] | None:
+        """The class that `file.py:Class` means; None if the name is not of that form."""
+        file, colon, wanted = name.rpartition(":")
+        if not colon and name.endswith(".py"):
+            raise ConfigError(f"{self.kind} {name!r} should name a class too, as {name}:Mine")
+        if not colon or not file.endswith(".py"):
+            return None
+        path = self._find_file(name, file, base)
+        found = vars(_run(path, self.kind)).get(wanted)
+        if found is None:
+            raise ConfigError(f"{self.kind} {name!r}: there is no class {wanted!r} in {path}")
+        return self._right_class(name, found)
+
+    def _find_file(self, name: str, file: str, base: Path | None) -> Path:
+        folders = [] if base is None else [base]
+        for root in resources.roots():
+            folders += [root, root / self.folder]
+        for folder in folders:
+            if (folder / file).is_file():
+                return (folder / file).resolve()
+        near = ", ".join(dict.fromkeys(str(folder) for folder in [base or Path.cwd(), Path.cwd()]))
+        problem = f"file {file!r} not found; looked in {near} and {self.folder}"
+        raise ConfigError(f"{self.kind} {name!r}: {problem}")
+
+    # --- packages ----------------------------------------------------------------------
+
+    def _installed(self, name: str) -> type[T]:
+        """The class that an installed package offers under a name."""
+        offers = {entry.name: entry for entry in entry_points(group=self.group)}
+        if name not in offers:
+            problem = f"{self.kind} {name!r} is unknown; known: {', '.join(self.known())}"
+            raise ConfigError(f"{problem}; or a file: mine.py:Mine")
+        return self._right_class(name, self._offered(name, offers[name]))
+
+    def _offered(self, name: str, entry: EntryPoint) -> Any:
+        try:
+            return entry.load()
+        except Exception as error:
+            problem = f"{entry.value} cannot be loaded: {said(error)}"
+            raise ConfigError(f"{self.kind} {name!r}: {problem}") from error
+
+    def _right_class(self, name: str, found: Any) -> type[T]:
+        base = self.base
+        if not (isinstance(found, type) and issubclass(found, base)):
+            wanted = f"should be a class derived from {self.public}"
+            raise ConfigError(f"{self.kind} {name!r} is not a {self.kind}; {wanted}")
+        method = self.needs.partition("(")[0]
+        if getattr(found, method) is getattr(base, method):
+            raise ConfigError(f"{self.kind} {name!r} has no {self.needs}; should define it")
+        return found
+
+
+def said(error: BaseException) -> str:
+    """An error in one line."""
+    text = " ".join(str(error).split())
+    return f"{type(error).__name__}: {text}" if text else type(error).__name__
+
+
+def _run(path: Path, kind: str) -> ModuleType:
+    """Run a file as a module of its own name, so that two files named alike do not meet."""
+    unique = f"dva_sim_{kind}_{hashlib.sha256(bytes(path)).hexdigest()[:16]}"
+    module = ModuleType(unique)
+    module.__file__ = str(path)
+    sys.modules[unique] = module  # dataclasses look their module up there
+    try:
+        exec(compile(path.read_bytes(), str(path), "exec"), vars(module))
+    except SyntaxError as error:
+        raise ConfigError(f"is not valid Python: {error.msg}", path, error.lineno) from None
+    except OSError as error:
+        raise ConfigError(f"cannot be read: {error.strerror or error}", path) from None
+    except (Exception, SystemExit) as error:
+        raise ConfigError(f"cannot be loaded: {said(error)}", path, _line(error, path)) from error
+    return module
+
+
+def _line(error: BaseException, path: Path) -> int | None:
+    """The last line of the file that the error came through."""
+    frames = traceback.extract_tb(error.__traceback__)
+    lines = [frame.lineno for frame in frames if frame.filename == str(path)]
+    return lines[-1] if lines else None
