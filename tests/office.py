@@ -98,6 +98,9 @@ class Office:
     def status(self, robot: str, metres: float, now: float = 0.0) -> None:
         self._publish(robot, m.RobotStatus("Idle", east(metres), 0.0, 0.0, 0.0, 5), now)
 
+    def is_in(self, mode: str, now: float = 0.0, robot: str = ROBOT) -> None:
+        self._publish(robot, m.RobotStatus(mode, east(10), 0.0, 0.0, 0.0, 5), now)
+
     def stands(self, guard: str, metres: float, now: float = 0.0) -> None:
         self._publish(guard, m.PersonStatus("waiting", east(metres)), now)
 
@@ -109,6 +112,13 @@ class Office:
     def _publish(self, source: str, body: m.Body, now: float) -> None:
         session = None if isinstance(body, m.Heartbeat) else 0
         self.desk.note(m.Message(DVA, 1, source, "12:00:00", session, body), now)
+
+    def silence(self, device: str, now: float) -> None:
+        """A device has been quiet for so long that it counts as gone."""
+        for other in list(self.desk.registry.entries):
+            if other != device:
+                self.beat(other, now=now)
+        self.tick(now, alive=False)
 
     def fire(
         self,

@@ -147,12 +147,12 @@ class Lookout:
 
     def _free(self, entries: Iterable[Entry], now: float) -> list[Entry]:
         """Those who may be given an order, in order of registration."""
-        held, engaged = self.orders.sessions.permissions.grants, self.orders.engaged
+        is_held, engaged = self.orders.sessions.is_held, self.orders.engaged
         free = [
             e
             for e in entries
             if not e.silent and e.free_from <= now
-            if e.device.id_tag not in engaged and e.device.id_tag not in held
+            if e.device.id_tag not in engaged and not is_held(e.device.id_tag)
         ]
         return sorted(free, key=_place)
 

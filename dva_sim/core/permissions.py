@@ -42,6 +42,7 @@ class Permissions:
         count: Sessions handed out so far, from any start that is higher than in an earlier
             life of the DVA: it makes sessions grow.
         changes: How often a grant was made, or ended.
+        own: Id of the DVA, which may hold robots itself: its grants yield to all others.
     """
 
     draw: Callable[[], int]
@@ -49,6 +50,7 @@ class Permissions:
     grants: dict[str, Grant] = field(default_factory=dict)
     observers: dict[tuple[str, str], Grant] = field(default_factory=dict)
     changes: int = 0
+    own: str = ""
 
     def request(
         self,
@@ -66,11 +68,12 @@ class Permissions:
         """
         only_sensors = level == "sensors"
         held = self.observers.get((robot, holder)) if only_sensors else self.grants.get(robot)
-        if held is not None and held.holder != holder:
+        if held is not None and held.holder not in (holder, self.own):
             return None, False
         if only_sensors and held is None and len(self.observers) >= MOST_OBSERVERS:
             return None, False
-        same = held is not None and (held.level, held.sensors) == (level, sensors)
+        asked = holder, level, sensors
+        same = held is not None and (held.holder, held.level, held.sensors) == asked
         session = held.session if held is not None and same else self._new_session(only_sensors)
         grant = Grant(robot, holder, level, session, sensors, address)
         self.changes += grant != held

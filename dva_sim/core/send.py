@@ -9,7 +9,8 @@ from dva_sim.protocol import messages as m
 
 @dataclass(frozen=True, slots=True)
 class Send:
-    """A message that the DVA wants delivered: to whom, and what."""
+    """A message that the DVA wants delivered: to whom, what, and in which session."""
 
     to: str
     body: m.Body
+    session: int = 0

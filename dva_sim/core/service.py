@@ -13,6 +13,7 @@ from dva_sim.core.dispatcher import Dispatcher
 from dva_sim.core.events import EventBook, State
 from dva_sim.core.ground import Ground, Travel
 from dva_sim.core.orders import Orders
+from dva_sim.core.patrols import Patrols
 from dva_sim.core.registry import GUARD, OPERATOR, ROBOT, Entry, Registry
 from dva_sim.core.rules import Rules
 from dva_sim.core.send import Send
@@ -37,6 +38,7 @@ class Desk:
         sessions: Who may act on what, and who has to be told.
         ground: What is known of the place.
         access: Who may ask for what.
+        patrols: Which robots go round while nothing happens.
 
     Attributes:
         registry: Who is there.
@@ -56,6 +58,7 @@ class Desk:
         sessions: Sessions,
         ground: Ground | None = None,
         access: Access | None = None,
+        patrols: Patrols | None = None,
     ) -> None:
         self.sessions, self.access = sessions, access or Access()
         self.registry, self.book = Registry(), EventBook(rules.merge_distance)
@@ -63,7 +66,7 @@ class Desk:
         self.dispatcher = Dispatcher(policy, travel, self.orders, rng, ground or Ground())
         self.counters: Counter[str] = self.orders.counters
         self.refused = 0
-        self._rules = rules
+        self._rules, self._patrols = rules, patrols or Patrols()
         self._list: tuple[int, tuple[m.Device, ...]] = (-1, ())
         self._access_ends = self.access.next_end(-1.0)
 
@@ -88,7 +91,8 @@ class Desk:
     def delivered(self, send: Send, now: float) -> list[Send]:
         """What was sent was answered with OK."""
         self.sessions.heard(send)
-        return self._and_revocations(self.orders.taken_up(send))
+        sends = self._patrols.held(send, self.registry, self.sessions)
+        return self._and_revocations(sends + self.orders.taken_up(send))
 
     def undelivered(self, send: Send, now: float) -> list[Send]:
         """What was sent did not arrive, or was declined: take it back."""
@@ -113,7 +117,9 @@ class Desk:
             self.check_access(now)
         sends += self.orders.take_back(now)
         self.sessions.remind()
-        return self._and_revocations(sends + self.dispatcher.decide(now))
+        sends += self.dispatcher.decide(now)
+        sends += self._patrols.set_out(self.registry, self.sessions, self.orders.engaged, now)
+        return self._and_revocations(sends)
 
     def next_deadline(self) -> float:
         """When `tick` has something to do at the latest, if nothing else happens [s]."""

@@ -40,7 +40,20 @@ class Sessions:
         level, session, sensors = grant.level, grant.session, grant.sensors
         told = m.PermissionGrant(holder.id_tag, level, session, holder.address, sensors)
         content = m.Permission(robot.id_tag, level, session, robot.address, sensors)
-        return content, [Send(robot.id_tag, told)] if is_news else []
+        return content, [Send(robot.id_tag, told, session)] if is_news else []
+
+    def hold(self, robot: str) -> tuple[int, Send | None]:
+        """The DVA takes a robot for itself: the session, and what to tell the robot if news."""
+        own = self.permissions.own
+        grant, is_news = self.permissions.request(robot, own, "missions")
+        assert grant is not None
+        told = Send(robot, m.PermissionGrant(own, grant.level, grant.session), grant.session)
+        return grant.session, told if is_news else None
+
+    def is_held(self, robot: str) -> bool:
+        """Whether somebody else than the DVA holds a robot."""
+        grant = self.permissions.grants.get(robot)
+        return grant is not None and grant.holder != self.permissions.own
 
     def give_back(self, body: m.PermissionRevocation) -> bool:
         """A holder needs its session no longer; False if it has no such session."""
@@ -112,5 +125,5 @@ class Sessions:
     def _tell(self, grant: Grant, holder_too: bool) -> None:
         body = m.PermissionRevocation(grant.robot, grant.holder, grant.session)
         self.tell_robot(body)
-        if holder_too:
+        if holder_too and grant.holder != self.permissions.own:
             self._over.append(Send(grant.holder, body))

@@ -70,3 +70,15 @@ class AccessConfig(Config):
     sensors: tuple[str, ...] | None = None
     from_s: NonNegative = 0.0
     until_s: Positive | None = None
+
+
+class PatrolConfig(Config):
+    """A round that the DVA sends a robot while nothing happens.
+
+    Attributes:
+        robot: Its label, such as `robot-1`.
+        places: Names of rooms, or places as `[x, y]` in metres on the site's plane, in order.
+    """
+
+    robot: str
+    places: Annotated[tuple[str | tuple[float, float], ...], Field(min_length=1, max_length=64)]

@@ -18,7 +18,7 @@ from dva_sim.scenario.parts import (
     RobotConfig,
     SiteConfig,
 )
-from dva_sim.scenario.rules import AccessConfig, DispatchConfig
+from dva_sim.scenario.rules import AccessConfig, DispatchConfig, PatrolConfig
 
 
 class Scenario(Config):
@@ -47,6 +47,7 @@ class Scenario(Config):
     events: Annotated[tuple[EventConfig, ...], Field(min_length=1)] = (EventConfig(kind="fire"),)
     dispatch: DispatchConfig = DispatchConfig()
     access: tuple[AccessConfig, ...] = ()
+    patrols: tuple[PatrolConfig, ...] = ()
     horizon_s: Annotated[float, Field(gt=0, le=86_400)] = 300.0
 
     @property

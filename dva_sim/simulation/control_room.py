@@ -19,6 +19,7 @@ from dva_sim.core.access import Access, AccessRule
 from dva_sim.core.dispatch import load_policy
 from dva_sim.core.ground import Floats, Ground, Start, Station
 from dva_sim.core.memory import Memory
+from dva_sim.core.patrols import Patrols
 from dva_sim.core.permissions import LOW_BITS, Permissions
 from dva_sim.core.service import Desk
 from dva_sim.core.sessions import Sessions
@@ -26,7 +27,9 @@ from dva_sim.errors import ConfigError
 from dva_sim.protocol import messages as m
 from dva_sim.scenario import Scenario, guard_profile, phone_profile, population
 from dva_sim.simulation.dva import DvaAgent
-from dva_sim.simulation.stage import Stage
+from dva_sim.simulation.names import DVA
+from dva_sim.simulation.stage import Stage, middle_of
+from dva_sim.worlds.site import FOOTPRINT
 
 
 def add_dva(
@@ -47,16 +50,18 @@ def add_dva(
         ConfigError: a policy that cannot be loaded.
     """
     dispatch, draw = stage.scenario.dispatch, stage.streams["dva/sessions"]
-    sessions = Sessions(permissions or Permissions(lambda: int(draw.integers(2**LOW_BITS))))
+    permissions = permissions or Permissions(lambda: int(draw.integers(2**LOW_BITS)))
+    permissions.own = DVA
     policy = load_policy(dispatch.policy, dispatch.options)
     desk = Desk(
         policy,
         _Ways(stage),
         dispatch.rules(),
         stage.streams["dva/policy"],
-        sessions,
+        Sessions(permissions),
         _ground(stage) if policy.relocates else Ground(),
         _access(stage.scenario),
+        _patrols(stage),
     )
     return DvaAgent(stage.device("dva", 1), desk, memory, keep_events)
 
@@ -123,6 +128,25 @@ def _access(scenario: Scenario) -> Access:
         for rule in scenario.access
     ]
     return Access(rules) if rules else Access()
+
+
+def _patrols(stage: Stage) -> Patrols:
+    """The beats of the scenario's robots.
+
+    Raises:
+        ConfigError: a room that the site does not have, or a place where no robot fits.
+    """
+    site, to_latlon = stage.site, stage.site.frame.to_latlon
+    beats: dict[str, tuple[m.Position, ...]] = {}
+    for patrol in stage.scenario.patrols:
+        if patrol.robot not in stage.labels.values():
+            raise ConfigError(f"patrols: there is no {patrol.robot!r}; robots: robot-1 and on")
+        places = [middle_of(site, p) if isinstance(p, str) else p for p in patrol.places]
+        for x, y in places:
+            if not site.is_free(x, y, FOOTPRINT):
+                raise ConfigError(f"patrols: no robot fits at x {x:g} m, y {y:g} m")
+        beats[patrol.robot] = tuple(m.Position(*to_latlon(x, y)) for x, y in places)
+    return Patrols(beats)
 
 
 def add_operator(

@@ -99,13 +99,12 @@ class DvaAgent:
         """Keep what has changed, then say it: what was said must not be forgotten."""
         self._keep_changes()
         for send in sends:
-            session = send.body.session if isinstance(send.body, m.PermissionGrant) else 0
             self.device.ask(
                 send.to,
                 send.body,
                 lambda reply, send=send: self._answered(send, reply),  # type: ignore[misc]
                 lambda send=send: self._undelivered(send),  # type: ignore[misc]
-                session,
+                send.session,
             )
 
     def _answered(self, send: Send, reply: m.Reply) -> None:

@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+import numpy as np
+import shapely
+
 from dva_sim.agents.device import Device
 from dva_sim.clock import Clock
 from dva_sim.core.registry import DETECTOR, GUARD, OPERATOR, ROBOT
@@ -109,3 +112,18 @@ def place_of(places: tuple[Pose, ...], number: int, what: str, site: Site) -> Po
         problem = f"site {site.name!r} has {len(places)} {what}s, the scenario needs more"
         raise ConfigError(problem)
     return places[number - 1]
+
+
+def middle_of(site: Site, room: str) -> tuple[float, float]:
+    """The place in a room that is farthest from everything [m].
+
+    Raises:
+        ConfigError: there is no such room.
+    """
+    outline = shapely.Polygon(site.room(room).polygon)
+    rows, columns = np.nonzero(site.grid.clearance > 0.0)
+    points = site.grid.to_xy(rows + 0.5, columns + 0.5)
+    inside = shapely.contains_xy(outline, points)
+    best = np.argmax(np.where(inside, site.grid.clearance[rows, columns], -1.0))
+    x, y = points[best].tolist()
+    return x, y

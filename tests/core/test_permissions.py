@@ -51,7 +51,7 @@ def test_a_robot_is_held_by_one_and_the_robot_is_told(office: Office) -> None:
     reply, sends = office.say(OPERATOR, ASK)
     assert isinstance(reply.content, m.Permission)
     told = m.PermissionGrant(OPERATOR, "teleoperation", reply.content.session, ADDRESS)
-    assert sends == [Send(ROBOT, told)]
+    assert sends == [Send(ROBOT, told, told.session)]
     assert office.say(OTHER_OPERATOR, ASK)[0].code == m.BUSY
 
 

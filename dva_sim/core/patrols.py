@@ -1,0 +1,60 @@
+"""Robots that go their rounds while nothing happens, sent by the DVA itself."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+
+from dva_sim.core.registry import ROBOT, Entry, Registry
+from dva_sim.core.send import Send
+from dva_sim.core.sessions import Sessions
+from dva_sim.protocol import messages as m
+
+REST = 10.0  # a robot has stood idle for so long before it sets out [s]
+
+
+@dataclass
+class Patrols:
+    """Sends idle robots round their beats.
+
+    The DVA holds such a robot itself. Its hold yields: whoever asks for the robot gets it, and
+    the higher session ends the patrol. A robot that does not set out is asked again when it has
+    rested as long once more.
+
+    Attributes:
+        beats: The places of each robot's round, by its label.
+    """
+
+    beats: Mapping[str, tuple[m.Position, ...]] = field(default_factory=dict)
+    _idle_since: dict[str, float] = field(default_factory=dict)
+
+    def set_out(
+        self, registry: Registry, sessions: Sessions, engaged: Mapping[str, object], now: float
+    ) -> list[Send]:
+        """What to tell the robots that have rested long enough."""
+        sends: list[Send] = []
+        for entry in self._with_a_beat(registry):
+            robot = entry.device.id_tag
+            if entry.mode != "Idle" or robot in engaged or sessions.is_held(robot):
+                self._idle_since.pop(robot, None)
+            elif now - self._idle_since.setdefault(robot, now) >= REST:
+                self._idle_since[robot] = now
+                session, told = sessions.hold(robot)
+                sends.append(told or self._order(entry, session))
+        return sends
+
+    def held(self, send: Send, registry: Registry, sessions: Sessions) -> list[Send]:
+        """A robot has heard who holds it: if that is the DVA, it can be sent now."""
+        entry, body = registry.entries.get(send.to), send.body
+        own = sessions.permissions.own
+        if entry is None or not isinstance(body, m.PermissionGrant) or body.holder != own:
+            return []
+        return [self._order(entry, body.session)]
+
+    def _with_a_beat(self, registry: Registry) -> Iterator[Entry]:
+        if self.beats:
+            yield from (e for e in registry.of_type(ROBOT) if e.device.label in self.beats)
+
+    def _order(self, entry: Entry, session: int) -> Send:
+        """Round after round, until somebody else takes the robot."""
+        return Send(entry.device.id_tag, m.Patrol(self.beats[entry.device.label], 0), session)
