@@ -16,6 +16,23 @@ from simpy.events import NORMAL, Event
 US = 1_000_000
 
 
+class _Call(Event):
+    """A function due at some time: a bare event, without the list and dictionary of SimPy's own."""
+
+    __slots__ = ("action", "args", "callbacks")
+    _ok = True  # the kernel asks: nothing has failed
+
+    def __init__(self, action: Callable[..., object], args: tuple[Any, ...]) -> None:
+        self.action, self.args, self.callbacks = action, args, _RUN
+
+
+def _run(call: Any) -> None:
+    call.action(*call.args)
+
+
+_RUN: Any = (_run,)  # one for all calls: the kernel replaces it, and never changes it
+
+
 class Clock:
     """Virtual time of one run.
 
@@ -32,8 +49,9 @@ class Clock:
 
     def call_at(self, time: float, action: Callable[..., object], *args: Any) -> None:
         """Run `action(*args)` at `time` [s]; a time already past means as soon as possible."""
-        delay = round(time * US) - self.env._now
-        self._schedule(delay if delay > 0 else 0, lambda _: action(*args))
+        env = self.env
+        delay = round(time * US) - env._now
+        env.schedule(_Call(action, args), NORMAL, delay if delay > 0 else 0)
 
     def call_after(self, delay: float, action: Callable[..., object], *args: Any) -> None:
         """Run `action(*args)` after `delay` [s]."""
@@ -46,20 +64,11 @@ class Clock:
         step = max(1, round(period * US))
         first = self.env._now if start is None else round(start * US)
 
-        def tick(_: object = None) -> None:
-            if action() is False:
-                return
-            self._schedule(step, tick)
+        def tick() -> None:
+            if action() is not False:
+                self.env.schedule(_Call(tick, ()), NORMAL, step)
 
-        self._schedule(max(0, first - int(self.env._now)), tick)
-
-    def _schedule(self, delay_us: float, callback: Callable[[Any], object]) -> None:
-        """A bare event with a callback: what SimPy's own Timeout is, without its checks."""
-        event = Event(self.env)
-        event._ok = True
-        event._value = None
-        event.callbacks = [callback]  # type: ignore[list-item]
-        self.env.schedule(event, NORMAL, delay_us)
+        self.env.schedule(_Call(tick, ()), NORMAL, max(0, first - self.env._now))
 
     def run(self, until: float) -> None:
         """Let time pass up to `until` [s]."""

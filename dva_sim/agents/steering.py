@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -36,6 +37,16 @@ class Ahead(NamedTuple):
     offset: float
 
 
+class _Leg(NamedTuple):
+    """A straight piece: its beginning [m], the way to its end [m] and the square of that."""
+
+    x: float
+    y: float
+    dx: float
+    dy: float
+    square: float
+
+
 class Route:
     """A polyline to follow, and how far along it one has come.
 
@@ -46,6 +57,10 @@ class Route:
     def __init__(self, points: NDArray[np.float64]) -> None:
         self._points = [(float(x), float(y)) for x, y in points]
         steps = np.hypot(*np.diff(points, axis=0).T)
+        self._legs = [
+            _Leg(ax, ay, bx - ax, by - ay, (bx - ax) * (bx - ax) + (by - ay) * (by - ay))
+            for (ax, ay), (bx, by) in pairwise(self._points)
+        ]
         self._at: list[float] = [0.0, *np.cumsum(steps).tolist()]
         self._segment = 0
         self.points = points
@@ -72,18 +87,15 @@ class Route:
 
     def _project(self, x: float, y: float) -> tuple[float, float]:
         """Nearest place on the next three segments: (way along the route, distance) [m]."""
-        best = (math.inf, 0.0, self._segment)
-        for i in range(self._segment, min(self._segment + 3, len(self._points) - 1)):
-            (ax, ay), (bx, by) = self._points[i], self._points[i + 1]
-            ux, uy = bx - ax, by - ay
-            square = ux * ux + uy * uy
-            share = ((x - ax) * ux + (y - ay) * uy) / square if square else 0.0
-            share = min(max(share, 0.0), 1.0)
-            distance = math.hypot(ax + share * ux - x, ay + share * uy - y)
-            if distance < best[0]:
-                best = distance, self._at[i] + share * math.sqrt(square), i
-        self._segment = best[2]
-        return best[1], best[0]
+        nearest, along, first = math.inf, 0.0, self._segment
+        for i, (ax, ay, dx, dy, square) in enumerate(self._legs[first : first + 3], first):
+            share = ((x - ax) * dx + (y - ay) * dy) / square if square else 0.0
+            share = 0.0 if share < 0.0 else 1.0 if share > 1.0 else share
+            distance = math.hypot(ax + share * dx - x, ay + share * dy - y)
+            if distance < nearest:
+                nearest, along = distance, self._at[i] + share * math.sqrt(square)
+                self._segment = i
+        return along, nearest
 
     def point_at(self, along: float) -> tuple[float, float]:
         """The place a given way along the route [m]; beyond its end, the end."""

@@ -32,11 +32,14 @@ class Stream:
         forward: Carries the data.
         backward: Carries the acknowledgements (their size is neglected).
         deliver: Takes each payload, once and in order.
+
+    Attributes:
+        deliver: The same; may be replaced at any time.
     """
 
     def __init__(self, clock: Clock, forward: Link, backward: Link, deliver: Deliver) -> None:
         self._clock, self._forward, self._backward = clock, forward, backward
-        self._deliver = deliver
+        self.deliver = deliver
         self._next_seq = self._next_delivered = 0
         self._waiting: dict[int, Any] = {}
         self._last_arrival = 0.0
@@ -45,21 +48,16 @@ class Stream:
         self.retransmitted = 0
         self.closed = False
 
-    @property
-    def in_flight(self) -> int:
-        """Messages sent and not yet delivered."""
-        return self._next_seq - self._next_delivered
-
     def send(self, payload: Any, size: int) -> bool:
         """Send a message of `size` bytes [B].
 
         Returns:
             False if the stream is closed or its send queue is full; nothing is sent then.
         """
-        if self.closed or self.in_flight >= MAX_IN_FLIGHT:
-            return False
         seq = self._next_seq
-        self._next_seq += 1
+        if self.closed or seq - self._next_delivered >= MAX_IN_FLIGHT:
+            return False
+        self._next_seq = seq + 1
         self._transmit(seq, payload, size, 0)
         return True
 
@@ -107,11 +105,15 @@ class Stream:
     def _arrive(self, seq: int, payload: Any) -> None:
         if self.closed:
             return
-        self._waiting[seq] = payload
+        if seq != self._next_delivered:
+            self._waiting[seq] = payload  # something before it is still missing
+            return
+        self._next_delivered += 1
+        self.deliver(payload)
         while self._next_delivered in self._waiting:
             ready = self._waiting.pop(self._next_delivered)
             self._next_delivered += 1
-            self._deliver(ready)
+            self.deliver(ready)
 
     def _measure(self, rtt: float) -> None:
         """RFC 6298, equations 2.2 and 2.3."""
@@ -150,11 +152,11 @@ class Connection:
     def __init__(
         self, clock: Clock, out: Link, back: Link, at_peer: Deliver, at_opener: Deliver
     ) -> None:
-        self._at_peer, self._at_opener = at_peer, at_opener
+        self._handlers = at_peer, at_opener
         self._then: Callable[[], object] = lambda: None
         self._hops_left = 2 * self.HANDSHAKE_ROUND_TRIPS
-        self.to_peer = Stream(clock, out, back, self._peer_gets)
-        self.to_opener = Stream(clock, back, out, self._opener_gets)
+        self.to_peer = Stream(clock, out, back, self._greets_back)
+        self.to_opener = Stream(clock, back, out, self._greets_on)
 
     def open(self, then: Callable[[], object]) -> None:
         """Shake hands, then call `then()`."""
@@ -166,19 +168,14 @@ class Connection:
         self.to_peer.close()
         self.to_opener.close()
 
-    def _peer_gets(self, payload: Any) -> None:
-        if self._hops_left > 0:
-            self._hops_left -= 1
-            self.to_opener.send(None, self.HANDSHAKE_BYTES)
-        else:
-            self._at_peer(payload)
+    def _greets_back(self, _: object) -> None:
+        self._hops_left -= 1
+        self.to_opener.send(None, self.HANDSHAKE_BYTES)
 
-    def _opener_gets(self, payload: Any) -> None:
-        if self._hops_left > 0:
-            self._hops_left -= 1
-            if self._hops_left:
-                self.to_peer.send(None, self.HANDSHAKE_BYTES)
-            else:
-                self._then()
+    def _greets_on(self, _: object) -> None:
+        self._hops_left -= 1
+        if self._hops_left:
+            self.to_peer.send(None, self.HANDSHAKE_BYTES)
         else:
-            self._at_opener(payload)
+            self.to_peer.deliver, self.to_opener.deliver = self._handlers
+            self._then()

@@ -54,9 +54,9 @@ class VirtualNetwork:
 
     def publish(self, node: str, topic: str, payload: Any, size: int) -> None:
         """See `Transport`."""
+        total = size + FRAMING + len(topic) + 2
         for subscription in self._subscriptions[node]:
             if subscription.joined and topic.startswith(subscription.topic):
-                total = size + FRAMING + len(topic) + 2
                 self.traffic(self.clock.now, node, subscription.node, total)
                 subscription.connection.to_opener.send(payload, total)
 

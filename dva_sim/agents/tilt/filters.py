@@ -5,7 +5,8 @@ All take samples one by one and are asked for a value when a command is due.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Iterable
 from typing import Protocol
 
 Sample = tuple[float, float]
@@ -70,16 +71,13 @@ class MovingMedian:
     """
 
     def __init__(self, window: int = 5) -> None:
-        self._window = window
-        self._speed: list[float] = []
-        self._turn: list[float] = []
+        self._speed: deque[float] = deque(maxlen=window)
+        self._turn: deque[float] = deque(maxlen=window)
 
     def add(self, sample: Sample) -> None:
         """See `Filter`."""
         self._speed.append(sample[0])
         self._turn.append(sample[1])
-        if len(self._speed) > self._window:
-            del self._speed[0], self._turn[0]
 
     @property
     def span(self) -> int:
@@ -113,7 +111,7 @@ class Last:
         return self._sample
 
 
-def _median(values: list[float]) -> float:
+def _median(values: Iterable[float]) -> float:
     """Of a short list: `sorted` is many times faster than `numpy.median` here."""
     ordered = sorted(values)
     middle = len(ordered) // 2

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from itertools import islice
 from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
@@ -133,19 +134,20 @@ class Phone:
 
     def _sample_until(self, now: float) -> None:
         due = int(now * self._profile.sample_rate_hz + 1e-9)
-        if self._profile.ideal:
+        new = due - self._samples_taken
+        if self._profile.ideal or new <= 0:
             return
         (asked_level, asked_turn), (level, turn), decay = self._asked, self._hand, self._decay
-        for _ in range(self._samples_taken, due):
+        add = self._filter.add
+        for noise_level, noise_turn in islice(self._noise, new):
             level = asked_level + (level - asked_level) * decay
             turn = asked_turn + (turn - asked_turn) * decay
-            noise_level, noise_turn = next(self._noise)
-            self._filter.add((level + noise_level, turn + noise_turn))
+            add((level + noise_level, turn + noise_turn))
         self._hand = level, turn
-        self._samples_taken = max(due, self._samples_taken)
+        self._samples_taken = due
 
 
-def _axis_noise(profile: PhoneProfile, rng: np.random.Generator) -> Iterator[tuple[float, float]]:
+def _axis_noise(profile: PhoneProfile, rng: np.random.Generator) -> Iterator[list[float]]:
     """Error of each sample in (levels, deg/s): bias, white noise and tremor, drawn in blocks."""
     scale = np.array([1 / profile.speed_step_mps2, 1 / profile.turn_step_mps2])
     bias = rng.normal(0.0, 1.0, 2) * profile.bias_mps2
@@ -155,5 +157,5 @@ def _axis_noise(profile: PhoneProfile, rng: np.random.Generator) -> Iterator[tup
         angle = 2 * math.pi * TREMOR_HZ / profile.sample_rate_hz * np.arange(start, start + block)
         tremor = profile.tremor_mps2 * np.sin(angle[:, None] + phase)
         white = rng.normal(0.0, 1.0, (block, 2)) * profile.noise_mps2
-        yield from ((float(a), float(b)) for a, b in (bias + white + tremor) * scale)
+        yield from ((bias + white + tremor) * scale).tolist()
         start += block
