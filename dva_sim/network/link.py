@@ -69,6 +69,12 @@ class ConstantRate:
         self._seconds_per_byte = 8.0 / rate_bps
         self._free_at = 0.0
 
+    def change_rate(self, now: float, rate_bps: float) -> None:
+        """Go on at another rate [bit/s] with the bytes that wait."""
+        waiting = self.backlog_bytes(now)
+        self._seconds_per_byte = 8.0 / rate_bps
+        self._free_at = now + waiting * self._seconds_per_byte
+
     def backlog_bytes(self, now: float) -> float:
         """See `Serialiser`."""
         return max(0.0, self._free_at - now) / self._seconds_per_byte
@@ -227,21 +233,18 @@ class Link:
         return self._serialiser.backlog_bytes(now)
 
 
-def make_link(config: LinkConfig, direction: str, streams: Streams, name: str) -> Link:
-    """The `up` or `down` direction of a configured link.
+def make_serialiser(config: LinkConfig, direction: str, streams: Streams, name: str) -> Serialiser:
+    """What gives the rate of the `up` or `down` direction of a configured link.
 
     Raises:
         ConfigError: the trace cannot be read.
     """
     trace = config.trace_up if direction == "up" else config.trace_down
-    serialiser: Serialiser
     if trace is None:
-        serialiser = ConstantRate(config.rate_bps)
-    else:
-        times = read_trace(trace)
-        offset = float(streams[f"{name}/trace-offset"].uniform(0.0, times[-1]))
-        serialiser = TraceRate(times, offset)
-    return Link(config, serialiser, streams, f"{name}/{direction}")
+        return ConstantRate(config.rate_bps)
+    times = read_trace(trace)
+    offset = float(streams[f"{name}/trace-offset"].uniform(0.0, times[-1]))
+    return TraceRate(times, offset)
 
 
 _TRACES: dict[str, NDArray[np.float64]] = {}

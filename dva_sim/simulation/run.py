@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 from dva_sim.agents.modes import Mode
 from dva_sim.clock import Clock
-from dva_sim.network.link import ConstantRate, Link, LinkConfig, make_link
+from dva_sim.network.link import ConstantRate, Link, LinkConfig
+from dva_sim.network.radio import Reception, make_link
 from dva_sim.network.virtual import VirtualNetwork
 from dva_sim.recorder import Recorder, TrackPoint
 from dva_sim.scenario import Scenario
 from dva_sim.simulation.control_room import add_dva, add_operator
 from dva_sim.simulation.field import Field
-from dva_sim.simulation.names import id_of, label_of
+from dva_sim.simulation.names import id_of
 from dva_sim.simulation.recording import Recording, event_about
 from dva_sim.simulation.stage import Stage
 from dva_sim.simulation.watch import broken_event_rules, broken_rules
@@ -113,14 +115,23 @@ class Run:
 
     def _make_links(self) -> dict[str, tuple[Link, Link]]:
         """To each robot and back, by its id."""
-        config, streams = self.scenario.link, self.stage.streams
-        return {
-            id_of("robot", number): (
-                make_link(config, "up", streams, f"{label_of('robot', number)}/link"),
-                make_link(config, "down", streams, f"{label_of('robot', number)}/link"),
-            )
-            for number in range(1, self.scenario.robot.count + 1)
-        }
+        links = {}
+        for number in range(1, self.scenario.robot.count + 1):
+            robot = id_of("robot", number)
+            links[robot] = self._make_link(robot, "up"), self._make_link(robot, "down")
+        return links
+
+    def _make_link(self, robot: str, direction: str) -> Link:
+        stage = self.stage
+        reception = partial(self._reception, robot) if stage.site.wifi else None
+        name = f"{stage.labels[robot]}/link"
+        return make_link(self.scenario.link, direction, stage.streams, name, reception)
+
+    def _reception(self, robot: str) -> Reception | None:
+        """The radio link's quality where a robot was at the last tick of the physics."""
+        x, y, _ = self.field.robots[robot].body.pose()
+        here = self.stage.site.link_quality(x, y)
+        return None if here is None else here.quality
 
     def _link_between(self, source: str, destination: str) -> tuple[Link, Link]:
         """A robot's link is the only one that matters; everybody else is on the LAN."""

@@ -13,9 +13,9 @@ from dva_sim.network.link import (
     Link,
     LinkConfig,
     TraceRate,
-    make_link,
     read_trace,
 )
+from dva_sim.network.radio import make_link
 from dva_sim.streams import Streams
 
 
