@@ -1,0 +1,120 @@
+"""Who goes first through a door: whoever is nearer to it. Pure.
+
+Who comes to a door towards which somebody else comes from the other side, and is nearer to it,
+waits beside the way until the other is through; but for no more than `PATIENCE`. Robots cannot
+go back: for one that is in a door everybody waits longer. These rules are assumed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dva_sim.agents.legs import Body
+from dva_sim.worlds.physics import RobotBody
+
+NARROW: Final = 1.6  # a door wider than this needs no manners [m]
+DOOR_AHEAD: Final = (0.3, 2.0)  # at that distance before a door one can still wait [m]
+WAITS_BESIDE: Final = (0.8, 0.9)  # before the door, and beside the way through it [m]
+ONCOMING: Final = 0.1  # who comes towards one faster than this, comes [m/s]
+IN_DOOR: Final = 1.0  # a robot so near to its middle is in it [m]
+PATIENCE: Final = 5.0  # so long one waits for people [s]
+PATIENCE_WITH_ROBOTS: Final = 30.0  # [s]
+
+Floats = NDArray[np.float64]
+Point = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Door:
+    """A door on a way: how far along the way it is, and its middle [m]."""
+
+    along: float
+    x: float
+    y: float
+
+
+def middles_of(doors: Floats) -> Floats:
+    """Middles `(k, 2)` of those doors, given by their ends `(n, 4)`, that are narrow [m]."""
+    widths = np.hypot(doors[:, 2] - doors[:, 0], doors[:, 3] - doors[:, 1])
+    middles: Floats = 0.5 * (doors[:, :2] + doors[:, 2:])
+    return middles[widths < NARROW]
+
+
+def doors_on(way: Floats, middles: Floats) -> list[Door]:
+    """The doors that a way `(n, 2)` goes through, in its order."""
+    if not len(middles):
+        return []
+    gaps = np.hypot(*(way[None, :, :] - middles[:, None, :]).transpose(2, 0, 1))
+    along = np.r_[0.0, np.cumsum(np.hypot(*np.diff(way, axis=0).T))]
+    near = np.flatnonzero(gaps.min(axis=1) < 0.5)
+    found = [Door(float(along[gaps[i].argmin()]), *middles[i].tolist()) for i in near]
+    return sorted(found, key=lambda door: door.along)
+
+
+class Courtesy:
+    """What one person does about the doors on its way.
+
+    Args:
+        doors: On the way, in its order.
+    """
+
+    def __init__(self, doors: list[Door]) -> None:
+        self._doors = doors
+        self._since: float | None = None  # when it began to wait [s]
+
+    def waits_for(self, me: Body, gone: float, near: Sequence[Body], now: float) -> Door | None:
+        """The door that this person lets somebody else through first.
+
+        Args:
+            me: Who walks.
+            gone: How far along the way [m].
+            near: Who else is near.
+            now: [s]
+        """
+        first, last = DOOR_AHEAD
+        door = next((d for d in self._doors if first < d.along - gone < last), None)
+        comer = None if door is None else _comes_through(door, me, near)
+        if comer is None:
+            self._since = None
+            return None
+        self._since = now if self._since is None else self._since
+        patience = PATIENCE_WITH_ROBOTS if isinstance(comer, RobotBody) else PATIENCE
+        return door if now - self._since < patience else None
+
+
+def _comes_through(door: Door, me: Body, near: Sequence[Body]) -> Body | None:
+    """Who comes towards a door and has it first, being nearer; or is a robot in it."""
+    mine, (ux, uy) = _towards(door, me)
+    for other in near:
+        its = math.dist((other.x, other.y), (door.x, door.y))
+        comes = other.velocity[0] * ux + other.velocity[1] * uy < -ONCOMING
+        if its < mine and (comes or (isinstance(other, RobotBody) and its < IN_DOOR)):
+            return other
+    return None
+
+
+def beside(door: Door, me: Body, room: Callable[[Floats], Floats]) -> Point:
+    """A place to wait beside the way through a door [m]: right of it if one fits, else left.
+
+    Args:
+        door: Which.
+        me: Who waits; it stays where it is if there is no such place.
+        room: Distance to the nearest wall at many points `(n, 2)` [m].
+    """
+    _, (ux, uy) = _towards(door, me)
+    back, side = WAITS_BESIDE
+    spots = [(door.x - back * ux + s * uy, door.y - back * uy - s * ux) for s in (side, -side)]
+    fits = room(np.array(spots)) >= me.radius
+    return next((s for s, fit in zip(spots, fits, strict=True) if fit), (me.x, me.y))
+
+
+def _towards(door: Door, me: Body) -> tuple[float, Point]:
+    """How far away a door is [m], and in which direction."""
+    gap = math.dist((me.x, me.y), (door.x, door.y))
+    return gap, ((door.x - me.x) / gap, (door.y - me.y) / gap)

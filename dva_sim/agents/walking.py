@@ -1,0 +1,249 @@
+"""Walking: a planned way, a body on it, and what to do when somebody is in the way.
+
+Guards and bystanders walk alike. A way is planned on the map; five times a second the walker
+looks where it is and chooses the velocity that its legs push towards:
+
+- **Nobody near**: straight to the point a little ahead on the way.
+- **Somebody near**: by the two rules of `manners`: step aside, to the right rather than the
+  left, and slow down.
+- **In doors** one gives way, by the rules of `doorways`.
+- **Blocked**: who has come no nearer for some seconds looks for a way around whoever stands
+  there, again and again at longer intervals; who has come no nearer for `GIVE_UP` says so, and
+  it is for the agent to decide what then. So nobody is stuck for ever.
+- **At a crowded place** one is there as soon as others keep one from coming nearer.
+
+Who stands costs nothing: there is no step until somebody walks.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from dva_sim.agents.doorways import Courtesy, beside, doors_on, middles_of
+from dva_sim.agents.legs import Body, Ground, Legs
+from dva_sim.agents.manners import REACH, Floats, Mover, Point, velocity
+from dva_sim.agents.steering import Ahead, Route
+from dva_sim.clock import Clock
+from dva_sim.worlds.planning import Disc, Planner
+
+STEP: Final = 0.2  # between looks at the way [s]
+LOOK_AHEAD: Final = 0.8  # on the way [m]
+LOOK_PAST: Final = 2.5  # on the way, where others are and no wall is between [m]
+ARRIVED: Final = 0.15  # so near to its end one is there [m]
+BRAKING: Final = 0.75  # the end is approached at the distance left, by this [s]
+CROWDED: Final = 1.5  # who is held up so near to the end is there [m]
+MOST_SEEN: Final = 8  # of those near, the nearest count
+
+NEARER: Final = 0.25  # less is no progress [m]
+TIRED: Final = 4.0  # of no progress; then one looks for another way [s]
+GIVE_UP: Final = 60.0  # of no progress; then one gives up [s]
+STANDING: Final = 0.1  # slower than this is in the way [m/s]
+
+SLOWEST, FASTEST = 0.6, 2.2  # walking [m/s]
+
+
+def draw_speed(mean: float, sd: float, rng: np.random.Generator) -> float:
+    """One person's free walking speed: normal over persons [m/s], no slower or faster than walks.
+
+    References:
+        1.34 m/s, SD 0.26: U. Weidmann, Transporttechnik der Fussgaenger, ETH Zuerich, 1993.
+    """
+    return float(np.clip(rng.normal(mean, sd), SLOWEST, FASTEST))
+
+
+@dataclass(eq=False)
+class Walk:
+    """One walk of one person.
+
+    Attributes:
+        goal: Where to [m].
+        arrived: Called at its end.
+        blocked: Called when it is given up.
+        is_far_enough: From where on it need not be gone to its end.
+    """
+
+    goal: Point
+    arrived: Callable[[], object]
+    blocked: Callable[[], object]
+    is_far_enough: Callable[[Point], bool]
+    route: Route
+    courtesy: Courtesy
+    gone: float = 0.0  # along the way [m]
+    least: float = math.inf  # of what was left of the way, so far [m]
+    nearer_at: float = 0.0  # when it last became less [s]
+    looks_around: float = 0.0  # when another way is looked for [s]
+
+
+class Walking:
+    """A person's legs and manners.
+
+    Args:
+        clock: The run's.
+        planner: The person knows the building.
+        ground: Where others are.
+        body: Its own.
+        speed: Of free walking [m/s].
+        doors: Ends of the doors, shape `(n, 4)` [m].
+
+    Attributes:
+        heading: Where the person looks [rad].
+        pace: Share of the free speed that smoke and water leave.
+    """
+
+    def __init__(
+        self,
+        clock: Clock,
+        planner: Planner,
+        ground: Ground,
+        body: Legs,
+        speed: float,
+        doors: Floats,
+    ) -> None:
+        self._clock, self._planner, self._ground = clock, planner, ground
+        self.body, self.speed = body, speed
+        self.heading, self.pace = 0.0, 1.0
+        self._doors = middles_of(doors)
+        self._walk: Walk | None = None
+        self._reach = REACH  # less in a crowd
+
+    @property
+    def place(self) -> Point:
+        """Where the person is now [m]."""
+        self._ground.advance_to(self._clock.now)
+        return self.body.x, self.body.y
+
+    @property
+    def walks(self) -> bool:
+        """Whether it is on its way."""
+        return self._walk is not None
+
+    def go(
+        self,
+        goal: Point,
+        arrived: Callable[[], object],
+        blocked: Callable[[], object],
+        is_far_enough: Callable[[Point], bool] = lambda at: False,
+        avoid: Sequence[Disc] = (),
+    ) -> bool:
+        """Walk somewhere; what was under way before is forgotten.
+
+        Args:
+            goal: Where to [m].
+            arrived: Called there.
+            blocked: Called if somebody is in the way for good.
+            is_far_enough: From where on the way need not be gone to its end.
+            avoid: Places to go around.
+
+        Returns:
+            Whether there is a way.
+        """
+        points = self._planner.path(self.place, goal, avoid)
+        if points is None:
+            self.stop()
+            return False
+        now = self._clock.now
+        courtesy = Courtesy(doors_on(points, self._doors))
+        walk = Walk(goal, arrived, blocked, is_far_enough, Route(points), courtesy)
+        walk.nearer_at, walk.looks_around = now, now + TIRED
+        self._walk = walk
+        self._step(walk)
+        return True
+
+    def places_ahead(self, every: float, reach: float) -> list[Point]:
+        """Places that it will come to next on its way, so far apart and up to so far off [m]."""
+        if self._walk is None:
+            return []
+        route, gone = self._walk.route, self._walk.gone
+        count = int(min(reach, route.length - gone) / every)
+        return [route.point_at(gone + every * k) for k in range(1, count + 1)]
+
+    def stop(self) -> None:
+        """Stand still."""
+        self._walk = None
+        self.body.walk(0.0, 0.0)
+
+    # --- one step ----------------------------------------------------------------------
+
+    def _step(self, walk: Walk) -> None:
+        if walk is not self._walk:
+            return
+        x, y = here = self.place
+        ahead = walk.route.ahead(x, y, 0.0, LOOK_AHEAD)
+        walk.gone = walk.route.length - ahead.remaining
+        if ahead.remaining <= ARRIVED or walk.is_far_enough(here) or self._is_held_up(walk, ahead):
+            self.stop()
+            walk.arrived()
+        elif self._clock.now - walk.nearer_at > GIVE_UP:
+            self.stop()
+            walk.blocked()
+        else:
+            self._push_on(walk, ahead)
+            self._clock.call_after(STEP, self._step, walk)
+
+    def _is_held_up(self, walk: Walk, ahead: Ahead) -> bool:
+        """Whether others keep one from coming nearer to an end that is near; notes progress."""
+        now = self._clock.now
+        if ahead.remaining < walk.least - NEARER:
+            walk.least, walk.nearer_at, walk.looks_around = ahead.remaining, now, now + TIRED
+        return ahead.remaining < CROWDED and now - walk.nearer_at > TIRED
+
+    def _push_on(self, walk: Walk, ahead: Ahead) -> None:
+        """Want a velocity for the next step."""
+        speed = min(self.speed * self.pace, ahead.remaining / BRAKING)
+        near = self._others()
+        if near and self._clock.now >= walk.looks_around:
+            self._look_around(walk, near)
+        heading = ahead.bearing
+        if near:
+            heading, vx, vy = self._among(walk, ahead, speed, near)
+        else:
+            vx, vy = speed * math.cos(heading), speed * math.sin(heading)
+        self.heading = heading
+        self.body.walk(vx, vy)
+
+    def _among(
+        self, walk: Walk, ahead: Ahead, speed: float, near: Sequence[Body]
+    ) -> tuple[float, float, float]:
+        """Where to look [rad] and how to walk [m/s] among others."""
+        body, heading = self.body, self._past_others(walk, ahead)
+        door = walk.courtesy.waits_for(body, walk.gone, near, self._clock.now)
+        if door is not None:
+            x, y = beside(door, body, self._planner.room_at)
+            heading = math.atan2(y - body.y, x - body.x)
+            speed = min(speed, math.dist((x, y), (body.x, body.y)) / BRAKING)
+        me = Mover(body.x, body.y, *body.velocity, body.radius)
+        movers = [Mover(o.x, o.y, *o.velocity, o.radius) for o in near]
+        return heading, *velocity(me, heading, speed, movers, self._planner.room_at)
+
+    def _past_others(self, walk: Walk, ahead: Ahead) -> float:
+        """Where to, seen from farther off: who steps aside does not want back at once [rad]."""
+        x, y = self.body.x, self.body.y
+        far = walk.route.point_at(walk.gone + LOOK_PAST)
+        if not self._planner.line_of_sight((x, y), far):
+            return ahead.bearing
+        return math.atan2(far[1] - y, far[0] - x)
+
+    def _others(self) -> list[Body]:
+        """Who is near."""
+        body = self.body
+        around = self._ground.neighbours(body.x, body.y, self._reach)
+        self._reach = 0.5 * REACH if len(around) > 2 * MOST_SEEN else REACH
+        return [other for other, _ in around if other is not body][:MOST_SEEN]
+
+    # --- in the way --------------------------------------------------------------------
+
+    def _look_around(self, walk: Walk, near: Sequence[Body]) -> None:
+        """Look for a way around who stands there; longer and longer pauses between."""
+        now = self._clock.now
+        walk.looks_around = now + max(TIRED, now - walk.nearer_at)
+        standing = [o for o in near if math.hypot(*o.velocity) < STANDING]
+        discs = [Disc(o.x, o.y, o.radius) for o in standing]
+        points = self._planner.path(self.place, walk.goal, discs) if discs else None
+        if points is not None:
+            walk.route, walk.courtesy = Route(points), Courtesy(doors_on(points, self._doors))
+            walk.least = walk.route.length
