@@ -1,0 +1,198 @@
+"""Upright surfaces of a site, and which of them a camera's columns of pixels meet.
+
+One ray for each column is enough: walls are upright, so all pixels of a column that show the
+same surface are equally far away.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dva_sim.worlds.geo import Pose
+from dva_sim.worlds.parts import DOOR_HEIGHT
+from dva_sim.worlds.site import Site
+
+Floats = NDArray[np.float32]
+Ints = NDArray[np.intp]
+
+SOLID_HEIGHT = 1.8  # of shelves and machines [m], assumed
+POSTS = 4  # upright parts of a door frame
+POST = 0.08  # width of a door post [m]
+REVEAL = 0.07  # how far a door frame stands out of the wall on both sides [m]
+NEAR = 0.05  # what is nearer to the lens is cut off [m]
+FAR = 80.0  # what is farther away is not looked for [m]
+
+WALL, FRAME, LINTEL, SOLID, NOTHING = range(5)
+
+
+class Hits(NamedTuple):
+    """Surfaces met by columns, one entry for each pair `(n,)`.
+
+    Attributes:
+        column: Which column of the picture.
+        surface: Which surface.
+        depth: How far ahead of the lens, along its axis [m].
+        along: Where on the surface, from its first end [m].
+    """
+
+    column: Ints
+    surface: Ints
+    depth: Floats
+    along: Floats
+
+    def where(self, choice: NDArray[Any]) -> Hits:
+        """Some of them, by mask or by index."""
+        return Hits(*(values[choice] for values in self))
+
+
+class Surfaces:
+    """Walls, door frames, lintels and the sides of solids.
+
+    Args:
+        site: Whose.
+
+    Attributes:
+        ends: x1, y1, x2, y2 of each, shape `(n, 4)` [m].
+        kind: `WALL`, `FRAME`, `LINTEL` or `SOLID`; the last one is `NOTHING`, without height.
+        low: Height of the lower edge [m].
+        high: Height of the upper edge [m].
+        light: How bright its orientation makes it, 0 to 1.
+        door: Which door a lintel belongs to, -1 for others.
+        length: [m].
+        dark_ends: Where the shade of a corner begins and ends `(n, 2)` [m]; doors make none.
+    """
+
+    def __init__(self, site: Site) -> None:
+        walls = np.asarray(site.walls, dtype=np.float64).reshape(-1, 4)
+        solid = _sides_of_solids(site, walls)
+        doors, tall = doorways(site)
+        frames = np.vstack([_frame(door) for door in doors]) if len(doors) else doors
+        nothing = np.array([[0.0, 0.0, 1.0, 0.0]])
+        parts = [walls[~solid], frames, doors, walls[solid], nothing]
+        heights = (site.ceiling, 0, 0, SOLID_HEIGHT, 0)
+        counts = [len(part) for part in parts]
+        self.ends: Floats = np.vstack(parts).astype(np.float32)
+        self.kind = np.repeat(np.arange(5), counts)
+        self.low: Floats = np.zeros(len(self.kind), dtype=np.float32)
+        self.high: Floats = np.repeat(np.array(heights, dtype=np.float32), counts)
+        self.high[self.kind == FRAME] = np.repeat(tall, POSTS)
+        self.low[self.kind == LINTEL] = tall
+        self.high[self.kind == LINTEL] = site.ceiling
+        self.door = np.full(len(self.kind), -1)
+        self.door[self.kind == LINTEL] = np.arange(len(doors))
+        dx, dy = self.ends[:, 2] - self.ends[:, 0], self.ends[:, 3] - self.ends[:, 1]
+        self.length: Floats = np.hypot(dx, dy)
+        # Light as from high windows in the south-west: walls of the two directions differ.
+        across = np.abs(np.cos(np.arctan2(dy, dx) - 0.35))
+        self.light: Floats = (0.74 + 0.24 * across).astype(np.float32)
+        self.dark_ends = self._dark_ends(doors)
+        self._full = self.kind == WALL
+
+    def _dark_ends(self, doors: NDArray[np.float64]) -> Floats:
+        """Places of the corners along each surface; far away where there is none."""
+        places = np.stack([np.zeros_like(self.length), self.length], axis=1)
+        if len(doors):
+            jambs = doors.reshape(-1, 1, 1, 2)
+            gaps = np.hypot(*np.moveaxis(self.ends.reshape(1, -1, 2, 2) - jambs, -1, 0))
+            places[gaps.min(axis=0) < 0.2] = -FAR
+        places[self.kind == LINTEL] = -FAR
+        return places.astype(np.float32)
+
+    def hits(self, pose: Pose, slopes: Floats) -> tuple[Hits, Hits]:
+        """What the columns meet: the nearest wall of each, and what stands before it.
+
+        Args:
+            pose: Of the lens [m, rad].
+            slopes: How far to the right per metre ahead each column looks, rising `(w,)`.
+
+        Returns:
+            The nearest wall of each column, `NOTHING` where there is none; and all lower or
+            hanging surfaces before it, the farthest first.
+        """
+        met = self._all_hits(pose, slopes)
+        full = self._full[met.surface]
+        walls = met.where(full)
+        order = np.argsort(-walls.depth, kind="stable")
+        nearest = np.full(len(slopes), len(walls.depth))
+        nearest[walls.column[order]] = order  # of a column, the nearest is written last
+        columns = np.arange(len(slopes))
+        walls = Hits(
+            columns,
+            np.r_[walls.surface, len(self.kind) - 1][nearest],
+            np.r_[walls.depth, np.float32(FAR)][nearest],
+            np.r_[walls.along, np.float32(0)][nearest],
+        )
+        before = met.where(~full & (met.depth < walls.depth[met.column]))
+        return walls, before.where(np.argsort(-before.depth, kind="stable"))
+
+    def _all_hits(self, pose: Pose, slopes: Floats) -> Hits:
+        """Every pair of a surface and a column that meets it."""
+        cos, sin = math.cos(pose.heading), math.sin(pose.heading)
+        turn = np.array([[cos, sin], [sin, -cos]], dtype=np.float32)  # ahead, to the right
+        ends = (self.ends - np.array([pose.x, pose.y] * 2, dtype=np.float32)).reshape(-1, 2)
+        local = (ends @ turn.T).reshape(-1, 4)
+        ahead = (np.maximum(local[:, 0], local[:, 2]) > NEAR) & (
+            np.minimum(local[:, 0], local[:, 2]) < FAR
+        )
+        ahead[-1] = False
+        index = np.flatnonzero(ahead)
+        first, last, det, step = _spans(local[index], slopes)
+        seen = (last > first) & (np.abs(det) > 1e-6)
+        index, first, last, det, step = (v[seen] for v in (index, first, last, det, step))
+        count = last - first
+        which = np.repeat(np.arange(len(index)), count)
+        column = np.arange(len(which)) - np.repeat(np.cumsum(count) - count - first, count)
+        z1, t1 = local[index, 0][which], local[index, 1][which]
+        slope, (dz, dt) = slopes[column], (step[which, 0], step[which, 1])
+        # The ray t = slope z meets the line (z1, t1) + s (dz, dt).
+        closing = dt - slope * dz
+        depth = det[which] / closing
+        surface = index[which]
+        along = (slope * z1 - t1) / closing * self.length[surface]
+        return Hits(column, surface, depth, along)
+
+
+def _spans(local: Floats, slopes: Floats) -> tuple[Any, ...]:
+    """First and last column of each surface, cut off at the lens."""
+    z1, t1, z2, t2 = local.T
+    dz, dt = z2 - z1, t2 - t1
+    det = z1 * dt - t1 * dz
+    with np.errstate(divide="ignore", invalid="ignore"):
+        cut1 = np.where(z1 < NEAR, t1 + (NEAR - z1) / dz * dt, t1) / np.maximum(z1, NEAR)
+        cut2 = np.where(z2 < NEAR, t2 + (NEAR - z2) / dz * dt, t2) / np.maximum(z2, NEAR)
+    first = np.searchsorted(slopes, np.minimum(cut1, cut2))
+    last = np.searchsorted(slopes, np.maximum(cut1, cut2))
+    return first, last, det, np.stack([dz, dt], axis=1)
+
+
+def _sides_of_solids(site: Site, walls: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which walls are sides of solids, not of rooms."""
+    corners = {
+        corner for solid in site.solids for corner in map(tuple, np.round(solid, 3).tolist())
+    }
+    ends = np.round(walls, 3).tolist()
+    return np.array([(a, b) in corners and (c, d) in corners for a, b, c, d in ends], dtype=bool)
+
+
+def doorways(site: Site) -> tuple[NDArray[np.float64], Floats]:
+    """Doors and exits: ends x1, y1, x2, y2, shape `(n, 4)` [m], and heights `(n,)` [m]."""
+    exits = [way.ends for way in site.exits]
+    ends = np.vstack([np.reshape(site.doors, (-1, 4)), np.reshape(exits, (-1, 4))])
+    heights = site.door_heights or (DOOR_HEIGHT,) * len(site.doors)
+    return ends, np.array([*heights, *(DOOR_HEIGHT for _ in exits)], dtype=np.float32)
+
+
+def _frame(door: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Posts of a door: across its line and along it, at both ends `(4, 4)` [m]."""
+    a, b = door[:2], door[2:]
+    along = (b - a) / max(float(np.hypot(*(b - a))), 1e-6)
+    across = np.array([-along[1], along[0]]) * REVEAL
+    posts = []
+    for end, inward in ((a, along), (b, -along)):
+        edge = end + inward * POST
+        posts += [np.r_[edge - across, edge + across], np.r_[end, edge]]
+    return np.array(posts)

@@ -1,0 +1,176 @@
+"""Walls, frames and signs: columns of texels, painted once per site."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
+
+from dva_sim.worlds.camera_picture.rooms import Colours, Rooms, pack
+from dva_sim.worlds.camera_picture.surfaces import (
+    FRAME,
+    LINTEL,
+    SOLID,
+    Floats,
+    Hits,
+    Ints,
+    Surfaces,
+    doorways,
+)
+from dva_sim.worlds.parts import DOOR_HEIGHT
+from dva_sim.worlds.site import Site
+
+TEXELS = 128  # of a wall, from the floor to the ceiling
+PANEL, PANEL_COLUMNS = 1.2, 32  # a wall has a joint every so often [m]
+WINDOW, WINDOW_COLUMNS = 2.4, 64  # and an outer wall a window [m]
+SIGN_COLUMNS = 96  # of a lintel, from post to post
+THROUGH = 0.15  # so far on both sides of a wall its rooms are looked for [m]
+BEYOND = 0.4  # so far behind a door its room is looked for [m]
+
+WOOD, PLASTER, SKIRTING = (138, 98, 60), (226, 225, 220), (96, 98, 104)
+STEEL, GLASS = (150, 154, 160), (176, 208, 232)
+SIGN, EXIT = (40, 62, 96), (26, 122, 66)
+
+
+class Uprights:
+    """How everything upright on a site looks.
+
+    Args:
+        site: Whose.
+        surfaces: Its upright parts.
+        rooms: Its rooms.
+
+    Attributes:
+        colours: Of all painted columns, each `TEXELS` from the floor up, in one row.
+    """
+
+    def __init__(self, site: Site, surfaces: Surfaces, rooms: Rooms) -> None:
+        self._surfaces, self._rooms, self._ceiling = surfaces, rooms, site.ceiling
+        self.colours: Colours = self._columns(site)
+
+    def texels(self, hits: Hits, pose_xy: tuple[float, float], far: tuple[Floats, Floats]) -> Ints:
+        """First texel of the painted column of each hit.
+
+        Args:
+            hits: Surfaces and places on them.
+            pose_xy: Of the lens [m]; it sees one side.
+            far: x and y of the hits [m].
+        """
+        kind = self._surfaces.kind[hits.surface]
+        x, y = far
+        x1, y1, x2, y2 = self._surfaces.ends[hits.surface].T
+        left = (x2 - x1) * (pose_xy[1] - y1) - (y2 - y1) * (pose_xy[0] - x1) > 0
+        gap = np.where(left, THROUGH, -THROUGH) / self._surfaces.length[hits.surface]
+        dx, dy = gap * (y1 - y2), gap * (x2 - x1)
+        here, beyond = self._rooms.at(x + dx, y + dy), self._rooms.at(x - dx, y - dy)
+        column = self._wall_columns(hits, here, beyond)
+        column = np.where(kind == FRAME, self._plain + 0, column)
+        column = np.where(kind == SOLID, self._plain + 1, column)
+        lintel = kind == LINTEL
+        if lintel.any():
+            column[lintel] = self._sign_columns(hits.where(lintel), left[lintel])
+        return np.asarray(column * TEXELS, dtype=np.intp)
+
+    def _wall_columns(self, hits: Hits, here: Any, beyond: Any) -> Ints:
+        """Panels, and windows where an outer wall has room for them."""
+        accent = self._rooms.accent[here]
+        length = self._surfaces.length[hits.surface]
+        base = accent * (PANEL_COLUMNS + WINDOW_COLUMNS)
+        panel = ((hits.along / PANEL) % 1 * PANEL_COLUMNS).astype(np.intp)
+        bays = np.floor(length / WINDOW)
+        margin = (length - bays * WINDOW) / 2
+        inside = (hits.along > margin) & (hits.along < length - margin)
+        glazed = inside & (self._rooms.outdoor[here] != self._rooms.outdoor[beyond])
+        window = (((hits.along - margin) / WINDOW) % 1 * WINDOW_COLUMNS).astype(np.intp)
+        return np.asarray(base + np.where(glazed, PANEL_COLUMNS + window, panel))
+
+    def _sign_columns(self, hits: Hits, left: Any) -> Ints:
+        """The side of a lintel that is seen, read from left to right."""
+        share = np.clip(hits.along / self._surfaces.length[hits.surface], 0, 0.999)
+        # Seen from its left side, a line runs from right to left.
+        share = np.where(left, 0.999 - share, share)
+        side = 2 * self._surfaces.door[hits.surface] + left
+        return np.asarray(self._first_sign + side * SIGN_COLUMNS + share * SIGN_COLUMNS).astype(
+            np.intp
+        )
+
+    def _columns(self, site: Site) -> Colours:
+        """Every painted column, `(n, TEXELS)` in one row, from the floor up."""
+        height = (np.arange(TEXELS) + 0.5) / TEXELS * self._ceiling
+        parts = []
+        for accent in self._rooms.palette:
+            parts += [_panels(height, accent), _windows(height, accent)]
+        self._plain = len(self._rooms.palette) * (PANEL_COLUMNS + WINDOW_COLUMNS)
+        self._first_sign = self._plain + 2
+        plain = np.array([WOOD, STEEL], dtype=np.float64)[:, None, :] * np.ones((2, TEXELS, 1))
+        plain[1] *= (0.9 + 0.1 * (height % 0.45 > 0.04))[:, None]
+        signs = [self._lintel(text, wide, height) for wide, *pair in _signs(site) for text in pair]
+        return pack(np.concatenate([*parts, plain, *signs]).clip(0, 255).astype(np.uint8)).ravel()
+
+    def _lintel(self, text: str, wide: float, height: Any) -> NDArray[np.float64]:
+        """The wall over a door with the name of the room behind it, `(SIGN_COLUMNS, TEXELS, 3)`."""
+        colours = np.ones((SIGN_COLUMNS, TEXELS, 1)) * np.array(PLASTER, dtype=np.float64)
+        colours[:, height < DOOR_HEIGHT + 0.08] = WOOD
+        room = int(np.count_nonzero(height > DOOR_HEIGHT + 0.12))
+        tall = max(4, min(14, room - 3))
+        size = wide, tall * self._ceiling / TEXELS
+        plate = _plate(text, size).resize((SIGN_COLUMNS - 6, tall), Image.Resampling.LANCZOS)
+        first = TEXELS - room
+        colours[3:-3, first : first + tall] = np.asarray(plate)[::-1].transpose(1, 0, 2)
+        return colours
+
+
+def _panels(height: Any, accent: Any) -> NDArray[np.float64]:
+    """A wall: skirting, a band in the room's colour, plaster; joints between panels."""
+    colours = np.ones((PANEL_COLUMNS, TEXELS, 1)) * np.array(PLASTER, dtype=np.float64)
+    colours[:, height < 1.0] = 255 * np.asarray(accent)
+    colours[:, (height >= 1.0) & (height < 1.05)] = 170 * np.asarray(accent)
+    colours[:, height < 0.1] = SKIRTING
+    colours[0] *= 0.88
+    return colours
+
+
+def _windows(height: Any, accent: Any) -> NDArray[np.float64]:
+    """An outer wall with a window in the middle of each bay."""
+    wall = _panels(height, accent)
+    colours = np.repeat(wall[1:2], WINDOW_COLUMNS, axis=0)
+    tall = (height > 1.0) & (height < 2.2)
+    pane = (height > 1.06) & (height < 2.14)
+    low, high, middle = 10, WINDOW_COLUMNS - 10, WINDOW_COLUMNS // 2
+    colours[low:high, tall] = (240, 240, 238)
+    sky = np.array(GLASS) * (0.86 + 0.16 * (height[pane] - 1.06))[:, None]
+    for first, last in ((low + 2, middle - 1), (middle + 1, high - 2)):
+        colours[first:last, pane] = sky
+    return colours
+
+
+def _signs(site: Site) -> list[tuple[float, str, str]]:
+    """Of each door: its width [m], and its signs seen from the right of its line and the left."""
+    signs = []
+    for x1, y1, x2, y2 in doorways(site)[0].tolist():
+        wide = max(float(np.hypot(x2 - x1, y2 - y1)), 0.1)
+        left = np.array([-(y2 - y1), x2 - x1]) / wide * BEYOND
+        middle = np.array([x1 + x2, y1 + y2]) / 2
+        signs.append((wide, _name(site, middle + left), _name(site, middle - left)))
+    return signs
+
+
+def _name(site: Site, point: Any) -> str:
+    """What a sign calls a place [m]."""
+    inside = [room for room in site.rooms if not room.outdoor and room.contains(*point)]
+    return inside[0].name if inside else "Exit"
+
+
+def _plate(text: str, size: tuple[float, float]) -> Image.Image:
+    """A sign of a size [m] with a word on it."""
+    width, height = (round(400 * side) for side in size)
+    image = Image.new("RGB", (width, height), EXIT if text == "Exit" else SIGN)
+    points = 0.95 * height
+    font = ImageFont.load_default(points)
+    while points > 8 and font.getlength(text) > 0.94 * width:
+        points *= 0.94
+        font = ImageFont.load_default(points)
+    ImageDraw.Draw(image).text((width / 2, height / 2), text, font=font, fill="white", anchor="mm")
+    return image

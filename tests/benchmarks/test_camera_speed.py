@@ -1,0 +1,56 @@
+"""What a robot's-eye picture costs: drawing it, and making a JPEG of it."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dva_sim.worlds.camera_picture import Camera, Figure, Spot, encode
+from dva_sim.worlds.geo import Pose
+from dva_sim.worlds.hazards import Raster
+from dva_sim.worlds.site import load_site
+
+MOST_MS = 5.0  # of CPU for a picture
+POSE = Pose(35.0, 16.0, 2.5)
+PEOPLE = [Figure("guard", 33.4, 17.6), Figure("bystander", 32.0, 16.0), Figure("robot", 30.0, 16.5)]
+FIRE = [Spot("fire", 31.5, 18.0, 1.4)]
+SCENES: dict[str, dict[str, Any]] = {
+    "empty": {},
+    "people": {"figures": PEOPLE},
+    "fire and smoke": {"figures": PEOPLE, "spots": FIRE, "smoke": 0.3},
+    "flood": {"figures": PEOPLE, "water": 0.05},
+}
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_a_picture_of_320_by_240(benchmark: Any, scene: str) -> None:
+    site = load_site("caparica")
+    west, south, east, north = site.extent
+    options = {
+        key: Raster(np.full((96, 160), value), (west, east, south, north), "")
+        if isinstance(value, float)
+        else value
+        for key, value in SCENES[scene].items()
+    }
+    camera = Camera(site)
+    picture = camera.picture(POSE, **options)
+    cost = []
+    for _ in range(50):
+        started = time.process_time()
+        camera.picture(POSE, **options)
+        drawn = time.process_time()
+        data = encode(picture)
+        cost.append((drawn - started, time.process_time() - drawn))
+    drawing, jpeg = np.array(cost).T * 1e3
+    benchmark.extra_info["median_ms"] = round(float(np.median(drawing)), 2)
+    benchmark.extra_info["jpeg_ms"] = round(float(np.median(jpeg)), 2)
+    benchmark.extra_info["jpeg_bytes"] = len(data)
+    print(
+        f"\n{scene}: {np.median(drawing):.1f} ms of CPU, {drawing.min():.1f} at best; "
+        f"JPEG {np.median(jpeg):.1f} ms, {len(data)} bytes"
+    )
+    assert np.median(drawing) < MOST_MS
+    benchmark(lambda: camera.picture(POSE, **options))

@@ -1,0 +1,207 @@
+import math
+from dataclasses import replace
+from io import BytesIO
+
+import numpy as np
+import pytest
+import shapely
+from PIL import Image
+
+from dva_sim.worlds.camera_picture import Camera, Figure, Spot, encode
+from dva_sim.worlds.geo import GeoFrame, Pose
+from dva_sim.worlds.hazards import Raster
+from dva_sim.worlds.maps import rasterise
+from dva_sim.worlds.parts import Room
+from dva_sim.worlds.site import Site, load_site
+
+EAST = 0.0
+FOCAL = 160 / math.tan(math.radians(35))  # pixels: 320 across show 70 degrees
+
+
+def hall(ceiling=3.0, extra=(), doors=(), rooms=True):
+    """A hall from (0, 0) to (20, 10), perhaps with more walls and doors in it."""
+    ring = [(0, 0, 20, 0), (20, 0, 20, 10), (20, 10, 0, 10), (0, 10, 0, 0)]
+    walls = np.array([*ring, *extra], dtype=float)
+    corners = np.array([(0, 0), (20, 0), (20, 10), (0, 10)], dtype=float)
+    return Site(
+        name="hall",
+        frame=GeoFrame(38.0, -9.0),
+        walls=walls,
+        rooms=(Room("Hall", corners),) if rooms else (),
+        doors=np.array(doors, dtype=float).reshape(-1, 4),
+        robot_bases=(),
+        guard_posts=(),
+        operator_desks=(),
+        detectors=(),
+        extent=(0.0, 0.0, 20.0, 10.0),
+        grid=rasterise(shapely.Polygon(corners), walls, 0.1),
+        ceiling=ceiling,
+    )
+
+
+def changed(a, b):
+    """Where two pictures differ: rows and columns."""
+    return np.nonzero(np.abs(a.astype(int) - b.astype(int)).max(axis=2) > 12)
+
+
+def air(value):
+    """The same everywhere in the hall."""
+    return Raster(np.full((20, 40), value), (0.0, 20.0, 0.0, 10.0), "")
+
+
+def test_a_picture_has_its_size_and_eight_bits_a_colour():
+    picture = Camera(hall()).picture(Pose(5, 5, EAST))
+    assert picture.shape == (240, 320, 3)
+    assert picture.dtype == np.uint8
+
+
+@pytest.mark.parametrize("distance", [4.0, 5.0, 10.0])
+@pytest.mark.parametrize("ceiling", [2.5, 3.0])
+def test_a_wall_covers_its_height_times_focal_length_over_distance(distance, ceiling):
+    picture = Camera(hall(ceiling)).picture(Pose(20 - distance, 5, EAST))
+    column = picture[:, 160].astype(int).sum(axis=1)
+    plaster = column[int(120 - 0.5 * FOCAL / distance)]  # 1.6 m above the floor
+    skirting = column[int(120 + 1.05 * FOCAL / distance)]  # 0.05 m
+    top, foot = np.flatnonzero(column == plaster)[0], np.flatnonzero(column == skirting)[-1]
+    assert pytest.approx(FOCAL, abs=0.1) == 228.5
+    assert foot + 1 - top == pytest.approx(ceiling * FOCAL / distance, abs=1.5)
+    assert top == pytest.approx(120 - (ceiling - 1.1) * FOCAL / distance, abs=1)
+
+
+def test_left_is_left():
+    camera, pose = Camera(hall()), Pose(5, 5, EAST)
+    bare = camera.picture(pose)
+    _, left = changed(bare, camera.picture(pose, [Figure("guard", 8, 6)]))
+    _, right = changed(bare, camera.picture(pose, [Figure("guard", 8, 4)]))
+    assert left.max() < 160 < right.min()
+
+
+@pytest.mark.parametrize("bearing_deg", [-30, -10, 0, 20])
+@pytest.mark.parametrize("heading_deg", [0, 90, 200])
+def test_a_person_at_three_metres_is_where_the_bearing_says(bearing_deg, heading_deg):
+    camera, heading = Camera(hall()), math.radians(heading_deg)
+    pose, angle = Pose(10, 5, heading), heading + math.radians(bearing_deg)
+    # Somebody who faces the lens looks the same on both sides.
+    figure = Figure("bystander", 10 + 3 * math.cos(angle), 5 + 3 * math.sin(angle), angle + math.pi)
+    _, columns = changed(camera.picture(pose), camera.picture(pose, [figure]))
+    middle = (columns.min() + columns.max() + 1) / 2
+    assert middle == pytest.approx(160 - FOCAL * math.tan(math.radians(bearing_deg)), abs=3)
+
+
+def test_a_person_of_a_metre_and_three_quarters_at_four_metres_is_a_hundred_pixels_tall():
+    camera, pose = Camera(hall()), Pose(10, 5, EAST)
+    rows, _ = changed(camera.picture(pose), camera.picture(pose, [Figure("guard", 14, 5, math.pi)]))
+    assert np.ptp(rows) + 1 == pytest.approx(1.77 * FOCAL / 4, abs=3)
+    assert rows.max() == pytest.approx(120 + 1.1 * FOCAL / 4, abs=2)
+
+
+def test_a_person_behind_a_wall_is_not_seen():
+    camera, pose = Camera(hall(extra=[(8, 0, 8, 10)])), Pose(5, 5, EAST)
+    behind = camera.picture(pose, [Figure("guard", 9, 5), Figure("robot", 12, 6)])
+    assert np.array_equal(behind, camera.picture(pose))
+
+
+def test_a_person_behind_another_is_hidden_and_beside_is_not():
+    camera, pose = Camera(hall()), Pose(5, 5, EAST)
+    near = Figure("guard", 7, 5, math.pi)
+    alone = camera.picture(pose, [near])
+    behind = camera.picture(pose, [near, Figure("robot", 13, 5, math.pi)])
+    beside = camera.picture(pose, [near, Figure("robot", 13, 7, math.pi)])
+    assert len(changed(alone, behind)[0]) < 20 < len(changed(alone, beside)[0])
+    assert np.array_equal(behind, camera.picture(pose, [Figure("robot", 13, 5, math.pi), near]))
+
+
+def test_one_sees_through_a_door_but_not_through_its_lintel():
+    wall = [(8, 0, 8, 4.4), (8, 5.6, 8, 10)]
+    camera = Camera(hall(extra=wall, doors=[(8, 4.4, 8, 5.6)]))
+    pose = Pose(5, 5, EAST)
+    fire = camera.picture(pose, spots=[Spot("fire", 10, 5, 1.2)])
+    flames = fire.astype(int) - camera.picture(pose)
+    rows, columns = np.nonzero(flames[:, :, 0] > 60)
+    lintel = 120 - (2.1 - 1.1) * FOCAL / 3
+    assert rows.min() >= lintel - 1
+    assert columns.min() >= 160 - 0.6 * FOCAL / 3 - 1
+    assert columns.max() <= 160 + 0.6 * FOCAL / 3 + 1
+
+
+def test_the_sign_over_a_door_reads_from_left_to_right_from_both_sides():
+    parts = {"West": (0, 8), "East": (8, 20)}
+    rooms = tuple(
+        Room(name, np.array([(a, 0), (b, 0), (b, 10), (a, 10)], dtype=float))
+        for name, (a, b) in parts.items()
+    )
+    site = hall(extra=[(8, 0, 8, 4.4), (8, 5.6, 8, 10)], doors=[(8, 4.4, 8, 5.6)])
+    turned = hall(extra=[(8, 0, 8, 4.4), (8, 5.6, 8, 10)], doors=[(8, 5.6, 8, 4.4)])
+    same = [Camera(replace(s, rooms=rooms)).picture(Pose(5, 5, EAST)) for s in (site, turned)]
+    assert len(changed(*same)[0]) < 100  # but for a column more or less of letters
+    sign = same[0][14:32, 118:202]
+    assert len(np.unique(sign.reshape(-1, 3), axis=0)) > 20  # letters on a plate
+    assert len(changed(sign, sign[:, ::-1])[0]) > 200  # that do not read both ways
+
+
+@pytest.mark.parametrize("extinction", [0.1, 0.3, 0.6])
+def test_smoke_leaves_exp_of_minus_k_d_of_the_contrast(extinction):
+    camera, pose = Camera(hall()), Pose(15, 5, EAST)
+    clear = camera.picture(pose).astype(float)
+    smoky = camera.picture(pose, smoke=air(extinction)).astype(float)
+    # Two places of the same wall, 5 m away: plaster above, the coloured band below.
+    contrast = [p[80, 164].sum() - p[135, 164].sum() for p in (clear, smoky)]
+    assert contrast[0] > 100
+    assert contrast[1] / contrast[0] == pytest.approx(math.exp(-extinction * 5.0), abs=0.02)
+
+
+def test_smoke_elsewhere_does_not_matter_and_near_smoke_hides_a_person():
+    camera, pose = Camera(hall()), Pose(5, 5, EAST)
+    values = np.zeros((20, 40))
+    values[:, :4] = 5.0  # behind the lens
+    behind = camera.picture(pose, smoke=Raster(values, (0.0, 20.0, 0.0, 10.0), "1/m"))
+    assert np.array_equal(behind, camera.picture(pose))
+    person = [Figure("guard", 9, 5)]
+    thick = [camera.picture(pose, who, smoke=air(3.0)) for who in ((), person)]
+    assert len(changed(*thick)[0]) == 0
+
+
+def test_water_shows_what_stands_behind_it_upside_down():
+    camera, pose = Camera(hall()), Pose(14, 5, EAST)
+    dry, wet = camera.picture(pose), camera.picture(pose, water=air(0.02))
+    foot = 120 + 1.1 * FOCAL / 6
+    assert np.array_equal(dry[: int(foot)], wet[: int(foot)])
+    # The floor takes on some of the colour of the wall's band.
+    row, mirrored = int(foot) + 20, int(foot) - 20
+    before = np.abs(dry[row].astype(int) - dry[mirrored]).mean()
+    after = np.abs(wet[row].astype(int) - dry[mirrored]).mean()
+    assert after < 0.8 * before
+
+
+def test_firelight_is_warm_and_stays_in_its_room():
+    site = load_site("caparica")
+    camera, pose = Camera(site), Pose(2, 12, EAST)
+    room = site.room_at(5, 18)
+    assert room != site.room_at(2, 12)
+    hidden = camera.picture(pose, spots=[Spot("fire", 5, 18, 1.0)])
+    assert len(changed(hidden, camera.picture(pose))[0]) < 400  # what a door lets through
+    near = camera.picture(pose, spots=[Spot("fire", 7, 12, 0.5)]).astype(int)
+    floor = (near - camera.picture(pose))[230, 100:220].mean(axis=0)
+    assert floor[0] > 5 > floor[2]
+
+
+def test_the_same_moment_gives_the_same_picture_and_flames_flicker():
+    fire, pose = [Spot("fire", 10, 5, 0.6)], Pose(5, 5, EAST)
+    first, second = (Camera(hall()).picture(pose, spots=fire, time=3.0) for _ in range(2))
+    assert np.array_equal(first, second)
+    assert not np.array_equal(first, Camera(hall()).picture(pose, spots=fire, time=3.2))
+
+
+def test_a_lens_close_to_a_wall_or_outside_everything_still_gives_a_picture():
+    camera = Camera(hall())
+    for pose in (Pose(19.98, 5, EAST), Pose(0, 0, EAST), Pose(-50, -50, 1.0), Pose(300, 5, 0)):
+        assert camera.picture(pose, [Figure("robot", 5, 5)], [Spot("fire", 6, 5, 0.0)]).std() > 0
+
+
+def test_a_jpeg_is_small_and_looks_the_same():
+    picture = Camera(load_site("caparica")).picture(Pose(2, 12, EAST))
+    data = encode(picture)
+    assert 4_000 < len(data) < 20_000
+    again = np.asarray(Image.open(BytesIO(data)))
+    assert again.shape == picture.shape
+    assert np.abs(again.astype(int) - picture).mean() < 4
