@@ -13,6 +13,7 @@ from typing import NamedTuple
 from dva_sim.protocol import messages as m
 
 LEASE_S = 30.0  # teleoperation without a valid command ends by itself after this
+ENDS = "done", "failed"  # how a mission ends
 MOST_OBSERVERS = 64  # devices that may subscribe to sensors without holding the robot
 
 
@@ -33,6 +34,8 @@ class SetPoint(NamedTuple):
 
 
 STAND = SetPoint(0.0, 0.0, 0.0)
+NO_MISSION = m.MissionStatus(0, "none", 0, "")
+Mission = m.GoTo | m.Patrol | m.Inspect | m.ReturnToBase
 
 
 class Decision(NamedTuple):
@@ -48,7 +51,7 @@ class Decision(NamedTuple):
     code: int
     text: str = ""
     set_point: SetPoint | None = None
-    content: m.SensorInfo | None = None
+    content: m.SensorInfo | m.MissionStatus | None = None
 
 
 @dataclass(frozen=True)
@@ -89,7 +92,8 @@ class RobotController:
     grant: m.PermissionGrant | None = None
     highest_session: int = 0
     observers: dict[str, m.PermissionGrant] = field(default_factory=dict)
-    mission: tuple[m.Position, ...] = ()
+    mission: Mission | None = None
+    mission_status: m.MissionStatus = NO_MISSION
     last_order_id: int = 0
     last_set_id: int = 0
     last_valid: float = 0.0
@@ -125,8 +129,12 @@ class RobotController:
                 return self._start(message, arrived, now, moving)
             case m.StopTeleOp():
                 return self._stop(message)
-            case m.GoTo() | m.CancelMission():
-                return self._mission(message, arrived, moving)
+            case m.GoTo() | m.Patrol() | m.Inspect() | m.ReturnToBase():
+                return self._mission(message, body, arrived, moving)
+            case m.CancelMission():
+                return self._cancel(message)
+            case m.GetMissionStatus():
+                return Decision(m.OK, content=self.mission_status)
             case m.TaskAnnouncement() | m.TaskAward():
                 return self._auction(message)
             case m.GetSensorInfo():
@@ -137,20 +145,36 @@ class RobotController:
     def expire(self, now: float) -> bool:
         """End a teleoperation whose operator has long said nothing; True if it did."""
         if self.mode is Mode.TELEOPERATION and now - self.last_valid > LEASE_S:
-            self._idle()
+            self._idle("")
             return True
         return False
 
-    def mission_done(self) -> None:
-        """The last waypoint is reached."""
-        self._idle()
+    def mission_stands(self, state: str, left: int, reason: str) -> bool:
+        """The robot says how its mission goes on; True if that is news.
 
-    def _idle(self) -> None:
-        self.mode, self.owner, self.mission = Mode.IDLE, None, ()
+        Args:
+            state: As in `MissionStatus`; `done` and `failed` end the mission.
+            left: Places still to be visited.
+            reason: In words.
+        """
+        before = self.mission_status
+        if self.mode is Mode.MISSION:
+            self.mission_status = m.MissionStatus(before.mission_id, state, left, reason)
+            if state in ENDS:
+                self._idle(reason)
+        return self.mission_status != before
+
+    def _idle(self, why: str) -> None:
+        """Stand by; a mission that was still going on has failed, and this is `why`."""
+        status = self.mission_status
+        if self.mode is Mode.MISSION and status.mission_state not in ENDS:
+            left = status.waypoints_left
+            self.mission_status = m.MissionStatus(status.mission_id, "failed", left, why)
+        self.mode, self.owner, self.mission = Mode.IDLE, None, None
 
     def _emergency(self, now: float) -> Decision:
         """Stop and stand idle; whatever was received before this moment moves nothing (S3)."""
-        self._idle()
+        self._idle("emergency")
         self.emergency_at = now
         return Decision(m.OK, "stopped", STAND)
 
@@ -168,7 +192,7 @@ class RobotController:
         self.grant, self.highest_session = body, body.session
         self.last_order_id = self.last_set_id = 0
         if self.owner is not None:
-            self._idle()
+            self._idle("revoked")
             return Decision(m.OK, set_point=STAND)
         return Decision(m.OK)
 
@@ -194,7 +218,7 @@ class RobotController:
         self.grant = None
         if self.owner is None:
             return Decision(m.OK)
-        self._idle()
+        self._idle("revoked")
         return Decision(m.OK, set_point=STAND)
 
     def _subscription(self, message: m.Message, body: m.DevSub) -> Decision:
@@ -306,23 +330,23 @@ class RobotController:
             return refusal
         if self.mode is not Mode.TELEOPERATION:
             return Decision(m.OK, "not in teleoperation")
-        self._idle()
+        self._idle("")
         return Decision(m.OK, set_point=STAND)
 
-    def _mission(self, message: m.Message, arrived: float, moving: bool) -> Decision:
+    def _mission(self, message: m.Message, body: Mission, arrived: float, moving: bool) -> Decision:
         refusal = self._refusal(message, "missions")
+        refusal = refusal or self._begin(message, arrived, moving) or self._order(message)
         if refusal is not None:
             return refusal
-        if isinstance(message.body, m.CancelMission):
-            refusal = self._order(message)
-            if refusal is not None:
-                return refusal
-            if self.mode is Mode.MISSION:
-                self._idle()
-            return Decision(m.OK, set_point=STAND)
-        refusal = self._begin(message, arrived, moving) or self._order(message)
-        if refusal is not None:
-            return refusal
-        assert isinstance(message.body, m.GoTo)
-        self.mode, self.owner, self.mission = Mode.MISSION, message.source, message.body.waypoints
+        self.mode, self.owner, self.mission = Mode.MISSION, message.source, body
+        left = len(body.waypoints) if isinstance(body, m.GoTo | m.Patrol) else 1
+        self.mission_status = m.MissionStatus(message.message_id, "under_way", left, "")
         return Decision(m.OK)
+
+    def _cancel(self, message: m.Message) -> Decision:
+        refusal = self._refusal(message, "missions") or self._order(message)
+        if refusal is not None:
+            return refusal
+        if self.mode is Mode.MISSION:
+            self._idle("cancelled")
+        return Decision(m.OK, set_point=STAND)

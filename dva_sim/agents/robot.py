@@ -1,4 +1,4 @@
-"""A robot on site: body, computer, camera, heartbeat; and the driver of its missions."""
+"""A robot on site: body, computer, camera, heartbeat."""
 
 from __future__ import annotations
 
@@ -9,11 +9,9 @@ from dva_sim.agents.camera import Frame, HazardSpot, Observation, View
 from dva_sim.agents.commands import topic_of
 from dva_sim.agents.device import STATUS, Device
 from dva_sim.agents.inbox import Inbox, Letter
-from dva_sim.agents.modes import Decision, Mode, RobotController, SetPoint
-from dva_sim.agents.operator.person import Person
-from dva_sim.agents.operator.strategies import Intent, Pursuit, Reach
+from dva_sim.agents.local_loops import GuardedDrive, MissionLoop, Surrounded
+from dva_sim.agents.modes import ENDS, Decision, Mode, RobotController, SetPoint
 from dva_sim.agents.sensing import SensorDesk, SensorPort
-from dva_sim.agents.steering import Route
 from dva_sim.agents.trace import LEASE_ENDS, MISSION_ENDS, Trace
 from dva_sim.network.patterns import Subscription
 from dva_sim.protocol import messages as m
@@ -22,9 +20,9 @@ from dva_sim.worlds.physics import RobotBody, World
 from dva_sim.worlds.planning import Planner
 
 FRAME = "frame|"  # topic of the camera
+MISSION = "mission|"  # topic of how missions stand
 PUBLISHED = ("pub-sub", "latest-wins")  # patterns in which nobody answers a command
 STATUS_PERIOD = 1.0  # [s]
-MISSION_PERIOD = 0.1  # [s]
 EXPECTED_SPEED = 0.35  # of a teleoperated robot, by which it bids, as the DVA expects it [m/s]
 EXPECTED_READY = 4.0  # until its operator begins to drive, as the DVA expects it [s]
 LONGEST_BID = 1e6  # [s]
@@ -43,6 +41,9 @@ class RobotSetup:
         view: What the camera sees.
         hazards: What is there to be seen, at a time [s].
         sensors: What it measures, by name.
+        guarded: Whether a collision guard slows whoever drives it (coordinated control).
+        encode: From taking a frame to publishing it [s]; one frame at a time.
+        charge: Share of the battery's charge that is left.
     """
 
     pattern: str
@@ -52,6 +53,9 @@ class RobotSetup:
     view: View
     hazards: Callable[[float], list[HazardSpot]]
     sensors: Mapping[str, SensorPort] = field(default_factory=dict)
+    guarded: bool = False
+    encode: float = 0.0
+    charge: Callable[[], float] = lambda: 1.0
 
 
 class RobotAgent:
@@ -87,7 +91,7 @@ class RobotAgent:
         self.device, self.controller = device, controller
         self.body, self._world, self._planner, self._setup = body, world, planner, setup
         self._drive_of = drive_of
-        self.applied = self.refused = self._missions = 0
+        self.applied = self.refused = 0
         self.picture_age: float | None = None
         self.trace: Trace | None = None
         self.inbox = Inbox(
@@ -96,6 +100,12 @@ class RobotAgent:
         self._sensing = SensorDesk(device, setup.sensors, controller.tick)
         controller.sensors = tuple(m.Sensor(n, port.unit) for n, port in setup.sensors.items())
         self._commands: Subscription | None = None
+        self._encoding = False
+        around = Surrounded(device.clock, world, body, planner)
+        self._guarded = GuardedDrive(around, controller) if setup.guarded else None
+        self._missions = MissionLoop(
+            around, controller, self.observe, setup.charge, self._mission_news
+        )
         device.network.serve(device.id_tag, self.inbox.request)
 
     def start(self) -> None:
@@ -138,7 +148,7 @@ class RobotAgent:
     def _decide(self, message: m.Message, arrived: float) -> Decision:
         now = self.device.clock.now
         self._world.advance_to(now)
-        before = self.controller.mode
+        before, mission = self.controller.mode, self.controller.mission_status
         moving = abs(self.body.speed) > STANDING or abs(self.body.turn_rate) > STANDING
         decision = self.controller.handle(message, arrived, now, moving)
         if self.trace is not None:
@@ -155,6 +165,8 @@ class RobotAgent:
             self._log_command(message, arrived, now, decision.set_point)
         if self.controller.mode is not before:
             self._mode_changed(message.source)
+        if self.controller.mission_status is not mission:
+            self._publish_mission()
         return decision
 
     def _follow_up(self, message: m.Message, decision: Decision) -> Decision:
@@ -194,6 +206,9 @@ class RobotAgent:
             )
 
     def _move(self, set_point: SetPoint) -> None:
+        if self._guarded is not None and self.controller.mode is Mode.TELEOPERATION:
+            self._guarded.take(set_point)
+            return
         self.body.drive(set_point.speed, set_point.turn_rate, set_point.until)
 
     def _mode_changed(self, source: str) -> None:
@@ -208,16 +223,27 @@ class RobotAgent:
             self._commands = self.device.network.subscribe(
                 me, source, topic_of(me), self.inbox.published
             )
-        if mode is Mode.MISSION:
-            self._begin_mission()
+        if self.controller.mission is not None:
+            self._missions.begin(self.controller.mission, self.device.frame)
 
     # --- what it does by itself --------------------------------------------------------
 
     def _take_frame(self) -> None:
         """Film for whoever watches; a frame is left out while the last one still waits."""
         network, me, size = self.device.network, self.device.id_tag, self._setup.frame_bytes
-        if network.ready(me, FRAME, size):
-            network.publish(me, FRAME, Frame(self.observe(), self.device.clock.now), size)
+        if self._encoding or not network.ready(me, FRAME, size):
+            return
+        frame = Frame(self.observe(), self.device.clock.now)
+        if self._setup.encode > 0.0:
+            self._encoding = True
+            self.device.clock.call_after(self._setup.encode, self._encoded, frame)
+        else:
+            network.publish(me, FRAME, frame, size)
+
+    def _encoded(self, frame: Frame) -> None:
+        self._encoding = False
+        size = self._setup.frame_bytes
+        self.device.network.publish(self.device.id_tag, FRAME, frame, size)
 
     def _publish_status(self) -> None:
         now = self.device.clock.now
@@ -237,54 +263,16 @@ class RobotAgent:
         )
         self.device.publish(STATUS, body)
 
-    def _begin_mission(self) -> None:
-        """Drive to the waypoints one by one, by the robot's own map."""
-        goals = [self.device.frame.to_xy(p.latitude, p.longitude) for p in self.controller.mission]
-        # The robot's own loop has no delay to speak of: a brisk, steady driver.
-        driver = Pursuit(AUTOPILOT, Reach(self.body.spec.max_speed, self.body.spec.max_turn_rate))
-        route: list[Route] = []
+    def _publish_mission(self) -> None:
+        self.device.publish(MISSION, self.controller.mission_status)
 
-        self._missions += 1
-        number = self._missions
-
-        def step() -> bool:
-            if self.controller.mode is not Mode.MISSION or number != self._missions:
-                return False  # stopped, or another mission has begun since
-            seen = self.observe()
-            if not route:
-                points = self._planner.path((seen.x, seen.y), goals[0]) if goals else None
-                if points is None:
-                    self.controller.mission_done()
-                    if self.trace is not None:
-                        self.trace.happened(MISSION_ENDS, self.device.clock.now)
-                    self._mode_changed("")
-                    return False
-                route.append(Route(points))
-            left = route[0].ahead(seen.x, seen.y, seen.heading, 0.5).remaining
-            if left < MISSION_NEAR:
-                goals.pop(0)
-                route.clear()
-                return True
-            self._obey(driver.drive(route[0], seen, MISSION_PERIOD, MISSION_NEAR))
-            return True
-
-        self.device.clock.every(MISSION_PERIOD, step)
-
-    def _obey(self, intent: Intent) -> None:
-        now = self.device.clock.now
-        until = now + 2 * MISSION_PERIOD
-        self._move(SetPoint(intent.speed, intent.turn_rate, until))
-
-
-MISSION_NEAR = 0.3  # a waypoint counts as reached from here [m]
-AUTOPILOT = Person(
-    perceptual_delay=0.0,
-    hand_lag=0.0,
-    crossover=2.0,
-    caution=0.3,
-    pace=1.0,
-    confirm_look=0.0,
-    reading=0.0,
-    position_error=0.0,
-    heading_error=0.0,
-)
+    def _mission_news(self) -> None:
+        """The mission stands otherwise than before; it may be over."""
+        status = self.controller.mission_status
+        self._publish_mission()
+        if status.mission_state in ENDS:
+            why = f": {status.reason}" if status.reason else ""
+            self.device.tell(f"mission {status.mission_state}{why}", "mode")
+            if self.trace is not None:
+                self.trace.happened(MISSION_ENDS, self.device.clock.now)
+            self._mode_changed("")

@@ -123,7 +123,7 @@ def _again(
     if happened == LEASE_ENDS:
         controller.expire(now)
     elif happened == MISSION_ENDS:
-        controller.mission_done()
+        controller.mission_stands("done", 0, "")
     else:
         raise ValueError(f"{happened!r} does not happen to a robot")
     return None

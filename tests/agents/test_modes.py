@@ -252,3 +252,171 @@ def test_starting_again_makes_older_orders_and_commands_old(driven: Bench) -> No
     assert driven.say(ANA, m.SetTeleOp(0.4, 0.0), number=59).code == m.OUT_OF_ORDER
     assert driven.say(ANA, m.StopTeleOp(), number=58).code == m.OUT_OF_ORDER
     assert driven.robot.mode is Mode.TELEOPERATION
+
+
+HERE = m.Position(38.66, -9.2)
+MESSAGES = {
+    "StartTeleOp": m.StartTeleOp(),
+    "SetTeleOp": m.SetTeleOp(0.3, 0.1),
+    "StopTeleOp": m.StopTeleOp(),
+    "GoTo": m.GoTo((HERE,)),
+    "Patrol": m.Patrol((HERE, HERE), 0),
+    "Inspect": m.Inspect(3, "fire", HERE),
+    "ReturnToBase": m.ReturnToBase(),
+    "CancelMission": m.CancelMission(),
+    "GetMissionStatus": m.GetMissionStatus(),
+    "GetSensorInfo": m.GetSensorInfo(),
+    "Emergency": m.Emergency(),
+}
+BEGINS = ("GoTo", "Patrol", "Inspect", "ReturnToBase")
+LETTERS = {"I": Mode.IDLE, "M": Mode.MISSION, "T": Mode.TELEOPERATION}
+CODES = {
+    "ok": m.OK,
+    "perm": m.NOT_PERMITTED,
+    "mode": m.WRONG_MODE,
+    "busy": m.BUSY,
+}
+# Each cell: the reply, and the mode afterwards. Columns: what Ana may do; with none or sensors
+# alone, Rui holds the robot with the level both and it is Rui's teleoperation or mission.
+TABLE = """
+mode message           none     sensors  teleoperation missions both
+I    StartTeleOp       perm I   perm I   ok T          perm I   ok T
+I    SetTeleOp         mode I   mode I   mode I        mode I   mode I
+I    StopTeleOp        perm I   perm I   ok I          perm I   ok I
+I    begins            perm I   perm I   perm I        ok M     ok M
+I    CancelMission     perm I   perm I   perm I        ok I     ok I
+I    GetMissionStatus  ok I     ok I     ok I          ok I     ok I
+I    GetSensorInfo     ok I     ok I     ok I          ok I     ok I
+I    Emergency         ok I     ok I     ok I          ok I     ok I
+M    StartTeleOp       perm M   perm M   -             perm M   busy M
+M    SetTeleOp         mode M   mode M   -             mode M   mode M
+M    StopTeleOp        perm M   perm M   -             perm M   ok M
+M    begins            perm M   perm M   -             busy M   busy M
+M    CancelMission     perm M   perm M   -             ok I     ok I
+M    GetMissionStatus  ok M     ok M     -             ok M     ok M
+M    GetSensorInfo     ok M     ok M     -             ok M     ok M
+M    Emergency         ok I     ok I     -             ok I     ok I
+T    StartTeleOp       perm T   perm T   ok T          -        ok T
+T    SetTeleOp         mode T   mode T   ok T          -        ok T
+T    StopTeleOp        perm T   perm T   ok I          -        ok I
+T    begins            perm T   perm T   perm T        -        busy T
+T    CancelMission     perm T   perm T   perm T        -        ok T
+T    GetMissionStatus  ok T     ok T     ok T          -        ok T
+T    GetSensorInfo     ok T     ok T     ok T          -        ok T
+T    Emergency         ok I     ok I     ok I          -        ok I
+"""
+
+
+def cells() -> list[tuple[str, str, str, str, str]]:
+    """Mode, message, level, reply, mode afterwards; states that cannot occur are left out."""
+    heading, *rows = TABLE.strip().splitlines()
+    levels = heading.split()[2:]
+    found = []
+    for row in rows:
+        mode, what, *rest = row.split()
+        for level in levels:
+            code = rest.pop(0)
+            if code == "-":
+                continue
+            after = rest.pop(0)
+            names = BEGINS if what == "begins" else (what,)
+            found += [(mode, name, level, code, after) for name in names]
+    return found
+
+
+def in_mode(mode: Mode, level: str) -> Bench:
+    """Ana has that permission, and the robot is in that mode for who holds it."""
+    bench = Bench()
+    holder, held = (RUI, "both") if level in ("none", "sensors") else (ANA, level)
+    bench.say(DVA, m.PermissionGrant(holder, held, 7))
+    if level == "sensors":
+        bench.say(DVA, m.PermissionGrant(ANA, "sensors", 7, None, ("smoke",)))
+    if mode is not Mode.IDLE:
+        begin = m.StartTeleOp() if mode is Mode.TELEOPERATION else m.GoTo((HERE,))
+        assert bench.say(holder, begin).code == m.OK
+    assert bench.robot.mode is mode
+    return bench
+
+
+@pytest.mark.parametrize(("mode", "what", "level", "code", "after"), cells())
+def test_every_mode_answers_every_message_by_the_permission_held(
+    mode: str, what: str, level: str, code: str, after: str
+) -> None:
+    bench = in_mode(LETTERS[mode], level)
+    decision = bench.say(ANA, MESSAGES[what], now=1.0)
+    assert decision.code == CODES[code]
+    assert bench.robot.mode is LETTERS[after]
+    if LETTERS[mode] is not Mode.IDLE and after == "I":
+        assert decision.set_point == STAND  # what ends a motion says so to the motors
+    if decision.code != m.OK:
+        assert decision.set_point is None
+    assert (bench.robot.owner is None) == (after == "I")
+
+
+def test_the_table_has_every_mode_and_message() -> None:
+    assert {(mode, what) for mode, what, *_ in cells()} == {
+        (mode, what) for mode in LETTERS for what in MESSAGES
+    }
+
+
+@pytest.mark.parametrize("name", BEGINS)
+def test_a_mission_begins_only_at_a_standstill(bench: Bench, name: str) -> None:
+    bench.say(DVA, m.PermissionGrant(ANA, "missions", 7))
+    assert bench.say(ANA, MESSAGES[name], moving=True).code == m.BUSY
+    assert bench.say(ANA, MESSAGES[name], moving=False).code == m.OK
+
+
+@pytest.mark.parametrize("name", BEGINS)
+def test_a_mission_that_was_sent_before_an_emergency_does_not_begin_after_it(
+    bench: Bench, name: str
+) -> None:
+    bench.say(DVA, m.PermissionGrant(ANA, "missions", 7))
+    bench.say(RUI, m.Emergency(), now=2.0)
+    assert bench.say(ANA, MESSAGES[name], now=2.1, arrived=1.9).code == m.STALE
+    assert bench.say(ANA, MESSAGES[name], now=2.3, arrived=2.2).code == m.OK
+
+
+def told(bench: Bench) -> tuple[str, int, str]:
+    status = bench.say(RUI, m.GetMissionStatus(), session=0).content
+    assert isinstance(status, m.MissionStatus)
+    return status.mission_state, status.waypoints_left, status.reason
+
+
+def test_how_a_mission_stands_is_told_to_everybody_who_asks(bench: Bench) -> None:
+    assert told(bench) == ("none", 0, "")
+    bench.say(DVA, m.PermissionGrant(ANA, "missions", 7))
+    bench.say(ANA, m.Patrol((HERE, HERE, HERE), 2), number=41)
+    assert told(bench) == ("under_way", 3, "")
+    assert bench.robot.mission_status.mission_id == 41
+    assert bench.robot.mission_stands("waiting", 2, "somebody is in the way")
+    assert not bench.robot.mission_stands("waiting", 2, "somebody is in the way")
+    assert told(bench) == ("waiting", 2, "somebody is in the way")
+    assert bench.robot.mission_stands("failed", 2, "no way")
+    assert told(bench) == ("failed", 2, "no way")
+    assert bench.robot.mode is Mode.IDLE
+
+
+@pytest.mark.parametrize(
+    ("source", "body", "reason"),
+    [
+        (ANA, m.CancelMission(), "cancelled"),
+        (RUI, m.Emergency(), "emergency"),
+        (DVA, m.PermissionRevocation(ROBOT, ANA, 7), "revoked"),
+        (DVA, m.PermissionGrant(RUI, "both", 8), "revoked"),
+    ],
+)
+def test_a_mission_that_somebody_ends_has_failed_and_says_why(
+    bench: Bench, source: str, body: m.Body, reason: str
+) -> None:
+    bench.say(DVA, m.PermissionGrant(ANA, "missions", 7))
+    bench.say(ANA, m.GoTo((HERE,)))
+    assert bench.say(source, body, now=1.0).set_point == STAND
+    assert told(bench) == ("failed", 1, reason)
+
+
+def test_what_a_robot_says_of_a_mission_that_is_over_is_no_news(bench: Bench) -> None:
+    bench.say(DVA, m.PermissionGrant(ANA, "missions", 7))
+    bench.say(ANA, m.GoTo((HERE,)))
+    bench.say(ANA, m.CancelMission())
+    assert not bench.robot.mission_stands("done", 0, "")
+    assert told(bench) == ("failed", 1, "cancelled")
