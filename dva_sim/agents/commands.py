@@ -54,6 +54,7 @@ class CommandSender:
         self._network, self._clock, self._outbox = network, network.clock, outbox
         self._drive, self._session, self._phone = drive, session, phone
         self._rate, self._recorder, self._seen_tick = rate_hz, recorder, seen_tick
+        self._topic = topic_of(drive.robot)
         self._on = False
 
     def start(self) -> None:
@@ -106,8 +107,7 @@ class PublishedCommands(CommandSender):
 
     def _offer(self, made: Made) -> None:
         data = self._encode(made)
-        topic = topic_of(self._drive.robot)
-        self._network.publish(self._outbox.source, topic, data, len(data))
+        self._network.publish(self._outbox.source, self._topic, data, len(data))
 
 
 class RequestedCommands(CommandSender):

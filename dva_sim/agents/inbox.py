@@ -90,22 +90,21 @@ class Inbox:
             self.overflowed += 1
             return
         queue.append(letter)
-        self.longest = max(self.longest, len(queue))
+        if len(queue) > self.longest:
+            self.longest = len(queue)
         if not self._busy:
             self._work()
 
     def _work(self) -> None:
         """Take the next letter; where processing takes no time, all of them."""
-        while True:
-            queue = next((q for q in (self._emergencies, self._control, self._commands) if q), None)
-            self._busy = queue is not None
-            if queue is None:
-                return
+        while queue := self._emergencies or self._control or self._commands:
+            self._busy = True
             letter = queue.popleft()
             if self._processing > 0.0:
                 self._clock.call_after(self._processing, self._done, letter)
                 return
             self._handle(letter)
+        self._busy = False
 
     def _done(self, letter: Letter) -> None:
         self._handle(letter)

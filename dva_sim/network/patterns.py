@@ -131,6 +131,7 @@ class Requester:
         self._timeout, self._attempts, self._window = timeout, attempts, window
         self._queue: deque[_Asked] = deque()
         self._open: dict[int, _Asked] = {}
+        self._deadlines: deque[tuple[float, int, int]] = deque()  # when [s], tag, attempt
         self._wire: Wire | None = None
         self._last_tag = 0
         self.timeouts = self.failures = self.overflows = 0
@@ -179,7 +180,9 @@ class Requester:
     def _attempt(self, asked: _Asked) -> None:
         """Send a request, over a new connection if there is none."""
         asked.attempts += 1
-        self._clock.call_after(self._timeout, self._expire, asked.tag, asked.attempts)
+        self._deadlines.append((self._clock.now + self._timeout, asked.tag, asked.attempts))
+        if len(self._deadlines) == 1:
+            self._clock.call_at(self._deadlines[0][0], self._look_at_deadlines)
         self.open()
         assert self._wire is not None
         self._wire.send(asked.tag, asked.data)
@@ -196,6 +199,19 @@ class Requester:
         self.round_trips.append(self._clock.now - asked.sent_at)
         asked.on_reply(reply)
         self._fill()
+
+    def _look_at_deadlines(self) -> None:
+        """The first deadline is reached; those of what was answered meanwhile need no event.
+
+        One event for all: a timer for each request costs more than the request.
+        """
+        _, tag, attempt = self._deadlines[0]
+        self._expire(tag, attempt)
+        self._deadlines.popleft()
+        while self._deadlines and self._deadlines[0][1] not in self._open:
+            self._deadlines.popleft()
+        if self._deadlines:
+            self._clock.call_at(self._deadlines[0][0], self._look_at_deadlines)
 
     def _expire(self, tag: int, attempt: int) -> None:
         asked = self._open.get(tag)

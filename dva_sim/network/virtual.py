@@ -36,6 +36,7 @@ class VirtualNetwork:
         self._services: dict[str, Service] = {}
         self._gone: set[str] = set()
         self._subscriptions: dict[str, list[VirtualSubscription]] = defaultdict(list)
+        self._wanted: dict[tuple[str, str], list[VirtualSubscription]] = {}
 
     def introduce(self, node: str, address: str) -> None:
         """See `Transport`: here everybody is found by name."""
@@ -55,17 +56,16 @@ class VirtualNetwork:
     def publish(self, node: str, topic: str, payload: Any, size: int) -> None:
         """See `Transport`."""
         total = size + FRAMING + len(topic) + 2
-        for subscription in self._subscriptions[node]:
-            if subscription.joined and topic.startswith(subscription.topic):
+        for subscription in self._subscribers(node, topic):
+            if subscription.joined:
                 self.traffic(self.clock.now, node, subscription.node, total)
                 subscription.connection.to_opener.send(payload, total)
 
     def ready(self, node: str, topic: str, size: int) -> bool:
         """See `Transport`: the link's queue shows what still waits."""
-        for subscription in self._subscriptions[node]:
-            if subscription.joined and topic.startswith(subscription.topic):
-                downlink, _ = self.links(node, subscription.node)
-                return downlink.backlog_bytes(self.clock.now) < size
+        for subscription in self._subscribers(node, topic):
+            if subscription.joined:
+                return subscription.downlink.backlog_bytes(self.clock.now) < size
         return False
 
     def subscribe(
@@ -74,6 +74,7 @@ class VirtualNetwork:
         """See `Transport`."""
         subscription = VirtualSubscription(self, node, publisher, topic, handler)
         self._subscriptions[publisher].append(subscription)
+        self._wanted.clear()
         if publisher not in self._gone:
             subscription.open()
         return subscription
@@ -97,6 +98,15 @@ class VirtualNetwork:
         known = self._subscriptions[subscription.publisher]
         if subscription in known:
             known.remove(subscription)
+            self._wanted.clear()
+
+    def _subscribers(self, node: str, topic: str) -> list[VirtualSubscription]:
+        """Who wants a topic, joined or not: found out anew when somebody has come or gone."""
+        known = self._wanted.get((node, topic))
+        if known is None:
+            known = [s for s in self._subscriptions[node] if topic.startswith(s.topic)]
+            self._wanted[node, topic] = known
+        return known
 
 
 class VirtualWire:
@@ -152,6 +162,7 @@ class VirtualSubscription:
 
     Attributes:
         joined: Whether the publisher knows of it by now.
+        downlink: Carries what is published to it.
     """
 
     def __init__(
@@ -183,8 +194,8 @@ class VirtualSubscription:
         self._network.forget(self)
 
     def _new_connection(self) -> Connection:
-        out, back = self._network.links(self.node, self.publisher)
-        return Connection(self._network.clock, out, back, self._joined, self._handler)
+        out, self.downlink = self._network.links(self.node, self.publisher)
+        return Connection(self._network.clock, out, self.downlink, self._joined, self._handler)
 
     def _subscribe(self) -> None:
         self.connection.to_peer.send(self.topic, len(self.topic) + 1)

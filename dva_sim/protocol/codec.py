@@ -8,7 +8,7 @@ very form `encode` gives them, of the kinds that a drive is made of, take a shor
 from __future__ import annotations
 
 import re
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Final
 
@@ -46,9 +46,14 @@ def timestamp(seconds_of_day: float, exact: bool = False) -> str:
         exact: To the microsecond; otherwise fractions are dropped.
     """
     whole = int(seconds_of_day // 1)
-    minutes, seconds = divmod(whole % 86_400, 60)
-    told = f"{minutes // 60:02}:{minutes % 60:02}:{seconds:02}"
+    told = _clock_face(whole % 86_400)
     return f"{told}.{int((seconds_of_day - whole) * 1e6):06}" if exact else told
+
+
+@lru_cache(maxsize=64)
+def _clock_face(second: int) -> str:
+    minutes, seconds = divmod(second, 60)
+    return f"{minutes // 60:02}:{minutes % 60:02}:{seconds:02}"
 
 
 def encode(message: Message) -> bytes:
