@@ -6,6 +6,7 @@ import math
 from typing import Final, NamedTuple, Protocol
 
 import pymunk
+from pymunk._chipmunk_cffi import lib
 
 from dva_sim.worlds.contacts import Contacts, Jam
 from dva_sim.worlds.drives import DriveSpec
@@ -21,15 +22,11 @@ WALL, ROBOT, PERSON = 1, 2, 3  # collision types
 RELAXATION: Final = 0.5  # of a person's velocity towards the wanted one [s]
 MOST_PUSH: Final = 3.0  # force of a person's legs by mass [m/s^2]; assumed
 
-# Bound once: the functions behind pymunk's properties skip a layer in the hot loop.
-_set_force = pymunk.Body.force.fset  # type: ignore[attr-defined]
-_set_torque = pymunk.Body.torque.fset  # type: ignore[attr-defined]
-_set_velocity = pymunk.Body.velocity.fset  # type: ignore[attr-defined]
-_set_spin = pymunk.Body.angular_velocity.fset  # type: ignore[attr-defined]
-_get_velocity = pymunk.Body.velocity.fget  # type: ignore[attr-defined]
-_get_spin = pymunk.Body.angular_velocity.fget  # type: ignore[attr-defined]
-_get_angle = pymunk.Body.angle.fget  # type: ignore[attr-defined]
-_get_position = pymunk.Body.position.fget  # type: ignore[attr-defined]
+# Straight to the functions behind pymunk's properties, for the hot loop: half the cost.
+_get_velocity, _get_position = lib.cpBodyGetVelocity, lib.cpBodyGetPosition
+_get_spin, _get_angle = lib.cpBodyGetAngularVelocity, lib.cpBodyGetAngle
+_set_velocity, _set_spin = lib.cpBodySetVelocity, lib.cpBodySetAngularVelocity
+_set_force, _set_torque = lib.cpBodySetForce, lib.cpBodySetTorque
 
 
 class Timing(Protocol):
@@ -72,24 +69,25 @@ class Body:
 
     def __init__(self, world: Timing, name: str, body: pymunk.Body, shape: pymunk.Shape) -> None:
         self.name, self._world, self.body, self.shape = name, world, body, shape
+        self._raw = body._body  # what the functions of the library take
         self.radius, self.impulse = 0.0, 0.0
         self._touch = Contacts()
 
     @property
     def x(self) -> float:
         """Position [m]."""
-        return float(_get_position(self.body)[0])
+        return float(_get_position(self._raw).x)
 
     @property
     def y(self) -> float:
         """Position [m]."""
-        return float(_get_position(self.body)[1])
+        return float(_get_position(self._raw).y)
 
     @property
     def velocity(self) -> tuple[float, float]:
         """Along x and y [m/s]."""
-        vx, vy = _get_velocity(self.body)
-        return float(vx), float(vy)
+        velocity = _get_velocity(self._raw)
+        return velocity.x, velocity.y
 
     @property
     def contacts(self) -> int:
@@ -176,18 +174,18 @@ class RobotBody(Body):
     @property
     def speed(self) -> float:
         """Measured speed along the heading [m/s]."""
-        velocity, angle = _get_velocity(self.body), _get_angle(self.body)
-        return float(velocity[0] * math.cos(angle) + velocity[1] * math.sin(angle))
+        velocity, angle = _get_velocity(self._raw), _get_angle(self._raw)
+        return float(velocity.x * math.cos(angle) + velocity.y * math.sin(angle))
 
     @property
     def turn_rate(self) -> float:
         """Measured turn rate [rad/s]."""
-        return float(_get_spin(self.body))
+        return float(_get_spin(self._raw))
 
     def pose(self) -> Pose:
         """Where it is, as of the last whole tick; the heading counts full turns."""
-        x, y = _get_position(self.body)
-        return Pose(x, y, _get_angle(self.body))
+        place = _get_position(self._raw)
+        return Pose(place.x, place.y, _get_angle(self._raw))
 
     @property
     def powered(self) -> bool:
@@ -222,34 +220,36 @@ class RobotBody(Body):
         Wheels hold along and across together no more than the grip of the floor: beyond that
         they slip, and the force keeps its direction (a friction circle).
         """
-        body = self.body
+        raw = self._raw
         if self._next is not self._now and tick >= self._next.start:
             self._now = self._next
         wanted, wanted_spin, _, end = self._now
         if tick >= end or not self._powered:
             wanted = wanted_spin = 0.0
-        velocity, spin = _get_velocity(body), _get_spin(body)
-        # pymunk moves a body before it applies forces: aim along the heading by then.
-        angle = _get_angle(body) + spin * dt
+        velocity, spin = _get_velocity(raw), _get_spin(raw)
+        vx, vy = velocity.x, velocity.y
+        # Bodies are moved before forces act on them: aim along the heading by then.
+        angle = _get_angle(raw) + spin * dt
         cos, sin = math.cos(angle), math.sin(angle)
-        forward = velocity[0] * cos + velocity[1] * sin
-        sideways = velocity[1] * cos - velocity[0] * sin
+        forward, sideways = vx * cos + vy * sin, vy * cos - vx * sin
         if wanted == wanted_spin == 0.0:
             if abs(forward) + abs(sideways) + abs(spin) < AT_REST:
-                _set_velocity(body, (0.0, 0.0))
-                _set_spin(body, 0.0)
+                _set_velocity(raw, (0.0, 0.0))
+                _set_spin(raw, 0.0)
                 return self._next is not self._now
         elif self._touch.touching:
             self._jam.strain(*self.pose(), dt)
-        change, turn = self._drive.accelerations(wanted, wanted_spin, forward, spin, dt)
-        slip, most = -sideways / dt, self.grip * G
-        asked = math.hypot(change, slip)
+        along, turn = self._drive.accelerations(wanted, wanted_spin, forward, spin, dt)
+        across, most = -sideways / dt, self.grip * G
+        asked = math.hypot(along, across)
         if asked > most:
-            change, slip = change * most / asked, slip * most / asked
-        along, across = self._mass * change, self._mass * slip
-        most_torque = self._mass * most * self._arm
-        _set_force(body, (along * cos - across * sin, along * sin + across * cos))
-        _set_torque(body, min(max(self._moment * turn, -most_torque), most_torque))
+            along, across = along * most / asked, across * most / asked
+        along, across = self._mass * along, self._mass * across
+        torque, most_torque = self._moment * turn, self._mass * most * self._arm
+        if not -most_torque <= torque <= most_torque:
+            torque = math.copysign(most_torque, torque)
+        _set_force(raw, (along * cos - across * sin, along * sin + across * cos))
+        _set_torque(raw, torque)
         self.distance += abs(forward) * dt
         if along > 0.0:
             self.work += along * forward * dt
@@ -310,14 +310,14 @@ class PersonBody(Body):
         if self._next is not self._now and tick >= self._next[2]:
             self._now = self._next
         wx, wy, _ = self._now
-        vx, vy = _get_velocity(self.body)
+        vx, vy = self.velocity
         if wx == wy == 0.0 and abs(vx) + abs(vy) < AT_REST:
-            _set_velocity(self.body, (0.0, 0.0))
+            _set_velocity(self._raw, (0.0, 0.0))
             return self._next is not self._now
         ax, ay = (wx - vx) / RELAXATION, (wy - vy) / RELAXATION
         asked = math.hypot(ax, ay)
         share = self._mass * min(1.0, MOST_PUSH / asked) if asked > 0.0 else 0.0
-        _set_force(self.body, (ax * share, ay * share))
+        _set_force(self._raw, (ax * share, ay * share))
         return True
 
     def meets(self, other: Body | None, now: float) -> None:

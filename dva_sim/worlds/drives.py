@@ -68,11 +68,13 @@ class Differential(Drive):
         self, speed: float, turn_rate: float, now_speed: float, now_turn_rate: float, dt: float
     ) -> tuple[float, float]:
         """First order towards what is wanted, within the limits of acceleration."""
-        gain = 1.0 / max(self._time, dt)
-        along = (speed - now_speed) * gain
-        along = min(max(along, self._down), self._up)
-        turn = (turn_rate - now_turn_rate) * gain
-        return along, min(max(turn, -self._turn), self._turn)
+        gain = 1.0 / (self._time if self._time > dt else dt)
+        along, turn = (speed - now_speed) * gain, (turn_rate - now_turn_rate) * gain
+        if not self._down <= along <= self._up:
+            along = self._up if along > 0.0 else self._down
+        if not -self._turn <= turn <= self._turn:
+            turn = math.copysign(self._turn, turn)
+        return along, turn
 
 
 class ThreeWay(Drive):
