@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.worlds.maps import OccupancyGrid, segments
-from dva_sim.worlds.parts import CEILING, Compartment, Opening, Room
+from dva_sim.worlds.maps import OccupancyGrid, cells_inside, segments
+from dva_sim.worlds.parts import CEILING, Compartment, Lookup, Opening, Room
 
 Floats = NDArray[np.float64]
 Labels = NDArray[np.int16]
@@ -51,7 +51,8 @@ def of_rooms(
     """
     indoor = [room for room in rooms if not room.outdoor]
     compartments = [Compartment(r.name, _area(r.polygon), r.ceiling, r.polygon) for r in indoor]
-    doors = [opening for way in ways for opening in _passage(rooms, *way)]
+    lookup = Lookup(rooms)
+    doors = [opening for way in ways for opening in _passage(lookup, *way)]
     borders = _borders(indoor, walls, [ends for ends, _, _ in ways])
     return Partition(tuple(compartments), (*doors, *borders), _labels(grid, indoor))
 
@@ -62,7 +63,7 @@ def _area(polygon: Floats) -> float:
 
 
 def _passage(
-    rooms: Sequence[Room], ends: Sequence[float], height: float, kind: str
+    rooms: Lookup[Room], ends: Sequence[float], height: float, kind: str
 ) -> Iterator[Opening]:
     """A door with the rooms on both sides; none if it joins a room to itself."""
     x1, y1, x2, y2 = ends
@@ -75,15 +76,15 @@ def _passage(
         yield Opening(a, b, x1, y1, x2, y2, width, height, kind)
 
 
-def _beside(rooms: Sequence[Room], ends: Sequence[float], side: float) -> Room | None:
+def _beside(rooms: Lookup[Room], ends: Sequence[float], side: float) -> Room | None:
     """The room on one side of a door's middle."""
     x1, y1, x2, y2 = ends
     for far in PROBES:
         x = (x1 + x2) / 2 - side * far * (y2 - y1)
         y = (y1 + y2) / 2 + side * far * (x2 - x1)
-        for room in rooms:
-            if room.contains(x, y):
-                return room
+        room = rooms.at(x, y)
+        if room is not None:
+            return room
     return None
 
 
@@ -95,12 +96,14 @@ def _borders(
 
     areas = [shapely.Polygon(room.polygon) for room in rooms]
     lines = np.vstack([walls, np.reshape(doors, (-1, 4))]).reshape(-1, 2, 2)
-    closed: Any = shapely.union_all(shapely.buffer(shapely.linestrings(lines), NEAR))
+    barriers = [shapely.LineString(line).buffer(NEAR) for line in lines]
+    near = shapely.STRtree(barriers)
     wide = [area.buffer(NEAR, join_style="mitre") for area in areas]
     first, second = shapely.STRtree(areas).query(wide, predicate="intersects")
     for a, b in sorted((int(a), int(b)) for a, b in zip(first, second, strict=True) if a < b):
-        free = (areas[a].exterior & wide[b]) - closed
-        for ends in _straight(free).tolist():
+        shared = areas[a].exterior & wide[b]
+        closed: Any = shapely.union_all(near.geometries[near.query(shared)])
+        for ends in _straight(shared - closed).tolist():
             x1, y1, x2, y2 = _up_to(closed, ends)
             width = math.hypot(x2 - x1, y2 - y1)
             if width >= LEAST_BORDER:
@@ -135,16 +138,11 @@ def _up_to(closed: Any, ends: Sequence[float]) -> tuple[float, float, float, flo
 
 def _labels(grid: OccupancyGrid, rooms: Sequence[Room]) -> Labels:
     """Whose each cell is."""
-    import shapely
-
     labels = np.full(grid.cells.shape, NOWHERE, np.int16)
     for number, room in reversed(list(enumerate(rooms))):
-        box = grid.window(room.polygon)
-        middles = grid.middles(box)
-        area = shapely.Polygon(room.polygon)
-        shapely.prepare(area)
-        inside = shapely.intersects_xy(area, middles[..., 0], middles[..., 1])
-        labels[box][inside] = number
+        window = grid.window(room.polygon)
+        border = np.hstack([room.polygon, np.roll(room.polygon, -1, axis=0)])
+        labels[window][cells_inside(grid, border, window)] = number
     return labels
 
 

@@ -22,6 +22,7 @@ from dva_sim.worlds.parts import (
     Detector,
     Exit,
     FixedCamera,
+    Lookup,
     Opening,
     Room,
     Zone,
@@ -82,18 +83,20 @@ class Site:
 
     def room_at(self, x: float, y: float) -> str | None:
         """Name of the room around a point [m], or None outside all rooms."""
-        for room, (xmin, ymin, xmax, ymax) in zip(self.rooms, self._boxes, strict=True):
-            if xmin <= x <= xmax and ymin <= y <= ymax and room.contains(x, y):
-                return room.name
-        return None
-
-    @cached_property
-    def _boxes(self) -> list[list[float]]:
-        return [[*r.polygon.min(axis=0), *r.polygon.max(axis=0)] for r in self.rooms]
+        room = self._rooms.at(x, y)
+        return None if room is None else room.name
 
     def link_quality(self, x: float, y: float) -> Coverage | None:
         """The coverage drawn around a point [m], the later over the earlier; None for none."""
-        return next((c for c in reversed(self.wifi) if c.contains(x, y)), None)
+        return self._wifi.at(x, y)
+
+    @cached_property
+    def _rooms(self) -> Lookup[Room]:
+        return Lookup(self.rooms)
+
+    @cached_property
+    def _wifi(self) -> Lookup[Coverage]:
+        return Lookup(self.wifi[::-1])
 
     # --- bodies of air -----------------------------------------------------------------
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from functools import cached_property
+from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,16 +14,6 @@ from numpy.typing import NDArray
 Points = NDArray[np.float64]
 CEILING = 3.0  # of a room that does not say [m]
 DOOR_HEIGHT = 2.1  # of a door that does not say [m]
-
-
-def contains(polygon: Points, x: float, y: float) -> bool:
-    """Whether a point [m] lies inside: a ray from it crosses the border an odd time."""
-    px, py = polygon.T
-    qx, qy = np.roll(px, -1), np.roll(py, -1)
-    spans = (py > y) != (qy > y)
-    px, py, qx, qy = px[spans], py[spans], qx[spans], qy[spans]
-    crossings = px + (y - py) * (qx - px) / (qy - py) > x
-    return bool(np.count_nonzero(crossings) % 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,8 +24,49 @@ class Area:
     polygon: Points
 
     def contains(self, x: float, y: float) -> bool:
-        """Whether a point [m] lies inside."""
-        return contains(self.polygon, x, y)
+        """Whether a point [m] lies inside: a ray from it crosses the border an odd time."""
+        odd = False
+        px, py = self._corners[-1]
+        for qx, qy in self._corners:
+            if (py > y) != (qy > y) and px + (y - py) * (qx - px) / (qy - py) > x:
+                odd = not odd
+            px, py = qx, qy
+        return odd
+
+    @cached_property
+    def _corners(self) -> list[tuple[float, float]]:
+        return [(float(x), float(y)) for x, y in self.polygon]
+
+    @cached_property
+    def box(self) -> tuple[float, float, float, float]:
+        """xmin, ymin, xmax, ymax [m]."""
+        (xmin, ymin), (xmax, ymax) = self.polygon.min(axis=0), self.polygon.max(axis=0)
+        return float(xmin), float(ymin), float(xmax), float(ymax)
+
+
+T = TypeVar("T", bound=Area)
+
+
+class Lookup(Generic[T]):
+    """Areas by point; where some overlap, the first counts.
+
+    Args:
+        areas: In order of precedence.
+    """
+
+    def __init__(self, areas: Sequence[T]) -> None:
+        self._areas = areas
+        boxes = np.array([area.box for area in areas]).reshape(-1, 4)
+        self._low, self._high = boxes[:, :2], boxes[:, 2:]
+
+    def at(self, x: float, y: float) -> T | None:
+        """The area around a point [m], or None outside all."""
+        point = (x, y)
+        near = np.all((self._low <= point) & (self._high >= point), axis=1)
+        for index in np.flatnonzero(near).tolist():
+            if self._areas[index].contains(x, y):
+                return self._areas[index]
+        return None
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -23,6 +23,7 @@ from dva_sim.worlds.parts import (
     Detector,
     Exit,
     FixedCamera,
+    Lookup,
     Room,
     Zone,
 )
@@ -93,7 +94,8 @@ def make_plan(features: Iterable[Feature], ceiling: float = CEILING) -> Plan:
     for feature in features:
         kinds[feature.kind].append(feature)
     plan = Plan(rooms=_rooms(kinds, ceiling))
-    plan.exits = tuple(_exit(plan.rooms, *numbered) for numbered in _numbered(kinds, "exit"))
+    lookup = Lookup(plan.rooms)
+    plan.exits = tuple(_exit(lookup, *numbered) for numbered in _numbered(kinds, "exit"))
     plan.zones = tuple(Zone(n, _corners(f), f.drawn.use) for f, n in _numbered(kinds, "zone"))
     plan.wifi = tuple(Coverage(n, _corners(f), f.drawn.link) for f, n in _numbered(kinds, "wifi"))
     plan.cameras = tuple(_camera(*numbered) for numbered in _numbered(kinds, "camera"))
@@ -105,7 +107,7 @@ def make_plan(features: Iterable[Feature], ceiling: float = CEILING) -> Plan:
     for kind in ("robot_base", "guard_post", "operator_desk"):
         for feature in kinds[kind]:
             plan.places[kind].append((_pose(feature), feature.fail))
-    _open_walls(plan, kinds)
+    _open_walls(plan, kinds, lookup)
     return plan
 
 
@@ -157,7 +159,7 @@ def _detectors(features: Iterable[Feature]) -> tuple[Detector, ...]:
     return tuple(found)
 
 
-def _exit(rooms: Sequence[Room], feature: Feature, name: str) -> Exit:
+def _exit(rooms: Lookup[Room], feature: Feature, name: str) -> Exit:
     """Out is the side further out: rooms, ground outdoors, nothing drawn; if alike, the left."""
     x1, y1, x2, y2 = _ends(feature.shape)
     width = math.hypot(x2 - x1, y2 - y1)
@@ -174,17 +176,17 @@ def _ends(line: Any) -> list[float]:
     return [float(value) for value in np.ravel(line.coords)[[0, 1, -2, -1]]]
 
 
-def _how_far_out(rooms: Sequence[Room], x: float, y: float, heading: float) -> int:
+def _how_far_out(rooms: Lookup[Room], x: float, y: float, heading: float) -> int:
     """What lies beyond a door: 0 a room, 1 ground outdoors, 2 nothing drawn."""
     for far in BEYOND:
         px, py = x + far * math.cos(heading), y + far * math.sin(heading)
-        for room in rooms:
-            if room.contains(px, py):
-                return int(room.outdoor)
+        room = rooms.at(px, py)
+        if room is not None:
+            return int(room.outdoor)
     return NOTHING
 
 
-def _open_walls(plan: Plan, kinds: dict[str, list[Feature]]) -> None:
+def _open_walls(plan: Plan, kinds: dict[str, list[Feature]], rooms: Lookup[Room]) -> None:
     """Open the walls at the doors and find the floor.
 
     An exit opens the wall only where ground is drawn beyond it: nobody drives off the plan.
@@ -197,7 +199,7 @@ def _open_walls(plan: Plan, kinds: dict[str, list[Feature]]) -> None:
     exits = [
         feature.shape
         for feature, way in zip(kinds["exit"], plan.exits, strict=True)
-        if _how_far_out(plan.rooms, way.x, way.y, way.heading) < NOTHING
+        if _how_far_out(rooms, way.x, way.y, way.heading) < NOTHING
     ]
     doors = [feature.shape for feature in kinds["door"]] + exits
     doorways = [door.buffer(DOOR_REACH, cap_style="flat") for door in doors]
@@ -206,6 +208,6 @@ def _open_walls(plan: Plan, kinds: dict[str, list[Feature]]) -> None:
     plan.doors = np.array([_ends(door.shape) for door in kinds["door"]]).reshape(-1, 4)
     plan.door_heights = tuple(door.drawn.height_m for door in kinds["door"])
     plan.solids = tuple(shapely.get_coordinates(solid.exterior) for solid in solids)
-    rooms = [shapely.Polygon(room.polygon) for room in plan.rooms]
+    ground = [shapely.Polygon(room.polygon) for room in plan.rooms]
     sills = [door.buffer(SILL, cap_style="flat") for door in doors]
-    plan.floor = shapely.difference(shapely.union_all(rooms + sills), shapely.union_all(solids))
+    plan.floor = shapely.difference(shapely.union_all(ground + sills), shapely.union_all(solids))
