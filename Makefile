@@ -5,6 +5,7 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 RUNTIME := $(VENV)/.runtime
 DEV := $(VENV)/.dev
+BENCH := $(VENV)/.bench
 DEMO := results/req-rep-vs-pub-sub
 
 .DEFAULT_GOAL := help
@@ -29,7 +30,7 @@ check: $(DEV)  ## lint, format, types, import contracts
 	@$(BIN)/mypy
 	@$(BIN)/lint-imports --no-logo 2>/dev/null || $(BIN)/lint-imports
 
-bench: $(DEV)  ## the ratios that performance work is judged by
+bench: $(BENCH)  ## the ratios that performance work is judged by
 	@$(BIN)/python -m pytest tests/benchmarks --benchmark-only --benchmark-disable-gc -p no:cacheprovider -s
 
 clean:  ## remove the environment and all caches, keep results
@@ -50,3 +51,8 @@ $(DEV): pyproject.toml constraints.txt | $(VENV)
 	@echo "Installing dva-sim and its development tools (about a minute the first time) ..."
 	@$(PIP) install -c constraints.txt -e '.[dev]'
 	@touch $@ $(RUNTIME)
+
+$(BENCH): $(DEV)
+	@echo "Installing what the benchmarks compare with ..."
+	@$(PIP) install -c constraints.txt -e '.[dev,bench]'
+	@touch $@ $(DEV) $(RUNTIME)
