@@ -85,7 +85,7 @@ def _draw(event: EventConfig, site: Site, streams: Streams, number: int) -> Inci
     room = site.room_at(x, y) or ""
     detector, detected = None, start
     if not event.reported:
-        detector, detected = first_detection(event.kind, hazard, site)
+        detector, detected = first_detection(hazard, site)
     luck = streams[f"event-{number}/hearsay"]
     hearsay = tuple(_hearsay(detected, (x, y), site, luck) for _ in range(event.reports - 1))
     return Incident(event.kind, room, start, detected, detector, hazard, event.false_alarm, hearsay)
@@ -119,5 +119,5 @@ def _place(event: EventConfig, site: Site, rng: np.random.Generator) -> tuple[fl
 
 def _watched_rooms(kind: str, site: Site) -> list[str | None]:
     """Rooms with a detector for a kind of event; `None`, which is anywhere, if there are none."""
-    watched = {site.room_at(d.x, d.y) for d in site.detectors if d.kind == DETECTS[kind]}
+    watched = {site.room_at(d.x, d.y) for d in site.detectors if d.kind in DETECTS[kind]}
     return [room.name for room in site.rooms if room.name in watched] or [None]

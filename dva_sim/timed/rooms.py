@@ -24,6 +24,7 @@ from dva_sim.worlds.site import FOOTPRINT, Pose, Site, load_site
 
 CLEARANCE = 0.4  # radius that must fit where an event happens [m]
 MOST_PATHS = 5000  # kept at a time
+FOUND = 3600.0  # what no detector notices people do, after so long [s]; assumed
 WALL, PASSAGE = 0.05, 0.6  # thickness of a wall, and the least width to pass [m]
 
 
@@ -90,7 +91,7 @@ def _passages_of(site: Site) -> tuple[Point, ...]:
 @lru_cache(maxsize=4096)
 def _detected_after(site: Site, kind: str, point: Point) -> float:
     """Events happen at the same few spots again and again: once per process."""
-    return first_detection(kind, make_hazard(kind, point, 0.0), site)[1]
+    return min(FOUND, first_detection(make_hazard(kind, point, 0.0), site)[1])
 
 
 class Rooms(Terrain):
@@ -215,9 +216,9 @@ class Rooms(Terrain):
         Raises:
             ConfigError: there is no detector for it.
         """
-        if not any(d.kind == DETECTS[kind] for d in self.site.detectors):
-            raise ConfigError(f"site {self.site.name!r} has no {DETECTS[kind]} detectors")
+        if not any(d.kind in DETECTS[kind] for d in self.site.detectors):
+            raise ConfigError(f"site {self.site.name!r} has no {DETECTS[kind][0]} detectors")
 
     def detected_after(self, kind: str, place: Place) -> float:
-        """From the outbreak to the first detector that notices it [s]; infinite if none does."""
+        """From the outbreak to the first detector, or somebody, that notices it [s]."""
         return _detected_after(self.site, kind, place.point)

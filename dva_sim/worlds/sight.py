@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -31,3 +33,20 @@ class Sight:
         across = np.array([ay - by, bx - ax]) @ self._ends + (ax * by - bx * ay)
         blocked = (sides[:, 0] * sides[:, 1] < 0) & (across[::2] * across[1::2] < 0)
         return not blocked.any()
+
+    def from_point(self, a: Point, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Whether each of many places `(..., 2)` [m] can be seen from one."""
+        flat = points.reshape(-1, 2)
+        seen = np.ones(len(flat), bool)
+        ends = self._ends.T.reshape(-1, 2, 2)
+        for (px, py), (qx, qy) in ends.tolist():
+            side_a, (x, y) = _side(px, py, qx, qy, *a), flat.T
+            across = side_a * _side(px, py, qx, qy, x, y) < 0
+            ends_apart = _side(*a, x, y, px, py) * _side(*a, x, y, qx, qy) < 0
+            seen &= ~(across & ends_apart)
+        return seen.reshape(points.shape[:-1])
+
+
+def _side(px: Any, py: Any, qx: Any, qy: Any, x: Any, y: Any) -> Any:
+    """On which side of the line p-q a point lies, by sign."""
+    return (qx - px) * (y - py) - (qy - py) * (x - px)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dva_sim.worlds.hazards.base import CLEAR, DETECTS, Conditions, Hazard
-from dva_sim.worlds.hazards.detecting import detection_time, first_detection
+from dva_sim.worlds.hazards.base import CLEAR, Conditions, Hazard
+from dva_sim.worlds.hazards.detecting import DETECTS, detection_time, first_detection
+from dva_sim.worlds.hazards.dose import Dose, pace_in_smoke, pace_in_water, visibility
 from dva_sim.worlds.hazards.fire import GROWTH_S, Fire
 from dva_sim.worlds.hazards.flood import Flood
 from dva_sim.worlds.hazards.leak import GASES, GasLeak
@@ -17,6 +18,7 @@ __all__ = [
     "GROWTH_S",
     "KINDS",
     "Conditions",
+    "Dose",
     "Fire",
     "Flood",
     "GasLeak",
@@ -26,4 +28,7 @@ __all__ = [
     "detection_time",
     "first_detection",
     "make_hazard",
+    "pace_in_smoke",
+    "pace_in_water",
+    "visibility",
 ]

@@ -10,9 +10,6 @@ AMBIENT = 20.0  # temperature of the air where nothing burns [deg C]
 BREATHING_HEIGHT = 1.5  # of a person's mouth and eyes [m]
 LARGEST = 2.5  # what can be seen of a leak or flood never grows beyond this [m]; assumed
 
-# Which detectors notice what.
-DETECTS = {"fire": "smoke", "gas_leak": "gas", "flood": "water"}
-
 
 class Conditions(NamedTuple):
     """The air at a place, at the height of a person's mouth and eyes; water on its floor.

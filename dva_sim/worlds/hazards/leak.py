@@ -62,6 +62,9 @@ class GasLeak:
         rate: Gas set free [m^3/s]; 0 stands for a serious leak of that gas.
         diffusivity: Of the stirred air [m^2/s].
         air_changes: Fresh air per hour, in volumes of the room.
+        wind: Outdoors [m/s].
+        wind_heading: Where it blows to, counter-clockwise from east [rad].
+        stability: Of the air outdoors, A to F.
 
     References:
         K.-C. Cheng et al., Environ. Sci. Technol. 45 (2011) 4016: 0.001 to 0.013 m^2/s in calm
@@ -74,6 +77,9 @@ class GasLeak:
     rate: float = 0.0
     diffusivity: float = EDDY_DIFFUSIVITY
     air_changes: float = AIR_CHANGES
+    wind: float = 2.0
+    wind_heading: float = 0.0
+    stability: str = "D"
 
     @property
     def kind_of_gas(self) -> Gas:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import fields
 
 from dva_sim.errors import ConfigError
@@ -9,13 +10,15 @@ from dva_sim.worlds.hazards.base import Hazard, Point
 from dva_sim.worlds.hazards.fire import GROWTH_S, Fire
 from dva_sim.worlds.hazards.flood import Flood
 from dva_sim.worlds.hazards.leak import GASES, GasLeak
+from dva_sim.worlds.hazards.plumes import CLASSES
 
 KINDS: dict[str, type[Fire] | type[GasLeak] | type[Flood]] = {
     "fire": Fire,
     "gas_leak": GasLeak,
     "flood": Flood,
 }
-CHOICES = {"growth": tuple(GROWTH_S), "gas": tuple(GASES)}
+CHOICES = {"growth": tuple(GROWTH_S), "gas": tuple(GASES), "stability": tuple(CLASSES)}
+ANY_SIGN = ("wind_heading",)
 
 
 def make_hazard(kind: str, position: Point, start: float, **settings: str | float) -> Hazard:
@@ -47,5 +50,7 @@ def _check(kind: str, name: str, value: str | float) -> None:
     if choices is not None:
         if value not in choices:
             raise ConfigError(f"{name} {value!r} is not known; known: {', '.join(choices)}")
-    elif not isinstance(value, int | float) or not 0.0 < value < float("inf"):
+    elif name in ANY_SIGN and isinstance(value, int | float) and math.isfinite(value):
+        return
+    elif not isinstance(value, int | float) or not 0.0 < value < math.inf:
         raise ConfigError(f"{name} of a {kind} is a positive number, not {value!r}")

@@ -1,0 +1,167 @@
+"""A site as air and water see it: spaces, what joins them, and which space is where."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dva_sim.worlds.layout import Site
+from dva_sim.worlds.maps import OccupancyGrid
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+LONGEST = 12.0  # longer corridors do not fill from end to end at once: they are parted [m]
+NOWHERE = -1  # in no space
+
+
+@dataclass(frozen=True, eq=False)
+class Spaces:
+    """Bodies of air with a level floor, and the openings between them.
+
+    Attributes:
+        area: Of the floors, shape `(n,)` [m^2].
+        ceiling: Heights, shape `(n,)` [m].
+        a: Index of the space on one side of each opening, shape `(k,)`.
+        b: On the other side; `n` stands for outdoors.
+        width: Of the openings [m].
+        top: Height of their lintels [m].
+    """
+
+    area: Floats
+    ceiling: Floats
+    a: Integers
+    b: Integers
+    width: Floats
+    top: Floats
+
+    @property
+    def count(self) -> int:
+        """How many there are."""
+        return len(self.area)
+
+
+@dataclass(frozen=True, eq=False)
+class Building:
+    """The spaces of a site, and where they are.
+
+    Attributes:
+        spaces: Its bodies of air; long ones are parted.
+        grid: Gives the cells.
+        labels: The space of each cell, or `NOWHERE`, shape `(rows, columns)`.
+    """
+
+    spaces: Spaces
+    grid: OccupancyGrid
+    labels: NDArray[np.int16]
+
+    def space_at(self, x: float, y: float) -> int:
+        """Index of the space around a point [m], or `NOWHERE`."""
+        row, column = self.grid.to_cell(x, y)
+        rows, columns = self.labels.shape
+        return int(self.labels[row, column]) if 0 <= row < rows and 0 <= column < columns else -1
+
+
+class _ByGrid:
+    """Sites of one bare map differ in their bases only: they share what is worked out."""
+
+    def __init__(self, site: Site) -> None:
+        self.site = site
+
+    def __hash__(self) -> int:
+        return hash(id(self.site.grid))
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _ByGrid) and other.site.grid is self.site.grid
+
+
+def building_of(site: Site) -> Building:
+    """The building that a site is, once per process."""
+    return _building(_ByGrid(site))
+
+
+@lru_cache(maxsize=8)
+def _building(key: _ByGrid) -> Building:
+    site = key.site
+    parting = _Parting(site)
+    openings = [o for o in site.openings if o.height > 0.0]
+    ends = [
+        parting.sides(o.room_a, o.room_b, (o.x1 + o.x2) / 2, (o.y1 + o.y2) / 2) for o in openings
+    ]
+    joints = np.array([*ends, *((a, b) for a, b, _ in parting.cuts)], np.int64).reshape(-1, 2)
+    ceiling = np.array(parting.ceiling)
+    tops = [ceiling[a] for a, _, _ in parting.cuts]
+    spaces = Spaces(
+        np.array(parting.area),
+        ceiling,
+        joints[:, 0],
+        np.where(joints[:, 1] == NOWHERE, len(ceiling), joints[:, 1]),
+        np.array([*(o.width for o in openings), *(width for _, _, width in parting.cuts)]),
+        np.array([*(o.height for o in openings), *tops]),
+    )
+    return Building(spaces, site.grid, parting.labels)
+
+
+class _Parting:
+    """Compartments cut into parts no longer than `LONGEST`.
+
+    Attributes:
+        area: Of the parts [m^2].
+        ceiling: Of the parts [m].
+        cuts: Two parts and the width between them [m], for each cut.
+        labels: The part of each cell.
+    """
+
+    def __init__(self, site: Site) -> None:
+        self._site, self._of = site, {}
+        self.area: list[float] = []
+        self.ceiling: list[float] = []
+        self.cuts: list[tuple[int, int, float]] = []
+        whole = site.partition.labels
+        self.labels = np.full(whole.shape, NOWHERE, np.int16)
+        for number, compartment in enumerate(site.compartments):
+            rows, columns = np.nonzero(whole == number)
+            self._of[compartment.name] = self._cut(
+                rows, columns, compartment.area, compartment.ceiling
+            )
+
+    def _cut(self, rows: Integers, columns: Integers, area: float, ceiling: float) -> list[int]:
+        """The parts of one compartment, cut across its longer side."""
+        first, resolution = len(self.area), self._site.grid.resolution
+        along = rows if _span(rows) > _span(columns) else columns
+        count = max(1, math.ceil(_span(along) * resolution / LONGEST - 0.1))
+        low, span = int(along.min()) if len(along) else 0, _span(along) / count
+        part = np.minimum((along - low) // span, count - 1).astype(np.int64)
+        self.labels[rows, columns] = first + part
+        for number in range(count):
+            self.area.append(area * max(1, int((part == number).sum())) / max(1, len(along)))
+            self.ceiling.append(ceiling)
+            if number:
+                across = int((along == low + math.ceil(number * span)).sum())
+                self.cuts.append((first + number - 1, first + number, across * resolution))
+        return list(range(first, first + count))
+
+    def sides(self, a: str, b: str | None, x: float, y: float) -> tuple[int, int]:
+        """The parts that an opening at a point [m] joins."""
+        return self._nearest(a, x, y), NOWHERE if b is None else self._nearest(b, x, y)
+
+    def _nearest(self, name: str, x: float, y: float) -> int:
+        """The part of a compartment nearest to a point [m]."""
+        parts = self._of[name]
+        if len(parts) == 1:
+            return parts[0]
+        row, column = self._site.grid.to_cell(x, y)
+        gaps = []
+        for part in parts:
+            rows, columns = np.nonzero(self.labels == part)
+            gaps.append(float(np.hypot(rows - row, columns - column).min()))
+        return parts[int(np.argmin(gaps))]
+
+
+def _span(cells: Integers) -> int:
+    """How many rows or columns cells lie in."""
+    return int(cells.max() - cells.min()) + 1 if len(cells) else 1

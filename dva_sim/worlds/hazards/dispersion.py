@@ -1,0 +1,144 @@
+"""Gas in a building: it spreads by eddies, drifts with a draught, and fresh air thins it.
+
+The share of gas in the air, averaged from floor to ceiling, on a mesh of the floor: finite
+volumes, implicit in time. What is set free is in the air or was carried out, to rounding.
+
+Left out: rising and layering of light gas, the jet itself, exchange through outer doors.
+
+References:
+    S. V. Patankar, Numerical Heat Transfer and Fluid Flow, Hemisphere 1980: finite volumes,
+    the exponential scheme.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dva_sim.worlds.hazards.building import Building
+from dva_sim.worlds.hazards.leak import MIXED_HEIGHT
+from dva_sim.worlds.hazards.mesh import Mesh, mesh_of
+
+Floats = NDArray[np.float64]
+
+
+class Draught(NamedTuple):
+    """Air blown in at one node of a mesh and sucked off at another [m^3/s]."""
+
+    supply: int
+    exhaust: int
+    rate: float
+
+
+class Air:
+    """How the air of a mesh moves.
+
+    Args:
+        mesh: Where.
+        diffusivity: [m^2/s]
+        loss: Fresh air, in volumes per second.
+        draught: A steady flow through the rooms, if there is one.
+        height: From floor to ceiling [m].
+    """
+
+    def __init__(
+        self,
+        mesh: Mesh,
+        diffusivity: float,
+        loss: float,
+        draught: Draught | None = None,
+        height: float = MIXED_HEIGHT,
+    ) -> None:
+        self.mesh, self.height, self._loss = mesh, height, loss
+        self._spread = diffusivity * mesh.shape
+        self.flow = _potential_flow(mesh, draught, height)
+        self._exhaust = np.zeros(len(mesh.area))
+        if draught is not None:
+            self._exhaust[draught.exhaust] = draught.rate / height
+        self._solvers: dict[float, Any] = {}
+
+    def still(self) -> Floats:
+        """Clean air: the share in every node and, last, what was carried out [m^3]."""
+        return np.zeros(len(self.mesh.area) + 1)
+
+    def amount(self, state: Floats) -> float:
+        """Gas in the air [m^3]."""
+        return float(state[:-1] @ self.mesh.area) * self.height
+
+    def step(self, state: Floats, node: int, rate: float, dt: float) -> Floats:
+        """The state `dt` [s] later, with a source [m^3/s] in a node."""
+        source = self.mesh.area / dt * state[:-1]
+        source[node] += rate / self.height
+        share = self._solver(dt).solve(source)
+        out = float((self._loss * self.mesh.area + self._exhaust) @ share)
+        return np.append(share, state[-1] + dt * self.height * out)
+
+    def _solver(self, dt: float) -> Any:
+        """The factors of a step's equations, once for each length of a step."""
+        if dt not in self._solvers:
+            from scipy.sparse.linalg import splu
+
+            self._solvers[dt] = splu(self._equations(dt), permc_spec="MMD_AT_PLUS_A")
+        return self._solvers[dt]
+
+    def _equations(self, dt: float) -> Any:
+        """The matrix of one implicit step."""
+        from scipy.sparse import coo_array
+
+        mesh = self.mesh
+        forth, back = _carried(self._spread, self.flow), _carried(self._spread, -self.flow)
+        own = mesh.area * (1.0 / dt + self._loss) + self._exhaust
+        own = own + np.bincount(mesh.a, forth, len(own)) + np.bincount(mesh.b, back, len(own))
+        here = np.arange(len(own))
+        rows, columns = np.r_[here, mesh.b, mesh.a], np.r_[here, mesh.a, mesh.b]
+        return coo_array((np.r_[own, -forth, -back], (rows, columns))).tocsc()
+
+
+def _carried(spread: Floats, flow: Floats) -> Floats:
+    """Air that passes each border one way, by eddies and drift: the exponential scheme.
+
+    Exact for steady flow along one line; never negative.
+    """
+    ratio = np.clip(-flow / spread, -50.0, 50.0)
+    small = np.abs(ratio) < 1e-6
+    safe = np.where(small, 1.0, ratio)
+    return np.asarray(spread * np.where(small, 1.0 - ratio / 2.0, safe / np.expm1(safe)))
+
+
+def _potential_flow(mesh: Mesh, draught: Draught | None, height: float) -> Floats:
+    """Air that passes each border from a to b [m^2/s]: without whirls, and none is lost."""
+    if draught is None:
+        return np.zeros(len(mesh.a))
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+    from scipy.sparse.linalg import spsolve
+
+    count = len(mesh.area)
+    both = np.r_[mesh.a, mesh.b], np.r_[mesh.b, mesh.a]
+    link = coo_array((-np.r_[mesh.shape, mesh.shape], both), (count, count)).tocsr()
+    _, part = connected_components(link, directed=False)
+    if part[draught.supply] != part[draught.exhaust]:
+        raise ValueError("no way leads from the supply to the exhaust")
+    inside = np.flatnonzero(part == part[draught.supply])
+    here = np.setdiff1d(inside, [draught.exhaust])  # its potential is zero
+    own = np.bincount(mesh.a, mesh.shape, count) + np.bincount(mesh.b, mesh.shape, count)
+    matrix = (link + coo_array((own, (np.arange(count),) * 2)).tocsr())[here][:, here]
+    potential, source = np.zeros(count), np.zeros(count)
+    source[draught.supply] = draught.rate / height
+    potential[here] = spsolve(matrix.tocsc(), source[here])
+    return np.asarray(mesh.shape * (potential[mesh.a] - potential[mesh.b]))
+
+
+@lru_cache(maxsize=8)
+def mesh_in(building: Building) -> Mesh:
+    """The mesh of a building, once per process."""
+    return mesh_of(building)
+
+
+@lru_cache(maxsize=8)
+def air_in(building: Building, diffusivity: float, loss: float) -> Air:
+    """The still air of a building, once per process."""
+    return Air(mesh_in(building), diffusivity, loss)

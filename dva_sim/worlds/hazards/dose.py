@@ -1,0 +1,100 @@
+"""What heat, smoke, gas and water do to a person.
+
+References:
+    ISO 13571:2012, Life-threatening components of fire: heat.
+    D. A. Purser and J. L. McAllister, in: SFPE Handbook of Fire Protection Engineering, 5th ed.,
+    chapter 63: carbon monoxide, lack of oxygen.
+    T. Jin, J. Fire and Flammability 9 (1978) 135: visibility in smoke.
+    H. Frantzich and D. Nilsson, Lund University, report 3126, 2003: walking in smoke.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from dva_sim.worlds.hazards.base import Conditions
+from dva_sim.worlds.hazards.fire import TENABLE_HEAT
+from dva_sim.worlds.hazards.leak import GASES
+
+MINUTE = 60.0
+BREATHING = 25.0  # air breathed in light work [L/min]
+CO_LIMIT = 30.0  # carboxyhaemoglobin at which people in light work collapse [%]
+OXYGEN = 0.209  # share of the air
+LEAST_OXYGEN_LACK = 0.01  # less goes unnoticed; assumed
+LUKEWARM = 60.0  # air does no harm below [deg C]; assumed
+
+SMOKE_SLOWS = 0.057 / 0.706  # share of walking speed lost per 1/m of extinction, in 0.706 m/s
+CRAWLING = 0.1  # nobody gets slower in smoke than this share
+REFLECTING, LIGHTED = 3.0, 8.0  # visibility times extinction, of signs without and with a lamp
+KNEE = 0.5  # water in which people walk at half their speed [m]; assumed
+WADING = 0.3  # nobody who still stands gets slower in water than this share; assumed
+
+
+@dataclass
+class Dose:
+    """What a person has taken in: 1 stands for being unable to help oneself.
+
+    Attributes:
+        heat: Fractional effective dose of radiant heat and hot air.
+        toxic: Fractional effective dose of carbon monoxide and lack of oxygen.
+        explosive: Time in air that could have exploded [s].
+        gas: What a leaking gas is, one of `GASES`.
+    """
+
+    heat: float = 0.0
+    toxic: float = 0.0
+    explosive: float = 0.0
+    gas: str = "methane"
+
+    def add(self, conditions: Conditions, dt: float) -> None:
+        """Spend `dt` [s] in some conditions."""
+        minutes = dt / MINUTE
+        self.heat += minutes * heat_rate(conditions)
+        self.toxic += minutes * toxic_rate(conditions)
+        if GASES[self.gas].lower <= conditions.gas <= GASES[self.gas].upper:
+            self.explosive += dt
+
+    @property
+    def incapacitated(self) -> bool:
+        """Whether one of the doses has become too much."""
+        return self.heat >= 1.0 or self.toxic >= 1.0
+
+
+def heat_rate(conditions: Conditions) -> float:
+    """Dose of heat per minute: radiant above 2.5 kW/m^2, and air on lightly clothed skin."""
+    rate = 0.0
+    if conditions.heat_flux > TENABLE_HEAT:
+        rate += conditions.heat_flux**1.9 / 4.2
+    if conditions.temperature > LUKEWARM:
+        rate += conditions.temperature**3.4 / 5e7
+    return float(rate)
+
+
+def toxic_rate(conditions: Conditions) -> float:
+    """Dose of carbon monoxide and of lack of oxygen, which a leaking gas drives out, per minute."""
+    rate = 3.317e-5 * conditions.co**1.036 * BREATHING / CO_LIMIT
+    lack = 100.0 * OXYGEN * conditions.gas  # [%] of the air
+    if lack > 100.0 * LEAST_OXYGEN_LACK:
+        rate += 1.0 / math.exp(8.13 - 0.54 * lack)
+    return float(rate)
+
+
+def visibility(extinction: float, lighted: bool = False) -> float:
+    """How far signs can be recognised [m]; infinite in clean air."""
+    if extinction <= 0.0:
+        return math.inf
+    return (LIGHTED if lighted else REFLECTING) / extinction
+
+
+def pace_in_smoke(extinction: float) -> float:
+    """Share of the walking speed in clean air that smoke [1/m] leaves.
+
+    Measured where lamps still shone, at 2 to 8 per metre: 0.706 m/s, less 0.057 m/s for each.
+    """
+    return max(CRAWLING, 1.0 - SMOKE_SLOWS * extinction)
+
+
+def pace_in_water(depth: float) -> float:
+    """Share of the walking speed on a dry floor that water [m] leaves; assumed."""
+    return max(WADING, 1.0 - 0.5 * depth / KNEE)

@@ -1,0 +1,126 @@
+"""The floor as a mesh for gas: coarse cells that no wall runs through.
+
+A coarse cell that a wall cuts becomes two nodes, one on each side; two nodes exchange air over
+as much of their common border as is free. So walls are tight wherever they stand, and doors are
+as wide as they are.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dva_sim.worlds.hazards.building import NOWHERE, Building
+from dva_sim.worlds.maps import FREE, OccupancyGrid
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+CELL = 0.5  # side of a coarse cell [m]
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Nodes and the borders between them.
+
+    Attributes:
+        area: Of each node, shape `(n,)` [m^2].
+        a: Node on one side of each border, shape `(k,)`.
+        b: Node on the other side.
+        shape: Length of each border over the distance between its nodes.
+        across: That distance [m].
+        nodes: Node of each cell of the grid, or -1, shape `(rows, columns)`.
+        grid: Gives the cells.
+    """
+
+    area: Floats
+    a: Integers
+    b: Integers
+    shape: Floats
+    across: Floats
+    nodes: NDArray[np.int32]
+    grid: OccupancyGrid
+
+    def node_at(self, x: float, y: float) -> int:
+        """The node around a point [m]; -1 in walls and outdoors."""
+        row, column = self.grid.to_cell(x, y)
+        rows, columns = self.nodes.shape
+        return int(self.nodes[row, column]) if 0 <= row < rows and 0 <= column < columns else -1
+
+    def nearest(self, x: float, y: float) -> int:
+        """The node around a point [m], or the one nearest to it."""
+        node = self.node_at(x, y)
+        if node < 0:
+            rows, columns = np.nonzero(self.nodes >= 0)
+            row, column = self.grid.to_cell(x, y)
+            nearest = int(np.argmin((rows - row) ** 2 + (columns - column) ** 2))
+            node = int(self.nodes[rows[nearest], columns[nearest]])
+        return node
+
+
+def mesh_of(building: Building) -> Mesh:
+    """The mesh of all floor indoors."""
+    inside = (building.grid.cells == FREE) & (building.labels != NOWHERE)
+    return make_mesh(building.grid, inside)
+
+
+def make_mesh(grid: OccupancyGrid, free: NDArray[np.bool_], cell: float = CELL) -> Mesh:
+    """The mesh of some cells of a grid.
+
+    Args:
+        grid: Gives the cells.
+        free: Which of them hold air, shape `(rows, columns)`.
+        cell: Side of a coarse cell [m].
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    number = np.full(free.shape, -1, np.int32)
+    rows, columns = np.nonzero(free)
+    number[rows, columns] = np.arange(len(rows))
+    block = max(1, round(cell / grid.resolution))
+    coarse = (rows // block) * (free.shape[1] // block + 1) + columns // block
+    pairs = [_edges(number, axis) for axis in (0, 1)]
+    same = [coarse[p[0]] == coarse[p[1]] for p in pairs]
+    joined = np.hstack([p[:, s] for p, s in zip(pairs, same, strict=True)])
+    graph = coo_array((np.ones(joined.shape[1], bool), tuple(joined)), (len(rows), len(rows)))
+    count, node = connected_components(graph, directed=False)
+    cells = np.bincount(node, minlength=count)
+    middles = np.stack([np.bincount(node, line, count) / cells for line in (rows, columns)])
+    borders = [
+        _borders(node[p[:, ~s]], middles[axis], count, block)
+        for axis, (p, s) in enumerate(zip(pairs, same, strict=True))
+    ]
+    a, b, shape, across = np.hstack(borders)
+    nodes = np.full(free.shape, -1, np.int32)
+    nodes[rows, columns] = node
+    area = cells.astype(np.float64) * grid.resolution**2
+    far = across * grid.resolution
+    return Mesh(area, a.astype(np.int64), b.astype(np.int64), shape, far, nodes, grid)
+
+
+def _edges(number: NDArray[np.int32], axis: int) -> Integers:
+    """Pairs of neighbouring cells along an axis, shape `(2, k)`."""
+    low, high = (number[:-1], number[1:]) if axis == 0 else (number[:, :-1], number[:, 1:])
+    both = (low >= 0) & (high >= 0)
+    return np.stack([low[both], high[both]]).astype(np.int64)
+
+
+def _borders(pairs: Integers, middles: Floats, count: int, block: int) -> Floats:
+    """Edges between cells put together to borders between nodes.
+
+    Args:
+        pairs: Nodes on both sides of each edge, shape `(2, k)`.
+        middles: Of the nodes along the axis that the edges are crossed in [cells].
+        count: How many nodes there are.
+        block: Side of a coarse cell [cells].
+
+    Returns:
+        Rows a, b, length over distance, distance [cells].
+    """
+    code, edges = np.unique(pairs[0] * count + pairs[1], return_counts=True)
+    a, b = code // count, code % count
+    across = np.clip(middles[b] - middles[a], 1.0, block)
+    return np.stack([a, b, edges / across, across])
