@@ -9,8 +9,8 @@ import numpy as np
 import shapely
 
 from dva_sim.agents.operator.agent import OperatorAgent
-from dva_sim.agents.operator.drive import DriverSeat, OperatorSetup
 from dva_sim.agents.operator.person import draw_person
+from dva_sim.agents.operator.seat import DriverSeat, OperatorSetup
 from dva_sim.agents.operator.strategies import STRATEGIES, Oracle, Reach, Truth
 from dva_sim.agents.profile import RobotProfile
 from dva_sim.agents.robot import EXPECTED_READY, EXPECTED_SPEED

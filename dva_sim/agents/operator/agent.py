@@ -1,12 +1,14 @@
-"""An operator at work: takes an order, gets permission, drives, reports, is free again.
+"""An operator at work: takes an order, gets permission, drives or supervises, reports, is free.
 
-The newest order holds: it takes the place of the present drive, whose robot is stopped first.
+The newest order holds: it takes the place of the present work, whose robot is stopped first.
 """
 
 from __future__ import annotations
 
 from dva_sim.agents.camera import CAMERA_SCHEME
-from dva_sim.agents.operator.drive import Drive, DriverSeat
+from dva_sim.agents.operator.drive import Drive
+from dva_sim.agents.operator.seat import DriverSeat
+from dva_sim.agents.operator.work import Work
 from dva_sim.protocol import messages as m
 from dva_sim.recorder import DriveLog
 
@@ -22,11 +24,12 @@ class OperatorAgent:
 
     Args:
         seat: Who it is, and what is at hand.
+        kind: How it has robots look at events: `Drive` them, or `Supervise` their missions.
     """
 
-    def __init__(self, seat: DriverSeat) -> None:
-        self.device, self._seat = seat.device, seat
-        self._drive: Drive | None = None
+    def __init__(self, seat: DriverSeat, kind: type[Work] = Drive) -> None:
+        self.device, self._seat, self._kind = seat.device, seat, kind
+        self._drive: Work | None = None
         self._next: m.Order | None = None  # what to do when the present drive has ended
         self._ordered = 0.0  # when the newest order came [s]
         self.device.serve(self._on_request)
@@ -38,7 +41,7 @@ class OperatorAgent:
         if drive is None:
             return "waiting"
         robot = self.device.label_of(drive.robot)
-        return f"{'reads of' if drive.log.started is None else 'drives'} {robot}"
+        return f"{'reads of' if drive.log.started is None else drive.verb} {robot}"
 
     def put_down(self) -> None:
         """Leave: a drive that is going on ends here, and its robot is told to stop."""
@@ -97,12 +100,12 @@ class OperatorAgent:
         log = DriveLog(order.device, device.id_tag, order.event_id, self._ordered)
         log.human_delay = self._seat.person.perceptual_delay + self._seat.person.hand_lag
         device.recorder.drives.append(log)
-        drive = self._drive = Drive(self._seat, order, log, self._finish)
+        drive = self._drive = self._kind(self._seat, order, log, self._finish)
         robot = device.label_of(order.device)
-        device.tell(f"shall drive {robot} to event {order.event_id}", "order")
+        device.tell(f"shall {drive.wish} {robot} to event {order.event_id}", "order")
         device.clock.call_after(self._seat.person.reading, self._ask_permission, drive)
 
-    def _ask_permission(self, drive: Drive) -> None:
+    def _ask_permission(self, drive: Work) -> None:
         if drive.over:
             return
 
@@ -119,11 +122,11 @@ class OperatorAgent:
             else:
                 drive.end("gave up", reply.text)
 
-        body = m.PermissionRequest(drive.robot, "teleoperation")
+        body = m.PermissionRequest(drive.robot, drive.level)
         unreachable = lambda: drive.end("lost link", "the DVA does not answer")  # noqa: E731
         self.device.ask(self.device.dva, body, answered, unreachable)
 
-    def _turn_on_picture(self, drive: Drive) -> None:
+    def _turn_on_picture(self, drive: Work) -> None:
         """Ask the robot where its camera is, and watch it."""
 
         def answered(reply: m.Reply) -> None:
@@ -140,13 +143,13 @@ class OperatorAgent:
 
         self.device.ask(drive.robot, m.GetSensorInfo(), answered, session=drive.session)
 
-    def _start(self, drive: Drive, tries: int = 1) -> None:
+    def _start(self, drive: Work, tries: int = 1) -> None:
         def answered(reply: m.Reply) -> None:
             if drive.over:
                 return
             if reply.code == m.OK:
                 self.device.progress(drive.order.event_id, "departed")
-                self.device.tell(f"drives {self.device.label_of(drive.robot)}", "drive")
+                self.device.tell(f"{drive.verb} {self.device.label_of(drive.robot)}", "drive")
                 drive.begin()
             elif tries < START_TRIES and reply.code in (m.BUSY, m.NOT_PERMITTED, m.BAD_SESSION):
                 self.device.clock.call_after(START_AGAIN, self._start, drive, tries + 1)
@@ -154,10 +157,10 @@ class OperatorAgent:
                 drive.end("gave up", reply.text)
 
         if not drive.over:
-            body = m.StartTeleOp()
+            body = drive.beginning()
             self.device.ask(drive.robot, body, answered, drive.link_lost, drive.session)
 
-    def _finish(self, drive: Drive, outcome: str, why: str) -> None:
+    def _finish(self, drive: Work, outcome: str, why: str) -> None:
         """A drive is over: stop the robot, tell the DVA, be free again."""
         device, order = self.device, drive.order
         device.tell(f"{outcome}{': ' + why if why else ''}", "drive")
@@ -180,7 +183,7 @@ class OperatorAgent:
         elif drive.log.started is None and not (drive.session and by_dva):
             give_back()
         else:
-            device.ask(drive.robot, m.StopTeleOp(), give_back, give_back, drive.session)
+            device.ask(drive.robot, drive.ending(), give_back, give_back, drive.session)
 
     def _give_back(self, robot: str, session: int) -> None:
         """A permission is needed no longer, unless the next drive is of the same robot."""
@@ -188,7 +191,7 @@ class OperatorAgent:
             body = m.PermissionRevocation(robot, self.device.id_tag, session)
             self.device.ask(self.device.dva, body)
 
-    def _be_free(self, drive: Drive) -> None:
+    def _be_free(self, drive: Work) -> None:
         """The robot was told to stop: what is next?"""
         if self._next is None:
             self._drive = None

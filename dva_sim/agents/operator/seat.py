@@ -1,0 +1,89 @@
+"""Where an operator sits: who it is, what is at hand, and what it knows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from dva_sim.agents.camera import Observation
+from dva_sim.agents.device import Device
+from dva_sim.agents.operator.delay import DelayEstimate
+from dva_sim.agents.operator.person import Person
+from dva_sim.agents.operator.strategies import Oracle, Pursuit, Truth
+from dva_sim.agents.tilt import Phone
+from dva_sim.worlds.planning import Planner
+
+FIRST_GUESS = 0.6  # delay a person expects before having seen any [s]
+
+
+@dataclass(frozen=True)
+class OperatorSetup:
+    """How an operator works, beside who it is.
+
+    Attributes:
+        window: Of the requests that carry SetTeleOp: how many may be unanswered at once; None
+            if SetTeleOp is published instead.
+        rate_hz: Wanted commands per second.
+        timeout: Of a request [s].
+        attempts: Of a request.
+        truth: The true state of a robot by id, if the strategy is the oracle; else None.
+    """
+
+    window: int | None
+    rate_hz: float
+    timeout: float
+    attempts: int
+    truth: Callable[[str], Truth] | None = None
+
+
+class DriverSeat:
+    """Everything a person brings to a drive, and keeps from one to the next.
+
+    Args:
+        device: Identity and ways to talk.
+        person: Who it is.
+        phone: The phone in the hand.
+        strategy: How the person drives.
+        planner: The person knows the building.
+        setup: Pattern, rate, time-outs.
+        rng: Luck of this person's judgement.
+
+    Attributes:
+        delay: What the person has learnt of the delay.
+    """
+
+    def __init__(
+        self,
+        device: Device,
+        person: Person,
+        phone: Phone,
+        strategy: Pursuit | Oracle,
+        planner: Planner,
+        setup: OperatorSetup,
+        rng: np.random.Generator,
+    ) -> None:
+        self.device, self.person, self.phone, self.strategy = device, person, phone, strategy
+        self.planner, self.setup = planner, setup
+        self.delay = DelayEstimate(0.0, FIRST_GUESS)
+        self._errors = _normals(rng)
+
+    def judge(self, seen: Observation) -> Observation:
+        """A frame as the person takes it: place and heading with an error."""
+        person, error = self.person, self._errors
+        return Observation(
+            seen.tick,
+            seen.x + person.position_error * next(error),
+            seen.y + person.position_error * next(error),
+            seen.heading + person.heading_error * next(error),
+            seen.speed,
+            seen.turn_rate,
+            seen.hazards,
+        )
+
+
+def _normals(rng: np.random.Generator, block: int = 512) -> Iterator[float]:
+    """Standard normal numbers without end, drawn in blocks."""
+    while True:
+        yield from rng.normal(size=block).tolist()
