@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from dva_sim.agents.device import Device
 from dva_sim.protocol import messages as m
+from dva_sim.protocol.errors import ProtocolError
 
 LEASE = 60.0  # a subscription that is not renewed ends by itself after this [s]
 MOST = 64  # subscriptions at one robot
@@ -15,10 +16,17 @@ FASTEST, SLOWEST = 20.0, 0.02  # values that a robot gives [Hz]
 
 @dataclass(frozen=True)
 class SensorPort:
-    """A sensor: the unit of its values, and how they are read at a time [s]: 1 to 360."""
+    """A sensor.
+
+    Attributes:
+        unit: Of its values.
+        read: Its values at a time [s]: 1 to 360, or none if it is lost.
+        fastest: How often it gives values at most [Hz].
+    """
 
     unit: str
     read: Callable[[float], tuple[float, ...]]
+    fastest: float = FASTEST
 
 
 def topic_of_sensor(sensor: str, subscriber: str) -> str:
@@ -58,8 +66,9 @@ class SensorDesk:
         if wish.frequency == 0.0:
             self._subscribed.pop(key, None)
             return m.OK, ""
-        if not SLOWEST <= wish.frequency <= FASTEST:
-            return m.NOT_SUPPORTED, f"a value is given {SLOWEST:g} to {FASTEST:g} times a second"
+        fastest = min(self._sensors[wish.sensor].fastest, FASTEST)
+        if not SLOWEST <= wish.frequency <= fastest:
+            return m.NOT_SUPPORTED, f"a value is given {SLOWEST:g} to {fastest:g} times a second"
         self._forget_who_vanished(now)
         known = self._subscribed.get(key)
         if known is None and len(self._subscribed) >= MOST:
@@ -94,5 +103,11 @@ class SensorDesk:
 
     def _publish(self, sensor: str, subscriber: str, now: float) -> None:
         port = self._sensors[sensor]
-        body = m.SensorValue(sensor, port.read(now), port.unit, self._tick_of(now))
-        self._device.publish(topic_of_sensor(sensor, subscriber), body)
+        values = port.read(now)
+        if not values:
+            return
+        body = m.SensorValue(sensor, values, port.unit, self._tick_of(now))
+        try:
+            self._device.publish(topic_of_sensor(sensor, subscriber), body)
+        except ProtocolError:
+            self._device.recorder.counters["sensor values that no message holds"] += 1
