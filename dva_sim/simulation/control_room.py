@@ -9,9 +9,11 @@ import numpy as np
 import shapely
 
 from dva_sim.agents.operator.agent import OperatorAgent
+from dva_sim.agents.operator.drive import Drive
 from dva_sim.agents.operator.person import draw_person
 from dva_sim.agents.operator.seat import DriverSeat, OperatorSetup
 from dva_sim.agents.operator.strategies import STRATEGIES, Oracle, Reach, Truth
+from dva_sim.agents.operator.supervise import Supervise
 from dva_sim.agents.profile import RobotProfile
 from dva_sim.agents.robot import EXPECTED_READY, EXPECTED_SPEED
 from dva_sim.agents.tilt import Phone
@@ -188,6 +190,6 @@ def add_operator(
         setup,
         stage.streams[f"{device.label}/judgement"],
     )
-    operator = OperatorAgent(seat)
+    operator = OperatorAgent(seat, Supervise if scenario.control == "supervisory" else Drive)
     device.register()
     return operator
