@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 
 from dva_sim import resources
 from dva_sim.agents.battery import BatteryProfile
-from dva_sim.config import Config, load_yaml, validate
+from dva_sim.config import Config, Document, load_yaml, validate
 from dva_sim.worlds.drives import LONGEST_TICK, DriveSpec, load_drive
 
 FOLDER: Final = "agents/robots"
@@ -93,16 +93,21 @@ class RobotProfile(Config):
 def load_robot(name: str) -> RobotProfile:
     """The profile of a name or path, once per process.
 
-    A drive in a file beside the profile is found from anywhere.
-
     Raises:
         ConfigError: not found, or not valid.
     """
-    path = resources.find(name, FOLDER)
-    document = load_yaml(path)
+    return read_robot(load_yaml(resources.find(name, FOLDER)))
+
+
+def read_robot(document: Document) -> RobotProfile:
+    """The profile in a file; a drive in a file beside it is found from anywhere.
+
+    Raises:
+        ConfigError: it is not valid.
+    """
     profile = validate(RobotProfile, document.data, document.error)
     file, _, wanted = profile.drive.rpartition(":")
-    beside = path.resolve().parent / file
+    beside = document.file.resolve().parent / file
     if wanted and beside.is_file():
         return profile.model_copy(update={"drive": f"{beside}:{wanted}"})
     return profile

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import operator
 import time
-import traceback
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from typing import Any, Final
 
 import numpy as np
 
+from dva_sim.checking.promises import Case, Outcome, line, said
 from dva_sim.checking.situations import situations
 from dva_sim.core.dispatch import (
     Announcement,
@@ -23,23 +23,6 @@ from dva_sim.core.dispatch import (
 SITUATIONS: Final = 200
 SLOW: Final = 0.1  # [s] of one decision; above that an episode is no longer fast
 TOO_MANY_ROBOTS: Final = "sends more robots than operators are free; the core drops the rest"
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """How a policy kept its promises.
-
-    Attributes:
-        broken: One line for each promise that it broke, with the first case.
-        warnings: The same of what the core makes good, or what is only slow.
-        situations: In how many it was tried.
-        slowest: Its longest decision [s].
-    """
-
-    broken: tuple[str, ...]
-    warnings: tuple[str, ...]
-    situations: int
-    slowest: float
 
 
 def try_policy(
@@ -65,19 +48,11 @@ def try_policy(
         slowest = max(slowest, (min(answer.took, other.took), where))
         for promise, case in _broken(policy, situation, answer, other):
             found.setdefault(promise, []).append(f"{case}in {where}")
-    warnings = [_line(p, cases) for p, cases in found.items() if p == TOO_MANY_ROBOTS]
+    warnings = [line(p, cases) for p, cases in found.items() if p == TOO_MANY_ROBOTS]
     if slowest[0] > slow:
         warnings.append(f"is slow: {slowest[0]:.2g} s in {slowest[1]}; should be {slow:g} s")
-    broken = tuple(_line(p, cases) for p, cases in found.items() if p != TOO_MANY_ROBOTS)
+    broken = tuple(line(p, cases) for p, cases in found.items() if p != TOO_MANY_ROBOTS)
     return Outcome(broken, tuple(warnings), count, slowest[0])
-
-
-Case = tuple[str, str]  # a promise in words, and what happened, to be followed by where
-
-
-def _line(promise: str, cases: Sequence[str]) -> str:
-    more = f"; and {len(cases) - 1} times more" if len(cases) > 1 else ""
-    return f"{promise}: {cases[0]}{more}"
 
 
 @dataclass(frozen=True)
@@ -86,7 +61,7 @@ class _Answer:
 
     advice: Any
     took: float
-    said: tuple[Case, ...] = ()
+    broke: tuple[Case, ...] = ()
 
 
 def _ask(policy: Policy, situation: Situation, seed: int) -> _Answer:
@@ -95,7 +70,7 @@ def _ask(policy: Policy, situation: Situation, seed: int) -> _Answer:
     try:
         advice = policy.advise(situation, rng)
     except Exception as error:
-        return _Answer((), time.perf_counter() - started, (("raises", f"{_said(error)} "),))
+        return _Answer((), time.perf_counter() - started, (("raises", f"{said(error)} "),))
     took = time.perf_counter() - started
     changed = before != _contents(situation)
     return _Answer(advice, took, (("changes the situation", ""),) if changed else ())
@@ -105,7 +80,7 @@ def _broken(
     policy: Policy, situation: Situation, answer: _Answer, other: _Answer
 ) -> Iterator[Case]:
     """The promises that an answer breaks, also in comparison with the other one's."""
-    yield from answer.said
+    yield from answer.broke
     advice = answer.advice
     if not isinstance(advice, Sequence) or isinstance(advice, str | bytes):
         yield "returns no sequence of advice", f"a {type(advice).__name__} "
@@ -211,10 +186,3 @@ def _contents(value: Any) -> dict[str, Any]:
         else:
             held[field.name] = inner
     return held
-
-
-def _said(error: Exception) -> str:
-    """An error in one line, with the line of the file that it comes from."""
-    frame = traceback.extract_tb(error.__traceback__)[-1]
-    text = " ".join(f"{type(error).__name__}: {error}".split())
-    return f"{text} ({frame.filename.rsplit('/', 1)[-1]}:{frame.lineno})"

@@ -32,7 +32,7 @@ EXAMPLES = [f"{path.name}:{path.stem.title()}" for path in (ROOT / "agents/polic
 @pytest.mark.parametrize("name", [*sorted(POLICIES.keys() - {"oracle"}), *EXAMPLES])
 def test_every_policy_that_is_shipped_keeps_its_promises(name):
     outcome = try_policy(partial(load_policy, name), slow=60.0)
-    assert (outcome.broken, outcome.warnings, outcome.situations) == ((), (), 200)
+    assert (outcome.broken, outcome.warnings, outcome.tries) == ((), (), 200)
 
 
 def test_the_oracle_keeps_them_too():
