@@ -169,21 +169,21 @@ class Smoke:
         state[:-1, HEAT] /= 1.0 + rate * dt
 
     def _overflow(self, state: Floats) -> None:
-        """What a space cannot hold is pressed through its openings, or out where it has none."""
+        """What a space cannot hold is pressed where there is room, or out through the cracks."""
         room = self._area[:-1] * self._ceiling[:-1]
-        full = volumes(state[:-1]) - room
-        for space in np.flatnonzero(full > 0.0):
-            excess = state[space] * (full[space] / (full[space] + room[space]))
-            ways = np.flatnonzero((self._spaces.a == space) | (self._spaces.b == space))
+        volume = volumes(state[:-1])
+        full = np.append(volume > room, False)
+        for space in np.flatnonzero(full):
+            excess = state[space] * (1.0 - room[space] / volume[space])
             state[space] -= excess
+            a, b = self._spaces.a, self._spaces.b
+            there = np.where(a == space, b, a)
+            ways = np.flatnonzero(((a == space) | (b == space)) & ~full[there])
             if len(ways) == 0:
                 state[-1] += excess
                 continue
             size = self._spaces.width[ways] * self._spaces.top[ways]
-            there = np.where(
-                self._spaces.a[ways] == space, self._spaces.b[ways], self._spaces.a[ways]
-            )
-            np.add.at(state, there, excess * (size / size.sum())[:, None])
+            np.add.at(state, there[ways], excess * (size / size.sum())[:, None])
 
 
 def volumes(state: Floats) -> Floats:

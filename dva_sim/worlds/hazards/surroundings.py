@@ -14,6 +14,7 @@ from dva_sim.worlds.hazards.base import AMBIENT, CLEAR, Conditions, Hazard, Poin
 from dva_sim.worlds.hazards.building import building_of
 from dva_sim.worlds.hazards.dispersion import mesh_in
 from dva_sim.worlds.hazards.fields import FireField, FloodField, LeakField, Places, field_of
+from dva_sim.worlds.hazards.flood import Flood
 from dva_sim.worlds.layout import Site
 from dva_sim.worlds.sight import Sight
 
@@ -53,6 +54,11 @@ class Surroundings:
     def _fields(self) -> list[FireField | LeakField | FloodField]:
         building, sight = building_of(self._site), Sight(self._site.walls)
         return [field_of(hazard, building, sight) for hazard in self._hazards]
+
+    @property
+    def may_be_wet(self) -> bool:
+        """Whether water ever stands on the floor."""
+        return any(isinstance(hazard, Flood) for hazard in self._hazards)
 
     def contain(self, number: int, time: float) -> None:
         """Hazard `number`, from 0, is dealt with at `time` [s]: its source stops for good."""

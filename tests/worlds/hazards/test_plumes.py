@@ -1,0 +1,62 @@
+"""Gas outdoors: how wide puffs and plumes are, and that nothing of them is lost."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dva_sim.worlds.hazards.plumes import CLASSES, plume, puff, sigma_y, sigma_z
+
+TARGETS = Path(__file__).parents[4] / "shared" / "targets" / "operator.json"
+AT_1_KM = {"A": 213.0, "B": 156.0, "C": 104.0, "D": 68.0, "E": 50.5, "F": 34.0}  # Martin [m]
+
+
+@pytest.mark.parametrize(("stability", "metres"), AT_1_KM.items())
+def test_a_kilometre_off_a_plume_is_as_wide_as_martin_says(stability: str, metres: float) -> None:
+    assert sigma_y(stability, 1000.0) == pytest.approx(metres, rel=1e-9)
+    assert sigma_y(stability, 2000.0) == pytest.approx(metres * 2.0**0.894)
+
+
+def test_the_widths_are_those_of_the_target_file() -> None:
+    if not TARGETS.is_file():
+        pytest.skip("the file of published numbers is not beside the project")
+    checks = {check["id"]: check for check in json.loads(TARGETS.read_text())["checks"]}
+    published, band = checks["S16e"]["target"], checks["S16e"]["band_rel"]
+    assert [sigma_y(c, 1000.0) for c in "ABCDEF"] == pytest.approx(published, rel=band)
+
+
+@pytest.mark.parametrize("stability", CLASSES)
+def test_both_halves_of_a_height_meet_at_a_kilometre(stability: str) -> None:
+    near, far = sigma_z(stability, 1000.0), sigma_z(stability, 1000.001)
+    assert near == pytest.approx(far, rel=0.03)
+
+
+def test_the_stabler_the_air_the_narrower_the_plume() -> None:
+    for distance in (20.0, 100.0, 500.0, 3000.0):
+        widths = [sigma_y(c, distance) for c in "ABCDEF"]
+        assert widths == sorted(widths, reverse=True)
+        assert min(sigma_z(c, distance) for c in "ABCDEF") > 0.0
+
+
+def test_through_every_section_of_a_plume_goes_what_is_set_free() -> None:
+    """0.01 m3/s in a wind of 2 m/s, class D, 200 m off."""
+    across, up = sigma_y("D", 200.0), sigma_z("D", 200.0)
+    ys, zs = np.linspace(-6 * across, 6 * across, 121), np.linspace(0.0, 6 * up, 121)
+    shares = np.array([[plume(0.01, 2.0, "D", 200.0, y, z) for y in ys] for z in zs])
+    through = 2.0 * np.trapezoid(np.trapezoid(shares, ys, axis=1), zs)
+    assert through == pytest.approx(0.01, rel=1e-3)
+    assert plume(0.01, 2.0, "D", -5.0, 0.0, 0.0) == 0.0
+
+
+def test_a_puff_holds_what_was_set_free() -> None:
+    across, up = sigma_y("C", 300.0), sigma_z("C", 300.0)
+    sides = np.linspace(-5 * across, 5 * across, 61)
+    zs = np.linspace(0.0, 5 * up, 61)
+    shares = [[[puff(2.0, "C", 300.0, 300.0 + x, y, z) for x in sides] for y in sides] for z in zs]
+    held = np.trapezoid(np.trapezoid(np.trapezoid(np.array(shares), sides), sides), zs)
+    assert held == pytest.approx(2.0, rel=1e-3)
+    assert math.isclose(puff(2.0, "C", 0.0, 0.0, 0.0, 0.0), 0.0)
