@@ -109,7 +109,7 @@ def test_a_fire_that_is_put_out_radiates_no_more_and_its_smoke_cools(site: Site)
     assert after.heat_flux < 0.25 * before.heat_flux  # hot smoke glows on
     assert after.temperature == pytest.approx(before.temperature, abs=8.0)
     assert later.temperature < 30.0
-    assert surroundings.at(*BESIDE, 299.0).heat_flux > 20.0  # what was, was
+    assert surroundings.at(*BESIDE, 299.0).heat_flux > 4.0  # what was, was
 
 
 def test_a_leak_that_is_stopped_thins_out(site: Site) -> None:
