@@ -252,7 +252,7 @@ class RobotBody(Body):
         _set_torque(raw, torque)
         self.distance += abs(forward) * dt
         if along > 0.0:
-            self.work += along * forward * dt
+            self.work += along * (forward + 0.5 * dt * along / self._mass) * dt
         return True
 
     def meets(self, other: Body | None, now: float) -> None:
@@ -291,7 +291,7 @@ class PersonBody(Body):
         # Who brushes past a wall or somebody else is not held back.
         shape.friction, shape.elasticity, shape.collision_type = 0.0, 0.0, PERSON
         super().__init__(world, name, body, shape)
-        self.radius, self._mass = radius, mass
+        self.radius, self._mass, self._circle = radius, mass, shape
         self._now = self._next = (0.0, 0.0, 0)
 
     def walk(self, vx: float, vy: float) -> None:
@@ -304,6 +304,11 @@ class PersonBody(Body):
             raise ValueError(f"{self.name} cannot walk at {vx} m/s, {vy} m/s")
         self._next = (vx, vy, self._world.next_tick())
         self._world.wake(self)
+
+    def take_up(self, radius: float) -> None:
+        """Be so wide from now on [m]: who turns sideways fits through a narrower gap."""
+        self.radius = radius
+        self._circle.unsafe_set_radius(radius)
 
     def push(self, tick: int, dt: float) -> bool:
         """Apply the force of the legs for one tick; False if the person stands and shall stand."""
