@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from dva_sim import scenario as scenarios
-from dva_sim.agents.guard import GuardAgent, Walker
+from dva_sim.agents.exposure import Air, clean_air
+from dva_sim.agents.guard import GuardAgent
+from dva_sim.agents.legs import RADIUS
 from dva_sim.agents.operator.agent import OperatorAgent
+from dva_sim.agents.people import Walker
+from dva_sim.agents.walking import Walking
 from dva_sim.clock import Clock
 from dva_sim.network.link import ConstantRate, Link, LinkConfig
 from dva_sim.network.virtual import VirtualNetwork
@@ -18,6 +22,7 @@ from dva_sim.simulation.field import Field
 from dva_sim.simulation.names import id_of
 from dva_sim.simulation.stage import Stage
 from dva_sim.streams import Streams
+from dva_sim.worlds.geo import Pose
 
 GUARD, ROBOT, OTHER_ROBOT = id_of("guard", 1), id_of("robot", 1), id_of("robot", 2)
 OPERATOR = id_of("operator", 1)
@@ -69,12 +74,20 @@ class PretendedDva:
 
     # --- who is there ------------------------------------------------------------------
 
-    def guard(self, position: Point = POST, walker: Walker = WALKER) -> GuardAgent:
+    def guard(
+        self,
+        position: Point = POST,
+        walker: Walker = WALKER,
+        air: Air = clean_air,
+        refuges: Sequence[Point] = (),
+    ) -> GuardAgent:
         """A guard who sees what is in `there`."""
-        device, planner = self.stage.device("guard", 1), self.stage.planner
-        guard = GuardAgent(
-            device, walker, planner, position, lambda kind, *_: kind in self.there, self._contained
-        )
+        device, planner, world = self.stage.device("guard", 1), self.stage.planner, self.field.world
+        body = world.add_person("guard-1", Pose(*position, 0.0), radius=RADIUS)
+        doors = self.stage.site.doors
+        walking = Walking(self.network.clock, planner, world, body, walker.speed, doors)
+        there, contained = lambda kind, *_: kind in self.there, self._contained
+        guard = GuardAgent(device, walker, planner, walking, there, contained, air, refuges)
         device.register(guard.start)
         self.run_for(1.0)
         return guard

@@ -1,8 +1,9 @@
 """Who goes first through a door: whoever is nearer to it. Pure.
 
 Who comes to a door towards which somebody else comes from the other side, and is nearer to it,
-waits beside the way until the other is through; but for no more than `PATIENCE`. Robots cannot
-go back: for one that is in a door everybody waits longer. These rules are assumed.
+waits beside the way until the other is through; but for no more than `PATIENCE`. Robots are slow
+and cannot go back: one that comes through a door is waited for longer, and one that stands in it
+may only stand because it is let no farther: it is given time, too. These rules are assumed.
 """
 
 from __future__ import annotations
@@ -15,7 +16,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.agents.legs import Body
+from dva_sim.agents.legs import SIDEWAYS, Body
+from dva_sim.agents.manners import FEELS_ROOM
 from dva_sim.worlds.physics import RobotBody
 
 NARROW: Final = 1.6  # a door wider than this needs no manners [m]
@@ -24,7 +26,7 @@ WAITS_BESIDE: Final = (0.8, 0.9)  # before the door, and beside the way through 
 ONCOMING: Final = 0.1  # who comes towards one faster than this, comes [m/s]
 IN_DOOR: Final = 1.0  # a robot so near to its middle is in it [m]
 PATIENCE: Final = 5.0  # so long one waits for people [s]
-PATIENCE_WITH_ROBOTS: Final = 30.0  # [s]
+PATIENCE_WITH_ROBOTS: Final = 15.0  # that move [s]
 
 Floats = NDArray[np.float64]
 Point = tuple[float, float]
@@ -84,7 +86,8 @@ class Courtesy:
             self._since = None
             return None
         self._since = now if self._since is None else self._since
-        patience = PATIENCE_WITH_ROBOTS if isinstance(comer, RobotBody) else PATIENCE
+        slow = isinstance(comer, RobotBody) and math.hypot(*comer.velocity) > ONCOMING
+        patience = PATIENCE_WITH_ROBOTS if slow else PATIENCE
         return door if now - self._since < patience else None
 
 
@@ -112,6 +115,30 @@ def beside(door: Door, me: Body, room: Callable[[Floats], Floats]) -> Point:
     spots = [(door.x - back * ux + s * uy, door.y - back * uy - s * ux) for s in (side, -side)]
     fits = room(np.array(spots)) >= me.radius
     return next((s for s, fit in zip(spots, fits, strict=True) if fit), (me.x, me.y))
+
+
+def past(robot: Body, along: Point, me: Body, room: Callable[[Floats], Floats]) -> Point | None:
+    """Where to step next to squeeze past a robot, sideways [m]; None: there is no gap.
+
+    First in front of the wider gap, then straight through it.
+
+    Args:
+        robot: Stands there.
+        along: Where the way leads, as a unit vector.
+        me: Who squeezes past.
+        room: Distance to the nearest wall at many points `(n, 2)` [m].
+    """
+    (ux, uy), off = along, robot.radius + SIDEWAYS
+    sides = [(-1.0, uy, -ux), (1.0, -uy, ux)]  # right and left
+    gaps = np.array([(robot.x + off * nx, robot.y + off * ny) for _, nx, ny in sides])
+    wide = room(gaps)
+    if wide.max() < SIDEWAYS - FEELS_ROOM:
+        return None
+    x, y = gaps[int(wide.argmax())].tolist()
+    before = (robot.x - me.x) * ux + (robot.y - me.y) * uy
+    beside = abs((x - me.x) * uy - (y - me.y) * ux)
+    step = -off if before > 0.0 and beside > FEELS_ROOM else off
+    return x + step * ux, y + step * uy
 
 
 def _towards(door: Door, me: Body) -> tuple[float, Point]:

@@ -58,6 +58,7 @@ class GuardDuty:
         is_at: Whether the guard stands at a place.
         errand: What the guard is on now; None while it waits.
         ready_at: When the guard can set out, or could [s].
+        unfit: Why the guard takes no orders now; empty while it does.
     """
 
     dva: str
@@ -65,6 +66,7 @@ class GuardDuty:
     is_at: Callable[[m.Position], bool] = lambda place: False
     errand: Errand | None = None
     ready_at: float = 0.0
+    unfit: str = ""
     _stands_at: int | None = None
     _announced: OrderedDict[int, tuple[m.TaskAnnouncement, float]] = field(
         default_factory=OrderedDict
@@ -79,6 +81,8 @@ class GuardDuty:
         """Decide on a message that came at `now` [s]."""
         if message.source != self.dva:
             return Answer(m.NOT_PERMITTED, "only the DVA gives orders")
+        if self.unfit and not isinstance(message.body, m.OrderProgress):
+            return Answer(m.BUSY, self.unfit)
         match message.body:
             case m.Order(device=None) as order:
                 return self._ordered(order, now)

@@ -1,26 +1,29 @@
-"""Guards: people who walk to an event, look at it, and deal with it."""
+"""Guards: people who walk to an event, look at it, deal with it, and get out of what is too much.
+
+A guard **withdraws** as soon as what is around it is untenable, or its dose is `HURT`: whatever it
+was on, it tells `failed`, and goes to the nearest of its refuges by a way that is not untenable.
+But who was sent to look, and has the place in sight, has seen enough: it confirms first. Until
+the guard is there it takes no orders; with such a dose it never takes one again. One who is
+incapacitated stays where it is, and its device answers that it lies down.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Annotated
-
-import numpy as np
-from pydantic import Field
+from collections.abc import Callable, Sequence
+from functools import partial
 
 from dva_sim.agents.device import STATUS, Device, do_nothing
 from dva_sim.agents.duty import Errand, GuardDuty
-from dva_sim.agents.operator.person import Trait
-from dva_sim.agents.steering import Route
-from dva_sim.config import Config
+from dva_sim.agents.escape import choose_escape
+from dva_sim.agents.exposure import Air, Exposure, clean_air
+from dva_sim.agents.people import Walker
+from dva_sim.agents.walking import Walking
 from dva_sim.protocol import messages as m
+from dva_sim.worlds.hazards import Dose
 from dva_sim.worlds.planning import Planner
 
 STATUS_PERIOD, FIRST_STATUS = 2.0, 0.5  # of where a guard is [s]
-STEP = 0.5  # how often a walking guard's place is looked at [s]
-SLOWEST, FASTEST = 0.6, 2.2  # [m/s]
 NEAR_ENOUGH = 2.0  # from where a guard sees what there is, if nothing stands between [m]
 HERE = 1.0  # who is so near a place stands at it [m]
 STAND_OFF = 10.0
@@ -28,65 +31,11 @@ STAND_OFF = 10.0
 lead a metre too far, and a place is reported a metre or two wrong."""
 STAND_BY_FOR = 900.0  # who stands by gives up if the DVA says nothing for so long [s]
 MOST = 1e6  # no bid is longer [s]
+IN_SIGHT = 10.0  # from where who is driven back has seen what there is [m]
+TRIES_AGAIN = 5.0  # who finds no way out looks for one again after this [s]
 CONFIRMED, REFUTED, CONTAINED = "confirmed", "refuted", "contained"
 
 Point = tuple[float, float]
-
-
-class GuardProfile(Config):
-    """How guards are drawn.
-
-    Attributes:
-        walking_mean_mps: Mean walking speed of a person.
-        walking_sd_mps: Its standard deviation between persons.
-        mobilisation_s: From the order to the first step.
-        confirm_look_s: From arrival to being sure.
-        contain_s: From arrival until the danger is over: a young fire put out, a valve or a
-            door shut. Assumed; no measurement stands behind it.
-
-    References:
-        Walking speed 1.34 m/s (SD 0.26): U. Weidmann, Transporttechnik der Fussgaenger,
-        ETH Zuerich, 1993. Turnout within 80 s in 90 % of all cases: NFPA 1710.
-    """
-
-    description: str = ""
-    walking_mean_mps: Annotated[float, Field(gt=0)] = 1.34
-    walking_sd_mps: Annotated[float, Field(ge=0)] = 0.26
-    mobilisation_s: Trait = Trait(median=45.0, spread=0.45)
-    confirm_look_s: Trait = Trait(median=3.0, spread=0.3)
-    contain_s: Trait = Trait(median=120.0, spread=0.5)
-
-
-@dataclass(frozen=True)
-class Walker:
-    """One guard.
-
-    Attributes:
-        speed: Walking [m/s].
-        mobilisation: From an order to the first step [s].
-        look: From arrival to being sure [s].
-        contain: From arrival until the danger is over [s].
-        usual_mobilisation: What the guard itself expects of getting ready [s]: as long as
-            guards usually need. How long it takes this time shows when it is over.
-    """
-
-    speed: float
-    mobilisation: float
-    look: float
-    contain: float = 60.0
-    usual_mobilisation: float = 45.0
-
-    @classmethod
-    def draw(cls, profile: GuardProfile, rng: np.random.Generator) -> Walker:
-        """One guard of a profile."""
-        speed = rng.normal(profile.walking_mean_mps, profile.walking_sd_mps)
-        return cls(
-            speed=float(np.clip(speed, SLOWEST, FASTEST)),
-            mobilisation=profile.mobilisation_s.draw(rng),
-            look=profile.confirm_look_s.draw(rng),
-            contain=profile.contain_s.draw(rng),
-            usual_mobilisation=profile.mobilisation_s.median,
-        )
 
 
 class GuardAgent:
@@ -96,9 +45,11 @@ class GuardAgent:
         device: Identity and ways to talk.
         walker: How this guard walks and works.
         planner: The guard knows the building.
-        position: Where the guard stands first [m].
+        walking: Its legs; where they stand first is its post.
         is_there: Whether something of a kind really is near a place [m].
         contain: Told of what kind is dealt with near a place [m].
+        air: What it is like at a place [m] and time [s].
+        refuges: Where it is safe, besides its post [m].
     """
 
     def __init__(
@@ -106,17 +57,40 @@ class GuardAgent:
         device: Device,
         walker: Walker,
         planner: Planner,
-        position: Point,
+        walking: Walking,
         is_there: Callable[[str, float, float], bool],
         contain: Callable[[str, float, float], object] = do_nothing,
+        air: Air = clean_air,
+        refuges: Sequence[Point] = (),
     ) -> None:
-        self.device, self._walker, self._planner = device, walker, planner
-        self.x, self.y = self._post = position
-        self.heading = 0.0
+        self.device, self._walker, self._planner, self.walking = device, walker, planner, walking
+        self._post, self._refuges = walking.place, refuges
         self.activity = "waiting"
         self._is_there, self._contain = is_there, contain
         self._duty = GuardDuty(device.dva, walker.mobilisation, self._stands_at)
+        self.exposure = Exposure(device.clock, walking, air)
+        self.exposure.start(self._felt)
         device.serve(self._on_request)
+
+    @property
+    def dose(self) -> Dose:
+        """Of heat and poison, so far."""
+        return self.exposure.dose
+
+    @property
+    def x(self) -> float:
+        """Where the guard is [m]."""
+        return self.walking.place[0]
+
+    @property
+    def y(self) -> float:
+        """Where the guard is [m]."""
+        return self.walking.place[1]
+
+    @property
+    def heading(self) -> float:
+        """Where the guard looks [rad]."""
+        return self.walking.heading
 
     def start(self) -> None:
         """Begin to tell where one is."""
@@ -124,7 +98,7 @@ class GuardAgent:
         clock.every(STATUS_PERIOD, self._publish_status, start=clock.now + FIRST_STATUS)
 
     def _publish_status(self) -> None:
-        position = m.Position(*self.device.frame.to_latlon(self.x, self.y))
+        position = m.Position(*self.device.frame.to_latlon(*self.walking.place))
         self.device.publish(STATUS, m.PersonStatus(self.activity, position))
 
     # --- what the DVA says -------------------------------------------------------------
@@ -140,6 +114,7 @@ class GuardAgent:
     def _take_up(self, errand: Errand | None) -> None:
         """Begin another errand; the steps of an older one come to nothing by themselves."""
         if errand is None:
+            self.walking.stop()
             self.activity = "waiting"
             self.device.tell("is told that the order is over", "order")
             return
@@ -153,7 +128,7 @@ class GuardAgent:
         """Offer to go, by what only this guard knows: its pace, and where it stands now."""
         if self._duty.order is not None:
             return
-        way = self._planner.distance((self.x, self.y), self._xy(announced.position))
+        way = self._planner.distance(self.walking.place, self._xy(announced.position))
         under_way = self._duty.errand is not None and self._duty.ready_at <= self.device.clock.now
         ready = 0.0 if under_way else self._walker.usual_mobilisation
         arrival = ready + way / self._walker.speed
@@ -166,15 +141,13 @@ class GuardAgent:
         if errand is not self._duty.errand:
             return
         goal, is_far_enough = self._goal(errand)
-        points = self._planner.path((self.x, self.y), goal)
-        if points is None:
+        arrived, blocked = partial(self._arrive, errand), partial(self._finish, "failed")
+        self.activity = "walking"
+        if not self.walking.go(goal, arrived, blocked, is_far_enough):
             self.device.tell("finds no way there", "event")
             self._finish("failed")
-            return
-        self.activity = "walking"
-        if errand.order is not None:
+        elif errand.order is not None:
             self.device.progress(errand.order.event_id, "departed")
-        self._walk(errand, Route(points), is_far_enough, 0.0)
 
     def _goal(self, errand: Errand) -> tuple[Point, Callable[[Point], bool]]:
         """Where the way leads to, and from where on it need not be gone to its end."""
@@ -183,40 +156,24 @@ class GuardAgent:
             return place, lambda at: False
         if errand.order.task != "stand_by":
             return place, lambda at: self._sees(at, place)
-        if math.dist((self.x, self.y), place) < STAND_OFF:
+        if math.dist(self.walking.place, place) < STAND_OFF:
             return self._post, lambda at: math.dist(at, place) >= STAND_OFF  # too near: back off
         return place, lambda at: math.dist(at, place) <= STAND_OFF
 
     def _stands_at(self, place: m.Position) -> bool:
-        return math.dist((self.x, self.y), self._xy(place)) < HERE
+        return math.dist(self.walking.place, self._xy(place)) < HERE
 
     def _sees(self, at: Point, place: Point) -> bool:
         """Whether a place is near, and nothing stands between."""
         near = math.hypot(place[0] - at[0], place[1] - at[1]) <= NEAR_ENOUGH
         return near and self._planner.line_of_sight(at, place)
 
-    def _walk(
-        self, errand: Errand, route: Route, is_far_enough: Callable[[Point], bool], along: float
-    ) -> None:
-        """One step."""
-        if errand is not self._duty.errand:
-            return
-        x, y = route.point_at(along)
-        if (x, y) != (self.x, self.y):
-            self.heading = math.atan2(y - self.y, x - self.x)
-        self.x, self.y = x, y
-        if along >= route.length or is_far_enough((x, y)):
-            self._arrive(errand)
-        else:
-            further = min(along + self._walker.speed * STEP, route.length)
-            self.device.clock.call_after(STEP, self._walk, errand, route, is_far_enough, further)
-
     # --- what is done there ------------------------------------------------------------
 
     def _arrive(self, errand: Errand) -> None:
         order, clock = errand.order, self.device.clock
         if order is None:
-            self._post = self.x, self.y
+            self._post = self.walking.place
             self._finish()
         elif order.task == "stand_by":
             self.activity = "standing by"
@@ -267,6 +224,56 @@ class GuardAgent:
             self.device.progress(order.event_id, state)
         self._duty.is_over(at_event)
         self.activity = "waiting"
+
+    # --- what is too much --------------------------------------------------------------
+
+    def _felt(self) -> None:
+        """Half a second more in this air."""
+        if self.dose.incapacitated:
+            self.exposure.end()
+            self._give_back("lies down")
+            self.walking.stop()
+            self.activity = "incapacitated"
+            self.device.tell("is incapacitated", "safety")
+        elif self.exposure.is_too_much and not self._duty.unfit:
+            self._give_back("withdraws from danger")
+            self.activity = "withdrawing"
+            self.device.tell("withdraws", "safety")
+            self._withdraw()
+
+    def _give_back(self, unfit: str) -> None:
+        """Be of no more use, for that reason, to whatever the guard was on."""
+        order, self._duty.unfit = self._duty.order, unfit
+        if order is None:
+            self._finish()
+        elif order.task == "confirm" and self._has_seen(order):
+            self._report(order, CONFIRMED)
+        else:
+            self._finish("failed")
+
+    def _has_seen(self, order: m.Order) -> bool:
+        at, place = self.walking.place, self._xy(order.position)
+        near = math.dist(at, place) <= IN_SIGHT and self._planner.line_of_sight(at, place)
+        return near and self._is_there(order.kind, *place)
+
+    def _withdraw(self) -> None:
+        """Go to where it is safe; if that cannot be reached, try again."""
+        if self.activity != "withdrawing":
+            return
+        places = (self._post, *self._refuges)
+        safe = [place for place in places if not self.exposure.is_bad(place)]
+        here, is_bad = self.walking.place, self.exposure.is_bad
+        escape = choose_escape(self._planner, here, safe, is_bad)
+        again = partial(self.device.clock.call_after, TRIES_AGAIN, self._withdraw)
+        if escape is None or not self.walking.go(
+            escape.goal, self._is_safe, again, avoid=escape.avoid
+        ):
+            again()
+
+    def _is_safe(self) -> None:
+        """At a refuge: fit for service again, unless hurt."""
+        self._duty.unfit = "is hurt" if self.exposure.is_hurt else ""
+        self.activity = "hurt" if self.exposure.is_hurt else "waiting"
 
     def _xy(self, place: m.Position) -> Point:
         return self.device.frame.to_xy(place.latitude, place.longitude)

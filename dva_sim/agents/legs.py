@@ -11,6 +11,7 @@ from dva_sim.clock import Clock
 RADIUS: Final = 0.2
 """Of the disc that stands for a person, seen from above [m]: as much floor as an ellipse of
 0.46 m by 0.28 m, and a little more; assumed."""
+SIDEWAYS: Final = 0.12  # half as deep as a chest: of who squeezes through a gap; assumed [m]
 
 
 class Body(Protocol):
@@ -39,6 +40,9 @@ class Legs(Body, Protocol):
     def walk(self, vx: float, vy: float) -> None:
         """Want to walk with this velocity [m/s] until told otherwise."""
 
+    def take_up(self, radius: float) -> None:
+        """Be so wide from now on [m]."""
+
 
 class Ground(Protocol):
     """Where one walks: the physics, or open ground without any."""
@@ -59,11 +63,9 @@ class FreeBody:
         y: First position [m].
     """
 
-    radius = RADIUS
-
     def __init__(self, clock: Clock, x: float, y: float) -> None:
         self._clock, self._since = clock, clock.now
-        self._x, self._y = x, y
+        self._x, self._y, self.radius = x, y, RADIUS
         self.velocity = 0.0, 0.0
 
     @property
@@ -80,6 +82,10 @@ class FreeBody:
         """See `Legs`."""
         self._x, self._y, self._since = self.x, self.y, self._clock.now
         self.velocity = vx, vy
+
+    def take_up(self, radius: float) -> None:
+        """See `Legs`."""
+        self.radius = radius
 
 
 class OpenGround:

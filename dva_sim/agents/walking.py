@@ -7,6 +7,7 @@ looks where it is and chooses the velocity that its legs push towards:
 - **Somebody near**: by the two rules of `manners`: step aside, to the right rather than the
   left, and slow down.
 - **In doors** one gives way, by the rules of `doorways`.
+- **Held up by a robot**, one turns sideways and squeezes past, if there is a gap.
 - **Blocked**: who has come no nearer for some seconds looks for a way around whoever stands
   there, again and again at longer intervals; who has come no nearer for `GIVE_UP` says so, and
   it is for the agent to decide what then. So nobody is stuck for ever.
@@ -19,29 +20,34 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
 
-from dva_sim.agents.doorways import Courtesy, beside, doors_on, middles_of
-from dva_sim.agents.legs import Body, Ground, Legs
+from dva_sim.agents.doorways import Courtesy, beside, doors_on, middles_of, past
+from dva_sim.agents.legs import RADIUS, SIDEWAYS, Body, Ground, Legs
 from dva_sim.agents.manners import REACH, Floats, Mover, Point, velocity
 from dva_sim.agents.steering import Ahead, Route
 from dva_sim.clock import Clock
+from dva_sim.worlds.physics import RobotBody
 from dva_sim.worlds.planning import Disc, Planner
 
 STEP: Final = 0.2  # between looks at the way [s]
 LOOK_AHEAD: Final = 0.8  # on the way [m]
 LOOK_PAST: Final = 2.5  # on the way, where others are and no wall is between [m]
+ASTRAY: Final = 1.0  # who was pushed so far off the way takes another [m] ...
+PLANS_EVERY: Final = 1.0  # ... no more often than this [s]
 ARRIVED: Final = 0.15  # so near to its end one is there [m]
-BRAKING: Final = 0.75  # the end is approached at the distance left, by this [s]
+BRAKING: Final = 1.0  # the end is approached at the distance left, by this [s]
 CROWDED: Final = 1.5  # who is held up so near to the end is there [m]
 MOST_SEEN: Final = 8  # of those near, the nearest count
 
 NEARER: Final = 0.25  # less is no progress [m]
 TIRED: Final = 4.0  # of no progress; then one looks for another way [s]
 GIVE_UP: Final = 60.0  # of no progress; then one gives up [s]
+BESIDE: Final = 0.8  # so near one squeezes past [m]
+SIDEWAYS_SPEED: Final = 0.5  # of who squeezes past; assumed [m/s]
 STANDING: Final = 0.1  # slower than this is in the way [m/s]
 
 SLOWEST, FASTEST = 0.6, 2.2  # walking [m/s]
@@ -65,6 +71,7 @@ class Walk:
         arrived: Called at its end.
         blocked: Called when it is given up.
         is_far_enough: From where on it need not be gone to its end.
+        avoid: Places to go around.
     """
 
     goal: Point
@@ -73,10 +80,13 @@ class Walk:
     is_far_enough: Callable[[Point], bool]
     route: Route
     courtesy: Courtesy
+    avoid: tuple[Disc, ...]
     gone: float = 0.0  # along the way [m]
     least: float = math.inf  # of what was left of the way, so far [m]
     nearer_at: float = 0.0  # when it last became less [s]
     looks_around: float = 0.0  # when another way is looked for [s]
+    planned: float = 0.0  # when its way was chosen [s]
+    robots: set[Disc] = field(default_factory=set)  # that stood in the way
 
 
 class Walking:
@@ -148,10 +158,11 @@ class Walking:
             return False
         now = self._clock.now
         courtesy = Courtesy(doors_on(points, self._doors))
-        walk = Walk(goal, arrived, blocked, is_far_enough, Route(points), courtesy)
+        route, keep_off = Route(points), tuple(avoid)
+        walk = Walk(goal, arrived, blocked, is_far_enough, route, courtesy, keep_off)
         walk.nearer_at, walk.looks_around = now, now + TIRED
         self._walk = walk
-        self._step(walk)
+        self._clock.call_after(0.0, self._step, walk)
         return True
 
     def places_ahead(self, every: float, reach: float) -> list[Point]:
@@ -182,6 +193,9 @@ class Walking:
             self.stop()
             walk.blocked()
         else:
+            if ahead.offset > ASTRAY and self._clock.now >= walk.planned + PLANS_EVERY:
+                self._plan(walk, ())
+                ahead = walk.route.ahead(x, y, 0.0, LOOK_AHEAD)
             self._push_on(walk, ahead)
             self._clock.call_after(STEP, self._step, walk)
 
@@ -198,8 +212,11 @@ class Walking:
         near = self._others()
         if near and self._clock.now >= walk.looks_around:
             self._look_around(walk, near)
-        heading = ahead.bearing
-        if near:
+        heading, slot = ahead.bearing, self._slot(walk, near)
+        if slot is not None:
+            heading = math.atan2(slot[1] - self.body.y, slot[0] - self.body.x)
+            vx, vy = SIDEWAYS_SPEED * math.cos(heading), SIDEWAYS_SPEED * math.sin(heading)
+        elif near:
             heading, vx, vy = self._among(walk, ahead, speed, near)
         else:
             vx, vy = speed * math.cos(heading), speed * math.sin(heading)
@@ -237,13 +254,45 @@ class Walking:
 
     # --- in the way --------------------------------------------------------------------
 
+    def _slot(self, walk: Walk, near: Sequence[Body]) -> Point | None:
+        """Where to squeeze past a robot that holds one up; sideways until it is passed."""
+        body, squeezes = self.body, self.body.radius == SIDEWAYS
+        robots = (o for o in near if isinstance(o, RobotBody))
+        robot = next((r for r in robots if _gap(r, body) < BESIDE), None)
+        tired = self._clock.now - walk.nearer_at > TIRED
+        if robot is None or not (tired or squeezes):
+            if squeezes:
+                body.take_up(RADIUS)
+            return None
+        (ax, ay), (bx, by) = (walk.route.point_at(walk.gone + k) for k in (0.0, LOOK_PAST))
+        length = math.hypot(bx - ax, by - ay)
+        along = (bx - ax) / length, (by - ay) / length
+        if (robot.x - body.x) * along[0] + (robot.y - body.y) * along[1] < -robot.radius:
+            body.take_up(RADIUS)
+            return None
+        body.take_up(SIDEWAYS)
+        return past(robot, along, body, self._planner.room_at)
+
     def _look_around(self, walk: Walk, near: Sequence[Body]) -> None:
         """Look for a way around who stands there; longer and longer pauses between."""
         now = self._clock.now
         walk.looks_around = now + max(TIRED, now - walk.nearer_at)
         standing = [o for o in near if math.hypot(*o.velocity) < STANDING]
-        discs = [Disc(o.x, o.y, o.radius) for o in standing]
-        points = self._planner.path(self.place, walk.goal, discs) if discs else None
-        if points is not None:
-            walk.route, walk.courtesy = Route(points), Courtesy(doors_on(points, self._doors))
+        walk.robots.update(Disc(o.x, o.y, o.radius) for o in standing if isinstance(o, RobotBody))
+        in_way = sorted(walk.robots | {Disc(o.x, o.y, o.radius) for o in standing})
+        if in_way and self._plan(walk, in_way):
             walk.least = walk.route.length
+
+    def _plan(self, walk: Walk, avoid: Sequence[Disc]) -> bool:
+        """Take another way, from where one is now; whether there is one."""
+        points = self._planner.path(self.place, walk.goal, (*walk.avoid, *avoid))
+        if points is None:
+            return False
+        walk.route, walk.courtesy = Route(points), Courtesy(doors_on(points, self._doors))
+        walk.planned, walk.gone = self._clock.now, 0.0
+        return True
+
+
+def _gap(one: Body, other: Body) -> float:
+    """Between two bodies [m]."""
+    return math.dist((one.x, one.y), (other.x, other.y)) - one.radius - other.radius

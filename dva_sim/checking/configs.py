@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from PIL import Image
 
-from dva_sim.agents.guard import GuardProfile
+from dva_sim.agents.people import GuardProfile
 from dva_sim.agents.operator.person import Population
 from dva_sim.agents.profile import RobotProfile
 from dva_sim.agents.tilt.phone import PhoneProfile

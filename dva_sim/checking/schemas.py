@@ -32,8 +32,8 @@ def _json_schema(kind: str) -> dict[str, Any]:
     """From the models that read the files; an agent may be of any of four kinds."""
     from pydantic import TypeAdapter
 
-    from dva_sim.agents.guard import GuardProfile
     from dva_sim.agents.operator.person import Population
+    from dva_sim.agents.people import GuardProfile
     from dva_sim.agents.profile import RobotProfile
     from dva_sim.agents.tilt.phone import PhoneProfile
     from dva_sim.experiments.study import Study

@@ -5,8 +5,8 @@ from __future__ import annotations
 from functools import cache
 
 from dva_sim import resources
-from dva_sim.agents.guard import GuardProfile
 from dva_sim.agents.operator.person import Population
+from dva_sim.agents.people import GuardProfile
 from dva_sim.agents.profile import RobotProfile
 from dva_sim.agents.tilt.phone import PhoneProfile
 from dva_sim.config import Config, M, load_yaml, validate

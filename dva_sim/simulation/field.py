@@ -6,11 +6,14 @@ import math
 
 from dva_sim.agents.camera import CAMERA_SCHEME, HazardSpot, View
 from dva_sim.agents.device import Device
-from dva_sim.agents.guard import GuardAgent, Walker
+from dva_sim.agents.guard import GuardAgent
+from dva_sim.agents.legs import RADIUS
 from dva_sim.agents.modes import Limits, RobotController
 from dva_sim.agents.operator.strategies import Truth
+from dva_sim.agents.people import Walker
 from dva_sim.agents.robot import FRAME, RobotAgent, RobotSetup
 from dva_sim.agents.sensing import SensorPort
+from dva_sim.agents.walking import Walking
 from dva_sim.protocol import messages as m
 from dva_sim.recorder import DriveLog
 from dva_sim.scenario import guard_profile
@@ -127,9 +130,11 @@ class Field:
         device = stage.device("guard", number)
         luck = stage.streams[f"{device.label}/walker"]
         walker = Walker.draw(guard_profile(stage.scenario), luck)
-        guard = GuardAgent(
-            device, walker, stage.planner, (post.x, post.y), self._is_there, self._contain
+        body = self.world.add_person(device.label, post, radius=RADIUS)
+        walking = Walking(
+            stage.clock, stage.planner, self.world, body, walker.speed, stage.site.doors
         )
+        guard = GuardAgent(device, walker, stage.planner, walking, self._is_there, self._contain)
         self.guards.append(guard)
         device.register(guard.start)
 

@@ -10,7 +10,8 @@ import pytest
 from pretended_dva import GUARD, POST, WALKER, PretendedDva
 
 from dva_sim.agents.duty import AWARD_WITHIN, MOST_ANNOUNCED, GuardDuty
-from dva_sim.agents.guard import STAND_BY_FOR, STAND_OFF, GuardAgent, GuardProfile, Walker
+from dva_sim.agents.guard import STAND_BY_FOR, STAND_OFF, GuardAgent
+from dva_sim.agents.people import GuardProfile, Walker
 from dva_sim.protocol import messages as m
 from dva_sim.worlds.hazards import KINDS, make_hazard
 
@@ -169,7 +170,8 @@ def test_an_order_that_the_dva_calls_over_is_given_up_without_a_word(
     assert dva.say(GUARD, m.OrderProgress(1, "done")) == m.OK
     here = at(guard)
     dva.run_for(60.0)
-    assert (at(guard), guard.activity) == (here, "waiting")
+    assert math.dist(at(guard), here) < 0.6  # who walks 1 m/s needs half a metre to stand
+    assert guard.activity == "waiting"
     assert dva.progress(1) == ["departed"]
 
 
@@ -291,7 +293,7 @@ def test_an_idle_guard_that_is_relocated_walks_there_and_waits(
     assert dva.say(GUARD, m.Relocation(place)) == m.OK
     assert guard.activity == "getting ready"
     dva.run_for(60.0)
-    assert at(guard) == pytest.approx(FAR, abs=0.01)
+    assert at(guard) == pytest.approx(FAR, abs=0.2)
     assert guard.activity == "waiting"
     assert dva.told == []
 

@@ -14,7 +14,7 @@ import pytest
 from halls import People, gap, hall, two_rooms
 
 from dva_sim.agents.doorways import Courtesy, Door, beside, doors_on, middles_of
-from dva_sim.agents.legs import FreeBody, OpenGround
+from dva_sim.agents.legs import RADIUS, FreeBody, OpenGround
 from dva_sim.agents.manners import BERTH, RELAXATION, Mover, velocity
 from dva_sim.agents.walking import (
     ARRIVED,
@@ -306,18 +306,29 @@ def test_who_finds_the_door_blocked_by_a_robot_goes_by_another_one():
     assert walker.place[0] > 9
 
 
-def test_who_can_get_through_nowhere_says_so_after_a_minute_and_does_not_push_for_ever():
+def test_who_is_held_up_by_a_robot_in_a_door_squeezes_past_if_there_is_a_gap():
+    """0.25 m are left on each side of the robot, and a person turned sideways takes 0.24 m."""
     people = People(two_rooms(1.1))
     robot = people.world.add_robot("robot", DriveSpec(), Pose(6, 5, 0))
+    walker = people.add((1, 5), (11, 5))
+    people.run_until(people.all_settled, 60.0)
+    assert people.arrived
+    assert walker.body.radius == RADIUS  # and turns back
+    assert math.dist(robot.pose()[:2], (6, 5)) < 0.05
+
+
+def test_who_can_get_through_nowhere_says_so_and_does_not_push_for_ever():
+    people = People(two_rooms(0.9))
+    robot = people.world.add_robot("robot", DriveSpec(), Pose(6, 5, 0))
     people.add((1, 5), (11, 5))
-    people.run_until(people.all_settled, 120.0)
+    people.run_until(people.all_settled, 200.0)
     assert people.arrived == {}
-    assert GIVE_UP < people.gave_up[0] < GIVE_UP + 10.0
+    assert GIVE_UP < people.gave_up[0] < 2 * GIVE_UP
     assert math.dist(robot.pose()[:2], (6, 5)) < 0.05
 
 
 def test_who_waits_until_a_robot_leaves_the_door_gets_through_then():
-    people = People(two_rooms(1.1))
+    people = People(two_rooms(0.9))
     robot = people.world.add_robot("robot", DriveSpec(), Pose(6, 5, 0))
     people.add((1, 5), (11, 5))
     people.clock.run(30.0)
