@@ -22,7 +22,7 @@ from dva_sim.agents.nearby import Nearby
 
 Floats = NDArray[np.float64]
 
-KEEP_WALL = 0.05  # distance kept to what does not move [m]; assumed
+KEEP_WALL = 0.01  # kept to walls; the grid is on the safe side by up to a cell [m]; assumed
 TIME_TO_CONTACT = 1.0  # speed is scaled so that contact is at least so far off [s]; assumed
 REACTION = 0.35  # until brakes answer: a period of the loop, and the motors' lag [s]; assumed
 STEP = 0.05  # between the samples of an arc [m]

@@ -180,6 +180,7 @@ def add_operator(
         command.timeout_s,
         command.attempts,
         truth=truth if needs_truth else None,
+        guarded=reach if scenario.control == "coordinated" else None,
     )
     seat = DriverSeat(
         device,

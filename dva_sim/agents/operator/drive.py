@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 from dva_sim.agents.camera import Observation
 from dva_sim.agents.commands import CommandSender, PublishedCommands, RequestedCommands
+from dva_sim.agents.operator.careful import Careful
 from dva_sim.agents.operator.delay import DelayEstimate
 from dva_sim.agents.operator.seat import DriverSeat
 from dva_sim.agents.operator.strategies import Intent, Oracle, Pursuit
@@ -47,6 +48,8 @@ class Drive(Work):
         self._route: Route | None = None
         self._intent = Intent(0.0, 0.0)
         self._seen_tick: int | None = None
+        guarded = seat.setup.guarded
+        self._careful = Careful(seat.person, guarded) if guarded is not None else None
         self._standing_since: float | None = None
         self._let_go_until = 0.0
         self._without_effect = 0
@@ -122,9 +125,16 @@ class Drive(Work):
         route = self._consider(judged)
         if route is not None:
             # The guess is made when a frame is perceived, so it holds the perceptual delay.
-            self._intend(
-                seat.strategy.drive(route, judged, seat.delay.value, self._keep_off(judged))
-            )
+            self._intend(self._steer(route, judged, seat.strategy))
+
+    def _steer(self, route: Route, seen: Observation, strategy: Pursuit) -> Intent:
+        """What to ask for; close quarters are for who knows that a guard holds the robot back."""
+        now, delay, careful = self._clock.now, self._seat.delay.value, self._careful
+        if careful is not None and careful.notice(now, seen, self._intent.speed, delay):
+            points = careful.way((seen.x, seen.y), self._goal, self._seat.planner)
+            route = self._route = route if points is None else Route(points)
+        how = careful if careful is not None and careful.on else strategy
+        return how.drive(route, seen, delay, self._keep_off(seen))
 
     def _look_at_truth(self) -> bool:
         """The oracle's own loop; False ends it."""

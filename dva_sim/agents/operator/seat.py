@@ -11,7 +11,7 @@ from dva_sim.agents.camera import Observation
 from dva_sim.agents.device import Device
 from dva_sim.agents.operator.delay import DelayEstimate
 from dva_sim.agents.operator.person import Person
-from dva_sim.agents.operator.strategies import Oracle, Pursuit, Truth
+from dva_sim.agents.operator.strategies import Oracle, Pursuit, Reach, Truth
 from dva_sim.agents.tilt import Phone
 from dva_sim.worlds.planning import Planner
 
@@ -29,6 +29,7 @@ class OperatorSetup:
         timeout: Of a request [s].
         attempts: Of a request.
         truth: The true state of a robot by id, if the strategy is the oracle; else None.
+        guarded: What the robot can do, if a collision guard may hold it back; else None.
     """
 
     window: int | None
@@ -36,6 +37,7 @@ class OperatorSetup:
     timeout: float
     attempts: int
     truth: Callable[[str], Truth] | None = None
+    guarded: Reach | None = None
 
 
 class DriverSeat:
