@@ -1,0 +1,198 @@
+import math
+
+import numpy as np
+import pytest
+
+from dva_sim.agents.profile import load_robot
+from dva_sim.errors import ConfigError
+from dva_sim.worlds.drives import (
+    Differential,
+    DriveSpec,
+    Guarded,
+    ThreeWay,
+    known_drives,
+    load_drive,
+)
+from dva_sim.worlds.geo import Pose
+from dva_sim.worlds.hall import hall
+from dva_sim.worlds.physics import World
+
+DT = 0.02
+CAR = DriveSpec(
+    mass=2.0, radius=0.2, max_speed=0.8, max_turn_rate=1.5, max_acceleration=1.5,
+    max_deceleration=2.0, motor_time_constant=0.1, drive=ThreeWay,
+)  # fmt: skip
+RADIUS = 0.26 / math.tan(math.radians(25.0))  # of its curve, 0.56 m
+
+
+def car(spec=CAR, dt=DT):
+    world = World(hall(20.0, 20.0), dt)
+    return world, world.add_robot("pibot-1", spec, Pose(10.0, 10.0, 0.4))
+
+
+# --- differential ----------------------------------------------------------------------
+
+
+def test_a_motor_is_63_percent_there_after_its_time_constant():
+    spec = DriveSpec(max_acceleration=100.0, motor_time_constant=0.15)
+    drive, speed, dt = Differential(spec), 0.0, 0.001
+    for _ in range(150):
+        along, _ = drive.accelerations(0.5, 0.0, speed, 0.0, dt)
+        speed += along * dt
+    assert speed / 0.5 == pytest.approx(1 - math.exp(-1), abs=0.005)
+
+
+def test_a_motor_is_never_asked_for_more_than_its_acceleration():
+    drive = Differential(DriveSpec())
+    assert drive.accelerations(0.5, 0.5, 0.0, 0.0, DT) == (0.5, 1.5)
+    assert drive.accelerations(0.0, -0.5, 0.5, 0.5, DT) == (-1.0, -1.5)
+    assert drive.accelerations(0.3, 0.2, 0.3, 0.2, DT) == (0.0, 0.0)
+
+
+# --- three ways ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("turn_rate", "side"), [(0.9, 1), (-0.9, -1), (5.0, 1)])
+def test_the_curve_of_a_car_has_the_radius_of_its_wheelbase_and_steering_angle(turn_rate, side):
+    world, robot = car()
+    robot.drive(0.5, turn_rate, math.inf)
+    world.advance_to(3.0)
+    assert robot.turn_rate == pytest.approx(side * robot.speed / RADIUS, rel=1e-3)
+    assert robot.turning_radius == pytest.approx(RADIUS)
+    points = []
+    for _ in range(400):
+        world.advance_to(world.time + DT)
+        points.append((robot.x, robot.y))
+    size = np.ptp(np.array(points), axis=0) / 2
+    assert size == pytest.approx([RADIUS, RADIUS], rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("asked", "steering"),
+    [(0.0, 0), (0.44, 0), (-0.44, 0), (0.46, 1), (-0.46, -1), (1.5, 1)],
+)
+def test_the_steering_goes_to_the_nearest_of_three_positions(asked, steering):
+    """At 0.5 m/s, a side is 0.90 rad/s: half of it, 0.45, is where it changes."""
+    speed, turn_rate = ThreeWay(CAR).set_point(0.504, asked)
+    assert speed == pytest.approx(0.504)  # 63 %
+    assert turn_rate == pytest.approx(steering * speed / RADIUS)
+
+
+@pytest.mark.parametrize(("asked", "got"), [(0.3, 0.304), (0.8, 0.8), (0.003, 0.0), (0.005, 0.008)])
+def test_the_motor_knows_whole_percentages(asked, got):
+    assert ThreeWay(CAR).set_point(asked, 0.0)[0] == pytest.approx(got)
+
+
+def test_a_car_does_not_turn_on_the_spot():
+    world, robot = car()
+    robot.drive(0.0, 1.5, math.inf)
+    world.advance_to(5.0)
+    assert robot.pose() == Pose(10.0, 10.0, 0.4)
+
+
+def test_a_car_never_turns_faster_than_its_curve_allows_whatever_it_is_asked():
+    world, robot = car()
+    rng, sharpest = np.random.default_rng(1), 0.0
+    for _ in range(100):
+        robot.drive(rng.choice([0.0, 0.2, 0.8]), rng.uniform(-1.5, 1.5), math.inf)
+        for _ in range(20):
+            world.advance_to(world.time + DT)
+            if not robot.in_contact and abs(robot.speed) > 0.02:
+                sharpest = max(sharpest, abs(robot.turn_rate / robot.speed))
+    assert sharpest == pytest.approx(1 / RADIUS, rel=0.01)
+
+
+def test_who_brakes_in_a_curve_stays_on_it():
+    world, robot = car()
+    robot.drive(0.5, 1.0, 2.0)
+    world.advance_to(2.0)
+    before = robot.pose().heading
+    start = robot.distance
+    world.advance_to(4.0)
+    assert robot.speed == 0.0
+    assert robot.pose().heading - before == pytest.approx(
+        (robot.distance - start) / RADIUS, rel=0.05
+    )
+
+
+def test_a_servo_takes_its_time_from_straight_to_a_side():
+    world, robot = car()
+    robot.drive(0.5, 0.0, math.inf)
+    world.advance_to(2.0)
+    robot.drive(0.5, 1.0, math.inf)
+    world.advance_to(2.0 + 0.075 + DT)
+    half = robot.turn_rate * RADIUS / robot.speed
+    assert half == pytest.approx(0.5, abs=0.15)
+    world.advance_to(2.0 + 0.15 + 2 * DT)
+    assert robot.turn_rate * RADIUS / robot.speed == pytest.approx(1.0, rel=0.01)
+
+
+@pytest.mark.parametrize("option", [{"wheelbase_m": 0}, {"steering_deg": 90}, {"servo_s": -1}])
+def test_a_car_that_cannot_be_is_refused(option):
+    with pytest.raises(ConfigError, match=f"option '{next(iter(option))}' is"):
+        ThreeWay(CAR, **option)
+
+
+# --- of users --------------------------------------------------------------------------
+
+
+class Wild(Differential):
+    def set_point(self, speed, turn_rate):
+        return (math.nan, 0.0) if speed > 0.4 else (7.0, -9.0)
+
+    def accelerations(self, speed, turn_rate, now_speed, now_turn_rate, dt):
+        return (math.inf, 0.0) if speed == 0 else (99.0, 0.5)
+
+
+def test_a_drive_of_a_user_is_kept_within_the_limits_whatever_it_answers():
+    spec = DriveSpec()
+    drive = Guarded(Wild(spec))
+    assert drive.set_point(0.5, 0.0) == (0.0, 0.0)
+    assert drive.set_point(0.1, 0.0) == (0.5, -spec.max_turn_rate)
+    assert drive.accelerations(0.5, 0.0, 0.1, 0.0, DT) == (0.5, 0.5)
+    assert drive.accelerations(0.5, 0.0, 0.499, 0.0, DT)[0] == pytest.approx(0.001 / DT)
+    assert drive.accelerations(0.0, 0.0, 0.3, 0.1, DT) == (-1.0, pytest.approx(-0.1 / DT))
+
+
+def test_drives_are_made_by_name_and_by_file(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert known_drives() == ["differential", "three_way"]
+    assert load_drive("differential") is Differential
+    assert load_drive("three_way", {"steering_deg": 45.0})(CAR).turning_radius == pytest.approx(
+        0.26
+    )
+    tracked = load_drive("tracked.py:Tracked", {"scrub": 1.0})(DriveSpec())
+    assert tracked.set_point(0.5, math.pi / 6) == (0.0, math.pi / 6)
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "said"),
+    [
+        ("four_way", {}, "drive 'four_way' is unknown; known: differential, three_way; or a file"),
+        ("mine.py", {}, "drive 'mine.py' should name a class too, as mine.py:Mine"),
+        ("mine.py:Mine", {}, "drive 'mine.py:Mine': file 'mine.py' not found; looked in"),
+        ("tracked.py:Yours", {}, "drive 'tracked.py:Yours': there is no class 'Yours' in"),
+        ("tracked.py:DriveSpec", {}, "is not a drive; should be a class derived from dva_sim.worl"),
+        ("three_way", {"scrub": 1}, "has no option 'scrub'; known: wheelbase_m, steering_deg, ser"),
+        ("differential", {"gain": 1}, "drive 'differential' has no option 'gain'; it has none"),
+    ],
+)
+def test_a_mistake_is_one_clear_line(name, options, said):
+    with pytest.raises(ConfigError) as caught:
+        load_drive(name, options)(DriveSpec())
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["servrobot", "pibot", "tracked"])
+def test_every_robot_that_is_shipped_drives_and_stops(name):
+    world = World(hall(20.0, 20.0), 0.04)
+    spec = load_robot(name).drive_spec()
+    robot = world.add_robot("robot-1", spec, Pose(5.0, 10.0, 0.0))
+    robot.drive(spec.max_speed, 0.0, 10.0)
+    world.advance_to(10.0)
+    assert robot.speed == pytest.approx(spec.max_speed, rel=1e-3)
+    start = robot.x
+    world.advance_to(20.0)
+    assert robot.speed == 0.0
+    assert 0.5 * spec.stopping_distance < robot.x - start < spec.stopping_distance
