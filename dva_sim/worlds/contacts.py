@@ -9,8 +9,8 @@ for help. The rules:
   counted among all, and once more by themselves.
 - **Jammed** is a robot that touches something, has been asked to drive or turn for `JAM_TIME`
   altogether, and in all that time moved less than `JAM_WAY` and turned less than `JAM_TURN`
-  from where it was. Time in which nothing is asked of it does not count, nor does it reset
-  anything; the more so does a robot without power never become jammed: it fails otherwise.
+  from where it was. Time in which nothing is asked of it does not count, and resets nothing.
+  A robot without power is asked for nothing: it fails, but it is not jammed.
 - **It recovers** by turning on the spot, where its drive can, until the way ahead is free, and
   then driving on; or by being pushed. As soon as it has moved `JAM_WAY` or turned `JAM_TURN` it
   is no longer jammed. A car cannot turn without moving ahead: one whose nose touches a wall

@@ -1,0 +1,67 @@
+"""Profiles of robots: what they say, and what they may not."""
+
+import math
+
+import pytest
+
+from dva_sim.agents.profile import RobotProfile, load_robot
+from dva_sim.config import validate
+from dva_sim.errors import ConfigError
+from dva_sim.worlds.drives import DriveSpec
+
+
+def test_the_service_robot_is_what_the_physics_has_by_itself():
+    assert load_robot("servrobot").drive_spec() == DriveSpec()
+    assert load_robot("servrobot").processing_s == 0.05
+
+
+def test_the_model_car_is_slow_to_answer_and_cannot_turn_on_the_spot():
+    car = load_robot("pibot")
+    spec = car.drive_spec()
+    assert car.processing_s == 1.0
+    assert spec.drive(spec).turning_radius == pytest.approx(0.26 / math.tan(math.radians(25)))
+    assert spec.inner_radius == pytest.approx(0.10)
+
+
+def test_a_drive_beside_its_profile_is_found_from_anywhere(tmp_path, monkeypatch):
+    there, here = tmp_path / "there", tmp_path / "here"
+    there.mkdir()
+    here.mkdir()
+    (there / "mine.yaml").write_text("drive: mine.py:Mine\noptions: {pace: 0.5}\n")
+    (there / "mine.py").write_text(
+        "from dva_sim.worlds.drives import Differential\n"
+        "class Mine(Differential):\n"
+        "    def __init__(self, spec, pace=1.0):\n"
+        "        super().__init__(spec)\n"
+        "        self.pace = pace\n"
+    )
+    monkeypatch.chdir(here)
+    spec = load_robot("../there/mine.yaml").drive_spec()
+    assert spec.drive(spec).drive.pace == 0.5
+
+
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [
+        ({"max_speed_mps": 3.8}, "max_speed_mps should be at most 3.75 for a body of this size"),
+        ({"max_speed_mps": 1.3, "radius_m": 0.1}, "max_speed_mps should be at most 1.25"),
+        (
+            {"corners_m": [[0.2, 0.05], [-0.2, 0.05], [-0.2, -0.05], [0.2, -0.05]],
+             "max_speed_mps": 0.7},
+            "max_speed_mps should be at most 0.625",
+        ),
+        ({"corners_m": [[0.4, 0.1], [-0.2, 0.1], [-0.2, -0.1]]}, "radius_m should hold the corner"),
+        ({"corners_m": [[0.2, 0], [0, 0.2]]}, "corners_m should go counter-clockwise"),
+        ({"corners_m": [[0.2, 0.1], [0.2, -0.1], [-0.2, 0]]}, "corners_m should go counter-clockw"),
+        ({"corners_m": [[0.2, 0], [0.02, 0.02], [0, 0.2], [-0.2, -0.2]]}, "without dents"),
+        ({"corners_m": [[0.2, 0.1], [0.1, 0.1], [0.1, 0.05], [0.2, 0.05]]}, "around 0, 0"),
+        ({"mass_kg": 0}, "mass_kg: input should be greater than 0, not 0"),
+        ({"battery": {"efficiency": 2}}, "battery.efficiency: input should be less than or equal"),
+        ({"reverse": True}, "unknown key 'reverse'"),
+    ],
+)  # fmt: skip
+def test_a_profile_that_cannot_be_is_refused_in_one_line(keys, said):
+    with pytest.raises(ConfigError) as caught:
+        validate(RobotProfile, keys)
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
