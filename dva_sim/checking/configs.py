@@ -11,9 +11,9 @@ from typing import Any, Final
 
 from PIL import Image
 
-from dva_sim.agents.people import GuardProfile
 from dva_sim.agents.operator.person import Population
-from dva_sim.agents.profile import RobotProfile
+from dva_sim.agents.people import GuardProfile
+from dva_sim.agents.profile import RobotProfile, read_robot
 from dva_sim.agents.tilt.phone import PhoneProfile
 from dva_sim.checking.problem import Problem
 from dva_sim.config import Config, Document, Path_, validate
@@ -180,6 +180,13 @@ def _check_map(document: Document) -> Iterator[ConfigError]:
     return iter(())
 
 
+def _check_robot(document: Document) -> Iterator[ConfigError]:
+    """The profile, and its motors made once."""
+    spec = read_robot(document).drive_spec()
+    spec.drive(spec)
+    return iter(())
+
+
 def _check_model(model: type[Config]) -> Check:
     def check(document: Document) -> Iterator[ConfigError]:
         validate(model, document.data, document.error)
@@ -208,7 +215,7 @@ KINDS: Final = (
     Kind("validation cases", CaseFile, "experiments/validation", _check_cases),
     Kind("site", SiteFile, "worlds", _check_site),
     Kind("ROS map", RosMap, "worlds", _check_map),
-    Kind("robot", RobotProfile, "agents/robots", _check_model(RobotProfile)),
+    Kind("robot", RobotProfile, "agents/robots", _check_robot),
     Kind("phone", PhoneProfile, "agents/phones", _check_model(PhoneProfile)),
     Kind("guard", GuardProfile, "agents/people", _check_model(GuardProfile)),
     Kind("operators", Population, "agents/people", _check_model(Population)),
