@@ -73,7 +73,25 @@ def episode(
     scenario: Annotated[str, typer.Argument(help="A scenario by name or path.")],
     seed: Annotated[int, typer.Option(help="Seed of the run.")] = 1,
     set_: Sets = None,
-    video: Annotated[Path | None, typer.Option(help="Write a .gif or .mp4.")] = None,
+    video: Annotated[Path | None, typer.Option(help="Write a film: .gif or .mp4.")] = None,
+    still: Annotated[
+        Path | None, typer.Option(help="Write one moment: .png, .pdf or .svg.")
+    ] = None,
+    strip: Annotated[
+        Path | None, typer.Option(help="Write several moments in one figure, likewise.")
+    ] = None,
+    at: Annotated[
+        str | None,
+        typer.Option(metavar="SECONDS", help="Moment of --still, or moments of --strip: 10,20,30."),
+    ] = None,
+    panels: Annotated[int, typer.Option(help="Moments in a strip.")] = 6,
+    camera: Annotated[
+        str | None,
+        typer.Option(metavar="ROBOT", help="--still shows what this robot's camera sees."),
+    ] = None,
+    inset: Annotated[
+        bool, typer.Option("--inset", help="Show in --video what a robot's camera sees.")
+    ] = False,
     side_by_side: Annotated[
         str | None,
         typer.Option(metavar="PATTERN,PATTERN", help="Show the same seed under two patterns."),
@@ -81,8 +99,10 @@ def episode(
 ) -> None:
     """Run one scenario and tell its story."""
     from dva_sim.experiments import console
+    from dva_sim.experiments.pictures import Wanted
 
-    console.episode(scenario, seed, set_ or [], video, side_by_side)
+    pictures = Wanted(video, still, strip, at, panels, camera, inset)
+    console.episode(scenario, seed, set_ or [], side_by_side, pictures)
 
 
 @app.command()

@@ -26,6 +26,7 @@ from dva_sim.config import parse_changes
 from dva_sim.errors import ConfigError
 from dva_sim.experiments import shifts
 from dva_sim.experiments.models import model_of
+from dva_sim.experiments.pictures import Wanted
 from dva_sim.scenario import Scenario
 from dva_sim.simulation import Recording, simulate
 from dva_sim.timed import TimedScenario
@@ -42,33 +43,26 @@ say = partial(console.print, soft_wrap=True)  # one line stays one line, also in
 
 
 def episode(
-    name: str, seed: int, pairs: list[str], video: Path | None, side_by_side: str | None
+    name: str, seed: int, pairs: list[str], side_by_side: str | None, pictures: Wanted
 ) -> None:
-    """Run one scenario, tell its timeline, and film it if asked to."""
-    if video is not None:
-        from dva_sim.experiments.film import check_path
-
-        check_path(video)
+    """Run one scenario, tell its timeline, and draw the pictures asked for."""
     document = scenarios.load(name)
     changes = parse_changes(pairs)
     scenario = model_of(document).build(document, changes)
     if isinstance(scenario, TimedScenario):
-        if video is not None or side_by_side is not None:
+        if pictures.any or side_by_side is not None:
             raise ConfigError(f"{name} is a timed scenario: there is nothing to see or to send")
         shifts.tell(scenario, seed, console)
         return
     settings: list[dict[str, Any]] = [changes]
     if side_by_side is not None:
         settings = [changes | {"pattern": p} for p in _two_patterns(side_by_side)]
-    runs = []
-    for setting in settings:
-        runs.append(_tell(scenarios.build(document, setting), seed, video is not None))
-    if video is not None:
-        from dva_sim.experiments.film import write_film
-
-        with console.status(f"Filming {video} ..."):
-            write_film(runs, video)
-        say(f"Video: {video}")
+    runs = [_tell(scenarios.build(document, each), seed, pictures.any) for each in settings]
+    if pictures.any:
+        with console.status("Drawing ..."):
+            written = list(pictures.write(runs))
+        for line in written:
+            say(line)
 
 
 def _two_patterns(text: str) -> list[str]:

@@ -1,0 +1,178 @@
+"""Hazards as fields over the floor: smoke, heat, gas and water, and where they come from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dva_sim.experiments.pictures import style
+from dva_sim.experiments.pictures.moments import Moments
+from dva_sim.worlds.hazards import GasLeak, Raster
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+
+LAYER = 2.2  # over the floors, under walls and names
+SHOWN = {"fire": ("heat", "smoke"), "gas_leak": ("gas",), "flood": ("water",)}
+CELL = 0.25  # of the fields [m]
+MOST_CELLS = 120_000  # of a field; on a larger site cells are larger
+SMOKE_PATH = 2.5  # smoke covers the floor as it does a thing so far away [m]
+THICKEST = 0.58  # so much of the floor does smoke cover at most
+DEEP = 0.15  # from this depth water has its full colour [m]
+WET = 0.002  # less is not drawn [m]
+LEAST_HEAT = 1.0  # less is not drawn [kW/m2]
+
+
+class Fields:
+    """All hazards of a run on one map.
+
+    Args:
+        ax: Where.
+        moments: The run.
+    """
+
+    def __init__(self, ax: Axes, moments: Moments) -> None:
+        self._ax, self._moments = ax, moments
+        west, south, east, north = moments.recording.site.extent
+        self._cell = max(CELL, ((east - west) * (north - south) / MOST_CELLS) ** 0.5)
+        lower = _lower_limit(moments)
+        paints: dict[str, Callable[[NDArray[Any]], NDArray[Any]]] = {
+            "water": _water,
+            "heat": _heat,
+            "smoke": _smoke,
+            "gas": lambda v: _gas(v / lower),
+        }
+        whats = {what for kind in moments.kinds for what in SHOWN[kind]}
+        self._paints = {what: paint for what, paint in paints.items() if what in whats}
+        gas = tuple(level * lower for level in style.GAS_LEVELS)
+        self._contours = {
+            "heat": _Contours(ax, style.HEAT_LEVELS, style.FIRE),
+            "gas": _Contours(ax, gas, style.GAS),
+        }
+        self._image = ax.imshow(
+            np.zeros((1, 1, 4), np.uint8), origin="lower", interpolation="bilinear",
+            zorder=LAYER, animated=True,
+        )  # fmt: skip
+        self._sources = [_Source(ax, kind) for kind in style.MARKS]
+
+    def show(self, time: float) -> list[Artist]:
+        """The hazards at a moment [s]."""
+        artists: list[Artist] = []
+        picture: NDArray[Any] | None = None
+        for what, paint in self._paints.items():
+            raster = self._moments.surroundings.raster(what, time, self._cell)
+            if raster.values.max() <= 0:
+                continue
+            layer = paint(raster.values)
+            picture = layer if picture is None else _over(layer, picture)
+            self._image.set_extent(raster.extent)
+            if what in self._contours:
+                artists += self._contours[what].show(raster)
+        if picture is not None:
+            self._image.set_data((255 * picture).astype(np.uint8))
+            artists.append(self._image)
+        for source in self._sources:
+            artists += source.show(self._moments, time)
+        return artists
+
+
+class _Contours:
+    """Lines of equal values."""
+
+    def __init__(self, ax: Axes, levels: tuple[float, ...], colour: str) -> None:
+        from matplotlib.collections import LineCollection
+
+        self._levels = levels
+        widths = np.linspace(0.6, 1.4, len(levels))
+        self._lines = [
+            LineCollection([], colors=colour, linewidths=width, zorder=4.5, animated=True)
+            for width in widths
+        ]
+        for lines in self._lines:
+            ax.add_collection(lines, autolim=False)
+
+    def show(self, raster: Raster) -> list[Artist]:
+        """Those of a field."""
+        from contourpy import contour_generator
+
+        west, east, south, north = raster.extent
+        rows, columns = raster.values.shape
+        x = west + (np.arange(columns) + 0.5) * (east - west) / columns
+        y = south + (np.arange(rows) + 0.5) * (north - south) / rows
+        contours = contour_generator(x, y, raster.values)
+        for level, lines in zip(self._levels, self._lines, strict=True):
+            found: Any = contours.lines(level)
+            lines.set_segments(found)
+        return list(self._lines)
+
+
+class _Source:
+    """A mark where hazards of one kind come from."""
+
+    def __init__(self, ax: Axes, kind: str) -> None:
+        self._kind = kind
+        size = 12 if kind == "fire" else 8
+        (self._marks,) = ax.plot(
+            [], [], ls="none", marker=style.MARKS[kind], ms=size, color=style.HAZARDS[kind],
+            mec="white", mew=0.8, zorder=6, animated=True,
+        )  # fmt: skip
+
+    def show(self, moments: Moments, time: float) -> list[Artist]:
+        """Those of a kind that go on."""
+        places = [i.hazard.position for i in moments.going_on(time) if i.kind == self._kind]
+        if not places:
+            return []
+        self._marks.set_data(*zip(*places, strict=True))
+        return [self._marks]
+
+
+def _lower_limit(moments: Moments) -> float:
+    """Lower explosive limit of what leaks; of several gases, of the one that explodes first."""
+    hazards = [incident.hazard for incident in moments.recording.incidents]
+    limits = [hazard.kind_of_gas.lower for hazard in hazards if isinstance(hazard, GasLeak)]
+    return min(limits, default=1.0)
+
+
+def _over(upper: NDArray[Any], under: NDArray[Any]) -> NDArray[Any]:
+    """One translucent picture over another `(rows, columns, 4)`."""
+    a, b = upper[..., 3:], under[..., 3:]
+    cover = a + b * (1 - a)
+    colours = (upper[..., :3] * a + under[..., :3] * b * (1 - a)) / np.maximum(cover, 1e-6)
+    return np.concatenate([colours, cover], axis=2)
+
+
+def _tinted(colour: str, cover: NDArray[Any]) -> NDArray[Any]:
+    """One colour that covers the floor more or less, `(rows, columns, 4)`."""
+    from matplotlib.colors import to_rgb
+
+    picture = np.empty((*cover.shape, 4))
+    picture[..., :3] = to_rgb(colour)
+    picture[..., 3] = cover
+    return picture
+
+
+def _smoke(extinction: NDArray[Any]) -> NDArray[Any]:
+    return _tinted(style.SMOKE, THICKEST * (1.0 - np.exp(-SMOKE_PATH * extinction)))
+
+
+def _water(depth: NDArray[Any]) -> NDArray[Any]:
+    deep = np.clip(depth / DEEP, 0.0, 1.0)
+    return _tinted(style.WATER, np.where(depth > WET, 0.25 + 0.5 * deep, 0.0))
+
+
+def _gas(share: NDArray[Any]) -> NDArray[Any]:
+    """By share of the lower explosive limit: above it, it could explode."""
+    cover = np.interp(share, (0.0, 0.02, *style.GAS_LEVELS), (0.0, 0.0, 0.12, 0.2, 0.34, 0.55))
+    return _tinted(style.GAS, cover)
+
+
+def _heat(flux: NDArray[Any]) -> NDArray[Any]:
+    """From yellow to red as it gets hotter."""
+    strong = np.clip(np.log10(np.maximum(flux, LEAST_HEAT) / LEAST_HEAT) / 1.5, 0.0, 1.0)
+    picture = _tinted(style.FIRE, 0.55 * np.sqrt(strong))
+    picture[..., 1] += (1 - strong) * 0.5
+    return picture

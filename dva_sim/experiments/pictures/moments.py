@@ -1,0 +1,148 @@
+"""A recorded run at any moment: who is where, what burns, what a camera sees."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from typing import NamedTuple
+
+from dva_sim.errors import ConfigError
+from dva_sim.recorder import DriveLog, TrackPoint
+from dva_sim.simulation import Recording
+from dva_sim.simulation.incidents import Incident
+from dva_sim.worlds.camera_picture import Camera, Figure, Spot
+from dva_sim.worlds.camera_picture.camera import Picture
+from dva_sim.worlds.geo import Pose
+from dva_sim.worlds.hazards import Surroundings
+
+ROBOT, GUARD, BYSTANDER = "robot", "guard", "bystander"
+DOWN = ("down", "collapsed", "incapacitated")
+FRESH = 3.0  # an older picture is not looked at any more [s]
+
+
+def kind_of(label: str) -> str:
+    """What somebody of that name is: `robot-1` is a robot."""
+    return label.rpartition("-")[0]
+
+
+class Glance(NamedTuple):
+    """What an operator's screen shows.
+
+    Attributes:
+        operator: Whose.
+        robot: The robot that took the picture, by its label.
+        captured: When it was taken [s].
+    """
+
+    operator: str
+    robot: str
+    captured: float
+
+
+class Moments:
+    """A run that can be asked about any time.
+
+    Args:
+        recording: The run.
+    """
+
+    def __init__(self, recording: Recording) -> None:
+        self.recording = recording
+        self.tracks = recording.recorder.tracks
+        self._times = {name: [p.time for p in track] for name, track in self.tracks.items()}
+        real = [(n, i) for n, i in enumerate(recording.incidents) if not i.false_alarm]
+        self.kinds = {incident.kind for _, incident in real}
+        self.surroundings = Surroundings(recording.site, [i.hazard for _, i in real])
+        for number, (incident, _) in enumerate(real):
+            if incident in recording.contained:
+                self.surroundings.contain(number, recording.contained[incident])
+        self._cameras: dict[tuple[int, int], Camera] = {}
+
+    # --- who is where ------------------------------------------------------------------
+
+    def names(self, *kinds: str) -> list[str]:
+        """Everybody of some kinds who left a track."""
+        return [name for kind in kinds for name in self.tracks if kind_of(name) == kind]
+
+    def past(self, name: str, time: float) -> list[TrackPoint]:
+        """Where somebody has been up to `time` [s], and is now."""
+        track, index = self.tracks[name], bisect_right(self._times[name], time)
+        return [*track[: max(1, index)], self.at(name, time)]
+
+    def at(self, name: str, time: float) -> TrackPoint:
+        """Where somebody is at `time` [s], between two samples on a straight line."""
+        track, index = self.tracks[name], bisect_right(self._times[name], time)
+        before, after = track[max(0, index - 1)], track[min(index, len(track) - 1)]
+        gap = after.time - before.time
+        share = (time - before.time) / gap if gap > 0 else 0.0
+        turn = (after.heading - before.heading + math.pi) % (2 * math.pi) - math.pi
+        return TrackPoint(
+            time,
+            before.x + share * (after.x - before.x),
+            before.y + share * (after.y - before.y),
+            before.heading + share * turn,
+            before.mode,
+        )
+
+    def going_on(self, time: float) -> list[Incident]:
+        """What has begun, is real and not dealt with at `time` [s]."""
+        contained = self.recording.contained
+        return [
+            incident
+            for number, incident in enumerate(self.recording.incidents)
+            if incident.is_there(time) and time < contained.get(number, math.inf)
+        ]
+
+    # --- what cameras see --------------------------------------------------------------
+
+    def radius(self, name: str) -> float:
+        """Of somebody, seen from above [m]."""
+        robots = self.recording.robots.values()
+        found = [r.body.spec.radius for r in robots if r.device.label == name]
+        return float(found[0]) if found else 0.25
+
+    def glance(self, time: float) -> Glance | None:
+        """The newest picture that an operator at the wheel looks at, if there is one."""
+        labels = self.recording.labels
+        for drive in self.recording.recorder.drives:
+            captured = _shown(drive, time)
+            if captured is not None:
+                return Glance(labels[drive.operator], labels[drive.robot], captured)
+        return None
+
+    def eye(self, robot: str, time: float, width: int = 320, height: int = 240) -> Picture:
+        """What a robot's camera sees at `time` [s].
+
+        Raises:
+            ConfigError: no such robot.
+        """
+        if robot not in self.names(ROBOT):
+            known = ", ".join(self.names(ROBOT)) or "none"
+            raise ConfigError(f"robot {robot!r} is not known; known: {known}")
+        size = width, height
+        if size not in self._cameras:
+            angle = math.radians(self.recording.scenario.camera.field_of_view_deg)
+            self._cameras[size] = Camera(self.recording.site, width, height, angle)
+        here, spots = self.at(robot, time), [i.spot(time) for i in self.going_on(time)]
+        raster = self.surroundings.raster
+        return self._cameras[size].picture(
+            Pose(here.x, here.y, here.heading),
+            [self._figure(name, time) for name in self.tracks if name != robot],
+            [Spot(*spot) for spot in spots if spot is not None],
+            raster("smoke", time) if "fire" in self.kinds else None,
+            raster("water", time) if "flood" in self.kinds else None,
+            time,
+        )
+
+    def _figure(self, name: str, time: float) -> Figure:
+        here, number = self.at(name, time), name.rpartition("-")[2]
+        looks = int(number) if number.isdigit() else 1
+        return Figure(kind_of(name), here.x, here.y, here.heading, looks, here.mode in DOWN)
+
+
+def _shown(drive: DriveLog, time: float) -> float | None:
+    """When the picture was taken that the driver looks at, if there is one."""
+    if drive.started is None or not drive.started <= time < (drive.ended or math.inf):
+        return None
+    shown = [frame for frame in drive.frame_times if frame[1] <= time]
+    return shown[-1][0] if shown and time - shown[-1][1] < FRESH else None

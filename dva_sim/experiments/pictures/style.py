@@ -1,0 +1,108 @@
+"""Colours, sizes and the legend of pictures from above."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+from dva_sim.experiments.pictures.moments import BYSTANDER, GUARD, ROBOT, Moments
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+
+INK, HALO, GHOST = "#2b3038", "white", "#e07a00"
+FONT = 7.5  # of labels [points]
+SMALLEST = {ROBOT: 8.5, GUARD: 7.5, BYSTANDER: 4.5}  # diameters, however large the site [points]
+TRAIL_S = 40.0  # a trail's colour falls to a third in that time [s]
+
+# What somebody is doing; what is not listed has the colour of its kind.
+ROBOT_MODES = {"Idle": "#8b95a1", "Mission": "#2f7fd0", "Teleoperation": "#7d2fb8"}
+ACTIVITIES = {
+    "waiting": "#9cc49e",
+    "getting ready": "#6fae74",
+    "walking": "#2f7d32",
+    "looking": "#c9a400",
+    "containing": "#c2571a",
+    "standing by": "#6b8f71",
+    "evacuating": "#d2691e",
+    "safe": "#9fb4a0",
+}
+KINDS = {ROBOT: "#2f7fd0", GUARD: "#2f7d32", BYSTANDER: "#8c6d5a"}
+SHAPES = {ROBOT: "s", GUARD: "o", BYSTANDER: "o"}
+
+# Outlines of bodies of diameter 1 that head east: a box with a bow, a disc with a beak.
+_BEAK = tuple(
+    (0.5 * math.cos(angle), 0.5 * math.sin(angle))
+    for angle in (math.radians(degrees) for degrees in range(48, 313, 12))
+)
+OUTLINES = {
+    ROBOT: ((0.8, 0.0), (0.32, 0.48), (-0.5, 0.48), (-0.5, -0.48), (0.32, -0.48)),
+    GUARD: ((0.82, 0.0), *_BEAK),
+    BYSTANDER: ((0.82, 0.0), *_BEAK),
+}
+LENGTHS = {ROBOT: 1.6, GUARD: 1.64, BYSTANDER: 1.64}  # of the marker box, twice the bow
+
+FIRE, GAS, WATER, SMOKE = "#d1332e", "#b59a00", "#2a7fb8", "#55585e"
+HAZARDS = {"fire": FIRE, "gas_leak": GAS, "flood": WATER}
+MARKS = {"fire": "*", "gas_leak": "D", "flood": "v"}
+GAS_LEVELS = (0.1, 0.2, 0.5, 1.0)  # of the lower explosive limit
+HEAT_LEVELS = (1.0, 2.5, 10.0)  # [kW/m2]; skin bears 2.5 for long
+
+
+def colour_of(kind: str, mode: str) -> str:
+    """Colour of somebody who does something."""
+    modes = ROBOT_MODES if kind == ROBOT else ACTIVITIES
+    return modes.get(mode, KINDS.get(kind, INK))
+
+
+def legend(moments: Iterable[Moments]) -> list[Artist]:
+    """A key for what occurs in some runs."""
+    from matplotlib.lines import Line2D
+
+    runs, handles, met = list(moments), [], set()
+    for kind in (ROBOT, GUARD, BYSTANDER):
+        names = [(run, name) for run in runs for name in run.names(kind)]
+        modes = {p.mode: None for run, name in names for p in run.tracks[name]}
+        for mode in sorted(modes, key=_order):
+            met.add(kind)
+            handles.append(_dot(SHAPES[kind], colour_of(kind, mode), f"{kind}: {mode.lower()}"))
+    kinds = {kind for run in runs for kind in run.kinds}
+    for kind in sorted(kinds):
+        handles.append(_dot(MARKS[kind], HAZARDS[kind], kind.replace("_", " ")))
+    if any(run.recording.recorder.views for run in runs):
+        seen = "as the operator sees it"
+        handles.append(
+            Line2D([], [], ls="none", marker="o", mfc="none", mec=GHOST, ms=7, label=seen)
+        )
+    handles += _fields(kinds)
+    return handles
+
+
+def _fields(kinds: set[str]) -> list[Artist]:
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    handles: list[Artist] = []
+    if "fire" in kinds:
+        handles.append(Patch(fc=SMOKE, alpha=0.5, label="smoke"))
+        levels = ", ".join(f"{level:g}" for level in HEAT_LEVELS)
+        handles.append(Line2D([], [], color=FIRE, lw=1, label=f"heat {levels} kW/m²"))
+    if "gas_leak" in kinds:
+        levels = ", ".join(f"{100 * level:.0f}" for level in GAS_LEVELS)
+        handles.append(Line2D([], [], color=GAS, lw=1, label=f"gas {levels} % of LEL"))
+    if "flood" in kinds:
+        handles.append(Patch(fc=WATER, alpha=0.5, label="water"))
+    return handles
+
+
+def _dot(shape: str, colour: str, label: str) -> Any:
+    from matplotlib.lines import Line2D
+
+    return Line2D([], [], ls="none", marker=shape, mfc=colour, mec="white", ms=7, label=label)
+
+
+def _order(mode: str) -> tuple[int, str]:
+    """Modes as they are listed above, others after them."""
+    known = [*ROBOT_MODES, *ACTIVITIES]
+    return (known.index(mode) if mode in known else len(known)), mode

@@ -1,0 +1,50 @@
+"""The messages of the last seconds, as a strip below the map."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dva_sim.simulation import Recording
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+
+WINDOW_S = 20.0
+
+
+class Traffic:
+    """Messages to the robots above the line, from them below.
+
+    Args:
+        ax: Where.
+        recording: A run made with `keep_traffic`.
+    """
+
+    def __init__(self, ax: Axes, recording: Recording) -> None:
+        robots = set(recording.robots)
+        traffic = recording.recorder.traffic or []
+        self._up = np.array([t for t, _, to, _ in traffic if to in robots])
+        self._down = np.array([t for t, source, _, _ in traffic if source in robots])
+        ax.set_xlim(-WINDOW_S, 0)
+        ax.set_ylim(-1, 1)
+        ax.set_yticks([0.5, -0.5], ["to robots", "from robots"], fontsize=7.5)
+        ax.set_xticks([-20, -10, 0], ["20 s ago", "10 s ago", "now"], fontsize=7.5)
+        ax.spines[["top", "right", "left"]].set_visible(False)
+        ax.axhline(0, color="0.7", lw=0.6)
+        ax.tick_params(length=0)
+        self._lines = [
+            ax.vlines([], 0, height, color=colour, lw=0.7, animated=True)
+            for height, colour in ((0.85, "#3f90da"), (-0.85, "0.55"))
+        ]
+
+    def show(self, time: float) -> list[Artist]:
+        """The strip at a moment [s]."""
+        for lines, times, height in zip(
+            self._lines, (self._up, self._down), (0.85, -0.85), strict=True
+        ):
+            inside = times[(times > time - WINDOW_S) & (times <= time)] - time
+            lines.set_segments([np.array([[x, 0.0], [x, height]]) for x in inside])
+        return list(self._lines)

@@ -1,0 +1,117 @@
+"""Writing films: GIF by Pillow, MP4 by ffmpeg; a film that fails leaves no half file."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryFile
+from typing import IO, Any
+
+from dva_sim.errors import ConfigError
+from dva_sim.experiments.pictures.film import FPS, Film
+
+COLOURS = 128  # of a GIF
+SAMPLES = 6  # pictures that these are chosen from
+
+
+def write_film(film: Film, path: Path) -> None:
+    """Write a film; the ending of `path` decides the form.
+
+    Raises:
+        ConfigError: ffmpeg is missing or failed.
+    """
+    with _whole(path) as part:
+        (_write_gif if path.suffix.lower() == ".gif" else _write_mp4)(film, part)
+
+
+def find_ffmpeg() -> str:
+    """Path of ffmpeg: the one of the `imageio-ffmpeg` package, or else of the system.
+
+    Raises:
+        ConfigError: there is none.
+    """
+    try:
+        import imageio_ffmpeg
+    except ImportError:
+        found = shutil.which("ffmpeg")
+    else:
+        found = imageio_ffmpeg.get_ffmpeg_exe()
+    if found is None:
+        raise ConfigError(
+            "mp4 needs ffmpeg: pip install 'dva-sim[video]', or install ffmpeg, or write a .gif"
+        )
+    return found
+
+
+@contextmanager
+def _whole(path: Path) -> Iterator[Path]:
+    """A name to write to beside `path`, which becomes `path` if all goes well."""
+    part = path.with_name(f".{path.stem}.part{path.suffix}")
+    try:
+        yield part
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def _write_gif(film: Film, path: Path) -> None:
+    from PIL import Image
+
+    # One palette, from pictures spread over the run, keeps the file small.
+    times = [film.duration * (n + 1) / SAMPLES for n in range(SAMPLES)]
+    samples = [Image.fromarray(film.at(time)) for time in times]
+    sheet = Image.new("RGB", (samples[0].width, samples[0].height * SAMPLES))
+    for number, sample in enumerate(samples):
+        sheet.paste(sample, (0, number * sample.height))
+    palette = sheet.quantize(COLOURS, Image.Quantize.MEDIANCUT)
+    pictures = [
+        Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE)
+        for frame in film.frames()
+    ]
+    pictures[0].save(
+        path, save_all=True, append_images=pictures[1:], duration=1000 // FPS, loop=0, optimize=True
+    )
+
+
+def _write_mp4(film: Film, path: Path) -> None:
+    frames = film.frames()
+    first = next(frames)
+    command = [find_ffmpeg(), "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24"]
+    command += ["-s", f"{first.shape[1]}x{first.shape[0]}", "-r", str(FPS), "-i", "-"]
+    # Most players want an even number of pixels and this order of colours.
+    command += ["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2:color=white", "-c:v", "libx264"]
+    command += ["-crf", "20", "-pix_fmt", "yuv420p", "-movflags", "+faststart", str(path)]
+    with TemporaryFile() as said:
+        process = subprocess.Popen(command, stdin=subprocess.PIPE, stderr=said)
+        try:
+            _feed(process, first.tobytes(), frames)
+        finally:
+            process.kill()  # where it has ended already, that does nothing
+            process.wait()
+        if process.returncode != 0:
+            raise ConfigError(f"ffmpeg could not write the video: {_last_line(said, process)}")
+
+
+def _feed(process: subprocess.Popen[bytes], first: bytes, frames: Iterator[Any]) -> None:
+    """Hand over all pictures; a pipe that breaks shows in how ffmpeg ended."""
+    pipe = process.stdin
+    assert pipe is not None
+    try:
+        with pipe:
+            pipe.write(first)
+            for frame in frames:
+                pipe.write(frame.tobytes())
+    except BrokenPipeError:
+        pass
+    process.wait()
+
+
+def _last_line(said: IO[bytes], process: subprocess.Popen[bytes]) -> str:
+    said.seek(0)
+    lines = said.read().decode(errors="replace").strip().splitlines()
+    if lines:
+        return lines[-1]
+    return f"it ended with {process.returncode}; a negative number is the signal that killed it"
