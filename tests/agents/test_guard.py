@@ -12,8 +12,10 @@ from pretended_dva import GUARD, POST, WALKER, PretendedDva
 from dva_sim.agents.duty import AWARD_WITHIN, MOST_ANNOUNCED, GuardDuty
 from dva_sim.agents.guard import STAND_BY_FOR, STAND_OFF, GuardAgent
 from dva_sim.agents.people import GuardProfile, Walker
+from dva_sim.config import load_yaml, validate
 from dva_sim.protocol import messages as m
-from dva_sim.worlds.hazards import KINDS, make_hazard
+from dva_sim.resources import find
+from dva_sim.worlds.hazards import CLEAR, KINDS, Conditions, make_hazard
 
 FAR, FARTHER, NEAR = (21.4, 12.0), (31.4, 12.0), (6.4, 12.0)  # 20, 30 and 5 m from the post [m]
 WALLED_IN = (1000.0, 1000.0)  # no way leads there
@@ -389,6 +391,106 @@ def test_an_award_is_no_reason_to_leave_an_order(dva: PretendedDva, guard: Guard
     assert dva.say(GUARD, m.TaskAward(7)) == m.BUSY
     dva.run_for(60.0)
     assert dva.progress(1)[-1] == "done"
+
+
+# --- what is too much ------------------------------------------------------------------
+
+FIRE_AT = 20.0  # the east half of the corridor burns from then on [s]
+
+
+def hot(x: float, y: float, now: float) -> Conditions:
+    return CLEAR._replace(heat_flux=4.0) if x > 15.0 and now > FIRE_AT else CLEAR
+
+
+def test_who_comes_into_heat_tells_failed_and_goes_back_to_its_post(dva: PretendedDva) -> None:
+    guard = dva.guard(air=hot)
+    dva.order(1, FARTHER, "contain")
+    dva.run_until(lambda: guard.activity == "withdrawing")
+    assert dva.progress(1) == ["departed", "failed"]
+    assert guard.x == pytest.approx(15.5, abs=1.0)
+    assert dva.order(2, NEAR) == m.BUSY
+    dva.run_for(30.0)
+    assert (guard.activity, dva.order(2, NEAR)) == ("waiting", m.OK)
+    assert math.dist(at(guard), POST) < 1.0
+    assert 0.0 < guard.dose.heat < 0.3
+
+
+def test_who_was_to_look_and_is_driven_back_in_sight_of_it_has_seen_enough(
+    dva: PretendedDva,
+) -> None:
+    guard = dva.guard(air=hot)
+    dva.there = {"fire"}
+    dva.order(1, FAR)
+    dva.run_for(60.0)
+    assert dva.progress(1) == ["departed", "confirmed", "done"]
+    assert math.dist(at(guard), POST) < 1.0
+
+
+def test_who_was_to_look_and_sees_nothing_there_has_failed(dva: PretendedDva) -> None:
+    dva.guard(air=hot)
+    dva.order(1, FAR)
+    dva.run_for(60.0)
+    assert dva.progress(1) == ["departed", "failed"]
+
+
+def test_a_guard_whose_post_burns_goes_to_another_refuge(dva: PretendedDva) -> None:
+    guard = dva.guard(air=lambda x, y, now: hot(20.0 - x, y, now), refuges=[POST, (38.0, 12.0)])
+    dva.run_for(90.0)
+    assert guard.activity == "waiting"
+    assert math.dist(at(guard), (38.0, 12.0)) < 1.0
+
+
+def test_who_is_hurt_takes_no_order_any_more_and_offers_nothing(dva: PretendedDva) -> None:
+    guard = dva.guard(air=lambda x, y, now: CLEAR._replace(co=4000.0 if x > 5.0 else 0.0))
+    guard.dose.toxic = 0.299
+    dva.order(1, FARTHER)
+    dva.run_for(60.0)
+    assert guard.dose.toxic > 0.3
+    assert guard.activity == "hurt"
+    assert dva.progress(1) == ["departed", "failed"]
+    assert dva.order(2, NEAR) == dva.announce(3, NEAR) == m.BUSY
+    assert dva.bids() == []
+
+
+def test_who_is_incapacitated_stays_where_it_is_and_its_order_has_failed(
+    dva: PretendedDva,
+) -> None:
+    guard = dva.guard(air=lambda x, y, now: CLEAR._replace(heat_flux=80.0 if now > 20.0 else 0.0))
+    dva.order(1, FARTHER)
+    dva.run_for(40.0)
+    assert guard.activity == "incapacitated"
+    assert guard.dose.incapacitated
+    assert dva.progress(1) == ["departed", "failed"]
+    here = at(guard)
+    dva.run_for(60.0)
+    assert at(guard) == here
+    assert dva.order(2, NEAR) == m.BUSY
+
+
+def test_the_end_of_an_order_is_heard_by_who_takes_none(dva: PretendedDva) -> None:
+    dva.guard(air=hot)
+    dva.order(1, FARTHER, "contain")
+    dva.run_for(30.0)
+    assert dva.say(GUARD, m.OrderProgress(1, "done")) == m.OK
+
+
+# --- who they are ----------------------------------------------------------------------
+
+
+def test_nine_guards_in_ten_have_set_out_after_80_s() -> None:
+    """NFPA 1710: turnout within 80 s in 90 % of all cases; within 3 %."""
+    file = load_yaml(find("guard", "agents/people"))
+    profile = validate(GuardProfile, file.data, file.error)
+    rng = np.random.default_rng(1)
+    drawn = [Walker.draw(profile, rng).mobilisation for _ in range(20_000)]
+    assert np.quantile(drawn, 0.9) == pytest.approx(80.0, rel=0.03)
+
+
+def test_guards_walk_as_fast_as_weidmann_found_within_three_per_cent() -> None:
+    rng = np.random.default_rng(1)
+    speeds = [Walker.draw(GuardProfile(), rng).speed for _ in range(20_000)]
+    assert np.mean(speeds) == pytest.approx(1.34, rel=0.03)
+    assert np.std(speeds) == pytest.approx(0.26, rel=0.03)
 
 
 # --- the decider alone -----------------------------------------------------------------

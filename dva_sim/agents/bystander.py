@@ -1,0 +1,211 @@
+"""Bystanders: people who work at a site, and leave it when the alarm sounds or danger shows.
+
+What one does, as its `activity` tells:
+
+- **working** at a place, or **walking** to another one, if it is one of those who move around.
+- **alarmed**: it has heard the alarm, or noticed smoke, heat, water or flames itself, and gets
+  ready to leave for its pre-movement time, whichever came first. Air that nobody endures ends
+  that time at once.
+- **evacuating** to the nearest refuge by the way there, not through what nobody endures; if the
+  way ahead becomes so, it chooses again, and so it does when it is blocked for good.
+- **safe**: out.
+- **incapacitated**: it stays where it is, for everybody else to walk around.
+
+Bystanders have no device: nobody is told of them but the recorder.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Final
+
+import numpy as np
+
+from dva_sim.agents.device import do_nothing
+from dva_sim.agents.escape import choose_escape
+from dva_sim.agents.exposure import Air, Exposure, clean_air
+from dva_sim.agents.people import Occupant
+from dva_sim.agents.walking import Walking
+from dva_sim.clock import Clock
+from dva_sim.worlds.hazards import Conditions, Dose
+from dva_sim.worlds.planning import Planner
+
+WORKING, WALKING, ALARMED = "working", "walking", "alarmed"
+EVACUATING, SAFE, DOWN = "evacuating", "safe", "incapacitated"
+
+NOTICED: Final = Conditions(
+    temperature=40.0, heat_flux=1.0, extinction=0.1, co=math.inf, gas=0.01, water=0.02
+)
+"""From any of it on people notice that something is wrong; assumed. Carbon monoxide has no smell,
+fuel gas is given one."""
+THROUGH: Final = 0.8  # so near to the middle of an exit one is through [m]
+CHOOSES_AGAIN: Final = 2.0  # no sooner than this after the last choice of a way [s]
+LOOKS_AHEAD: Final = 6.0  # along its way, for what nobody endures [m]
+
+Point = tuple[float, float]
+
+
+def nothing_seen(x: float, y: float, time: float) -> bool:
+    """The eyes of who has no hazard to see."""
+    return False
+
+
+class BystanderAgent:
+    """One bystander.
+
+    Args:
+        name: As in `bystander-1`.
+        clock: The run's.
+        occupant: Who it is.
+        walking: Its legs.
+        planner: It knows the building.
+        places: Where it works; it begins at the first [m].
+        refuges: Where it is safe [m].
+        luck: Decides where it walks while nothing is wrong, and when.
+        air: What it is like at a place [m] and time [s].
+        sees: Whether flames can be seen from a place [m] at a time [s].
+        leaves: Called when it is out: its body goes.
+        tell: Told in words what happens to it.
+
+    Attributes:
+        activity: What it does now.
+        leaves_at: When it sets out to leave [s]; infinite until it is alarmed.
+        out_at: When it was out [s]; infinite until then.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        clock: Clock,
+        occupant: Occupant,
+        walking: Walking,
+        planner: Planner,
+        places: Sequence[Point],
+        refuges: Sequence[Point],
+        luck: np.random.Generator,
+        air: Air = clean_air,
+        sees: Callable[[float, float, float], bool] = nothing_seen,
+        leaves: Callable[[], object] = do_nothing,
+        tell: Callable[[str], object] = do_nothing,
+    ) -> None:
+        self.name, self._clock, self._occupant = name, clock, occupant
+        self.walking, self._planner, self._luck = walking, planner, luck
+        self._places, self._refuges = places, refuges
+        self._sees, self._leaves, self._tell = sees, leaves, tell
+        self.activity = WORKING
+        self.leaves_at = self.out_at = math.inf
+        self._chosen = -math.inf
+        self.exposure = Exposure(clock, walking, air)
+
+    @property
+    def x(self) -> float:
+        """Where it is, or went out [m]."""
+        return self.walking.place[0]
+
+    @property
+    def y(self) -> float:
+        """Where it is, or went out [m]."""
+        return self.walking.place[1]
+
+    @property
+    def heading(self) -> float:
+        """Where it looks [rad]."""
+        return self.walking.heading
+
+    @property
+    def dose(self) -> Dose:
+        """Of heat and poison, so far."""
+        return self.exposure.dose
+
+    def start(self) -> None:
+        """Begin to work, and to notice what is wrong."""
+        self.exposure.start(self._felt)
+        if self._occupant.moves:
+            self._stay()
+
+    # --- while nothing is wrong --------------------------------------------------------
+
+    def _stay(self) -> None:
+        if self.activity in (WORKING, WALKING):
+            self.activity = WORKING
+            self._clock.call_after(self._occupant.stay.draw(self._luck), self._change_place)
+
+    def _change_place(self) -> None:
+        if self.activity != WORKING:
+            return
+        place = self._places[int(self._luck.integers(len(self._places)))]
+        self.activity = WALKING
+        if not self.walking.go(place, self._stay, self._stay):
+            self._stay()
+
+    # --- alarm -------------------------------------------------------------------------
+
+    def alarm(self, now: float) -> None:
+        """The alarm sounds; who has left, or is about to, does not mind."""
+        self._leave_at(now + self._occupant.premovement)
+
+    def _leave_at(self, time: float) -> None:
+        """Set out to leave at `time` [s], if not sooner."""
+        if self.activity in (EVACUATING, SAFE, DOWN) or time >= self.leaves_at:
+            return
+        if self.activity != ALARMED:
+            self.walking.stop()
+            self.activity = ALARMED
+        self.leaves_at = time
+        self._clock.call_at(time, self._evacuate)
+
+    def _felt(self) -> None:
+        """Half a second more in this air."""
+        now = self._clock.now
+        if self.dose.incapacitated:
+            self._collapse()
+        elif self.activity == EVACUATING:
+            ahead = self.walking.places_ahead(1.0, LOOKS_AHEAD)
+            if now >= self._chosen + CHOOSES_AGAIN and any(map(self.exposure.is_bad, ahead)):
+                self._choose_way()
+        elif self.exposure.is_too_much:
+            self._leave_at(now)
+        elif self.activity != ALARMED and self._notices(now):
+            self._tell("notices danger")
+            self._leave_at(now + self._occupant.premovement)
+
+    def _notices(self, now: float) -> bool:
+        felt = zip(self.exposure.conditions, NOTICED, strict=True)
+        return any(is_ >= least for is_, least in felt) or self._sees(*self.walking.place, now)
+
+    def _collapse(self) -> None:
+        self.exposure.end()
+        self.walking.stop()
+        self.activity = DOWN
+        self._tell("is incapacitated")
+
+    # --- the way out -------------------------------------------------------------------
+
+    def _evacuate(self) -> None:
+        if self.activity == ALARMED:
+            self.activity = EVACUATING
+            self._tell("leaves")
+            self._choose_way()
+
+    def _choose_way(self) -> None:
+        """Set out for the refuge that is best now; if none can be reached, try again."""
+        if self.activity != EVACUATING:
+            return
+        self._chosen = self._clock.now
+        here, is_bad = self.walking.place, self.exposure.is_bad
+        escape = choose_escape(self._planner, here, self._refuges, is_bad)
+        if escape is None or not self.walking.go(
+            escape.goal,
+            self._is_out,
+            self._choose_way,
+            lambda at: math.dist(at, escape.goal) < THROUGH,
+            escape.avoid,
+        ):
+            self._clock.call_after(CHOOSES_AGAIN, self._choose_way)
+
+    def _is_out(self) -> None:
+        self.activity, self.out_at = SAFE, self._clock.now
+        self.exposure.end()
+        self._tell("is out")
+        self._leaves()
