@@ -70,27 +70,24 @@ class Stream:
         """Offer the message's packets to the link; those lost are offered again later."""
         if self.closed:
             return
-        now = self._clock.now
-        arrival, missing = self._offer(now, size)
+        now, packets, missing = self._clock.now, -(-size // MSS), 0
+        arrival = self._forward.carry_train(now, packets, size + packets * HEADERS)
+        if arrival is None:
+            arrival, missing = self._offer_each(now, size)
         if missing:
             self.retransmitted += 1
             wait = self._recovery_time(tries)
             self._clock.call_at(now + wait, self._transmit, seq, payload, missing, tries + 1)
             return
+        # A remnant sent again may arrive before what had been lost around it: in order only.
+        last = self._last_arrival = max(self._last_arrival, arrival)
         if tries == 0:
             self._measure(arrival - now + self._backward.delay)
-        # A remnant sent again may arrive before what had been lost around it: in order only.
-        self._last_arrival = max(self._last_arrival, arrival)
-        self._clock.call_at(
-            self._last_arrival if tries == 0 else arrival, self._arrive, seq, payload
-        )
+            arrival = last
+        self._clock.call_at(arrival, self._arrive, seq, payload)
 
-    def _offer(self, now: float, size: int) -> tuple[float, int]:
-        """Offer a message's packets: when the last one arrives [s], and the bytes lost."""
-        packets = -(-size // MSS)
-        together = self._forward.carry_train(now, packets, size + packets * HEADERS)
-        if together is not None:
-            return together, 0
+    def _offer_each(self, now: float, size: int) -> tuple[float, int]:
+        """Offer a message packet by packet: when the last one arrives [s], and the bytes lost."""
         arrival, missing = 0.0, 0
         while size > 0:
             part = min(size, MSS)
