@@ -7,7 +7,7 @@ from functools import cache
 from dva_sim import resources
 from dva_sim.agents.operator.person import Population
 from dva_sim.agents.people import GuardProfile
-from dva_sim.agents.profile import RobotProfile
+from dva_sim.agents.profile import RobotProfile, load_robot
 from dva_sim.agents.tilt.phone import PhoneProfile
 from dva_sim.config import Config, M, load_yaml, validate
 from dva_sim.scenario.scenario import Scenario
@@ -26,7 +26,7 @@ def robot_profiles(scenario: Scenario) -> list[RobotProfile]:
     """What the scenario's robots are, one after the other."""
     named = scenario.robot.profile
     names = (named,) if isinstance(named, str) else named
-    kinds = [_profile(RobotProfile, name, "agents/robots") for name in names]
+    kinds = [load_robot(name) for name in names]
     return [kinds[number % len(kinds)] for number in range(scenario.robot.count)]
 
 
