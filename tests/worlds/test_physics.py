@@ -193,16 +193,22 @@ def test_a_robot_cannot_be_placed_in_a_wall_or_in_another_robot(world):
 
 DRIVE = """
 import math
+from dva_sim.agents.profile import load_robot
 from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.physics import DriveSpec, World
 from dva_sim.worlds.site import load_site
 world = World(load_site("caparica"))
-robots = [world.add_robot(str(i), DriveSpec(), Pose(4 + 2 * i, 12, i)) for i in range(4)]
+kinds = DriveSpec(), load_robot("pibot").drive_spec()
+robots = [world.add_robot(str(i), kinds[i % 2], Pose(4 + 2 * i, 12, i)) for i in range(4)]
+people = [world.add_person(f"person-{i}", Pose(5 + 2 * i, 12.3, 0)) for i in range(3)]
 for step in range(300):
     world.advance_to(step / 10)
     for number, robot in enumerate(robots):
         robot.drive(0.5, math.sin(step / 9 + number), step / 10 + 0.5)
-print([(*map(float.hex, r.pose()), r.contacts, r.impulse.hex()) for r in robots])
+    for number, person in enumerate(people):
+        person.walk(math.cos(step / 30 + number), 0.3 * math.sin(step / 20))
+bodies = [*robots, *people]
+print([(b.x.hex(), b.y.hex(), b.body.angle.hex(), b.contacts, b.impulse.hex()) for b in bodies])
 """
 
 
