@@ -12,7 +12,7 @@ from typing import Any, Final
 from PIL import Image
 
 from dva_sim.agents.operator.person import Population
-from dva_sim.agents.people import GuardProfile
+from dva_sim.agents.people import BystanderProfile, GuardProfile
 from dva_sim.agents.profile import RobotProfile, read_robot
 from dva_sim.agents.tilt.phone import PhoneProfile
 from dva_sim.checking.problem import Problem
@@ -218,5 +218,6 @@ KINDS: Final = (
     Kind("robot", RobotProfile, "agents/robots", _check_robot),
     Kind("phone", PhoneProfile, "agents/phones", _check_model(PhoneProfile)),
     Kind("guard", GuardProfile, "agents/people", _check_model(GuardProfile)),
+    Kind("bystanders", BystanderProfile, "agents/people", _check_model(BystanderProfile)),
     Kind("operators", Population, "agents/people", _check_model(Population)),
 )

@@ -29,11 +29,11 @@ def schema_text(kind: str) -> str:
 
 
 def _json_schema(kind: str) -> dict[str, Any]:
-    """From the models that read the files; an agent may be of any of four kinds."""
+    """From the models that read the files; an agent may be of any of five kinds."""
     from pydantic import TypeAdapter
 
     from dva_sim.agents.operator.person import Population
-    from dva_sim.agents.people import GuardProfile
+    from dva_sim.agents.people import BystanderProfile, GuardProfile
     from dva_sim.agents.profile import RobotProfile
     from dva_sim.agents.tilt.phone import PhoneProfile
     from dva_sim.experiments.study import Study
@@ -47,6 +47,6 @@ def _json_schema(kind: str) -> dict[str, Any]:
         "scenario": Scenario | TimedScenario,
         "cases": CaseFile,
         "site": SiteFile,
-        "agent": RobotProfile | PhoneProfile | GuardProfile | Population,
+        "agent": RobotProfile | PhoneProfile | GuardProfile | BystanderProfile | Population,
     }
     return TypeAdapter(kinds[kind]).json_schema()
