@@ -27,6 +27,7 @@ TIME_TO_CONTACT = 1.0  # speed is scaled so that contact is at least so far off 
 REACTION = 0.35  # until brakes answer: a period of the loop, and the motors' lag [s]; assumed
 STEP = 0.05  # between the samples of an arc [m]
 AWAY = 0.005  # a gap that shrinks by less does not shrink [m]
+SLOWEST = 1e-3  # slower than this is not at all [m/s]
 ROUNDS = 4  # a slower robot turns more sharply: its arc is looked at again so often
 
 
@@ -60,7 +61,7 @@ class CollisionGuard:
             others: Who is near.
         """
         for _ in range(ROUNDS):
-            if not speed > 0.0:
+            if not speed > SLOWEST:
                 return 0.0
             reach = max(speed * TIME_TO_CONTACT, self.stopping_distance(speed)) + STEP
             allowed = self._speed_for(self.free_way(pose, speed, turn_rate, others, reach))

@@ -1,0 +1,146 @@
+"""Robots that drive missions in real physics, each with its own map, without any network."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cache
+
+from dva_sim.agents.camera import HazardSpot, Observation, View
+from dva_sim.agents.local_loops import Surrounded
+from dva_sim.agents.manoeuvres import Seen
+from dva_sim.agents.missions import PERIOD, Errand, Pilot, Step
+from dva_sim.clock import Clock
+from dva_sim.worlds.geo import Pose
+from dva_sim.worlds.physics import DriveSpec, PersonBody, RobotBody, World
+from dva_sim.worlds.planning import Planner
+from dva_sim.worlds.site import Site, load_site
+
+Point = tuple[float, float]
+CAMERA_ANGLE, CAMERA_RANGE = math.radians(70.0), 6.0
+EMPTY = Errand(((0.0, 0.0),))  # for a robot that somebody else drives
+
+
+@cache
+def caparica() -> Site:
+    return load_site("caparica")
+
+
+@cache
+def map_of_caparica(clearance: float = 0.30) -> Planner:
+    return Planner(caparica(), clearance)
+
+
+@dataclass
+class Robot:
+    """One robot of a fleet, and what became of it."""
+
+    body: RobotBody
+    around: Surrounded
+    pilot: Pilot
+    told: list[tuple[float, Step]] = field(default_factory=list)
+    speeds: list[float] = field(default_factory=list)
+
+    @property
+    def here(self) -> Point:
+        return self.body.x, self.body.y
+
+    @property
+    def over(self) -> bool:
+        return bool(self.told) and self.told[-1][1].state in ("done", "failed")
+
+    @property
+    def end(self) -> tuple[str, str]:
+        """State and reason of what was told last."""
+        step = self.told[-1][1]
+        return step.state, step.reason
+
+    def states(self) -> list[str]:
+        return [step.state for _, step in self.told]
+
+    def reasons(self) -> set[str]:
+        return {step.reason for _, step in self.told}
+
+    def when(self, state: str) -> float:
+        return next(time for time, step in self.told if step.state == state)
+
+
+class Fleet:
+    """A world in which each robot looks ten times a second and does what its pilot says.
+
+    Args:
+        site: What the world is like; the robots' map is always that of caparica.
+        charge: Of all batteries, at a time [s].
+    """
+
+    def __init__(
+        self, site: Site | None = None, charge: Callable[[float], float] = lambda now: 1.0
+    ) -> None:
+        self.world = World(site or caparica(), 0.04)
+        self.now = 0.0
+        self.robots: list[Robot] = []
+        self.hazards: list[HazardSpot] = []
+        self.gaps: list[float] = []
+        self._charge = charge
+
+    def robot(
+        self,
+        number: int,
+        start: tuple[float, float, float],
+        errand: Errand,
+        spec: DriveSpec | None = None,
+    ) -> Robot:
+        """Robot number so-and-so, with an errand."""
+        body = self.world.add_robot(f"robot-{number}", spec or DriveSpec(), Pose(*start))
+        planner = map_of_caparica(body.radius)
+        around = Surrounded(Clock(), self.world, body, planner)
+        pilot = Pilot(errand, planner, around.guard, body.name, around.reach, body.turning_radius)
+        robot = Robot(body, around, pilot)
+        self.robots.append(robot)
+        return robot
+
+    def parked(self, number: int, x: float, y: float) -> RobotBody:
+        return self.world.add_robot(f"robot-{number}", DriveSpec(), Pose(x, y, 0.0))
+
+    def person(self, x: float, y: float, vx: float = 0.0, vy: float = 0.0) -> PersonBody:
+        person = self.world.add_person(f"person-{len(self.world.people) + 1}", Pose(x, y, 0.0))
+        person.walk(vx, vy)
+        return person
+
+    def run(self, seconds: float, each: Callable[[], object] = lambda: None) -> None:
+        """Let time pass until all errands are over."""
+        end = self.now + seconds
+        while self.now < end and not (self.robots and all(r.over for r in self.robots)):
+            self.world.advance_to(self.now)
+            each()
+            for robot in self.robots:
+                self._step(robot)
+            self._measure()
+            self.now = round(self.now + PERIOD, 6)
+        self.world.advance_to(self.now)
+
+    def _step(self, robot: Robot) -> None:
+        robot.speeds.append(robot.body.speed)
+        if robot.over:
+            return
+        step = robot.pilot.step(self._seen(robot))
+        robot.body.drive(*step.intent, self.now + 2 * PERIOD)
+        if not robot.told or robot.told[-1][1][1:] != step[1:]:
+            robot.told.append((self.now, step))
+
+    def _seen(self, robot: Robot) -> Seen:
+        body, pose = robot.body, robot.body.pose()
+        sees = map_of_caparica().line_of_sight
+        view = View(CAMERA_ANGLE, CAMERA_RANGE, sees)
+        hazards = view.look(pose.x, pose.y, pose.heading, self.hazards)
+        seen = Observation(0, *pose, body.speed, body.turn_rate, hazards)
+        nearby = robot.around.nearby()
+        return Seen(self.now, seen, nearby, body.jammed, self._charge(self.now))
+
+    def _measure(self) -> None:
+        """The smallest gap between any two that move about."""
+        bodies = [*self.world.robots, *self.world.people]
+        pairs = ((a, b) for i, a in enumerate(bodies) for b in bodies[:i])
+        gaps = [math.dist((a.x, a.y), (b.x, b.y)) - a.radius - b.radius for a, b in pairs]
+        self.gaps.append(min(gaps, default=math.inf))
