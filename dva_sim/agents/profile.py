@@ -10,10 +10,13 @@ from pydantic import Field, model_validator
 
 from dva_sim import resources
 from dva_sim.agents.battery import BatteryProfile
+from dva_sim.agents.sensors import KINDS, SensorConfig
 from dva_sim.config import Config, Document, load_yaml, validate
 from dva_sim.worlds.drives import LONGEST_TICK, DriveSpec, load_drive
 
 FOLDER: Final = "agents/robots"
+
+ONE_OF_EACH: Final = tuple(SensorConfig(name=name) for name in KINDS)
 
 Positive = Annotated[float, Field(gt=0)]
 Corner = tuple[float, float]
@@ -30,6 +33,7 @@ class RobotProfile(Config):
         options: Of that drive.
         processing_s: What a message takes its computer; left out: 0.05.
         battery: Left out: power never ends.
+        sensors: What it carries; left out: one of each kind.
     """
 
     description: str = ""
@@ -46,6 +50,7 @@ class RobotProfile(Config):
     options: dict[str, Any] = Field(default_factory=dict)
     processing_s: Annotated[float, Field(ge=0, le=10)] = 0.05
     battery: BatteryProfile | None = None
+    sensors: Annotated[tuple[SensorConfig, ...], Field(max_length=16)] = ONE_OF_EACH
 
     @model_validator(mode="after")
     def _footprint(self) -> RobotProfile:

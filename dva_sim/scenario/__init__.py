@@ -4,6 +4,7 @@ from dva_sim.scenario.building import FOLDER, build, load
 from dva_sim.scenario.names import check_policy, locate_policy
 from dva_sim.scenario.parts import EventConfig, RobotConfig
 from dva_sim.scenario.profiles import (
+    bystander_profile,
     guard_profile,
     phone_profile,
     population,
@@ -21,6 +22,7 @@ __all__ = [
     "RobotConfig",
     "Scenario",
     "build",
+    "bystander_profile",
     "check_policy",
     "guard_profile",
     "load",

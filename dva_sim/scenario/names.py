@@ -34,6 +34,7 @@ def check_names(scenario: Scenario, error: Fail) -> None:
         ("profile",): (scenario.profile, resources.available("agents/phones")),
         ("robot", "profile"): (robots, resources.available("agents/robots")),
         ("guard", "profile"): (scenario.guard.profile, people),
+        ("bystander", "profile"): (scenario.bystander.profile, people),
         ("operator", "population"): (scenario.operator.population, people),
     }
     for path, (given, known) in choices.items():

@@ -6,7 +6,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
+from dva_sim.agents.sensors import SensorConfig
 from dva_sim.config import Config
+from dva_sim.errors import ConfigError
+from dva_sim.worlds.hazards import make_hazard
 
 Positive = Annotated[float, Field(gt=0)]
 NonNegative = Annotated[float, Field(ge=0)]
@@ -30,11 +33,15 @@ class RobotConfig(Config):
     Attributes:
         profile: One for all, or a list: the first robot has the first, and so on in turn.
         processing_s: Time a message takes a robot's computer; left out: as its profile says.
+        sensors: What they carry; left out: as their profile says.
+        charge: Share of the battery's capacity that they begin with.
     """
 
     profile: str | Annotated[tuple[str, ...], Field(min_length=1)] = "servrobot"
     count: Annotated[int, Field(ge=0, le=1000)] = 1
     processing_s: Annotated[float, Field(ge=0, le=10)] | None = None
+    sensors: Annotated[tuple[SensorConfig, ...], Field(max_length=16)] | None = None
+    charge: Annotated[float, Field(gt=0, le=1)] = 1.0
     watchdog_s: Annotated[float, Field(gt=0, le=60)] = 3.0
     max_age_s: Annotated[float, Field(gt=0, le=120)] = 6.0
 
@@ -83,10 +90,15 @@ class CommandConfig(Config):
 
 
 class CameraConfig(Config):
-    """The robots' cameras: what a frame costs and what it can show."""
+    """The robots' cameras: what a frame costs and what it can show.
+
+    Attributes:
+        encode_s: From taking a frame to publishing it; one frame at a time.
+    """
 
     rate_hz: Annotated[float, Field(gt=0, le=60)] = 10.0
     frame_bytes: Annotated[int, Field(ge=100, le=1_000_000)] = 12_000
+    encode_s: Annotated[float, Field(ge=0, le=5)] = 0.0
     field_of_view_deg: Annotated[float, Field(gt=10, le=360)] = 70.0
     range_m: Positive = 6.0
 
@@ -100,6 +112,8 @@ class EventConfig(Config):
         latest_s: If given, the seed draws the start between `at_s` and this.
         reported: Whether somebody reports it at once; otherwise detectors must notice it.
         false_alarm: Whether nothing is there: it is reported as it would be, and that is all.
+        hazard: What else belongs to its kind, such as `{growth: fast}` of a fire or
+            `{gas: propane, rate: 0.01}` of a leak: the settings of `make_hazard`.
         reports: How many report it; the others are people who see it a little later, and tell
             the place a little otherwise.
     """
@@ -110,10 +124,19 @@ class EventConfig(Config):
     latest_s: NonNegative | None = None
     reported: bool = False
     false_alarm: bool = False
+    hazard: dict[str, str | float] = Field(default_factory=dict)
     reports: Annotated[int, Field(ge=1, le=20)] = 1
 
     @model_validator(mode="after")
     def _in_order(self) -> EventConfig:
         if self.latest_s is not None and self.latest_s < self.at_s:
             raise ValueError(f"latest_s {self.latest_s:g} is before at_s {self.at_s:g}")
+        return self
+
+    @model_validator(mode="after")
+    def _hazard_can_be_made(self) -> EventConfig:
+        try:
+            make_hazard(self.kind, (0.0, 0.0), self.at_s, **self.hazard)
+        except ConfigError as error:
+            raise ValueError(error.problem) from None
         return self

@@ -6,7 +6,7 @@ from functools import cache
 
 from dva_sim import resources
 from dva_sim.agents.operator.person import Population
-from dva_sim.agents.people import GuardProfile
+from dva_sim.agents.people import BystanderProfile, GuardProfile
 from dva_sim.agents.profile import RobotProfile, load_robot
 from dva_sim.agents.tilt.phone import PhoneProfile
 from dva_sim.config import Config, M, load_yaml, validate
@@ -38,6 +38,11 @@ def phone_profile(scenario: Scenario) -> PhoneProfile:
 def guard_profile(scenario: Scenario) -> GuardProfile:
     """How the scenario's guards are drawn."""
     return _profile(GuardProfile, scenario.guard.profile, "agents/people")
+
+
+def bystander_profile(scenario: Scenario) -> BystanderProfile:
+    """How the scenario's bystanders are drawn."""
+    return _profile(BystanderProfile, scenario.bystander.profile, "agents/people")
 
 
 def population(scenario: Scenario) -> Population:

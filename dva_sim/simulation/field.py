@@ -1,31 +1,27 @@
-"""The field: robots and guards of a site, the physics around them, and the hazards."""
+"""The field: robots and people of a site, the physics around them, and the hazards."""
 
 from __future__ import annotations
 
 import math
 
-from dva_sim.agents.camera import CAMERA_SCHEME, HazardSpot, View
+from dva_sim.agents.bystander import BystanderAgent
+from dva_sim.agents.camera import HazardSpot
 from dva_sim.agents.device import Device
 from dva_sim.agents.guard import GuardAgent
-from dva_sim.agents.legs import RADIUS
-from dva_sim.agents.modes import Limits, RobotController
 from dva_sim.agents.operator.strategies import Truth
-from dva_sim.agents.people import Walker
-from dva_sim.agents.robot import FRAME, RobotAgent, RobotSetup
-from dva_sim.agents.sensing import SensorPort
-from dva_sim.agents.walking import Walking
+from dva_sim.agents.robot import RobotAgent
 from dva_sim.protocol import messages as m
 from dva_sim.recorder import DriveLog
-from dva_sim.scenario import guard_profile
 from dva_sim.simulation.incidents import Hearsay, Incident, draw_incidents
+from dva_sim.simulation.machines import Machines
 from dva_sim.simulation.names import DVA
-from dva_sim.simulation.stage import Stage, place_of
-from dva_sim.worlds.hazards import Fire
+from dva_sim.simulation.people import People
+from dva_sim.simulation.stage import Stage
+from dva_sim.worlds.hazards import Surroundings
 from dva_sim.worlds.physics import World
 
 PHYSICS_TICK = 0.04  # two centimetres at top speed [s]
 SAME_PLACE = 4.0  # what is so near a place is what is there [m]
-HEAT = "heat_flux"
 
 
 class Field:
@@ -35,6 +31,7 @@ class Field:
         stage: Where.
 
     Attributes:
+        surroundings: What the hazards make of the air and the floor.
         contained: When an incident was dealt with [s], by its place in `incidents`.
 
     Raises:
@@ -45,17 +42,31 @@ class Field:
         self.stage = stage
         self.world = World(stage.site, PHYSICS_TICK)
         self.incidents = draw_incidents(stage.scenario.events, stage.site, stage.streams)
+        self._real = [n for n, i in enumerate(self.incidents) if not i.false_alarm]
+        self.surroundings = Surroundings(
+            stage.site, [self.incidents[number].hazard for number in self._real]
+        )
         self.contained: dict[int, float] = {}
         self.robots: dict[str, RobotAgent] = {}
         self.guards: list[GuardAgent] = []
+        self.bystanders: list[BystanderAgent] = []
         self._others = 0
 
     def populate(self) -> None:
         """Put everybody in place and let them register."""
+        machines = Machines(
+            self.stage, self.world, self.surroundings, self._spots, self.newest_drive
+        )
         for number in range(1, self.stage.scenario.robot.count + 1):
-            self._add_robot(number)
+            robot = machines.add(number)
+            self.robots[robot.device.id_tag] = robot
+        people = People(
+            self.stage, self.world, self.surroundings, self._spots, self._is_there, self._contain
+        )
         for number in range(1, self.stage.scenario.guard.count + 1):
-            self._add_guard(number)
+            self.guards.append(people.add_guard(number))
+        for number in range(1, self.stage.scenario.bystander.count + 1):
+            self.bystanders.append(people.add_bystander(number))
 
     def schedule_incidents(self) -> None:
         """Let the hazards break out, and those who notice them report."""
@@ -77,66 +88,6 @@ class Field:
             math.dist(i.hazard.position, (x, y)) < i.hazard.danger_radius(now)
             for i in self._going_on(now)
         )
-
-    # --- who is there ------------------------------------------------------------------
-
-    def _add_robot(self, number: int) -> None:
-        stage, scenario = self.stage, self.stage.scenario
-        base = place_of(stage.site.robot_bases, number, "robot base", stage.site)
-        device = stage.device("robot", number)
-        label = device.label
-        body = self.world.add_robot(label, stage.robots[number - 1].drive_spec(), base)
-        controller = RobotController(
-            device.id_tag,
-            DVA,
-            Limits(scenario.robot.watchdog_s, scenario.robot.max_age_s),
-            camera_url=f"{CAMERA_SCHEME}{device.address}/{FRAME}",
-            clock_offset=float(stage.streams[f"{label}/clock"].uniform(10.0, 100_000.0)),
-        )
-
-        def heat_flux(now: float) -> tuple[float]:
-            self.world.advance_to(now)
-            return (self._heat_at(body.pose()[:2], now),)
-
-        sensors = {HEAT: SensorPort("kW/m2", heat_flux)}
-        robot = RobotAgent(
-            device,
-            controller,
-            self.world,
-            body,
-            stage.planner,
-            self._setup(sensors),
-            self.newest_drive,
-        )
-        self.robots[device.id_tag] = robot
-        device.register(robot.start)
-
-    def _setup(self, sensors: dict[str, SensorPort]) -> RobotSetup:
-        scenario, camera = self.stage.scenario, self.stage.scenario.camera
-        angle = math.radians(camera.field_of_view_deg)
-        return RobotSetup(
-            scenario.pattern,
-            scenario.robot.processing_s or 0.0,
-            camera.rate_hz,
-            camera.frame_bytes,
-            View(angle, camera.range_m, self.stage.planner.line_of_sight),
-            self._spots,
-            sensors,
-        )
-
-    def _add_guard(self, number: int) -> None:
-        stage = self.stage
-        post = place_of(stage.site.guard_posts, number, "guard post", stage.site)
-        device = stage.device("guard", number)
-        luck = stage.streams[f"{device.label}/walker"]
-        walker = Walker.draw(guard_profile(stage.scenario), luck)
-        body = self.world.add_person(device.label, post, radius=RADIUS)
-        walking = Walking(
-            stage.clock, stage.planner, self.world, body, walker.speed, stage.site.doors
-        )
-        guard = GuardAgent(device, walker, stage.planner, walking, self._is_there, self._contain)
-        self.guards.append(guard)
-        device.register(guard.start)
 
     # --- what happens ------------------------------------------------------------------
 
@@ -175,6 +126,12 @@ class Field:
         body = m.EventReport(None, incident.kind, position, severity, 0.9, "detected")
         device.ask(DVA, body)
         device.tell(f"reports {incident.kind.replace('_', ' ')}", "event")
+        self._sound_alarm()
+
+    def _sound_alarm(self) -> None:
+        """What detectors and callers report is heard by all who are in the building."""
+        for bystander in self.bystanders:
+            bystander.alarm(self.stage.clock.now)
 
     # --- what agents may ask of the world ----------------------------------------------
 
@@ -194,18 +151,11 @@ class Field:
         now = self.stage.clock.now
         for number, incident in enumerate(self.incidents):
             near = math.dist(incident.hazard.position, (x, y)) < SAME_PLACE
-            if incident.kind == kind and near and incident.is_there(now):
-                self.contained.setdefault(number, now)
+            there = incident.is_there(now) and number not in self.contained
+            if incident.kind == kind and near and there:
+                self.contained[number] = now
+                self.surroundings.contain(self._real.index(number), now)
 
     def _is_there(self, kind: str, x: float, y: float) -> bool:
         spots = self._spots(self.stage.clock.now)
         return any(s.kind == kind and math.dist((s.x, s.y), (x, y)) < SAME_PLACE for s in spots)
-
-    def _heat_at(self, point: tuple[float, float], now: float) -> float:
-        """Radiant heat at a place [kW/m^2]; what a wall hides does not count."""
-        sees = self.stage.planner.line_of_sight
-        return sum(
-            i.hazard.heat_flux(now, point)
-            for i in self._going_on(now)
-            if isinstance(i.hazard, Fire) and sees(point, i.hazard.position)
-        )

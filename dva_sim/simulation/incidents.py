@@ -81,7 +81,7 @@ def _draw(event: EventConfig, site: Site, streams: Streams, number: int) -> Inci
     if event.latest_s is not None:
         start = float(rng.uniform(event.at_s, event.latest_s))
     x, y = _place(event, site, rng)
-    hazard = make_hazard(event.kind, (x, y), start)
+    hazard = make_hazard(event.kind, (x, y), start, **event.hazard)
     room = site.room_at(x, y) or ""
     detector, detected = None, start
     if not event.reported:

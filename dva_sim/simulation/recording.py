@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from dva_sim.agents.robot import RobotAgent
 from dva_sim.core.events import Event
@@ -11,9 +12,34 @@ from dva_sim.network.link import Link
 from dva_sim.recorder import Recorder
 from dva_sim.scenario import Scenario
 from dva_sim.simulation.incidents import Incident
+from dva_sim.worlds.hazards import Surroundings
 from dva_sim.worlds.site import Site
 
 MERGED_WITHIN = 8.5  # the DVA takes reports so near each other for one event [m]
+
+
+class PersonLog(NamedTuple):
+    """What became of a guard or bystander.
+
+    Attributes:
+        name: As in `guard-1`.
+        kind: `guard` or `bystander`.
+        activity: At the end.
+        exposure: Time within the danger radius of a hazard [s].
+        heat: Fractional effective dose of heat; at 1 half of all people are incapacitated.
+        toxic: The same of carbon monoxide.
+        leaves: When it set out to leave [s]; infinite if it never did.
+        out: When it was out [s]; infinite if it never was.
+    """
+
+    name: str
+    kind: str
+    activity: str
+    exposure: float
+    heat: float
+    toxic: float
+    leaves: float = math.inf
+    out: float = math.inf
 
 
 @dataclass
@@ -24,8 +50,10 @@ class Recording:
         incidents: The hazards as they were.
         events: The events as the DVA knew them.
         robots: The robots by id, as they ended.
+        surroundings: What the hazards made of the air and the floor.
         labels: Names by id.
         duration: How long the run lasted [s].
+        people: What became of the people on foot.
         contained: When incidents were dealt with [s], by their place in `incidents`.
     """
 
@@ -36,9 +64,11 @@ class Recording:
     incidents: list[Incident]
     events: list[Event]
     robots: dict[str, RobotAgent]
+    surroundings: Surroundings
     labels: dict[str, str]
     links: dict[str, tuple[Link, Link]]
     duration: float
+    people: list[PersonLog] = field(default_factory=list)
     contained: dict[int, float] = field(default_factory=dict)
 
     def event_of(self, number: int) -> Event | None:

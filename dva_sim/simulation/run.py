@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from functools import partial
 
+from dva_sim.agents.bystander import ALARMED, EVACUATING, SAFE, BystanderAgent
+from dva_sim.agents.guard import GuardAgent
 from dva_sim.agents.modes import Mode
 from dva_sim.clock import Clock
 from dva_sim.network.link import ConstantRate, Link, LinkConfig
@@ -15,7 +17,7 @@ from dva_sim.scenario import Scenario
 from dva_sim.simulation.control_room import add_dva, add_operator
 from dva_sim.simulation.field import Field
 from dva_sim.simulation.names import id_of
-from dva_sim.simulation.recording import Recording, event_about
+from dva_sim.simulation.recording import PersonLog, Recording, event_about
 from dva_sim.simulation.stage import Stage
 from dva_sim.simulation.watch import broken_event_rules, broken_rules
 
@@ -91,19 +93,36 @@ class Run:
             self.field.incidents,
             list(self.dva.events.values()),
             self.field.robots,
+            self.field.surroundings,
             stage.labels,
             self.links,
             self.clock.now,
+            people=self._people(),
             contained=self.field.contained,
         )
 
+    def _people(self) -> list[PersonLog]:
+        exposure, field = self.recorder.exposure, self.field
+        return [
+            PersonLog(name, "guard", g.activity, exposure[name], g.dose.heat, g.dose.toxic)
+            for g in field.guards
+            for name in (g.device.label,)
+        ] + [
+            PersonLog(
+                *(b.name, "bystander", b.activity, exposure[b.name], b.dose.heat, b.dose.toxic),
+                *(b.leaves_at, b.out_at),
+            )
+            for b in field.bystanders
+        ]
+
     def _settled(self) -> bool:
-        """Whether every incident is known and closed, and nobody drives any more."""
+        """Whether every incident is known and closed, nobody drives, and nobody is leaving."""
         events = list(self.dva.events.values())
         return (
             bool(events)
             and not any(e.open for e in events)
             and all(d.ended is not None for d in self.recorder.drives)
+            and not any(b.activity in (ALARMED, EVACUATING) for b in self.field.bystanders)
             and all(
                 event_about(i, events, self.stage.site) is not None
                 for i in self.field.incidents
@@ -149,7 +168,10 @@ class Run:
         now = self.clock.now
         self.field.world.advance_to(now)
         self._watch_robots(now)
-        self._watch_guards(now)
+        for guard in self.field.guards:
+            self._watch_person(guard.device.label, guard, now)
+        for bystander in self.field.bystanders:
+            self._watch_person(bystander.name, bystander, now)
         deadline = self.scenario.dispatch.rules().escalate_after
         for rule, what in broken_event_rules(self.dva.desk.book, deadline, now):
             self.recorder.violated(rule, now, "dva", what)
@@ -168,11 +190,9 @@ class Run:
             for rule, what in broken_rules(robot, drive, self.scenario.robot, mission, now):
                 recorder.violated(rule, now, label, what)
 
-    def _watch_guards(self, now: float) -> None:
-        for guard in self.field.guards:
-            label = guard.device.label
-            self.recorder.tracks[label].append(
-                TrackPoint(now, guard.x, guard.y, guard.heading, guard.activity)
-            )
-            if self.field.in_danger(guard.x, guard.y, now):
-                self.recorder.exposure[label] += self._period
+    def _watch_person(self, name: str, who: GuardAgent | BystanderAgent, now: float) -> None:
+        x, y = who.walking.place
+        if who.activity != SAFE:
+            self.recorder.tracks[name].append(TrackPoint(now, x, y, who.heading, who.activity))
+            if self.field.in_danger(x, y, now):
+                self.recorder.exposure[name] += self._period

@@ -1,0 +1,139 @@
+"""The robots of a run: body, battery, sensors, computer."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from dva_sim.agents.battery import Battery
+from dva_sim.agents.camera import CAMERA_SCHEME, HazardSpot, View
+from dva_sim.agents.modes import Limits, RobotController
+from dva_sim.agents.profile import RobotProfile
+from dva_sim.agents.robot import FRAME, RobotAgent, RobotSetup
+from dva_sim.agents.sensors import make_ports, sources_of
+from dva_sim.clock import Clock
+from dva_sim.recorder import DriveLog
+from dva_sim.simulation.names import DVA
+from dva_sim.simulation.stage import Stage, place_of
+from dva_sim.worlds.bodies import GRIP
+from dva_sim.worlds.geo import Pose
+from dva_sim.worlds.hazards import Surroundings
+from dva_sim.worlds.lidar import Lidar
+from dva_sim.worlds.physics import RobotBody, World
+
+WET_GRIP = 0.4  # friction coefficient of rubber on a wet smooth floor; assumed
+WET = 0.002  # deeper water than this makes a floor slippery [m]
+HOUSEKEEPING = 1.0  # how often a robot looks at its battery, and the floor at the robot [s]
+AT_BASE = 0.5  # so near its base a robot that stands is charged [m]
+STANDING = 0.02  # slower than this it stands [m/s]
+
+
+class Machines:
+    """Makes robots and keeps them going.
+
+    Args:
+        stage: Where.
+        world: The physics.
+        around: The hazards.
+        spots: What cameras may see of them, at a time [s].
+        drive_of: The log of a robot's newest drive, if it had any.
+    """
+
+    def __init__(
+        self,
+        stage: Stage,
+        world: World,
+        around: Surroundings,
+        spots: Callable[[float], list[HazardSpot]],
+        drive_of: Callable[[str], DriveLog | None],
+    ) -> None:
+        self._stage, self._world, self._around = stage, world, around
+        self._spots, self._drive_of = spots, drive_of
+        self._lidar = Lidar(world)
+
+    def add(self, number: int) -> RobotAgent:
+        """The `number`-th robot, in its place; it registers and begins to work.
+
+        Raises:
+            ConfigError: the site has no base for it, or something is in its way.
+        """
+        stage, config = self._stage, self._stage.scenario.robot
+        profile = stage.robots[number - 1]
+        base = place_of(stage.site.robot_bases, number, "robot base", stage.site)
+        device = stage.device("robot", number)
+        body = self._world.add_robot(device.label, profile.drive_spec(), base)
+        controller = RobotController(
+            device.id_tag,
+            DVA,
+            Limits(config.watchdog_s, config.max_age_s),
+            camera_url=f"{CAMERA_SCHEME}{device.address}/{FRAME}",
+            clock_offset=float(stage.streams[f"{device.label}/clock"].uniform(10.0, 100_000.0)),
+        )
+        power = Power(profile, config.charge, body, base, stage.clock)
+        setup = self._setup(profile, body, power)
+        robot = RobotAgent(
+            device, controller, self._world, body, stage.planner, setup, self._drive_of
+        )
+        device.register(robot.start)
+        stage.clock.every(HOUSEKEEPING, lambda: self._look_after(body, power))
+        return robot
+
+    def _setup(self, profile: RobotProfile, body: RobotBody, power: Power) -> RobotSetup:
+        stage, scenario = self._stage, self._stage.scenario
+        camera, robot = scenario.camera, scenario.robot
+        angle = math.radians(camera.field_of_view_deg)
+        sources = sources_of(self._world, body, self._around, self._lidar, power.share)
+        configs = profile.sensors if robot.sensors is None else robot.sensors
+        return RobotSetup(
+            scenario.pattern,
+            profile.processing_s if robot.processing_s is None else robot.processing_s,
+            camera.rate_hz,
+            camera.frame_bytes,
+            View(angle, camera.range_m, stage.planner.line_of_sight),
+            self._spots,
+            make_ports(
+                configs, sources, lambda what: stage.streams.fresh(f"{body.name}/sensor/{what}")
+            ),
+            guarded=scenario.control == "coordinated",
+            encode=camera.encode_s,
+            charge=power.share,
+        )
+
+    def _look_after(self, body: RobotBody, power: Power) -> None:
+        """Once a second: is there power, and is the floor wet?"""
+        now = self._stage.clock.now
+        self._world.advance_to(now)
+        body.powered = power.share() > 0.0
+        if self._around.may_be_wet:
+            wet = self._around.at(body.x, body.y, now).water > WET
+            body.grip = WET_GRIP if wet else GRIP
+
+
+class Power:
+    """A robot's battery, if it has one, and the base that charges it.
+
+    Args:
+        profile: Of the robot.
+        charge: Share of the capacity that it begins with.
+        body: Says how far it went, and what that took.
+        base: Where it is charged.
+        clock: The run's.
+    """
+
+    def __init__(
+        self, profile: RobotProfile, charge: float, body: RobotBody, base: Pose, clock: Clock
+    ) -> None:
+        self._battery = None
+        if profile.battery is not None:
+            self._battery = Battery(profile.battery, profile.mass_kg, charge)
+        self._body, self._base, self._clock = body, base, clock
+
+    def share(self) -> float:
+        """Of the capacity that is left now; 1 without a battery."""
+        battery, body = self._battery, self._body
+        if battery is None:
+            return 1.0
+        near = math.dist((body.x, body.y), (self._base.x, self._base.y)) < AT_BASE
+        at_base = near and abs(body.speed) < STANDING
+        battery.advance(self._clock.now, body.distance, body.work, at_base)
+        return battery.share
