@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,9 +62,18 @@ class Building:
 
     def space_at(self, x: float, y: float) -> int:
         """Index of the space around a point [m], or `NOWHERE`."""
-        row, column = self.grid.to_cell(x, y)
+        x0, y0, cos, sin = self._turn
+        column = math.floor(cos * (x - x0) + sin * (y - y0))
+        row = math.floor(cos * (y - y0) - sin * (x - x0))
         rows, columns = self.labels.shape
         return int(self.labels[row, column]) if 0 <= row < rows and 0 <= column < columns else -1
+
+    @cached_property
+    def _turn(self) -> tuple[float, float, float, float]:
+        """The grid's corner [m], and how its axes lie [cells/m]."""
+        origin, per_metre = self.grid.origin, 1.0 / self.grid.resolution
+        cos, sin = math.cos(origin.heading), math.sin(origin.heading)
+        return origin.x, origin.y, per_metre * cos, per_metre * sin
 
 
 class _ByGrid:
@@ -106,6 +116,24 @@ def _building(key: _ByGrid) -> Building:
     return Building(spaces, site.grid, parting.labels)
 
 
+class _Cut(NamedTuple):
+    """How a compartment is cut.
+
+    Attributes:
+        first: Index of its first part.
+        parts: How many there are.
+        axis: 0 if rows are cut, 1 for columns.
+        low: Where it begins [cells].
+        length: Of a part [cells].
+    """
+
+    first: int
+    parts: int
+    axis: int
+    low: int
+    length: float
+
+
 class _Parting:
     """Compartments cut into parts no longer than `LONGEST`.
 
@@ -117,33 +145,42 @@ class _Parting:
     """
 
     def __init__(self, site: Site) -> None:
-        self._site, self._of = site, {}
+        self._site = site
+        self._of: dict[str, _Cut] = {}
         self.area: list[float] = []
         self.ceiling: list[float] = []
         self.cuts: list[tuple[int, int, float]] = []
         whole = site.partition.labels
         self.labels = np.full(whole.shape, NOWHERE, np.int16)
+        cells = np.flatnonzero(whole != NOWHERE)
+        order = np.argsort(whole.ravel()[cells], kind="stable")
+        numbers = np.arange(len(site.compartments) + 1)
+        bounds = np.searchsorted(whole.ravel()[cells][order], numbers)
         for number, compartment in enumerate(site.compartments):
-            rows, columns = np.nonzero(whole == number)
+            own = cells[order[bounds[number] : bounds[number + 1]]]
+            rows, columns = np.divmod(own, whole.shape[1])
             self._of[compartment.name] = self._cut(
                 rows, columns, compartment.area, compartment.ceiling
             )
 
-    def _cut(self, rows: Integers, columns: Integers, area: float, ceiling: float) -> list[int]:
-        """The parts of one compartment, cut across its longer side."""
+    def _cut(self, rows: Integers, columns: Integers, area: float, ceiling: float) -> _Cut:
+        """One compartment cut across its longer side."""
         first, resolution = len(self.area), self._site.grid.resolution
-        along = rows if _span(rows) > _span(columns) else columns
+        axis = 0 if _span(rows) > _span(columns) else 1
+        along = columns if axis else rows
         count = max(1, math.ceil(_span(along) * resolution / LONGEST - 0.1))
-        low, span = int(along.min()) if len(along) else 0, _span(along) / count
-        part = np.minimum((along - low) // span, count - 1).astype(np.int64)
+        low = int(along.min()) if len(along) else 0
+        cut = _Cut(first, count, axis, low, _span(along) / count)
+        part = np.minimum((along - low) // cut.length, count - 1).astype(np.int64)
         self.labels[rows, columns] = first + part
+        sizes = np.bincount(part, minlength=count)
         for number in range(count):
-            self.area.append(area * max(1, int((part == number).sum())) / max(1, len(along)))
+            self.area.append(area * max(1, int(sizes[number])) / max(1, len(along)))
             self.ceiling.append(ceiling)
             if number:
-                across = int((along == low + math.ceil(number * span)).sum())
+                across = int((along == low + math.ceil(number * cut.length)).sum())
                 self.cuts.append((first + number - 1, first + number, across * resolution))
-        return list(range(first, first + count))
+        return cut
 
     def sides(self, a: str, b: str | None, x: float, y: float) -> tuple[int, int]:
         """The parts that an opening at a point [m] joins."""
@@ -151,15 +188,9 @@ class _Parting:
 
     def _nearest(self, name: str, x: float, y: float) -> int:
         """The part of a compartment nearest to a point [m]."""
-        parts = self._of[name]
-        if len(parts) == 1:
-            return parts[0]
-        row, column = self._site.grid.to_cell(x, y)
-        gaps = []
-        for part in parts:
-            rows, columns = np.nonzero(self.labels == part)
-            gaps.append(float(np.hypot(rows - row, columns - column).min()))
-        return parts[int(np.argmin(gaps))]
+        cut = self._of[name]
+        along = self._site.grid.to_cell(x, y)[cut.axis]
+        return cut.first + min(max(0, int((along - cut.low) // cut.length)), cut.parts - 1)
 
 
 def _span(cells: Integers) -> int:

@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dva_sim.errors import ConfigError
 from dva_sim.worlds.hazards.building import Building
 from dva_sim.worlds.hazards.leak import MIXED_HEIGHT
 from dva_sim.worlds.hazards.mesh import Mesh, mesh_of
@@ -42,6 +43,9 @@ class Air:
         loss: Fresh air, in volumes per second.
         draught: A steady flow through the rooms, if there is one.
         height: From floor to ceiling [m].
+
+    Raises:
+        ConfigError: the draught is blown in where no way leads to where it is sucked off.
     """
 
     def __init__(
@@ -121,7 +125,7 @@ def _potential_flow(mesh: Mesh, draught: Draught | None, height: float) -> Float
     link = coo_array((-np.r_[mesh.shape, mesh.shape], both), (count, count)).tocsr()
     _, part = connected_components(link, directed=False)
     if part[draught.supply] != part[draught.exhaust]:
-        raise ValueError("no way leads from the supply to the exhaust")
+        raise ConfigError("no way leads from the supply of a draught to its exhaust")
     inside = np.flatnonzero(part == part[draught.supply])
     here = np.setdiff1d(inside, [draught.exhaust])  # its potential is zero
     own = np.bincount(mesh.a, mesh.shape, count) + np.bincount(mesh.b, mesh.shape, count)
@@ -139,6 +143,6 @@ def mesh_in(building: Building) -> Mesh:
 
 
 @lru_cache(maxsize=8)
-def air_in(building: Building, diffusivity: float, loss: float) -> Air:
-    """The still air of a building, once per process."""
-    return Air(mesh_in(building), diffusivity, loss)
+def air_in(building: Building, diffusivity: float, loss: float, draught: Draught | None) -> Air:
+    """The air of a building, once per process."""
+    return Air(mesh_in(building), diffusivity, loss, draught)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 
 from dva_sim.worlds.hazards.base import AMBIENT, BREATHING_HEIGHT, CLEAR, Conditions, Hazard
 from dva_sim.worlds.hazards.building import NOWHERE, Building
-from dva_sim.worlds.hazards.dispersion import Air, air_in, mesh_in
+from dva_sim.worlds.hazards.dispersion import Air, Draught, air_in, mesh_in
 from dva_sim.worlds.hazards.filling import Filling
 from dva_sim.worlds.hazards.fire import Fire
 from dva_sim.worlds.hazards.flood import FILM, Flood
 from dva_sim.worlds.hazards.leak import HOUR, GasLeak
-from dva_sim.worlds.hazards.march import March, Step
+from dva_sim.worlds.hazards.march import PACES, March, Paces, Step
 from dva_sim.worlds.hazards.plumes import plume
 from dva_sim.worlds.hazards.smoke import (
     CO_RATIO,
@@ -39,7 +39,9 @@ from dva_sim.worlds.sight import Sight
 
 Floats = NDArray[np.float64]
 
+BLUR = 0.3  # the lower face of a smoke layer is so thick [m]; assumed
 RADIATION = 5.67e-11  # Stefan and Boltzmann's constant [kW/m^2/K^4]
+SMOKE_PACES = ((math.inf, 1.0),)  # in longer steps layers would swing
 GAS_PACES = ((120.0, 2.0), (600.0, 10.0), (math.inf, 30.0))
 
 
@@ -75,10 +77,11 @@ class _Course:
     Args:
         shared: With the source, from age 0 on.
         step: Without the source.
+        paces: Of this run's own.
     """
 
-    def __init__(self, shared: March, step: Step) -> None:
-        self._shared, self._step = shared, step
+    def __init__(self, shared: March, step: Step, paces: Paces) -> None:
+        self._shared, self._step, self._paces = shared, step, paces
         self._own: tuple[float, March] | None = None
 
     def around(self, age: float, stopped: float) -> tuple[Floats, Floats, float]:
@@ -86,7 +89,7 @@ class _Course:
         if age <= stopped:
             return self._shared.around(age)
         if self._own is None or self._own[0] != stopped:
-            self._own = stopped, March(self._shared.at(stopped), self._step)
+            self._own = stopped, March(self._shared.at(stopped), self._step, self._paces)
         return self._own[1].around(age - stopped)
 
     def at(self, age: float, stopped: float) -> Floats:
@@ -109,10 +112,10 @@ class Layer(NamedTuple):
     co: float
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=32)
 def _smoke(building: Building, growth: str, peak: float, room: int) -> tuple[Smoke, March]:
     smoke = Smoke(building.spaces, Fire((0.0, 0.0), 0.0, growth, peak), room)
-    return smoke, March(smoke.empty(), smoke.step)
+    return smoke, March(smoke.empty(), smoke.step, SMOKE_PACES)
 
 
 class FireField:
@@ -143,9 +146,13 @@ class FireField:
         if layer is None:
             return Conditions(AMBIENT, heat)
         heat += _glow(layer.temperature, layer.extinction * layer.depth)
-        if layer.bottom >= BREATHING_HEIGHT:
-            return Conditions(AMBIENT, heat)
-        return Conditions(layer.temperature, heat, layer.extinction, layer.co)
+        share = _within(layer.bottom)
+        return Conditions(
+            AMBIENT + share * (layer.temperature - AMBIENT),
+            heat,
+            share * layer.extinction,
+            share * layer.co,
+        )
 
     def layer(self, space: int, time: float) -> Layer | None:
         """The smoke in a space; None if there is none."""
@@ -168,12 +175,12 @@ class FireField:
             CO_RATIO * co / mass,
         )
 
-    def extinctions(self, time: float, height: float | None = BREATHING_HEIGHT) -> Floats:
+    def extinctions(self, time: float, mean: bool = False) -> Floats:
         """Extinction in each space [1/m], and 0 last, for -1: nowhere.
 
         Args:
             time: [s]
-            height: Where it counts [m]; None for the mean from floor to ceiling.
+            mean: From floor to ceiling; else at breathing height.
         """
         spaces = self._building.spaces
         if self._room == NOWHERE or time <= self._fire.start:
@@ -185,14 +192,15 @@ class FireField:
         volume = np.maximum(volume, 1e-9)
         value = SOOT_EXTINCTION * state[:, SOOT] / volume
         share = np.minimum(1.0, volume / room)
-        if height is not None:
-            share = (spaces.ceiling * (1.0 - share) < height).astype(float)
+        if not mean:
+            bottom = spaces.ceiling * (1.0 - share)
+            share = np.clip((BREATHING_HEIGHT - bottom) / BLUR + 0.5, 0.0, 1.0)
         return np.append(value * share, 0.0)
 
     def picture(self, what: str, places: Places, time: float) -> Floats | None:
         """See `HazardField`."""
         if what == "smoke":
-            return np.asarray(self.extinctions(time, None)[places.spaces])
+            return np.asarray(self.extinctions(time, mean=True)[places.spaces])
         if what != "heat":
             return None
         if not self._fire.start <= time < self.until:
@@ -209,9 +217,14 @@ class FireField:
     def _states(self, time: float) -> tuple[Floats, Floats, float]:
         if self._course is None:
             smoke, march = _smoke(self._building, self._fire.growth, self._fire.peak, self._room)
-            self._course = _Course(march, smoke.step_without_fire)
+            self._course = _Course(march, smoke.step_without_fire, SMOKE_PACES)
         start = self._fire.start
         return self._course.around(time - start, max(0.0, self.until - start))
+
+
+def _within(bottom: float) -> float:
+    """How far breathing height lies within a layer whose lower face is there [m], 0 to 1."""
+    return min(1.0, max(0.0, (BREATHING_HEIGHT - bottom) / BLUR + 0.5))
 
 
 def _glow(temperature: float, optical_depth: float) -> float:
@@ -226,11 +239,8 @@ def _glow(temperature: float, optical_depth: float) -> float:
 
 
 @lru_cache(maxsize=16)
-def _gas(
-    building: Building, diffusivity: float, loss: float, node: int, rate: float
-) -> tuple[Air, March]:
-    air = air_in(building, diffusivity, loss)
-    return air, March(air.still(), lambda state, _, dt: air.step(state, node, rate, dt), GAS_PACES)
+def _gas(air: Air, node: int, rate: float) -> March:
+    return March(air.still(), lambda state, _, dt: air.step(state, node, rate, dt), GAS_PACES)
 
 
 class LeakField:
@@ -276,11 +286,11 @@ class LeakField:
         In still air as much gas comes from one place to another as would come back from there:
         one solution, with the source at this place, serves leaks wherever they are.
         """
-        if not self._indoors or self._building.space_at(x, y) == NOWHERE:
-            return lambda age: self._outdoors(x, y, self._leak.start + age)
+        if not self._indoors or self._leak.draught > 0.0:
+            return lambda age: self.share(x, y, self._leak.start + age)
         mesh, leak = mesh_in(self._building), self._leak
         here, there = mesh.nearest(x, y), mesh.nearest(*leak.position)
-        _, march = _gas(self._building, leak.diffusivity, leak.air_changes / HOUR, here, 1.0)
+        march = _gas(self._air, here, 1.0)
 
         def share(age: float) -> float:
             before, after, weight = march.around(age)
@@ -300,6 +310,17 @@ class LeakField:
             return 0.0
         height = BREATHING_HEIGHT
         return plume(leak.release, leak.wind, leak.stability, downwind, across, height)
+
+    @cached_property
+    def _air(self) -> Air:
+        """The air that it leaks into."""
+        leak, mesh = self._leak, mesh_in(self._building)
+        draught = None
+        if leak.draught > 0.0:
+            supply = mesh.nearest(leak.supply_x, leak.supply_y)
+            exhaust = mesh.nearest(leak.exhaust_x, leak.exhaust_y)
+            draught = Draught(supply, exhaust, leak.draught)
+        return air_in(self._building, leak.diffusivity, leak.air_changes / HOUR, draught)
 
     def picture(self, what: str, places: Places, time: float) -> Floats | None:
         """See `HazardField`."""
@@ -322,9 +343,10 @@ class LeakField:
         leak = self._leak
         if self._course is None:
             node = mesh_in(self._building).nearest(*leak.position)
-            loss = leak.air_changes / HOUR
-            air, march = _gas(self._building, leak.diffusivity, loss, node, leak.release)
-            self._course = _Course(march, lambda state, _, dt: air.step(state, node, 0.0, dt))
+            air, march = self._air, _gas(self._air, node, leak.release)
+            self._course = _Course(
+                march, lambda state, _, dt: air.step(state, node, 0.0, dt), GAS_PACES
+            )
         return self._course.around(time - leak.start, max(0.0, self.until - leak.start))
 
 
@@ -386,7 +408,7 @@ class FloodField:
         flood = self._flood
         if self._course is None:
             filling, march = _water(self._building, flood.inflow, self._room)
-            self._course = _Course(march, filling.step_without_inflow)
+            self._course = _Course(march, filling.step_without_inflow, PACES)
         return self._course.around(time - flood.start, max(0.0, self.until - flood.start))
 
 

@@ -62,6 +62,9 @@ class GasLeak:
         rate: Gas set free [m^3/s]; 0 stands for a serious leak of that gas.
         diffusivity: Of the stirred air [m^2/s].
         air_changes: Fresh air per hour, in volumes of the room.
+        draught: Air blown in at one place indoors and sucked off at another [m^3/s].
+        supply_x: Where it is blown in [m]; the same for y.
+        exhaust_x: Where it is sucked off [m]; the same for y.
         wind: Outdoors [m/s].
         wind_heading: Where it blows to, counter-clockwise from east [rad].
         stability: Of the air outdoors, A to F.
@@ -77,6 +80,11 @@ class GasLeak:
     rate: float = 0.0
     diffusivity: float = EDDY_DIFFUSIVITY
     air_changes: float = AIR_CHANGES
+    draught: float = 0.0
+    supply_x: float = 0.0
+    supply_y: float = 0.0
+    exhaust_x: float = 0.0
+    exhaust_y: float = 0.0
     wind: float = 2.0
     wind_heading: float = 0.0
     stability: str = "D"

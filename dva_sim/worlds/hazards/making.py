@@ -18,7 +18,7 @@ KINDS: dict[str, type[Fire] | type[GasLeak] | type[Flood]] = {
     "flood": Flood,
 }
 CHOICES = {"growth": tuple(GROWTH_S), "gas": tuple(GASES), "stability": tuple(CLASSES)}
-ANY_SIGN = ("wind_heading",)
+ANY_SIGN = ("wind_heading", "supply_x", "supply_y", "exhaust_x", "exhaust_y")
 
 
 def make_hazard(kind: str, position: Point, start: float, **settings: str | float) -> Hazard:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 Step = Callable[[Floats, float, float], Floats]
+Paces = Sequence[tuple[float, float]]
 
 # Until which age, in which steps [s]: what has just begun changes fast.
 PACES = ((120.0, 1.0), (600.0, 2.0), (1800.0, 5.0), (math.inf, 20.0))
@@ -25,9 +26,7 @@ class March:
         paces: Until which age, in which steps [s].
     """
 
-    def __init__(
-        self, state: Floats, step: Step, paces: Sequence[tuple[float, float]] = PACES
-    ) -> None:
+    def __init__(self, state: Floats, step: Step, paces: Paces = PACES) -> None:
         self._step, self._paces = step, paces
         self.ages, self.states = [0.0], [state]
 

@@ -56,6 +56,11 @@ class Surroundings:
         return [field_of(hazard, building, sight) for hazard in self._hazards]
 
     @property
+    def has_any(self) -> bool:
+        """Whether there is any hazard."""
+        return bool(self._hazards)
+
+    @property
     def may_be_wet(self) -> bool:
         """Whether water ever stands on the floor."""
         return any(isinstance(hazard, Flood) for hazard in self._hazards)
