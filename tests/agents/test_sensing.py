@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import pytest
 
 from dva_sim import scenario as scenarios
@@ -22,8 +24,12 @@ class Bench:
         self.run = Run(scenarios.build(scenarios.load("drive-to-event"), quiet), 1)
         device = self.run.field.robots[ROBOT].device
         self.clock = device.clock
-        port = SensorPort("s", lambda now: (now,))
-        self.desk = SensorDesk(device, {"time": port}, lambda now: round(now * 1000))
+        self.read: Callable[[float], tuple[float, ...]] = lambda now: (now,)
+        ports = {
+            "time": SensorPort("s", lambda now: self.read(now)),
+            "slow": SensorPort("s", lambda now: (now,), fastest=2.0),
+        }
+        self.desk = SensorDesk(device, ports, lambda now: round(now * 1000))
         self.got: list[tuple[float, m.SensorValue]] = []
         topic = topic_of_sensor("time", READER)
         self.run.network.subscribe(READER, ROBOT, topic, self._hear)
@@ -34,8 +40,8 @@ class Bench:
         assert isinstance(body, m.SensorValue)
         self.got.append((self.clock.now, body))
 
-    def subscribe(self, frequency: float, who: str = READER) -> int:
-        return self.desk.subscribe(who, m.DevSub("time", frequency))[0]
+    def subscribe(self, frequency: float, who: str = READER, sensor: str = "time") -> int:
+        return self.desk.subscribe(who, m.DevSub(sensor, frequency))[0]
 
 
 @pytest.fixture
@@ -96,3 +102,48 @@ def test_a_robot_serves_so_many_and_no_more(bench: Bench) -> None:
     for number in range(MOST):
         assert bench.subscribe(0.1, who=f"02:00:00:03:01:{number:02X}") == m.OK
     assert bench.subscribe(0.1, who=OTHER) == m.BUSY
+
+
+def test_a_sensor_is_not_read_faster_than_it_samples(bench: Bench) -> None:
+    assert bench.subscribe(2.5, sensor="slow") == m.NOT_SUPPORTED
+    assert bench.subscribe(2.0, sensor="slow") == m.OK
+    assert bench.subscribe(20.0) == m.OK
+
+
+def test_a_sensor_is_read_for_subscribers_only(bench: Bench) -> None:
+    """Casting the rays of a lidar costs more than all the rest of a robot."""
+    asked: list[float] = []
+    bench.read = lambda now: (asked.append(now), (now,))[1]  # type: ignore[func-returns-value]
+    bench.clock.run(10.0)
+    assert asked == []
+    bench.subscribe(2.0)
+    bench.clock.run(20.0)
+    assert len(asked) == pytest.approx(20, abs=1)
+
+
+def test_a_sensor_that_has_nothing_to_say_says_nothing_until_it_has_again(bench: Bench) -> None:
+    bench.read = lambda now: () if now < 6.0 else (now,)
+    bench.subscribe(10.0)
+    bench.clock.run(5.9)
+    assert bench.got == []
+    bench.clock.run(7.0)
+    assert len(bench.got) == pytest.approx(10, abs=1)
+
+
+def test_a_whole_turn_of_ranges_arrives_as_it_was(bench: Bench) -> None:
+    turn = tuple(round(0.5 + 0.02 * ray, 3) for ray in range(360))
+    bench.read = lambda now: turn
+    bench.subscribe(1.0)
+    bench.clock.run(3.0)
+    assert {value.values for _, value in bench.got} == {turn}
+
+
+def test_values_that_no_message_can_hold_are_counted_and_stop_nothing(bench: Bench) -> None:
+    bench.read = lambda now: tuple(now / 3.0 + ray / 7.0 for ray in range(361))
+    bench.subscribe(1.0)
+    bench.clock.run(4.0)
+    assert bench.got == []
+    assert bench.run.recorder.counters["sensor values that no message holds"] >= 3
+    bench.read = lambda now: (now,)
+    bench.clock.run(6.0)
+    assert len(bench.got) >= 1
