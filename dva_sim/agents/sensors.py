@@ -223,7 +223,7 @@ def sources_of(
 
     def ranges(now: float) -> Values:
         world.advance_to(now)
-        return tuple(lidar.scan([body])[0].tolist())
+        return tuple(lidar.read(body).tolist())
 
     return {
         "lidar": ranges,

@@ -21,6 +21,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 CELL: Final = 2.0  # side of the cells that walls are sorted by [m]
+LISTENS: Final = 0.25  # who asked so lately will ask again [s]
 EDGE: Final = 1e-9  # a ray through a corner meets both walls, never neither
 
 
@@ -49,6 +50,9 @@ class Lidar:
         self.angles: Floats = self._start + self._step * np.arange(rays, dtype=np.float64)
         self._world, self._walls = world, world.site.walls
         self._near: dict[tuple[int, int], Ints] = {}
+        self._asked: dict[RobotBody, float] = {}
+        self._seen: dict[RobotBody, Floats] = {}
+        self._seen_at = -math.inf
 
     def scan(self, bodies: Sequence[RobotBody]) -> Floats:
         """Distances from the middle of each body, rays counter-clockwise.
@@ -67,6 +71,21 @@ class Lidar:
         self._meet_discs(eyes, best, by[discs], places[seen[discs]])
         self._meet_segments(eyes, best, *_edges(others, seen[edged], by[edged]))
         return best.reshape(len(bodies), self.rays)
+
+    def read(self, body: RobotBody) -> Floats:
+        """A scan of one body, shape `(rays,)` [m]: the same as `scan` gives, but cheaper.
+
+        Those who listen are scanned along with the first of them that asks in a tick.
+        """
+        now, listeners = self._world.time, {body: None}
+        if now != self._seen_at:
+            self._asked = {b: last for b, last in self._asked.items() if now - last <= LISTENS}
+            listeners.update(dict.fromkeys(self._asked))
+            self._seen, self._seen_at = {}, now
+        if body not in self._seen:
+            self._seen.update(zip(listeners, self.scan(list(listeners)), strict=True))
+        self._asked[body] = now
+        return self._seen[body]
 
     # --- what may be met ---------------------------------------------------------------
 

@@ -140,3 +140,30 @@ def test_who_is_scanned_with_whom_changes_nothing():
 def test_nobody_asks_and_nothing_is_cast():
     world = crowd()
     assert Lidar(world).scan([]).shape == (0, 36)
+
+
+def test_to_read_one_after_the_other_gives_what_a_scan_gives():
+    world = crowd()
+    lidar, other = Lidar(world), Lidar(world)
+    for robot in world.robots:
+        robot.drive(0.5, 0.4, math.inf)
+    for tick in range(40):
+        world.advance_to(0.04 * tick)
+        for robot in world.robots[tick % 3 :: 1 + tick % 2]:
+            assert lidar.read(robot).tolist() == other.scan([robot])[0].tolist()
+
+
+def test_who_listens_is_scanned_together_and_who_has_ceased_to_is_not(monkeypatch):
+    world, scanned = crowd(), []
+    lidar = Lidar(world)
+    scan = lidar.scan
+    monkeypatch.setattr(lidar, "scan", lambda bodies: scanned.append(len(bodies)) or scan(bodies))
+    world.robots[-1].drive(0.1, 0.0, math.inf)
+    for tick in range(20):
+        world.advance_to(0.04 * tick)
+        for robot in world.robots[: 6 if tick < 3 else 1]:
+            lidar.read(robot)
+    assert scanned[:6] == [1] * 6  # nobody is known yet
+    assert scanned[6:8] == [6, 6]
+    assert scanned[-1] == 1
+    assert len(scanned) == 6 + 19
