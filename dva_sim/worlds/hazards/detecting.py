@@ -19,9 +19,12 @@ from dva_sim.worlds.hazards.alarms import (
 )
 from dva_sim.worlds.hazards.base import Hazard
 from dva_sim.worlds.hazards.building import Building, building_of
-from dva_sim.worlds.hazards.fields import FireField, FloodField, LeakField, field_of
+from dva_sim.worlds.hazards.fields import Field, field_of
 from dva_sim.worlds.hazards.fire import Fire
+from dva_sim.worlds.hazards.fire_field import FireField
+from dva_sim.worlds.hazards.flood_field import FloodField
 from dva_sim.worlds.hazards.leak import GasLeak
+from dva_sim.worlds.hazards.leak_field import LeakField
 from dva_sim.worlds.layout import Site
 from dva_sim.worlds.parts import Detector
 from dva_sim.worlds.sight import Sight
@@ -109,9 +112,7 @@ def _jet(kind: str, growth: str, peak: float, gap: float, ceiling: float) -> tup
     return reached, math.inf if kind == "co" else sounds
 
 
-def _alarm(
-    detector: Detector, field: FireField | LeakField | FloodField, building: Building
-) -> Alarm:
+def _alarm(detector: Detector, field: Field, building: Building) -> Alarm:
     """What a detector makes of a field whose hazard starts at 0."""
     x, y = detector.x, detector.y
     if isinstance(field, FloodField):

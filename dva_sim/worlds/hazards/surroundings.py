@@ -12,13 +12,16 @@ from numpy.typing import NDArray
 
 from dva_sim.worlds.hazards.base import AMBIENT, CLEAR, Conditions, Hazard, Point
 from dva_sim.worlds.hazards.building import building_of
+from dva_sim.worlds.hazards.course import HazardField, Places
 from dva_sim.worlds.hazards.dispersion import mesh_in
-from dva_sim.worlds.hazards.fields import FireField, FloodField, LeakField, Places, field_of
+from dva_sim.worlds.hazards.fields import field_of
+from dva_sim.worlds.hazards.fire_field import FireField
 from dva_sim.worlds.hazards.flood import Flood
+from dva_sim.worlds.hazards.leak_field import LeakField
 from dva_sim.worlds.layout import Site
 from dva_sim.worlds.sight import Sight
 
-UNITS = {"smoke": "1/m", "gas": "1", "water": "m", "heat": "kW/m2"}
+UNITS = {"smoke": "1/m", "layer": "1/m", "gas": "1", "water": "m", "heat": "kW/m2"}
 RAY = 0.25  # between the points of a line of sight [m]
 
 
@@ -51,7 +54,7 @@ class Surroundings:
         self._places: dict[float, Places] = {}
 
     @cached_property
-    def _fields(self) -> list[FireField | LeakField | FloodField]:
+    def _fields(self) -> list[HazardField]:
         building, sight = building_of(self._site), Sight(self._site.walls)
         return [field_of(hazard, building, sight) for hazard in self._hazards]
 
@@ -94,8 +97,9 @@ class Surroundings:
         """A field as a picture shows it.
 
         Args:
-            what: `smoke` (extinction, mean from floor to ceiling), `gas` (share of the volume),
-                `water` (depth) or `heat` (radiant, of flames).
+            what: `smoke` (extinction, mean from floor to ceiling), `layer` (extinction in the
+                layer under the ceiling), `gas` (share of the volume), `water` (depth) or
+                `heat` (radiant, of flames).
             time: [s]
             cell: Side of a cell [m].
         """
