@@ -19,6 +19,7 @@ from dva_sim.protocol import messages as m
 from dva_sim.recorder import Recorder
 from dva_sim.simulation.control_room import add_operator
 from dva_sim.simulation.field import Field
+from dva_sim.simulation.machines import Machines
 from dva_sim.simulation.names import id_of
 from dva_sim.simulation.stage import Stage
 from dva_sim.streams import Streams
@@ -47,6 +48,7 @@ class PretendedDva:
 
     Args:
         robots: How many robots there are.
+        changes: Of the scenario, by dotted key.
 
     Attributes:
         told: What was told, but for registrations.
@@ -54,16 +56,20 @@ class PretendedDva:
         contained: What guards have dealt with: kind and place.
     """
 
-    def __init__(self, robots: int = 0) -> None:
+    def __init__(self, robots: int = 0, **changes: object) -> None:
         config = LinkConfig(delay_s=0.001)
         links = [Link(config, ConstantRate(config.rate_bps), Streams(1), way) for way in "ab"]
         self.network = VirtualNetwork(Clock(), lambda *_: (links[0], links[1]))
-        changes = {"robot.count": robots, "guard.count": 1}
-        scenario = scenarios.build(scenarios.load("drive-to-event"), changes)
+        team = {"robot.count": robots, "guard.count": 1}
+        scenario = scenarios.build(scenarios.load("drive-to-event"), team | changes)
         self.stage = Stage(scenario, 1, self.network, Recorder())
-        self.field = Field(self.stage)
+        self.field = field = Field(self.stage)
+        machines = Machines(
+            self.stage, field.world, field.surroundings, field._spots, field.newest_drive
+        )
         for number in range(1, robots + 1):
-            self.field._add_robot(number)
+            robot = machines.add(number)
+            field.robots[robot.device.id_tag] = robot
         self.device = self.stage.device("dva", 1)
         self.device.serve(self._hear)
         self.told: list[Told] = []
