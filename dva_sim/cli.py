@@ -169,6 +169,42 @@ def list_() -> None:
     console.list_all()
 
 
+site = typer.Typer(help="Draw a site, or write it as files to edit.", no_args_is_help=True)
+app.add_typer(site, name="site")
+SiteName = Annotated[str, typer.Argument(help="A site by name or path, or a ROS map by path.")]
+Options_ = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="An option of a generated site."),
+]
+
+
+@site.command(name="show")
+def site_show(
+    name: SiteName,
+    out: Annotated[Path | None, typer.Option("-o", "--out", help="Default: NAME.png.")] = None,
+    set_: Options_ = None,
+    coverage: Annotated[
+        bool, typer.Option("--coverage", help="Show where Wi-Fi is not good.")
+    ] = False,
+) -> None:
+    """Draw a site and say in a line what it is."""
+    from dva_sim.worlds import console
+
+    console.show(name, out, set_ or [], coverage)
+
+
+@site.command(name="export")
+def site_export(
+    name: SiteName,
+    out: Annotated[Path, typer.Option("-o", "--out", help="Folder.")] = Path(),
+    set_: Options_ = None,
+) -> None:
+    """Write a site as YAML and GeoJSON, to go on drawing."""
+    from dva_sim.worlds import console
+
+    console.export(name, out, set_ or [])
+
+
 @app.command()
 def check(
     files: Annotated[

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import difflib
+import itertools
+from collections import Counter
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 
@@ -97,6 +99,15 @@ class Site:
     @cached_property
     def _wifi(self) -> Lookup[Coverage]:
         return Lookup(self.wifi[::-1])
+
+    @cached_property
+    def wall_lines(self) -> Floats:
+        """The walls `(n, 4)` [m] without the sides of solids."""
+        sides = Counter(_side(a, b) for solid in self.solids for a, b in itertools.pairwise(solid))
+        walls = [_side(wall[:2], wall[2:]) for wall in self.walls]
+        drawn = Counter(walls)
+        keep = np.array([drawn[wall] > sides[wall] for wall in walls], dtype=bool)
+        return np.asarray(self.walls[keep])
 
     # --- bodies of air -----------------------------------------------------------------
 
@@ -202,6 +213,11 @@ class Site:
                 cells = cells[shapely.contains_xy(area, middles)]
             self._cache[key] = cells
         return self._cache[key]
+
+
+def _side(a: Floats, b: Floats) -> frozenset[tuple[float, ...]]:
+    """A segment in either direction, to the millimetre."""
+    return frozenset(tuple(np.round(end, 3).tolist()) for end in (a, b))
 
 
 @lru_cache(maxsize=4)

@@ -104,6 +104,15 @@ class LinkQuality(NamedTuple):
     rate_bps: float
     extra_delay_s: float
 
+    def is_as_bad_as(self, other: LinkQuality) -> bool:
+        """Whether any of its three numbers is: `none` loses all, whatever its rate."""
+        lossy = 0 < other.loss <= self.loss
+        return (
+            lossy
+            or self.rate_bps <= other.rate_bps
+            or 0 < other.extra_delay_s <= self.extra_delay_s
+        )
+
 
 # Assumed, in the order in which a link fades; nobody measured them on these sites.
 QUALITIES = {
@@ -119,6 +128,12 @@ class Coverage(Area):
     """Where the radio link has a quality of its own."""
 
     quality: LinkQuality = QUALITIES["good"]
+
+    @property
+    def grade(self) -> str:
+        """The name of the worst quality that it is at least as bad as; good if of none."""
+        worse = (n for n in reversed(QUALITIES) if self.quality.is_as_bad_as(QUALITIES[n]))
+        return next(worse, "good")
 
 
 @dataclass(frozen=True)

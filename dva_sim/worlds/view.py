@@ -3,29 +3,46 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+import re
+from collections import Counter
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from dva_sim.worlds.maps import FREE
+from dva_sim.worlds.layout import FOOTPRINT
+from dva_sim.worlds.parts import Exit
 from dva_sim.worlds.site import Room, Site
+from dva_sim.worlds.view_marks import draw_equipment, draw_north, draw_scale_bar
+from dva_sim.worlds.view_names import write_names
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+Floats = NDArray[np.float64]
+
 # Soft floors, so that tracks and hazards stand out.
 FLOORS = ("#eef3f8", "#f6f1e7", "#edf4ec", "#f6edf0", "#f0eff7", "#eaf4f4")
 CORRIDOR = "#fbfbf9"
+PAVING, GRASS = "#ece9e3", "#dfe9d4"
 MAP_FLOOR = "#f5f4ef"
-WALL, SOLID, DOOR, INK = "#3a3f46", "#c6cad0", "#b08c5a", "#59606a"
-DETECTORS = {"smoke": ("o", "#9aa1ab"), "gas": ("^", "#c79a2a"), "water": ("s", "#5b93c7")}
+WALL, SOLID, SOLID_EDGE, DOOR = "#3a3f46", "#dcdfe3", "#b9bec6", "#b08c5a"
+EXIT = "#009e73"
+# Hues that differ for all eyes, and hatches that differ without hue.
+ZONES = {
+    "restricted": ("#d55e00", "////"),
+    "charging": ("#0072b2", "\\\\\\\\"),
+    "assembly": ("#009e73", "oo"),
+}
+COVERAGE = {"fair": "#f0e442", "poor": "#e69f00", "none": "#8f5b8a"}  # good is left blank
 WALL_WIDTH = 0.14  # as drawn [m]
-MARGIN = 0.8  # around the site [m]
-BAR_ROOM = 0.6  # below, for the scale bar [m]
-NAME_INSET = 0.35  # of a room's name from its corner [m]
+INK = "#59606a"
+MARGIN = (0.8, 0.012)  # around the site: at least [m], of its width
+BELOW = (0.6, 0.045)  # the same for the scale bar
+ARC_POINTS = 9
 
 
-def draw_site(ax: Axes, site: Site, labels: bool = True) -> None:
+def draw_site(ax: Axes, site: Site, labels: bool = True, coverage: bool = False) -> None:
     """Draw a site into `ax`, in metres, without axes.
 
     Everything lies below `zorder` 5; robots and people belong above.
@@ -33,56 +50,94 @@ def draw_site(ax: Axes, site: Site, labels: bool = True) -> None:
     Args:
         ax: Where; its limits are set to the site.
         site: What.
-        labels: Room names, bases, desks and detectors too, not only floor, walls and doors.
+        labels: Names, zones and equipment too, not only ground, walls, doors and exits.
+        coverage: Where the radio link is not good, as a faint layer.
     """
+    _set_limits(ax, site)
     if site.rooms:
         _draw_rooms(ax, site)
     else:
         _draw_grid(ax, site)
     _draw_walls(ax, site)
     _draw_doors(ax, site)
+    for way in site.exits:
+        _draw_exit(ax, way)
+    if coverage:
+        _draw_coverage(ax, site)
     if labels:
-        _draw_equipment(ax, site)
-        for room in site.rooms:
-            _write_name(ax, room)
-    _draw_scale_bar(ax, site)
+        _draw_zones(ax, site)
+        draw_equipment(ax, site)
+        write_names(ax, site)
+        draw_north(ax, site)
+    draw_scale_bar(ax, site)
+
+
+def limits(site: Site) -> tuple[tuple[float, float], tuple[float, float]]:
+    """What a picture of a site shows, scale bar and all: from x to x, from y to y [m]."""
     xmin, ymin, xmax, ymax = site.extent
-    ax.set_xlim(xmin - MARGIN, xmax + MARGIN)
-    ax.set_ylim(ymin - MARGIN - BAR_ROOM, ymax + MARGIN)
+    margin, below = (max(least, share * (xmax - xmin)) for least, share in (MARGIN, BELOW))
+    return (xmin - margin, xmax + margin), (ymin - margin - below, ymax + margin)
+
+
+def _set_limits(ax: Axes, site: Site) -> None:
+    across, up = limits(site)
+    ax.set(xlim=across, ylim=up)
     ax.set_aspect("equal")
     ax.set_axis_off()
 
 
-def _draw_rooms(ax: Axes, site: Site) -> None:
-    from matplotlib.patches import Polygon
+# --- ground ----------------------------------------------------------------------------
 
-    tint = 0
-    for room in site.rooms:
-        corridor = "corridor" in room.name.lower()
-        colour = CORRIDOR if corridor else FLOORS[tint % len(FLOORS)]
-        tint += not corridor
-        ax.add_patch(Polygon(room.polygon, facecolor=colour, edgecolor="none", zorder=1))
-    for corners in site.solids:
-        ax.add_patch(Polygon(corners, facecolor=SOLID, edgecolor="none", zorder=2))
+
+def _draw_rooms(ax: Axes, site: Site) -> None:
+    """Yards below paths below rooms; rooms of one purpose have one colour."""
+    from matplotlib.collections import PolyCollection
+
+    tints: dict[str, str] = {}
+    rooms = sorted(site.rooms, key=lambda room: (not room.outdoor, room.paved))
+    colours = [_floor(room, tints) for room in rooms]
+    polygons = [room.polygon for room in rooms]
+    ax.add_collection(PolyCollection(polygons, facecolors=colours, edgecolors="none", zorder=1))
+    solids = PolyCollection(list(site.solids), facecolors=SOLID, edgecolors=SOLID_EDGE, zorder=2)
+    solids.set_linewidth(0.5)
+    ax.add_collection(solids)
+
+
+def _floor(room: Room, tints: dict[str, str]) -> str:
+    if room.outdoor:
+        return PAVING if room.paved else GRASS
+    if "corridor" in room.name.lower():
+        return CORRIDOR
+    purpose = re.sub(r"\W*\b[A-Z]?\d*$", "", room.name)
+    return tints.setdefault(purpose, FLOORS[len(tints) % len(FLOORS)])
 
 
 def _draw_grid(ax: Axes, site: Site) -> None:
-    """The known-free floor of a bare map."""
+    """The floor of a bare map, and what stands on it."""
     from matplotlib.colors import ListedColormap
     from matplotlib.transforms import Affine2D
+    from scipy import ndimage
 
     grid = site.grid
+    floor = grid.floor(FOOTPRINT)
+    shades = np.ma.masked_where(~ndimage.binary_fill_holes(floor), floor)
     rows, columns = grid.cells.shape
     turn = Affine2D().scale(grid.resolution).rotate(grid.origin.heading)
     image = ax.imshow(
-        np.ma.masked_where(grid.cells != FREE, np.zeros(grid.cells.shape)),
-        cmap=ListedColormap([MAP_FLOOR]),
+        shades,
+        cmap=ListedColormap([SOLID, MAP_FLOOR]),
+        vmin=0,
+        vmax=1,
         extent=(0, columns, 0, rows),
         origin="lower",
         interpolation="nearest",
         zorder=1,
     )
     image.set_transform(turn.translate(grid.origin.x, grid.origin.y) + ax.transData)
+    _set_limits(ax, site)  # which the image has moved
+
+
+# --- walls and ways through them -------------------------------------------------------
 
 
 def _draw_walls(ax: Axes, site: Site) -> None:
@@ -92,7 +147,7 @@ def _draw_walls(ax: Axes, site: Site) -> None:
     from matplotlib.path import Path
 
     width = WALL_WIDTH if site.rooms else WALL_WIDTH / 2
-    lines = shapely.multilinestrings(site.walls.reshape(-1, 2, 2))
+    lines = shapely.multilinestrings(site.wall_lines.reshape(-1, 2, 2))
     area = shapely.buffer(lines, width / 2, cap_style="square", join_style="mitre")
     rings = shapely.get_rings(shapely.get_parts(area))
     if not len(rings):
@@ -102,64 +157,68 @@ def _draw_walls(ax: Axes, site: Site) -> None:
 
 
 def _draw_doors(ax: Axes, site: Site) -> None:
-    """A leaf that stands open and the arc it swings through."""
-    from matplotlib.patches import Arc
+    """Leaves that stand open, and the arcs they swing through."""
+    from matplotlib.collections import LineCollection
 
-    for x1, y1, x2, y2 in site.doors.tolist():
-        width, angle = math.hypot(x2 - x1, y2 - y1), math.atan2(y2 - y1, x2 - x1)
-        leaf = angle + math.pi / 2
-        tip = (x1 + width * math.cos(leaf), y1 + width * math.sin(leaf))
-        ax.plot([x1, tip[0]], [y1, tip[1]], color=DOOR, lw=1.0, zorder=2.5)
-        degrees = math.degrees(angle)
-        arc = Arc((x1, y1), 2 * width, 2 * width, angle=degrees, theta1=0, theta2=90)
-        arc.set(color=DOOR, linewidth=0.6, alpha=0.7, zorder=2.5)
-        ax.add_patch(arc)
-
-
-def _draw_equipment(ax: Axes, site: Site) -> None:
-    """Detectors, bases (a robot fits into the ring), guard posts and desks."""
-    from matplotlib.patches import Circle, Rectangle
-    from matplotlib.transforms import Affine2D
-
-    for kind, (marker, colour) in DETECTORS.items():
-        points = [(d.x, d.y) for d in site.detectors if d.kind == kind]
-        if points:
-            x, y = zip(*points, strict=True)
-            ax.plot(x, y, marker, ms=2.6, mfc="white", mec=colour, mew=0.8, zorder=3.5)
-    for base in site.robot_bases:
-        ring = Circle((base.x, base.y), 0.42, fill=False, ec=INK, lw=0.9, ls=(0, (2, 1.2)))
-        ax.add_patch(ring).set_zorder(3.5)
-    for post in site.guard_posts:
-        ax.plot(post.x, post.y, marker="P", ms=4.5, mfc=INK, mec="white", mew=0.5, zorder=3.5)
-    for desk in site.operator_desks if site.rooms else ():
-        turn = Affine2D().rotate(desk.heading).translate(desk.x, desk.y) + ax.transData
-        table = Rectangle((0.25, -0.7), 0.7, 1.4, fc=SOLID, ec=INK, lw=0.5, zorder=3.5)
-        table.set_transform(turn)
-        ax.add_patch(table)
-        ax.plot(desk.x, desk.y, "o", ms=2.6, color=INK, zorder=3.5)
+    leaves, arcs = [], []
+    busy = Counter(name for o in site.openings for name in (o.room_a, o.room_b) if name)
+    for ends in site.doors:
+        hinge, jamb = _hung(site, busy, ends)
+        along = jamb - hinge
+        turned = np.array([-along[1], along[0]])
+        angle = np.linspace(0.0, math.pi / 2, ARC_POINTS)[:, None]
+        arcs.append(hinge + along * np.cos(angle) + turned * np.sin(angle))
+        leaves.append(np.array([hinge, hinge + turned]))
+    ax.add_collection(LineCollection(leaves, colors=DOOR, linewidths=0.9, zorder=2.5))
+    ax.add_collection(LineCollection(arcs, colors=DOOR, linewidths=0.5, alpha=0.7, zorder=2.5))
 
 
-def _write_name(ax: Axes, room: Room) -> None:
-    """The room's name in its upper left corner; along a narrow room from south to north."""
-    xmin, ymin = room.polygon.min(axis=0)
-    xmax, ymax = room.polygon.max(axis=0)
-    ax.text(
-        xmin + NAME_INSET,
-        ymax - NAME_INSET,
-        room.name,
-        ha="left",
-        va="top",
-        rotation=90 if ymax - ymin > 2.5 * (xmax - xmin) else 0,
-        fontsize=6.5,
-        color=INK,
-        zorder=4,
-        clip_on=True,
+def _hung(site: Site, busy: Counter[str], ends: Floats) -> tuple[Floats, Floats]:
+    """Hinge and jamb of a door whose leaf opens to the left: into the room with fewer ways."""
+    hinge, jamb = ends[:2], ends[2:]
+    along = (jamb - hinge) / max(math.dist(hinge, jamb), 1e-9)
+    aside, middle = 0.3 * np.array([-along[1], along[0]]), (hinge + jamb) / 2
+    left, right = (
+        busy.get(site.room_at(*(middle + way).tolist()) or "", math.inf) for way in (aside, -aside)
     )
+    return (hinge, jamb) if left <= right else (jamb, hinge)
 
 
-def _draw_scale_bar(ax: Axes, site: Site) -> None:
-    xmin, ymin, xmax, _ = site.extent
-    length = max(n for n in (1, 2, 5, 10, 20, 50) if n <= max(1.0, (xmax - xmin) / 4))
-    y = ymin - MARGIN
-    ax.plot([xmin, xmin + length], [y, y], color=INK, lw=1.6, solid_capstyle="butt", zorder=4)
-    ax.text(xmin + length + 0.4, y, f"{length} m", va="center", fontsize=6.5, color=INK, zorder=4)
+def _draw_exit(ax: Axes, way: Exit) -> None:
+    """A green bar in the wall and an arrow outwards."""
+    x1, y1, x2, y2 = way.ends
+    ax.plot([x1, x2], [y1, y2], color=EXIT, lw=2.4, solid_capstyle="butt", zorder=3.2)
+    out = np.array([math.cos(way.heading), math.sin(way.heading)])
+    side = np.array([-out[1], out[0]])
+    size = min(0.62, 0.45 * way.width)
+    foot = np.array([way.x, way.y]) + 0.12 * out
+    corners = [foot + 0.8 * size * side, foot + size * out, foot - 0.8 * size * side]
+    ax.fill(*np.array(corners).T, color=EXIT, lw=0, zorder=3.2)
+
+
+# --- zones -----------------------------------------------------------------------------
+
+
+def _hatch(ax: Axes, polygon: Floats, colour: str, hatch: str | None, **style: Any) -> None:
+    from matplotlib.patches import Polygon
+
+    patch = Polygon(polygon, fill=False, hatch=hatch, edgecolor=colour, **style)
+    patch.set_hatch_linewidth(0.45)
+    ax.add_patch(patch)
+
+
+def _draw_zones(ax: Axes, site: Site) -> None:
+    for zone in site.zones:
+        colour, hatch = ZONES[zone.use]
+        _hatch(ax, zone.polygon, colour, hatch, lw=0, alpha=0.35, zorder=1.4)
+        _hatch(ax, zone.polygon, colour, None, lw=0.8, ls=(0, (4, 2)), alpha=0.8, zorder=3.1)
+
+
+def _draw_coverage(ax: Axes, site: Site) -> None:
+    from matplotlib.patches import Polygon
+
+    for area in site.wifi:
+        colour = COVERAGE.get(area.grade)
+        if colour is not None:
+            patch = Polygon(area.polygon, facecolor=colour, edgecolor=colour, lw=0.6, alpha=0.28)
+            ax.add_patch(patch).set_zorder(1.6)

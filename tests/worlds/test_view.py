@@ -1,10 +1,15 @@
+import math
+
 import numpy as np
 import pytest
+import shapely
 from matplotlib.figure import Figure
 from PIL import Image
 
+from dva_sim.worlds.parts import FixedCamera
 from dva_sim.worlds.site import load_site, map_site
-from dva_sim.worlds.view import WALL, draw_site
+from dva_sim.worlds.view import EXIT, WALL, draw_site
+from dva_sim.worlds.view_marks import view_of
 
 
 def write_hall(folder):
@@ -44,12 +49,54 @@ def test_walls_are_dark_and_doors_are_gaps():
     assert min(colour_at(figure, ax, 12.0, 10.8)) > 200
 
 
+def names_of(ax):
+    return {text.get_text().replace("\n", " ") for text in ax.texts}
+
+
 def test_every_room_has_its_name_when_labels_are_wanted():
     site = load_site("caparica")
     _, ax = draw(site)
-    assert {room.name for room in site.rooms} <= {text.get_text() for text in ax.texts}
+    assert {room.name for room in site.rooms} | {"10 m", "N"} == names_of(ax)
     _, bare = draw(site, labels=False)
     assert [text.get_text() for text in bare.texts] == ["10 m"]
+
+
+@pytest.mark.parametrize("width", [60, 120])
+def test_no_name_leaves_its_room_however_small_it_is_drawn(width):
+    site = load_site("office-block", {"width_m": width, "depth_m": 30})
+    figure, ax = draw(site)
+    figure.canvas.draw()
+    written = 0
+    for text in ax.texts:
+        box = text.get_window_extent().transformed(ax.transData.inverted())
+        room = site.room_at(*text.get_position())
+        if room is None:
+            continue  # the scale bar and the arrow to the north
+        corners = site.room(room).polygon
+        assert (corners.min(axis=0) < box.min).all()
+        assert (box.max < corners.max(axis=0)).all()
+        assert text.get_text().split("\n")[-1].split()[-1] in room
+        written += 1
+    assert written > 0.9 * len(site.rooms)
+
+
+def test_exits_are_green_and_lie_in_the_wall():
+    site = load_site("office-block")
+    figure, ax = draw(site, labels=False)
+    way = site.exits[0]
+    green = tuple(int(EXIT[i : i + 2], 16) for i in (1, 3, 5))
+    assert colour_at(figure, ax, way.x, way.y) == pytest.approx(green, abs=12)
+
+
+def test_a_camera_sees_up_to_its_range_and_not_through_walls():
+    site = load_site("caparica")
+    camera = FixedCamera(0.5, 12.0, 0.0, math.radians(90), 15.0, "corridor")
+    view = view_of(site, camera)
+    seen = shapely.Polygon(view)
+    assert seen.contains(shapely.Point(15.0, 12.0))
+    assert not seen.contains(shapely.Point(16.0, 12.0))
+    assert not seen.contains(shapely.Point(3.0, 14.0))
+    assert np.hypot(*(view - (0.5, 12.0)).T).max() == pytest.approx(15.0)
 
 
 def test_a_bare_map_shows_its_known_free_floor(tmp_path):
