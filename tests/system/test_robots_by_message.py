@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 
 import pymunk
+import pytest
 
 from dva_sim import scenario as scenarios
-from dva_sim.agents.robot import RobotAgent
+from dva_sim.agents.robot import FRAME, MISSION, RobotAgent
 from dva_sim.agents.sensing import topic_of_sensor
 from dva_sim.network.patterns import Request
 from dva_sim.protocol import messages as m
@@ -15,6 +16,7 @@ from dva_sim.protocol.codec import decode, encode
 from dva_sim.simulation.names import DVA, id_of
 from dva_sim.simulation.run import Run
 from dva_sim.simulation.watch import broken_rules
+from dva_sim.worlds.lidar import Lidar
 
 ROBOT = id_of("robot", 1)
 QUIET = {"events": [{"kind": "fire", "at_s": 500}], "horizon_s": 600}
@@ -130,7 +132,7 @@ def test_a_sensor_is_read_at_the_frequency_asked_for_while_it_is_permitted() -> 
     over = send(run, 23.0, m.PermissionRevocation(ROBOT, DVA, 5))
     run.clock.run(40.0)
     assert isinstance(told[0].content, m.SensorInfo)
-    assert told[0].content.sensors == (m.Sensor("heat_flux", "kW/m2"),)
+    assert m.Sensor("heat_flux", "kW/m2") in told[0].content.sensors
     assert [r.code for r in (*early, *late, *over)] == [m.NOT_PERMITTED, m.OK, m.OK]
     assert len(values) in (39, 40, 41)
     assert {value.unit for value in values} == {"kW/m2"}
@@ -180,3 +182,117 @@ def test_a_published_command_to_another_robot_is_counted_and_not_obeyed() -> Non
     run.clock.run(1.0)
     assert run.recorder.counters["refused: to another device"] == 1
     assert robot.refused == 0
+
+
+def told_of_mission(run: Run) -> list[m.MissionStatus]:
+    """What a robot publishes of its missions, from now on."""
+    told: list[m.MissionStatus] = []
+
+    def hear(data: bytes) -> None:
+        body = decode(data).body
+        assert isinstance(body, m.MissionStatus)
+        told.append(body)
+
+    run.network.subscribe(DVA, ROBOT, MISSION, hear)
+    return told
+
+
+def test_a_patrol_is_cancelled_and_the_robot_goes_home() -> None:
+    run = staged()
+    robot = run.field.robots[ROBOT]
+    base = robot.body.pose()
+    told = told_of_mission(run)
+    beat = (place(run, 12.0, 12.0), place(run, 18.0, 12.0))
+    send(run, 10.0, m.PermissionGrant(DVA, "missions", 5))
+    began = send(run, 12.0, m.Patrol(beat, 0))
+    asked = send(run, 70.0, m.GetMissionStatus(), session=0)
+    second = send(run, 100.0, m.ReturnToBase())  # refused: on a patrol
+    over = send(run, 101.0, m.CancelMission())
+    home = send(run, 103.0, m.ReturnToBase())
+    run.clock.run(99.0)
+    assert robot.controller.mode == "Mission"
+    assert robot.body.distance > 25.0
+    run.clock.run(102.5)
+    assert robot.controller.mode == "Idle"
+    assert abs(robot.body.speed) < 0.01
+    run.clock.run(200.0)
+    assert [r.code for r in (*began, *second, *over, *home)] == [m.OK, m.BUSY, m.OK, m.OK]
+    assert math.dist(robot.body.pose()[:2], base[:2]) < 0.5
+    assert [status.mission_state for status in told][-3:] == ["failed", "under_way", "done"]
+    assert told[-3].reason == "cancelled"
+    patrol, way_home = told[0].mission_id, told[-1].mission_id
+    assert way_home > patrol > 0
+    (status,) = (reply.content for reply in asked)
+    assert isinstance(status, m.MissionStatus)
+    assert (status.mission_id, status.mission_state) == (patrol, "under_way")
+    assert status.waypoints_left in (1, 2)
+    assert run.recorder.violations == {}
+
+
+def test_an_emergency_during_a_patrol_ends_it_and_says_so() -> None:
+    run = staged()
+    told = told_of_mission(run)
+    send(run, 10.0, m.PermissionGrant(DVA, "missions", 5))
+    send(run, 12.0, m.Patrol((place(run, 12.0, 12.0), place(run, 18.0, 12.0)), 0))
+    send(run, 40.0, m.Emergency(), session=0)
+    run.clock.run(60.0)
+    robot = run.field.robots[ROBOT]
+    assert robot.controller.mode == "Idle"
+    assert (told[-1].mission_state, told[-1].reason) == ("failed", "emergency")
+    before = robot.body.distance
+    run.clock.run(90.0)
+    assert robot.body.distance == before
+
+
+def test_a_robot_inspects_an_event_and_waits_before_it() -> None:
+    nobody_drives = [{"levels": ["sensors"]}]
+    run = staged(events=[{"kind": "fire", "at_s": 5, "room": "Workshop"}], access=nobody_drives)
+    robot = run.field.robots[ROBOT]
+    fire = run.field.incidents[0].hazard.position
+    told = told_of_mission(run)
+    send(run, 10.0, m.PermissionGrant(DVA, "missions", 5))
+    send(run, 12.0, m.Inspect(3, "fire", place(run, *fire)))
+    run.clock.run(110.0)
+    assert (told[-1].mission_state, told[-1].reason) == ("waiting", "fire in view")
+    assert any(seen.kind == "fire" for seen in robot.observe().hazards)
+    assert robot.controller.mode == "Mission"
+    assert robot.body.contacts == 0
+
+
+def test_a_lidar_is_subscribed_to_and_sees_the_walls_of_its_bay() -> None:
+    run = staged(**{"robot.sensors": [{"name": "lidar", "noise": 0.0, "rate_hz": 10}]})
+    robot = run.field.robots[ROBOT]
+    scans: list[m.SensorValue] = []
+
+    def hear(data: bytes) -> None:
+        body = decode(data).body
+        assert isinstance(body, m.SensorValue)
+        scans.append(body)
+
+    run.network.subscribe(DVA, ROBOT, topic_of_sensor("lidar", DVA), hear)
+    send(run, 2.0, m.PermissionGrant(DVA, "sensors", 5, None, ("lidar",)))
+    too_often = send(run, 3.0, m.DevSub("lidar", 20.0))
+    told = send(run, 4.0, m.DevSub("lidar", 5.0))
+    run.clock.run(24.0)
+    assert [r.code for r in (*too_often, *told)] == [m.NOT_SUPPORTED, m.OK]
+    assert len(scans) == 100 or abs(len(scans) - 100) <= 2
+    assert {len(scan.values) for scan in scans} == {36}
+    assert {scan.unit for scan in scans} == {"m"}
+    expected = Lidar(run.field.world).scan([robot.body])[0]
+    assert scans[-1].values == tuple(expected.round(3).tolist())
+
+
+def test_a_frame_is_published_when_it_has_been_encoded_one_at_a_time() -> None:
+    """0.25 s for a frame: of ten a second, one in three is taken, and arrives that much later."""
+    run = staged(**{"camera.encode_s": 0.25, "camera.rate_hz": 10.0, "link.delay_s": 0.0})
+    shown: list[tuple[float, float]] = []
+    run.network.subscribe(
+        DVA, ROBOT, FRAME, lambda frame: shown.append((run.clock.now, frame.captured))
+    )
+    run.clock.run(31.0)
+    ages = [arrived - captured for arrived, captured in shown]
+    assert min(ages) >= 0.25
+    assert max(ages) < 0.30
+    (first, _), (last, _) = shown[0], shown[-1]
+    # The next frame is taken at the first tick of the camera after the last one was encoded.
+    assert (last - first) / (len(shown) - 1) == pytest.approx(0.3, abs=0.001)
