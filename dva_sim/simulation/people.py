@@ -15,10 +15,9 @@ from dva_sim.agents.walking import Walking
 from dva_sim.errors import ConfigError
 from dva_sim.scenario import bystander_profile, guard_profile
 from dva_sim.simulation.stage import Stage, place_of
-from dva_sim.worlds.bodies import PersonBody
 from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.hazards import Surroundings
-from dva_sim.worlds.physics import World
+from dva_sim.worlds.physics import PersonBody, World
 
 PLACES = 3  # where a bystander works, by turns
 APART = 0.7  # from everybody else at the start [m]

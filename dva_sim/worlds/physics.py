@@ -1,7 +1,7 @@
 """Moving bodies seen from above: robots and people that push, slip and stop (pymunk, no gravity).
 
-What a robot's motors do is in `drives`, what its wheels hold and how people walk in `bodies`,
-what counts as a contact or a jam in `contacts`.
+What a robot's motors do is in `drives`, what its wheels hold in `robot_body`, how people walk in
+`person_body`, what counts as a contact or a jam in `contacts`.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ import pymunk
 
 from dva_sim.errors import ConfigError
 from dva_sim.worlds.bodies import ELASTICITY, FRICTION, PERSON, ROBOT, WALL, Body
-from dva_sim.worlds.bodies import PersonBody as PersonBody
-from dva_sim.worlds.bodies import RobotBody as RobotBody
 from dva_sim.worlds.drives import DriveSpec as DriveSpec
 from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.maps import FREE
+from dva_sim.worlds.person_body import PersonBody as PersonBody
+from dva_sim.worlds.robot_body import RobotBody as RobotBody
 from dva_sim.worlds.site import Site
 
 US = 1_000_000

@@ -1,0 +1,199 @@
+"""A robot's body: motors push it, wheels hold it as well as the floor lets them."""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+import pymunk
+
+from dva_sim.worlds.bodies import (
+    AT_REST,
+    ELASTICITY,
+    FRICTION,
+    GRIP,
+    PERSON,
+    ROBOT,
+    Body,
+    G,
+    Timing,
+    get_angle,
+    get_position,
+    get_spin,
+    get_velocity,
+    set_force,
+    set_spin,
+    set_torque,
+    set_velocity,
+)
+from dva_sim.worlds.contacts import Contacts, Jam
+from dva_sim.worlds.drives import DriveSpec
+from dva_sim.worlds.geo import Pose
+
+TRACK: Final = 0.5  # wheels stand that share of the radius off the middle; assumed
+
+
+class SetPoint(NamedTuple):
+    """What the motors are asked for from tick `start` on and before tick `end`."""
+
+    speed: float
+    turn_rate: float
+    start: int
+    end: float
+
+
+STOP = SetPoint(0.0, 0.0, 0, math.inf)
+
+
+class RobotBody(Body):
+    """A robot's body in the world; made by `World.add_robot`.
+
+    Attributes:
+        spec: Mass, size, limits.
+        distance: Way covered so far [m].
+        work: Done by the motors against inertia and what is in the way, without braking [J].
+        grip: Friction coefficient of the floor under it; less on a wet one.
+    """
+
+    kind = ROBOT
+
+    def __init__(self, world: Timing, name: str, spec: DriveSpec, pose: Pose) -> None:
+        if spec.corners:
+            moment = pymunk.moment_for_poly(spec.mass, spec.corners)
+        else:
+            moment = pymunk.moment_for_circle(spec.mass, 0.0, spec.radius)
+        body = pymunk.Body(spec.mass, moment)
+        body.position, body.angle = (pose.x, pose.y), pose.heading
+        circle = pymunk.Circle(body, spec.radius)
+        shape = pymunk.Poly(body, spec.corners) if spec.corners else circle
+        shape.friction, shape.elasticity = FRICTION, ELASTICITY
+        shape.collision_type = self.kind
+        super().__init__(world, name, body, shape)
+        self.spec, self.radius, self._drive = spec, spec.radius, spec.drive(spec)
+        self.distance, self.work, self.grip = 0.0, 0.0, GRIP
+        self._powered = True
+        self._now, self._next = STOP, STOP
+        self._people, self._jam = Contacts(), Jam()
+        self._mass, self._moment = spec.mass, body.moment
+        self._arm = TRACK * spec.radius
+
+    @property
+    def person_contacts(self) -> int:
+        """Contacts with people begun so far."""
+        return self._people.count
+
+    @property
+    def jammed(self) -> bool:
+        """Whether it is stuck, by the rules of `dva_sim.worlds.contacts`."""
+        return self._jam.holds(*self.pose())
+
+    @property
+    def jams(self) -> int:
+        """How often it became stuck."""
+        return self._jam.count
+
+    @property
+    def turning_radius(self) -> float:
+        """Of the sharpest curve that it can drive [m]; 0: it turns on the spot."""
+        return self._drive.turning_radius
+
+    @property
+    def speed(self) -> float:
+        """Measured speed along the heading [m/s]."""
+        velocity, angle = get_velocity(self._raw), get_angle(self._raw)
+        return float(velocity.x * math.cos(angle) + velocity.y * math.sin(angle))
+
+    @property
+    def turn_rate(self) -> float:
+        """Measured turn rate [rad/s]."""
+        return float(get_spin(self._raw))
+
+    def pose(self) -> Pose:
+        """Where it is, as of the last whole tick; the heading counts full turns."""
+        place = get_position(self._raw)
+        return Pose(place.x, place.y, get_angle(self._raw))
+
+    @property
+    def powered(self) -> bool:
+        """Whether the motors obey; without power they brake and stop, from the next tick on."""
+        return self._powered
+
+    @powered.setter
+    def powered(self, on: bool) -> None:
+        self._powered = on
+        self._world.wake(self)
+
+    def drive(self, speed: float, turn_rate: float, until: float) -> None:
+        """Take a set point: from the next tick on until `until` [s], then stop.
+
+        Whatever is asked for, the motors get a forward speed [m/s] and a turn rate [rad/s]
+        within the limits; anything that is not a number, or not finite, means stop.
+        """
+        world, spec = self._world, self.spec
+        start = world.next_tick()
+        if not (math.isfinite(speed) and math.isfinite(turn_rate)) or math.isnan(until):
+            self._next = SetPoint(0.0, 0.0, start, math.inf)
+        else:
+            speed = min(max(speed, 0.0), spec.max_speed)
+            turn_rate = min(max(turn_rate, -spec.max_turn_rate), spec.max_turn_rate)
+            speed, turn_rate = self._drive.set_point(speed, turn_rate)
+            self._next = SetPoint(speed, turn_rate, start, world.tick_at(until))
+        world.wake(self)
+
+    def push(self, tick: int, dt: float) -> bool:
+        """Apply the motors' forces for one tick; False if the robot stands and shall stand.
+
+        Wheels hold along and across together no more than the grip of the floor: beyond that
+        they slip, and the force keeps its direction (a friction circle).
+        """
+        raw = self._raw
+        if self._next is not self._now and tick >= self._next.start:
+            self._now = self._next
+        wanted, wanted_spin, _, end = self._now
+        if tick >= end or not self._powered:
+            wanted = wanted_spin = 0.0
+        velocity, spin = get_velocity(raw), get_spin(raw)
+        vx, vy = velocity.x, velocity.y
+        # Bodies are moved before forces act on them: aim along the heading by then.
+        angle = get_angle(raw) + spin * dt
+        cos, sin = math.cos(angle), math.sin(angle)
+        forward, sideways = vx * cos + vy * sin, vy * cos - vx * sin
+        if wanted == wanted_spin == 0.0:
+            if abs(forward) + abs(sideways) + abs(spin) < AT_REST:
+                set_velocity(raw, (0.0, 0.0))
+                set_spin(raw, 0.0)
+                return self._next is not self._now
+        elif self._touch.touching:
+            self._jam.strain(*self.pose(), dt)
+        along, turn = self._drive.accelerations(wanted, wanted_spin, forward, spin, dt)
+        across, most = -sideways / dt, self.grip * G
+        asked = math.hypot(along, across)
+        if asked > most:
+            along, across = along * most / asked, across * most / asked
+        along, across = self._mass * along, self._mass * across
+        torque, most_torque = self._moment * turn, self._mass * most * self._arm
+        if not -most_torque <= torque <= most_torque:
+            torque = math.copysign(most_torque, torque)
+        set_force(raw, (along * cos - across * sin, along * sin + across * cos))
+        set_torque(raw, torque)
+        self.distance += abs(forward) * dt
+        if along > 0.0:
+            self.work += along * (forward + 0.5 * dt * along / self._mass) * dt
+        return True
+
+    def meets(self, other: Body | None, now: float) -> None:
+        """It begins to touch somebody, or a wall (None)."""
+        self._touch.begin(now)
+        if other is not None and other.kind == PERSON:
+            self._people.begin(now)
+
+    def parts(self, other: Body | None, now: float) -> None:
+        """It touches somebody, or a wall (None), no longer."""
+        self._touch.end(now)
+        if other is not None and other.kind == PERSON:
+            self._people.end(now)
+
+    def feels(self, other: Body | None, impulse: float) -> None:
+        """A contact with somebody, or a wall (None), has stopped or pushed it [N s]."""
+        self.impulse += impulse
+        self._world.wake(self)
