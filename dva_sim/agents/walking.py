@@ -1,7 +1,8 @@
 """Walking: a planned way, a body on it, and what to do when somebody is in the way.
 
-Guards and bystanders walk alike. A way is planned on the map; five times a second the walker
-looks where it is and chooses the velocity that its legs push towards:
+Guards and bystanders walk alike. A way is planned on the map; five times a second, or half as
+often where nobody is near, the walker looks where it is and chooses the velocity that its legs
+push towards:
 
 - **Nobody near**: straight to the point a little ahead on the way.
 - **Somebody near**: by the two rules of `manners`: step aside, to the right rather than the
@@ -27,13 +28,14 @@ import numpy as np
 
 from dva_sim.agents.doorways import Courtesy, beside, doors_on, middles_of, past
 from dva_sim.agents.legs import RADIUS, SIDEWAYS, Body, Ground, Legs
-from dva_sim.agents.manners import REACH, Floats, Mover, Point, velocity
+from dva_sim.agents.manners import REACH, Floats, Mover, Point, is_clear, velocity
 from dva_sim.agents.steering import Ahead, Route
 from dva_sim.clock import Clock
 from dva_sim.worlds.physics import RobotBody
 from dva_sim.worlds.planning import Disc, Planner
 
 STEP: Final = 0.2  # between looks at the way [s]
+CALM: Final = 0.4  # the same while nobody is near and the end is not [s]
 LOOK_AHEAD: Final = 0.8  # on the way [m]
 LOOK_PAST: Final = 2.5  # on the way, where others are and no wall is between [m]
 ASTRAY: Final = 1.0  # who was pushed so far off the way takes another [m] ...
@@ -196,8 +198,8 @@ class Walking:
             if ahead.offset > ASTRAY and self._clock.now >= walk.planned + PLANS_EVERY:
                 self._plan(walk, ())
                 ahead = walk.route.ahead(x, y, 0.0, LOOK_AHEAD)
-            self._push_on(walk, ahead)
-            self._clock.call_after(STEP, self._step, walk)
+            calm = not self._push_on(walk, ahead) and ahead.remaining > CROWDED
+            self._clock.call_after(CALM if calm else STEP, self._step, walk)
 
     def _is_held_up(self, walk: Walk, ahead: Ahead) -> bool:
         """Whether others keep one from coming nearer to an end that is near; notes progress."""
@@ -206,8 +208,8 @@ class Walking:
             walk.least, walk.nearer_at, walk.looks_around = ahead.remaining, now, now + TIRED
         return ahead.remaining < CROWDED and now - walk.nearer_at > TIRED
 
-    def _push_on(self, walk: Walk, ahead: Ahead) -> None:
-        """Want a velocity for the next step."""
+    def _push_on(self, walk: Walk, ahead: Ahead) -> bool:
+        """Want a velocity for the next step; whether somebody is near."""
         speed = min(self.speed * self.pace, ahead.remaining / BRAKING)
         near = self._others()
         if near and self._clock.now >= walk.looks_around:
@@ -222,19 +224,24 @@ class Walking:
             vx, vy = speed * math.cos(heading), speed * math.sin(heading)
         self.heading = heading
         self.body.walk(vx, vy)
+        return bool(near)
 
     def _among(
         self, walk: Walk, ahead: Ahead, speed: float, near: Sequence[Body]
     ) -> tuple[float, float, float]:
         """Where to look [rad] and how to walk [m/s] among others."""
-        body, heading = self.body, self._past_others(walk, ahead)
+        body, heading = self.body, ahead.bearing
+        me = Mover(body.x, body.y, *body.velocity, body.radius)
+        movers = [Mover(o.x, o.y, *o.velocity, o.radius) for o in near]
         door = walk.courtesy.waits_for(body, walk.gone, near, self._clock.now)
         if door is not None:
             x, y = beside(door, body, self._planner.room_at)
-            heading = math.atan2(y - body.y, x - body.x)
-            speed = min(speed, math.dist((x, y), (body.x, body.y)) / BRAKING)
-        me = Mover(body.x, body.y, *body.velocity, body.radius)
-        movers = [Mover(o.x, o.y, *o.velocity, o.radius) for o in near]
+            heading = math.atan2(y - me.y, x - me.x)
+            speed = min(speed, math.dist((x, y), (me.x, me.y)) / BRAKING)
+        elif is_clear(me, heading, speed, movers):
+            return heading, speed * math.cos(heading), speed * math.sin(heading)
+        else:
+            heading = self._past_others(walk, ahead)
         return heading, *velocity(me, heading, speed, movers, self._planner.room_at)
 
     def _past_others(self, walk: Walk, ahead: Ahead) -> float:

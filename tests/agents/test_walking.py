@@ -15,7 +15,7 @@ from halls import People, gap, hall, two_rooms
 
 from dva_sim.agents.doorways import Courtesy, Door, beside, doors_on, middles_of
 from dva_sim.agents.legs import RADIUS, FreeBody, OpenGround
-from dva_sim.agents.manners import BERTH, RELAXATION, Mover, velocity
+from dva_sim.agents.manners import BERTH, RELAXATION, Mover, is_clear, velocity
 from dva_sim.agents.walking import (
     ARRIVED,
     FASTEST,
@@ -74,6 +74,21 @@ def test_nobody_steps_aside_into_a_wall():
 
     _, vy = velocity(ME, 0.0, SPEED, [Mover(1.5, 0.0, 0.0, 0.0, 0.2)], wall_on_the_right)
     assert vy > 0
+
+
+def test_where_it_is_clear_the_rules_keep_direction_and_speed():
+    rng = np.random.default_rng(2)
+    clear = 0
+    for _ in range(500):
+        others = [
+            Mover(*rng.uniform(-3, 3, 2), *rng.uniform(-1.5, 1.5, 2), 0.2)
+            for _ in range(int(rng.integers(1, 4)))
+        ]
+        others = [o for o in others if math.hypot(o.x, o.y) > 0.6]
+        if others and is_clear(ME, 0.0, SPEED, others):
+            clear += 1
+            assert velocity(ME, 0.0, SPEED, others, wide_open) == pytest.approx((SPEED, 0.0))
+    assert 100 < clear < 450  # of some 480
 
 
 # --- doorways: pure --------------------------------------------------------------------
