@@ -56,12 +56,12 @@ class Air:
         draught: Draught | None = None,
         height: float = MIXED_HEIGHT,
     ) -> None:
-        self.mesh, self.height, self._loss = mesh, height, loss
+        self.mesh, self.height = mesh, height
         self._spread = diffusivity * mesh.shape
         self.flow = _potential_flow(mesh, draught, height)
-        self._exhaust = np.zeros(len(mesh.area))
+        self._out = loss * mesh.area  # air that leaves each node [m^2/s]
         if draught is not None:
-            self._exhaust[draught.exhaust] = draught.rate / height
+            self._out[draught.exhaust] += draught.rate / height
         self._solvers: dict[float, Any] = {}
 
     def still(self) -> Floats:
@@ -70,14 +70,14 @@ class Air:
 
     def amount(self, state: Floats) -> float:
         """Gas in the air [m^3]."""
-        return float(state[:-1] @ self.mesh.area) * self.height
+        return float((state[:-1] * self.mesh.area).sum()) * self.height
 
     def step(self, state: Floats, node: int, rate: float, dt: float) -> Floats:
         """The state `dt` [s] later, with a source [m^3/s] in a node."""
         source = self.mesh.area / dt * state[:-1]
         source[node] += rate / self.height
         share = self._solver(dt).solve(source)
-        out = float((self._loss * self.mesh.area + self._exhaust) @ share)
+        out = float((self._out * share).sum())  # in one thread, whatever the machine
         return np.append(share, state[-1] + dt * self.height * out)
 
     def _solver(self, dt: float) -> Any:
@@ -94,7 +94,7 @@ class Air:
 
         mesh = self.mesh
         forth, back = _carried(self._spread, self.flow), _carried(self._spread, -self.flow)
-        own = mesh.area * (1.0 / dt + self._loss) + self._exhaust
+        own = mesh.area / dt + self._out
         own = own + np.bincount(mesh.a, forth, len(own)) + np.bincount(mesh.b, back, len(own))
         here = np.arange(len(own))
         rows, columns = np.r_[here, mesh.b, mesh.a], np.r_[here, mesh.a, mesh.b]

@@ -141,7 +141,7 @@ def test_a_door_lets_through_as_much_as_it_is_wide() -> None:
     mesh = floor(16.0, 2.0, ((slice(10, 20), slice(80, 160)),))
     end = mesh.node_at(15.75, 0.25)
     air = Air(mesh, 0.5, 0.0)
-    air._exhaust[mesh.node_at(15.75, 0.25)] = air._exhaust[mesh.node_at(15.75, 0.75)] = 1.0
+    air._out[mesh.node_at(15.75, 0.25)] = air._out[mesh.node_at(15.75, 0.75)] = 1.0
     state = air.still()
     for _ in range(200):
         state = air.step(state, mesh.node_at(0.25, 0.25), 0.01, 60.0)
