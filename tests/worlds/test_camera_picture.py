@@ -7,11 +7,11 @@ import pytest
 import shapely
 from PIL import Image
 
-from dva_sim.worlds.camera_picture import Camera, Figure, Spot, encode
+from dva_sim.worlds.camera_picture import Camera, Figure, Smoke, Spot, encode
 from dva_sim.worlds.geo import GeoFrame, Pose
 from dva_sim.worlds.hazards import Raster
 from dva_sim.worlds.maps import rasterise
-from dva_sim.worlds.parts import Room
+from dva_sim.worlds.parts import Exit, Room
 from dva_sim.worlds.site import Site, load_site
 
 EAST = 0.0
@@ -47,6 +47,11 @@ def changed(a, b):
 def air(value):
     """The same everywhere in the hall."""
     return Raster(np.full((20, 40), value), (0.0, 20.0, 0.0, 10.0), "")
+
+
+def smoke(extinction, share=1.0):
+    """A layer that fills this share of the hall's height, from the ceiling down."""
+    return Smoke(air(extinction * share), air(extinction))
 
 
 def test_a_picture_has_its_size_and_eight_bits_a_colour():
@@ -143,21 +148,48 @@ def test_the_sign_over_a_door_reads_from_left_to_right_from_both_sides():
 def test_smoke_leaves_exp_of_minus_k_d_of_the_contrast(extinction):
     camera, pose = Camera(hall()), Pose(15, 5, EAST)
     clear = camera.picture(pose).astype(float)
-    smoky = camera.picture(pose, smoke=air(extinction)).astype(float)
+    smoky = camera.picture(pose, smoke=smoke(extinction)).astype(float)
     # Two places of the same wall, 5 m away: plaster above, the coloured band below.
     contrast = [p[80, 164].sum() - p[135, 164].sum() for p in (clear, smoky)]
     assert contrast[0] > 100
     assert contrast[1] / contrast[0] == pytest.approx(math.exp(-extinction * 5.0), abs=0.02)
 
 
+def test_a_layer_under_the_ceiling_hides_the_ceiling_and_leaves_the_floor_clear():
+    camera, pose = Camera(hall(3.0)), Pose(5, 5, EAST)
+    clear = camera.picture(pose).astype(float)
+    smoky = camera.picture(pose, smoke=smoke(2.0, share=0.4)).astype(float)
+    assert np.array_equal(clear[120:], smoky[120:])  # below the lens, which is under the layer
+    # The far wall, 15 m away: its upper 1.2 m are in the layer.
+    face = 120 - (3.0 - 1.2 - 1.1) * FOCAL / 15
+    column = np.abs(clear - smoky).max(axis=2)[:120, 150]
+    assert np.flatnonzero(column > 4).max() == pytest.approx(face, abs=3)
+    # Straight up into it: the ray to the ceiling 4 m ahead is in the layer for 1.2 of 1.9 m.
+    row = round(120 - 1.9 * FOCAL / 4)
+    length = 1.2 / 1.9 * math.hypot(4, 1.9)
+    left = np.abs(smoky[row, 160] - [112, 110, 108]) / np.abs(clear[row, 160] - [112, 110, 108])
+    assert left == pytest.approx(math.exp(-2.0 * length), abs=0.03)
+
+
+def test_a_way_out_without_ground_beyond_it_is_a_shut_green_door():
+    site = replace(hall(), exits=(Exit(20.0, 5.0, 0.0, 1.6, "East exit"),))
+    picture = Camera(site).picture(Pose(16, 5, EAST)).astype(int)
+    leaf = picture[150, 150]
+    assert leaf[1] > leaf[0] + 20
+    outside = picture[150, 160 + round(1.2 * FOCAL / 4)]
+    assert abs(outside[1] - outside[0]) < 60
+    assert not np.array_equal(leaf, outside)
+
+
 def test_smoke_elsewhere_does_not_matter_and_near_smoke_hides_a_person():
     camera, pose = Camera(hall()), Pose(5, 5, EAST)
     values = np.zeros((20, 40))
     values[:, :4] = 5.0  # behind the lens
-    behind = camera.picture(pose, smoke=Raster(values, (0.0, 20.0, 0.0, 10.0), "1/m"))
+    there = Raster(values, (0.0, 20.0, 0.0, 10.0), "1/m")
+    behind = camera.picture(pose, smoke=Smoke(there, there))
     assert np.array_equal(behind, camera.picture(pose))
     person = [Figure("guard", 9, 5)]
-    thick = [camera.picture(pose, who, smoke=air(3.0)) for who in ((), person)]
+    thick = [camera.picture(pose, who, smoke=smoke(3.0)) for who in ((), person)]
     assert len(changed(*thick)[0]) == 0
 
 

@@ -64,7 +64,7 @@ class Fields:
         artists: list[Artist] = []
         picture: NDArray[Any] | None = None
         for what, paint in self._paints.items():
-            raster = self._moments.surroundings.raster(what, time, self._cell)
+            raster = self._moments.recording.surroundings.raster(what, time, self._cell)
             if raster.values.max() <= 0:
                 continue
             layer = paint(raster.values)

@@ -6,17 +6,16 @@ import math
 from bisect import bisect_right
 from typing import NamedTuple
 
+from dva_sim.agents.bystander import DOWN, SAFE
 from dva_sim.errors import ConfigError
 from dva_sim.recorder import DriveLog, TrackPoint
 from dva_sim.simulation import Recording
 from dva_sim.simulation.incidents import Incident
-from dva_sim.worlds.camera_picture import Camera, Figure, Spot
+from dva_sim.worlds.camera_picture import Camera, Figure, Smoke, Spot
 from dva_sim.worlds.camera_picture.camera import Picture
 from dva_sim.worlds.geo import Pose
-from dva_sim.worlds.hazards import Surroundings
 
 ROBOT, GUARD, BYSTANDER = "robot", "guard", "bystander"
-DOWN = ("down", "collapsed", "incapacitated")
 FRESH = 3.0  # an older picture is not looked at any more [s]
 
 
@@ -50,12 +49,7 @@ class Moments:
         self.recording = recording
         self.tracks = recording.recorder.tracks
         self._times = {name: [p.time for p in track] for name, track in self.tracks.items()}
-        real = [(n, i) for n, i in enumerate(recording.incidents) if not i.false_alarm]
-        self.kinds = {incident.kind for _, incident in real}
-        self.surroundings = Surroundings(recording.site, [i.hazard for _, i in real])
-        for number, (incident, _) in enumerate(real):
-            if incident in recording.contained:
-                self.surroundings.contain(number, recording.contained[incident])
+        self.kinds = {i.kind for i in recording.incidents if not i.false_alarm}
         self._cameras: dict[tuple[int, int], Camera] = {}
 
     # --- who is where ------------------------------------------------------------------
@@ -124,20 +118,28 @@ class Moments:
             angle = math.radians(self.recording.scenario.camera.field_of_view_deg)
             self._cameras[size] = Camera(self.recording.site, width, height, angle)
         here, spots = self.at(robot, time), [i.spot(time) for i in self.going_on(time)]
-        raster = self.surroundings.raster
+        raster = self.recording.surroundings.raster
+        smoke = None
+        if "fire" in self.kinds:
+            smoke = Smoke(raster("smoke", time), raster("layer", time))
         return self._cameras[size].picture(
             Pose(here.x, here.y, here.heading),
-            [self._figure(name, time) for name in self.tracks if name != robot],
+            self._others(robot, time),
             [Spot(*spot) for spot in spots if spot is not None],
-            raster("smoke", time) if "fire" in self.kinds else None,
+            smoke,
             raster("water", time) if "flood" in self.kinds else None,
             time,
         )
 
+    def _others(self, robot: str, time: float) -> list[Figure]:
+        """Everybody else who is still on the site."""
+        others = (name for name in self.tracks if name != robot)
+        return [self._figure(n, time) for n in others if self.at(n, time).mode != SAFE]
+
     def _figure(self, name: str, time: float) -> Figure:
         here, number = self.at(name, time), name.rpartition("-")[2]
         looks = int(number) if number.isdigit() else 1
-        return Figure(kind_of(name), here.x, here.y, here.heading, looks, here.mode in DOWN)
+        return Figure(kind_of(name), here.x, here.y, here.heading, looks, here.mode == DOWN)
 
 
 def _shown(drive: DriveLog, time: float) -> float | None:

@@ -25,8 +25,13 @@ ACTIVITIES = {
     "looking": "#c9a400",
     "containing": "#c2571a",
     "standing by": "#6b8f71",
-    "evacuating": "#d2691e",
-    "safe": "#9fb4a0",
+    "withdrawing": "#e08a4a",
+    "hurt": "#a03030",
+    "working": "#b7aa9c",
+    "alarmed": "#e3b100",
+    "evacuating": "#d9641e",
+    "safe": "#b9d3ba",
+    "incapacitated": "#1c1c1c",
 }
 KINDS = {ROBOT: "#2f7fd0", GUARD: "#2f7d32", BYSTANDER: "#8c6d5a"}
 SHAPES = {ROBOT: "s", GUARD: "o", BYSTANDER: "o"}
@@ -52,6 +57,8 @@ HEAT_LEVELS = (1.0, 2.5, 10.0)  # [kW/m2]; skin bears 2.5 for long
 
 def colour_of(kind: str, mode: str) -> str:
     """Colour of somebody who does something."""
+    if kind == BYSTANDER and mode == "walking":
+        return KINDS[kind]  # green is for guards
     modes = ROBOT_MODES if kind == ROBOT else ACTIVITIES
     return modes.get(mode, KINDS.get(kind, INK))
 

@@ -36,47 +36,93 @@ class Rays(NamedTuple):
     origin: tuple[float, float]
 
 
-def look_up(raster: Raster, x: Floats, y: Floats) -> Floats:
-    """Values at places [m]; 0 outside."""
-    values = np.asarray(raster.values, dtype=np.float32)
-    xmin, xmax, ymin, ymax = raster.extent
-    rows, columns = values.shape
-    column = np.floor((x - xmin) * (columns / (xmax - xmin))).astype(np.intp)
-    row = np.floor((y - ymin) * (rows / (ymax - ymin))).astype(np.intp)
-    inside = (column >= 0) & (column < columns) & (row >= 0) & (row < rows)
-    index = np.where(inside, row * columns + column, 0)
-    return np.where(inside, values.ravel().take(index), np.float32(0))
+def look_up(x: Floats, y: Floats, *rasters: Raster) -> list[Floats]:
+    """Values of rasters on the same grid at places [m]; 0 outside."""
+    xmin, xmax, ymin, ymax = rasters[0].extent
+    rows, columns = rasters[0].values.shape
+    # A rim of zeros around the grid takes what lies outside.
+    column = (x - np.float32(xmin)) * np.float32(columns / (xmax - xmin)) + np.float32(1)
+    row = (y - np.float32(ymin)) * np.float32(rows / (ymax - ymin)) + np.float32(1)
+    np.clip(column, 0, columns + 1, out=column)
+    np.clip(row, 0, rows + 1, out=row)
+    index = row.astype(np.int32)
+    index *= columns + 2
+    index += column.astype(np.int32)
+    return [np.pad(r.values.astype(np.float32), 1).take(index) for r in rasters]
 
 
-def add_smoke(scene: Floats, depth: Floats, rays: Rays, smoke: Raster) -> None:
-    """Let smoke hide what is behind it: exp(-K d) of its contrast is left after d metres.
+class Smoke(NamedTuple):
+    """Smoke on a site, both on the same grid; in a building it hangs under the ceilings.
+
+    Attributes:
+        mean: Extinction coefficient K, the mean from floor to ceiling [1/m].
+        layer: The same within the layer, which is denser the thinner it is [1/m].
+    """
+
+    mean: Raster
+    layer: Raster
+
+
+def add_smoke(
+    scene: Floats, depth: Floats, rays: Rays, fall: Floats, smoke: Smoke, heights: Any
+) -> None:
+    """Let smoke hide what is behind it: exp(-K d) of its contrast is left after d metres in it.
+
+    A column takes the layer to hang equally low everywhere along its ray. Two columns share the
+    air that they look through, two rows what is left of the contrast.
 
     Args:
         scene: Red, green, blue `(3, h, w)`, changed in place.
         depth: Of each pixel, along the axis of the lens `(h, w)` [m].
         rays: Where the columns look.
-        smoke: Extinction coefficient K [1/m].
+        fall: How far below the axis each row looks, per metre ahead `(h,)`.
+        smoke: Where it is.
+        heights: Of the lens and of the ceiling [m].
     """
+    whole, depth, fall = depth, depth[::2], fall[::2]
     step = REACH / SAMPLES
     ahead = (np.arange(SAMPLES, dtype=np.float32)[:, None] + 0.5) * step
-    extinction = look_up(smoke, rays.origin[0] + ahead * rays.x, rays.origin[1] + ahead * rays.y)
-    extinction *= rays.length
+    x, y = (values[::2] for values in (rays.x, rays.y))
+    extinction, mean = look_up(
+        rays.origin[0] + ahead * x, rays.origin[1] + ahead * y, smoke.layer, smoke.mean
+    )
     if not extinction.any():
         return
-    before = np.cumsum(extinction, axis=0) * step - extinction * step
+    share = mean.sum(axis=0) / np.maximum(extinction.sum(axis=0), 1e-6)
+    extinction *= rays.length[::2] * np.float32(step)
+    before = np.cumsum(extinction, axis=0) - extinction
     sample = depth * np.float32(1 / step)
     number = np.minimum(sample.astype(np.int32), SAMPLES - 1)
     sample -= number
-    number *= depth.shape[1]
-    number += np.arange(depth.shape[1], dtype=np.int32)
+    number *= extinction.shape[1]
+    number += np.arange(depth.shape[1], dtype=np.int32) // 2
     thickness = extinction.take(number)
-    thickness *= sample * np.float32(step)
+    thickness *= sample
     thickness += before.take(number)
-    left = np.exp(-thickness)
+    thickness *= np.sqrt(1 + fall * fall)[:, None]
+    if share.min() < 1:
+        share = np.repeat(share, 2)[: depth.shape[1]]
+        thickness *= _in_the_layer(depth, fall, heights, share)
+    np.negative(thickness, out=thickness)
+    left = np.repeat(np.exp(thickness, out=thickness), 2, axis=0)[: len(whole)]
     for plane, colour in zip(scene, SMOKE, strict=True):
         plane -= colour
         plane *= left
         plane += colour
+
+
+def _in_the_layer(depth: Floats, fall: Floats, heights: Any, share: Floats) -> Floats:
+    """Which share of each pixel's ray runs above the lower face of the layer `(h, w)`."""
+    eye, ceiling = heights
+    bottom = ceiling * (1 - np.minimum(share, 1))
+    here, there = np.float32(eye) - bottom, depth * -fall[:, None]
+    there += here
+    whole = np.abs(there)
+    whole += np.abs(here) + np.float32(1e-4)
+    np.maximum(there, 0, out=there)
+    there += np.maximum(here, 0)
+    there /= whole
+    return there
 
 
 def add_firelight(scene: Floats, gap2: Floats, lit: Any, strength: float) -> None:
@@ -84,14 +130,15 @@ def add_firelight(scene: Floats, gap2: Floats, lit: Any, strength: float) -> Non
 
     Args:
         scene: Red, green, blue `(3, h, w)`, changed in place.
-        gap2: Squared distance of each pixel's place from the fire `(h, w)` [m^2].
-        lit: Which pixels lie in the room of the fire `(h, w)`.
+        gap2: Squared distance of every second row's places from the fire `(h / 2, w)` [m^2].
+        lit: Which of them lie in the room of the fire `(h / 2, w)`.
         strength: 0 to 1.
     """
     light = np.float32(strength) / (np.float32(1.0) + gap2 * np.float32(1.0 / GLOW_REACH**2))
     light *= lit
     for plane, gain in zip(scene, GAIN, strict=True):
-        plane *= 1.0 + gain * light
+        factor = np.repeat(1 + gain * light, 2, axis=0)
+        plane *= factor[: len(plane)]
 
 
 def add_water(scene: Floats, water: Floats, base: Floats, grazing: Floats, time: float) -> None:

@@ -10,7 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.worlds.camera_picture.air import Rays, add_firelight, add_smoke, add_water, look_up
+from dva_sim.worlds.camera_picture.air import (
+    Rays,
+    Smoke,
+    add_firelight,
+    add_smoke,
+    add_water,
+    look_up,
+)
 from dva_sim.worlds.camera_picture.floors import HORIZON, Floors
 from dva_sim.worlds.camera_picture.rooms import Rooms
 from dva_sim.worlds.camera_picture.sprites import Sprite
@@ -72,7 +79,7 @@ class Camera:
         pose: Pose,
         figures: Sequence[Figure] = (),
         spots: Sequence[Spot] = (),
-        smoke: Raster | None = None,
+        smoke: Smoke | None = None,
         water: Raster | None = None,
         time: float = 0.0,
     ) -> Picture:
@@ -82,7 +89,7 @@ class Camera:
             pose: Of the lens [m, rad].
             figures: Robots and people around; not the one that carries the camera.
             spots: Fires and leaks.
-            smoke: Its extinction coefficient [1/m], if there is any.
+            smoke: Where it is, if there is any.
             water: Its depth on the floor [m], if there is any.
             time: Lets flames flicker and water ripple [s].
         """
@@ -100,10 +107,11 @@ class Camera:
             self._flood(scene, depth, rays, water, walls.depth, time)
         self._add_things(scene, depth, pose, (*spots, *figures), time)
         if smoke is not None:
-            add_smoke(scene, depth, rays, smoke)
+            heights = self.eye_height, self._ceiling
+            add_smoke(scene, depth, rays, self._fall, smoke, heights)
         np.clip(scene, 0, 255, out=scene)
         picture = np.empty((self.height, self.width, 3), dtype=np.uint8)
-        for channel, plane in enumerate(scene):
+        for channel, plane in enumerate(scene.astype(np.uint8)):
             picture[:, :, channel] = plane
         return picture
 
@@ -172,7 +180,7 @@ class Camera:
 
     def _light_up(self, scene: Floats, depth: Floats, rays: Rays, fire: Spot) -> None:
         """Firelight in the room of the fire."""
-        x, y = depth * rays.x, depth * rays.y
+        x, y = depth[::2] * rays.x, depth[::2] * rays.y
         x += np.float32(rays.origin[0] - fire.x)
         y += np.float32(rays.origin[1] - fire.y)
         gap2 = x * x
@@ -194,7 +202,7 @@ class Camera:
         x = rays.origin[0] + depth[first:] * rays.x
         y = rays.origin[1] + depth[first:] * rays.y
         deep = np.zeros_like(depth)
-        deep[first:] = look_up(water, x, y) * (depth[first:] == self._floors.depth[first:])
+        deep[first:] = look_up(x, y, water)[0] * (depth[first:] == self._floors.depth[first:])
         base = self.height / 2 + self.eye_height * self.focal_length / far
         steep = self.eye_height / np.hypot(self._floors.depth[:, 0], self.eye_height)
         grazing = np.asarray(MIRROR * (1 - steep) ** 2, dtype=np.float32)
@@ -260,8 +268,9 @@ def encode(picture: Picture, quality: int = QUALITY) -> bytes:
 def _develop(colours: Any, light: Floats) -> Floats:
     """Packed colours in their light, as red, green and blue `(3, h, w)`."""
     scene = np.empty((3, *colours.shape), dtype=np.float32)
+    channels = colours.astype("<u4", copy=False).view(np.uint8).reshape(*colours.shape, 4)
     for channel, plane in enumerate(scene):
-        np.multiply((colours >> (8 * channel)) & 255, light, out=plane, casting="unsafe")
+        np.multiply(channels[..., channel], light, out=plane)
     return scene
 
 

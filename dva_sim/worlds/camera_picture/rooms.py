@@ -18,7 +18,7 @@ ACCENTS = 12  # different colours of rooms
 MOST_CELLS = 4_000_000  # of a floor
 BORDER = 1.0  # of unknown ground around a site [m]
 BLOCK = 16  # cells; floors are made of whole blocks, so that coarser ones fit
-FACADE = (0.74, 0.60, 0.50)  # of buildings from outside, 0 to 1
+FACADE, PLAIN = (0.74, 0.60, 0.50), (0.66, 0.68, 0.70)  # from outside; of bare maps
 GOLDEN = 0.61803399  # steps of the hue, so that neighbours differ
 
 
@@ -50,7 +50,7 @@ class Rooms:
         self.origin = xmin - BORDER, ymin - BORDER
         rows, columns = (BLOCK * int(np.ceil(side / self.cell / BLOCK)) for side in sides)
         self.numbers = _room_numbers(site, self.origin, self.cell, (rows, columns))
-        self.palette = _palette()
+        self.palette = _palette(FACADE if site.rooms else PLAIN)
         self.accent = _accents(site)
         self.outdoor = np.array([True, *(room.outdoor for room in site.rooms)])
 
@@ -68,11 +68,11 @@ class Rooms:
         return np.asarray(self.numbers.take(index))
 
 
-def _palette() -> NDArray[np.float64]:
+def _palette(outside: tuple[float, float, float]) -> NDArray[np.float64]:
     """Colours of rooms, 0 to 1, `(ACCENTS + 2, 3)`: none, then the accents, then corridors."""
     hues = (0.58 + GOLDEN * np.arange(ACCENTS)) % 1.0
     accents = [colorsys.hls_to_rgb(float(hue), 0.56, 0.42) for hue in hues]
-    return np.array([FACADE, *accents, (0.78, 0.78, 0.80)])
+    return np.array([outside, *accents, (0.78, 0.78, 0.80)])
 
 
 def _accents(site: Site) -> Ints:

@@ -23,10 +23,12 @@ SOLID_HEIGHT = 1.8  # of shelves and machines [m], assumed
 POSTS = 4  # upright parts of a door frame
 POST = 0.08  # width of a door post [m]
 REVEAL = 0.07  # how far a door frame stands out of the wall on both sides [m]
+SHORT = 0.6  # shorter pieces of wall, as bare maps have them, make no corners [m]
+HANGING = 0.04  # so much behind a wall it still counts as on it [m]
 NEAR = 0.05  # what is nearer to the lens is cut off [m]
 FAR = 80.0  # what is farther away is not looked for [m]
 
-WALL, FRAME, LINTEL, SOLID, NOTHING = range(5)
+WALL, FRAME, LINTEL, SOLID, LEAF, NOTHING = range(6)
 
 
 class Hits(NamedTuple):
@@ -57,7 +59,8 @@ class Surfaces:
 
     Attributes:
         ends: x1, y1, x2, y2 of each, shape `(n, 4)` [m].
-        kind: `WALL`, `FRAME`, `LINTEL` or `SOLID`; the last one is `NOTHING`, without height.
+        kind: `WALL`, `FRAME`, `LINTEL`, `SOLID` or the `LEAF` of a shut door; the last one is
+            `NOTHING`, without height.
         low: Height of the lower edge [m].
         high: Height of the upper edge [m].
         light: How bright its orientation makes it, 0 to 1.
@@ -72,14 +75,17 @@ class Surfaces:
         doors, tall = doorways(site)
         frames = np.vstack([_frame(door) for door in doors]) if len(doors) else doors
         nothing = np.array([[0.0, 0.0, 1.0, 0.0]])
-        parts = [walls[~solid], frames, doors, walls[solid], nothing]
-        heights = (site.ceiling, 0, 0, SOLID_HEIGHT, 0)
+        shut = _shut(doors, walls)
+        leaves = _inset(doors[shut])
+        parts = [walls[~solid], frames, doors, walls[solid], leaves, nothing]
+        heights = (site.ceiling, 0, 0, SOLID_HEIGHT, 0, 0)
         counts = [len(part) for part in parts]
         self.ends: Floats = np.vstack(parts).astype(np.float32)
-        self.kind = np.repeat(np.arange(5), counts)
+        self.kind = np.repeat(np.arange(6), counts)
         self.low: Floats = np.zeros(len(self.kind), dtype=np.float32)
         self.high: Floats = np.repeat(np.array(heights, dtype=np.float32), counts)
         self.high[self.kind == FRAME] = np.repeat(tall, POSTS)
+        self.high[self.kind == LEAF] = tall[shut]
         self.low[self.kind == LINTEL] = tall
         self.high[self.kind == LINTEL] = site.ceiling
         self.door = np.full(len(self.kind), -1)
@@ -91,6 +97,8 @@ class Surfaces:
         self.light: Floats = (0.74 + 0.24 * across).astype(np.float32)
         self.dark_ends = self._dark_ends(doors)
         self._full = self.kind == WALL
+        # A shut door hangs on its wall; what stands against a wall does not show through it.
+        self._slack = np.where(self.kind == SOLID, -HANGING / 4, HANGING).astype(np.float32)
 
     def _dark_ends(self, doors: NDArray[np.float64]) -> Floats:
         """Places of the corners along each surface; far away where there is none."""
@@ -99,7 +107,7 @@ class Surfaces:
             jambs = doors.reshape(-1, 1, 1, 2)
             gaps = np.hypot(*np.moveaxis(self.ends.reshape(1, -1, 2, 2) - jambs, -1, 0))
             places[gaps.min(axis=0) < 0.2] = -FAR
-        places[self.kind == LINTEL] = -FAR
+        places[(self.kind == LINTEL) | (self.length < SHORT)] = -FAR
         return places.astype(np.float32)
 
     def hits(self, pose: Pose, slopes: Floats) -> tuple[Hits, Hits]:
@@ -126,7 +134,8 @@ class Surfaces:
             np.r_[walls.depth, np.float32(FAR)][nearest],
             np.r_[walls.along, np.float32(0)][nearest],
         )
-        before = met.where(~full & (met.depth < walls.depth[met.column]))
+        reach = walls.depth[met.column] + self._slack[met.surface]
+        before = met.where(~full & (met.depth < reach))
         return walls, before.where(np.argsort(-before.depth, kind="stable"))
 
     def _all_hits(self, pose: Pose, slopes: Floats) -> Hits:
@@ -184,6 +193,23 @@ def doorways(site: Site) -> tuple[NDArray[np.float64], Floats]:
     ends = np.vstack([np.reshape(site.doors, (-1, 4)), np.reshape(exits, (-1, 4))])
     heights = site.door_heights or (DOOR_HEIGHT,) * len(site.doors)
     return ends, np.array([*heights, *(DOOR_HEIGHT for _ in exits)], dtype=np.float32)
+
+
+def _shut(doors: NDArray[np.float64], walls: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which doors have a wall right across them: ways out that nobody drives through `(n,)`."""
+    import shapely
+
+    lines: Any = shapely.linestrings(walls.reshape(-1, 2, 2))
+    middles: Any = shapely.points((doors[:, :2] + doors[:, 2:]) / 2)
+    gaps = shapely.distance(middles[:, None], lines[None, :])
+    return np.asarray(gaps.min(axis=1, initial=np.inf) < HANGING)
+
+
+def _inset(doors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The leaves of doors, between their posts."""
+    along = doors[:, 2:] - doors[:, :2]
+    along = along / np.maximum(np.hypot(*along.T), 1e-6)[:, None] * POST
+    return np.hstack([doors[:, :2] + along, doors[:, 2:] - along])
 
 
 def _frame(door: NDArray[np.float64]) -> NDArray[np.float64]:

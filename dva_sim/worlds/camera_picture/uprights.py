@@ -11,6 +11,7 @@ from PIL import Image, ImageDraw, ImageFont
 from dva_sim.worlds.camera_picture.rooms import Colours, Rooms, pack
 from dva_sim.worlds.camera_picture.surfaces import (
     FRAME,
+    LEAF,
     LINTEL,
     SOLID,
     Floats,
@@ -30,7 +31,7 @@ THROUGH = 0.15  # so far on both sides of a wall its rooms are looked for [m]
 BEYOND = 0.4  # so far behind a door its room is looked for [m]
 
 WOOD, PLASTER, SKIRTING = (138, 98, 60), (226, 225, 220), (96, 98, 104)
-STEEL, GLASS = (150, 154, 160), (176, 208, 232)
+STEEL, GLASS, LEAF_PAINT = (150, 154, 160), (176, 208, 232), (62, 122, 96)
 SIGN, EXIT = (40, 62, 96), (26, 122, 66)
 
 
@@ -68,6 +69,7 @@ class Uprights:
         column = self._wall_columns(hits, here, beyond)
         column = np.where(kind == FRAME, self._plain + 0, column)
         column = np.where(kind == SOLID, self._plain + 1, column)
+        column = np.where(kind == LEAF, self._plain + 2, column)
         lintel = kind == LINTEL
         if lintel.any():
             column[lintel] = self._sign_columns(hits.where(lintel), left[lintel])
@@ -103,9 +105,11 @@ class Uprights:
         for accent in self._rooms.palette:
             parts += [_panels(height, accent), _windows(height, accent)]
         self._plain = len(self._rooms.palette) * (PANEL_COLUMNS + WINDOW_COLUMNS)
-        self._first_sign = self._plain + 2
-        plain = np.array([WOOD, STEEL], dtype=np.float64)[:, None, :] * np.ones((2, TEXELS, 1))
+        self._first_sign = self._plain + 3
+        plain = np.array([WOOD, STEEL, LEAF_PAINT], dtype=np.float64)[:, None, :]
+        plain = plain * np.ones((3, TEXELS, 1))
         plain[1] *= (0.9 + 0.1 * (height % 0.45 > 0.04))[:, None]
+        plain[2, (height > 0.98) & (height < 1.06)] = STEEL  # the bar to push
         signs = [self._lintel(text, wide, height) for wide, *pair in _signs(site) for text in pair]
         return pack(np.concatenate([*parts, plain, *signs]).clip(0, 255).astype(np.uint8)).ravel()
 
