@@ -27,9 +27,12 @@ _CONDITIONS = {
     "size of a frame": "camera.frame_bytes",
     "field of view": "camera.field_of_view_deg",
     "operator strategy": "operator.strategy",
+    "control": "control",
+    "robot": "robot.profile",
     "robots": "robot.count",
     "guards": "guard.count",
     "operators": "operator.count",
+    "bystanders": "bystander.count",
     "dispatch policy": "dispatch.policy",
     "horizon of a run": "horizon_s",
 }
@@ -90,6 +93,8 @@ def _text(key: str, value: Any) -> str:
         return f"{value / 1e6:g} Mbit/s"
     if key.endswith("_bytes"):
         return f"{value / 1000:g} kB"
+    if isinstance(value, list):
+        return ", ".join(_text(key, item) for item in value)
     if isinstance(value, str):
         return value.rpartition("/")[2]
     return level_name(key, value)

@@ -96,7 +96,7 @@ def _tell(scenario: Scenario, seed: int, keep_traffic: bool) -> Recording:
 
 
 def _summarise(recording: Recording, took: float) -> None:
-    from dva_sim.experiments.metrics import drive_measures, event_rows
+    from dva_sim.experiments.metrics import drive_measures, event_rows, run_row
 
     say()
     for row in event_rows(recording):
@@ -107,17 +107,39 @@ def _summarise(recording: Recording, took: float) -> None:
         say(f"{row['kind']}: {row['outcome']}{who}{response if known else ''}")
     row = drive_measures(recording)
     if "commands_sent" in row:
-        say(
-            f"driving: {row['outcome']} in {row['attempts']} attempt(s), "
-            f"{row['commands_applied']} of {row['commands_sent']} commands applied, "
-            f"median age {row['command_age_p50_s']:.2f} s, {row['command_rate_hz']:.1f} per s, "
-            f"{row['contacts']} contacts"
-        )
+        say(f"robots: {row['outcome']} in {row['attempts']} attempt(s), {_driven(row)}")
+    if recording.people:
+        say(f"people: {_fared(run_row(recording), recording)}")
     broken = sum(recording.recorder.violations.values())
     say(
         f"{recording.duration:.0f} s simulated in {took:.2f} s, "
         f"{recording.recorder.counters['messages']} messages, {broken} safety rules broken"
     )
+
+
+def _driven(row: dict[str, Any]) -> str:
+    parts = [f"{row['contacts']} contacts"]
+    if row["jams"]:
+        parts.append(f"{row['jams']} jams")
+    if row["commands_sent"]:
+        commands = f"{row['commands_applied']} of {row['commands_sent']} commands applied"
+        age = f"median age {row['command_age_p50_s']:.2f} s"
+        parts = [commands, age, f"{row['command_rate_hz']:.1f} per s", *parts]
+    return ", ".join(parts)
+
+
+def _fared(row: dict[str, Any], recording: Recording) -> str:
+    parts = [f"{row['person_exposure_s']:.0f} s in danger"]
+    doses = f"{row['dose_heat_max']:.2g} of heat, {row['dose_toxic_max']:.2g} of carbon monoxide"
+    parts.append(f"largest dose {doses}")
+    if row["incapacitated"]:
+        parts.append(f"{row['incapacitated']} incapacitated")
+    out = [p.out for p in recording.people if p.out < recording.duration]
+    if "evacuated_share" in row:
+        count = sum(p.kind == "bystander" for p in recording.people)
+        last = f", the last at {max(out):.0f} s" if out else ""
+        parts.insert(0, f"{len(out)} of {count} bystanders out{last}")
+    return ", ".join(parts)
 
 
 # --- studies ---------------------------------------------------------------------------

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dva_sim.agents.bystander import DOWN
 from dva_sim.core.events import Event
 from dva_sim.recorder import Applied, DriveLog
 from dva_sim.simulation import Recording
@@ -23,6 +24,7 @@ def run_row(recording: Recording) -> Row:
     exposure = recording.recorder.exposure
     row["events"] = len(recording.events)
     row["person_exposure_s"] = float(sum(exposure.values()))
+    row |= _people_measures(recording)
     row["replans"] = recording.recorder.counters["replans"]
     row["messages"] = recording.recorder.counters["messages"]
     row["bytes"] = recording.recorder.counters["bytes"]
@@ -30,6 +32,41 @@ def run_row(recording: Recording) -> Row:
     row["violations"] = sum(recording.recorder.violations.values())
     row["simulated_s"] = recording.duration
     return row
+
+
+def _people_measures(recording: Recording) -> Row:
+    """Of all who are on foot; nothing where there is nobody."""
+    people = recording.people
+    if not people:
+        return {}
+    bystanders = [p for p in people if p.kind == "bystander"]
+    out = [p.out for p in bystanders if p.out < math.inf]
+    row: Row = {
+        "dose_heat_max": max(p.heat for p in people),
+        "dose_toxic_max": max(p.toxic for p in people),
+        "incapacitated": sum(p.activity == DOWN for p in people),
+    }
+    if bystanders:
+        row["evacuated_share"] = len(out) / len(bystanders)
+        row["evacuated_s"] = max(out, default=NAN)
+    return row
+
+
+def people_rows(recording: Recording) -> list[Row]:
+    """One row per guard and bystander; times that never came are missing."""
+    return [
+        {
+            "person_name": p.name,
+            "kind": p.kind,
+            "activity": p.activity,
+            "exposure_s": p.exposure,
+            "dose_heat": p.heat,
+            "dose_toxic": p.toxic,
+            "t_leaves_s": p.leaves if p.leaves < math.inf else NAN,
+            "t_out_s": p.out if p.out < math.inf else NAN,
+        }
+        for p in recording.people
+    ]
 
 
 def drive_measures(recording: Recording) -> Row:
@@ -62,6 +99,8 @@ def _body_measures(attempts: list[DriveLog], recording: Recording) -> Row:
         "path_m": sum(body.distance for body in bodies),
         "contacts": sum(body.contacts for body in bodies),
         "contact_impulse_ns": sum(body.impulse for body in bodies),
+        "person_contacts": sum(body.person_contacts for body in bodies),
+        "jams": sum(body.jams for body in bodies),
     }
 
 

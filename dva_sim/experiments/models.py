@@ -97,6 +97,7 @@ class _Full:
         tables: Tables = {
             "runs": [metrics.run_row(recording)],
             "events": metrics.event_rows(recording),
+            "people": metrics.people_rows(recording),
         }
         if with_tracks:
             tables["tracks"] = metrics.track_rows(recording)

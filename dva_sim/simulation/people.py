@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 from dva_sim.agents.bystander import BystanderAgent
 from dva_sim.agents.camera import HazardSpot
+from dva_sim.agents.escape import refuges_of
 from dva_sim.agents.exposure import Air, clean_air
 from dva_sim.agents.guard import GuardAgent
 from dva_sim.agents.legs import RADIUS
@@ -54,9 +55,7 @@ class People:
         self._stage, self._world, self._around, self._spots = stage, world, around, spots
         self._is_there, self._contain = is_there, contain
         self._air: Air = around.at if around.has_any else clean_air
-        site = stage.site
-        # Where nobody has drawn an exit, one is as safe as the guards are at their posts.
-        self._refuges: list[Point] = [(way.x, way.y) for way in site.exits or site.guard_posts]
+        self._refuges = refuges_of(stage.site)
 
     def add_guard(self, number: int) -> GuardAgent:
         """The `number`-th guard, at its post; it registers and is on duty.

@@ -13,6 +13,7 @@ from dva_sim.agents.robot import RobotAgent
 from dva_sim.core.events import ACT_STEPS, STEPS, EventBook
 from dva_sim.recorder import DriveLog
 from dva_sim.scenario import RobotConfig
+from dva_sim.worlds.bodies import G
 
 MOVING = 0.05  # above this a robot is going somewhere [m/s]
 SLACK = 1.02  # measured speeds may exceed a limit by so much
@@ -39,7 +40,8 @@ def broken_rules(
     """
     spec, speed, turn_rate = robot.body.spec, robot.body.speed, robot.body.turn_rate
     mode = robot.controller.mode
-    stopping = spec.max_speed / spec.max_deceleration + 4 * spec.motor_time_constant
+    braking = min(spec.max_deceleration, robot.body.grip * G)
+    stopping = spec.max_speed / braking + 4 * spec.motor_time_constant
     # What another robot has pushed moves on, until its own brakes have stopped it.
     pushed = robot.body.last_touch + stopping >= now
     if mode is not Mode.MISSION and abs(speed) > MOVING and not pushed:

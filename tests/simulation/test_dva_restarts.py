@@ -16,7 +16,7 @@ from dva_sim.simulation.run import Run
 from dva_sim.simulation.watch import broken_event_rules
 
 EVENTS = [
-    {"kind": "fire", "at_s": 5, "reported": True},
+    {"kind": "fire", "at_s": 5, "reported": True, "hazard": {"growth": "slow"}},
     {"kind": "gas_leak", "at_s": 10, "reported": True},
     {"kind": "flood", "at_s": 15, "reported": True},
 ]
