@@ -176,6 +176,19 @@ def test_trails_fade_with_time(drive):
     assert np.all(np.diff(cover) > 0)
 
 
+def test_who_has_left_the_site_is_not_drawn_but_left_a_trail():
+    run = run_of("drive-to-event", horizon_s=20)
+    run.recorder.tracks["bystander-1"] = [
+        TrackPoint(float(t), 5.0 + t, 12.0, 0.0, "evacuating") for t in range(8)
+    ]
+    moments, ax = Moments(run), new_figure((6, 4)).add_subplot()
+    ax.set(xlim=(0, 40), ylim=(0, 24))
+    body = Body(ax, moments, "bystander-1")
+    assert [len(body.show(time)) for time in (3.0, 7.5, 12.0)] == [2, 2, 1]
+    assert len(body.show(12.0)[0].get_segments()) == 7
+    assert moments.eye("robot-1", 3.0).shape == moments.eye("robot-1", 12.0).shape
+
+
 @pytest.mark.parametrize(("metres", "true_to_scale"), [(10, True), (300, False)])
 def test_a_robot_is_true_to_scale_but_never_too_small_to_see(drive, metres, true_to_scale):
     ax = new_figure((6, 6)).add_subplot()
@@ -199,6 +212,9 @@ class Fixed:
 
     def place(self, time):
         return self._place
+
+    def is_there(self, time):
+        return True
 
 
 def boxes_of(texts, ax):

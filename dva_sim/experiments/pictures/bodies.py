@@ -57,10 +57,16 @@ class Body:
         here = self._moments.at(self.name, time)
         return here.x, here.y
 
+    def is_there(self, time: float) -> bool:
+        """Whether it is still on the site."""
+        return self._moments.is_there(self.name, time)
+
     def show(self, time: float) -> list[Artist]:
         """The body at a moment [s]."""
-        here = self._moments.at(self.name, time)
         self._draw_trail(time)
+        if not self.is_there(time):
+            return [self._trail]
+        here = self._moments.at(self.name, time)
         self._mark.set_data([here.x], [here.y])
         self._mark.set(
             marker=_pointed(style.OUTLINES[self.kind]).rotated(rad=here.heading),

@@ -6,7 +6,7 @@ import math
 from bisect import bisect_right
 from typing import NamedTuple
 
-from dva_sim.agents.bystander import DOWN, SAFE
+from dva_sim.agents.bystander import DOWN
 from dva_sim.errors import ConfigError
 from dva_sim.recorder import DriveLog, TrackPoint
 from dva_sim.simulation import Recording
@@ -16,6 +16,7 @@ from dva_sim.worlds.camera_picture.camera import Picture
 from dva_sim.worlds.geo import Pose
 
 ROBOT, GUARD, BYSTANDER = "robot", "guard", "bystander"
+GONE = 1.0  # so long after the end of the track of somebody who left [s]
 FRESH = 3.0  # an older picture is not looked at any more [s]
 
 
@@ -57,6 +58,10 @@ class Moments:
     def names(self, *kinds: str) -> list[str]:
         """Everybody of some kinds who left a track."""
         return [name for kind in kinds for name in self.tracks if kind_of(name) == kind]
+
+    def is_there(self, name: str, time: float) -> bool:
+        """Whether somebody is on the site at `time` [s]; tracks of those who leave end."""
+        return time <= self._times[name][-1] + GONE
 
     def past(self, name: str, time: float) -> list[TrackPoint]:
         """Where somebody has been up to `time` [s], and is now."""
@@ -134,7 +139,7 @@ class Moments:
     def _others(self, robot: str, time: float) -> list[Figure]:
         """Everybody else who is still on the site."""
         others = (name for name in self.tracks if name != robot)
-        return [self._figure(n, time) for n in others if self.at(n, time).mode != SAFE]
+        return [self._figure(name, time) for name in others if self.is_there(name, time)]
 
     def _figure(self, name: str, time: float) -> Figure:
         here, number = self.at(name, time), name.rpartition("-")[2]

@@ -74,13 +74,13 @@ class Names:
             extents = [text.get_window_extent(renderer).extents for text in self._fixed]
             self._rooms = [Box(*extent) for extent in extents]
         taken = list(self._rooms)
-        taken += [self._box_of(body.place(time), body.size()) for body in self._bodies]
+        bodies = [body for body in self._bodies if body.is_there(time)]
+        taken += [self._box_of(body.place(time), body.size()) for body in bodies]
         taken += [self._box_of(place, SOURCE) for place in sources]
-        for body in self._bodies:
-            text = self._texts.get(body.name)
-            if text is not None:
-                taken.append(self._put(body, text, time, renderer, frame, taken))
-        return list(self._texts.values())
+        named = [body for body in bodies if body.name in self._texts]
+        for body in named:
+            taken.append(self._put(body, self._texts[body.name], time, renderer, frame, taken))
+        return [self._texts[body.name] for body in named]
 
     def _box_of(self, place: tuple[float, float], size: float) -> Box:
         """What something of a size [points] covers."""

@@ -30,7 +30,6 @@ ACTIVITIES = {
     "working": "#b7aa9c",
     "alarmed": "#e3b100",
     "evacuating": "#d9641e",
-    "safe": "#b9d3ba",
     "incapacitated": "#1c1c1c",
 }
 KINDS = {ROBOT: "#2f7fd0", GUARD: "#2f7d32", BYSTANDER: "#8c6d5a"}
