@@ -8,9 +8,10 @@ from dataclasses import dataclass, field
 from functools import cache
 
 from dva_sim.agents.camera import HazardSpot, Observation, View
+from dva_sim.agents.errands import Errand
 from dva_sim.agents.local_loops import Surrounded
 from dva_sim.agents.manoeuvres import Seen
-from dva_sim.agents.missions import PERIOD, Errand, Pilot, Step
+from dva_sim.agents.missions import PERIOD, Pilot, Step
 from dva_sim.clock import Clock
 from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.physics import DriveSpec, PersonBody, RobotBody, World

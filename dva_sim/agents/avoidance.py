@@ -47,6 +47,11 @@ REFUGE = 3.0  # how far to look for a place to step aside to [m]
 SPARE = 0.15  # gap left to who passes a robot that has stepped aside [m]
 
 
+# One lane of each side and each place where it goes back; the planned way is the first.
+_LANES = np.array([(side, hold) for side in SIDES for hold in (HOLDS if side else HOLDS[:1])])
+_SIDES, _HOLDS = _LANES.T
+
+
 class Lane(NamedTuple):
     """A way past those who are near: its points `(n, 2)` [m], and how far to the left [m]."""
 
@@ -110,23 +115,24 @@ class Avoidance:
         base = np.array([route.point_at(along + s) for s in way.tolist()])
         left = _to_the_left(base)
         offset = float((np.array(here) - base[0]) @ left[0])
-        lanes = [(side, hold) for side in SIDES for hold in (HOLDS if side else HOLDS[:1])]
-        shift = np.array([_shift(way, offset, side, hold) for side, hold in lanes])
-        points = base + shift[..., None] * left
+        if last == 0.0:  # then nothing is better than the planned way
+            points = base + _shifts(way, offset, _SIDES[:1], _HOLDS[:1])[..., None] * left
+            if self._are_free(points, way, here, others)[1].all():
+                return Lane(points[0], 0.0)
+        points = base + _shifts(way, offset, _SIDES, _HOLDS)[..., None] * left
         walls = self._keeps_to_walls(points, base)
-        gaps = np.stack([self._gaps(points, way, here, other) for other in others])
-        keep = np.array([other.keep + LANE_SPARE for other in others])[:, None, None]
-        # A gap that is too small already may grow.
-        free = (gaps >= np.minimum(keep, gaps[..., :1] - 0.01)).all(axis=0)
-        cost = np.array([_cost(side, last) for side, _ in lanes])
+        gaps, free = self._are_free(points, way, here, others)
+        keep = _keeps(others)
+        cost = np.abs(_SIDES) + TO_THE_LEFT * (_SIDES > 0.0) + CHANGE * np.abs(_SIDES - last)
         choices = np.flatnonzero((walls & free).all(axis=1))
         if len(choices):
             best = int(choices[np.argmin(cost[choices])])
-            return Lane(points[best], lanes[best][0])
+            return Lane(points[best], float(_SIDES[best]))
         lack = np.maximum(keep - gaps, 0.0).max(axis=(0, 2))
         choices = np.flatnonzero(walls.all(axis=1))
         best = int(choices[np.argmin((lack + 0.05 * cost)[choices])])
-        return _blocked(others, gaps[:, best], keep[:, 0], way, Lane(points[best], lanes[best][0]))
+        lane = Lane(points[best], float(_SIDES[best]))
+        return _blocked(others, gaps[:, best], keep[:, 0], way, lane)
 
     def _keeps_to_walls(self, points: Floats, base: Floats) -> NDArray[np.bool_]:
         """Where lanes `(k, n, 2)` have room; the planned way has as much as there is."""
@@ -136,6 +142,17 @@ class Avoidance:
         kept = room >= needed - 1e-9
         kept[0] = True
         return kept
+
+    def _are_free(
+        self, points: Floats, way: Floats, here: Point, others: Sequence[Nearby]
+    ) -> tuple[Floats, NDArray[np.bool_]]:
+        """Gaps to everybody, `(others, k, n)` [m], and where they suffice, `(k, n)`.
+
+        A gap that is too small already may grow.
+        """
+        gaps = np.stack([self._gaps(points, way, here, other) for other in others])
+        enough = gaps >= np.minimum(_keeps(others), gaps[..., :1] - 0.01)
+        return gaps, np.asarray(enough.all(axis=0))
 
     def _gaps(self, points: Floats, way: Floats, here: Point, other: Nearby) -> Floats:
         """Gap between surfaces along lanes `(k, n, 2)` [m].
@@ -210,15 +227,17 @@ def _to_the_left(points: Floats) -> Floats:
     return np.asarray(np.stack([-ahead[:, 1], ahead[:, 0]], 1) / length)
 
 
-def _shift(way: Floats, offset: float, side: float, hold: float) -> Floats:
-    """How far to the left a lane runs, from where one is to the side, and back [m]."""
-    out = np.clip(way / RAMP, 0.0, 1.0)
-    back = np.clip((way - hold) / RAMP, 0.0, 1.0)
+def _shifts(way: Floats, offset: float, sides: Floats, holds: Floats) -> Floats:
+    """How far to the left lanes run, from where one is to the side, and back: `(k, n)` [m]."""
+    out = np.minimum(way / RAMP, 1.0)
+    back = np.minimum(np.maximum((way - holds[:, None]) / RAMP, 0.0), 1.0)
+    side = sides[:, None]
     return np.asarray(offset + (side - offset) * out - side * back)
 
 
-def _cost(side: float, last: float) -> float:
-    return abs(side) + TO_THE_LEFT * (side > 0.0) + CHANGE * abs(side - last)
+def _keeps(others: Sequence[Nearby]) -> Floats:
+    """What a lane has to keep to each, shape `(others, 1, 1)` [m]."""
+    return np.array([other.keep + LANE_SPARE for other in others])[:, None, None]
 
 
 def _gap_to(places: Floats, line: Floats) -> Floats:

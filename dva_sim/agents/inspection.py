@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 
 from dva_sim.agents.camera import SeenHazard
-from dva_sim.agents.manoeuvres import FACING, Seen, turn_to
+from dva_sim.agents.manoeuvres import FACING, STAND, Seen, turn_to
 from dva_sim.agents.operator.strategies import Intent
 from dva_sim.agents.steering import wrap
 
@@ -18,7 +18,6 @@ MATCH_WITHIN = 4.0  # a hazard so near the place is the one to look at [m]
 FIRST_LOOK = 3.0  # with nothing in view for so long, it looks all around [s]; assumed
 LOOK_AROUND = 0.4  # turn rate meanwhile [rad/s]; assumed
 INSPECT_FOR = 120.0  # an inspection that nobody ends is done after this [s]; assumed
-STAND = Intent(0.0, 0.0)
 
 
 class Inspection:

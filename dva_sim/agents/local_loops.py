@@ -6,8 +6,9 @@ from collections.abc import Callable
 
 from dva_sim.agents.camera import Observation
 from dva_sim.agents.collision_guard import CollisionGuard
+from dva_sim.agents.errands import Errand
 from dva_sim.agents.manoeuvres import Seen
-from dva_sim.agents.missions import PERIOD, Errand, Pilot, Step
+from dva_sim.agents.missions import PERIOD, Pilot, Step
 from dva_sim.agents.modes import Mission, Mode, RobotController, SetPoint
 from dva_sim.agents.nearby import Nearby, who_is_near
 from dva_sim.agents.operator.strategies import Reach

@@ -18,6 +18,7 @@ from dva_sim.agents.steering import wrap
 Floats = NDArray[np.float64]
 Point = tuple[float, float]
 
+STAND = Intent(0.0, 0.0)
 GAIN = 2.0  # of turning towards a heading [1/s]
 FACING = 0.1  # nearer than this one faces it [rad]
 SLOWLY = 0.25  # speed of manoeuvres [m/s]; assumed

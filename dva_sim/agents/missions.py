@@ -16,22 +16,18 @@ The rules, in the order in which they are asked:
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from dva_sim.agents.avoidance import SQUEEZE, Avoidance, Blocked, pace_among
 from dva_sim.agents.collision_guard import CollisionGuard
+from dva_sim.agents.errands import AUTOPILOT, Errand
 from dva_sim.agents.inspection import Inspection
-from dva_sim.agents.manoeuvres import Aside, Manoeuvre, Recovery, Seen
-from dva_sim.agents.modes import Mission
+from dva_sim.agents.manoeuvres import STAND, Aside, Manoeuvre, Recovery, Seen
 from dva_sim.agents.nearby import Nearby
-from dva_sim.agents.operator.person import Person
 from dva_sim.agents.operator.strategies import Intent, Pursuit, Reach
 from dva_sim.agents.steering import Route
-from dva_sim.protocol import messages as m
 from dva_sim.worlds.planning import Disc, Planner
 
 Point = tuple[float, float]
@@ -51,48 +47,6 @@ AROUND = 0.08  # a way around somebody keeps so much more [m]
 SQUEEZE_AFTER = 10.0  # [s]
 GIVE_UP_AFTER = 60.0  # [s]
 
-# The robot's own loop has no delay to speak of: a brisk, steady driver.
-AUTOPILOT = Person(
-    perceptual_delay=0.0,
-    hand_lag=0.0,
-    crossover=2.0,
-    caution=0.3,
-    pace=1.0,
-    confirm_look=0.0,
-    reading=0.0,
-    position_error=0.0,
-    heading_error=0.0,
-)
-
-
-@dataclass(frozen=True)
-class Errand:
-    """A mission in metres.
-
-    Attributes:
-        goals: Places of a lap, in order [m].
-        laps: How many; 0: without end.
-        event: Kind of the event to be looked at, if there is one.
-        home: Whether it is the way home.
-    """
-
-    goals: tuple[Point, ...]
-    laps: int = 1
-    event: str | None = None
-    home: bool = False
-
-    @classmethod
-    def of(cls, mission: Mission, to_xy: Callable[[float, float], Point], base: Point) -> Errand:
-        """The errand that a message asks for; `base` is the robot's own [m]."""
-        match mission:
-            case m.Inspect():
-                place = to_xy(mission.position.latitude, mission.position.longitude)
-                return cls((place,), event=mission.kind)
-            case m.ReturnToBase():
-                return cls((base,), home=True)
-        goals = tuple(to_xy(p.latitude, p.longitude) for p in mission.waypoints)
-        return cls(goals, mission.laps if isinstance(mission, m.Patrol) else 1)
-
 
 class Step(NamedTuple):
     """What follows: how to move, and how the mission stands, as in `MissionStatus`."""
@@ -101,9 +55,6 @@ class Step(NamedTuple):
     state: str
     left: int
     reason: str = ""
-
-
-STAND = Intent(0.0, 0.0)
 
 
 class Pilot:

@@ -14,9 +14,11 @@ import pytest
 from fleet import Fleet, Robot, caparica
 
 from dva_sim.agents.camera import HazardSpot
+from dva_sim.agents.errands import Errand
 from dva_sim.agents.inspection import INSPECT_FOR, LOOK_FROM
-from dva_sim.agents.missions import GIVE_UP_AFTER, MOST_JAMS, NEAR, RESERVE, Errand
+from dva_sim.agents.missions import GIVE_UP_AFTER, MOST_JAMS, NEAR, RESERVE
 from dva_sim.agents.nearby import PERSONAL
+from dva_sim.agents.profile import RobotProfile
 from dva_sim.protocol import messages as m
 from dva_sim.worlds.site import Site
 
@@ -88,6 +90,21 @@ def test_a_message_becomes_an_errand() -> None:
     assert Errand.of(m.ReturnToBase(), to_xy, base) == Errand((base,), home=True)
     look = Errand.of(m.Inspect(3, "flood", two), to_xy, base)
     assert look == Errand(((30.0, 40.0),), event="flood")
+
+
+CAR = RobotProfile(
+    mass_kg=2.0, radius_m=0.24, max_speed_mps=0.8, max_turn_rate_rad_s=1.5, drive="three_way"
+).drive_spec()
+
+
+@pytest.mark.parametrize("heading", [EASTWARD, WESTWARD])
+def test_a_car_that_cannot_turn_on_the_spot_turns_in_the_corridor(heading: float) -> None:
+    fleet = Fleet()
+    robot = fleet.robot(1, (*WEST, heading), to((13.1, 12.0), (13.1, 20.0)), CAR)
+    assert robot.body.turning_radius > 0.3
+    fleet.run(60.0)
+    assert robot.end == ("done", "")
+    assert untouched(robot)
 
 
 # --- other robots -------------------------------------------------------------------------
