@@ -225,7 +225,8 @@ def write_features(path: Path, features: Iterable[Feature], frame: GeoFrame) -> 
     for feature in features:
         there = shapely.transform(feature.shape, lambda points: _to_degrees(points, frame))
         properties = {"kind": feature.kind, **feature.properties}
-        geometry = mapping(there)
+        ring = feature.shape.geom_type == "LinearRing"  # which GeoJSON does not know
+        geometry = mapping(shapely.LineString(there) if ring else there)
         lines.append(
             json.dumps({"type": "Feature", "properties": properties, "geometry": geometry})
         )

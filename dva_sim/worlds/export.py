@@ -7,6 +7,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from dva_sim.errors import ConfigError
 from dva_sim.worlds.drawing import Feature, write_features
 from dva_sim.worlds.geo import Pose
@@ -81,10 +83,12 @@ def _floor(site: Site) -> Iterator[Feature]:
     """The floor of a bare map as one room, with what stands in it as solids."""
     import shapely
 
-    lines = [shapely.LineString(wall.reshape(2, 2)) for wall in site.walls]
-    faces = shapely.get_parts(shapely.polygonize(lines))
-    middles = site.grid.middles((slice(None), slice(None)))[site.grid.reachable(FOOTPRINT)]
-    floor: Any = next(face for face in faces if shapely.contains_xy(face, *middles[0]))
+    walls = [shapely.LineString(wall.reshape(2, 2)) for wall in site.walls]
+    pieces = shapely.get_parts(shapely.union_all(walls))  # cut where they cross
+    faces: list[Any] = list(shapely.get_parts(shapely.polygonize(list(pieces))))
+    row, column = np.argwhere(site.grid.reachable(FOOTPRINT))[0]
+    middle = site.grid.to_xy(row + 0.5, column + 0.5)
+    floor = next(face for face in faces if shapely.contains_xy(face, *middle))
     yield Feature("room", shapely.Polygon(floor.exterior), {"name": "Floor"})
     yield Feature("wall", shapely.LineString(floor.exterior))
     yield from (Feature("wall", shapely.Polygon(hole)) for hole in floor.interiors)

@@ -7,6 +7,7 @@ import itertools
 from collections import Counter
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -209,7 +210,11 @@ class Site:
 
                 columns = self.grid.cells.shape[1]
                 middles = self.grid.to_xy(cells // columns + 0.5, cells % columns + 0.5)
-                area = shapely.Polygon(self.room(room).polygon)
+                area: Any = shapely.Polygon(self.room(room).polygon)
+                if self.room(room).outdoor:  # others may be drawn over it
+                    number = self.rooms.index(self.room(room))
+                    over = [shapely.Polygon(other.polygon) for other in self.rooms[:number]]
+                    area = area - shapely.union_all(over)
                 cells = cells[shapely.contains_xy(area, middles)]
             self._cache[key] = cells
         return self._cache[key]

@@ -49,7 +49,7 @@ def poster(site: Site, coverage: bool = False) -> Figure:
     tall = height + LEGEND
     figure = Figure(figsize=(width, tall))
     ax = figure.add_axes((0, LEGEND / tall, 1, height / tall))
-    draw_site(ax, site, coverage=coverage)
+    draw_site(ax, site, coverage=coverage, views=True)
     handles = _handles(site, coverage)
     if handles:
         figure.legend(
@@ -94,7 +94,13 @@ def _areas(site: Site, coverage: bool) -> list[Artist]:
         found.append(Patch(fc="none", ec=colour, hatch=hatch, lw=0.6, label=use))
     grades = {area.grade for area in site.wifi} if coverage else set()
     for grade in (grade for grade in COVERAGE if grade in grades):
-        found.append(Patch(fc=COVERAGE[grade], alpha=0.4, label=f"{grade} Wi-Fi"))
+        found.append(
+            Patch(
+                fc=COVERAGE[grade],
+                alpha=0.4,
+                label="no Wi-Fi" if grade == "none" else f"{grade} Wi-Fi",
+            )
+        )
     return found
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from dva_sim.worlds.layout import FOOTPRINT
 from dva_sim.worlds.parts import Exit
 from dva_sim.worlds.site import Room, Site
-from dva_sim.worlds.view_marks import draw_equipment, draw_north, draw_scale_bar
+from dva_sim.worlds.view_marks import draw_equipment, draw_north, draw_scale_bar, draw_views
 from dva_sim.worlds.view_names import write_names
 
 if TYPE_CHECKING:
@@ -42,7 +42,9 @@ BELOW = (0.6, 0.045)  # the same for the scale bar
 ARC_POINTS = 9
 
 
-def draw_site(ax: Axes, site: Site, labels: bool = True, coverage: bool = False) -> None:
+def draw_site(
+    ax: Axes, site: Site, labels: bool = True, coverage: bool = False, views: bool = False
+) -> None:
     """Draw a site into `ax`, in metres, without axes.
 
     Everything lies below `zorder` 5; robots and people belong above.
@@ -52,6 +54,7 @@ def draw_site(ax: Axes, site: Site, labels: bool = True, coverage: bool = False)
         site: What.
         labels: Names, zones and equipment too, not only ground, walls, doors and exits.
         coverage: Where the radio link is not good, as a faint layer.
+        views: What fixed cameras see, as a faint layer.
     """
     _set_limits(ax, site)
     if site.rooms:
@@ -64,6 +67,8 @@ def draw_site(ax: Axes, site: Site, labels: bool = True, coverage: bool = False)
         _draw_exit(ax, way)
     if coverage:
         _draw_coverage(ax, site)
+    if views:
+        draw_views(ax, site)
     if labels:
         _draw_zones(ax, site)
         draw_equipment(ax, site)
@@ -143,17 +148,11 @@ def _draw_grid(ax: Axes, site: Site) -> None:
 def _draw_walls(ax: Axes, site: Site) -> None:
     """Walls as one shape in metres, so that they keep their width when somebody zooms."""
     import shapely
-    from matplotlib.patches import PathPatch
-    from matplotlib.path import Path
 
     width = WALL_WIDTH if site.rooms else WALL_WIDTH / 2
     lines = shapely.multilinestrings(site.wall_lines.reshape(-1, 2, 2))
     area = shapely.buffer(lines, width / 2, cap_style="square", join_style="mitre")
-    rings = shapely.get_rings(shapely.get_parts(area))
-    if not len(rings):
-        return
-    path = Path.make_compound_path(*(Path(shapely.get_coordinates(r), closed=True) for r in rings))
-    ax.add_patch(PathPatch(path, facecolor=WALL, edgecolor="none", zorder=3))
+    _fill(ax, area, facecolor=WALL, edgecolor="none", zorder=3)
 
 
 def _draw_doors(ax: Axes, site: Site) -> None:
@@ -215,10 +214,24 @@ def _draw_zones(ax: Axes, site: Site) -> None:
 
 
 def _draw_coverage(ax: Axes, site: Site) -> None:
-    from matplotlib.patches import Polygon
+    """Each coverage where no later one is drawn over it."""
+    import shapely
 
-    for area in site.wifi:
-        colour = COVERAGE.get(area.grade)
-        if colour is not None:
-            patch = Polygon(area.polygon, facecolor=colour, edgecolor=colour, lw=0.6, alpha=0.28)
-            ax.add_patch(patch).set_zorder(1.6)
+    above: Any = shapely.Polygon()
+    for area in reversed(site.wifi):
+        polygon = shapely.Polygon(area.polygon)
+        if area.grade in COVERAGE:
+            _fill(ax, polygon - above, facecolor=COVERAGE[area.grade], alpha=0.24, lw=0, zorder=1.6)
+        above = above | polygon
+
+
+def _fill(ax: Axes, area: Any, **style: Any) -> None:
+    """A shapely area, holes and all."""
+    import shapely
+    from matplotlib.patches import PathPatch
+    from matplotlib.path import Path
+
+    rings = shapely.get_rings(shapely.get_parts(area))
+    if len(rings):
+        paths = (Path(shapely.get_coordinates(ring), closed=True) for ring in rings)
+        ax.add_patch(PathPatch(Path.make_compound_path(*paths), **style))

@@ -66,7 +66,7 @@ def draw_equipment(ax: Axes, site: Site) -> None:
         )
     _draw_desks(ax, site)
     for camera in site.cameras:
-        _draw_camera(ax, site, camera)
+        _draw_camera(ax, camera)
     for station in site.base_stations:
         ax.plot(
             station.x,
@@ -111,22 +111,19 @@ def _draw_desks(ax: Axes, site: Site) -> None:
         ax.plot(desk.x, desk.y, "o", ms=2.6 * scale_of(ax), color=INK, zorder=3.5)
 
 
-def _draw_camera(ax: Axes, site: Site, camera: FixedCamera) -> None:
-    """The camera, and the floor that it sees."""
+def _draw_camera(ax: Axes, camera: FixedCamera) -> None:
+    look = (3, 0, math.degrees(camera.heading) - 90)
+    size = 4.5 * scale_of(ax)
+    ax.plot(camera.x, camera.y, marker=look, ms=size, color=CAMERA, mew=0, zorder=3.6)
+
+
+def draw_views(ax: Axes, site: Site) -> None:
+    """The floor that each fixed camera sees."""
     from matplotlib.patches import Polygon
 
-    seen = Polygon(view_of(site, camera), facecolor=CAMERA, alpha=0.10, lw=0, zorder=1.8)
-    ax.add_patch(seen)
-    degrees = math.degrees(camera.heading)
-    ax.plot(
-        camera.x,
-        camera.y,
-        marker=(3, 0, degrees + 90),
-        ms=4.5 * scale_of(ax),
-        color=CAMERA,
-        mew=0,
-        zorder=3.6,
-    )
+    for camera in site.cameras:
+        seen = Polygon(view_of(site, camera), facecolor=CAMERA, alpha=0.08, lw=0, zorder=1.8)
+        ax.add_patch(seen)
 
 
 def view_of(site: Site, camera: FixedCamera) -> Floats:

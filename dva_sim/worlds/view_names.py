@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 INK, FAINT_INK = "#59606a", "#7c8b6d"
-SIZES = (7.5, 6.5, 5.5, 4.8, 4.2, 3.6, 3.0)  # [pt]
+SIZES = (7.5, 6.5, 5.5, 4.8, 4.2, 3.6)  # [pt]
 LINE = 1.15  # height of a line, in font sizes
 SLACK = 0.3  # of a line, as fonts are drawn in whole dots [font sizes]
 GAP = 0.2  # between a name and the walls [m]

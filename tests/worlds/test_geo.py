@@ -3,6 +3,8 @@ import math
 import numpy as np
 import pymap3d
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from dva_sim.worlds.geo import GeoFrame
 
@@ -22,6 +24,22 @@ def test_the_plane_agrees_with_an_independent_library():
     for latitude, longitude in [(38.67, -9.2), (38.655, -9.21), (38.6612, -9.2058)]:
         east, north, _ = pymap3d.geodetic2enu(latitude, longitude, 0, 38.6612, -9.2058, 0)
         assert CAPARICA.to_xy(latitude, longitude) == pytest.approx((east, north), abs=1e-6)
+
+
+@given(
+    st.floats(-75, 75),
+    st.floats(-179, 179),
+    st.floats(0, 3000),
+    st.floats(-math.pi, math.pi),
+)
+def test_both_ways_agree_with_an_independent_library_within_three_kilometres(
+    latitude, longitude, far, direction
+):
+    x, y = far * math.cos(direction), far * math.sin(direction)
+    there = GeoFrame(latitude, longitude).to_latlon(x, y)
+    east, north, _ = pymap3d.geodetic2enu(*there, 0, latitude, longitude, 0)
+    assert math.dist((east, north), (x, y)) < 1e-3
+    assert GeoFrame(latitude, longitude).to_xy(*there) == pytest.approx((east, north), abs=1e-4)
 
 
 def test_x_points_east_and_y_points_north():

@@ -3,6 +3,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import shapely
 from PIL import Image
 
 from dva_sim.errors import ConfigError
@@ -62,6 +63,30 @@ def test_the_last_image_row_is_the_lowest_in_y(tmp_path):
     assert grid.state_at(10.25, 20.25) == FREE
     assert grid.state_at(10.25, 20.75) == OCCUPIED
     assert grid.state_at(9.9, 20.25) == UNKNOWN
+
+
+def test_scale_mode_tells_free_occupied_and_what_lies_between(tmp_path):
+    path = write_map(tmp_path, [[254, 128, 0, 205]], mode="scale")
+    assert load_ros_map(path).cells.tolist() == [[FREE, UNKNOWN, OCCUPIED, UNKNOWN]]
+    path = write_map(tmp_path, [[205]], mode="scale", free_thresh=0.25)
+    assert load_ros_map(path).cells.tolist() == [[FREE]]  # 205 means unknown in trinary maps only
+
+
+def test_transparent_pixels_are_unknown_in_scale_mode(tmp_path):
+    path = write_map(tmp_path, [[0]], mode="scale", image="map.png")
+    pixels = np.array([[[254, 254, 254, 255], [254, 254, 254, 0]]], np.uint8)
+    Image.fromarray(pixels).save(tmp_path / "map.png")
+    assert load_ros_map(path).cells.tolist() == [[FREE, UNKNOWN]]
+
+
+@pytest.mark.parametrize("turn", [0.3, -2.0, math.pi])
+def test_points_of_a_turned_map_find_their_cell_again(tmp_path, turn):
+    path = write_map(tmp_path, np.full((4, 7), 254), origin=f"[3, -2, {turn}]")
+    grid = load_ros_map(path)
+    for row, column in ((0, 0), (3, 6), (2, 1)):
+        assert grid.to_cell(*grid.to_xy(row + 0.5, column + 0.5)) == (row, column)
+    walls = outline(grid, grid.cells == FREE)
+    assert np.hypot(*(walls[:, 2:] - walls[:, :2]).T).sum() == pytest.approx(2 * (2.0 + 3.5))
 
 
 def test_a_quarter_turn_of_the_origin_turns_the_map(tmp_path):
@@ -146,3 +171,33 @@ def test_a_recorded_map_becomes_a_site_of_few_walls_and_free_bases(name):
     for pose in (*site.robot_bases, *site.guard_posts):
         assert site.is_free(pose.x, pose.y, 0.30)
         assert reached[site.grid.to_cell(pose.x, pose.y)]
+
+
+def borders(grid, floor):
+    """Edges between floor and other cells: one shapely line each."""
+    inside = np.pad(floor, 1)
+    low, row = np.argwhere(inside[1:, 1:-1] != inside[:-1, 1:-1]), np.array([[0, 0], [0, 1]])
+    left, column = np.argwhere(inside[1:-1, 1:] != inside[1:-1, :-1]), np.array([[0, 0], [1, 0]])
+    cells = np.vstack([low[:, None] + row, left[:, None] + column])
+    return shapely.linestrings(grid.to_xy(cells[..., 0], cells[..., 1]))
+
+
+def farthest(lines, others):
+    """Largest distance from points on `lines` to the nearest of `others` [m]."""
+    many, share = np.repeat(lines, 5), np.tile(np.arange(5) / 4, len(lines))
+    points = shapely.line_interpolate_point(many, share, normalized=True)
+    _, gaps = shapely.STRtree(others).query_nearest(points, return_distance=True, all_matches=False)
+    return gaps.max()
+
+
+@pytest.mark.skipif(not MAPS.is_dir(), reason="recorded maps are not beside the project")
+@pytest.mark.parametrize(("name", "most"), [("depot", 600), ("warehouse", 1200)])
+def test_the_walls_of_a_recorded_map_are_few_true_to_a_cell_and_closed(name, most):
+    site = map_site(MAPS / f"{name}.yaml", 1, robots=0, guards=0)
+    walls = shapely.linestrings(site.walls.reshape(-1, 2, 2))
+    edges = borders(site.grid, site.grid.floor(0.30))
+    assert len(walls) < most < len(edges) / 8
+    assert farthest(walls, edges) < 1.01 * site.grid.resolution
+    assert farthest(edges, walls) < 1.01 * site.grid.resolution
+    _, ends = np.unique(np.round(site.walls.reshape(-1, 2), 6), axis=0, return_counts=True)
+    assert not (ends % 2).any()  # no wall ends in the open: nothing leaks

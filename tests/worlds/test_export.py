@@ -1,0 +1,102 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+from PIL import Image
+
+from dva_sim.errors import ConfigError
+from dva_sim.worlds import console
+from dva_sim.worlds.export import write_site
+from dva_sim.worlds.site import load_site, map_site
+
+MAPS = Path(__file__).parents[3] / "shared" / "maps"
+
+
+def sides(walls):
+    """Segments in either direction, to a millimetre."""
+    return {frozenset(map(tuple, np.round(w.reshape(2, 2), 3).tolist())) for w in walls}
+
+
+def far(a, b):
+    """How far two lists of things of numbers are apart at most [m, rad]."""
+    return max(np.abs(np.subtract(x[:3], y[:3])).max() for x, y in zip(a, b, strict=True))
+
+
+@pytest.mark.parametrize("name", ["caparica", "campus", "office-block"])
+def test_a_site_written_and_read_again_is_the_same_to_a_millimetre(tmp_path, name):
+    site = load_site(name)
+    again = load_site(write_site(site, tmp_path))
+    assert sides(again.walls) == sides(site.walls)
+    assert np.abs(again.doors - site.doors).max() < 1e-3
+    for one, two in zip(site.rooms, again.rooms, strict=True):
+        assert (one.name, one.ceiling, one.outdoor) == (two.name, two.ceiling, two.outdoor)
+        assert np.abs(one.polygon - two.polygon).max() < 1e-3
+    for one, two in zip((*site.zones, *site.wifi), (*again.zones, *again.wifi), strict=True):
+        assert np.abs(one.polygon - two.polygon).max() < 1e-3
+    assert [w.quality for w in again.wifi] == [w.quality for w in site.wifi]
+    assert [z.use for z in again.zones] == [z.use for z in site.zones]
+    for what in ("robot_bases", "guard_posts", "operator_desks", "exits", "cameras"):
+        assert far(getattr(site, what), getattr(again, what)) < 1e-3
+    assert [(d.name, d.kind) for d in again.detectors] == [(d.name, d.kind) for d in site.detectors]
+    assert [o[:2] for o in again.openings] == [o[:2] for o in site.openings]
+    assert np.mean(again.grid.cells == site.grid.cells) > 0.999
+
+
+@pytest.mark.skipif(not MAPS.is_dir(), reason="recorded maps are not beside the project")
+def test_a_ros_map_becomes_a_drawn_site_with_one_room_and_the_same_walls(tmp_path):
+    site = map_site(MAPS / "depot.yaml", 1, robots=0, guards=0)
+    again = load_site(write_site(site, tmp_path))
+    assert [room.name for room in again.rooms] == ["Floor"]
+    old, new = (shapely.multilinestrings(s.walls.reshape(-1, 2, 2)) for s in (site, again))
+    assert shapely.union_all(new).within(shapely.buffer(old, 1e-3))
+    assert shapely.union_all(old).within(shapely.buffer(new, 1e-3))
+    both = again.grid.reachable(0.3).sum() * again.grid.resolution**2
+    assert both == pytest.approx(site.grid.reachable(0.3).sum() * 0.05**2, rel=0.02)
+
+
+def test_a_folder_that_cannot_be_made_is_told(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(ConfigError, match="cannot be written"):
+        write_site(load_site("caparica"), tmp_path / "file")
+
+
+# --- dva-sim site ----------------------------------------------------------------------
+
+
+def test_show_draws_a_site_and_says_what_it_is(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    console.show("caparica", None, [], coverage=False)
+    line, file = capsys.readouterr().out.splitlines()
+    assert line == (
+        "caparica: 40.0 m x 24.0 m, 15 rooms, 15 doors, 4 exits, 3 robot bases, 3 guard posts, "
+        "2 operator desks, 28 detectors, 3 cameras, 112 wall segments"
+    )
+    assert file == "caparica.png"
+    with Image.open(tmp_path / file) as picture:
+        assert picture.width == 1650
+
+
+def test_show_takes_options_of_a_generated_site_and_a_file(tmp_path, capsys):
+    console.show("office-block", tmp_path / "x.png", ["width_m=24", "depth_m=12"], coverage=True)
+    assert capsys.readouterr().out.startswith("office-block: 24.0 m x 12.0 m, ")
+    assert (tmp_path / "x.png").stat().st_size > 10_000
+
+
+def test_show_refuses_options_of_a_map_and_a_format_that_nobody_knows(tmp_path):
+    Image.fromarray(np.full((60, 80), 254, np.uint8)).save(tmp_path / "hall.pgm")
+    (tmp_path / "hall.yaml").write_text(
+        "image: hall.pgm\nresolution: 0.1\norigin: [0, 0, 0]\n"
+        "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
+    )
+    console.show(str(tmp_path / "hall.yaml"), tmp_path / "hall.png", [], coverage=False)
+    with pytest.raises(ConfigError, match="is not generated and takes no options"):
+        console.show(str(tmp_path / "hall.yaml"), None, ["seed=1"], coverage=False)
+    with pytest.raises(ConfigError, match="cannot be written"):
+        console.show("caparica", tmp_path / "a.hologram", [], coverage=False)
+
+
+def test_export_names_the_file_it_wrote(tmp_path, capsys):
+    console.export("caparica", tmp_path / "new", [])
+    assert capsys.readouterr().out.splitlines()[1] == str(tmp_path / "new" / "caparica.yaml")
+    assert (tmp_path / "new" / "caparica.geojson").is_file()
