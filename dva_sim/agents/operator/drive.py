@@ -125,16 +125,28 @@ class Drive(Work):
         route = self._consider(judged)
         if route is not None:
             # The guess is made when a frame is perceived, so it holds the perceptual delay.
-            self._intend(self._steer(route, judged, seat.strategy))
+            drive, delay = seat.strategy.drive, seat.delay.value
+            usual = lambda way, keep: drive(way, judged, delay, keep)  # noqa: E731
+            self._intend(self._steer(route, judged, delay, usual))
 
-    def _steer(self, route: Route, seen: Observation, strategy: Pursuit) -> Intent:
-        """What to ask for; close quarters are for who knows that a guard holds the robot back."""
-        now, delay, careful = self._clock.now, self._seat.delay.value, self._careful
-        if careful is not None and careful.notice(now, seen, self._intent.speed, delay):
+    def _steer(
+        self, route: Route, seen: Observation, delay: float, usual: Callable[[Route, float], Intent]
+    ) -> Intent:
+        """What to ask for; close quarters are for who knows that a guard holds the robot back.
+
+        Args:
+            route: The way to go.
+            seen: What is seen now.
+            delay: What the whole delay is taken to be [s].
+            usual: How the person drives otherwise, told the way and where to stop before its end.
+        """
+        careful, keep = self._careful, self._keep_off(seen)
+        if careful is None:
+            return usual(route, keep)
+        if careful.notice(self._clock.now, seen, self._intent.speed, delay):
             points = careful.way((seen.x, seen.y), self._goal, self._seat.planner)
             route = self._route = route if points is None else Route(points)
-        how = careful if careful is not None and careful.on else strategy
-        return how.drive(route, seen, delay, self._keep_off(seen))
+        return careful.drive(route, seen, delay, keep) if careful.on else usual(route, keep)
 
     def _look_at_truth(self) -> bool:
         """The oracle's own loop; False ends it."""
@@ -145,7 +157,9 @@ class Drive(Work):
         self._seen_tick = truth.state.tick
         route = self._consider(truth.state)
         if route is not None:
-            self._intend(seat.strategy.drive_by_truth(route, truth, self._keep_off(truth.state)))
+            drive = seat.strategy.drive_by_truth
+            usual = lambda way, keep: drive(way, truth, keep)  # noqa: E731
+            self._intend(self._steer(route, truth.state, Oracle.DELAY, usual))
         return not self.over
 
     def _consider(self, seen: Observation) -> Route | None:
