@@ -37,8 +37,8 @@ EVACUATING, SAFE, DOWN = "evacuating", "safe", "incapacitated"
 NOTICED: Final = Conditions(
     temperature=40.0, heat_flux=1.0, extinction=0.1, co=math.inf, gas=0.01, water=0.02
 )
-"""From any of it on people notice that something is wrong; assumed. Carbon monoxide has no smell,
-fuel gas is given one."""
+"""From any of it on people notice that something is wrong; assumed, but for gas: it is given a
+smell that is noticed at a fifth of its lower explosive limit. Carbon monoxide has none."""
 THROUGH: Final = 0.8  # so near to the middle of an exit one is through [m]
 CHOOSES_AGAIN: Final = 2.0  # no sooner than this after the last choice of a way [s]
 LOOKS_AHEAD: Final = 6.0  # along its way, for what nobody endures [m]

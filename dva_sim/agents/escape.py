@@ -4,8 +4,8 @@ References:
     Radiant heat of 2.5 kW/m^2, which skin stands for some minutes: ISO 13571.
     Carbon monoxide of 1200 ppm, immediately dangerous to life: NIOSH.
     People turn back in smoke through which they see 3 m or less, an extinction of 1 /m by
-    V = 3 / K: T. Jin, Visibility and human behavior in fire smoke, SFPE Handbook. The limits of
-    air temperature, gas (a fifth of methane's lower explosive limit) and water are assumed.
+    V = 3 / K: T. Jin, Visibility and human behavior in fire smoke, SFPE Handbook. Gas: the lower
+    explosive limit of methane. The limits of air temperature and water are assumed.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from dva_sim.worlds.planning import Disc, Planner
 from dva_sim.worlds.site import Site
 
 UNTENABLE: Final = Conditions(
-    temperature=60.0, heat_flux=2.5, extinction=1.0, co=1200.0, gas=0.01, water=1.0
+    temperature=60.0, heat_flux=2.5, extinction=1.0, co=1200.0, gas=0.05, water=1.0
 )
 """Any of it is more than anybody goes into, or stays in."""
 EVERY: Final = 1.0  # a way is looked at so often [m]

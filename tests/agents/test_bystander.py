@@ -105,8 +105,8 @@ def test_the_time_to_get_out_of_an_empty_corridor_is_premovement_and_distance_by
         building.run_until(lambda: one.activity == "safe", 600.0)  # noqa: B023
         late.append(one.out_at - (who.premovement + (14.0 - THROUGH) / who.speed))
     assert min(late) > -0.3  # nobody is faster than possible, but for one look in five a second
-    assert max(late) < 2.0
-    assert np.mean(late) < 1.2
+    assert max(late) < 2.5
+    assert np.mean(late) < 1.5
 
 
 def test_a_second_alarm_makes_nobody_later_or_earlier():

@@ -145,7 +145,7 @@ def test_a_walk_takes_its_length_by_its_speed_and_little_more():
     people = People(hall(20, CORRIDOR))
     walker = people.add((1.0, 1.2), (19.0, 1.2))
     people.run_until(people.all_settled, 30.0)
-    assert people.arrived[0] == pytest.approx(18.0 / SPEED, abs=1.2)
+    assert 18.0 / SPEED < people.arrived[0] < 18.0 / SPEED + 1.6  # to begin and to stop
     assert math.dist(walker.place, (19.0, 1.2)) < 2 * ARRIVED
 
 
@@ -156,7 +156,7 @@ def test_a_slower_pace_takes_longer_in_proportion():
         people.add((1.0, 1.2), (19.0, 1.2)).pace = pace
         people.run_until(people.all_settled, 60.0)
         times.append(people.arrived[0])
-    assert times[1] == pytest.approx(2 * times[0], rel=0.05)
+    assert times[1] == pytest.approx(2 * times[0], rel=0.1)
 
 
 def test_where_there_is_no_physics_the_same_walk_is_walked_by_a_body_that_moves_freely():
@@ -168,7 +168,7 @@ def test_where_there_is_no_physics_the_same_walk_is_walked_by_a_body_that_moves_
     clock.run(5.0)
     assert walker.place == pytest.approx((1.0 + 5.0 * SPEED, 1.2), abs=0.01)
     clock.run(30.0)
-    assert seen == [pytest.approx(18.0 / SPEED, abs=1.2)]
+    assert seen == [pytest.approx(18.0 / SPEED, abs=2.0)]
 
 
 def test_who_stands_costs_nothing():
