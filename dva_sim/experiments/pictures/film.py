@@ -43,14 +43,15 @@ class Film:
         self.speed = max(1.0, round(self.duration / LENGTH_S))
         across = WIDE if len(runs) == 1 else NARROW
         map_height = height_of_map(recordings[0], across)
-        below = 1.9 if inset else 0.75
+        below = 1.7 if inset else 0.75
         size = across * len(runs), map_height + below + LEGEND
         self.figure = new_figure(size)
         grid = self.figure.add_gridspec(2, len(runs), height_ratios=[map_height, below])
+        scenes: list[Scene] = []
         self._parts: list[Any] = []
         for number, run in enumerate(runs):
             ax = self.figure.add_subplot(grid[0, number])
-            self._parts.append(Scene(ax, run, title_of(run.recording), tell=not inset))
+            scenes.append(Scene(ax, run, title_of(run.recording), tell=not inset))
             strip: Any = grid[1, number]
             if inset:
                 eye, rest = strip.subgridspec(1, 2, width_ratios=[1, 1.6])
@@ -58,10 +59,13 @@ class Film:
                 self._parts.append(_Eye(self.figure.add_subplot(eye), run))
                 self._parts.append(_Story(self.figure.add_subplot(story), run.recording))
             self._parts.append(Traffic(self.figure.add_subplot(strip), run.recording))
+        self._parts += scenes
         add_legend(self.figure, runs)
         canvas: Any = self.figure.canvas
         canvas.draw()
         self.figure.set_layout_engine("none")
+        for scene in scenes:
+            scene.freeze(canvas)
         self._canvas, self._background = canvas, canvas.copy_from_bbox(self.figure.bbox)
 
     def __len__(self) -> int:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from dva_sim.experiments.pictures import style
 from dva_sim.experiments.pictures.bodies import Body
 from dva_sim.experiments.pictures.fields import LAYER, Fields
@@ -34,7 +36,7 @@ class Scene:
         self._timeline = moments.recording.recorder.timeline if tell else []
         draw_site(ax, moments.recording.site)
         # What hazards must not cover is drawn after them.
-        self._upper = [artist for artist in ax.get_children() if _stands_out(artist)]
+        self._upper: list[Any] = [artist for artist in ax.get_children() if _stands_out(artist)]
         for artist in self._upper:
             artist.set_animated(True)
         limits = ax.get_xlim(), ax.get_ylim()
@@ -64,6 +66,13 @@ class Scene:
         self._clock.set_text(f"{min(time, self._moments.recording.duration):.1f} s")
         return [*artists, self._told, self._clock]
 
+    def freeze(self, canvas: Any) -> None:
+        """From now on draw what stands still as one sheet: the layout is final."""
+        renderer = type(canvas.get_renderer())(*canvas.get_width_height(), canvas.figure.dpi)
+        for artist in sorted(self._upper, key=lambda artist: artist.get_zorder()):
+            artist.draw(renderer)
+        self._upper = [_Sheet(renderer)]
+
     def fix(self, time: float) -> None:
         """Show a moment [s] for good."""
         shown = {id(artist) for artist in self.show(time)}
@@ -71,6 +80,21 @@ class Scene:
         for artist in children:
             if artist.get_animated():
                 artist.set(animated=False, visible=id(artist) in shown)
+
+
+class _Sheet:
+    """A finished layer, as an artist; lies between hazards and bodies."""
+
+    def __init__(self, renderer: Any) -> None:
+        self._pixels = np.asarray(renderer.buffer_rgba())[::-1].copy()  # from the lowest row up
+
+    def get_zorder(self) -> float:
+        """Over walls and names, under lines of equal heat or gas."""
+        return 4.2
+
+    def draw(self, renderer: Any) -> None:
+        """Lay it over what is there."""
+        renderer.draw_image(renderer.new_gc(), 0, 0, self._pixels)
 
 
 def _stands_out(artist: Artist) -> bool:

@@ -11,9 +11,10 @@ from tempfile import TemporaryFile
 from typing import IO, Any
 
 from dva_sim.errors import ConfigError
+from dva_sim.experiments.pictures import style
 from dva_sim.experiments.pictures.film import FPS, Film
 
-COLOURS = 128  # of a GIF
+COLOURS = 112  # of a GIF
 SAMPLES = 6  # pictures that these are chosen from
 
 
@@ -58,7 +59,7 @@ def _whole(path: Path) -> Iterator[Path]:
 
 
 def _write_gif(film: Film, path: Path) -> None:
-    from PIL import Image
+    from PIL import Image, ImageColor
 
     # One palette, from pictures spread over the run, keeps the file small.
     times = [film.duration * (n + 1) / SAMPLES for n in range(SAMPLES)]
@@ -66,7 +67,11 @@ def _write_gif(film: Film, path: Path) -> None:
     sheet = Image.new("RGB", (samples[0].width, samples[0].height * SAMPLES))
     for number, sample in enumerate(samples):
         sheet.paste(sample, (0, number * sample.height))
-    palette = sheet.quantize(COLOURS, Image.Quantize.MEDIANCUT)
+    most = COLOURS - len(style.SMALL)
+    common = sheet.quantize(most, Image.Quantize.MEDIANCUT).getpalette() or []
+    # Few pixels show a robot: left to chance, its colour would be lost.
+    palette = Image.new("P", (1, 1))
+    palette.putpalette(common[: 3 * most] + [v for c in style.SMALL for v in ImageColor.getrgb(c)])
     pictures = [
         Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE)
         for frame in film.frames()
