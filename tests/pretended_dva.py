@@ -28,7 +28,14 @@ from dva_sim.worlds.geo import Pose
 GUARD, ROBOT, OTHER_ROBOT = id_of("guard", 1), id_of("robot", 1), id_of("robot", 2)
 OPERATOR = id_of("operator", 1)
 # One metre a second, ten seconds to get ready, three to look, twenty to deal with something.
-WALKER = Walker(speed=1.0, mobilisation=10.0, look=3.0, contain=20.0, usual_mobilisation=12.0)
+WALKER = Walker(
+    speed=1.0,
+    mobilisation=10.0,
+    look=3.0,
+    contain=40.0,
+    extinguish=20.0,
+    usual_mobilisation=12.0,
+)
 POST = (1.4, 12.0)  # at the west end of the main corridor, which is straight [m]
 SETTLED = 0.01  # after this, what somebody said in answer has arrived [s]
 

@@ -5,6 +5,9 @@ was on, it tells `failed`, and goes to the nearest of its refuges by a way that 
 But who was sent to look, and has the place in sight, has seen enough: it confirms first. Until
 the guard is there it takes no orders; with such a dose it never takes one again. One who is
 incapacitated stays where it is, and its device answers that it lies down.
+
+What is **contained** is contained from afar: a fire with a hand-held extinguisher, a leak or a
+burst pipe by its valve, which is taken to be no nearer than the air allows to go.
 """
 
 from __future__ import annotations
@@ -24,7 +27,10 @@ from dva_sim.worlds.hazards import Dose
 from dva_sim.worlds.planning import Planner
 
 STATUS_PERIOD, FIRST_STATUS = 2.0, 0.5  # of where a guard is [s]
-NEAR_ENOUGH = 2.0  # from where a guard sees what there is, if nothing stands between [m]
+AT_MOST = 2.0  # from where a guard sees what there is, if nothing stands between [m]
+NEAR_ENOUGH = {"fire": 3.0}  # the stream of a hand-held extinguisher carries so far; assumed [m]
+HAVE_VALVES = "gas_leak", "flood"
+KEEPS_OFF = 5.0  # who shuts a valve keeps so far from what nobody endures [m]
 HERE = 1.0  # who is so near a place stands at it [m]
 STAND_OFF = 10.0
 """Who stands by waits so far from the place [m]: no hazard is dangerous beyond 7 m, one step may
@@ -155,7 +161,7 @@ class GuardAgent:
         if errand.order is None:
             return place, lambda at: False
         if errand.order.task != "stand_by":
-            return place, lambda at: self._sees(at, place)
+            return place, partial(self._is_near_enough, errand.order, place)
         if math.dist(self.walking.place, place) < STAND_OFF:
             return self._post, lambda at: math.dist(at, place) >= STAND_OFF  # too near: back off
         return place, lambda at: math.dist(at, place) <= STAND_OFF
@@ -163,9 +169,17 @@ class GuardAgent:
     def _stands_at(self, place: m.Position) -> bool:
         return math.dist(self.walking.place, self._xy(place)) < HERE
 
-    def _sees(self, at: Point, place: Point) -> bool:
-        """Whether a place is near, and nothing stands between."""
-        near = math.hypot(place[0] - at[0], place[1] - at[1]) <= NEAR_ENOUGH
+    def _is_near_enough(self, order: m.Order, place: Point, at: Point) -> bool:
+        """Whether what is to be looked at, or dealt with, can be so from here."""
+        if order.task == "contain" and order.kind in HAVE_VALVES:
+            ahead = self.walking.places_ahead(1.0, KEEPS_OFF)
+            if any(map(self.exposure.is_bad, ahead)):
+                return True
+        return self._sees(at, place, NEAR_ENOUGH.get(order.kind, AT_MOST))
+
+    def _sees(self, at: Point, place: Point, within: float) -> bool:
+        """Whether a place is so near [m], and nothing stands between."""
+        near = math.hypot(place[0] - at[0], place[1] - at[1]) <= within
         return near and self._planner.line_of_sight(at, place)
 
     # --- what is done there ------------------------------------------------------------
@@ -203,8 +217,11 @@ class GuardAgent:
             self._begin_to_contain(errand)
 
     def _begin_to_contain(self, errand: Errand) -> None:
+        walker, order = self._walker, errand.order
+        is_fire = order is not None and order.kind == "fire"
+        takes = walker.extinguish if is_fire else walker.contain
         self.activity = "containing"
-        self.device.clock.call_after(self._walker.contain, self._contained, errand)
+        self.device.clock.call_after(takes, self._contained, errand)
 
     def _contained(self, errand: Errand) -> None:
         order = errand.order
@@ -253,8 +270,7 @@ class GuardAgent:
 
     def _has_seen(self, order: m.Order) -> bool:
         at, place = self.walking.place, self._xy(order.position)
-        near = math.dist(at, place) <= IN_SIGHT and self._planner.line_of_sight(at, place)
-        return near and self._is_there(order.kind, *place)
+        return self._sees(at, place, IN_SIGHT) and self._is_there(order.kind, *place)
 
     def _withdraw(self) -> None:
         """Go to where it is safe; if that cannot be reached, try again."""

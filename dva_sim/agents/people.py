@@ -21,8 +21,9 @@ class GuardProfile(Config):
         walking_sd_mps: Its standard deviation between persons.
         mobilisation_s: From the order to the first step.
         confirm_look_s: From arrival to being sure.
-        contain_s: From arrival until the danger is over: a young fire put out, a valve or a
-            door shut. Assumed; no measurement stands behind it.
+        contain_s: From arrival until a leak or flood is over: a valve found and shut. Assumed.
+        extinguish_s: From arrival until a young fire is put out. Assumed, as of some discharges
+            of a hand-held extinguisher.
 
     References:
         Walking speed 1.34 m/s (SD 0.26): U. Weidmann, Transporttechnik der Fussgaenger,
@@ -35,6 +36,7 @@ class GuardProfile(Config):
     mobilisation_s: Trait = Trait(median=45.0, spread=0.45)
     confirm_look_s: Trait = Trait(median=3.0, spread=0.3)
     contain_s: Trait = Trait(median=120.0, spread=0.5)
+    extinguish_s: Trait = Trait(median=30.0, spread=0.5)
 
 
 @dataclass(frozen=True)
@@ -45,7 +47,8 @@ class Walker:
         speed: Walking [m/s].
         mobilisation: From an order to the first step [s].
         look: From arrival to being sure [s].
-        contain: From arrival until the danger is over [s].
+        contain: From arrival until a leak or flood is over [s].
+        extinguish: From arrival until a fire is out [s].
         usual_mobilisation: What the guard itself expects of getting ready [s]: as long as
             guards usually need. How long it takes this time shows when it is over.
     """
@@ -54,6 +57,7 @@ class Walker:
     mobilisation: float
     look: float
     contain: float = 60.0
+    extinguish: float = 30.0
     usual_mobilisation: float = 45.0
 
     @classmethod
@@ -64,6 +68,7 @@ class Walker:
             mobilisation=profile.mobilisation_s.draw(rng),
             look=profile.confirm_look_s.draw(rng),
             contain=profile.contain_s.draw(rng),
+            extinguish=profile.extinguish_s.draw(rng),
             usual_mobilisation=profile.mobilisation_s.median,
         )
 
