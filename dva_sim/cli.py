@@ -186,11 +186,12 @@ def site_show(
     coverage: Annotated[
         bool, typer.Option("--coverage", help="Show where Wi-Fi is not good.")
     ] = False,
+    width: Annotated[int, typer.Option(metavar="PIXELS", min=200, max=8000)] = 1650,
 ) -> None:
     """Draw a site and say in a line what it is."""
     from dva_sim.worlds import console
 
-    console.show(name, out, set_ or [], coverage)
+    console.show(name, out, set_ or [], coverage, width)
 
 
 @site.command(name="export")

@@ -12,7 +12,7 @@ from dva_sim.errors import ConfigError
 from dva_sim.worlds.site import Site, load_site, map_site
 
 
-def show(name: str, out: Path | None, changes: Sequence[str], coverage: bool) -> None:
+def show(name: str, out: Path | None, changes: Sequence[str], coverage: bool, width: int) -> None:
     """Draw a site into a PNG file, and say in a line what it is.
 
     Args:
@@ -20,6 +20,7 @@ def show(name: str, out: Path | None, changes: Sequence[str], coverage: bool) ->
         out: The file; `NAME.png` in the working folder if None.
         changes: `key=value` pairs for a site that is generated.
         coverage: Show where the radio link is not good.
+        width: Of the picture [pixels].
 
     Raises:
         ConfigError: the site cannot be read, or the file cannot be written.
@@ -28,7 +29,7 @@ def show(name: str, out: Path | None, changes: Sequence[str], coverage: bool) ->
 
     site = _open(name, parse_changes(changes))
     file = out or Path(f"{Path(name).stem}.png")
-    write_poster(site, file, coverage)
+    write_poster(site, file, coverage, width)
     print(f"{describe(site)}\n{file}")
 
 

@@ -17,28 +17,28 @@ if TYPE_CHECKING:
 LONG_SIDE, MOST_INCHES = 11.0, 18.0  # of the picture [in]
 INCHES_PER_METRE = 0.1
 LEGEND = 0.4  # height [in]
-DOTS = 150  # per inch
 
 
-def write_poster(site: Site, file: Path, coverage: bool = False) -> None:
+def write_poster(site: Site, file: Path, coverage: bool, width: int) -> None:
     """Draw a site into an image file.
 
     Args:
         site: What.
         file: Where; its suffix gives the format.
         coverage: Show where the radio link is not good.
+        width: Of the picture [pixels].
 
     Raises:
         ConfigError: the file cannot be written.
     """
     figure = poster(site, coverage)
     try:
-        figure.savefig(file, dpi=DOTS, facecolor="white")
+        figure.savefig(file, dpi=width / figure.get_figwidth(), facecolor="white")
     except (OSError, ValueError) as error:
         raise ConfigError(f"cannot be written: {error}", file) from error
 
 
-def poster(site: Site, coverage: bool = False) -> Figure:
+def poster(site: Site, coverage: bool) -> Figure:
     """The picture itself."""
     from matplotlib.figure import Figure
 
@@ -94,13 +94,9 @@ def _areas(site: Site, coverage: bool) -> list[Artist]:
         found.append(Patch(fc="none", ec=colour, hatch=hatch, lw=0.6, label=use))
     grades = {area.grade for area in site.wifi} if coverage else set()
     for grade in (grade for grade in COVERAGE if grade in grades):
-        found.append(
-            Patch(
-                fc=COVERAGE[grade],
-                alpha=0.4,
-                label="no Wi-Fi" if grade == "none" else f"{grade} Wi-Fi",
-            )
-        )
+        colour, alpha = COVERAGE[grade]
+        label = "no Wi-Fi" if grade == "none" else f"{grade} Wi-Fi"
+        found.append(Patch(fc=colour, alpha=alpha, label=label))
     return found
 
 

@@ -34,7 +34,8 @@ ZONES = {
     "charging": ("#0072b2", "\\\\\\\\"),
     "assembly": ("#009e73", "oo"),
 }
-COVERAGE = {"fair": "#f0e442", "poor": "#e69f00", "none": "#8f5b8a"}  # good is left blank
+# How coverage is shown: colour and opacity; good is left blank.
+COVERAGE = {"fair": ("#f0e442", 0.14), "poor": ("#e69f00", 0.26), "none": ("#8f5b8a", 0.32)}
 WALL_WIDTH = 0.14  # as drawn [m]
 INK = "#59606a"
 MARGIN = (0.8, 0.012)  # around the site: at least [m], of its width
@@ -221,7 +222,8 @@ def _draw_coverage(ax: Axes, site: Site) -> None:
     for area in reversed(site.wifi):
         polygon = shapely.Polygon(area.polygon)
         if area.grade in COVERAGE:
-            _fill(ax, polygon - above, facecolor=COVERAGE[area.grade], alpha=0.24, lw=0, zorder=1.6)
+            colour, alpha = COVERAGE[area.grade]
+            _fill(ax, polygon - above, facecolor=colour, alpha=alpha, lw=0, zorder=1.6)
         above = above | polygon
 
 
