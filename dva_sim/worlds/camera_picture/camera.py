@@ -18,7 +18,7 @@ from dva_sim.worlds.camera_picture.air import (
     add_water,
     look_up,
 )
-from dva_sim.worlds.camera_picture.floors import HORIZON, Floors
+from dva_sim.worlds.camera_picture.floors import HORIZON, OPEN_AIR, Floors
 from dva_sim.worlds.camera_picture.rooms import Rooms
 from dva_sim.worlds.camera_picture.sprites import Sprite
 from dva_sim.worlds.camera_picture.surfaces import Floats, Hits, Surfaces
@@ -72,6 +72,7 @@ class Camera:
         row = np.arange(height, dtype=np.float32) + 0.5 - height / 2
         self._fall: Floats = (row / self.focal_length).astype(np.float32)
         self._floors = Floors(site, self._rooms, self._fall, eye_height)
+        self._open_air = any(room.outdoor for room in site.rooms)
         self._texels_per_metre = TEXELS / site.ceiling
 
     def picture(
@@ -96,6 +97,8 @@ class Camera:
         colours = self._floors.seen(pose, self._slopes)
         depth = np.repeat(self._floors.depth, self.width, axis=1)
         light = _dim(depth)
+        if self._open_air:
+            np.copyto(light, self._floors.daylight, where=colours >= OPEN_AIR)
         walls, before = self._surfaces.hits(pose, self._slopes)
         self._draw_walls(walls, pose, colours, depth, light)
         self._draw_others(before, pose, colours, depth, light)

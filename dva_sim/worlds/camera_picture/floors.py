@@ -16,9 +16,12 @@ from dva_sim.worlds.site import Site
 
 Bytes = NDArray[np.uint8]
 
+OPEN_AIR = np.uint32(1 << 24)
+
 HORIZON = 60.0  # floors and ceilings end there [m]
 MIDDLE, DISTANT = 5.0, 16.0  # from here on coarser cells do [m]
 TILE, JOINT = 1.0, 0.035  # of a floor [m]
+HAZE = 250.0  # daylight falls off to a half over this distance [m], assumed
 LAMPS = 3.0  # about so far apart [m]
 
 GRASS, PAVING, BARE_FLOOR, LINOLEUM = (
@@ -41,6 +44,7 @@ class Floors:
         eye_height: Of the lens [m].
 
     Attributes:
+        daylight: Light of each row where the sky is above it `(h, 1)`.
         depth: How far ahead each row meets floor or ceiling `(h, 1)` [m].
     """
 
@@ -48,14 +52,25 @@ class Floors:
         self._rooms = rooms
         floor = self._floor(site)
         parts = [floor, _coarser(floor, 4), _coarser(floor, 16), self._lamps(site)]
-        self._colours: Colours = np.concatenate([pack(part).ravel() for part in parts])
+        # A bit above the colours tells what lies under the open sky.
+        steps = (1, 4, 16, 1)
+        open_air = rooms.outdoor & bool(site.rooms)
+        self._colours: Colours = np.concatenate(
+            [
+                (pack(part) | open_air[rooms.numbers[::step, ::step]] * OPEN_AIR).ravel()
+                for part, step in zip(parts, steps, strict=True)
+            ]
+        ).astype(np.uint32)
         above = np.where(fall > 0, eye_height, site.ceiling - eye_height)
         depth = np.minimum(above / np.abs(fall), HORIZON)
         part = np.where(fall > 0, (depth >= MIDDLE) + (depth >= DISTANT), 3)[:, None]
         sizes = np.array([p.shape[:2] for p in parts])
         starts = np.cumsum([0, *sizes.prod(axis=1)[:-1]])
-        cell = rooms.cell * np.array([1, 4, 16, 1])[part]
+        cell = rooms.cell * np.array(steps)[part]
         self.depth: Floats = depth.astype(np.float32)[:, None]
+        sky = 0.94 + 0.2 * np.minimum(np.maximum(fall, -0.4), 0.0)  # deeper higher up
+        daylight = np.where(fall > 0, 1.0 / (1.0 + depth / HAZE), sky)
+        self.daylight: Floats = daylight.astype(np.float32)[:, None]
         self._per_metre: Floats = (1 / cell).astype(np.float32)
         self._scale: Floats = (depth[:, None] / cell).astype(np.float32)
         self._start, self._columns = starts[part].astype(np.int32), sizes[part, 1].astype(np.int32)
@@ -84,11 +99,7 @@ class Floors:
 
     def _floor(self, site: Site) -> Bytes:
         """Tiles in a tint of each room's colour, so that one sees oneself move."""
-        tints = 0.55 * np.array(LINOLEUM) + 0.45 * 255 * self._rooms.palette
-        tints[0] = PAVING if site.rooms else BARE_FLOOR
-        colours = tints[self._rooms.accent[self._rooms.numbers]]
-        if site.rooms:
-            colours[self._rooms.numbers == 0] = GRASS
+        colours = self._tints(site)[self._rooms.numbers]
         rows, columns = self._rooms.numbers.shape
         x = self._rooms.origin[0] + (np.arange(columns) + 0.5) * self._rooms.cell
         y = self._rooms.origin[1] + (np.arange(rows) + 0.5) * self._rooms.cell
@@ -104,6 +115,17 @@ class Floors:
         for post in site.guard_posts:
             self._ring(draw, post.x, post.y, 0.3, POST)
         return np.asarray(image)
+
+    def _tints(self, site: Site) -> NDArray[np.float64]:
+        """Colour of the floor of each room, by its number `(n, 3)`."""
+        tints = 0.55 * np.array(LINOLEUM) + 0.45 * 255 * self._rooms.palette
+        rooms = tints[self._rooms.accent]
+        rooms[self._rooms.outdoor] = PAVING if site.rooms else BARE_FLOOR
+        lawns = [n for n, r in enumerate(site.rooms, 1) if r.outdoor and "lawn" in r.name.lower()]
+        rooms[lawns] = GRASS
+        if site.rooms:
+            rooms[0] = GRASS
+        return rooms
 
     def _ring(self, draw: Any, x: float, y: float, radius: float, colour: Any) -> None:
         """A painted circle on the floor."""
