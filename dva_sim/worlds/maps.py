@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -38,10 +39,10 @@ class OccupancyGrid:
     def to_cell(self, x: float, y: float) -> tuple[int, int]:
         """Row and column of a point [m]; may lie outside of the grid."""
         dx, dy = x - self.origin.x, y - self.origin.y
-        cos, sin = np.cos(self.origin.heading), np.sin(self.origin.heading)
+        cos, sin = math.cos(self.origin.heading), math.sin(self.origin.heading)
         column = (cos * dx + sin * dy) / self.resolution
         row = (cos * dy - sin * dx) / self.resolution
-        return int(np.floor(row)), int(np.floor(column))
+        return math.floor(row), math.floor(column)
 
     def to_xy(self, rows: Any, columns: Any) -> NDArray[np.float64]:
         """Points `(n, 2)` [m] at fractional cell coordinates; a cell's middle is at +0.5."""

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 Points = NDArray[np.float64]
 CEILING = 3.0  # of a room that does not say [m]
+SQUARE = 4.0  # side of a square that remembers which areas are near [m]
 DOOR_HEIGHT = 2.1  # of a door that does not say [m]
 
 
@@ -55,18 +56,25 @@ class Lookup(Generic[T]):
     """
 
     def __init__(self, areas: Sequence[T]) -> None:
+        self._boxes = np.array([area.box for area in areas]).reshape(-1, 4)
         self._areas = areas
-        boxes = np.array([area.box for area in areas]).reshape(-1, 4)
-        self._low, self._high = boxes[:, :2], boxes[:, 2:]
+        self._near: dict[tuple[int, int], list[T]] = {}
 
     def at(self, x: float, y: float) -> T | None:
         """The area around a point [m], or None outside all."""
-        point = (x, y)
-        near = np.all((self._low <= point) & (self._high >= point), axis=1)
-        for index in np.flatnonzero(near).tolist():
-            if self._areas[index].contains(x, y):
-                return self._areas[index]
-        return None
+        square = math.floor(x / SQUARE), math.floor(y / SQUARE)
+        near = self._near.get(square)
+        if near is None:
+            near = self._areas_near(*square)
+            if near:  # else it may be any place on earth
+                self._near[square] = near
+        return next((area for area in near if area.contains(x, y)), None)
+
+    def _areas_near(self, column: int, row: int) -> list[T]:
+        """Those whose box touches a square of a lattice."""
+        low, high = np.array([column, row]) * SQUARE, np.array([column + 1, row + 1]) * SQUARE
+        touch = np.all((self._boxes[:, :2] <= high) & (self._boxes[:, 2:] >= low), axis=1)
+        return [self._areas[index] for index in np.flatnonzero(touch).tolist()]
 
 
 @dataclass(frozen=True, eq=False)

@@ -126,3 +126,10 @@ def test_all_floor_of_the_depot_map_is_one_network_of_blocks():
         reached |= {o.room_b for o in site.openings if o.room_a in reached}
     assert reached == {c.name for c in site.compartments}
     assert all(4 <= c.area <= 100 for c in site.compartments)
+
+
+def test_a_look_up_finds_the_first_area_around_a_point_as_a_search_does():
+    rng, site = np.random.default_rng(8), load_site("campus")
+    for x, y in rng.uniform((-20, -20), (140, 110), (2000, 2)).tolist():
+        names = [room.name for room in site.rooms if room.contains(x, y)]
+        assert site.room_at(x, y) == (names[0] if names else None)
