@@ -4,8 +4,8 @@ What one does, as its `activity` tells:
 
 - **working** at a place, or **walking** to another one, if it is one of those who move around.
 - **alarmed**: it has heard the alarm, or noticed smoke, heat, water or flames itself, and gets
-  ready to leave for its pre-movement time, whichever came first. Air that nobody endures ends
-  that time at once.
+  ready to leave for its pre-movement time, whichever came first. Air that nobody endures, or a
+  fire that can be felt, ends that time at once.
 - **evacuating** to the nearest refuge by the way there, not through what nobody endures; if the
   way ahead becomes so, it chooses again, and so it does when it is blocked for good.
 - **safe**: out.
@@ -35,10 +35,11 @@ WORKING, WALKING, ALARMED = "working", "walking", "alarmed"
 EVACUATING, SAFE, DOWN = "evacuating", "safe", "incapacitated"
 
 NOTICED: Final = Conditions(
-    temperature=40.0, heat_flux=1.0, extinction=0.1, co=math.inf, gas=0.01, water=0.02
+    temperature=40.0, heat_flux=0.5, extinction=0.1, co=math.inf, gas=0.01, water=0.02
 )
 """From any of it on people notice that something is wrong; assumed, but for gas: it is given a
 smell that is noticed at a fifth of its lower explosive limit. Carbon monoxide has none."""
+TOO_NEAR: Final = 1.0  # who feels a fire so hot waits for nothing [kW/m^2]; assumed
 THROUGH: Final = 0.8  # so near to the middle of an exit one is through [m]
 CHOOSES_AGAIN: Final = 2.0  # no sooner than this after the last choice of a way [s]
 LOOKS_AHEAD: Final = 6.0  # along its way, for what nobody endures [m]
@@ -164,7 +165,7 @@ class BystanderAgent:
             ahead = self.walking.places_ahead(1.0, LOOKS_AHEAD)
             if now >= self._chosen + CHOOSES_AGAIN and any(map(self.exposure.is_bad, ahead)):
                 self._choose_way()
-        elif self.exposure.is_too_much:
+        elif self.exposure.is_too_much or self.exposure.conditions.heat_flux >= TOO_NEAR:
             self._leave_at(now)
         elif self.activity != ALARMED and self._notices(now):
             self._tell("notices danger")
@@ -193,8 +194,8 @@ class BystanderAgent:
         if self.activity != EVACUATING:
             return
         self._chosen = self._clock.now
-        here, is_bad = self.walking.place, self.exposure.is_bad
-        escape = choose_escape(self._planner, here, self._refuges, is_bad)
+        here, limits = self.walking.place, self.exposure.limits
+        escape = choose_escape(self._planner, here, self._refuges, limits)
         if escape is None or not self.walking.go(
             escape.goal,
             self._is_out,

@@ -10,6 +10,8 @@ from typing import NamedTuple
 
 from dva_sim.agents.steering import wrap
 
+Point = tuple[float, float]
+
 CAMERA_SCHEME = "zmq+tcp://"  # host, port, topic: where simulated robots publish their frames
 
 
@@ -84,6 +86,16 @@ class HazardSpot(NamedTuple):
     radius: float
 
 
+SEEN_THROUGH = 3.0
+"""Optical depth of smoke through which what does not shine is still made out (T. Jin, Visibility
+and human behavior in fire smoke, SFPE Handbook). Smoke hides no fire: who sees it has found one."""
+
+
+def no_smoke(a: Point, b: Point) -> float:
+    """The optical depth where nothing burns."""
+    return 0.0
+
+
 @dataclass(frozen=True)
 class View:
     """Field of view and range of a camera.
@@ -91,12 +103,14 @@ class View:
     Attributes:
         angle: Whole angle of view [rad].
         range: How far a hazard can be recognised [m].
-        line_of_sight: Whether nothing stands between two places.
+        line_of_sight: Whether no wall stands between two places.
+        smoke: Optical depth of the smoke between two places now.
     """
 
     angle: float
     range: float
-    line_of_sight: Callable[[tuple[float, float], tuple[float, float]], bool]
+    line_of_sight: Callable[[Point, Point], bool]
+    smoke: Callable[[Point, Point], float] = no_smoke
 
     def look(
         self, x: float, y: float, heading: float, hazards: Iterable[HazardSpot]
@@ -112,6 +126,9 @@ class View:
             half_width = math.atan2(hazard.radius, distance)
             if abs(bearing) - half_width > self.angle / 2:
                 continue
-            if self.line_of_sight((x, y), (hazard.x, hazard.y)):
+            here, there = (x, y), (hazard.x, hazard.y)
+            if not self.line_of_sight(here, there):
+                continue
+            if hazard.kind == "fire" or self.smoke(here, there) < SEEN_THROUGH:
                 seen.append(SeenHazard(hazard.kind, hazard.x, hazard.y, distance))
         return tuple(seen)

@@ -24,11 +24,17 @@ UNTENABLE: Final = Conditions(
     temperature=60.0, heat_flux=2.5, extinction=1.0, co=1200.0, gas=0.05, water=1.0
 )
 """Any of it is more than anybody goes into, or stays in."""
+DEADLY: Final = Conditions(
+    temperature=120.0, heat_flux=10.0, extinction=math.inf, co=math.inf, gas=math.inf, water=1.5
+)
+"""Flames and what is next to them: nobody goes through, whatever the other ways are like; in
+10 kW/m^2 skin burns within seconds (ISO 13571), the rest is assumed."""
 EVERY: Final = 1.0  # a way is looked at so often [m]
 KEEPS_OFF: Final = 1.0  # around a bad place of a way [m]
 TRIES: Final = 3  # to find a way around bad places
 
 Point = tuple[float, float]
+Limit = Callable[[Point], bool]
 
 
 class Escape(NamedTuple):
@@ -43,6 +49,11 @@ def is_untenable(conditions: Conditions) -> bool:
     return any(is_ >= most for is_, most in zip(conditions, UNTENABLE, strict=True))
 
 
+def is_deadly(conditions: Conditions) -> bool:
+    """Whether not even who is in smoke already goes there."""
+    return any(is_ >= most for is_, most in zip(conditions, DEADLY, strict=True))
+
+
 def refuges_of(site: Site) -> list[Point]:
     """Where people of a site are safe [m]: its exits; else the guard posts; else robot bases."""
     poses = site.exits or site.guard_posts or site.robot_bases
@@ -50,35 +61,32 @@ def refuges_of(site: Site) -> list[Point]:
 
 
 def choose_escape(
-    planner: Planner, here: Point, refuges: Sequence[Point], is_bad: Callable[[Point], bool]
+    planner: Planner, here: Point, refuges: Sequence[Point], limits: Sequence[Limit]
 ) -> Escape | None:
     """The nearest refuge by the way there, on a way without bad places.
 
     A longer way around bad places is taken if every refuge's shortest way leads through some.
-    If there is none either, the nearest refuge is better than none.
+    If there is none either, less has to do: a way without what the next limit calls bad. If no
+    way keeps even the last limit there is no escape for now.
 
     Args:
         planner: Knows the site.
         here: Where one is; bad places around it count only from the first good one on [m].
         refuges: Where one is safe [m].
-        is_bad: Whether nobody goes through a place.
-
-    Returns:
-        None if no way leads to any refuge.
+        limits: Each says whether one keeps off a place; the strictest first.
     """
     far = {refuge: planner.distance(here, refuge) for refuge in refuges}
     near = sorted((r for r in refuges if far[r] < math.inf), key=lambda r: far[r])
-    for tries in (1, TRIES):
-        for refuge in near:
-            escape = _try(planner, here, refuge, is_bad, tries)
-            if escape is not None:
-                return escape
-    return Escape(near[0]) if near else None
+    for is_bad in limits:
+        for tries in (1, TRIES):
+            for refuge in near:
+                escape = _try(planner, here, refuge, is_bad, tries)
+                if escape is not None:
+                    return escape
+    return None
 
 
-def _try(
-    planner: Planner, here: Point, refuge: Point, is_bad: Callable[[Point], bool], tries: int
-) -> Escape | None:
+def _try(planner: Planner, here: Point, refuge: Point, is_bad: Limit, tries: int) -> Escape | None:
     """A good way to one refuge, keeping off more and more bad places."""
     avoid: tuple[Disc, ...] = ()
     for _ in range(tries):
@@ -92,7 +100,7 @@ def _try(
     return None
 
 
-def _bad_places(way: np.ndarray, is_bad: Callable[[Point], bool]) -> list[Point]:
+def _bad_places(way: np.ndarray, is_bad: Limit) -> list[Point]:
     """The bad ones of some places on a way, after the first good one."""
     steps = max(1, round(EVERY / float(np.hypot(*(way[1] - way[0])) or EVERY)))
     places = [(float(x), float(y)) for x, y in way[::steps]]

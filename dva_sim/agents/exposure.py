@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Final
 
 from dva_sim.agents.device import do_nothing
-from dva_sim.agents.escape import is_untenable
+from dva_sim.agents.escape import Limit, is_deadly, is_untenable
 from dva_sim.agents.walking import Walking
 from dva_sim.clock import Clock
 from dva_sim.worlds.hazards import CLEAR, Conditions, Dose, pace_in_smoke, pace_in_water
@@ -76,3 +76,12 @@ class Exposure:
     def is_bad(self, place: tuple[float, float]) -> bool:
         """Whether it is untenable at a place [m] now."""
         return is_untenable(self._air(*place, self._clock.now))
+
+    def is_deadly(self, place: tuple[float, float]) -> bool:
+        """Whether nobody would go through a place [m] now."""
+        return is_deadly(self._air(*place, self._clock.now))
+
+    @property
+    def limits(self) -> tuple[Limit, Limit]:
+        """What to keep off: what is untenable, or where that cannot be, what is deadly."""
+        return self.is_bad, self.is_deadly

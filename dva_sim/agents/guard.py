@@ -278,8 +278,7 @@ class GuardAgent:
             return
         places = (self._post, *self._refuges)
         safe = [place for place in places if not self.exposure.is_bad(place)]
-        here, is_bad = self.walking.place, self.exposure.is_bad
-        escape = choose_escape(self._planner, here, safe, is_bad)
+        escape = choose_escape(self._planner, self.walking.place, safe, self.exposure.limits)
         again = partial(self.device.clock.call_after, TRIES_AGAIN, self._withdraw)
         if escape is None or not self.walking.go(
             escape.goal, self._is_safe, again, avoid=escape.avoid

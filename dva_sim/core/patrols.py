@@ -18,8 +18,8 @@ class Patrols:
     """Sends idle robots round their beats.
 
     The DVA holds such a robot itself. Its hold yields: whoever asks for the robot gets it, and
-    the higher session ends the patrol. A robot that does not set out is asked again when it has
-    rested as long once more.
+    the higher session ends the patrol. A robot that comes to stand on its round, for whatever
+    reason, is sent home, where it is charged; and when it has rested, on its round again.
 
     Attributes:
         beats: The places of each robot's round, by its label.
@@ -27,6 +27,7 @@ class Patrols:
 
     beats: Mapping[str, tuple[m.Position, ...]] = field(default_factory=dict)
     _idle_since: dict[str, float] = field(default_factory=dict)
+    _on_round: set[str] = field(default_factory=set)
 
     def set_out(
         self, registry: Registry, sessions: Sessions, engaged: Mapping[str, object], now: float
@@ -40,7 +41,13 @@ class Patrols:
             elif now - self._idle_since.setdefault(robot, now) >= REST:
                 self._idle_since[robot] = now
                 session, told = sessions.hold(robot)
-                sends.append(told or self._order(entry, session))
+                if told is not None:
+                    sends.append(told)
+                elif robot in self._on_round:
+                    self._on_round.remove(robot)
+                    sends.append(Send(robot, m.ReturnToBase(), session))
+                else:
+                    sends.append(self._round(entry, session))
         return sends
 
     def held(self, send: Send, registry: Registry, sessions: Sessions) -> list[Send]:
@@ -49,12 +56,13 @@ class Patrols:
         own = sessions.permissions.own
         if entry is None or not isinstance(body, m.PermissionGrant) or body.holder != own:
             return []
-        return [self._order(entry, body.session)]
+        return [self._round(entry, body.session)]
 
     def _with_a_beat(self, registry: Registry) -> Iterator[Entry]:
         if self.beats:
             yield from (e for e in registry.of_type(ROBOT) if e.device.label in self.beats)
 
-    def _order(self, entry: Entry, session: int) -> Send:
+    def _round(self, entry: Entry, session: int) -> Send:
         """Round after round, until somebody else takes the robot."""
+        self._on_round.add(entry.device.id_tag)
         return Send(entry.device.id_tag, m.Patrol(self.beats[entry.device.label], 0), session)

@@ -89,7 +89,7 @@ class Machines:
             profile.processing_s if robot.processing_s is None else robot.processing_s,
             camera.rate_hz,
             camera.frame_bytes,
-            View(angle, camera.range_m, stage.planner.line_of_sight),
+            View(angle, camera.range_m, stage.planner.line_of_sight, self._smoke),
             self._spots,
             make_ports(
                 configs, sources, lambda what: stage.streams.fresh(f"{body.name}/sensor/{what}")
@@ -98,6 +98,9 @@ class Machines:
             encode=camera.encode_s,
             charge=power.share,
         )
+
+    def _smoke(self, a: tuple[float, float], b: tuple[float, float]) -> float:
+        return self._around.optical_depth(a, b, self._stage.clock.now)
 
     def _look_after(self, body: RobotBody, power: Power) -> None:
         """Once a second: is there power, and is the floor wet?"""

@@ -13,7 +13,7 @@ from dva_sim.agents.guard import GuardAgent
 from dva_sim.agents.legs import RADIUS
 from dva_sim.agents.people import Occupant, Walker
 from dva_sim.agents.walking import Walking
-from dva_sim.errors import ConfigError
+from dva_sim.agents.workplaces import draw_places
 from dva_sim.scenario import bystander_profile, guard_profile
 from dva_sim.simulation.stage import Stage, place_of
 from dva_sim.worlds.geo import Pose
@@ -21,12 +21,8 @@ from dva_sim.worlds.hazards import Surroundings
 from dva_sim.worlds.physics import PersonBody, World
 
 PLACES = 3  # where a bystander works, by turns
-APART = 0.7  # from everybody else at the start [m]
-TRIES = 200
 FLAMES_SEEN = 15.0  # from so far, if nothing stands between and smoke lets one see [m]
-SEEN_THROUGH = 3.0
-"""Optical depth of smoke through which a flame is still seen: visibility times extinction is 8 for
-what shines by itself and 3 for what does not (G. Jin, SFPE Handbook); the lower one is taken."""
+FLAMES_THROUGH = 8.0  # optical depth at which what shines is lost in smoke (T. Jin, SFPE Handbook)
 
 Point = tuple[float, float]
 
@@ -56,6 +52,7 @@ class People:
         self._is_there, self._contain = is_there, contain
         self._air: Air = around.at if around.has_any else clean_air
         self._refuges = refuges_of(stage.site)
+        self._first_places: list[Point] = []
 
     def add_guard(self, number: int) -> GuardAgent:
         """The `number`-th guard, at its post; it registers and is on duty.
@@ -115,13 +112,12 @@ class People:
 
     def _places(self, name: str) -> list[Point]:
         """Where a bystander works; at the first nobody stands yet."""
-        luck, site = self._stage.streams[f"{name}/places"], self._stage.site
-        for _ in range(TRIES):
-            x, y = site.sample_free(luck, APART / 2)
-            if not self._world.neighbours(x, y, APART):
-                others = [site.sample_free(luck, APART / 2) for _ in range(PLACES - 1)]
-                return [(x, y), *others]
-        raise ConfigError(f"site {site.name!r} has no place for {name}: it is full of people")
+        stage = self._stage
+        starts = (*stage.site.guard_posts, *stage.site.robot_bases)
+        taken = [*((pose.x, pose.y) for pose in starts), *self._first_places]
+        places = draw_places(stage.site, stage.streams[f"{name}/places"], PLACES, taken)
+        self._first_places.append(places[0])
+        return places
 
     def _sees_flames(self, x: float, y: float, time: float) -> bool:
         sees = self._stage.planner.line_of_sight
@@ -129,6 +125,6 @@ class People:
             spot.kind == "fire"
             and math.dist((x, y), (spot.x, spot.y)) < FLAMES_SEEN
             and sees((x, y), (spot.x, spot.y))
-            and self._around.optical_depth((x, y), (spot.x, spot.y), time) < SEEN_THROUGH
+            and self._around.optical_depth((x, y), (spot.x, spot.y), time) < FLAMES_THROUGH
             for spot in self._spots(time)
         )

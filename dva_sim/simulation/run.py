@@ -148,8 +148,10 @@ class Run:
 
     def _reception(self, robot: str) -> Reception | None:
         """The radio link's quality where a robot was at the last tick of the physics."""
-        x, y, _ = self.field.robots[robot].body.pose()
-        here = self.stage.site.link_quality(x, y)
+        known = self.field.robots.get(robot)  # it talks before the next one has been placed
+        if known is None:
+            return None
+        here = self.stage.site.link_quality(known.body.x, known.body.y)
         return None if here is None else here.quality
 
     def _link_between(self, source: str, destination: str) -> tuple[Link, Link]:

@@ -141,7 +141,7 @@ def test_forty_people_in_a_room_need_the_time_that_its_door_takes_and_no_less():
     "conditions",
     [
         CLEAR._replace(extinction=0.2),
-        CLEAR._replace(heat_flux=1.2),
+        CLEAR._replace(heat_flux=0.7),
         CLEAR._replace(water=0.05),
         CLEAR._replace(temperature=45.0),
     ],
@@ -153,6 +153,14 @@ def test_who_notices_smoke_heat_or_water_gets_ready_without_an_alarm(conditions)
     assert one.activity == "alarmed"
     assert one.leaves_at == pytest.approx(4.0 + PREMOVEMENT, abs=PERIOD)
     assert building.told == ["notices danger"]
+
+
+def test_who_feels_a_fire_waits_for_nothing():
+    building = Building()
+    one = building.bystander(air=from_then_on(4.0, CLEAR._replace(heat_flux=1.2)))
+    building.pass_time(6.0)
+    assert one.activity == "evacuating"
+    assert one.leaves_at == pytest.approx(4.0, abs=PERIOD)
 
 
 def test_who_sees_flames_gets_ready_and_nobody_smells_carbon_monoxide():
@@ -202,22 +210,44 @@ def test_a_bad_place_is_walked_around_where_there_is_room():
     def is_bad(at):
         return math.dist(at, (10.0, 5.0)) < 1.5
 
-    escape = choose_escape(planner, (2.0, 5.0), [(18.0, 5.0)], is_bad)
+    escape = choose_escape(planner, (2.0, 5.0), [(18.0, 5.0)], [is_bad])
     way = planner.path((2.0, 5.0), escape.goal, escape.avoid)
     assert escape.avoid
     assert not any(is_bad(at) for at in way)
 
 
-def test_who_has_no_good_way_takes_the_nearest_and_who_has_none_gets_none():
+def test_who_has_no_good_way_takes_the_nearest_that_is_not_deadly_and_else_waits():
     planner = Planner(hall(20, 10), 0.3)
-    escape = choose_escape(planner, (2.0, 5.0), [(18.0, 5.0), (8.0, 5.0)], lambda at: at[0] > 5.0)
+    refuges = [(18.0, 5.0), (8.0, 5.0)]
+
+    def bad(at):
+        return at[0] > 5.0
+
+    def deadly(at):
+        return 5.5 < at[0] < 8.5
+
+    escape = choose_escape(planner, (2.0, 5.0), refuges, [bad, lambda at: False])
     assert (escape.goal, escape.avoid) == ((8.0, 5.0), ())
-    assert choose_escape(planner, (2.0, 5.0), [(500.0, 5.0)], lambda at: False) is None
+    assert choose_escape(planner, (2.0, 5.0), refuges, [bad, deadly]) is None
+    assert choose_escape(planner, (2.0, 5.0), [(500.0, 5.0)], [lambda at: False]) is None
+
+
+def test_nobody_walks_through_flames_to_get_out_of_smoke():
+    planner = Planner(hall(20, 10), 0.3)
+
+    def flames(at):
+        return math.dist(at, (10.0, 5.0)) < 1.5
+
+    escape = choose_escape(planner, (2.0, 5.0), [(18.0, 5.0)], [lambda at: at[0] > 3.0, flames])
+    way = planner.path((2.0, 5.0), escape.goal, escape.avoid)
+    assert not any(flames(at) for at in way)
 
 
 def test_who_stands_in_smoke_may_go_through_it_to_clean_air():
     planner = Planner(hall(20, 3), 0.3)
-    escape = choose_escape(planner, (5.0, 1.5), [(18.0, 1.5), (1.0, 1.5)], lambda at: 4 < at[0] < 9)
+    escape = choose_escape(
+        planner, (5.0, 1.5), [(18.0, 1.5), (1.0, 1.5)], [lambda at: 4 < at[0] < 9]
+    )
     assert escape.goal == (1.0, 1.5)
 
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
+import math
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dva_sim.agents.camera import Frame, Observation, SeenHazard
+from dva_sim.agents.camera import Frame, HazardSpot, Observation, SeenHazard, View
 
 FIRE = SeenHazard("fire", 4.0, 5.0, 1.5)
 FRAME = Frame(Observation(86_320, 1.0, 2.0, 0.5, 0.4, -0.1, (FIRE,)), 12.5)
@@ -42,3 +43,12 @@ def test_what_is_no_frame_is_none(data: bytes) -> None:
 @given(st.binary(max_size=200))
 def test_any_bytes_are_a_frame_or_none(data: bytes) -> None:
     assert Frame.unpack(data) is None or isinstance(Frame.unpack(data), Frame)
+
+
+@pytest.mark.parametrize(
+    ("kind", "depth", "seen"),
+    [("gas_leak", 2.9, True), ("gas_leak", 3.1, False), ("fire", 50.0, True)],
+)
+def test_smoke_hides_everything_but_that_it_burns(kind: str, depth: float, seen: bool) -> None:
+    view = View(math.radians(70), 6.0, lambda a, b: True, lambda a, b: depth)
+    assert bool(view.look(0.0, 0.0, 0.0, [HazardSpot(kind, 3.0, 0.0, 0.5)])) is seen

@@ -74,14 +74,21 @@ def test_nobody_is_told_that_the_dva_itself_holds_a_robot_no_longer() -> None:
     assert {send.to for send in office.no([grant], REST)} == {ROBOT}
 
 
-def test_a_robot_that_did_not_set_out_is_asked_again_when_it_has_rested() -> None:
+def test_a_robot_that_comes_to_stand_is_sent_home_and_then_round_again() -> None:
     office = PatrolOffice()
-    office.tick(0.0)
-    [grant] = office.tick(REST)
-    [patrol] = office.ok([grant], REST)
-    office.no([patrol], REST)
-    assert office.tick(2.0 * REST - 0.1) == []
-    assert office.tick(2.0 * REST) == [patrol]
+    session = sent_out(office)
+    office.tick(15.0)
+    for start in (20.0, 50.0):
+        office.is_in("Idle", start)
+        assert office.tick(start) == []
+        assert office.tick(start + REST) == [Send(ROBOT, m.ReturnToBase(), session)]
+        office.is_in("Mission", start + REST)
+        assert office.tick(start + REST) == []
+        office.is_in("Idle", start + REST)
+        office.tick(start + REST)
+        assert office.tick(start + 2.0 * REST) == [Send(ROBOT, m.Patrol(BEAT, 0), session)]
+        office.is_in("Mission", start + 2.0 * REST)
+        office.tick(start + 2.0 * REST)
 
 
 def test_a_robot_that_comes_back_from_an_order_takes_up_its_round() -> None:
