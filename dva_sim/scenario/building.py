@@ -8,9 +8,11 @@ from typing import Any
 
 from dva_sim import config, resources
 from dva_sim.config import Document, Fail, load_yaml
+from dva_sim.errors import ConfigError
 from dva_sim.scenario.names import check_names, locate_policy
 from dva_sim.scenario.profiles import robot_profiles
 from dva_sim.scenario.scenario import Scenario
+from dva_sim.worlds.site import load_site
 
 FOLDER = "experiments/scenarios"
 
@@ -42,6 +44,7 @@ def build(
 def _complete(scenario: Scenario, error: Fail) -> Scenario:
     """With what follows from the profiles; refuses what does not go together."""
     check_names(scenario, error)
+    _check_options(scenario, error)
     processing = {profile.processing_s for profile in robot_profiles(scenario)}
     longest = scenario.robot.processing_s
     if longest is None:
@@ -51,6 +54,15 @@ def _complete(scenario: Scenario, error: Fail) -> Scenario:
             scenario = scenario.model_copy(update={"robot": robot})
     _check_timeout(scenario, longest, error)
     return scenario
+
+
+def _check_options(scenario: Scenario, error: Fail) -> None:
+    """Options of a site say what it becomes, so it has to be made to judge them."""
+    if scenario.site.options and scenario.site.map is None:
+        try:
+            load_site(scenario.site.name, scenario.site.options)
+        except ConfigError as problem:
+            raise error(problem.problem, ("site", "options")) from None
 
 
 def _check_timeout(scenario: Scenario, processing: float, error: Fail) -> None:

@@ -17,7 +17,7 @@ from dva_sim.worlds.site import Site, load_site, map_site
 def site_of(scenario: Scenario, seed: int) -> Site:
     """The site a scenario plays on; a bare map places its bases by `seed`."""
     if scenario.site.map is None:
-        return load_site(scenario.site.name)
+        return load_site(scenario.site.name, scenario.site.options)
     team = max(1, scenario.robot.count), max(1, scenario.guard.count)
     return map_site(scenario.site.map, seed, robots=team[0], guards=team[1])
 
