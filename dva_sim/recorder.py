@@ -111,6 +111,7 @@ class Recorder:
         self.counters: Counter[str] = Counter()
         self.violations: Counter[str] = Counter()
         self.drives: list[DriveLog] = []
+        self.newest_drive: dict[str, DriveLog] = {}  # of each robot
         self.views: dict[str, list[TrackPoint]] = defaultdict(list)
         self.traffic: list[tuple[float, str, str, int]] | None = [] if keep_traffic else None
         self.exposure: dict[str, float] = defaultdict(float)
@@ -151,6 +152,11 @@ class Recorder:
             drive.applied.append(
                 Applied(issued.made, issued.sent, arrived, now, until, issued.sample_age)
             )
+
+    def drive_ordered(self, drive: DriveLog) -> None:
+        """An operator shall drive a robot."""
+        self.drives.append(drive)
+        self.newest_drive[drive.robot] = drive
 
     def drive_begins(self, source: str) -> None:
         """Forget the commands of a phone's earlier drives that were never applied."""

@@ -29,6 +29,7 @@ _SESSION = "(0|[1-9][0-9]{0,19})"
 _TICK = "(0|[1-9][0-9]{0,15})"
 _CODE = "(0|[1-9][0-9]{0,2})"
 _TEXT = "([ -%'-;=?-~]{0,256})"
+_NAME = "([ -%'-;=?-~]{1,64})"
 _MODE = "(Idle|Mission|Teleoperation)"
 
 
@@ -52,9 +53,12 @@ _SET_TELEOP = (
     f"<TeleOp><SetTeleOp><Speed>{_BELOW_100}</Speed><TurnRate>{_BELOW_100}</TurnRate>"
     f"(?:<SeenTick>{_TICK}</SeenTick>)?</SetTeleOp></TeleOp>"
 )
+_POSITION = (
+    f"<Position><Latitude>{_LATITUDE}</Latitude><Longitude>{_LONGITUDE}</Longitude></Position>"
+)
+_PERSON = f"<PersonStatus><Activity>{_NAME}</Activity>{_POSITION}</PersonStatus>"
 _STATUS = (
-    f"<RobotStatus><Mode>{_MODE}</Mode><Position><Latitude>{_LATITUDE}</Latitude>"
-    f"<Longitude>{_LONGITUDE}</Longitude></Position><Heading>{_HEADING}</Heading>"
+    f"<RobotStatus><Mode>{_MODE}</Mode>{_POSITION}<Heading>{_HEADING}</Heading>"
     f"<Speed>{_BELOW_100}</Speed><TurnRate>{_BELOW_100}</TurnRate><Tick>{_TICK}</Tick>"
     "</RobotStatus>"
 )
@@ -87,6 +91,11 @@ def _status(groups: _Groups) -> m.RobotStatus | None:
     )
 
 
+def _person(groups: _Groups) -> m.PersonStatus:
+    activity, latitude, longitude = groups
+    return m.PersonStatus(activity.decode(), m.Position(float(latitude), float(longitude)))
+
+
 def _reply(groups: _Groups) -> m.Reply | None:
     answers, code, text = groups
     if int(answers) > MAX_UINT32:
@@ -108,6 +117,7 @@ _READERS: Final[dict[bytes, tuple[_Match, Callable[[_Groups], m.Body | None]]]] 
     b"</Timestamp></HBMsg></msg>"[-_LAST:]: (_whole(_HEARTBEAT), lambda groups: m.Heartbeat()),
     b"</TeleOp></SimpleMsg></msg>"[-_LAST:]: (_whole(_simple(_SET_TELEOP)), _set_teleop),
     b"</RobotStatus></SimpleMsg></msg>"[-_LAST:]: (_whole(_simple(_STATUS)), _status),
+    b"</PersonStatus></SimpleMsg></msg>"[-_LAST:]: (_whole(_simple(_PERSON)), _person),
     b"</reply></SimpleMsg></msg>"[-_LAST:]: (_whole(_simple(_REPLY)), _reply),
 }
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 from dva_sim.agents.bystander import BystanderAgent
 from dva_sim.agents.camera import HazardSpot
@@ -22,6 +23,8 @@ from dva_sim.worlds.physics import World
 
 PHYSICS_TICK = 0.04  # two centimetres at top speed [s]
 SAME_PLACE = 4.0  # what is so near a place is what is there [m]
+
+Danger = tuple[tuple[float, float], float]  # the middle and the radius of a place to keep off [m]
 
 
 class Field:
@@ -79,15 +82,15 @@ class Field:
 
     def newest_drive(self, robot: str) -> DriveLog | None:
         """The log of a robot's newest drive, where its operator's recorder is ours."""
-        drives = self.stage.recorder.drives
-        return next((d for d in reversed(drives) if d.robot == robot), None)
+        return self.stage.recorder.newest_drive.get(robot)
 
     def in_danger(self, x: float, y: float, now: float) -> bool:
         """Whether a place [m] is within the danger radius of a hazard."""
-        return any(
-            math.dist(i.hazard.position, (x, y)) < i.hazard.danger_radius(now)
-            for i in self._going_on(now)
-        )
+        return is_inside(self.dangers(now), x, y)
+
+    def dangers(self, now: float) -> list[Danger]:
+        """Where people should not be."""
+        return [(i.hazard.position, i.hazard.danger_radius(now)) for i in self._going_on(now)]
 
     # --- what happens ------------------------------------------------------------------
 
@@ -159,3 +162,8 @@ class Field:
     def _is_there(self, kind: str, x: float, y: float) -> bool:
         spots = self._spots(self.stage.clock.now)
         return any(s.kind == kind and math.dist((s.x, s.y), (x, y)) < SAME_PLACE for s in spots)
+
+
+def is_inside(dangers: Iterable[Danger], x: float, y: float) -> bool:
+    """Whether a place [m] is within one of them."""
+    return any(math.dist(middle, (x, y)) < radius for middle, radius in dangers)

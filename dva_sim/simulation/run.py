@@ -15,7 +15,7 @@ from dva_sim.network.virtual import VirtualNetwork
 from dva_sim.recorder import Recorder, TrackPoint
 from dva_sim.scenario import Scenario
 from dva_sim.simulation.control_room import add_dva, add_operator
-from dva_sim.simulation.field import Field
+from dva_sim.simulation.field import Danger, Field, is_inside
 from dva_sim.simulation.names import id_of
 from dva_sim.simulation.recording import PersonLog, Recording, event_about
 from dva_sim.simulation.stage import Stage
@@ -170,10 +170,11 @@ class Run:
         now = self.clock.now
         self.field.world.advance_to(now)
         self._watch_robots(now)
+        dangers = self.field.dangers(now)
         for guard in self.field.guards:
-            self._watch_person(guard.device.label, guard, now)
+            self._watch_person(guard.device.label, guard, now, dangers)
         for bystander in self.field.bystanders:
-            self._watch_person(bystander.name, bystander, now)
+            self._watch_person(bystander.name, bystander, now, dangers)
         deadline = self.scenario.dispatch.rules().escalate_after
         for rule, what in broken_event_rules(self.dva.desk.book, deadline, now):
             self.recorder.violated(rule, now, "dva", what)
@@ -192,9 +193,11 @@ class Run:
             for rule, what in broken_rules(robot, drive, self.scenario.robot, mission, now):
                 recorder.violated(rule, now, label, what)
 
-    def _watch_person(self, name: str, who: GuardAgent | BystanderAgent, now: float) -> None:
+    def _watch_person(
+        self, name: str, who: GuardAgent | BystanderAgent, now: float, dangers: list[Danger]
+    ) -> None:
         x, y = who.walking.place
         if who.activity != SAFE:
             self.recorder.tracks[name].append(TrackPoint(now, x, y, who.heading, who.activity))
-            if self.field.in_danger(x, y, now):
+            if is_inside(dangers, x, y):
                 self.recorder.exposure[name] += self._period

@@ -77,8 +77,7 @@ class Planner:
 
     def distance(self, start: Point, goal: Point) -> float:
         """Length of that way [m]; infinite if there is none."""
-        way = self._roadmap.way(_plain(start), _plain(goal), self.line_of_sight)
-        return math.inf if way is None else float(np.hypot(*np.diff(way, axis=0).T).sum())
+        return self._roadmap.length(_plain(start), _plain(goal), self.line_of_sight)
 
     def line_of_sight(self, a: Point, b: Point) -> bool:
         """Whether no wall stands between two places [m]."""
@@ -126,6 +125,7 @@ class Roadmap:
         self._clearances = room.ravel()
         self._fields: OrderedDict[Hashable, tuple[Floats, NDArray[np.int32]]] = OrderedDict()
         self._ways: OrderedDict[Hashable, Floats | None] = OrderedDict()
+        self._lengths: OrderedDict[Hashable, float] = OrderedDict()
 
     def around(self, discs: Sequence[Disc]) -> Roadmap:
         """The same floor with some things standing on it."""
@@ -163,6 +163,15 @@ class Roadmap:
     def way(self, start: Point, goal: Point, sees: Callable[[Point, Point], bool]) -> Floats | None:
         """The finished way between two points [m], kept for the next time."""
         return _kept(self._ways, (start, goal), KEPT_PATHS, lambda: self._solve(start, goal, sees))
+
+    def length(self, start: Point, goal: Point, sees: Callable[[Point, Point], bool]) -> float:
+        """Of that way [m]; infinite if there is none."""
+
+        def measure() -> float:
+            way = self.way(start, goal, sees)
+            return math.inf if way is None else float(np.hypot(*np.diff(way, axis=0).T).sum())
+
+        return _kept(self._lengths, (start, goal), KEPT_PATHS, measure)
 
     def _solve(
         self, start: Point, goal: Point, sees: Callable[[Point, Point], bool]

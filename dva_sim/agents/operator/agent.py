@@ -99,7 +99,7 @@ class OperatorAgent:
         device = self.device
         log = DriveLog(order.device, device.id_tag, order.event_id, self._ordered)
         log.human_delay = self._seat.person.perceptual_delay + self._seat.person.hand_lag
-        device.recorder.drives.append(log)
+        device.recorder.drive_ordered(log)
         drive = self._drive = self._kind(self._seat, order, log, self._finish)
         robot = device.label_of(order.device)
         device.tell(f"shall {drive.wish} {robot} to event {order.event_id}", "order")
