@@ -70,6 +70,11 @@ class Route:
         """Whole way [m]."""
         return self._at[-1]
 
+    @property
+    def left(self) -> float:
+        """Way left from the beginning of the piece that one was on when one last looked [m]."""
+        return self._at[-1] - self._at[self._segment]
+
     def ahead(self, x: float, y: float, heading: float, look_ahead: float) -> Ahead:
         """What to aim at from a pose; never steps back along the route.
 

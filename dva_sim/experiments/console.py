@@ -107,7 +107,8 @@ def _summarise(recording: Recording, took: float) -> None:
         say(f"{row['kind']}: {row['outcome']}{who}{response if known else ''}")
     row = drive_measures(recording)
     if "commands_sent" in row:
-        say(f"robots: {row['outcome']} in {row['attempts']} attempt(s), {_driven(row)}")
+        cause = f" ({row['cause']})" if row["cause"] not in ("", row["outcome"]) else ""
+        say(f"robots: {row['outcome']}{cause} in {row['attempts']} attempt(s), {_driven(row)}")
     if recording.people:
         say(f"people: {_fared(run_row(recording), recording)}")
     broken = sum(recording.recorder.violations.values())

@@ -89,7 +89,16 @@ def drive_measures(recording: Recording) -> Row:
     time = ended - first.ordered if confirmed else recording.scenario.horizon_s
     row: Row = {"confirmed": confirmed, "outcome": last.outcome, "drive_time_s": time}
     row |= {"attempts": len(attempts)} | _body_measures(attempts, recording)
+    row["cause"] = "" if confirmed else _cause(row, attempts, recording)
     return row | _command_measures(attempts, recording)
+
+
+def _cause(row: Row, attempts: list[DriveLog], recording: Recording) -> str:
+    """Why an event was not confirmed: a robot without power or jammed, else how it ended."""
+    bodies = [recording.robots[drive.robot].body for drive in attempts]
+    if not all(body.powered for body in bodies):
+        return "battery"
+    return "jammed" if row["jams"] else str(row["outcome"])
 
 
 def _body_measures(attempts: list[DriveLog], recording: Recording) -> Row:

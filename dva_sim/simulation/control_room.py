@@ -12,9 +12,8 @@ from dva_sim.agents.operator.agent import OperatorAgent
 from dva_sim.agents.operator.drive import Drive
 from dva_sim.agents.operator.person import draw_person
 from dva_sim.agents.operator.seat import DriverSeat, OperatorSetup
-from dva_sim.agents.operator.strategies import STRATEGIES, Oracle, Reach, Truth
+from dva_sim.agents.operator.strategies import STRATEGIES, Oracle, Truth
 from dva_sim.agents.operator.supervise import Supervise
-from dva_sim.agents.profile import RobotProfile
 from dva_sim.agents.robot import EXPECTED_READY, EXPECTED_SPEED
 from dva_sim.agents.tilt import Phone
 from dva_sim.core.access import Access, AccessRule
@@ -167,10 +166,8 @@ def add_operator(
     scenario, config = stage.scenario, stage.scenario.operator
     device = stage.device("operator", number)
     person = draw_person(population(scenario), config.population_seed, config.person + number - 1)
-    slowest = min(stage.robots, key=lambda robot: robot.max_speed_mps, default=RobotProfile())
-    reach = Reach(slowest.max_speed_mps, slowest.max_turn_rate_rad_s)
-    strategy = STRATEGIES[config.strategy](person, reach)
-    needs_truth = isinstance(strategy, Oracle)
+    strategy = STRATEGIES[config.strategy]
+    needs_truth = strategy is Oracle
     if needs_truth and truth is None:
         raise ConfigError("operator.strategy 'oracle' knows the truth: only in virtual time")
     command = scenario.command
@@ -180,13 +177,14 @@ def add_operator(
         command.timeout_s,
         command.attempts,
         truth=truth if needs_truth else None,
-        guarded=reach if scenario.control == "coordinated" else None,
+        guarded=scenario.control == "coordinated",
     )
     seat = DriverSeat(
         device,
         person,
         Phone(phone_profile(scenario), person.hand_lag, stage.streams[f"{device.label}/phone"]),
         strategy,
+        stage.reach,
         stage.planner,
         setup,
         stage.streams[f"{device.label}/judgement"],

@@ -9,6 +9,7 @@ import numpy as np
 import shapely
 
 from dva_sim.agents.device import Device
+from dva_sim.agents.operator.strategies import Reach
 from dva_sim.clock import Clock
 from dva_sim.core.registry import DETECTOR, GUARD, OPERATOR, ROBOT
 from dva_sim.errors import ConfigError
@@ -61,6 +62,10 @@ class Stage:
             "guard": self.scenario.guard.count,
             "operator": self.scenario.operator.count,
         }
+        self._specs = {
+            id_of("robot", number): profile.drive_spec()
+            for number, profile in enumerate(self.robots, 1)
+        }
         self.labels[DVA] = label_of("dva", 1)
         for kind, count in counts.items():
             for number in range(1, count + 1):
@@ -70,6 +75,11 @@ class Stage:
     def clock(self) -> Clock:
         """The clock that everybody shares."""
         return self.network.clock
+
+    def reach(self, robot: str) -> Reach:
+        """What a robot can do, by its id, as its operator has been taught."""
+        spec = self._specs[robot]
+        return Reach(spec.max_speed, spec.max_turn_rate, spec.drive(spec).turning_radius)
 
     def device(self, kind: str, number: int) -> Device:
         """A new device: its identity and ways to talk."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 from dva_sim.agents.camera import Observation
@@ -20,6 +21,8 @@ STILL = 0.02  # a robot that moves less stands [m/s, rad/s]
 ASKED_SPEED, ASKED_TURN = 0.05, 0.1  # from here on one expects to see it move [m/s, rad/s]
 STUCK_AFTER = 4.0  # standing for so long though asked to drive, a person plans anew [s]
 LET_GO_FOR = 1.0  # one who sees no effect levels the phone for so long, and tilts again [s]
+NEARER = 0.5  # less is no progress [m]
+NO_NEARER_FOR = 90.0  # of no progress; then a person gives up on the robot [s]; assumed
 GIVE_UP_AFTER = 4  # after so many attempts in a row without any motion, the link is lost
 KEEP_OFF = 1.2  # distance kept to the event [m]
 
@@ -48,11 +51,13 @@ class Drive(Work):
         self._route: Route | None = None
         self._intent = Intent(0.0, 0.0)
         self._seen_tick: int | None = None
-        guarded = seat.setup.guarded
-        self._careful = Careful(seat.person, guarded) if guarded is not None else None
+        reach = seat.reach(self.robot)
+        self._strategy = seat.strategy(seat.person, reach)
+        self._careful = Careful(seat.person, reach) if seat.setup.guarded else None
         self._standing_since: float | None = None
         self._let_go_until = 0.0
         self._without_effect = 0
+        self._least_left, self._nearer_at = math.inf, 0.0
 
     def begin(self) -> None:
         """The robot has agreed to be driven: look, and tilt."""
@@ -63,7 +68,7 @@ class Drive(Work):
         self._sender = self._make_sender()
         self._sender.start()
         self._clock.every(1.0, self._watch_picture)
-        if isinstance(seat.strategy, Oracle):
+        if isinstance(self._strategy, Oracle):
             self._clock.every(Oracle.DELAY, self._look_at_truth)
 
     def beginning(self) -> m.Body:
@@ -77,7 +82,7 @@ class Drive(Work):
     def _see(self, observation: Observation) -> None:
         """A frame is on the screen; the person perceives it a little later."""
         self._seen_tick = observation.tick
-        if self._sender is not None and isinstance(self._seat.strategy, Pursuit):
+        if self._sender is not None and isinstance(self._strategy, Pursuit):
             delay = self._seat.person.perceptual_delay
             self._clock.call_after(delay, self._perceive, observation)
 
@@ -117,7 +122,7 @@ class Drive(Work):
     def _perceive(self, observation: Observation) -> None:
         """A frame has reached the person's mind."""
         seat, now = self._seat, self._clock.now
-        if self.over or not isinstance(seat.strategy, Pursuit):
+        if self.over or not isinstance(self._strategy, Pursuit):
             return
         seat.delay.see(now, observation.speed, observation.turn_rate)
         judged = seat.judge(observation)
@@ -125,7 +130,7 @@ class Drive(Work):
         route = self._consider(judged)
         if route is not None:
             # The guess is made when a frame is perceived, so it holds the perceptual delay.
-            drive, delay = seat.strategy.drive, seat.delay.value
+            drive, delay = self._strategy.drive, seat.delay.value
             usual = lambda way, keep: drive(way, judged, delay, keep)  # noqa: E731
             self._intend(self._steer(route, judged, delay, usual))
 
@@ -151,13 +156,13 @@ class Drive(Work):
     def _look_at_truth(self) -> bool:
         """The oracle's own loop; False ends it."""
         seat = self._seat
-        if self.over or seat.setup.truth is None or not isinstance(seat.strategy, Oracle):
+        if self.over or seat.setup.truth is None or not isinstance(self._strategy, Oracle):
             return False
         truth = seat.setup.truth(self.robot)
         self._seen_tick = truth.state.tick
         route = self._consider(truth.state)
         if route is not None:
-            drive = seat.strategy.drive_by_truth
+            drive = self._strategy.drive_by_truth
             usual = lambda way, keep: drive(way, truth, keep)  # noqa: E731
             self._intend(self._steer(route, truth.state, Oracle.DELAY, usual))
         return not self.over
@@ -191,7 +196,17 @@ class Drive(Work):
                 self.end("gave up", "no way there")
                 return None
             self._route = Route(points)
+        if self._gets_nowhere(self._route.left):
+            self.end("gave up", "the robot gets no nearer")
+            return None
         return self._route
+
+    def _gets_nowhere(self, left: float) -> bool:
+        """Whether the way left [m] has not become less for a long time, whatever was tried."""
+        now = self._clock.now
+        if left < self._least_left - NEARER:
+            self._least_left, self._nearer_at = left, now
+        return left > NEARER and now - self._nearer_at > NO_NEARER_FOR
 
     def _is_stuck(self, seen: Observation) -> bool:
         """Whether the robot has stood for too long although it was asked to move."""

@@ -29,7 +29,7 @@ class OperatorSetup:
         timeout: Of a request [s].
         attempts: Of a request.
         truth: The true state of a robot by id, if the strategy is the oracle; else None.
-        guarded: What the robot can do, if a collision guard may hold it back; else None.
+        guarded: Whether a collision guard may hold a robot back.
     """
 
     window: int | None
@@ -37,7 +37,7 @@ class OperatorSetup:
     timeout: float
     attempts: int
     truth: Callable[[str], Truth] | None = None
-    guarded: Reach | None = None
+    guarded: bool = False
 
 
 class DriverSeat:
@@ -47,7 +47,8 @@ class DriverSeat:
         device: Identity and ways to talk.
         person: Who it is.
         phone: The phone in the hand.
-        strategy: How the person drives.
+        strategy: How the person drives a robot that can do so much.
+        reach: What a robot can do, by its id.
         planner: The person knows the building.
         setup: Pattern, rate, time-outs.
         rng: Luck of this person's judgement.
@@ -61,12 +62,14 @@ class DriverSeat:
         device: Device,
         person: Person,
         phone: Phone,
-        strategy: Pursuit | Oracle,
+        strategy: Callable[[Person, Reach], Pursuit | Oracle],
+        reach: Callable[[str], Reach],
         planner: Planner,
         setup: OperatorSetup,
         rng: np.random.Generator,
     ) -> None:
-        self.device, self.person, self.phone, self.strategy = device, person, phone, strategy
+        self.device, self.person, self.phone = device, person, phone
+        self.strategy, self.reach = strategy, reach
         self.planner, self.setup = planner, setup
         self.delay = DelayEstimate(0.0, FIRST_GUESS)
         self._errors = _normals(rng)

@@ -36,10 +36,21 @@ class Intent(NamedTuple):
 
 @dataclass(frozen=True)
 class Reach:
-    """What the robot can do: top speed [m/s], highest turn rate [rad/s]."""
+    """What the robot can do.
+
+    Attributes:
+        speed: At most [m/s].
+        turn_rate: At most, either way [rad/s].
+        radius: Of its sharpest curve [m]; 0: it turns on the spot.
+    """
 
     speed: float
     turn_rate: float
+    radius: float = 0.0
+
+    def turn(self, turn_rate: float) -> Intent:
+        """Turn at a rate [rad/s], as nearly on the spot as the robot can."""
+        return Intent(min(abs(turn_rate) * self.radius, self.speed), turn_rate)
 
 
 class Strategy(Protocol):
@@ -79,9 +90,12 @@ class Pursuit:
         ahead = route.ahead(seen.x, seen.y, seen.heading, look)
         limit = TURN_UNTIL if self._turning else TURN_FROM
         self._turning = abs(ahead.bearing) > limit
-        if self._turning or ahead.remaining < stop_before:
+        is_there = ahead.remaining < stop_before
+        if is_there and reach.radius > 0.0:
+            return Intent(0.0, 0.0)  # a car cannot turn towards what it has come to see
+        if self._turning or is_there:
             gain = min(person.crossover, TURN_MARGIN / delay)
-            return Intent(0.0, self._clamp(gain * ahead.bearing))
+            return reach.turn(self._clamp(gain * ahead.bearing))
         speed = min(wanted, person.caution * look / delay, ahead.remaining / (2.0 * delay + 1.0))
         curvature = 2.0 * math.sin(ahead.bearing) / max(ahead.distance, 0.2)
         if abs(curvature) * speed > 0.8 * reach.turn_rate:
