@@ -131,9 +131,14 @@ def middle_of(site: Site, room: str) -> tuple[float, float]:
         ConfigError: there is no such room.
     """
     outline = shapely.Polygon(site.room(room).polygon)
-    rows, columns = np.nonzero(site.grid.clearance > 0.0)
+    low_x, low_y, high_x, high_y = outline.bounds
+    (low_row, low_column), (high_row, high_column) = (
+        site.grid.to_cell(low_x, low_y),
+        site.grid.to_cell(high_x, high_y),
+    )
+    rows, columns = np.mgrid[low_row : high_row + 1, low_column : high_column + 1]
     points = site.grid.to_xy(rows + 0.5, columns + 0.5)
-    inside = shapely.contains_xy(outline, points)
+    inside = shapely.contains_xy(outline, points[..., 0], points[..., 1])
     best = np.argmax(np.where(inside, site.grid.clearance[rows, columns], -1.0))
-    x, y = points[best].tolist()
+    x, y = points.reshape(-1, 2)[best].tolist()
     return x, y
