@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -21,13 +22,17 @@ class Sight:
         x1, y1, x2, y2 = walls.T
         self._lines = np.stack([y1 - y2, x2 - x1, x1 * y2 - x2 * y1], axis=1)
         self._ends = walls.reshape(-1, 2).T
+        self._kept = lru_cache(maxsize=4096)(self._between)
 
     def between(self, a: Point, b: Point) -> bool:
-        """Whether no wall stands between two places [m].
+        """Whether no wall stands between two places [m]; who stands still asks the same again.
 
         A wall blocks when its ends lie on both sides of the line a-b and a and b on both
         sides of the wall.
         """
+        return self._kept(a, b)
+
+    def _between(self, a: Point, b: Point) -> bool:
         (ax, ay), (bx, by) = a, b
         sides = self._lines @ np.array([[ax, bx], [ay, by], [1.0, 1.0]])
         across = np.array([ay - by, bx - ax]) @ self._ends + (ax * by - bx * ay)
