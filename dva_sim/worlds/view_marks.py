@@ -172,7 +172,8 @@ def draw_north(ax: Axes, site: Site) -> None:
     """An arrow to the north; a bare map does not say where that is."""
     if not site.rooms:
         return
-    y, size = _below(ax, site), ARROW / points_per_metre(ax)
+    room = site.extent[1] - ax.get_ylim()[0]
+    y, size = _below(ax, site), min(ARROW / points_per_metre(ax), 0.3 * room)
     x = site.extent[2] - 1.5 * size
     ax.fill(
         [x, x - 0.7 * size, x, x + 0.7 * size],
