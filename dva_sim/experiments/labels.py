@@ -27,8 +27,13 @@ _LEVELS = {
     "pipelined": "pipelined requests",
     "pub-sub": "plain PUB/SUB",
     "latest-wins": "latest-wins PUB/SUB",
+    "direct": "direct control",
+    "coordinated": "coordinated control",
+    "supervisory": "supervisory control",
 }
-_SHORT_LEVELS = {**_LEVELS, "latest-wins": "latest-wins"}
+_SHORT_LEVELS = _LEVELS | {
+    name: name for name in ("latest-wins", "direct", "coordinated", "supervisory")
+}
 _MEASURES = {
     "drive_time_s": "driving time to confirmation",
     "path_m": "path length",

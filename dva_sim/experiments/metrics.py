@@ -121,6 +121,8 @@ def _command_measures(attempts: list[DriveLog], recording: Recording) -> Row:
     hold = np.concatenate([_holds(d, end) for d, (_, end) in zip(attempts, spans, strict=True)])
     trips = [t for d in attempts for t in d.round_trips]
     inboxes = [recording.robots[robot].inbox for robot in sorted({d.robot for d in attempts})]
+    if not any(d.sent for d in attempts):
+        driving = 0.0  # nobody drove: the robot was on a mission
     row = command_ages(applied, hold) | {
         "command_rate_hz": len(applied) / driving if driving else NAN,
         "commands_sent": sum(d.sent for d in attempts),
