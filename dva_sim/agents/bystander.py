@@ -25,10 +25,11 @@ import numpy as np
 from dva_sim.agents.device import do_nothing
 from dva_sim.agents.escape import choose_escape
 from dva_sim.agents.exposure import Air, Exposure, clean_air
+from dva_sim.agents.on_foot import OnFoot
 from dva_sim.agents.people import Occupant
 from dva_sim.agents.walking import Walking
 from dva_sim.clock import Clock
-from dva_sim.worlds.hazards import Conditions, Dose
+from dva_sim.worlds.hazards import Conditions
 from dva_sim.worlds.planning import Planner
 
 WORKING, WALKING, ALARMED = "working", "walking", "alarmed"
@@ -52,7 +53,7 @@ def nothing_seen(x: float, y: float, time: float) -> bool:
     return False
 
 
-class BystanderAgent:
+class BystanderAgent(OnFoot):
     """One bystander.
 
     Args:
@@ -90,34 +91,14 @@ class BystanderAgent:
         leaves: Callable[[], object] = do_nothing,
         tell: Callable[[str], object] = do_nothing,
     ) -> None:
+        super().__init__(walking, Exposure(clock, walking, air))
         self.name, self._clock, self._occupant = name, clock, occupant
-        self.walking, self._planner, self._luck = walking, planner, luck
+        self._planner, self._luck = planner, luck
         self._places, self._refuges = places, refuges
         self._sees, self._leaves, self._tell = sees, leaves, tell
         self.activity = WORKING
         self.leaves_at = self.out_at = math.inf
         self._chosen = -math.inf
-        self.exposure = Exposure(clock, walking, air)
-
-    @property
-    def x(self) -> float:
-        """Where it is, or went out [m]."""
-        return self.walking.place[0]
-
-    @property
-    def y(self) -> float:
-        """Where it is, or went out [m]."""
-        return self.walking.place[1]
-
-    @property
-    def heading(self) -> float:
-        """Where it looks [rad]."""
-        return self.walking.heading
-
-    @property
-    def dose(self) -> Dose:
-        """Of heat and poison, so far."""
-        return self.exposure.dose
 
     def start(self) -> None:
         """Begin to work, and to notice what is wrong."""

@@ -20,10 +20,10 @@ from dva_sim.agents.device import STATUS, Device, do_nothing
 from dva_sim.agents.duty import Errand, GuardDuty
 from dva_sim.agents.escape import choose_escape
 from dva_sim.agents.exposure import Air, Exposure, clean_air
+from dva_sim.agents.on_foot import OnFoot
 from dva_sim.agents.people import Walker
 from dva_sim.agents.walking import Walking
 from dva_sim.protocol import messages as m
-from dva_sim.worlds.hazards import Dose
 from dva_sim.worlds.planning import Planner
 
 STATUS_PERIOD, FIRST_STATUS = 2.0, 0.5  # of where a guard is [s]
@@ -44,7 +44,7 @@ CONFIRMED, REFUTED, CONTAINED = "confirmed", "refuted", "contained"
 Point = tuple[float, float]
 
 
-class GuardAgent:
+class GuardAgent(OnFoot):
     """A guard on duty: walks, looks, works and tells; what it is on is decided by `GuardDuty`.
 
     Args:
@@ -69,34 +69,14 @@ class GuardAgent:
         air: Air = clean_air,
         refuges: Sequence[Point] = (),
     ) -> None:
-        self.device, self._walker, self._planner, self.walking = device, walker, planner, walking
+        super().__init__(walking, Exposure(device.clock, walking, air))
+        self.device, self._walker, self._planner = device, walker, planner
         self._post, self._refuges = walking.place, refuges
         self.activity = "waiting"
         self._is_there, self._contain = is_there, contain
         self._duty = GuardDuty(device.dva, walker.mobilisation, self._stands_at)
-        self.exposure = Exposure(device.clock, walking, air)
         self.exposure.start(self._felt)
         device.serve(self._on_request)
-
-    @property
-    def dose(self) -> Dose:
-        """Of heat and poison, so far."""
-        return self.exposure.dose
-
-    @property
-    def x(self) -> float:
-        """Where the guard is [m]."""
-        return self.walking.place[0]
-
-    @property
-    def y(self) -> float:
-        """Where the guard is [m]."""
-        return self.walking.place[1]
-
-    @property
-    def heading(self) -> float:
-        """Where the guard looks [rad]."""
-        return self.walking.heading
 
     def start(self) -> None:
         """Begin to tell where one is."""
