@@ -418,4 +418,5 @@ def test_a_million_hostile_messages_leave_no_memory_behind():
     before = resident_bytes()
     attack(mutated(rng.choice(seeds), rng) for _ in range(1_000_000))
     grown = resident_bytes() - before
-    assert grown < 4e6, f"{grown / 1e6:.1f} MB more, which is that many bytes per message"
+    # No object of Python takes 16 bytes or less; the allocator's own ups and downs stay below.
+    assert grown < 16e6, f"{grown / 1e6:.1f} MB more, which is that many bytes per message"
