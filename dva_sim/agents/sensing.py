@@ -22,11 +22,14 @@ class SensorPort:
         unit: Of its values.
         read: Its values at a time [s]: 1 to 360, or none if it is lost.
         fastest: How often it gives values at most [Hz].
+        lags: Whether a value depends on those before: then it samples while anybody listens,
+            however seldom.
     """
 
     unit: str
     read: Callable[[float], tuple[float, ...]]
     fastest: float = FASTEST
+    lags: bool = False
 
 
 def topic_of_sensor(sensor: str, subscriber: str) -> str:
@@ -94,6 +97,9 @@ class SensorDesk:
         """Publish what is due. One timer for all: nobody can fill the clock with wishes."""
         now = self._device.clock.now
         self._forget_who_vanished(now)
+        for sensor in dict.fromkeys(sensor for sensor, _ in self._subscribed):
+            if self._sensors[sensor].lags:
+                self._sensors[sensor].read(now)
         for (sensor, subscriber), held in self._subscribed.items():
             if now >= held.due - 1e-9:
                 held.due = max(held.due + held.period, now)

@@ -3,7 +3,8 @@
 A sensor samples at its own rate, whoever listens. Between the world and the value that is
 published stand, in this order: a first-order lag, noise, the ends of its range, and its
 resolution. The noise of a sample is keyed by the sensor and the number of the sample: that
-somebody reads one sensor, or reads it more often, changes no other value.
+somebody reads one sensor, or reads it more often, changes no other value. A sensor with a lag is
+switched on by whoever subscribes first, shows what is there at once, and follows from then on.
 
 A sensor that is *lost* gives nothing from then on; one that is *stuck* gives its last values
 for ever.
@@ -255,7 +256,8 @@ def make_ports(
         if name in ports:
             raise ConfigError(f"sensor {name!r} is there twice")
         sensor = Sensor(config, sources[name], _own(luck, name))
-        ports[name] = SensorPort(sensor.kind.unit, sensor.read, config.rate_hz)
+        lags = sensor.kind.lag > 0.0
+        ports[name] = SensorPort(sensor.kind.unit, sensor.read, config.rate_hz, lags)
     return ports
 
 

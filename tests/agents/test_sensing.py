@@ -7,7 +7,7 @@ from collections.abc import Callable
 import pytest
 
 from dva_sim import scenario as scenarios
-from dva_sim.agents.sensing import LEASE, MOST, SensorDesk, SensorPort, topic_of_sensor
+from dva_sim.agents.sensing import FASTEST, LEASE, MOST, SensorDesk, SensorPort, topic_of_sensor
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode
 from dva_sim.simulation.names import id_of
@@ -24,16 +24,22 @@ class Bench:
         self.run = Run(scenarios.build(scenarios.load("drive-to-event"), quiet), 1)
         device = self.run.field.robots[ROBOT].device
         self.clock = device.clock
+        self.noted: list[float] = []
         self.read: Callable[[float], tuple[float, ...]] = lambda now: (now,)
         ports = {
             "time": SensorPort("s", lambda now: self.read(now)),
             "slow": SensorPort("s", lambda now: (now,), fastest=2.0),
+            "lagging": SensorPort("s", self._note, lags=True),
         }
         self.desk = SensorDesk(device, ports, lambda now: round(now * 1000))
         self.got: list[tuple[float, m.SensorValue]] = []
         topic = topic_of_sensor("time", READER)
         self.run.network.subscribe(READER, ROBOT, topic, self._hear)
         self.clock.run(1.0)
+
+    def _note(self, now: float) -> tuple[float, ...]:
+        self.noted.append(now)
+        return (now,)
 
     def _hear(self, data: bytes) -> None:
         body = decode(data).body
@@ -147,3 +153,16 @@ def test_values_that_no_message_can_hold_are_counted_and_stop_nothing(bench: Ben
     bench.read = lambda now: (now,)
     bench.clock.run(6.0)
     assert len(bench.got) >= 1
+
+
+def test_a_sensor_with_a_lag_samples_at_its_own_pace_however_seldom_it_is_read(
+    bench: Bench,
+) -> None:
+    assert bench.subscribe(0.1, sensor="lagging") == m.OK
+    bench.clock.run(6.0)
+    assert len(bench.noted) == pytest.approx(5 * FASTEST, abs=3)
+    bench.subscribe(0.0, sensor="lagging")
+    bench.clock.run(7.0)
+    count = len(bench.noted)
+    bench.clock.run(20.0)
+    assert len(bench.noted) == count
