@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.hazards.dispersion import Air, Draught
-from dva_sim.worlds.hazards.mesh import Mesh, make_mesh
+from dva_sim.worlds.hazards.mesh import Mesh, make_mesh, side_for
 from dva_sim.worlds.maps import FREE, OCCUPIED, OccupancyGrid
 
 RESOLUTION = 0.1  # of the grids below [m]
@@ -39,6 +39,24 @@ def puff(air: Air, node: int, amount: float, seconds: int) -> NDArray[np.float64
     for _ in range(2 * seconds):
         state = air.step(state, node, 0.0, 0.5)
     return state[:-1]
+
+
+# --- meshes ----------------------------------------------------------------------------
+
+
+def test_a_floor_of_more_nodes_than_32_bits_can_pair_has_a_mesh() -> None:
+    """60 000 nodes in a row of 6 km: 3.6e9 pairs, each node joined to the next."""
+    cells = np.full((1, 60_000), FREE, np.uint8)
+    mesh = make_mesh(OccupancyGrid(0.1, Pose(0.0, 0.0, 0.0), cells), cells == FREE, 0.1)
+    assert np.array_equal(mesh.b - mesh.a, np.ones(59_999))
+    assert mesh.area.sum() == pytest.approx(600.0)
+
+
+@pytest.mark.parametrize(("floor_m2", "side"), [(100, 0.5), (10_000, 0.5), (40_000, 1.0)])
+def test_cells_are_half_a_metre_wide_up_to_10_000_square_metres(
+    floor_m2: float, side: float
+) -> None:
+    assert side_for(floor_m2) == pytest.approx(side)
 
 
 # --- puffs -----------------------------------------------------------------------------
