@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import string
+from collections import Counter
 from collections.abc import Callable, Iterator
 from functools import partial
 from typing import NamedTuple
@@ -115,7 +116,9 @@ def assign(layout: Layout, bases: int) -> list[tuple[Cell, Use, str]]:
             if cell is not None:
                 left.remove(cell)
                 uses[cell] = use, name
-    numbers = [itertools.count(100 * (wing + 1) + 1) for wing in range(len(layout.corridors))]
+    most = max(Counter(cell.wing for cell in left).values(), default=0)
+    hundred = 100 if most < 100 else 1000  # no corridor's numbers run into the next one's
+    numbers = [itertools.count(hundred * (wing + 1) + 1) for wing in range(len(layout.corridors))]
     return [
         (cell, *(uses.get(cell) or _by_size(cell, numbers[cell.wing]))) for cell in layout.cells
     ]

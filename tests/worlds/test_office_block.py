@@ -11,6 +11,7 @@ from dva_sim.errors import ConfigError
 from dva_sim.worlds.maps import FREE
 from dva_sim.worlds.office_block import OfficeBlock, office_block
 from dva_sim.worlds.office_plan import lay_out
+from dva_sim.worlds.office_rooms import assign
 from dva_sim.worlds.planning import Planner
 from dva_sim.worlds.site import load_site
 
@@ -93,6 +94,30 @@ def test_rooms_and_corridors_are_as_wide_as_people_build_them(options):
         assert 2.0 - 1e-9 <= high - low <= 2.6 + 1e-9
     for x1, _, x2, _ in itertools.chain(*layout.crossings):
         assert 2.0 - 1e-9 <= x2 - x1 <= 2.6 + 1e-9
+
+
+LARGEST = {"seed": 1, "width_m": 300.0, "depth_m": 200.0}
+sizes = st.fixed_dictionaries(
+    {"seed": st.integers(0, 10_000), "width_m": st.floats(24, 300), "depth_m": st.floats(12, 200)}
+)
+
+
+@few
+@given(sizes)
+@example(LARGEST)
+def test_no_two_rooms_of_any_block_have_one_name_and_the_number_tells_the_corridor(options):
+    layout = lay_out(options["width_m"], options["depth_m"], np.random.default_rng(options["seed"]))
+    rooms = assign(layout, bases=4)
+    assert len({name for _, _, name in rooms}) == len(rooms) == len(layout.cells)
+    numbered = [(cell, int(name.split()[-1])) for cell, _, name in rooms if name[-3:].isdigit()]
+    told = (all(n // hundred == cell.wing + 1 for cell, n in numbered) for hundred in (100, 1000))
+    assert any(told)
+
+
+def test_the_largest_block_there_is_names_each_of_its_1800_rooms_otherwise():
+    features = office_block(OfficeBlock(**LARGEST))
+    names = [f.properties["name"] for f in features if f.kind == "room"]
+    assert len(set(names)) == len(names) > 1700
 
 
 @few
