@@ -1,7 +1,9 @@
 """Gas outdoors: Gaussian puffs and plumes over flat ground.
 
 How wide they are follows from the distance and from how stable the air is, classes A (sunny,
-calm) to F (clear night). Fitted from 0.1 km on; nearer it is extrapolated.
+calm) to F (clear night). Fitted from 0.1 km on; nearer it is extrapolated: across by the same
+power, upwards in proportion to the distance, as the fit's constant f would leave metres of gas
+(classes A and B), or less than none (D to F), at the leak itself.
 
 References:
     D. O. Martin, J. Air Pollut. Control Assoc. 26 (1976) 145: sigma = a x^0.894 across, c x^d + f
@@ -31,7 +33,7 @@ CLASSES = {
     "E": Spread(50.5, (22.8, 0.678, -1.3), (55.4, 0.305, -34.0)),
     "F": Spread(34.0, (14.35, 0.740, -0.35), (62.6, 0.180, -48.6)),
 }
-FLATTEST = 0.5  # sigma_z is at least this share of sigma_y nearer than 0.1 km; assumed
+FITTED = 0.1  # from so far on [km]
 
 
 def sigma_y(stability: str, distance: float) -> float:
@@ -41,10 +43,9 @@ def sigma_y(stability: str, distance: float) -> float:
 
 def sigma_z(stability: str, distance: float) -> float:
     """Standard deviation upwards [m] at a distance downwind [m]."""
-    spread, x = CLASSES[stability], distance / 1000.0
+    spread, x = CLASSES[stability], max(FITTED, distance / 1000.0)
     c, d, f = spread.near if x <= 1.0 else spread.far
-    sigma = float(c * x**d + f)
-    return sigma if x >= 0.1 else max(sigma, FLATTEST * sigma_y(stability, distance))
+    return float(c * x**d + f) * distance / 1000.0 / x
 
 
 def plume(rate: float, wind: float, stability: str, x: float, y: float, z: float) -> float:

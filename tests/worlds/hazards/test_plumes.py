@@ -35,6 +35,18 @@ def test_both_halves_of_a_height_meet_at_a_kilometre(stability: str) -> None:
     assert near == pytest.approx(far, rel=0.03)
 
 
+@pytest.mark.parametrize("stability", CLASSES)
+def test_nearer_than_a_hundred_metres_the_height_of_a_plume_is_proportional_to_the_distance(
+    stability: str,
+) -> None:
+    """The fit holds from 0.1 km on; below it is a straight line from the leak."""
+    at_100 = sigma_z(stability, 100.0)
+    assert sigma_z(stability, 100.001) == pytest.approx(at_100, rel=1e-4)
+    assert sigma_z(stability, 1.0) == pytest.approx(at_100 / 100.0)
+    assert sigma_z(stability, 0.0) == 0.0
+    assert plume(0.01, 2.0, stability, 1e-3, 0.0, 0.0) == 1.0  # pure gas at the leak
+
+
 def test_the_stabler_the_air_the_narrower_the_plume() -> None:
     for distance in (20.0, 100.0, 500.0, 3000.0):
         widths = [sigma_y(c, distance) for c in "ABCDEF"]
