@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 from typing import Any
 
@@ -9,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Point = tuple[float, float]
+
+ON_LINE = 1e-6  # who is so near to the line of a wall is on it, on neither side [m]
 
 
 class Sight:
@@ -20,7 +23,9 @@ class Sight:
 
     def __init__(self, walls: NDArray[np.float64]) -> None:
         x1, y1, x2, y2 = walls.T
-        self._lines = np.stack([y1 - y2, x2 - x1, x1 * y2 - x2 * y1], axis=1)
+        lines = np.stack([y1 - y2, x2 - x1, x1 * y2 - x2 * y1], axis=1)
+        lengths = np.hypot(x2 - x1, y2 - y1)[:, None]
+        self._lines = np.divide(lines, lengths, out=np.zeros_like(lines), where=lengths > 0.0)
         self._ends = walls.reshape(-1, 2).T
         self._kept = lru_cache(maxsize=4096)(self._between)
 
@@ -28,7 +33,7 @@ class Sight:
         """Whether no wall stands between two places [m]; who stands still asks the same again.
 
         A wall blocks when its ends lie on both sides of the line a-b and a and b on both
-        sides of the wall.
+        sides of the wall: not for who stands on its line, as in an exit, however rounded.
         """
         return self._kept(a, b)
 
@@ -36,7 +41,9 @@ class Sight:
         (ax, ay), (bx, by) = a, b
         sides = self._lines @ np.array([[ax, bx], [ay, by], [1.0, 1.0]])
         across = np.array([ay - by, bx - ax]) @ self._ends + (ax * by - bx * ay)
-        blocked = (sides[:, 0] * sides[:, 1] < 0) & (across[::2] * across[1::2] < 0)
+        one, other = sides.T
+        apart = (np.minimum(one, other) < -ON_LINE) & (np.maximum(one, other) > ON_LINE)
+        blocked = apart & (across[::2] * across[1::2] < 0)
         return not blocked.any()
 
     def from_point(self, a: Point, points: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -45,8 +52,9 @@ class Sight:
         seen = np.ones(len(flat), bool)
         ends = self._ends.T.reshape(-1, 2, 2)
         for (px, py), (qx, qy) in ends.tolist():
-            side_a, (x, y) = _side(px, py, qx, qy, *a), flat.T
-            across = side_a * _side(px, py, qx, qy, x, y) < 0
+            (x, y), on_line = flat.T, ON_LINE * math.hypot(qx - px, qy - py)
+            side_a, sides = _side(px, py, qx, qy, *a), _side(px, py, qx, qy, x, y)
+            across = (np.minimum(side_a, sides) < -on_line) & (np.maximum(side_a, sides) > on_line)
             ends_apart = _side(*a, x, y, px, py) * _side(*a, x, y, qx, qy) < 0
             seen &= ~(across & ends_apart)
         return seen.reshape(points.shape[:-1])

@@ -8,6 +8,7 @@ import pytest
 from dva_sim.worlds.geo import GeoFrame, Pose
 from dva_sim.worlds.maps import UNKNOWN, OccupancyGrid, rasterise
 from dva_sim.worlds.planning import Disc, Planner
+from dva_sim.worlds.sight import Sight
 from dva_sim.worlds.site import Site, load_site, map_site
 
 MAPS = Path(__file__).parents[3] / "shared" / "maps"
@@ -150,3 +151,14 @@ def test_the_room_around_a_point_is_its_distance_from_the_nearest_wall():
     planner = Planner(make_site([]), 0.3)
     room = planner.room_at(np.array([(5.0, 5.0), (5.0, 1.0), (9.5, 5.0)]))
     assert room == pytest.approx([5.0, 1.0, 0.5], abs=0.06)
+
+
+@pytest.mark.parametrize("off", [0.0, 3.6e-15, -3.6e-15, 1e-9, -1e-9])
+def test_who_stands_on_the_line_of_a_wall_up_to_rounding_is_behind_it_for_nobody(off):
+    sight = Sight(np.array([[0.0, 24.0, 40.0, 24.0]]))
+    on_line = (13.1, 24.0 + off)
+    for side in (23.0, 25.0):
+        assert sight.between((13.1, side), on_line)
+        assert sight.from_point(on_line, np.array([[13.1, side]])).all()
+    assert not sight.between((13.1, 23.0), (13.1, 24.001))
+    assert not sight.from_point((13.1, 23.0), np.array([[13.1, 24.001]])).any()
