@@ -36,7 +36,13 @@ WORKING, WALKING, ALARMED = "working", "walking", "alarmed"
 EVACUATING, SAFE, DOWN = "evacuating", "safe", "incapacitated"
 
 NOTICED: Final = Conditions(
-    temperature=40.0, heat_flux=0.5, extinction=0.1, co=math.inf, gas=0.01, water=0.02
+    temperature=40.0,
+    heat_flux=0.5,
+    extinction=0.1,
+    co=math.inf,
+    gas=math.inf,
+    water=0.02,
+    explosive=0.2,
 )
 """From any of it on people notice that something is wrong; assumed, but for gas: it is given a
 smell that is noticed at a fifth of its lower explosive limit. Carbon monoxide has none."""

@@ -4,8 +4,9 @@ References:
     Radiant heat of 2.5 kW/m^2, which skin stands for some minutes: ISO 13571.
     Carbon monoxide of 1200 ppm, immediately dangerous to life: NIOSH.
     People turn back in smoke through which they see 3 m or less, an extinction of 1 /m by
-    V = 3 / K: T. Jin, Visibility and human behavior in fire smoke, SFPE Handbook. Gas: the lower
-    explosive limit of methane. The limits of air temperature and water are assumed.
+    V = 3 / K: T. Jin, Visibility and human behavior in fire smoke, SFPE Handbook. Nobody stays
+    where gas can explode, at its lower explosive limit, or goes in; how much of it that is counts
+    only for the dose, by the oxygen lacking. The limits of air temperature and water are assumed.
 """
 
 from __future__ import annotations
@@ -21,17 +22,30 @@ from dva_sim.worlds.planning import Disc, Planner
 from dva_sim.worlds.site import Site
 
 UNTENABLE: Final = Conditions(
-    temperature=60.0, heat_flux=2.5, extinction=1.0, co=1200.0, gas=0.05, water=1.0
+    temperature=60.0,
+    heat_flux=2.5,
+    extinction=1.0,
+    co=1200.0,
+    gas=math.inf,
+    water=1.0,
+    explosive=1.0,
 )
 """Any of it is more than anybody goes into, or stays in."""
 DEADLY: Final = Conditions(
-    temperature=120.0, heat_flux=10.0, extinction=math.inf, co=math.inf, gas=math.inf, water=1.5
+    temperature=120.0,
+    heat_flux=10.0,
+    extinction=math.inf,
+    co=math.inf,
+    gas=math.inf,
+    water=1.5,
+    explosive=math.inf,
 )
 """Flames and what is next to them: nobody goes through, whatever the other ways are like; in
 10 kW/m^2 skin burns within seconds (ISO 13571), the rest is assumed."""
 EVERY: Final = 1.0  # a way is looked at so often [m]
 KEEPS_OFF: Final = 1.0  # around a bad place of a way [m]
 TRIES: Final = 3  # to find a way around bad places
+WITHIN: Final = 0.05  # of the line of an exit, still indoors [m]
 
 Point = tuple[float, float]
 Limit = Callable[[Point], bool]
@@ -55,9 +69,14 @@ def is_deadly(conditions: Conditions) -> bool:
 
 
 def refuges_of(site: Site) -> list[Point]:
-    """Where people of a site are safe [m]: its exits; else the guard posts; else robot bases."""
-    poses = site.exits or site.guard_posts or site.robot_bases
-    return [(pose.x, pose.y) for pose in poses]
+    """Where people of a site are safe [m]: its exits; else the guard posts; else robot bases.
+
+    An exit lies in the line of the outer wall: the place is just within.
+    """
+    if not site.exits:
+        return [(pose.x, pose.y) for pose in site.guard_posts or site.robot_bases]
+    ways = [(way, math.cos(way.heading), math.sin(way.heading)) for way in site.exits]
+    return [(way.x - WITHIN * dx, way.y - WITHIN * dy) for way, dx, dy in ways]
 
 
 def choose_escape(

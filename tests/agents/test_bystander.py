@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable
 
@@ -18,7 +19,7 @@ from dva_sim.agents.workplaces import APART, draw_places
 from dva_sim.config import load_yaml, validate
 from dva_sim.resources import find
 from dva_sim.streams import Streams
-from dva_sim.worlds.hazards import CLEAR, pace_in_smoke, pace_in_water
+from dva_sim.worlds.hazards import CLEAR, Surroundings, make_hazard, pace_in_smoke, pace_in_water
 from dva_sim.worlds.planning import Planner
 from dva_sim.worlds.site import load_site
 
@@ -144,9 +145,11 @@ def test_forty_people_in_a_room_need_the_time_that_its_door_takes_and_no_less():
         CLEAR._replace(heat_flux=0.7),
         CLEAR._replace(water=0.05),
         CLEAR._replace(temperature=45.0),
+        CLEAR._replace(gas=0.0034, explosive=0.2),  # propane
+        CLEAR._replace(gas=0.0088, explosive=0.2),  # methane
     ],
 )
-def test_who_notices_smoke_heat_or_water_gets_ready_without_an_alarm(conditions):
+def test_who_notices_smoke_heat_water_or_the_smell_of_gas_gets_ready_without_an_alarm(conditions):
     building = Building()
     one = building.bystander(air=from_then_on(4.0, conditions))
     building.pass_time(10.0)
@@ -251,12 +254,24 @@ def test_who_stands_in_smoke_may_go_through_it_to_clean_air():
     assert escape.goal == (1.0, 1.5)
 
 
-@pytest.mark.parametrize("index", range(6))
-def test_each_of_the_conditions_alone_can_be_too_much(index):
+@pytest.mark.parametrize("what", sorted(set(CLEAR._fields) - {"gas"}))
+def test_each_of_the_conditions_alone_can_be_too_much(what):
     assert not is_untenable(CLEAR)
-    parts = list(CLEAR)
-    parts[index] = UNTENABLE[index]
-    assert is_untenable(CLEAR._replace(**dict(zip(CLEAR._fields, parts, strict=True))))
+    most = getattr(UNTENABLE, what)
+    assert is_untenable(CLEAR._replace(**{what: most}))
+    assert not is_untenable(CLEAR._replace(**{what: 0.99 * most}))
+
+
+@pytest.mark.parametrize(("gas", "limit"), [("methane", 0.044), ("propane", 0.017)])
+def test_nobody_stays_where_the_gas_that_leaks_could_explode(gas, limit):
+    """ISO/IEC 80079-20-1: the same share of two gases is harmless or not."""
+    site = load_site("caparica")
+    around = Surroundings(site, [make_hazard("gas_leak", (5.0, 12.0), 0.0, gas=gas)])
+    for time in range(10, 1200, 10):
+        air = around.at(5.0, 12.0, time)
+        assert air.explosive == pytest.approx(air.gas / limit)
+        assert is_untenable(air) == (air.gas / limit >= 1.0)
+    assert air.gas > 0.005
 
 
 # --- dose and pace ---------------------------------------------------------------------
@@ -368,8 +383,28 @@ def test_one_more_bystander_changes_nobody_elses_place():
     assert places(5) == places(9)[:5]
 
 
-def test_a_site_without_exits_is_left_for_the_posts_of_its_guards():
+OFFICES = [("office-block", {"seed": seed}) for seed in range(1, 5)]
+
+
+@pytest.mark.parametrize(("name", "overrides"), [("caparica", {}), ("campus", {}), *OFFICES])
+def test_every_exit_is_reached_from_the_largest_free_floor(name, overrides):
+    site = load_site(name, overrides)
+    planner = Planner(site, 0.3)
+    starts = [site.sample_free(np.random.default_rng(n), 0.3) for n in range(5)]
+    refuges = refuges_of(site)
+    reached = [[planner.distance(start, r) < math.inf for r in refuges] for start in starts]
+    assert len(refuges) == len(site.exits) >= 2
+    assert max(sum(of_one) for of_one in reached) == len(refuges)
+
+
+def test_who_is_to_be_safe_stands_5_cm_within_an_exit_not_in_the_wall():
     site = load_site("caparica")
-    expected = site.exits or site.guard_posts
-    assert refuges_of(site) == [(place.x, place.y) for place in expected]
+    for place, way in zip(refuges_of(site), site.exits, strict=True):
+        assert math.dist(place, (way.x, way.y)) == pytest.approx(0.05)
+        assert site.room_at(*place) != ""
+
+
+def test_a_site_without_exits_is_left_for_the_posts_of_its_guards():
+    site = dataclasses.replace(load_site("caparica"), exits=())
+    assert refuges_of(site) == [(post.x, post.y) for post in site.guard_posts]
     assert refuges_of(hall(5, 5)) == []

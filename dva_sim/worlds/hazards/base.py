@@ -21,6 +21,7 @@ class Conditions(NamedTuple):
         co: Carbon monoxide [ppm].
         gas: Fuel gas, share of the volume, 0 to 1.
         water: Depth [m].
+        explosive: The same gas, as a share of its lower explosive limit: at 1 it can explode.
     """
 
     temperature: float = AMBIENT
@@ -29,6 +30,7 @@ class Conditions(NamedTuple):
     co: float = 0.0
     gas: float = 0.0
     water: float = 0.0
+    explosive: float = 0.0
 
 
 CLEAR = Conditions()

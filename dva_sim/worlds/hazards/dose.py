@@ -15,7 +15,6 @@ from dataclasses import dataclass
 
 from dva_sim.worlds.hazards.base import Conditions
 from dva_sim.worlds.hazards.fire import TENABLE_HEAT
-from dva_sim.worlds.hazards.leak import GASES
 
 MINUTE = 60.0
 BREATHING = 25.0  # air breathed in light work [L/min]
@@ -38,21 +37,19 @@ class Dose:
     Attributes:
         heat: Fractional effective dose of radiant heat and hot air.
         toxic: Fractional effective dose of carbon monoxide and lack of oxygen.
-        explosive: Time in air that could have exploded [s].
-        gas: What a leaking gas is, one of `GASES`.
+        explosive: Time in air with gas enough to explode, there or thinned a little [s].
     """
 
     heat: float = 0.0
     toxic: float = 0.0
     explosive: float = 0.0
-    gas: str = "methane"
 
     def add(self, conditions: Conditions, dt: float) -> None:
         """Spend `dt` [s] in some conditions."""
         minutes = dt / MINUTE
         self.heat += minutes * heat_rate(conditions)
         self.toxic += minutes * toxic_rate(conditions)
-        if GASES[self.gas].lower <= conditions.gas <= GASES[self.gas].upper:
+        if conditions.explosive >= 1.0:
             self.explosive += dt
 
     @property

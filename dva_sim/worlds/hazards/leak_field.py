@@ -46,11 +46,11 @@ class LeakField:
         self._course: Course | None = None
 
     def at(self, x: float, y: float, time: float) -> Conditions:
-        """See `HazardField`."""
+        """See `HazardField`; carbon monoxide kills long before it could explode."""
         share = self.share(x, y, time)
         if self._leak.gas == "carbon_monoxide":
             return Conditions(co=1e6 * share)
-        return Conditions(gas=share)
+        return Conditions(gas=share, explosive=share / self.limits.lower)
 
     def share(self, x: float, y: float, time: float) -> float:
         """Share of the gas in the air, 0 to 1."""

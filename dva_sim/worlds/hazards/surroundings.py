@@ -147,7 +147,11 @@ class Surroundings:
 
 
 def _together(a: Conditions, b: Conditions) -> Conditions:
-    """The air with both hazards."""
+    """The air with both hazards; gases explode together by their shares of their limits.
+
+    References:
+        H. Le Chatelier, Annales des Mines 19 (1891) 388: limits of mixed gases.
+    """
     return Conditions(
         max(a.temperature, b.temperature, AMBIENT),
         a.heat_flux + b.heat_flux,
@@ -155,4 +159,5 @@ def _together(a: Conditions, b: Conditions) -> Conditions:
         a.co + b.co,
         min(1.0, a.gas + b.gas),
         a.water + b.water,
+        a.explosive + b.explosive,
     )

@@ -48,10 +48,9 @@ def test_gas_that_drives_out_half_of_the_oxygen_stuns_within_two_minutes() -> No
 
 
 def test_time_in_air_that_could_explode_is_counted() -> None:
-    """Methane: from 4.4 to 17 %."""
     dose = Dose()
-    for share in (0.04, 0.05, 0.16, 0.18):
-        dose.add(Conditions(gas=share), 10.0)
+    for share in (0.0, 0.99, 1.0, 3.0):
+        dose.add(Conditions(explosive=share), 10.0)
     assert dose.explosive == 20.0
 
 
