@@ -53,8 +53,9 @@ def broken_rules(
             yield "S2", f"is owned by {robot.controller.owner}, driven by {drive.operator}"
         if _moved_by_the_past(robot, drive):
             yield "S3", "obeys a session from before the emergency"
-    # Comparisons that a nan fails, too.
-    within = abs(speed) <= spec.max_speed * SLACK and abs(turn_rate) <= spec.max_turn_rate * SLACK
+    # Comparisons that a nan fails, too; nobody drives backwards.
+    forward = -MOVING <= speed <= spec.max_speed * SLACK
+    within = forward and abs(turn_rate) <= spec.max_turn_rate * SLACK
     if not within and not pushed:
         yield "S4", f"moves at {speed:.2f} m/s and {turn_rate:.2f} rad/s"
 

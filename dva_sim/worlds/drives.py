@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from dva_sim.errors import ConfigError
-from dva_sim.plugins import Plugins
+from dva_sim.plugins import Plugins, said
 
 LONGEST_TICK: Final = 0.04  # that profiles are made for [s]
 CREEP: Final = 0.01  # below this a car stands, and its steering turns nothing [m/s]
@@ -30,9 +30,13 @@ class Drive:
 
     Attributes:
         turning_radius: Of the sharpest curve it can drive [m]; 0: it turns on the spot.
+        failures: How often it gave no answer that is one; only drives of users do that.
+        first_failure: What was wrong with it first, in a line.
     """
 
     turning_radius = 0.0
+    failures = 0
+    first_failure = ""
 
     def __init__(self, spec: DriveSpec) -> None:
         self.spec = spec
@@ -141,6 +145,10 @@ class ThreeWay(Drive):
 class Guarded(Drive):
     """A drive of a user, kept within the limits of its robot whatever it answers.
 
+    Both accelerations stay within their limits, and so do the speed and the turn rate that they
+    lead to: never backwards, never too fast. What raises or answers no two finite numbers is
+    counted, and brakes.
+
     Attributes:
         drive: The user's own.
     """
@@ -150,23 +158,45 @@ class Guarded(Drive):
         self.turning_radius, self.drive = drive.turning_radius, drive
 
     def set_point(self, speed: float, turn_rate: float) -> tuple[float, float]:
-        """Within the limits; a stop where the answer is not finite."""
-        got = self.drive.set_point(speed, turn_rate)
-        if not all(map(math.isfinite, got)):
+        """Within the limits; a stop where there is no answer."""
+        got = self._answer(self.drive.set_point, speed, turn_rate)
+        if got is None:
             return 0.0, 0.0
         most = self.spec.max_turn_rate
-        return min(max(got[0], 0.0), self.spec.max_speed), min(max(got[1], -most), most)
+        return _within(got[0], 0.0, self.spec.max_speed), _within(got[1], -most, most)
 
     def accelerations(
         self, speed: float, turn_rate: float, now_speed: float, now_turn_rate: float, dt: float
     ) -> tuple[float, float]:
-        """Within the limits, and no faster than they allow; brakes where it is not finite."""
-        spec = self.spec
-        along, turn = self.drive.accelerations(speed, turn_rate, now_speed, now_turn_rate, dt)
-        if not (math.isfinite(along) and math.isfinite(turn)):
-            along, turn = -now_speed / dt, -now_turn_rate / dt
-        along = min(along, (spec.max_speed - now_speed) / dt)
-        return min(max(along, -spec.max_deceleration), spec.max_acceleration), turn
+        """Within the limits, and no faster than they allow; brakes where there is no answer."""
+        spec, given = self.spec, (speed, turn_rate, now_speed, now_turn_rate, dt)
+        got = self._answer(self.drive.accelerations, *given)
+        along, turn = got or (-now_speed / dt, -now_turn_rate / dt)
+        # Who was pushed beyond a limit comes back as fast as the accelerations allow.
+        along = _within(along, -now_speed / dt, (spec.max_speed - now_speed) / dt)
+        most = spec.max_turn_rate
+        turn = _within(turn, (-most - now_turn_rate) / dt, (most - now_turn_rate) / dt)
+        most = spec.max_turn_acceleration
+        return _within(along, -spec.max_deceleration, spec.max_acceleration), _within(
+            turn, -most, most
+        )
+
+    def _answer(self, ask: Callable[..., Any], *given: float) -> tuple[float, float] | None:
+        """Two finite numbers, or None."""
+        try:
+            one, other = ask(*given)
+            if math.isfinite(one) and math.isfinite(other):
+                return float(one), float(other)
+            problem = f"answers {one!r}, {other!r}"
+        except Exception as error:
+            problem = said(error)
+        self.failures += 1
+        self.first_failure = self.first_failure or problem
+        return None
+
+
+def _within(value: float, least: float, most: float) -> float:
+    return min(max(value, least), most)
 
 
 @dataclass(frozen=True)

@@ -174,6 +174,19 @@ def test_a_robot_that_another_has_pushed_breaks_no_rule_but_one_that_drives_on_d
     assert rules_broken(run, pushed) == ["S1"]
 
 
+def test_a_robot_that_drives_backwards_by_itself_breaks_a_rule() -> None:
+    run = staged()
+    robot = run.field.robots[ROBOT]
+    run.clock.run(10.0)
+    run.field.world.advance_to(10.0)
+    robot.body.body.velocity = pymunk.Vec2d(-0.04, 0.0).rotated(robot.body.body.angle)
+    assert rules_broken(run, robot) == []
+    robot.body.body.velocity = pymunk.Vec2d(-0.06, 0.0).rotated(robot.body.body.angle)
+    assert rules_broken(run, robot) == ["S1", "S4"]
+    robot.body._touch.last = 10.0
+    assert rules_broken(run, robot) == []
+
+
 def test_a_published_command_to_another_robot_is_counted_and_not_obeyed() -> None:
     run = staged()
     robot = run.field.robots[ROBOT]

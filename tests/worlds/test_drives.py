@@ -1,3 +1,4 @@
+import itertools
 import math
 
 import numpy as np
@@ -151,7 +152,80 @@ def test_a_drive_of_a_user_is_kept_within_the_limits_whatever_it_answers():
     assert drive.set_point(0.1, 0.0) == (0.5, -spec.max_turn_rate)
     assert drive.accelerations(0.5, 0.0, 0.1, 0.0, DT) == (0.5, 0.5)
     assert drive.accelerations(0.5, 0.0, 0.499, 0.0, DT)[0] == pytest.approx(0.001 / DT)
-    assert drive.accelerations(0.0, 0.0, 0.3, 0.1, DT) == (-1.0, pytest.approx(-0.1 / DT))
+    assert drive.accelerations(0.0, 0.0, 0.3, 0.1, DT) == (-1.0, -1.5)
+
+
+class Spinning(Differential):
+    """Always in reverse, and turning as hard as it can."""
+
+    def accelerations(self, speed, turn_rate, now_speed, now_turn_rate, dt):
+        return -5.0, 50.0
+
+
+class Eager(Differential):
+    """Its brake does not know when the robot stands."""
+
+    def accelerations(self, speed, turn_rate, now_speed, now_turn_rate, dt):
+        return -1.0 if speed == 0.0 else 0.5, 0.0
+
+
+@pytest.mark.parametrize("kind", [Spinning, Eager])
+def test_motors_of_a_user_neither_reverse_nor_spin_beyond_the_limit_whatever_they_ask_for(kind):
+    world = World(hall(20.0, 20.0), 0.04)
+    spec = DriveSpec(drive=lambda spec: Guarded(kind(spec)))
+    robot = world.add_robot("robot-1", spec, Pose(10.0, 10.0, 0.0))
+    robot.drive(0.5, 0.1, 2.0)
+    speeds, turn_rates = [], []
+    for _ in range(250):
+        world.advance_to(world.time + 0.04)
+        speeds.append(robot.speed)
+        turn_rates.append(robot.turn_rate)
+    assert min(speeds) > -1e-9
+    assert max(speeds) <= 0.5 + 1e-9
+    assert max(map(abs, turn_rates)) <= spec.max_turn_rate + 1e-9
+    assert max(abs(b - a) for a, b in itertools.pairwise(turn_rates)) <= 1.5 * 0.04 + 1e-9
+    assert robot.speed == 0.0
+
+
+def test_who_was_pushed_beyond_a_limit_comes_back_no_faster_than_its_accelerations_allow():
+    drive = Guarded(Differential(DriveSpec()))
+    assert drive.accelerations(0.5, 0.0, -1.0, 0.0, DT) == (0.5, 0.0)
+    assert drive.accelerations(0.5, 0.0, 2.0, 9.0, DT) == (-1.0, -1.5)
+
+
+def answering(what):
+    """A drive that answers everything with the same, or raises it."""
+
+    class Odd(Differential):
+        def set_point(self, speed, turn_rate):
+            return self.accelerations()
+
+        def accelerations(self, *_):
+            if isinstance(what, Exception):
+                raise what
+            return what
+
+    return Guarded(Odd(DriveSpec()))
+
+
+@pytest.mark.parametrize(
+    ("answer", "told"),
+    [
+        ((math.nan, 0.0), "answers nan, 0.0"),
+        ((0.0, -math.inf), "answers 0.0, -inf"),
+        (None, "TypeError: cannot unpack non-iterable NoneType object"),
+        ("ab", "TypeError: must be real number, not str"),
+        ((1.0, 2.0, 3.0), "ValueError: too many values to unpack (expected 2)"),
+        ((10**400, 0.0), "OverflowError: int too large to convert to float"),
+        (ValueError("broken\nwire"), "ValueError: broken wire"),
+    ],
+)
+def test_a_drive_without_an_answer_brakes_and_is_counted(answer, told):
+    drive = answering(answer)
+    assert drive.set_point(0.5, 0.5) == (0.0, 0.0)
+    assert drive.accelerations(0.5, 0.5, 0.5, 0.5, DT) == (-1.0, -1.5)
+    assert drive.accelerations(0.5, 0.5, 0.01, 0.0, DT) == (pytest.approx(-0.01 / DT), 0.0)
+    assert (drive.failures, drive.first_failure) == (3, told)
 
 
 def test_drives_are_made_by_name_and_by_file(tmp_path, monkeypatch):
