@@ -177,8 +177,9 @@ class RobotBody(Body):
         set_force(raw, (along * cos - across * sin, along * sin + across * cos))
         set_torque(raw, torque)
         self.distance += abs(forward) * dt
-        if along > 0.0:
-            self.work += along * (forward + 0.5 * dt * along / self._mass) * dt
+        power = along * (forward + 0.5 * dt * along / self._mass)  # with the mean of the tick
+        spinning = torque * (spin + 0.5 * dt * torque / self._moment)
+        self.work += (max(power, 0.0) + max(spinning, 0.0)) * dt
         return True
 
     def meets(self, other: Body | None, now: float) -> None:

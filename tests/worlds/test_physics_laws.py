@@ -133,6 +133,17 @@ def test_what_the_motors_do_becomes_kinetic_energy():
     assert robot.work == pytest.approx(0.5 * MASS * 0.5**2, rel=1e-3)
 
 
+def test_every_start_of_a_turn_on_the_spot_costs_its_kinetic_energy_and_braking_gives_none_back():
+    world, robot = on_floor()
+    one = 0.5 * robot.body.moment * SPEC.max_turn_rate**2
+    for turn in range(1, 11):
+        robot.drive(0.0, SPEC.max_turn_rate * (-1) ** turn, world.time + 3.0)
+        world.advance_to(world.time + 6.0)
+        assert robot.turn_rate == 0.0
+        assert robot.work == pytest.approx(turn * one, rel=1e-3)
+    assert robot.distance == pytest.approx(0.0, abs=1e-9)
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_nobody_pushes_and_energy_only_falls(seed):
     """Ten robots thrown together between walls, brakes on, grip anything from ice to rubber."""
