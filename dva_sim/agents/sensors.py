@@ -124,6 +124,13 @@ class SensorConfig(Config):
             raise ValueError(f"sensor {name!r} is not known; known: {', '.join(KINDS)}")
         return name
 
+    @model_validator(mode="after")
+    def _low_is_below_high(self) -> SensorConfig:
+        kind = self.as_kind()
+        if kind.low >= kind.high:
+            raise ValueError(f"low {kind.low:g} of {self.name} is not below high {kind.high:g}")
+        return self
+
     def as_kind(self) -> Kind:
         """The kind of sensor with what is said here."""
         usual = KINDS[self.name]

@@ -10,7 +10,7 @@ from dva_sim import config, resources
 from dva_sim.config import Document, Fail, load_yaml
 from dva_sim.errors import ConfigError
 from dva_sim.scenario.names import check_names, locate_policy
-from dva_sim.scenario.profiles import robot_profiles
+from dva_sim.scenario.profiles import robot_profiles, site_of
 from dva_sim.scenario.scenario import Scenario
 from dva_sim.worlds.site import load_site
 
@@ -45,6 +45,7 @@ def _complete(scenario: Scenario, error: Fail) -> Scenario:
     """With what follows from the profiles; refuses what does not go together."""
     check_names(scenario, error)
     _check_options(scenario, error)
+    _check_draughts(scenario, error)
     processing = {profile.processing_s for profile in robot_profiles(scenario)}
     longest = scenario.robot.processing_s
     if longest is None:
@@ -63,6 +64,19 @@ def _check_options(scenario: Scenario, error: Fail) -> None:
             load_site(scenario.site.name, scenario.site.options)
         except ConfigError as problem:
             raise error(problem.problem, ("site", "options")) from None
+
+
+def _check_draughts(scenario: Scenario, error: Fail) -> None:
+    """Where a draught blows is on the site, so it has to be made to judge that."""
+    for number, event in enumerate(scenario.events):
+        if "draught" in event.hazard:
+            west, south, east, north = site_of(scenario, seed=0).extent
+            for end in ("supply", "exhaust"):
+                x, y = (float(event.hazard.get(f"{end}_{axis}", 0.0)) for axis in "xy")
+                if not (west <= x <= east and south <= y <= north):
+                    problem = f"{end} of a draught ({x:g}, {y:g}) is not on the site, which is "
+                    extent = f"from ({west:g}, {south:g}) to ({east:g}, {north:g})"
+                    raise error(problem + extent, ("events", number, "hazard"))
 
 
 def _check_timeout(scenario: Scenario, processing: float, error: Fail) -> None:

@@ -13,6 +13,7 @@ from dva_sim.worlds.hazards import make_hazard
 
 Positive = Annotated[float, Field(gt=0)]
 NonNegative = Annotated[float, Field(ge=0)]
+AnyNumber = Annotated[float, Field(allow_inf_nan=True)]  # `make_hazard` says what is wrong with it
 
 
 class SiteConfig(Config):
@@ -25,6 +26,14 @@ class SiteConfig(Config):
     name: str = "caparica"
     options: dict[str, Any] = Field(default_factory=dict)
     map: str | None = None
+
+    @model_validator(mode="after")
+    def _one_place(self) -> SiteConfig:
+        if self.map is not None and self.name != SiteConfig.model_fields["name"].default:
+            raise ValueError(f"site.map and site.name {self.name!r} are two places; leave out one")
+        if self.map is not None and self.options:
+            raise ValueError("site.options are of a generated site: site.map takes none")
+        return self
 
 
 class RobotConfig(Config):
@@ -44,6 +53,14 @@ class RobotConfig(Config):
     charge: Annotated[float, Field(gt=0, le=1)] = 1.0
     watchdog_s: Annotated[float, Field(gt=0, le=60)] = 3.0
     max_age_s: Annotated[float, Field(gt=0, le=120)] = 6.0
+
+    @model_validator(mode="after")
+    def _every_profile_has_a_robot(self) -> RobotConfig:
+        if isinstance(self.profile, tuple) and len(self.profile) > self.count:
+            raise ValueError(
+                f"robot.profile names {len(self.profile)} robots, robot.count is {self.count}"
+            )
+        return self
 
 
 class GuardConfig(Config):
@@ -124,7 +141,7 @@ class EventConfig(Config):
     latest_s: NonNegative | None = None
     reported: bool = False
     false_alarm: bool = False
-    hazard: dict[str, str | float] = Field(default_factory=dict)
+    hazard: dict[str, str | AnyNumber] = Field(default_factory=dict)
     reports: Annotated[int, Field(ge=1, le=20)] = 1
 
     @model_validator(mode="after")

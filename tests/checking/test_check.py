@@ -14,6 +14,8 @@ from dva_sim.checking import console
 ROOT = Path(__file__).parents[2]
 SAMPLES = ROOT / "protocol" / "samples"
 GOOD = SAMPLES / "valid" / "set-teleop.xml"
+FLOOD = "events: [{{kind: flood, hazard: {{{}}}}}]\n"
+LEAK = "events: [{{kind: gas_leak, hazard: {{draught: 1, {}}}}}]\n"
 BOMB = "a: &a [x, x]\n" + "".join(
     f"{new}: &{new} [*{old}, *{old}]\n"
     for old, new in zip("abcdefghijklmnopqrstu", "bcdefghijklmnopqrstuv", strict=True)
@@ -94,6 +96,14 @@ def test_the_place_tells_the_kind_where_the_keys_do_not(check, here):
         ("horizon_s: 5\nrobot: {count: 9}\n", "2:9: site 'caparica' has 3 robot bases"),
         ("link:\n  trace_up: no.up\n", "2:3: 'no.up': trace cannot be read"),
         ("site:\n  map: no.yaml\n", "2:3: world 'no.yaml' not found"),
+        ("horizon_s: 5\nsite: {name: campus, map: m.yaml}\n", "2:1: site: site.map and site.name"),
+        ("horizon_s: 5\nsite: {map: m.yaml, options: {seed: 2}}\n", "2:1: site: site.options are"),
+        ("robot: {profile: [servrobot, pibot]}\n", "1:1: robot: robot.profile names 2 robots, rob"),
+        ("robot: {sensors: [{name: gas, low: 1}]}\n", "1:19: robot.sensors.0: low 1 of gas is not"),
+        (FLOOD.format("inflow: 11"), "1:10: events.0: inflow of a flood is at most 10, not 11"),
+        (FLOOD.format("inflow: 1e400"), "1:10: events.0: inflow of a flood is a positive number, "),
+        (LEAK.format("supply_x: 900"), "1:27: supply of a draught (900, 0) is not on the site, w"),
+        (LEAK.format("exhaust_y: -9"), "1:27: exhaust of a draught (0, -9) is not on the site, w"),
         ("dispatch: {policy: dice}\n", "1:12: policy 'dice' is unknown"),
         ("question: what?\nparts:\n  a:\n    scenario: lost\n", "4:5: scenario 'lost' not found"),
         ("question: what?\nparts: {a: {scenario: fire-drill, x: 1}}\n", "2:35: unknown key 'parts"),

@@ -18,6 +18,13 @@ KINDS: dict[str, type[Fire] | type[GasLeak] | type[Flood]] = {
     "flood": Flood,
 }
 CHOICES = {"growth": tuple(GROWTH_S), "gas": tuple(GASES), "stability": tuple(CLASSES)}
+LARGEST = {  # assumed; beyond any building, and beyond what the fields are made for
+    "peak": 100e3,  # [kW]
+    "inflow": 10.0,  # [m^3/s]
+    "rate": 10.0,  # [m^3/s]
+    "draught": 100.0,  # [m^3/s]
+    "wind": 50.0,  # [m/s]
+}
 ANY_SIGN = ("wind_heading", "supply_x", "supply_y", "exhaust_x", "exhaust_y")
 
 
@@ -31,7 +38,8 @@ def make_hazard(kind: str, position: Point, start: float, **settings: str | floa
         settings: What else belongs to its kind: `growth`, `gas`, `rate`, `inflow`, ...
 
     Raises:
-        ConfigError: a kind or setting that is not known, or a number that is not positive.
+        ConfigError: a kind or setting that is not known, or a number that is not positive or
+            absurdly large.
     """
     if kind not in KINDS:
         raise ConfigError(f"hazard {kind!r} is not known; known: {', '.join(KINDS)}")
@@ -54,3 +62,5 @@ def _check(kind: str, name: str, value: str | float) -> None:
         return
     elif not isinstance(value, int | float) or not 0.0 < value < math.inf:
         raise ConfigError(f"{name} of a {kind} is a positive number, not {value!r}")
+    elif value > LARGEST.get(name, math.inf):
+        raise ConfigError(f"{name} of a {kind} is at most {LARGEST[name]:g}, not {value:g}")

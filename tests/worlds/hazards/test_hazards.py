@@ -39,6 +39,11 @@ def test_what_is_not_known_is_said_in_one_line() -> None:
         ("fire", {"growth": "quick"}, "known: slow, medium, fast, ultrafast"),
         ("gas_leak", {"gas": "helium"}, "known: methane, propane, carbon_monoxide"),
         ("flood", {"inflow": -1.0}, "inflow of a flood is a positive number, not -1.0"),
+        ("flood", {"inflow": 10.1}, "inflow of a flood is at most 10, not 10.1"),
+        ("fire", {"peak": 100_001.0}, "peak of a fire is at most 100000, not 100001"),
+        ("fire", {"peak": math.inf}, "peak of a fire is a positive number, not inf"),
+        ("gas_leak", {"rate": 1e9}, r"rate of a gas_leak is at most 10, not 1e\+09"),
+        ("gas_leak", {"wind": 51.0}, "wind of a gas_leak is at most 50, not 51"),
     ):
         with pytest.raises(ConfigError, match=message):
             make_hazard(kind, (0.0, 0.0), 0.0, **settings)
