@@ -57,6 +57,7 @@ def episode(
     settings: list[dict[str, Any]] = [changes]
     if side_by_side is not None:
         settings = [changes | {"pattern": p} for p in _two_patterns(side_by_side)]
+    pictures.check(scenario)
     runs = [_tell(scenarios.build(document, each), seed, pictures.any) for each in settings]
     if pictures.any:
         with console.status("Drawing ..."):

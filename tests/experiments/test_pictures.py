@@ -324,6 +324,22 @@ def test_what_cannot_be_drawn_is_said_before_the_run(options, said):
         Wanted(**(options | paths))
 
 
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"camera": "robot-9"}, "robot 'robot-9' is not known; known: robot-1, robot-2"),
+        ({"at": "121"}, "--at 121 is not within the run, which lasts at most 120 s"),
+        ({"at": "-1"}, "--at -1 is not within the run"),
+        ({"at": "nan"}, "--at nan is not within the run"),
+    ],
+)
+def test_what_no_run_of_a_scenario_has_is_said_before_the_run(options, said, tmp_path):
+    drill = scenarios.build(scenarios.load("fire-drill"), {"horizon_s": 120, "robot.count": 2})
+    Wanted(still=tmp_path / "a.png", at="120", camera="robot-2").check(drill)
+    with pytest.raises(ConfigError, match=said):
+        Wanted(still=tmp_path / "a.png", **options).check(drill)
+
+
 def test_a_moment_after_the_end_is_refused(drive, tmp_path):
     wanted = Wanted(still=tmp_path / "a.png", at="99")
     with pytest.raises(ConfigError, match="--at 99 is not within the run, which lasts 30 s"):

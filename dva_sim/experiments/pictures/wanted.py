@@ -7,10 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dva_sim.errors import ConfigError
+from dva_sim.scenario import Scenario
 from dva_sim.simulation import Recording
 
 MOVING, STANDING, DRAWN = (".gif", ".mp4"), (".png", ".jpg"), (".png", ".pdf", ".svg")
 MOST_PANELS = 24
+MOST_TOLD = 12  # robots by name in a message
 
 
 @dataclass(frozen=True)
@@ -75,6 +77,22 @@ class Wanted:
         except ValueError:
             raise ConfigError(f"--at {self.at!r} should be seconds, as in 42 or 10,20,30") from None
 
+    def check(self, scenario: Scenario) -> None:
+        """Refuse what no run of a scenario has.
+
+        Raises:
+            ConfigError: a robot that is not there, or a moment before the run or past its horizon.
+        """
+        robots = [f"robot-{number}" for number in range(1, scenario.robot.count + 1)]
+        if self.camera is not None and self.camera not in robots:
+            known = ", ".join(robots[:MOST_TOLD]) or "none"
+            more = ", ..." if len(robots) > MOST_TOLD else ""
+            raise ConfigError(f"robot {self.camera!r} is not known; known: {known}{more}")
+        for time in self.times:
+            if not 0 <= time <= scenario.horizon_s:
+                lasts = f"which lasts at most {scenario.horizon_s:g} s"
+                raise ConfigError(f"--at {time:g} is not within the run, {lasts}")
+
     def write(self, recordings: Sequence[Recording]) -> Iterator[str]:
         """Write everything, and say of each what it is and where.
 
@@ -82,7 +100,7 @@ class Wanted:
             recordings: Runs made with `keep_traffic`; a strip shows the first one.
 
         Raises:
-            ConfigError: a moment or a robot that the run does not have, or a failing ffmpeg.
+            ConfigError: a moment after the run ended, or a failing ffmpeg.
         """
         from dva_sim.experiments.pictures import stills, writing
         from dva_sim.experiments.pictures.film import Film
