@@ -26,6 +26,10 @@ class Timing(Protocol):
     """What a body needs to know of the world that steps it."""
 
     @property
+    def space(self) -> pymunk.Space:
+        """What its shape, and what holds it, belong to."""
+
+    @property
     def time(self) -> float:
         """Of the last whole tick [s]."""
 

@@ -45,6 +45,45 @@ class SetPoint(NamedTuple):
 STOP = SetPoint(0.0, 0.0, 0, math.inf)
 
 
+class Lock:
+    """Wheels that are locked: the floor holds them along, across and turning, up to its grip.
+
+    Friction is solved together with contacts, as forces from one tick to the next would let
+    whoever is leant against creep away. Nothing draws the body back to where it was.
+
+    Args:
+        space: That the body is in.
+        body: Of the robot.
+        arm: On which the grip holds against turning [m].
+    """
+
+    def __init__(self, space: pymunk.Space, body: pymunk.Body, arm: float) -> None:
+        self._space, self._body, self._arm = space, body, arm
+        self._joints: list[pymunk.Constraint] = []
+
+    @property
+    def closed(self) -> bool:
+        """Whether it holds."""
+        return bool(self._joints)
+
+    def close(self, grip: float) -> None:
+        """Hold from now on, with this friction coefficient of the floor."""
+        self.open()
+        floor, body, most = self._space.static_body, self._body, grip * G * self._body.mass
+        # New ones each time: a joint remembers the impulse with which it held last.
+        slide = pymunk.PivotJoint(floor, body, (0.0, 0.0), (0.0, 0.0))
+        turn = pymunk.GearJoint(floor, body, 0.0, 1.0)
+        slide.max_bias = turn.max_bias = 0.0
+        slide.max_force, turn.max_force = most, most * self._arm
+        self._joints = [slide, turn]
+        self._space.add(*self._joints)
+
+    def open(self) -> None:
+        """Let the wheels roll."""
+        self._space.remove(*self._joints)
+        self._joints = []
+
+
 class RobotBody(Body):
     """A robot's body in the world; made by `World.add_robot`.
 
@@ -52,7 +91,6 @@ class RobotBody(Body):
         spec: Mass, size, limits.
         distance: Way covered so far [m].
         work: Done by the motors against inertia and what is in the way, without braking [J].
-        grip: Friction coefficient of the floor under it; less on a wet one.
     """
 
     kind = ROBOT
@@ -70,12 +108,14 @@ class RobotBody(Body):
         shape.collision_type = self.kind
         super().__init__(world, name, body, shape)
         self.spec, self.radius, self._drive = spec, spec.radius, spec.drive(spec)
-        self.distance, self.work, self.grip = 0.0, 0.0, GRIP
+        self.distance, self.work, self._grip = 0.0, 0.0, GRIP
         self._powered = True
         self._now, self._next = STOP, STOP
         self._people, self._jam = Contacts(), Jam()
         self._mass, self._moment = spec.mass, body.moment
         self._arm = TRACK * spec.radius
+        self._lock = Lock(world.space, body, self._arm)
+        self._lock.close(GRIP)
 
     @property
     def person_contacts(self) -> int:
@@ -114,6 +154,17 @@ class RobotBody(Body):
         return Pose(place.x, place.y, get_angle(self._raw))
 
     @property
+    def grip(self) -> float:
+        """Friction coefficient of the floor under it; less on a wet one."""
+        return self._grip
+
+    @grip.setter
+    def grip(self, grip: float) -> None:
+        self._grip = grip
+        if self._lock.closed:
+            self._lock.close(grip)
+
+    @property
     def powered(self) -> bool:
         """Whether the motors obey; without power they brake and stop, from the next tick on."""
         return self._powered
@@ -144,7 +195,8 @@ class RobotBody(Body):
         """Apply the motors' forces for one tick; False if the robot stands and shall stand.
 
         Wheels hold along and across together no more than the grip of the floor: beyond that
-        they slip, and the force keeps its direction (a friction circle).
+        they slip, and the force keeps its direction (a friction circle). Who has come to rest
+        locks them until it is asked to move.
         """
         raw = self._raw
         if self._next is not self._now and tick >= self._next.start:
@@ -162,11 +214,19 @@ class RobotBody(Body):
             if abs(forward) + abs(sideways) + abs(spin) < AT_REST:
                 set_velocity(raw, (0.0, 0.0))
                 set_spin(raw, 0.0)
+                if not self._lock.closed:
+                    self._lock.close(self._grip)
                 return self._next is not self._now
-        elif self._touch.touching:
-            self._jam.strain(*self.pose(), dt)
+            if self._lock.closed:
+                self.distance += abs(forward) * dt
+                return True
+        else:
+            if self._lock.closed:
+                self._lock.open()
+            if self._touch.touching:
+                self._jam.strain(*self.pose(), dt)
         along, turn = self._drive.accelerations(wanted, wanted_spin, forward, spin, dt)
-        across, most = -sideways / dt, self.grip * G
+        across, most = -sideways / dt, self._grip * G
         asked = math.hypot(along, across)
         if asked > most:
             along, across = along * most / asked, across * most / asked

@@ -57,6 +57,49 @@ def test_who_is_hit_by_a_robot_is_counted_by_both_and_feels_its_momentum(world):
     assert person.impulse == robot.impulse
 
 
+def leant_on(world, heading):
+    """A robot that stands, and somebody who walks against it for 10 s along x."""
+    robot = world.add_robot("robot-1", DriveSpec(), Pose(20.0, 12.0, heading))
+    person = world.add_person("guard-1", Pose(19.4, 12.0, 0.0))
+    person.walk(1.3, 0.0)
+    world.advance_to(10.0)
+    return robot
+
+
+@pytest.mark.parametrize("heading", [0.0, 0.5 * math.pi, math.pi])
+def test_a_robot_that_stands_locks_its_wheels_and_does_not_creep_under_225_n(world, heading):
+    """Rubber holds 0.8 of 589 N; motors that only brake with 1 m/s^2 would hold 60 N."""
+    robot = leant_on(world, heading)
+    here = robot.pose()
+    assert here.x - 20.0 < 0.05  # what the blow moved it, mostly by ticks of 0.04 s
+    world.advance_to(60.0)
+    assert robot.pose() == here
+    assert robot.velocity == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("heading", [0.0, 0.5 * math.pi])
+def test_on_ice_a_robot_that_stands_is_pushed_along_with_the_rest_of_the_force(world, heading):
+    """Mu of 0.1 holds 59 N: 225 N push robot and person together with 166 N."""
+    robot = world.add_robot("robot-1", DriveSpec(), Pose(20.0, 12.0, heading))
+    robot.grip = 0.1
+    person = world.add_person("guard-1", Pose(19.4, 12.0, 0.0))
+    person.walk(9.0, 0.0)
+    world.advance_to(0.6)
+    before = robot.velocity[0]
+    world.advance_to(1.0)
+    gained = (robot.velocity[0] - before) / 0.4
+    assert gained == pytest.approx((75 * 3.0 - 0.1 * 60 * 9.81) / 135, rel=0.02)
+
+
+def test_wheels_that_were_locked_roll_again_when_they_are_asked_to(world):
+    robot = leant_on(world, math.pi / 2)
+    robot.drive(0.5, 0.0, 12.0)
+    world.advance_to(11.5)
+    assert robot.speed == pytest.approx(0.5, abs=0.01)
+    world.advance_to(20.0)
+    assert robot.velocity == (0.0, 0.0)
+
+
 def test_a_wall_or_another_person_is_no_contact_with_a_robot(world):
     one = world.add_person("guard-1", Pose(6.0, 12.0, 0.0))
     other = world.add_person("guard-2", Pose(8.0, 12.0, 0.0))

@@ -28,6 +28,7 @@ class PlainWorld:
             wall.friction, wall.elasticity = 0.3, 0.1
             self.space.add(wall)
         self.robots, self.people = [], []
+        self.locks = {}
 
     def add(self, pose, robot):
         """A disc of a robot, or of a person."""
@@ -39,17 +40,35 @@ class PlainWorld:
         shape.friction, shape.elasticity = (0.3, 0.1) if robot else (0.0, 0.0)
         self.space.add(body, shape)
         (self.robots if robot else self.people).append(body)
+        if robot:
+            self.lock(body)
+
+    def lock(self, body):
+        """Hold a robot with the friction of its wheels, 0.8 of its weight on half its radius."""
+        place = pymunk.PivotJoint(self.space.static_body, body, (0, 0), (0, 0))
+        angle = pymunk.GearJoint(self.space.static_body, body, 0.0, 1.0)
+        place.max_bias = angle.max_bias = 0.0
+        place.max_force, angle.max_force = 0.8 * 9.81 * 60.0, 0.8 * 9.81 * 60.0 * 0.15
+        self.space.add(place, angle)
+        self.locks[body] = place, angle
 
     def tick(self, speeds, walks):
         """One tick with what is wanted of everybody."""
         for body, (speed, turn_rate) in zip(self.robots, speeds, strict=True):
-            push_robot(body, speed, turn_rate)
+            stands, rests = speed == turn_rate == 0, push_robot(body, speed, turn_rate)
+            if not stands and body in self.locks:
+                self.space.remove(*self.locks.pop(body))
+            if rests and body not in self.locks:
+                self.lock(body)
+            if stands and body in self.locks:
+                body.force, body.torque = (0.0, 0.0), 0.0
         for body, wanted in zip(self.people, walks, strict=True):
             push_person(body, wanted)
         self.space.step(DT)
 
 
 def push_robot(body, wanted, wanted_spin):
+    """What its motors do; whether it is asked to stand, and does."""
     velocity, spin = body.velocity, body.angular_velocity
     angle = body.angle + spin * DT
     cos, sin = math.cos(angle), math.sin(angle)
@@ -57,7 +76,7 @@ def push_robot(body, wanted, wanted_spin):
     sideways = velocity.y * cos - velocity.x * sin
     if wanted == wanted_spin == 0 and abs(forward) + abs(sideways) + abs(spin) < 1e-3:
         body.velocity, body.angular_velocity = (0.0, 0.0), 0.0
-        return
+        return True
     gain = 1.0 / 0.15
     along = min(max((wanted - forward) * gain, -1.0), 0.5)
     turn = min(max((wanted_spin - spin) * gain, -1.5), 1.5)
@@ -68,6 +87,7 @@ def push_robot(body, wanted, wanted_spin):
     along, across = 60.0 * along, 60.0 * across
     body.force = along * cos - across * sin, along * sin + across * cos
     body.torque = body.moment * turn
+    return False
 
 
 def push_person(body, wanted):
