@@ -18,10 +18,20 @@ from dva_sim.simulation.machines import Machines
 from dva_sim.simulation.names import DVA
 from dva_sim.simulation.people import People
 from dva_sim.simulation.stage import Stage
-from dva_sim.worlds.hazards import Surroundings
+from dva_sim.worlds.hazards import Conditions, Surroundings
 from dva_sim.worlds.physics import World
 
 PHYSICS_TICK = 0.04  # two centimetres at top speed [s]
+DANGEROUS = Conditions(
+    temperature=60.0,
+    heat_flux=2.5,
+    extinction=math.inf,
+    co=1200.0,
+    gas=math.inf,
+    water=0.1,
+    explosive=0.2,
+)
+"""What makes a place dangerous, by the limits of `danger_radius` (worlds/HAZARDS.md)."""
 SAME_PLACE = 4.0  # what is so near a place is what is there [m]
 
 Danger = tuple[tuple[float, float], float]  # the middle and the radius of a place to keep off [m]
@@ -85,8 +95,18 @@ class Field:
         return self.stage.recorder.newest_drive.get(robot)
 
     def in_danger(self, x: float, y: float, now: float) -> bool:
-        """Whether a place [m] is within the danger radius of a hazard."""
-        return is_inside(self.dangers(now), x, y)
+        """Whether a place [m] is one where people should not be."""
+        return self.is_near(self.dangers(now), x, y) or is_dangerous(
+            self.surroundings.at(x, y, now)
+        )
+
+    def is_near(self, dangers: Iterable[Danger], x: float, y: float) -> bool:
+        """Whether a place [m] is within a danger's radius, with no wall between."""
+        sees = self.stage.planner.line_of_sight
+        return any(
+            math.dist(middle, (x, y)) < radius and sees(middle, (x, y))
+            for middle, radius in dangers
+        )
 
     def dangers(self, now: float) -> list[Danger]:
         """Where people should not be."""
@@ -164,6 +184,6 @@ class Field:
         return any(s.kind == kind and math.dist((s.x, s.y), (x, y)) < SAME_PLACE for s in spots)
 
 
-def is_inside(dangers: Iterable[Danger], x: float, y: float) -> bool:
-    """Whether a place [m] is within one of them."""
-    return any(math.dist(middle, (x, y)) < radius for middle, radius in dangers)
+def is_dangerous(air: Conditions) -> bool:
+    """Whether people should not be where it is like this."""
+    return any(is_ >= least for is_, least in zip(air, DANGEROUS, strict=True))

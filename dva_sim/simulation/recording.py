@@ -25,7 +25,8 @@ class PersonLog(NamedTuple):
         name: As in `guard-1`.
         kind: `guard` or `bystander`.
         activity: At the end.
-        exposure: Time within the danger radius of a hazard [s].
+        exposure: Time within the danger radius of a hazard and in sight of it, or in air or water
+            that is dangerous [s].
         heat: Fractional effective dose of heat; at 1 half of all people are incapacitated.
         toxic: The same of carbon monoxide.
         leaves: When it set out to leave [s]; infinite if it never did.

@@ -15,7 +15,7 @@ from dva_sim.network.virtual import VirtualNetwork
 from dva_sim.recorder import Recorder, TrackPoint
 from dva_sim.scenario import Scenario
 from dva_sim.simulation.control_room import add_dva, add_operator
-from dva_sim.simulation.field import Danger, Field, is_inside
+from dva_sim.simulation.field import Danger, Field, is_dangerous
 from dva_sim.simulation.names import id_of
 from dva_sim.simulation.recording import PersonLog, Recording, event_about
 from dva_sim.simulation.stage import Stage
@@ -199,5 +199,5 @@ class Run:
         x, y = who.walking.place
         if who.activity != SAFE:
             self.recorder.tracks[name].append(TrackPoint(now, x, y, who.heading, who.activity))
-            if is_inside(dangers, x, y):
+            if is_dangerous(who.exposure.conditions) or self.field.is_near(dangers, x, y):
                 self.recorder.exposure[name] += self._period

@@ -15,6 +15,7 @@ from dva_sim.simulation.names import id_of
 from dva_sim.simulation.recording import Recording
 from dva_sim.simulation.run import Run
 from dva_sim.streams import Streams
+from dva_sim.worlds.hazards import CLEAR
 from dva_sim.worlds.site import load_site
 
 LATE = 400.0  # by then the fire of these tests burns well [s]
@@ -123,7 +124,7 @@ def test_what_a_guard_has_contained_is_not_there_any_more() -> None:
     flames = field.surroundings.at(x + 1.0, y, LATE).heat_flux
     field._contain("fire", x + 1.0, y)
     assert not field._is_there("fire", x, y)
-    assert not field.in_danger(x, y, LATE)
+    assert not field.is_near(field.dangers(LATE), x, y)
     # The hot smoke under the ceiling still radiates.
     assert field.surroundings.at(x + 1.0, y, LATE + 0.1).heat_flux < 0.1 * flames
     assert field.contained == {0: LATE}
@@ -153,3 +154,20 @@ def test_a_robot_looks_and_a_guard_contains() -> None:
     played, recording = run({"room": "Canteen"}, **team)
     assert [event.state for event in recording.events] == [State.CONTAINED]
     assert list(played.field.contained) == [0]
+
+
+# --- danger ----------------------------------------------------------------------------
+
+
+def test_a_wall_keeps_one_out_of_danger_that_is_near_but_not_of_air_that_comes_through() -> None:
+    field = Run(scenario({"room": "North office", "hazard": {"growth": "ultrafast"}}), 1).field
+    x, y = field.incidents[0].hazard.position
+    far = 0.9 * field.incidents[0].hazard.danger_radius(75.0)
+    sees = field.stage.planner.line_of_sight
+    around = [(x + far * math.cos(a / 2), y + far * math.sin(a / 2)) for a in range(13)]
+    hidden = [p for p in around if not sees((x, y), p)]
+    assert 0 < len(hidden) < len(around)
+    for place in around:
+        assert field.in_danger(*place, 75.0) is (place not in hidden)
+    field.surroundings.at = lambda *_: CLEAR._replace(explosive=0.3)  # type: ignore[method-assign]
+    assert field.in_danger(*hidden[0], 75.0)
