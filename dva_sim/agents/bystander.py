@@ -7,7 +7,8 @@ What one does, as its `activity` tells:
   ready to leave for its pre-movement time, whichever came first. Air that nobody endures, or a
   fire that can be felt, ends that time at once.
 - **evacuating** to the nearest refuge by the way there, not through what nobody endures; if the
-  way ahead becomes so, it chooses again, and so it does when it is blocked for good.
+  way ahead becomes so, it chooses again, and so it does when it is blocked for good. Where no
+  way is left it stands still, and looks for one again.
 - **safe**: out.
 - **incapacitated**: it stays where it is, for everybody else to walk around.
 
@@ -23,11 +24,11 @@ from typing import Final
 import numpy as np
 
 from dva_sim.agents.device import do_nothing
-from dva_sim.agents.escape import choose_escape
 from dva_sim.agents.exposure import Air, Exposure, clean_air
 from dva_sim.agents.on_foot import OnFoot
 from dva_sim.agents.people import Occupant
 from dva_sim.agents.walking import Walking
+from dva_sim.agents.way_out import WayOut
 from dva_sim.clock import Clock
 from dva_sim.worlds.hazards import Conditions
 from dva_sim.worlds.planning import Planner
@@ -47,9 +48,6 @@ NOTICED: Final = Conditions(
 """From any of it on people notice that something is wrong; assumed, but for gas: it is given a
 smell that is noticed at a fifth of its lower explosive limit. Carbon monoxide has none."""
 TOO_NEAR: Final = 1.0  # who feels a fire so hot waits for nothing [kW/m^2]; assumed
-THROUGH: Final = 0.8  # so near to the middle of an exit one is through [m]
-CHOOSES_AGAIN: Final = 2.0  # no sooner than this after the last choice of a way [s]
-LOOKS_AHEAD: Final = 6.0  # along its way, for what nobody endures [m]
 
 Point = tuple[float, float]
 
@@ -99,12 +97,11 @@ class BystanderAgent(OnFoot):
     ) -> None:
         super().__init__(walking, Exposure(clock, walking, air))
         self.name, self._clock, self._occupant = name, clock, occupant
-        self._planner, self._luck = planner, luck
-        self._places, self._refuges = places, refuges
+        self._way_out = WayOut(clock, planner, walking, self.exposure, lambda: refuges)
+        self._places, self._luck = places, luck
         self._sees, self._leaves, self._tell = sees, leaves, tell
         self.activity = WORKING
         self.leaves_at = self.out_at = math.inf
-        self._chosen = -math.inf
 
     def start(self) -> None:
         """Begin to work, and to notice what is wrong."""
@@ -149,9 +146,7 @@ class BystanderAgent(OnFoot):
         if self.dose.incapacitated:
             self._collapse()
         elif self.activity == EVACUATING:
-            ahead = self.walking.places_ahead(1.0, LOOKS_AHEAD)
-            if now >= self._chosen + CHOOSES_AGAIN and any(map(self.exposure.is_bad, ahead)):
-                self._choose_way()
+            self._way_out.look_ahead()
         elif self.exposure.is_too_much or self.exposure.conditions.heat_flux >= TOO_NEAR:
             self._leave_at(now)
         elif self.activity != ALARMED and self._notices(now):
@@ -164,7 +159,7 @@ class BystanderAgent(OnFoot):
 
     def _collapse(self) -> None:
         self.exposure.end()
-        self.walking.stop()
+        self._way_out.end()
         self.activity = DOWN
         self._tell("is incapacitated")
 
@@ -174,23 +169,7 @@ class BystanderAgent(OnFoot):
         if self.activity == ALARMED:
             self.activity = EVACUATING
             self._tell("leaves")
-            self._choose_way()
-
-    def _choose_way(self) -> None:
-        """Set out for the refuge that is best now; if none can be reached, try again."""
-        if self.activity != EVACUATING:
-            return
-        self._chosen = self._clock.now
-        here, limits = self.walking.place, self.exposure.limits
-        escape = choose_escape(self._planner, here, self._refuges, limits)
-        if escape is None or not self.walking.go(
-            escape.goal,
-            self._is_out,
-            self._choose_way,
-            lambda at: math.dist(at, escape.goal) < THROUGH,
-            escape.avoid,
-        ):
-            self._clock.call_after(CHOOSES_AGAIN, self._choose_way)
+            self._way_out.leave(self._is_out)
 
     def _is_out(self) -> None:
         self.activity, self.out_at = SAFE, self._clock.now

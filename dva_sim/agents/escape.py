@@ -16,6 +16,7 @@ from collections.abc import Callable, Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dva_sim.worlds.hazards import Conditions
 from dva_sim.worlds.planning import Disc, Planner
@@ -45,10 +46,12 @@ DEADLY: Final = Conditions(
 EVERY: Final = 1.0  # a way is looked at so often [m]
 KEEPS_OFF: Final = 1.0  # around a bad place of a way [m]
 TRIES: Final = 3  # to find a way around bad places
+CLOSE: Final = 10.0  # so far one goes through bad air to the end, if it gets no worse; assumed [m]
 WITHIN: Final = 0.05  # of the line of an exit, still indoors [m]
 
 Point = tuple[float, float]
-Limit = Callable[[Point], bool]
+Floats = NDArray[np.float64]
+Limit = Callable[[Point], float]  # 1 and more is more than one bears
 
 
 class Escape(NamedTuple):
@@ -58,14 +61,19 @@ class Escape(NamedTuple):
     avoid: tuple[Disc, ...] = ()
 
 
+def strain(conditions: Conditions, most: Conditions) -> float:
+    """How much of a limit it is: 1 where the first of the conditions reaches it."""
+    return max(is_ / limit for is_, limit in zip(conditions, most, strict=True))
+
+
 def is_untenable(conditions: Conditions) -> bool:
     """Whether nobody goes there, or stays."""
-    return any(is_ >= most for is_, most in zip(conditions, UNTENABLE, strict=True))
+    return strain(conditions, UNTENABLE) >= 1.0
 
 
 def is_deadly(conditions: Conditions) -> bool:
     """Whether not even who is in smoke already goes there."""
-    return any(is_ >= most for is_, most in zip(conditions, DEADLY, strict=True))
+    return strain(conditions, DEADLY) >= 1.0
 
 
 def refuges_of(site: Site) -> list[Point]:
@@ -85,44 +93,59 @@ def choose_escape(
     """The nearest refuge by the way there, on a way without bad places.
 
     A longer way around bad places is taken if every refuge's shortest way leads through some.
-    If there is none either, less has to do: a way without what the next limit calls bad. If no
+    If there is none either, less has to do: a way that keeps the limits but the first. If no
     way keeps even the last limit there is no escape for now.
 
     Args:
         planner: Knows the site.
-        here: Where one is; bad places around it count only from the first good one on [m].
-        refuges: Where one is safe [m].
-        limits: Each says whether one keeps off a place; the strictest first.
+        here: Where one is; who stands in bad air goes through no worse to the first good place.
+        refuges: Where one is safe, whatever it is like right there: outdoors is beyond [m].
+        limits: Each says how much of what one bears a place is; the strictest first.
     """
-    far = {refuge: planner.distance(here, refuge) for refuge in refuges}
-    near = sorted((r for r in refuges if far[r] < math.inf), key=lambda r: far[r])
-    for is_bad in limits:
-        for tries in (1, TRIES):
-            for refuge in near:
-                escape = _try(planner, here, refuge, is_bad, tries)
-                if escape is not None:
-                    return escape
+    for k in range(len(limits)):
+        escape = _keeping(planner, here, refuges, limits[k:])
+        if escape is not None:
+            return escape
     return None
 
 
-def _try(planner: Planner, here: Point, refuge: Point, is_bad: Limit, tries: int) -> Escape | None:
-    """A good way to one refuge, keeping off more and more bad places."""
+def _keeping(
+    planner: Planner, here: Point, refuges: Sequence[Point], limits: Sequence[Limit]
+) -> Escape | None:
+    """The nearest refuge on a way that keeps some limits, around more and more bad places."""
     avoid: tuple[Disc, ...] = ()
-    for _ in range(tries):
-        way = planner.path(here, refuge, avoid)
-        if way is None:
+    for _ in range(TRIES):
+        ways = [(refuge, planner.path(here, refuge, avoid)) for refuge in refuges]
+        there = [(_length(way), refuge, way) for refuge, way in ways if way is not None]
+        found: dict[Point, None] = {}
+        for _, refuge, way in sorted(there, key=lambda one: one[0]):
+            judged = [_judge(way, one, CLOSE) for one in limits[:-1]]
+            judged.append(_judge(way, limits[-1], math.inf))
+            if all(will_do for will_do, _ in judged):
+                return Escape(refuge, avoid)
+            found.update((place, None) for _, bad in judged for place in bad)
+        if not found:
             return None
-        bad = _bad_places(way, is_bad)
-        if not bad:
-            return Escape(refuge, avoid)
-        avoid = (*avoid, *(Disc(x, y, KEEPS_OFF) for x, y in bad))
+        avoid = (*avoid, *(Disc(x, y, KEEPS_OFF) for x, y in found))
     return None
 
 
-def _bad_places(way: np.ndarray, is_bad: Limit) -> list[Point]:
-    """The bad ones of some places on a way, after the first good one."""
+def _judge(way: Floats, limit: Limit, close: float) -> tuple[bool, list[Point]]:
+    """Whether a way keeps a limit, and the bad places to go around.
+
+    No way keeps it that is bad from begin to end, and longer than `close` [m]: only who stands
+    in what is deadly runs however far, if it gets no worse.
+    """
     steps = max(1, round(EVERY / float(np.hypot(*(way[1] - way[0])) or EVERY)))
-    places = [(float(x), float(y)) for x, y in way[::steps]]
-    bad = [is_bad(place) for place in places]
-    first = bad.index(False) if False in bad else len(bad)
-    return [p for p, b in zip(places[first:], bad[first:], strict=True) if b]
+    places = [(float(x), float(y)) for x, y in way[:-1:steps]]
+    strains = [float(limit(place)) for place in places]
+    leaves = (i for i, s in enumerate(strains) if s < 1.0 or s > strains[0])
+    first = next(leaves, len(places))
+    bad = [p for p, s in zip(places[first:], strains[first:], strict=True) if s >= 1.0]
+    comes_out = first < len(places) or _length(way) <= close
+    return comes_out and not bad, bad
+
+
+def _length(way: Floats) -> float:
+    """Of a way [m]."""
+    return float(np.hypot(*np.diff(way, axis=0).T).sum())

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Final
 
 from dva_sim.agents.device import do_nothing
-from dva_sim.agents.escape import Limit, is_deadly, is_untenable
+from dva_sim.agents.escape import DEADLY, UNTENABLE, Limit, is_deadly, is_untenable, strain
 from dva_sim.agents.walking import Walking
 from dva_sim.clock import Clock
 from dva_sim.worlds.hazards import CLEAR, Conditions, Dose, pace_in_smoke, pace_in_water
@@ -84,4 +84,8 @@ class Exposure:
     @property
     def limits(self) -> tuple[Limit, Limit]:
         """What to keep off: what is untenable, or where that cannot be, what is deadly."""
-        return self.is_bad, self.is_deadly
+        return self._strain(UNTENABLE), self._strain(DEADLY)
+
+    def _strain(self, most: Conditions) -> Limit:
+        """How much of some limit it is at a place now."""
+        return lambda place: strain(self._air(*place, self._clock.now), most)

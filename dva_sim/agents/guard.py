@@ -1,7 +1,8 @@
 """Guards: people who walk to an event, look at it, deal with it, and get out of what is too much.
 
 A guard **withdraws** as soon as what is around it is untenable, or its dose is `HURT`: whatever it
-was on, it tells `failed`, and goes to the nearest of its refuges by a way that is not untenable.
+was on, it tells `failed`, and goes to its post or the nearest exit by a way that is not
+untenable; it looks ahead on it, and chooses again, as bystanders do.
 But who was sent to look, and has the place in sight, has seen enough: it confirms first. Until
 the guard is there it takes no orders; with such a dose it never takes one again. One who is
 incapacitated stays where it is, and its device answers that it lies down.
@@ -18,11 +19,11 @@ from functools import partial
 
 from dva_sim.agents.device import STATUS, Device, do_nothing
 from dva_sim.agents.duty import Errand, GuardDuty
-from dva_sim.agents.escape import choose_escape
 from dva_sim.agents.exposure import Air, Exposure, clean_air
 from dva_sim.agents.on_foot import OnFoot
 from dva_sim.agents.people import Walker
 from dva_sim.agents.walking import Walking
+from dva_sim.agents.way_out import WayOut
 from dva_sim.protocol import messages as m
 from dva_sim.worlds.planning import Planner
 
@@ -33,12 +34,12 @@ HAVE_VALVES = "gas_leak", "flood"
 KEEPS_OFF = 5.0  # who shuts a valve keeps so far from what nobody endures [m]
 HERE = 1.0  # who is so near a place stands at it [m]
 STAND_OFF = 10.0
-"""Who stands by waits so far from the place [m]: no hazard is dangerous beyond 7 m, one step may
-lead a metre too far, and a place is reported a metre or two wrong."""
+"""Who stands by waits so far from the place [m]: no hazard of the default settings is dangerous
+beyond 7 m (a greater one, set in a scenario, may be), one step may lead a metre too far, and a
+place is reported a metre or two wrong."""
 STAND_BY_FOR = 900.0  # who stands by gives up if the DVA says nothing for so long [s]
 MOST = 1e6  # no bid is longer [s]
 IN_SIGHT = 10.0  # from where who is driven back has seen what there is [m]
-TRIES_AGAIN = 5.0  # who finds no way out looks for one again after this [s]
 CONFIRMED, REFUTED, CONTAINED = "confirmed", "refuted", "contained"
 
 Point = tuple[float, float]
@@ -55,7 +56,7 @@ class GuardAgent(OnFoot):
         is_there: Whether something of a kind really is near a place [m].
         contain: Told of what kind is dealt with near a place [m].
         air: What it is like at a place [m] and time [s].
-        refuges: Where it is safe, besides its post [m].
+        refuges: Ways out, where it is safe whatever the air there [m].
     """
 
     def __init__(
@@ -72,6 +73,7 @@ class GuardAgent(OnFoot):
         super().__init__(walking, Exposure(device.clock, walking, air))
         self.device, self._walker, self._planner = device, walker, planner
         self._post, self._refuges = walking.place, refuges
+        self._way_out = WayOut(device.clock, planner, walking, self.exposure, self._safe_places)
         self.activity = "waiting"
         self._is_there, self._contain = is_there, contain
         self._duty = GuardDuty(device.dva, walker.mobilisation, self._stands_at)
@@ -229,14 +231,16 @@ class GuardAgent(OnFoot):
         if self.dose.incapacitated:
             self.exposure.end()
             self._give_back("lies down")
-            self.walking.stop()
+            self._way_out.end()
             self.activity = "incapacitated"
             self.device.tell("is incapacitated", "safety")
         elif self.exposure.is_too_much and not self._duty.unfit:
             self._give_back("withdraws from danger")
             self.activity = "withdrawing"
             self.device.tell("withdraws", "safety")
-            self._withdraw()
+            self._way_out.leave(self._is_safe)
+        elif self.activity == "withdrawing":
+            self._way_out.look_ahead()
 
     def _give_back(self, unfit: str) -> None:
         """Be of no more use, for that reason, to whatever the guard was on."""
@@ -252,18 +256,10 @@ class GuardAgent(OnFoot):
         at, place = self.walking.place, self._xy(order.position)
         return self._sees(at, place, IN_SIGHT) and self._is_there(order.kind, *place)
 
-    def _withdraw(self) -> None:
-        """Go to where it is safe; if that cannot be reached, try again."""
-        if self.activity != "withdrawing":
-            return
-        places = (self._post, *self._refuges)
-        safe = [place for place in places if not self.exposure.is_bad(place)]
-        escape = choose_escape(self._planner, self.walking.place, safe, self.exposure.limits)
-        again = partial(self.device.clock.call_after, TRIES_AGAIN, self._withdraw)
-        if escape is None or not self.walking.go(
-            escape.goal, self._is_safe, again, avoid=escape.avoid
-        ):
-            again()
+    def _safe_places(self) -> list[Point]:
+        """Where to withdraw to: its post, unless it is bad there, and the ways out."""
+        post = [] if self.exposure.is_bad(self._post) else [self._post]
+        return [*post, *(place for place in self._refuges if place != self._post)]
 
     def _is_safe(self) -> None:
         """At a refuge: fit for service again, unless hurt."""

@@ -22,7 +22,7 @@ STEP = 0.25  # between the points of a finished way [m]
 SNAP = 1.5  # how far to look for a planning cell around a start or goal [m]
 ROUNDS = 20  # of smoothing
 SPARE = 0.30  # on top of the clearance: so near to a wall may a rounded corner get [m]
-KEPT_FIELDS, KEPT_PATHS = 256, 2048
+KEPT_FIELDS, KEPT_PATHS, KEPT_MAPS = 256, 2048, 4
 
 Point = tuple[float, float]
 Floats = NDArray[np.float64]
@@ -126,9 +126,13 @@ class Roadmap:
         self._fields: OrderedDict[Hashable, tuple[Floats, NDArray[np.int32]]] = OrderedDict()
         self._ways: OrderedDict[Hashable, Floats | None] = OrderedDict()
         self._lengths: OrderedDict[Hashable, float] = OrderedDict()
+        self._others: OrderedDict[Hashable, Roadmap] = OrderedDict()
 
     def around(self, discs: Sequence[Disc]) -> Roadmap:
-        """The same floor with some things standing on it."""
+        """The same floor with some things standing on it; the last few are kept."""
+        return _kept(self._others, tuple(discs), KEPT_MAPS, lambda: self._with(discs))
+
+    def _with(self, discs: Sequence[Disc]) -> Roadmap:
         room = self._grid.clearance.copy()
         rows, columns = room.shape
         for x, y, radius in discs:

@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 from halls import People, hall, two_rooms
 
-from dva_sim.agents.bystander import THROUGH, BystanderAgent, nothing_seen
+from dva_sim.agents.bystander import BystanderAgent, nothing_seen
 from dva_sim.agents.escape import UNTENABLE, choose_escape, is_untenable, refuges_of
 from dva_sim.agents.exposure import PERIOD, clean_air
 from dva_sim.agents.operator.person import Trait
 from dva_sim.agents.people import BystanderProfile, Occupant
+from dva_sim.agents.way_out import THROUGH
 from dva_sim.agents.workplaces import APART, draw_places
 from dva_sim.config import load_yaml, validate
 from dva_sim.resources import find
