@@ -19,6 +19,7 @@ from dva_sim.worlds.hazards.plumes import plume
 
 Floats = NDArray[np.float64]
 
+LARGE_MESH = 20_000  # nodes, of 5000 m^2 of floor
 GAS_PACES = ((120.0, 2.0), (600.0, 10.0), (math.inf, 30.0))
 
 
@@ -68,17 +69,22 @@ class LeakField:
         """The share of gas at a place [m] by the age of a leak that goes on [s].
 
         In still air as much gas comes from one place to another as would come back from there:
-        one solution, with the source at this place, serves leaks wherever they are.
+        one solution, with the source at this place, serves leaks wherever they are. In a large
+        house that would be slow, for every detector, and the leak's own serves them all.
         """
         if not self._indoors or self._leak.draught > 0.0:
             return lambda age: self.share(x, y, self._leak.start + age)
         mesh, leak = mesh_in(self._building), self._leak
         here, there = mesh.nearest(x, y), mesh.nearest(*leak.position)
-        march = _gas(self._air, here, 1.0)
+        source, seen, rate = here, there, 1.0
+        if len(mesh.area) > LARGE_MESH:
+            source, seen, rate = there, here, leak.release
+        march = _gas(self._air, source, rate)
 
         def share(age: float) -> float:
             before, after, weight = march.around(age)
-            return leak.release * float(before[there] + weight * (after[there] - before[there]))
+            gas = float(before[seen] + weight * (after[seen] - before[seen]))
+            return leak.release / rate * gas
 
         return share
 

@@ -7,8 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from dva_sim.worlds.hazards import CLEAR, Hazard, Surroundings, make_hazard
+from dva_sim.worlds.hazards import CLEAR, Hazard, Surroundings, leak_field, make_hazard
 from dva_sim.worlds.hazards.building import building_of
+from dva_sim.worlds.hazards.leak import GasLeak
+from dva_sim.worlds.hazards.leak_field import LeakField
 from dva_sim.worlds.site import Site, load_site
 
 LAB = (19.0, 22.5)  # in the chemistry lab; its door opens on the north corridor
@@ -171,6 +173,21 @@ def test_a_draught_blows_gas_down_the_corridor(site: Site) -> None:
     assert west < 0.01 * east
     still = air(site, make_hazard("gas_leak", (15.0, 12.0), 0.0))
     assert still.at(25.0, 12.0, 120.0).gas < 0.01 * east
+
+
+def test_a_large_house_gives_a_detector_the_same_gas_from_the_leak_as_to_the_leak(
+    site: Site, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Solved from the detector's side in small houses, from the leak's in large ones."""
+    leak = make_hazard("gas_leak", LAB, 0.0)
+    assert isinstance(leak, GasLeak)
+    field = LeakField(building_of(site), leak)
+    small = field.seen_from(*CORRIDOR)
+    monkeypatch.setattr(leak_field, "LARGE_MESH", 0)
+    large = field.seen_from(*CORRIDOR)
+    for age in (60.0, 300.0, 1500.0):
+        assert large(age) == pytest.approx(small(age), rel=1e-9)
+        assert large(age) == pytest.approx(field.share(*CORRIDOR, age), rel=1e-9)
 
 
 def test_outdoors_gas_goes_with_the_wind(site: Site) -> None:
