@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from dva_sim import scenario as scenarios
+from dva_sim.agents.camera import no_smoke
 from dva_sim.agents.exposure import Air, clean_air
 from dva_sim.agents.guard import GuardAgent
 from dva_sim.agents.legs import RADIUS
@@ -93,14 +94,15 @@ class PretendedDva:
         walker: Walker = WALKER,
         air: Air = clean_air,
         refuges: Sequence[Point] = (),
+        smoke: Callable[[Point, Point], float] = no_smoke,
     ) -> GuardAgent:
-        """A guard who sees what is in `there`."""
+        """A guard who sees what is in `there`, through no more smoke than people do."""
         device, planner, world = self.stage.device("guard", 1), self.stage.planner, self.field.world
         body = world.add_person("guard-1", Pose(*position, 0.0), radius=RADIUS)
         doors = self.stage.site.doors
         walking = Walking(self.network.clock, planner, world, body, walker.speed, doors)
         there, contained = lambda kind, *_: kind in self.there, self._contained
-        guard = GuardAgent(device, walker, planner, walking, there, contained, air, refuges)
+        guard = GuardAgent(device, walker, planner, walking, there, contained, air, refuges, smoke)
         device.register(guard.start)
         self.run_for(1.0)
         return guard

@@ -40,7 +40,7 @@ class Exposure:
     def __init__(self, clock: Clock, walking: Walking, air: Air = clean_air) -> None:
         self._clock, self._walking, self._air = clock, walking, air
         self.dose, self.conditions = Dose(), CLEAR
-        self._over = False
+        self._over = self._is_outdoors = False
 
     def start(self, then: Callable[[], object] = do_nothing) -> None:
         """Look at the air from now on, and call `then` each time."""
@@ -51,12 +51,17 @@ class Exposure:
         """The person is out of it."""
         self._over = True
 
+    def step_out(self) -> None:
+        """The person stands just beyond an exit, in clean air, until it walks again."""
+        self._is_outdoors = True
+
     def _look(self, then: Callable[[], object]) -> bool:
         """Sample; False when it is over."""
         if self._over:
             return False
         x, y = self._walking.place
-        self.conditions = self._air(x, y, self._clock.now)
+        self._is_outdoors = self._is_outdoors and not self._walking.walks
+        self.conditions = CLEAR if self._is_outdoors else self._air(x, y, self._clock.now)
         self.dose.add(self.conditions, PERIOD)
         in_smoke = pace_in_smoke(self.conditions.extinction)
         self._walking.pace = in_smoke * pace_in_water(self.conditions.water)

@@ -17,6 +17,7 @@ import math
 from collections.abc import Callable, Sequence
 from functools import partial
 
+from dva_sim.agents.camera import SEEN_THROUGH, no_smoke
 from dva_sim.agents.device import STATUS, Device, do_nothing
 from dva_sim.agents.duty import Errand, GuardDuty
 from dva_sim.agents.exposure import Air, Exposure, clean_air
@@ -57,6 +58,7 @@ class GuardAgent(OnFoot):
         contain: Told of what kind is dealt with near a place [m].
         air: What it is like at a place [m] and time [s].
         refuges: Ways out, where it is safe whatever the air there [m].
+        smoke: Optical depth of the smoke between two places now.
     """
 
     def __init__(
@@ -69,13 +71,14 @@ class GuardAgent(OnFoot):
         contain: Callable[[str, float, float], object] = do_nothing,
         air: Air = clean_air,
         refuges: Sequence[Point] = (),
+        smoke: Callable[[Point, Point], float] = no_smoke,
     ) -> None:
         super().__init__(walking, Exposure(device.clock, walking, air))
         self.device, self._walker, self._planner = device, walker, planner
         self._post, self._refuges = walking.place, refuges
         self._way_out = WayOut(device.clock, planner, walking, self.exposure, self._safe_places)
         self.activity = "waiting"
-        self._is_there, self._contain = is_there, contain
+        self._is_there, self._contain, self._smoke = is_there, contain, smoke
         self._duty = GuardDuty(device.dva, walker.mobilisation, self._stands_at)
         self.exposure.start(self._felt)
         device.serve(self._on_request)
@@ -157,12 +160,16 @@ class GuardAgent(OnFoot):
             ahead = self.walking.places_ahead(1.0, KEEPS_OFF)
             if any(map(self.exposure.is_bad, ahead)):
                 return True
-        return self._sees(at, place, NEAR_ENOUGH.get(order.kind, AT_MOST))
+        return self._sees(order.kind, at, place, NEAR_ENOUGH.get(order.kind, AT_MOST))
 
-    def _sees(self, at: Point, place: Point, within: float) -> bool:
-        """Whether a place is so near [m], and nothing stands between."""
-        near = math.hypot(place[0] - at[0], place[1] - at[1]) <= within
-        return near and self._planner.line_of_sight(at, place)
+    def _sees(self, kind: str, at: Point, place: Point, within: float) -> bool:
+        """Whether a place is so near [m], and neither wall nor thick smoke between.
+
+        As for cameras, smoke hides no fire: who stands before thick smoke has found one.
+        """
+        if math.dist(at, place) > within or not self._planner.line_of_sight(at, place):
+            return False
+        return kind == "fire" or self._smoke(at, place) < SEEN_THROUGH
 
     # --- what is done there ------------------------------------------------------------
 
@@ -254,7 +261,8 @@ class GuardAgent(OnFoot):
 
     def _has_seen(self, order: m.Order) -> bool:
         at, place = self.walking.place, self._xy(order.position)
-        return self._sees(at, place, IN_SIGHT) and self._is_there(order.kind, *place)
+        seen = self._sees(order.kind, at, place, IN_SIGHT)
+        return seen and self._is_there(order.kind, *place)
 
     def _safe_places(self) -> list[Point]:
         """Where to withdraw to: its post, unless it is bad there, and the ways out."""
@@ -262,7 +270,9 @@ class GuardAgent(OnFoot):
         return [*post, *(place for place in self._refuges if place != self._post)]
 
     def _is_safe(self) -> None:
-        """At a refuge: fit for service again, unless hurt."""
+        """At a refuge: fit for service again, unless hurt; who is at an exit steps out."""
+        if any(math.dist(self.walking.place, place) < HERE for place in self._refuges):
+            self.exposure.step_out()
         self._duty.unfit = "is hurt" if self.exposure.is_hurt else ""
         self.activity = "hurt" if self.exposure.is_hurt else "waiting"
 

@@ -74,6 +74,7 @@ class People:
             self._contain,
             self._air,
             self._refuges,
+            self._smoke,
         )
         device.register(guard.start)
         return guard
@@ -118,6 +119,9 @@ class People:
         places = draw_places(stage.site, stage.streams[f"{name}/places"], PLACES, taken)
         self._first_places.append(places[0])
         return places
+
+    def _smoke(self, a: Point, b: Point) -> float:
+        return self._around.optical_depth(a, b, self._stage.clock.now)
 
     def _sees_flames(self, x: float, y: float, time: float) -> bool:
         sees = self._stage.planner.line_of_sight

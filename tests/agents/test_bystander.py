@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 from halls import People, hall, two_rooms
 
+from dva_sim.agents import way_out
 from dva_sim.agents.bystander import BystanderAgent, nothing_seen
 from dva_sim.agents.escape import UNTENABLE, choose_escape, is_untenable, refuges_of
 from dva_sim.agents.exposure import PERIOD, clean_air
 from dva_sim.agents.operator.person import Trait
 from dva_sim.agents.people import BystanderProfile, Occupant
-from dva_sim.agents.way_out import THROUGH
+from dva_sim.agents.way_out import AT_LATEST, THROUGH
 from dva_sim.agents.workplaces import APART, draw_places
 from dva_sim.config import load_yaml, validate
 from dva_sim.resources import find
@@ -245,6 +246,74 @@ def test_nobody_walks_through_flames_to_get_out_of_smoke():
     escape = choose_escape(planner, (2.0, 5.0), [(18.0, 5.0)], [lambda at: at[0] > 3.0, flames])
     way = planner.path((2.0, 5.0), escape.goal, escape.avoid)
     assert not any(flames(at) for at in way)
+
+
+def test_nobody_sets_out_through_air_that_gets_worse_though_all_of_it_is_bad():
+    """4 kW/m2 and more all the way east, more and more up to a fire; an exit in the west too."""
+    planner = Planner(hall(40, 3), 0.3)
+
+    def heat(at):
+        return 1.0 + 0.1 * at[0]
+
+    near, far = (39.0, 1.5), (1.0, 1.5)
+    assert choose_escape(planner, (32.0, 1.5), [near], [heat, lambda at: False]).goal == near
+    assert choose_escape(planner, (32.0, 1.5), [near, far], [heat, heat]).goal == far
+    assert choose_escape(planner, (32.0, 1.5), [near], [heat, heat]) is None
+
+
+def test_what_is_deadly_is_not_skipped_by_who_stands_in_thicker_smoke():
+    planner = Planner(hall(40, 3), 0.3)
+
+    def smoke(at):
+        return 8.0
+
+    def flames(at):
+        return math.dist(at, (36.0, 1.5)) < 2.0
+
+    east, west = (39.0, 1.5), (1.0, 1.5)
+    assert choose_escape(planner, (32.0, 1.5), [east, west], [smoke, flames]).goal == west
+    assert choose_escape(planner, (32.0, 1.5), [east], [smoke, flames]) is None
+
+
+def test_an_exit_within_10_m_is_taken_through_smoke_that_gets_no_thicker():
+    planner = Planner(hall(40, 3), 0.3)
+    refuges = [(39.0, 1.5), (1.0, 1.5)]
+
+    def smoke(at):
+        return at[0] > 12.0
+
+    assert choose_escape(planner, (30.0, 1.5), refuges, [smoke]).goal == (39.0, 1.5)
+    strict = [smoke, lambda at: False]
+    assert choose_escape(planner, (30.0, 1.5), refuges, strict).goal == (39.0, 1.5)
+    assert choose_escape(planner, (26.0, 1.5), refuges, strict).goal == (1.0, 1.5)
+
+
+def test_who_has_no_way_left_stands_still_and_leaves_when_there_is_one_again():
+    """Flames on both sides from 23 to 60 s."""
+    building = Building()
+    burns = CLEAR._replace(temperature=150.0, heat_flux=20.0)
+
+    def air(x, y, time):
+        return burns if 23.0 <= time < 60.0 and abs(x - 10.0) > 6.0 else CLEAR
+
+    one = building.bystander((10.0, 1.5), air=air)
+    one.alarm(0.0)
+    building.pass_time(30.0)
+    here = one.x
+    assert (one.activity, one.walking.walks) == ("evacuating", False)
+    building.pass_time(59.0)
+    assert one.x == pytest.approx(here, abs=0.05)
+    building.pass_time(60.0 + AT_LATEST + 20.0)
+    assert (one.activity, one.dose.heat) == ("safe", 0.0)
+
+
+def test_who_is_trapped_looks_for_a_way_after_2_4_8_and_then_every_16_seconds(monkeypatch):
+    building, tries = Building(), []
+    monkeypatch.setattr(way_out, "choose_escape", lambda *_: tries.append(building.clock.now))
+    one = building.bystander((10.0, 1.5), premovement=1.0)
+    one.alarm(0.0)
+    building.pass_time(70.0)
+    assert np.diff(tries).tolist() == pytest.approx([2.0, 4.0, 8.0, 16.0, 16.0, 16.0])
 
 
 def test_who_stands_in_smoke_may_go_through_it_to_clean_air():

@@ -433,6 +433,52 @@ def test_who_was_to_look_and_sees_nothing_there_has_failed(dva: PretendedDva) ->
     assert dva.progress(1) == ["departed", "failed"]
 
 
+@pytest.mark.parametrize(
+    ("kind", "depth", "said"),
+    [
+        ("gas_leak", 2.9, ["departed", "confirmed", "done"]),
+        ("gas_leak", 3.1, ["departed", "failed"]),
+        ("flood", 3.1, ["departed", "failed"]),
+        ("fire", 3.1, ["departed", "confirmed", "done"]),
+    ],
+)
+def test_who_is_driven_back_has_seen_a_fire_by_its_smoke_and_nothing_else_through_it(
+    dva: PretendedDva, kind: str, depth: float, said: list[str]
+) -> None:
+    dva.guard(air=hot, smoke=lambda a, b: depth)
+    dva.there = {kind}
+    dva.say(GUARD, m.Order(1, kind, dva.position(FAR), None))
+    dva.run_for(60.0)
+    assert dva.progress(1) == said
+
+
+def test_a_guard_whose_way_out_turns_bad_turns_round(dva: PretendedDva) -> None:
+    """Its post, in the west, becomes unbearable when it is half way back to it."""
+
+    def air(x: float, y: float, now: float) -> Conditions:
+        bad = x > 15.0 if now < 30.0 else x < 6.0
+        return CLEAR._replace(heat_flux=4.0) if bad and now > FIRE_AT else CLEAR
+
+    guard = dva.guard(air=air, refuges=[(38.0, 12.0)])
+    dva.order(1, FARTHER)
+    dva.run_until(lambda: guard.activity == "withdrawing")
+    dva.run_for(60.0)
+    assert guard.activity == "waiting"
+    assert math.dist(at(guard), (38.0, 12.0)) < 1.0
+    assert guard.dose.heat < 0.3
+
+
+def test_an_exit_in_smoke_is_a_way_out_beyond_which_the_air_is_clean(dva: PretendedDva) -> None:
+    smoky = CLEAR._replace(extinction=3.0, co=1000.0)
+    guard = dva.guard(air=lambda x, y, now: smoky if now > FIRE_AT else CLEAR, refuges=[NEAR])
+    dva.run_for(60.0)
+    assert (guard.activity, dva.order(2, NEAR)) == ("waiting", m.OK)
+    assert math.dist(at(guard), NEAR) < 1.0
+    breathed = guard.dose.toxic
+    dva.run_for(5.0)
+    assert guard.dose.toxic == breathed > 0.0
+
+
 def test_a_guard_whose_post_burns_goes_to_another_refuge(dva: PretendedDva) -> None:
     guard = dva.guard(air=lambda x, y, now: hot(20.0 - x, y, now), refuges=[POST, (38.0, 12.0)])
     dva.run_for(90.0)
