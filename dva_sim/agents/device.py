@@ -50,6 +50,7 @@ class Device:
         attempts: Of the same.
         labels: Names of all devices by id, for the timeline.
         time_of_day: When the run starts [s since midnight], and whether timestamps are exact.
+        silent: Whether it sends nothing at all, as it has no power.
     """
 
     id_tag: str
@@ -64,6 +65,7 @@ class Device:
     attempts: int
     labels: dict[str, str]
     time_of_day: tuple[float, bool] = (NOON, False)
+    silent: bool = False
     outbox: Outbox = field(init=False)
     _requesters: dict[tuple[str, bool], Requester] = field(default_factory=dict)
     _replies: ReplyCache = field(default_factory=ReplyCache)
@@ -116,6 +118,9 @@ class Device:
 
         An emergency has a socket of its own, so that it never waits behind another request.
         """
+        if self.silent:
+            self.clock.call_after(self.attempts * self.timeout, on_failure)
+            return
         key = peer, isinstance(body, m.Emergency)
         requester = self._requesters.get(key)
         if requester is None:
@@ -227,6 +232,8 @@ class Device:
 
     def publish(self, topic: str, body: m.Body) -> None:
         """Publish a message to whoever has subscribed."""
+        if self.silent:
+            return
         data = encode(self.outbox.message(self.dva, body, self.clock.now))
         self.network.publish(self.id_tag, topic, data, len(data))
 

@@ -124,10 +124,18 @@ class RobotAgent:
         tick = self.controller.tick(now)
         return Observation(tick, pose.x, pose.y, pose.heading, speed, turn_rate, hazards)
 
+    def power(self, on: bool) -> None:
+        """Give motors, computer and radio power, or none: then it brakes, and is silent."""
+        if on is not self.body.powered:
+            self.body.powered, self.device.silent = on, not on
+            self.device.tell("has power again" if on else "has no power left: it is silent", "link")
+
     # --- messages ----------------------------------------------------------------------
 
     def _handle(self, letter: Letter) -> None:
         """A letter's processing is done."""
+        if self.device.silent:
+            return
         if letter.answer is None:
             owner = self.controller.owner
             message = self.device.read(letter.data, owner)
@@ -213,7 +221,8 @@ class RobotAgent:
 
     def _mode_changed(self, source: str) -> None:
         mode = self.controller.mode
-        self.device.tell(f"is now in mode {mode}", "mode")
+        if not self.device.silent:
+            self.device.tell(f"is now in mode {mode}", "mode")
         if self._commands is not None:
             self._commands.close()
             self._commands = None
@@ -231,7 +240,7 @@ class RobotAgent:
     def _take_frame(self) -> None:
         """Film for whoever watches; a frame is left out while the last one still waits."""
         network, me, size = self.device.network, self.device.id_tag, self._setup.frame_bytes
-        if self._encoding or not network.ready(me, FRAME, size):
+        if self.device.silent or self._encoding or not network.ready(me, FRAME, size):
             return
         frame = Frame(self.observe(), self.device.clock.now)
         if self._setup.encode > 0.0:
@@ -243,7 +252,8 @@ class RobotAgent:
     def _encoded(self, frame: Frame) -> None:
         self._encoding = False
         size = self._setup.frame_bytes
-        self.device.network.publish(self.device.id_tag, FRAME, frame, size)
+        if not self.device.silent:
+            self.device.network.publish(self.device.id_tag, FRAME, frame, size)
 
     def _publish_status(self) -> None:
         now = self.device.clock.now

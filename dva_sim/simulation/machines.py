@@ -50,6 +50,7 @@ class Machines:
         self._stage, self._world, self._around = stage, world, around
         self._spots, self._drive_of = spots, drive_of
         self._lidar = Lidar(world)
+        self._failures: dict[str, int] = {}
 
     def add(self, number: int) -> RobotAgent:
         """The `number`-th robot, in its place; it registers and begins to work.
@@ -75,7 +76,7 @@ class Machines:
             device, controller, self._world, body, stage.planner, setup, self._drive_of
         )
         device.register(robot.start)
-        stage.clock.every(HOUSEKEEPING, lambda: self._look_after(body, power))
+        stage.clock.every(HOUSEKEEPING, lambda: self._look_after(robot, power))
         return robot
 
     def _setup(self, profile: RobotProfile, body: RobotBody, power: Power) -> RobotSetup:
@@ -102,14 +103,25 @@ class Machines:
     def _smoke(self, a: tuple[float, float], b: tuple[float, float]) -> float:
         return self._around.optical_depth(a, b, self._stage.clock.now)
 
-    def _look_after(self, body: RobotBody, power: Power) -> None:
-        """Once a second: is there power, and is the floor wet?"""
-        now = self._stage.clock.now
+    def _look_after(self, robot: RobotAgent, power: Power) -> None:
+        """Once a second: is there power, does its drive answer, and is the floor wet?"""
+        now, body = self._stage.clock.now, robot.body
         self._world.advance_to(now)
-        body.powered = power.share() > 0.0
+        robot.power(power.share() > 0.0)
+        self._look_at_drive(robot)
         if self._around.may_be_wet:
             wet = self._around.at(body.x, body.y, now).water > WET
             body.grip = WET_GRIP if wet else GRIP
+
+    def _look_at_drive(self, robot: RobotAgent) -> None:
+        """Count what motors of a user got wrong, and tell of the first time."""
+        device, failures = robot.device, robot.body.drive_failures
+        known = self._failures.get(device.label, 0)
+        if failures > known:
+            device.recorder.counters["failed: an answer of a drive"] += failures - known
+            self._failures[device.label] = failures
+            if not known:
+                device.tell(f"brakes, as its drive fails: {robot.body.first_failure}", "mode")
 
 
 class Power:

@@ -48,7 +48,8 @@ def broken_rules(
         allowed = max(_allowed_until(drive, config), last_mission)
         if now > allowed + stopping:
             yield "S1", f"moves at {speed:.2f} m/s, {now - allowed:.1f} s after it had to stop"
-    if mode is Mode.TELEOPERATION and drive is not None and drive.ended is None:
+    driven = mode is Mode.TELEOPERATION and robot.body.powered
+    if driven and drive is not None and drive.ended is None:
         if robot.controller.owner != drive.operator:
             yield "S2", f"is owned by {robot.controller.owner}, driven by {drive.operator}"
         if _moved_by_the_past(robot, drive):

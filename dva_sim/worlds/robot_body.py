@@ -138,6 +138,16 @@ class RobotBody(Body):
         return self._drive.turning_radius
 
     @property
+    def drive_failures(self) -> int:
+        """How often its motors' own program gave no answer that is one; it braked instead."""
+        return self._drive.failures
+
+    @property
+    def first_failure(self) -> str:
+        """What was wrong with that program first, in a line."""
+        return self._drive.first_failure
+
+    @property
     def speed(self) -> float:
         """Measured speed along the heading [m/s]."""
         velocity, angle = get_velocity(self._raw), get_angle(self._raw)
