@@ -9,7 +9,7 @@ from dva_sim.worlds.hazards.base import Point
 
 FULL_GROWTH_KW = 1055.0  # heat release that defines the growth classes [kW]
 GROWTH_S = {"slow": 600.0, "medium": 300.0, "fast": 150.0, "ultrafast": 75.0}
-HEAT_PER_AREA = 500.0  # heat release of burning floor area [kW/m^2]
+HEAT_PER_AREA = 500.0  # heat release of burning floor [kW/m^2]; assumed, offices: 150 to 650
 FIRE_LOAD = 420e3  # fuel of an office, the mean [kJ/m^2]
 DECAY_FROM = 0.7  # share of the fuel burnt when the fire begins to die down
 PEAK_KW = 5000.0  # what the air through one door can burn, 1500 A sqrt(H) for 1.1 m x 2.1 m [kW]
@@ -21,6 +21,14 @@ LEAST_DANGER = 2.0  # from flames, however small [m]; assumed
 HEAT_OF_COMBUSTION = 20e3  # of wood and plastics mixed [kJ/kg]; assumed
 SOOT_YIELD = 0.05  # [kg/kg]; assumed: wood 0.015, polyurethane foam 0.13 to 0.23
 CO_YIELD = 0.02  # [kg/kg]; assumed: wood 0.004, polyurethane foam 0.01 to 0.04
+
+
+def largest_peak(growth: str) -> float:
+    """Heat release at which a growing fire has burnt all fuel of the floor it is on [kW].
+
+    Growing for a time t to a peak Q burns Q t / 3 on Q / `HEAT_PER_AREA` of floor.
+    """
+    return FULL_GROWTH_KW * (3.0 * FIRE_LOAD / HEAT_PER_AREA / GROWTH_S[growth]) ** 2
 
 
 @dataclass(frozen=True)
@@ -35,8 +43,10 @@ class Fire:
 
     References:
         NFPA 72, annex B: 1055 kW after 600, 300, 150 and 75 s.
-        EN 1991-1-2:2002, annex E: 500 kW/m^2, 420 MJ/m^2 (office, mean), linear decay once
-        70 % of the fuel is burnt.
+        EN 1991-1-2:2002, annex E: 420 MJ/m^2 (office, mean), linear decay once 70 % of the
+        fuel is burnt.
+        C. Hopkin, M. Spearpoint and D. Hopkin, Fire Technology 55 (2019) 1599: 150 to
+        650 kW/m^2 in offices.
         K. Kawagoe, Fire behaviour in rooms, BRI report 27, Tokyo 1958: air through an opening.
         A. Tewarson, in: SFPE Handbook of Fire Protection Engineering: yields of soot and CO.
     """

@@ -7,7 +7,7 @@ from dataclasses import fields
 
 from dva_sim.errors import ConfigError
 from dva_sim.worlds.hazards.base import Hazard, Point
-from dva_sim.worlds.hazards.fire import GROWTH_S, Fire
+from dva_sim.worlds.hazards.fire import GROWTH_S, Fire, largest_peak
 from dva_sim.worlds.hazards.flood import Flood
 from dva_sim.worlds.hazards.leak import GASES, GasLeak
 from dva_sim.worlds.hazards.plumes import CLASSES
@@ -39,7 +39,7 @@ def make_hazard(kind: str, position: Point, start: float, **settings: str | floa
 
     Raises:
         ConfigError: a kind or setting that is not known, or a number that is not positive or
-            absurdly large.
+            absurdly large, or a fire without the fuel to grow to its peak.
     """
     if kind not in KINDS:
         raise ConfigError(f"hazard {kind!r} is not known; known: {', '.join(KINDS)}")
@@ -49,7 +49,11 @@ def make_hazard(kind: str, position: Point, start: float, **settings: str | floa
             problem = f"a {kind} has no setting {name!r}; it has: {', '.join(known)}"
             raise ConfigError(problem)
         _check(kind, name, value)
-    return KINDS[kind](position, start, **settings)  # type: ignore[arg-type]
+    hazard = KINDS[kind](position, start, **settings)  # type: ignore[arg-type]
+    if isinstance(hazard, Fire) and hazard.peak > largest_peak(hazard.growth):
+        most = f"its fuel lasts to {largest_peak(hazard.growth):.0f}"
+        raise ConfigError(f"peak {hazard.peak:g} kW of a {hazard.growth} fire is too large: {most}")
+    return hazard
 
 
 def _check(kind: str, name: str, value: str | float) -> None:

@@ -69,6 +69,20 @@ def test_a_fire_burns_all_its_fuel_and_no_more(growth: str) -> None:
     assert np.trapezoid(heat, times) == pytest.approx(10 * 420e3, rel=1e-3)
 
 
+@pytest.mark.parametrize(("growth", "most"), [("slow", 18_600.0), ("medium", 74_400.0)])
+def test_a_fire_that_has_burnt_its_fuel_before_its_peak_is_refused(
+    growth: str, most: float
+) -> None:
+    """Each m2 holds 840 s of burning at 500 kW, and growing burns a third of that."""
+    times = np.arange(0.0, 8000.0)
+    fire = make_hazard("fire", (0, 0), 0.0, growth=growth, peak=most)
+    assert isinstance(fire, Fire)
+    burnt = np.trapezoid([fire.heat_release(t) for t in times], times)
+    assert burnt == pytest.approx(most / 500.0 * 420e3, rel=0.01)
+    with pytest.raises(ConfigError, match=f"of a {growth} fire is too large: its fuel lasts to "):
+        make_hazard("fire", (0, 0), 0.0, growth=growth, peak=1.01 * most)
+
+
 def test_a_fire_dies_down_once_70_percent_of_its_fuel_is_burnt() -> None:
     times = np.arange(0.0, 4000.0)
     heat = np.array([Fire((0, 0), 0.0).heat_release(t) for t in times])
