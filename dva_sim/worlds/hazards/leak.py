@@ -108,7 +108,11 @@ class GasLeak:
         return min(LARGEST, math.sqrt(4.0 * self.diffusivity * max(0.0, time - self.start)))
 
     def danger_radius(self, time: float) -> float:
-        """See `Hazard`: where the gas would exceed its danger level in the open, or 1 m."""
+        """See `Hazard`: where the gas would exceed its danger level, at least 1 m and at most 20 m.
+
+        Under a ceiling without walls. Outdoors it is the same: farther than the plume needs at the
+        height of a mouth, but near the leak there is the jet, which is left out.
+        """
         if time < self.start:
             return 0.0
         loss = self.air_changes / HOUR
