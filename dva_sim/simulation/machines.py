@@ -21,7 +21,7 @@ from dva_sim.worlds.hazards import Surroundings
 from dva_sim.worlds.lidar import Lidar
 from dva_sim.worlds.physics import RobotBody, World
 
-WET_GRIP = 0.4  # friction coefficient of rubber on a wet smooth floor; assumed
+WET_GRIP = 0.4  # friction coefficient of rubber on a wet floor; assumed
 WET = 0.002  # deeper water than this makes a floor slippery [m]
 HOUSEKEEPING = 1.0  # how often a robot looks at its battery, and the floor at the robot [s]
 AT_BASE = 0.5  # so near its base a robot that stands is charged [m]

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from dva_sim.agents.profile import load_robot
 from dva_sim.errors import ConfigError
 from dva_sim.simulation.field import PHYSICS_TICK
+from dva_sim.simulation.machines import WET_GRIP
 from dva_sim.worlds.drives import LONGEST_TICK, DriveSpec
 from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.hall import hall
@@ -91,6 +92,35 @@ def test_the_floor_changes_a_velocity_by_no_more_than_mu_g_dt_whatever_is_asked(
             largest = max(largest, (robot.body.velocity - before).length)
     assert largest <= grip * G * DT * (1 + 1e-9)
     assert largest == pytest.approx(grip * G * DT)  # and it is used to the full
+
+
+def ends(spec, grip):
+    """Where a robot gets by hard starts, stops and curves, on a floor of that grip."""
+    world, robot = on_floor(grip, spec, dt=0.04)
+    rng = np.random.default_rng(3)
+    for _ in range(40):
+        speed, turn_rate = rng.choice([0.0, 0.7, 1.0]), rng.choice([-1.0, -0.5, 0.0, 1.0])
+        robot.drive(speed * spec.max_speed, turn_rate * spec.max_turn_rate, math.inf)
+        world.advance_to(world.time + 0.6)
+    return robot.pose()
+
+
+@pytest.mark.parametrize("name", ["servrobot", "pibot", "tracked"])
+def test_shipped_robots_drive_on_a_wet_floor_as_on_a_dry_one(name):
+    spec = load_robot(name).drive_spec()
+    assert ends(spec, WET_GRIP) == ends(spec, 0.8)
+
+
+@pytest.mark.parametrize(("grip", "holds"), [(0.8, 6.0), (WET_GRIP, WET_GRIP * G)])
+def test_brakes_of_6_m_s2_are_more_than_a_wet_floor_holds(grip, holds):
+    spec = DriveSpec(max_speed=1.5, max_deceleration=6.0, motor_time_constant=DT)
+    world, robot = on_floor(grip, spec)
+    robot.drive(1.5, 0.0, 6.0)
+    world.advance_to(6.0)
+    start = robot.x
+    world.advance_to(8.0)
+    assert robot.speed == 0.0
+    assert robot.x - start == pytest.approx(1.5**2 / (2 * holds), abs=1.5 * DT)
 
 
 def test_a_robot_skids_out_of_a_curve_that_the_floor_cannot_hold():
