@@ -153,6 +153,13 @@ def test_the_room_around_a_point_is_its_distance_from_the_nearest_wall():
     assert room == pytest.approx([5.0, 1.0, 0.5], abs=0.06)
 
 
+def test_the_same_things_in_the_way_cost_one_map_however_many_ask():
+    planner = Planner(make_site([]), 0.3)
+    one, again = (planner._roadmap.around([Disc(5.0, 5.0, radius)]) for radius in (0.7, 0.7))
+    assert one is again
+    assert planner._roadmap.around([Disc(5.0, 5.0, 0.8)]) is not one
+
+
 @pytest.mark.parametrize("off", [0.0, 3.6e-15, -3.6e-15, 1e-9, -1e-9])
 def test_who_stands_on_the_line_of_a_wall_up_to_rounding_is_behind_it_for_nobody(off):
     sight = Sight(np.array([[0.0, 24.0, 40.0, 24.0]]))

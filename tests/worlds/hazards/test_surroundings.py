@@ -234,6 +234,23 @@ def test_a_picture_of_smoke_is_thickest_where_it_burns(site: Site) -> None:
     assert picture[10, 10] == 0.0  # the plant room
 
 
+def test_two_gases_explode_together_by_their_shares_of_their_limits(site: Site) -> None:
+    """Le Chatelier: 60 % of the one limit and 60 % of the other are more than enough."""
+    leaks = [make_hazard("gas_leak", LAB, 0.0, gas=gas) for gas in ("methane", "propane")]
+    both = Surroundings(site, leaks).at(*LAB, 300.0)
+    methane, propane = (Surroundings(site, [leak]).at(*LAB, 300.0) for leak in leaks)
+    assert methane.explosive == pytest.approx(methane.gas / 0.044)
+    assert propane.explosive == pytest.approx(propane.gas / 0.017)
+    assert both.explosive == pytest.approx(methane.explosive + propane.explosive)
+
+
+def test_carbon_monoxide_has_no_smell_and_kills_before_it_explodes(site: Site) -> None:
+    leak = make_hazard("gas_leak", LAB, 0.0, gas="carbon_monoxide")
+    there = Surroundings(site, [leak]).at(*LAB, 300.0)
+    assert there.co > 100.0
+    assert there.explosive == there.gas == 0.0
+
+
 # --- buildings -------------------------------------------------------------------------
 
 
