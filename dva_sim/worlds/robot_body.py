@@ -30,6 +30,7 @@ from dva_sim.worlds.contacts import Contacts, Jam
 from dva_sim.worlds.drives import DriveSpec
 from dva_sim.worlds.geo import Pose
 
+REST: Final = 8.0  # time constants after which nothing is left of a speed of 1 m/s
 TRACK: Final = 0.5  # wheels stand that share of the radius off the middle; assumed
 
 
@@ -116,6 +117,10 @@ class RobotBody(Body):
         self._arm = TRACK * spec.radius
         self._lock = Lock(world.space, body, self._arm)
         self._lock.close(GRIP)
+        self._braked = 0.0
+        stopping = spec.max_speed / spec.max_deceleration
+        turning = spec.max_turn_rate / spec.max_turn_acceleration
+        self._patience = max(stopping, turning) + REST * spec.motor_time_constant
 
     @property
     def person_contacts(self) -> int:
@@ -206,7 +211,8 @@ class RobotBody(Body):
 
         Wheels hold along and across together no more than the grip of the floor: beyond that
         they slip, and the force keeps its direction (a friction circle). Who has come to rest
-        locks them until it is asked to move.
+        locks them until it is asked to move; and so does who still moves when its brakes should
+        have stopped it, as somebody pushes.
         """
         raw = self._raw
         if self._next is not self._now and tick >= self._next.start:
@@ -227,10 +233,11 @@ class RobotBody(Body):
                 if not self._lock.closed:
                     self._lock.close(self._grip)
                 return self._next is not self._now
-            if self._lock.closed:
+            if self._is_held(dt):
                 self.distance += abs(forward) * dt
                 return True
         else:
+            self._braked = 0.0
             if self._lock.closed:
                 self._lock.open()
             if self._touch.touching:
@@ -251,6 +258,13 @@ class RobotBody(Body):
         spinning = torque * (spin + 0.5 * dt * torque / self._moment)
         self.work += (max(power, 0.0) + max(spinning, 0.0)) * dt
         return True
+
+    def _is_held(self, dt: float) -> bool:
+        """Whether wheels are locked that shall stand; also where its brakes were not enough."""
+        self._braked += dt
+        if self._braked > self._patience and not self._lock.closed:
+            self._lock.close(self._grip)
+        return self._lock.closed
 
     def meets(self, other: Body | None, now: float) -> None:
         """It begins to touch somebody, or a wall (None)."""

@@ -91,6 +91,21 @@ def test_on_ice_a_robot_that_stands_is_pushed_along_with_the_rest_of_the_force(w
     assert gained == pytest.approx((75 * 3.0 - 0.1 * 60 * 9.81) / 135, rel=0.02)
 
 
+def test_who_is_pushed_while_it_brakes_stands_all_the_same(world):
+    """0.5 s of brakes and 8 time constants of 0.15 s: after 1.7 s the wheels are locked."""
+    robot = world.add_robot("robot-1", DriveSpec(), Pose(10.0, 12.0, 0.0))
+    person = world.add_person("guard-1", Pose(9.4, 12.0, 0.0))
+    person.walk(1.3, 0.0)
+    robot.drive(0.5, 0.0, 1.0)
+    world.advance_to(2.6)
+    assert robot.speed > 0.5
+    world.advance_to(3.5)
+    here = robot.x
+    world.advance_to(20.0)
+    assert robot.velocity == (0.0, 0.0)
+    assert robot.x == here
+
+
 def test_wheels_that_were_locked_roll_again_when_they_are_asked_to(world):
     robot = leant_on(world, math.pi / 2)
     robot.drive(0.5, 0.0, 12.0)

@@ -28,7 +28,7 @@ class PlainWorld:
             wall.friction, wall.elasticity = 0.3, 0.1
             self.space.add(wall)
         self.robots, self.people = [], []
-        self.locks = {}
+        self.locks, self.braked = {}, {}
 
     def add(self, pose, robot):
         """A disc of a robot, or of a person."""
@@ -50,7 +50,7 @@ class PlainWorld:
         place.max_bias = angle.max_bias = 0.0
         place.max_force, angle.max_force = 0.8 * 9.81 * 60.0, 0.8 * 9.81 * 60.0 * 0.15
         self.space.add(place, angle)
-        self.locks[body] = place, angle
+        self.locks[body], self.braked[body] = (place, angle), 0.0
 
     def tick(self, speeds, walks):
         """One tick with what is wanted of everybody."""
@@ -58,7 +58,9 @@ class PlainWorld:
             stands, rests = speed == turn_rate == 0, push_robot(body, speed, turn_rate)
             if not stands and body in self.locks:
                 self.space.remove(*self.locks.pop(body))
-            if rests and body not in self.locks:
+            self.braked[body] = self.braked[body] + DT if stands and not rests else 0.0
+            late = self.braked[body] > 0.5 / 1.0 + 8 * 0.15
+            if (rests or late) and body not in self.locks:
                 self.lock(body)
             if stands and body in self.locks:
                 body.force, body.torque = (0.0, 0.0), 0.0
