@@ -1,11 +1,11 @@
 """Guards: people who walk to an event, look at it, deal with it, and get out of what is too much.
 
-A guard **withdraws** as soon as what is around it is untenable, or its dose is `HURT`: whatever it
-was on, it tells `failed`, and goes to its post or the nearest exit by a way that is not
-untenable; it looks ahead on it, and chooses again, as bystanders do.
-But who was sent to look, and has the place in sight, has seen enough: it confirms first. Until
-the guard is there it takes no orders; with such a dose it never takes one again. One who is
-incapacitated stays where it is, and its device answers that it lies down.
+A guard **withdraws** as soon as what is around it is untenable, what is right ahead of it deadly,
+or its dose is `HURT`: whatever it was on, it tells `failed`, and goes to its post or the nearest
+exit by a way that is not untenable, looking ahead as bystanders do. But who was sent to look, and
+has the place in sight, has seen enough: it confirms first. Until the guard is there it takes no
+orders; with such a dose it never takes one again. One who is incapacitated stays where it is, and
+its device answers that it lies down.
 
 What is **contained** is contained from afar: a fire with a hand-held extinguisher, a leak or a
 burst pipe by its valve, which is taken to be no nearer than the air allows to go.
@@ -16,6 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from functools import partial
+from itertools import takewhile
 
 from dva_sim.agents.camera import SEEN_THROUGH, no_smoke
 from dva_sim.agents.device import STATUS, Device, do_nothing
@@ -40,6 +41,7 @@ beyond 7 m (a greater one, set in a scenario, may be), one step may lead a metre
 place is reported a metre or two wrong."""
 STAND_BY_FOR = 900.0  # who stands by gives up if the DVA says nothing for so long [s]
 MOST = 1e6  # no bid is longer [s]
+LOOKS_AHEAD = 1.5  # on an errand, for what nobody survives; about a second's walk [m]
 IN_SIGHT = 10.0  # from where who is driven back has seen what there is [m]
 CONFIRMED, REFUTED, CONTAINED = "confirmed", "refuted", "contained"
 
@@ -157,9 +159,11 @@ class GuardAgent(OnFoot):
     def _is_near_enough(self, order: m.Order, place: Point, at: Point) -> bool:
         """Whether what is to be looked at, or dealt with, can be so from here."""
         if order.task == "contain" and order.kind in HAVE_VALVES:
-            ahead = self.walking.places_ahead(1.0, KEEPS_OFF)
-            if any(map(self.exposure.is_bad, ahead)):
+            if any(map(self.exposure.is_bad, self.walking.places_ahead(1.0, KEEPS_OFF))):
                 return True
+        return self._is_in_reach(order, place, at)
+
+    def _is_in_reach(self, order: m.Order, place: Point, at: Point) -> bool:
         return self._sees(order.kind, at, place, NEAR_ENOUGH.get(order.kind, AT_MOST))
 
     def _sees(self, kind: str, at: Point, place: Point, within: float) -> bool:
@@ -241,13 +245,25 @@ class GuardAgent(OnFoot):
             self._way_out.end()
             self.activity = "incapacitated"
             self.device.tell("is incapacitated", "safety")
-        elif self.exposure.is_too_much and not self._duty.unfit:
+        elif not self._duty.unfit and (self.exposure.is_too_much or self._is_deadly_ahead()):
             self._give_back("withdraws from danger")
             self.activity = "withdrawing"
             self.device.tell("withdraws", "safety")
             self._way_out.leave(self._is_safe)
         elif self.activity == "withdrawing":
             self._way_out.look_ahead()
+
+    def _is_deadly_ahead(self) -> bool:
+        """Whether an errand leads on into what nobody survives, before it is near enough."""
+        if self.activity != "walking":
+            return False
+        ahead = takewhile(self._goes_on_from, self.walking.places_ahead(0.5, LOOKS_AHEAD))
+        return any(map(self.exposure.is_deadly, ahead))
+
+    def _goes_on_from(self, at: Point) -> bool:
+        """Whether a place [m] is not near enough yet to what the guard is sent to."""
+        order = self._duty.order
+        return order is None or not self._is_in_reach(order, self._xy(order.position), at)
 
     def _give_back(self, unfit: str) -> None:
         """Be of no more use, for that reason, to whatever the guard was on."""
@@ -261,8 +277,7 @@ class GuardAgent(OnFoot):
 
     def _has_seen(self, order: m.Order) -> bool:
         at, place = self.walking.place, self._xy(order.position)
-        seen = self._sees(order.kind, at, place, IN_SIGHT)
-        return seen and self._is_there(order.kind, *place)
+        return self._sees(order.kind, at, place, IN_SIGHT) and self._is_there(order.kind, *place)
 
     def _safe_places(self) -> list[Point]:
         """Where to withdraw to: its post, unless it is bad there, and the ways out."""

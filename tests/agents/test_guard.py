@@ -452,6 +452,32 @@ def test_who_is_driven_back_has_seen_a_fire_by_its_smoke_and_nothing_else_throug
     assert dva.progress(1) == said
 
 
+def test_no_guard_walks_through_a_door_behind_which_nobody_survives(dva: PretendedDva) -> None:
+    def furnace(x: float, y: float, now: float) -> Conditions:
+        return CLEAR._replace(temperature=300.0) if x > 15.0 else CLEAR
+
+    guard = dva.guard(air=furnace)
+    dva.order(1, FARTHER, "contain")
+    dva.run_until(lambda: guard.activity == "withdrawing")
+    assert 13.0 < guard.x < 15.0
+    dva.run_for(30.0)
+    assert (guard.activity, guard.dose.heat) == ("waiting", 0.0)
+    assert dva.progress(1) == ["departed", "failed"]
+
+
+def test_flames_keep_no_guard_from_where_the_stream_reaches_them(dva: PretendedDva) -> None:
+    """Within 2 m of a fire it is deadly; an extinguisher carries 3 m, half a metre is braking."""
+
+    def flames(x: float, y: float, now: float) -> Conditions:
+        return CLEAR._replace(heat_flux=20.0 if x > FARTHER[0] - 2.0 else 0.0)
+
+    dva.guard(air=flames)
+    dva.there = {"fire"}
+    dva.order(1, FARTHER, "contain")
+    dva.run_for(90.0)
+    assert dva.progress(1) == ["departed", "arrived", "contained", "done"]
+
+
 def test_a_guard_whose_way_out_turns_bad_turns_round(dva: PretendedDva) -> None:
     """Its post, in the west, becomes unbearable when it is half way back to it."""
 
