@@ -158,10 +158,9 @@ class GuardAgent(OnFoot):
 
     def _is_near_enough(self, order: m.Order, place: Point, at: Point) -> bool:
         """Whether what is to be looked at, or dealt with, can be so from here."""
-        if order.task == "contain" and order.kind in HAVE_VALVES:
-            if any(map(self.exposure.is_bad, self.walking.places_ahead(1.0, KEEPS_OFF))):
-                return True
-        return self._is_in_reach(order, place, at)
+        has_valve = order.task == "contain" and order.kind in HAVE_VALVES
+        ahead = self.walking.places_ahead(1.0, KEEPS_OFF) if has_valve else []
+        return any(map(self.exposure.is_bad, ahead)) or self._is_in_reach(order, place, at)
 
     def _is_in_reach(self, order: m.Order, place: Point, at: Point) -> bool:
         return self._sees(order.kind, at, place, NEAR_ENOUGH.get(order.kind, AT_MOST))
