@@ -13,12 +13,30 @@ from dva_sim.agents.walking import draw_speed
 from dva_sim.config import Config
 
 
-class GuardProfile(Config):
+class PaceProfile(Config):
+    """How fast people of some kind walk.
+
+    Attributes:
+        walking_mean_mps: Mean over persons.
+        walking_sd_mps: Standard deviation between persons.
+
+    References:
+        1.34 m/s (SD 0.26): U. Weidmann, Transporttechnik der Fussgaenger, ETH Zuerich, 1993.
+    """
+
+    description: str = ""
+    walking_mean_mps: Annotated[float, Field(gt=0)] = 1.34
+    walking_sd_mps: Annotated[float, Field(ge=0)] = 0.26
+
+    def draw_speed(self, rng: np.random.Generator) -> float:
+        """One person's free walking speed [m/s]."""
+        return draw_speed(self.walking_mean_mps, self.walking_sd_mps, rng)
+
+
+class GuardProfile(PaceProfile):
     """How guards are drawn.
 
     Attributes:
-        walking_mean_mps: Mean walking speed of a person.
-        walking_sd_mps: Its standard deviation between persons.
         mobilisation_s: From the order to the first step.
         confirm_look_s: From arrival to being sure.
         contain_s: From arrival until a leak or flood is over: a valve found and shut. Assumed.
@@ -26,13 +44,9 @@ class GuardProfile(Config):
             of a hand-held extinguisher.
 
     References:
-        Walking speed 1.34 m/s (SD 0.26): U. Weidmann, Transporttechnik der Fussgaenger,
-        ETH Zuerich, 1993. Turnout within 80 s in 90 % of all cases: NFPA 1710.
+        Turnout within 80 s in 90 % of all cases: NFPA 1710.
     """
 
-    description: str = ""
-    walking_mean_mps: Annotated[float, Field(gt=0)] = 1.34
-    walking_sd_mps: Annotated[float, Field(ge=0)] = 0.26
     mobilisation_s: Trait = Trait(median=45.0, spread=0.45)
     confirm_look_s: Trait = Trait(median=3.0, spread=0.3)
     contain_s: Trait = Trait(median=120.0, spread=0.5)
@@ -64,7 +78,7 @@ class Walker:
     def draw(cls, profile: GuardProfile, rng: np.random.Generator) -> Walker:
         """One guard of a profile."""
         return cls(
-            speed=draw_speed(profile.walking_mean_mps, profile.walking_sd_mps, rng),
+            speed=profile.draw_speed(rng),
             mobilisation=profile.mobilisation_s.draw(rng),
             look=profile.confirm_look_s.draw(rng),
             contain=profile.contain_s.draw(rng),
@@ -73,12 +87,10 @@ class Walker:
         )
 
 
-class BystanderProfile(Config):
+class BystanderProfile(PaceProfile):
     """How people are drawn who work at a site and have no part in its surveillance.
 
     Attributes:
-        walking_mean_mps: Mean walking speed of a person.
-        walking_sd_mps: Its standard deviation between persons.
         premovement_s: From the alarm, or from noticing the danger, to the first step outwards.
         moving_share: Share of the people who change their place now and then. Assumed.
         stay_s: How long those stay at a place. Assumed.
@@ -90,9 +102,6 @@ class BystanderProfile(Config):
         who are awake, know the building and hear a bell.
     """
 
-    description: str = ""
-    walking_mean_mps: Annotated[float, Field(gt=0)] = 1.34
-    walking_sd_mps: Annotated[float, Field(ge=0)] = 0.26
     premovement_s: Trait = Trait(median=60.0, spread=0.6)
     moving_share: Annotated[float, Field(ge=0, le=1)] = 0.3
     stay_s: Trait = Trait(median=180.0, spread=0.8)
@@ -118,7 +127,7 @@ class Occupant:
     def draw(cls, profile: BystanderProfile, rng: np.random.Generator) -> Occupant:
         """One bystander of a profile."""
         return cls(
-            speed=draw_speed(profile.walking_mean_mps, profile.walking_sd_mps, rng),
+            speed=profile.draw_speed(rng),
             premovement=profile.premovement_s.draw(rng),
             moves=bool(rng.random() < profile.moving_share),
             stay=profile.stay_s,

@@ -86,14 +86,7 @@ class Careful:
         return points if points is None or not self._again else np.vstack([here, points])
 
     def drive(self, route: Route, seen: Observation, delay: float, stop_before: float) -> Intent:
-        """Turn on the spot towards a point close by on the way, then go there slowly.
-
-        Args:
-            route: The way to go.
-            seen: The newest frame, as the person judges it.
-            delay: What the person takes the whole delay to be [s].
-            stop_before: Where to stop: so far before the end of the route [m].
-        """
+        """See `Strategy`: turn on the spot towards a point close by on the way, then go there."""
         ahead = route.ahead(seen.x, seen.y, seen.heading, LOOK)
         most = self._reach.turn_rate
         gain = min(self._person.crossover, TURN_MARGIN / delay)
