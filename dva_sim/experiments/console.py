@@ -83,7 +83,7 @@ def _tell(scenario: Scenario, seed: int, keep_traffic: bool) -> Recording:
     took = time.perf_counter() - started
     delay = scenario.link.delay_s * 1000
     console.rule(
-        f"{scenario.pattern}, {delay:g} ms each way, profile {scenario.profile}, seed {seed}"
+        f"{scenario.pattern}, {delay:g} ms each way, phone {scenario.phone.profile}, seed {seed}"
     )
     table = Table(box=None, pad_edge=False)
     for heading in ("time", "who", "what"):
@@ -240,7 +240,7 @@ def list_all() -> None:
         "studies": "experiments",
         "scenarios": "experiments/scenarios",
         "sites": "worlds",
-        "phones (profile)": "agents/phones",
+        "phones (phone.profile)": "agents/phones",
         "robots": "agents/robots",
         "people": "agents/people",
     }

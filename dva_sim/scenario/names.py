@@ -31,7 +31,7 @@ def check_names(scenario: Scenario, error: Fail) -> None:
     people, robots = resources.available("agents/people"), scenario.robot.profile
     choices: dict[Path_, tuple[str | tuple[str, ...], Mapping[str, object]]] = {
         ("operator", "strategy"): (scenario.operator.strategy, STRATEGIES),
-        ("profile",): (scenario.profile, resources.available("agents/phones")),
+        ("phone", "profile"): (scenario.phone.profile, resources.available("agents/phones")),
         ("robot", "profile"): (robots, resources.available("agents/robots")),
         ("guard", "profile"): (scenario.guard.profile, people),
         ("bystander", "profile"): (scenario.bystander.profile, people),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from dva_sim.agents.sensors import SensorConfig
 from dva_sim.config import Config
@@ -77,17 +77,41 @@ class BystanderConfig(Config):
     count: Annotated[int, Field(ge=0, le=1000)] = 0
 
 
+class PhoneConfig(BaseModel):
+    """The tilt phones of the operators: a profile, and whatever of it is otherwise.
+
+    Any key of a phone's profile may stand beside its name, such as `filter: none`; they are
+    judged where the profile is read.
+    """
+
+    model_config = ConfigDict(extra="allow", frozen=True, allow_inf_nan=False)
+
+    profile: str = "default"
+
+    @property
+    def changes(self) -> dict[str, Any]:
+        """What is otherwise than in the profile."""
+        return dict(self.__pydantic_extra__ or {})
+
+
 class OperatorConfig(Config):
     """The operators: how they drive, and which simulated person each is.
 
     Attributes:
+        strategy: By name, or a class in a file, `mine.py:Mine`.
+        options: Of the strategy, such as `{inner: pursuit, quality: 0.8}` of the predictor.
+        traits: Medians that take the place of the population's, such as `{margin: 0.4}`.
+        span: How many robots one operator may have in hand at once.
         person: Index of the first operator's person in the population; the next operator
             is the next person.
         population_seed: Draws the population; a study gives its own seed.
     """
 
     strategy: str = "pursuit"
+    options: dict[str, Any] = Field(default_factory=dict)
+    traits: dict[str, Positive] = Field(default_factory=dict)
     count: Annotated[int, Field(ge=0, le=50)] = 1
+    span: Annotated[int, Field(ge=1, le=20)] = 1
     population: str = "operators"
     person: Annotated[int, Field(ge=0)] = 0
     population_seed: Annotated[int, Field(ge=0)] = 1

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cache
+from typing import Any, cast
 
 from dva_sim import resources
 from dva_sim.agents.operator.person import Population
 from dva_sim.agents.people import BystanderProfile, GuardProfile
 from dva_sim.agents.profile import RobotProfile, load_robot
 from dva_sim.agents.tilt.phone import PhoneProfile
-from dva_sim.config import Config, M, load_yaml, validate
+from dva_sim.config import Config, Document, Fail, M, Path_, load_yaml, validate
+from dva_sim.errors import ConfigError
 from dva_sim.scenario.scenario import Scenario
 from dva_sim.worlds.site import Site, load_site, map_site
 
@@ -30,9 +33,26 @@ def robot_profiles(scenario: Scenario) -> list[RobotProfile]:
     return [kinds[number % len(kinds)] for number in range(scenario.robot.count)]
 
 
-def phone_profile(scenario: Scenario) -> PhoneProfile:
-    """The tilt phone the operators hold."""
-    return _profile(PhoneProfile, scenario.profile, "agents/phones")
+def phone_profile(scenario: Scenario, error: Fail | None = None) -> PhoneProfile:
+    """The tilt phone the operators hold: its profile, and what the scenario changes of it.
+
+    Args:
+        scenario: Names the profile.
+        error: Makes the error for a change that is not valid, at its key path.
+
+    Raises:
+        ConfigError: no such profile, or a change that is not valid.
+    """
+    phone = scenario.phone
+    if not phone.changes:
+        return _profile(PhoneProfile, phone.profile, "agents/phones")
+
+    def wrong(problem: str, path: Path_) -> ConfigError:
+        told = f"phone: {problem}"
+        return error(told, ("phone", *path)) if error else ConfigError(told)
+
+    data = _merged(_read_document(phone.profile, "agents/phones").data, phone.changes)
+    return validate(PhoneProfile, data, wrong)
 
 
 def guard_profile(scenario: Scenario) -> GuardProfile:
@@ -59,5 +79,20 @@ def _profile(model: type[M], name: str, folder: str) -> M:
 @cache
 def _read_profile(model: type[Config], name: str, folder: str) -> Config:
     """A profile, read once per process: reading costs more than a short run."""
-    document = load_yaml(resources.find(name, folder))
+    document = _read_document(name, folder)
     return validate(model, document.data, document.error)
+
+
+@cache
+def _read_document(name: str, folder: str) -> Document:
+    return load_yaml(resources.find(name, folder))
+
+
+def _merged(data: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Data with some values changed, mappings within it key by key."""
+    merged = dict(data)
+    for key, value in changes.items():
+        old = merged.get(key)
+        nested = isinstance(old, Mapping) and isinstance(value, Mapping)
+        merged[key] = _merged(cast(Mapping[str, Any], old), value) if nested else value
+    return merged

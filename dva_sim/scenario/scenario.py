@@ -15,6 +15,7 @@ from dva_sim.scenario.parts import (
     EventConfig,
     GuardConfig,
     OperatorConfig,
+    PhoneConfig,
     RobotConfig,
     SiteConfig,
 )
@@ -40,7 +41,7 @@ class Scenario(Config):
     operator: OperatorConfig = OperatorConfig()
     control: Literal["direct", "coordinated", "supervisory"] = "direct"
     pattern: Literal["req-rep", "pipelined", "pub-sub", "latest-wins"] = "latest-wins"
-    profile: str = "default"
+    phone: PhoneConfig = PhoneConfig()
     command: CommandConfig = CommandConfig()
     link: LinkConfig = LinkConfig()
     camera: CameraConfig = CameraConfig()

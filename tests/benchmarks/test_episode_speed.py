@@ -72,8 +72,8 @@ def test_a_one_robot_episode_against_its_physics_and_control(benchmark: Any) -> 
         "pipelined": {"pattern": "pipelined"},
         "pub-sub": {"pattern": "pub-sub"},
         "latest-wins": {"pattern": "latest-wins"},
-        "latest-wins, ideal phone": {"pattern": "latest-wins", "profile": "ideal"},
-        "latest-wins, dissertation": {"pattern": "latest-wins", "profile": "dissertation"},
+        "latest-wins, ideal phone": {"pattern": "latest-wins", "phone.profile": "ideal"},
+        "latest-wins, dissertation": {"pattern": "latest-wins", "phone.profile": "dissertation"},
     }
     runs = {name: episode("drive-to-event", **changes) for name, changes in kinds.items()}
     cost = cpu_per_second({"bare": bare_drive, **runs})

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 DATA = Path(__file__).parents[2].parent / "shared"
-SETTINGS = ("persons=2", "replications=1", "profile=default", "link.delay_s=[0, 0.5]")
+SETTINGS = ("persons=2", "replications=1", "phone.profile=default", "link.delay_s=[0, 0.5]")
 SMALL = [word for setting in SETTINGS for word in ("--set", setting)]
 
 

@@ -81,7 +81,7 @@ def test_keeping_traffic_for_pictures_changes_nothing() -> None:
 def test_no_safety_rule_is_broken_on_any_link(
     pattern: str, profile: str, link: dict[str, float]
 ) -> None:
-    recording = run(pattern=pattern, profile=profile, link=link, horizon_s=120)
+    recording = run(pattern=pattern, phone__profile=profile, link=link, horizon_s=120)
     assert recording.recorder.violations == {}
     assert recording.recorder.drives[0].applied
 
@@ -125,7 +125,10 @@ def test_a_slow_robot_falls_behind_under_plain_publishing_but_not_if_the_latest_
 
 def test_the_oracle_is_faster_than_any_operator() -> None:
     reference = run(
-        operator__strategy="oracle", profile="ideal", robot__processing_s=0.0, link__delay_s=0.0
+        operator__strategy="oracle",
+        phone__profile="ideal",
+        robot__processing_s=0.0,
+        link__delay_s=0.0,
     )
     best = metrics.run_row(reference)["drive_time_s"]
     for delay in (0.0, 0.5):
@@ -162,7 +165,7 @@ def test_the_loop_delay_is_what_operators_come_to_see(
 
 
 def test_waiting_for_the_last_reply_is_told_as_the_patterns_own_delay() -> None:
-    slow = {"profile": "dissertation", "link__delay_s": 0.5}
+    slow = {"phone__profile": "dissertation", "link__delay_s": 0.5}
     waited = metrics.run_row(run(pattern="req-rep", **slow))["delay_pattern_s"]
     assert 0.05 < waited < 1.05
     assert metrics.run_row(run(pattern="pub-sub", **slow))["delay_pattern_s"] == 0.0
@@ -187,7 +190,7 @@ def test_commands_still_under_way_when_a_drive_ends_are_known_to_the_checks() ->
     """At a second's delay they move the robot once more, lawfully, before the stop arrives."""
     operator = {"operator__person": 18, "operator__population_seed": 2014}
     seed = derive_seed(2014, "drive", 18, 0)
-    recording = run(seed=seed, profile="dissertation", link__delay_s=1.0, **operator)
+    recording = run(seed=seed, phone__profile="dissertation", link__delay_s=1.0, **operator)
     drive = recording.recorder.drives[0]
     assert drive.ended is not None
     assert drive.applied[-1].time > drive.ended
