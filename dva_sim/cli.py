@@ -55,17 +55,22 @@ def report(folder: Annotated[Path, typer.Argument(help="A results folder.")]) ->
 
 @app.command()
 def validate(
-    what: Annotated[str, typer.Argument(help="dispatch.")] = "dispatch",
+    what: Annotated[str, typer.Argument(help="dispatch or operators.")] = "dispatch",
     out: Annotated[Path | None, typer.Option("-o", "--out", help="Results folder.")] = None,
-    cases: Annotated[str | None, typer.Option(help="A file of cases, by name or path.")] = None,
+    cases: Annotated[
+        str | None, typer.Option(help="A file of cases, by name or path; dispatch only.")
+    ] = None,
+    strategy: Annotated[
+        str | None, typer.Option(help="How operators drive, by name; operators only.")
+    ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Fewer runs, wider errors.")] = False,
     jobs: Annotated[int | None, typer.Option(help="Processes; default: all cores.")] = None,
     seed: Annotated[int, typer.Option(help="Seed of all luck.")] = 1,
 ) -> None:
-    """Play worlds whose answer is known exactly, and compare."""
+    """Play what the answer is known of, by theory or from people, and compare."""
     from dva_sim.experiments.validation import console
 
-    raise typer.Exit(console.validate(what, out, cases, quick, jobs, seed))
+    raise typer.Exit(console.validate(what, out, cases, quick, jobs, seed, strategy))
 
 
 @app.command()

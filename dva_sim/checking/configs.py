@@ -22,7 +22,8 @@ from dva_sim.experiments import design
 from dva_sim.experiments.design import Cell
 from dva_sim.experiments.models import model_for, model_of
 from dva_sim.experiments.study import Study, load_study
-from dva_sim.experiments.validation.cases import CaseFile, load_cases
+from dva_sim.experiments.validation.dispatch.cases import CaseFile, load_cases
+from dva_sim.experiments.validation.operators.targets import SplitFile, TargetFile, load_split
 from dva_sim.scenario import Scenario
 from dva_sim.timed.scenario import TimedScenario
 from dva_sim.worlds.geo import GeoFrame
@@ -169,6 +170,11 @@ def _check_cases(document: Document) -> Iterator[ConfigError]:
     return iter(())
 
 
+def _check_split(document: Document) -> Iterator[ConfigError]:
+    load_split(str(document.file))
+    return iter(())
+
+
 def _check_site(document: Document) -> Iterator[ConfigError]:
     load_site(document.file)
     return iter(())
@@ -213,6 +219,8 @@ KINDS: Final = (
     Kind("scenario", Scenario, "experiments/scenarios", _check_scenario),
     Kind("timed scenario", TimedScenario, "experiments/scenarios", _check_scenario),
     Kind("validation cases", CaseFile, "experiments/validation", _check_cases),
+    Kind("targets", TargetFile, "experiments/validation", _check_model(TargetFile)),
+    Kind("split", SplitFile, "experiments/validation", _check_split),
     Kind("site", SiteFile, "worlds", _check_site),
     Kind("ROS map", RosMap, "worlds", _check_map),
     Kind("robot", RobotProfile, "agents/robots", _check_robot),

@@ -37,7 +37,7 @@ def _json_schema(kind: str) -> dict[str, Any]:
     from dva_sim.agents.profile import RobotProfile
     from dva_sim.agents.tilt.phone import PhoneProfile
     from dva_sim.experiments.study import Study
-    from dva_sim.experiments.validation.cases import CaseFile
+    from dva_sim.experiments.validation.dispatch.cases import CaseFile
     from dva_sim.scenario import Scenario
     from dva_sim.timed.scenario import TimedScenario
     from dva_sim.worlds.site import SiteFile

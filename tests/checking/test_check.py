@@ -50,7 +50,7 @@ def test_all_that_is_shipped_is_valid(check):
     assert lines[-1] == f"{len(files)} files: {len(files)} valid"
     kinds = {line.split(": ")[1] for line in lines[:-1]}
     agents = {"robot", "phone", "guard", "bystanders", "operators"}
-    runs = {"study", "scenario", "timed scenario", "validation cases"}
+    runs = {"study", "scenario", "timed scenario", "validation cases", "targets", "split"}
     assert kinds == {"site", "plan", "message"} | runs | agents
 
 

@@ -1,1 +1,5 @@
-"""The evidence: worlds whose answer is known exactly, run again and compared."""
+"""The evidence: what is simulated beside what is known.
+
+`dispatch` plays worlds whose answer is known exactly, `operators` the tasks of published
+experiments; both are told, written and drawn in the same way.
+"""

@@ -1,120 +1,56 @@
-"""What the command line does with a validation: play, tell, write."""
+"""What the command line does with a validation: choose what is validated."""
 
 from __future__ import annotations
 
 import os
-import time
-from collections.abc import Sequence
-from functools import partial
 from pathlib import Path
-from typing import Literal
-
-from rich.console import Console
-from rich.markup import escape
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-from rich.table import Table
 
 from dva_sim.errors import ConfigError
-from dva_sim.experiments.validation import output
-from dva_sim.experiments.validation.cases import SHIPPED, Case, load_cases
-from dva_sim.experiments.validation.identities import IDENTITIES
-from dva_sim.experiments.validation.play import (
-    Check,
-    check_cases,
-    check_identities,
-    runs_of,
-)
+from dva_sim.experiments.validation.telling import say
 
-WHAT = "dispatch"
-TOLD = {
-    "input": "checks of what the scenarios put in agree",
-    "identity": "identities hold (Little's law, conservation, scaling, the oracle, ...)",
-}
-WIDTH = 110  # of the table at least, also in a file
+WHAT = ("dispatch", "operators")
 INTERRUPTED = 130  # exit code of a program ended by Ctrl-C
-STYLES = {"agrees": "green", "too rough": "yellow", "differs": "bold red"}
-
-console = Console(highlight=False)
-say = partial(console.print, soft_wrap=True)
 
 
 def validate(
-    what: str, out: Path | None, cases: str | None, quick: bool, jobs: int | None, seed: int
+    what: str,
+    out: Path | None,
+    cases: str | None = None,
+    quick: bool = False,
+    jobs: int | None = None,
+    seed: int = 1,
+    strategy: str | None = None,
 ) -> int:
-    """Play every case, print the comparison, write it if asked to; the exit code.
+    """Play, print the comparison, write it if asked to; the exit code.
+
+    Args:
+        what: `dispatch` or `operators`.
+        out: Where tables, figures and the page go.
+        cases: A file of cases, for dispatch.
+        quick: Fewer runs.
+        jobs: Processes; left out, one per core.
+        seed: Of all luck.
+        strategy: How the operators drive, for operators; left out, as the split file says.
 
     Raises:
-        ConfigError: something other than dispatch, or a mistake in the cases.
+        ConfigError: something else to validate, an option that belongs to the other, or a
+            mistake in the files.
     """
-    if what != WHAT:
-        raise ConfigError(f"{what!r} cannot be validated; should be {WHAT}")
-    started = time.perf_counter()
-    played = load_cases(cases or SHIPPED)
+    workers = jobs or os.cpu_count() or 1
     try:
-        checks = _play(played, seed, quick, jobs or os.cpu_count() or 1)
+        if what == "dispatch":
+            if strategy is not None:
+                raise ConfigError("--strategy is for `validate operators`: dispatch has none")
+            from dva_sim.experiments.validation.dispatch import console as dispatch
+
+            return dispatch.validate(cases, out, quick, workers, seed)
+        if what == "operators":
+            if cases is not None:
+                raise ConfigError("--cases is for `validate dispatch`: operators have no cases")
+            from dva_sim.experiments.validation.operators import console as operators
+
+            return operators.validate(strategy, out, quick, workers, seed)
     except KeyboardInterrupt:
         say("Stopped.")
         return INTERRUPTED
-    _tell(checks, quick)
-    say(f"{time.perf_counter() - started:.0f} s")
-    if out is not None:
-        conditions = {
-            "cases": f"{cases or SHIPPED} ({len(played)})",
-            "events played": f"{_events(checks):,}",
-            "seed": str(seed),
-            "length": "quick" if quick else "full",
-        }
-        say(f"Report: {output.write(out, checks, conditions)}")
-    return int(any(c.verdict == "differs" or _too_rough(c, quick) for c in checks))
-
-
-def _too_rough(check: Check, quick: bool) -> bool:
-    """A full run is to be as sharp as it promises."""
-    return check.verdict == "too rough" and not quick
-
-
-def _play(cases: Sequence[Case], seed: int, quick: bool, workers: int) -> list[Check]:
-    with Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        console=console,
-    ) as bar:
-        first = len(IDENTITIES)
-        task = bar.add_task("identities", total=first + runs_of(cases, quick))
-        checks = check_identities(seed, lambda n: bar.update(task, completed=n))
-        bar.update(task, description="cases")
-        checks += check_cases(
-            cases, seed, quick, workers, lambda n: bar.update(task, completed=first + n)
-        )
-    return checks
-
-
-def _tell(checks: Sequence[Check], quick: bool) -> None:
-    """The table of results, and of everything else that differs."""
-    table = Table(box=None, pad_edge=False)
-    table.add_column("case", no_wrap=True)
-    for head in output.HEADS:
-        side: Literal["left", "right"] = "left" if head in ("measure", "verdict") else "right"
-        table.add_column(head, justify=side, no_wrap=True)
-    last = ""
-    for check in checks:
-        if check.kind != "result" and check.verdict == "agrees":
-            continue
-        *cells, verdict = output.words(check)
-        shown = f"[{STYLES[verdict]}]{verdict}[/]"
-        table.add_row(escape(check.case) if check.case != last else "", *map(escape, cells), shown)
-        last = check.case
-    # A narrow terminal breaks its lines; better than numbers that are cut off.
-    Console(highlight=False, width=max(console.width, WIDTH)).print(table)
-    for kind, told in TOLD.items():
-        count = sum(c.kind == kind and c.verdict == "agrees" for c in checks)
-        say(f"{count} {told}")
-    say(f"[bold]{output.headline(checks)}[/bold]")
-    for note in output.notes(checks, quick):
-        say(note)
-
-
-def _events(checks: Sequence[Check]) -> int:
-    return sum({c.case: c.events for c in checks}.values())
+    raise ConfigError(f"{what!r} cannot be validated; should be {' or '.join(WHAT)}")

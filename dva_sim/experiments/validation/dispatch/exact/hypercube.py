@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.experiments.validation.exact.queues import Floats, Measures, Memoryless
+from dva_sim.experiments.validation.dispatch.exact.queues import Floats, Measures, Memoryless
 
 Ints = NDArray[np.int64]
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dva_sim.core.dispatch import Assignment, Responder, Situation, Task, load_policy
-from dva_sim.experiments.validation.sample import Floats, Ints
+from dva_sim.experiments.validation.dispatch.sample import Floats, Ints
 
 POLICIES = (
     "nearest_idle",

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dva_sim.experiments.figures.style import FAINT, INK, SOFT, Drawn, finish, panels, styled
-from dva_sim.experiments.validation.estimation import ERRORS, PRECISION, TOLERANCE
-from dva_sim.experiments.validation.play import Check
+from dva_sim.experiments.validation.dispatch.estimation import ERRORS, PRECISION, TOLERANCE
+from dva_sim.experiments.validation.dispatch.play import Check
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from dva_sim.errors import ConfigError
-from dva_sim.experiments.validation import exact
-from dva_sim.experiments.validation.cases import load_cases
+from dva_sim.experiments.validation.dispatch import exact
+from dva_sim.experiments.validation.dispatch.cases import load_cases
 
 CASE = """
 cases:
@@ -92,5 +92,5 @@ def test_an_unknown_file_is_refused():
 
 
 def test_the_shipped_policy_of_stages_lies_beside_the_cases():
-    root = Path(__file__).parents[3]
+    root = Path(__file__).parents[4]
     assert (root / "experiments/validation/stages.py").is_file()

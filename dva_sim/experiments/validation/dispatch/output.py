@@ -1,26 +1,22 @@
-"""What a validation leaves behind: a table as CSV and Parquet, figures, and a page."""
+"""What a validation of dispatch leaves behind: its rows, its words and its page."""
 
 from __future__ import annotations
 
-import base64
-import csv
-import io
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
-from dva_sim.errors import DvaSimError
-from dva_sim.experiments.figures import Drawn
-from dva_sim.experiments.validation.estimation import (
+from dva_sim.experiments.validation.dispatch.estimation import (
     ERRORS,
     PRECISION,
     TOLERANCE,
     expected_alarms,
 )
-from dva_sim.experiments.validation.pictures import draw_all
-from dva_sim.experiments.validation.play import LOOK_AGAIN, Check
+from dva_sim.experiments.validation.dispatch.pictures import draw_all
+from dva_sim.experiments.validation.dispatch.play import LOOK_AGAIN, Check
+from dva_sim.experiments.validation.writing import render, write_all
 
 NAME = "dispatch"
 
@@ -37,19 +33,17 @@ def write(folder: Path, checks: Sequence[Check], conditions: dict[str, str]) -> 
         DvaSimError: the folder cannot be written.
     """
     drawn = draw_all(checks)
-    rows = [_row(check) for check in checks]
-    try:
-        (folder / "figures").mkdir(parents=True, exist_ok=True)
-        (folder / f"{NAME}.csv").write_text(_csv(rows), encoding="utf-8", newline="")
-        _write_parquet(folder / f"{NAME}.parquet", rows)
-        for figure in drawn:
-            (folder / "figures" / f"{figure.name}.svg").write_bytes(figure.svg)
-            (folder / "figures" / f"{figure.name}.png").write_bytes(figure.png)
-        page = folder / "index.html"
-        page.write_text(_page(checks, drawn, conditions), encoding="utf-8", newline="\n")
-    except OSError as error:
-        raise DvaSimError(f"{folder} cannot be written: {error.strerror or error}") from None
-    return page
+    page = render(
+        "validation-dispatch.html.j2",
+        drawn,
+        headline=headline(checks),
+        notes=notes(checks, conditions.get("length") == "quick"),
+        fails=any(c.verdict == "differs" for c in checks),
+        conditions=conditions,
+        groups=_groups(checks),
+        rule=(ERRORS, 100 * TOLERANCE, 100 * PRECISION, LOOK_AGAIN),
+    )
+    return write_all(folder, {NAME: [_row(check) for check in checks]}, drawn, page)
 
 
 def headline(checks: Sequence[Check]) -> str:
@@ -97,52 +91,6 @@ def _row(check: Check) -> dict[str, Any]:
     return row
 
 
-def _csv(rows: list[dict[str, Any]]) -> str:
-    text = io.StringIO()
-    writer = csv.DictWriter(text, list(rows[0]) if rows else [], lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    return text.getvalue()
-
-
-def _write_parquet(path: Path, rows: list[dict[str, Any]]) -> None:
-    """One thread, rows in their order: the same bytes each time."""
-    import duckdb
-
-    kinds = {str: "VARCHAR", float: "DOUBLE", int: "BIGINT"}
-    columns = ", ".join(f'"{name}" {kinds[type(value)]}' for name, value in rows[0].items())
-    config: dict[str, str | bool | int | float | list[str]]
-    config = {"threads": 1, "preserve_insertion_order": True}
-    with duckdb.connect(config=config) as connection:
-        connection.execute(f"CREATE TABLE checks ({columns})")
-        marks = ", ".join("?" for _ in rows[0])
-        connection.executemany(
-            f"INSERT INTO checks VALUES ({marks})", [list(row.values()) for row in rows]
-        )
-        connection.execute("COPY checks TO $1 (FORMAT parquet, COMPRESSION zstd)", [str(path)])
-
-
-def _page(checks: Sequence[Check], drawn: list[Drawn], conditions: dict[str, str]) -> str:
-    import jinja2
-
-    loader = jinja2.PackageLoader("dva_sim.experiments", "templates")
-    environment = jinja2.Environment(
-        loader=loader, autoescape=True, trim_blocks=True, undefined=jinja2.StrictUndefined
-    )
-    study = loader.get_source(environment, "report.html.j2")[0]
-    style = study.partition("<style>")[2].partition("</style>")[0]  # one look for all pages
-    return environment.get_template("validation.html.j2").render(
-        style=style,
-        headline=headline(checks),
-        notes=notes(checks, conditions.get("length") == "quick"),
-        fails=any(c.verdict == "differs" for c in checks),
-        conditions=conditions,
-        figures=[(d, _data_uri(d.svg)) for d in drawn],
-        groups=_groups(checks),
-        rule=(ERRORS, 100 * TOLERANCE, 100 * PRECISION, LOOK_AGAIN),
-    )
-
-
 def _groups(checks: Sequence[Check]) -> list[tuple[str, list[list[str]]]]:
     """Checks case by case, as the words of a table."""
     groups: dict[str, list[list[str]]] = {}
@@ -166,7 +114,3 @@ def words(check: Check) -> list[str]:
         off,
         check.verdict,
     ]
-
-
-def _data_uri(svg: bytes) -> str:
-    return f"data:image/svg+xml;base64,{base64.b64encode(svg).decode()}"

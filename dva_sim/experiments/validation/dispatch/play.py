@@ -13,9 +13,9 @@ from dva_sim.errors import DvaSimError
 from dva_sim.experiments.design import Job
 from dva_sim.experiments.journal import Outcome, Tables
 from dva_sim.experiments.pool import run_all
-from dva_sim.experiments.validation.cases import Case
-from dva_sim.experiments.validation.controls import controls, inputs
-from dva_sim.experiments.validation.estimation import (
+from dva_sim.experiments.validation.dispatch.cases import Case
+from dva_sim.experiments.validation.dispatch.controls import controls, inputs
+from dva_sim.experiments.validation.dispatch.estimation import (
     PRECISION,
     Estimate,
     Verdict,
@@ -23,9 +23,9 @@ from dva_sim.experiments.validation.estimation import (
     estimate,
     verdict,
 )
-from dva_sim.experiments.validation.identities import IDENTITIES, check_identity
-from dva_sim.experiments.validation.measures import Batches, sums
-from dva_sim.experiments.validation.sample import Floats, Sample, occupied, sample_of
+from dva_sim.experiments.validation.dispatch.identities import IDENTITIES, check_identity
+from dva_sim.experiments.validation.dispatch.measures import Batches, sums
+from dva_sim.experiments.validation.dispatch.sample import Floats, Sample, occupied, sample_of
 from dva_sim.scenario import Scenario
 from dva_sim.streams import derive_seed
 from dva_sim.timed import simulate_timed

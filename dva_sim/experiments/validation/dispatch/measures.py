@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dva_sim.errors import ConfigError
-from dva_sim.experiments.validation.sample import Floats, Sample, occupied
+from dva_sim.experiments.validation.dispatch.sample import Floats, Sample, occupied
 from dva_sim.timed.scenario import TimedScenario
 
 Sums = tuple[Floats, Floats]  # tops and bottoms, one for each batch

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dva_sim.experiments.validation.exact.queues import Measures, Memoryless, birth_death
+from dva_sim.experiments.validation.dispatch.exact.queues import Measures, Memoryless, birth_death
 
 
 def finite_source(

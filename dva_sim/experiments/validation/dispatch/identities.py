@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from dva_sim.experiments.validation.rearranged import changed_choices
-from dva_sim.experiments.validation.recursions import many_servers
-from dva_sim.experiments.validation.sample import sample_of
+from dva_sim.experiments.validation.dispatch.rearranged import changed_choices
+from dva_sim.experiments.validation.dispatch.recursions import many_servers
+from dva_sim.experiments.validation.dispatch.sample import sample_of
 from dva_sim.streams import derive_seed
 from dva_sim.timed import TimedRecording, build, simulate_timed
 

@@ -9,7 +9,12 @@ import math
 
 import numpy as np
 
-from dva_sim.experiments.validation.exact.queues import Floats, Law, Measures, require_stable
+from dva_sim.experiments.validation.dispatch.exact.queues import (
+    Floats,
+    Law,
+    Measures,
+    require_stable,
+)
 
 _NODES = 32  # of Gauss-Legendre in each direction and piece; 48 change the ninth digit
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from dva_sim.experiments.validation.exact.queues import Law, Measures, Memoryless, erlang_c
+from dva_sim.experiments.validation.dispatch.exact.queues import Law, Measures, Memoryless, erlang_c
 
 
 def priorities(

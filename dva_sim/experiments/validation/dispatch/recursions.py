@@ -6,7 +6,7 @@ import heapq
 
 import numpy as np
 
-from dva_sim.experiments.validation.sample import Floats, Ints
+from dva_sim.experiments.validation.dispatch.sample import Floats, Ints
 
 
 def many_servers(times: Floats, services: Floats, servers: int) -> Floats:

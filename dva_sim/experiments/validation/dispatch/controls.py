@@ -26,11 +26,11 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.experiments.validation import exact
-from dva_sim.experiments.validation.exact.transforms import laplace
-from dva_sim.experiments.validation.measures import Batches
-from dva_sim.experiments.validation.recursions import one_server
-from dva_sim.experiments.validation.sample import Floats, Sample
+from dva_sim.experiments.validation.dispatch import exact
+from dva_sim.experiments.validation.dispatch.exact.transforms import laplace
+from dva_sim.experiments.validation.dispatch.measures import Batches
+from dva_sim.experiments.validation.dispatch.recursions import one_server
+from dva_sim.experiments.validation.dispatch.sample import Floats, Sample
 from dva_sim.timed.laws import Exponential, Law
 from dva_sim.timed.scenario import TimedScenario
 

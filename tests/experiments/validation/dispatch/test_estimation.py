@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from dva_sim.experiments.validation.estimation import (
+from dva_sim.experiments.validation.dispatch.estimation import (
     Estimate,
     adjusted,
     estimate,

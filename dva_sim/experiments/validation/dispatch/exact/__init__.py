@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from dva_sim.experiments.validation.exact.geometry import sqm, square_centre, square_nearest
-from dva_sim.experiments.validation.exact.hypercube import hypercube
-from dva_sim.experiments.validation.exact.matching import assignment
-from dva_sim.experiments.validation.exact.priorities import cobham, priorities
-from dva_sim.experiments.validation.exact.queues import (
+from dva_sim.experiments.validation.dispatch.exact.geometry import (
+    sqm,
+    square_centre,
+    square_nearest,
+)
+from dva_sim.experiments.validation.dispatch.exact.hypercube import hypercube
+from dva_sim.experiments.validation.dispatch.exact.matching import assignment
+from dva_sim.experiments.validation.dispatch.exact.priorities import cobham, priorities
+from dva_sim.experiments.validation.dispatch.exact.queues import (
     Law,
     Measures,
     erlang_a,
@@ -21,7 +25,7 @@ from dva_sim.experiments.validation.exact.queues import (
     mmck,
     tandem,
 )
-from dva_sim.experiments.validation.exact.sources import fan_out, finite_source
+from dva_sim.experiments.validation.dispatch.exact.sources import fan_out, finite_source
 
 FORMULAS: dict[str, Callable[..., Measures]] = {
     "mmc": mmc,

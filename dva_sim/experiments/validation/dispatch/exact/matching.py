@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dva_sim.experiments.validation.exact.queues import Measures
+from dva_sim.experiments.validation.dispatch.exact.queues import Measures
 
 
 def assignment(events: int, responders: int, mean_s: float = 1.0) -> Measures:

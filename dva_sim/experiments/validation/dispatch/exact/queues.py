@@ -23,7 +23,7 @@ from typing import Annotated, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.experiments.validation.exact.transforms import laplace
+from dva_sim.experiments.validation.dispatch.exact.transforms import laplace
 from dva_sim.timed import laws as timed
 
 Measures = dict[str, float]

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dva_sim.experiments.validation import exact
-from dva_sim.experiments.validation.exact.transforms import laplace
+from dva_sim.experiments.validation.dispatch import exact
+from dva_sim.experiments.validation.dispatch.exact.transforms import laplace
 from dva_sim.timed.laws import (
     Constant,
     Erlang,
@@ -20,7 +20,7 @@ from dva_sim.timed.laws import (
     Weibull,
 )
 
-TARGETS = Path(__file__).parents[4] / "shared/targets/dispatch.json"
+TARGETS = Path(__file__).parents[5] / "shared/targets/dispatch.json"
 
 
 def gamma(mean, shape=1.0):

@@ -9,7 +9,7 @@ from typing import Any, get_args, get_type_hints
 from pydantic import TypeAdapter, ValidationError
 
 from dva_sim.errors import ConfigError
-from dva_sim.experiments.validation.exact import FORMULAS, Measures
+from dva_sim.experiments.validation.dispatch.exact import FORMULAS, Measures
 from dva_sim.timed import laws
 from dva_sim.timed.scenario import TimedScenario
 

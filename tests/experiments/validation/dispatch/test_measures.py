@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from dva_sim.errors import ConfigError
-from dva_sim.experiments.validation.controls import controls, inputs
-from dva_sim.experiments.validation.estimation import estimate
-from dva_sim.experiments.validation.measures import Batches, check_name, sums
-from dva_sim.experiments.validation.recursions import many_servers, one_server
-from dva_sim.experiments.validation.sample import Sample, occupied, sample_of
+from dva_sim.experiments.validation.dispatch.controls import controls, inputs
+from dva_sim.experiments.validation.dispatch.estimation import estimate
+from dva_sim.experiments.validation.dispatch.measures import Batches, check_name, sums
+from dva_sim.experiments.validation.dispatch.recursions import many_servers, one_server
+from dva_sim.experiments.validation.dispatch.sample import Sample, occupied, sample_of
 from dva_sim.timed import build, simulate_timed
 
 NAN = math.nan

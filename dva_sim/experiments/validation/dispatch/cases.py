@@ -15,8 +15,8 @@ from pydantic import Field, field_validator
 from dva_sim import resources
 from dva_sim.config import Config, Document, load_yaml, validate
 from dva_sim.errors import ConfigError
-from dva_sim.experiments.validation.binding import exact_values
-from dva_sim.experiments.validation.measures import check_name
+from dva_sim.experiments.validation.dispatch.binding import exact_values
+from dva_sim.experiments.validation.dispatch.measures import check_name
 from dva_sim.timed import scenario as timed
 from dva_sim.timed.scenario import TimedScenario
 

@@ -4,11 +4,11 @@ import csv
 
 import pytest
 
-from dva_sim.experiments.validation import play
-from dva_sim.experiments.validation.cases import load_cases
 from dva_sim.experiments.validation.console import validate
-from dva_sim.experiments.validation.identities import IDENTITIES, check_identity
-from dva_sim.experiments.validation.play import check_cases
+from dva_sim.experiments.validation.dispatch import play
+from dva_sim.experiments.validation.dispatch.cases import load_cases
+from dva_sim.experiments.validation.dispatch.identities import IDENTITIES, check_identity
+from dva_sim.experiments.validation.dispatch.play import check_cases
 
 FILE = """
 cases:
