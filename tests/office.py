@@ -182,14 +182,16 @@ class Office:
     def busy(self, *names: str) -> None:
         """Somebody is kept by the rest of an event that is not ours."""
         other = Event(99, "flood", HERE, 0.5, state=State.REFUTED, times={"closed": math.inf})
-        self.desk.orders.engaged |= dict.fromkeys(names, other)
+        for name in names:
+            self.desk.orders.engaged.begin(name, other)
 
     def idle(self, *names: str) -> None:
         """And does not any longer."""
         for name in names:
-            del self.desk.orders.engaged[name]
+            for event in self.desk.orders.engaged.all(name):
+                self.desk.orders.engaged.end(name, event)
 
     @property
     def working(self) -> dict[str, int]:
         """Who works on which event."""
-        return {name: event.number for name, event in self.desk.orders.engaged.items()}
+        return {name: event.number for name, event in self.desk.orders.engaged.pairs()}

@@ -90,6 +90,7 @@ class Walk:
             most_waiting=self.luck.choice([None, None, 0, 2]),
             merge_distance=self.luck.choice([0.0, 8.0]),
             order_limit=LIMIT,
+            operator_span=1 + seed % 3,
         )
         self.access_until = self.luck.choice([math.inf, 300.0])
         self.now, self.numbers = 0.0, dict.fromkeys(DEVICES, 0)
@@ -202,7 +203,7 @@ class Walk:
             device = self.luck.choice(list(working))
         number = self._some_event()
         if device in working and self.luck.random() < 0.8:
-            number = working[device].number
+            number = working.all(device)[0].number
         states = ["accepted", "departed", "arrived", "done", "failed", "declined"]
         return self.say(device, m.OrderProgress(number, self.luck.choice(states)))
 
@@ -282,14 +283,14 @@ class Walk:
         assert not any(event.open for event in book.closed.values()), after
         waiting = {n for n, e in book.open.items() if e.waits_for is not None}
         assert book.waiting.keys() == waiting, after
-        for device, event in desk.orders.engaged.items():
+        for device, event in desk.orders.engaged.pairs():
             assert device in (event.responder, event.operator, event.actor), after
             assert book.get(event.number) is event, after
         for event in (*book.open.values(), *book.closed.values()):
             self._check_event(event, after)
         looked = [e.responder for e in book.open.values() if e.state in LOOKS]
         assert len(looked) == len(set(looked)), after
-        assert not desk.dispatcher.lookout._bound_for.keys() & desk.orders.engaged.keys(), after
+        assert not desk.dispatcher.lookout._bound_for.keys() & set(desk.orders.engaged), after
 
     def _check_event(self, event: Event, after: str) -> None:
         engaged = self.desk.orders.engaged
@@ -299,14 +300,14 @@ class Walk:
         assert ("closed" in event.times) != event.open, (after, event)
         if event.state in LOOKS:
             assert event.responder is not None, (after, event)
-            assert engaged.get(event.responder) is event, (after, event)
+            assert engaged.is_at(event.responder, event), (after, event)
             is_robot = DEVICES[event.responder] == "Robot"
             assert is_robot == (event.operator is not None), (after, event)
-            assert event.operator is None or engaged.get(event.operator) is event, (after, event)
+            assert event.operator is None or engaged.is_at(event.operator, event), (after, event)
         if event.state is State.PENDING:
             assert (event.responder, event.operator, event.actor) == (None,) * 3, (after, event)
         if event.open and event.actor is not None:
-            assert engaged.get(event.actor) is event, (after, event)
+            assert engaged.is_at(event.actor, event), (after, event)
             assert DEVICES[event.actor] == "Guard", (after, event)
         most = self.rules.max_attempts + ("confirmed" in event.times)  # one to deal with it
         assert 0 <= event.attempts <= most, (after, event)
@@ -383,7 +384,9 @@ def _watch(desk: Desk) -> None:
     def watched_confirm(
         event: Event, responder: str, operator: str | None, *args: Any, **named: Any
     ) -> Send:
-        assert not {responder, operator} & orders.engaged.keys()
+        span = orders.rules.operator_span
+        assert responder not in orders.engaged
+        assert operator is None or orders.engaged.count(operator) < span
         return confirm(event, responder, operator, *args, **named)
 
     def watched_act(event: Event, guard: str, now: float) -> Send:
@@ -405,7 +408,7 @@ def snapshot(desk: Desk) -> dict[str, Any]:
         "waiting": set(book.waiting),
         "counts": book.counts,
         "total": book.total,
-        "engaged": {device: event.number for device, event in desk.orders.engaged.items()},
+        "engaged": sorted((device, event.number) for device, event in desk.orders.engaged.pairs()),
         "devices": [entry.device for entry in desk.registry.entries.values()],
         "grants": permissions.grants,
         "observers": permissions.observers,

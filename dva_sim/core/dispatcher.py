@@ -144,7 +144,7 @@ class Dispatcher:
         on_offer = event.number in self.auctions.running
         if not self.policy.auctions or on_offer or event.state is not State.PENDING:
             return None
-        idle = view.team.idle() - self.orders.engaged.keys()
+        idle = view.team.idle().difference(self.orders.engaged)
         able = np.isfinite(view.situation.eta[offer.task])
         both = zip(view.situation.responders, able, strict=True)
         asked = [who.device for who, can in both if can and who.device in idle]

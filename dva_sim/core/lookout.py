@@ -28,7 +28,7 @@ _place = operator.attrgetter("place")
 
 @dataclass
 class Team:
-    """Who can go: the entries behind `Situation.responders`, and the free operators."""
+    """Who can go: the entries behind `Situation.responders`, and the operators' free hands."""
 
     entries: list[Entry]
     engaged: list[Event | None]
@@ -123,7 +123,7 @@ class Lookout:
         finder = event.responder
         if event.state is not State.CONFIRMED or event.operator is not None or finder is None:
             return False
-        return self.orders.engaged.get(finder) is event
+        return self.orders.engaged.is_at(finder, event)
 
     def _is_under_way(self, event: Event) -> bool:
         """Whether its responder has heard of it and is not there yet."""
@@ -135,7 +135,7 @@ class Lookout:
         registry = self.orders.registry
         entries = self._free(registry.located(GUARD), now)
         robots = self._free(registry.located(ROBOT), now)
-        operators = self._free(registry.of_type(OPERATOR), now) if robots else []
+        operators = self._hands(registry.of_type(OPERATOR), now) if robots else []
         if operators:
             entries += robots
         engaged: list[Event | None] = [None] * len(entries)
@@ -155,6 +155,17 @@ class Lookout:
             if e.device.id_tag not in engaged and not is_held(e.device.id_tag)
         ]
         return sorted(free, key=_place)
+
+    def _hands(self, operators: Iterable[Entry], now: float) -> list[Entry]:
+        """Operators who may be given a robot, each as often as it may; the least busy first."""
+        span, count = self.orders.rules.operator_span, self.orders.engaged.count
+        hands = [
+            (in_hand, e.place, e)
+            for e in operators
+            if not e.silent and e.free_from <= now
+            for in_hand in range(count(e.device.id_tag), span)
+        ]
+        return [entry for _, _, entry in sorted(hands, key=operator.itemgetter(0, 1))]
 
     def _situation(self, events: list[Event], team: Team, now: float) -> Situation:
         rows = {id(e): row for row, e in enumerate(events)}

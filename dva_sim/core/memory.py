@@ -173,7 +173,8 @@ class Memory:
             kept = json.loads(data)
             event = _event(kept, self.epoch)
             desk.book.restore(event)
-            desk.orders.engaged |= dict.fromkeys(kept["engaged"], event)
+            for name in kept["engaged"]:
+                desk.orders.engaged.begin(name, event)
         desk.book.total = sum(desk.book.counts.values())
         self._recall_sessions(desk)
         desk.registry.changes()
@@ -224,7 +225,7 @@ def _of_event(event: Event, desk: Desk, epoch: float) -> dict[str, Any]:
         "times": {step: time + epoch for step, time in event.times.items()},
         "failed": sorted(event.failed),
         "sent": sorted(event.sent),
-        "engaged": [name for name in people if name and engaged.get(name) is event],
+        "engaged": [name for name in people if name and engaged.is_at(name, event)],
     }
 
 

@@ -6,6 +6,7 @@ import math
 from collections import Counter
 from dataclasses import dataclass, field
 
+from dva_sim.core.engaged import Engaged
 from dva_sim.core.events import NEXT, Event, EventBook, State
 from dva_sim.core.registry import Registry
 from dva_sim.core.rules import Rules
@@ -21,7 +22,7 @@ class Orders:
     """All orders of a desk.
 
     Attributes:
-        engaged: What each device is working on, also while it still winds up a closed event.
+        engaged: What each device is working on.
         counters: How often what happened.
     """
 
@@ -29,7 +30,7 @@ class Orders:
     registry: Registry
     book: EventBook
     sessions: Sessions
-    engaged: dict[str, Event] = field(default_factory=dict)
+    engaged: Engaged = field(default_factory=Engaged)
     counters: Counter[str] = field(default_factory=Counter)
     _pauses: list[float] = field(default_factory=list)
 
@@ -43,7 +44,7 @@ class Orders:
         event.responder, event.operator = responder, operator
         for name in (responder, operator):
             if name is not None:
-                self.engaged[name] = event
+                self.engaged.begin(name, event)
         event.sent.add(operator or responder)
         if award:
             return Send(responder, m.TaskAward(event.number))
@@ -62,7 +63,7 @@ class Orders:
             event.times.pop(step, None)
         event.times["act_assigned"] = now
         event.sent.add(guard)
-        self.engaged[guard] = event
+        self.engaged.begin(guard, event)
         self.book.touch(event)
         return self._order_to_act(event)
 
@@ -110,10 +111,8 @@ class Orders:
 
     def _meant(self, send: Send) -> Event | None:
         """What an order that was sent is about, if whom it went to still works on that."""
-        event = self.engaged.get(send.to)
         body = send.body
-        right = event is not None and isinstance(body, _ORDERS) and body.event_id == event.number
-        return event if right else None
+        return self.engaged.find(send.to, body.event_id) if isinstance(body, _ORDERS) else None
 
     def _noted_as_taken_up(self, event: Event) -> None:
         if not event.taken_up:
@@ -139,7 +138,7 @@ class Orders:
 
     def has_order(self, event: Event, device: str) -> bool:
         """Whether a device may say how an order stands; a robot leaves that to its operator."""
-        return self.engaged.get(device) is event and device in (event.holder, event.actor)
+        return self.engaged.is_at(device, event) and device in (event.holder, event.actor)
 
     def departed(self, event: Event, device: str, now: float) -> None:
         """Somebody has set out."""
@@ -209,9 +208,9 @@ class Orders:
 
     def abandon(self, device: str, now: float) -> list[Send]:
         """A device is gone: what it was doing is open to others."""
-        event = self.engaged.get(device)
-        if event is None:
-            return []
+        return [send for e in self.engaged.all(device) for send in self._abandon(e, device, now)]
+
+    def _abandon(self, event: Event, device: str, now: float) -> list[Send]:
         if device == event.actor and event.open:
             return self._actor_gone(event, now)
         self._free(event, device)
@@ -234,11 +233,11 @@ class Orders:
         self._pauses = [until for until in self._pauses if until > now]
         if math.isinf(self.rules.order_limit):
             return []
-        late = [d for d, e in self.engaged.items() if self._order_ends(d, e) <= now]
+        late = [(d, e) for d, e in self.engaged.pairs() if self._order_ends(d, e) <= now]
         sends: list[Send] = []
-        for device in late:
-            if device in self.engaged:  # a robot is free with its operator
-                sends += self._take_back(device, self.engaged[device], now)
+        for device, event in late:
+            if self.engaged.is_at(device, event):  # a robot is free with its operator
+                sends += self._take_back(device, event, now)
         return sends
 
     def next_deadline(self) -> float:
@@ -248,7 +247,7 @@ class Orders:
         if math.isfinite(rules.escalate_after):
             ends += (self._wait_ends(e) for e in waiting.values())
         if math.isfinite(rules.order_limit):
-            ends += (self._order_ends(d, e) for d, e in self.engaged.items())
+            ends += (self._order_ends(d, e) for d, e in self.engaged.pairs())
         return min(ends)
 
     def _wait_ends(self, event: Event) -> float:
@@ -313,8 +312,7 @@ class Orders:
 
     def _free(self, event: Event, *names: str | None) -> None:
         for name in names:
-            if name is not None and self.engaged.get(name) is event:
-                del self.engaged[name]
+            if name is not None and self.engaged.end(name, event):
                 self.book.touch(event)
 
     def _reopen(self, event: Event, now: float) -> list[Send]:

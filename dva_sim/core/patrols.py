@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
+from dva_sim.core.engaged import Engaged
 from dva_sim.core.registry import ROBOT, Entry, Registry
 from dva_sim.core.send import Send
 from dva_sim.core.sessions import Sessions
@@ -30,7 +31,7 @@ class Patrols:
     _on_round: set[str] = field(default_factory=set)
 
     def set_out(
-        self, registry: Registry, sessions: Sessions, engaged: Mapping[str, object], now: float
+        self, registry: Registry, sessions: Sessions, engaged: Engaged, now: float
     ) -> list[Send]:
         """What to tell the robots that have rested long enough."""
         sends: list[Send] = []

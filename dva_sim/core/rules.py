@@ -18,6 +18,7 @@ class Rules:
         max_attempts: Orders given for one event before it is escalated.
         order_limit: Who has not settled an event so long after the order gives it back [s].
         bid_within: How long bids are taken [s].
+        operator_span: How many robots one operator may have in hand at once.
         declined_pause: Who declines an order, or is not reached, is not asked again for [s].
     """
 
@@ -28,4 +29,5 @@ class Rules:
     max_attempts: int = 4
     order_limit: float = 900.0
     bid_within: float = 2.0
+    operator_span: int = 1
     declined_pause: float = 10.0

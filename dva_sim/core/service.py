@@ -216,7 +216,7 @@ class Desk:
 
     def _serves_another(self, robot: str, asker: str) -> bool:
         engaged = self.orders.engaged
-        return robot in engaged and engaged[robot] is not engaged.get(asker)
+        return any(not engaged.is_at(asker, event) for event in engaged.all(robot))
 
     def _give_back(self, message: m.Message, body: m.PermissionRevocation) -> Answer:
         """A holder needs its permission no longer; only its own."""
@@ -278,12 +278,8 @@ class Desk:
         return self._ok(message)[0], sends
 
     def _progress(self, message: m.Message, body: m.OrderProgress, now: float) -> Answer:
-        event = self.orders.engaged.get(message.source)
-        if (
-            event is None
-            or event.number != body.event_id
-            or not self.orders.has_order(event, message.source)
-        ):
+        event = self.orders.engaged.find(message.source, body.event_id)
+        if event is None or not self.orders.has_order(event, message.source):
             text = f"device {message.source} has no order for event {body.event_id}"
             return self._refuse(message, m.UNKNOWN_EVENT, text)
         sends: list[Send] = []

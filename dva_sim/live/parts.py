@@ -96,7 +96,7 @@ class DvaPart:
                     "heard_s": now - entry.last_heard,
                     "beats_hz": beats,
                     "silent": entry.silent,
-                    "order": engaged[id_tag].number if id_tag in engaged else None,
+                    "order": next((event.number for event in engaged.all(id_tag)), None),
                 }
             )
         return rows

@@ -51,8 +51,8 @@ def _team(shift: Shift) -> Iterator[str]:
     """One event per responder and one responder per event, as the DVA believes it to be."""
     engaged = shift.desk.orders.engaged
     for unit in shift.units:
-        job, event = unit.job, engaged.get(unit.device)
-        if (None if job is None else job.order.event_id) != (event and event.number):
+        job, at = unit.job, [event.number for event in engaged.all(unit.device)]
+        if ([] if job is None else [job.order.event_id]) != at:
             yield "a responder is at something else than the DVA believes"
     for event in shift.desk.book.in_state(State.ASSIGNED, State.ON_SCENE):
         if event.responder is None:

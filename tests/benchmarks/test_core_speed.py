@@ -119,7 +119,7 @@ class Site:
     def _work(self, step: int) -> Iterator[tuple[str, m.Body]]:
         working = self.desk.orders.engaged
         if working:
-            who, event = next(iter(working.items()))
+            who, event = working.pairs()[0]
             place = event.position
             yield {
                 1: (who, m.OrderProgress(event.number, "arrived")),

@@ -77,7 +77,8 @@ def test_the_newest_is_the_one_detected_last_even_if_an_older_one_waits_again() 
     office.busy(GUARD)
     office.fire(40)
     office.busy(OPERATOR)  # it is kept from taking anything else
-    office.desk.orders.engaged[OPERATOR] = office.event(1)
+    office.idle(OPERATOR)
+    office.desk.orders.engaged.begin(OPERATOR, office.event(1))
     office.desk.registry.entries[OPERATOR].free_from = 100.0
     office.progress(OPERATOR, "failed", 5.0)
     assert (state(office, 1), state(office, 2)) == (State.PENDING, State.ESCALATED)

@@ -179,7 +179,9 @@ def test_an_event_that_waits_again_has_not_been_departed_for(office: Office) -> 
     office.progress(OPERATOR, "arrived", 9.0)
     office.busy(GUARD)
     office.busy(OPERATOR, ROBOT)
-    office.desk.orders.engaged |= dict.fromkeys((OPERATOR, ROBOT), office.event())
+    office.idle(OPERATOR, ROBOT)
+    for name in (OPERATOR, ROBOT):
+        office.desk.orders.engaged.begin(name, office.event())
     office.progress(OPERATOR, "failed", 10.0)
     assert set(office.event().times) == {"detected", "assigned"}  # to the same again
 

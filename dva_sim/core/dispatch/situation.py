@@ -97,7 +97,7 @@ class Situation:
             infinite if it is not on it. Empty if no lists are configured.
         bids: Arrival that each responder has offered [s from now], same shape; nan where there
             is no bid. Empty unless the policy `auctions`.
-        operators: How many operators are free; each robot that is sent takes one.
+        operators: How many robots operators can take on; each robot that is sent takes one.
         cover: Where guards could wait; None unless the policy `relocates`.
     """
 
