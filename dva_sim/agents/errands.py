@@ -22,6 +22,10 @@ AUTOPILOT = Person(
     reading=0.0,
     position_error=0.0,
     heading_error=0.0,
+    reaction=0.0,
+    margin=0.5,
+    motor_noise=0.0,
+    pointing=2.0,
 )
 
 

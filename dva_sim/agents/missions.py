@@ -26,7 +26,7 @@ from dva_sim.agents.errands import AUTOPILOT, Errand
 from dva_sim.agents.inspection import Inspection
 from dva_sim.agents.manoeuvres import STAND, Aside, Manoeuvre, Recovery, Seen
 from dva_sim.agents.nearby import Nearby
-from dva_sim.agents.operator.strategies import Intent, Pursuit, Reach
+from dva_sim.agents.operator.strategies import Intent, Pursuit, Reach, View
 from dva_sim.agents.steering import Route
 from dva_sim.worlds.planning import Disc, Planner
 
@@ -161,7 +161,7 @@ class Pilot:
 
     def _drive(self, route: Route, seen: Seen) -> Intent:
         """Along a way; a car drives its sharpest curve where others turn on the spot."""
-        speed, turn_rate = self._driver.drive(route, seen.view, PERIOD, NEAR)
+        speed, turn_rate = self._driver.drive(route, View(seen.now, seen.view, PERIOD), NEAR)
         return Intent(
             max(speed, min(abs(turn_rate) * self._sharpest, self._reach.speed)), turn_rate
         )

@@ -232,7 +232,7 @@ class _Rate(ProgressColumn):
 
 def list_all() -> None:
     """Everything that can be named in a configuration."""
-    from dva_sim.agents.operator.strategies import STRATEGIES
+    from dva_sim.agents.operator.strategies import known_strategies
     from dva_sim.agents.tilt import FILTERS
     from dva_sim.core.dispatch import known_policies
 
@@ -248,7 +248,7 @@ def list_all() -> None:
     for title, folder in from_files.items():
         table.add_row(title, ", ".join(sorted(resources.available(folder))))
     table.add_row("patterns", ", ".join(PATTERNS))
-    table.add_row("operators", ", ".join(sorted(STRATEGIES)))
+    table.add_row("operators", ", ".join(known_strategies()))
     table.add_row("filters", ", ".join(sorted(FILTERS)))
     table.add_row("policies", ", ".join(known_policies()))
     console.print(table)

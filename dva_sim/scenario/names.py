@@ -26,11 +26,8 @@ def locate_policy(data: dict[str, Any], folders: Sequence[Path]) -> None:
 
 def check_names(scenario: Scenario, error: Fail) -> None:
     """Refuse a profile, strategy or policy that does not exist, before anything runs."""
-    from dva_sim.agents.operator.strategies import STRATEGIES
-
     people, robots = resources.available("agents/people"), scenario.robot.profile
     choices: dict[Path_, tuple[str | tuple[str, ...], Mapping[str, object]]] = {
-        ("operator", "strategy"): (scenario.operator.strategy, STRATEGIES),
         ("phone", "profile"): (scenario.phone.profile, resources.available("agents/phones")),
         ("robot", "profile"): (robots, resources.available("agents/robots")),
         ("guard", "profile"): (scenario.guard.profile, people),
@@ -42,7 +39,21 @@ def check_names(scenario: Scenario, error: Fail) -> None:
             if name not in known and not Path(name).is_file():
                 key = ".".join(str(p) for p in path)
                 raise error(f"{key} {name!r} is unknown; known: {', '.join(sorted(known))}", path)
+    check_strategy(scenario.operator.strategy, scenario.operator.options, error)
     check_policy(scenario.dispatch.policy, scenario.dispatch.options, error)
+
+
+def check_strategy(strategy: str, options: Mapping[str, Any], error: Fail) -> None:
+    """Refuse a way of steering that cannot be loaded, or does not know its options."""
+    from dva_sim.agents.operator.strategies import try_strategy
+
+    try:
+        try_strategy(strategy, options)
+    except ConfigError as problem:
+        if problem.file is not None:
+            raise
+        key = "options" if "option" in problem.problem else "strategy"
+        raise error(problem.problem, ("operator", key)) from None
 
 
 def check_policy(policy: str, options: Mapping[str, Any], error: Fail) -> None:

@@ -8,11 +8,12 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import shapely
 
+from dva_sim.agents.camera import Observation
 from dva_sim.agents.operator.agent import OperatorAgent
 from dva_sim.agents.operator.drive import Drive
 from dva_sim.agents.operator.person import draw_person
 from dva_sim.agents.operator.seat import DriverSeat, OperatorSetup
-from dva_sim.agents.operator.strategies import STRATEGIES, Oracle, Truth
+from dva_sim.agents.operator.strategies import Truth, load_strategy
 from dva_sim.agents.operator.supervise import Supervise
 from dva_sim.agents.robot import EXPECTED_READY, EXPECTED_SPEED
 from dva_sim.agents.tilt import Phone
@@ -151,7 +152,7 @@ def _patrols(stage: Stage) -> Patrols:
 
 
 def add_operator(
-    stage: Stage, number: int, truth: Callable[[str], Truth] | None = None
+    stage: Stage, number: int, truth: Callable[[str], Truth[Observation]] | None = None
 ) -> OperatorAgent:
     """The `number`-th operator.
 
@@ -165,9 +166,10 @@ def add_operator(
     """
     scenario, config = stage.scenario, stage.scenario.operator
     device = stage.device("operator", number)
-    person = draw_person(population(scenario), config.population_seed, config.person + number - 1)
-    strategy = STRATEGIES[config.strategy]
-    needs_truth = strategy is Oracle
+    people = population(scenario).with_medians(config.traits)
+    person = draw_person(people, config.population_seed, config.person + number - 1)
+    strategy = load_strategy(config.strategy, config.options)
+    needs_truth = config.strategy == "oracle"
     if needs_truth and truth is None:
         raise ConfigError("operator.strategy 'oracle' knows the truth: only in virtual time")
     command = scenario.command

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable
 
 from dva_sim.agents.bystander import BystanderAgent
-from dva_sim.agents.camera import HazardSpot
+from dva_sim.agents.camera import HazardSpot, Observation
 from dva_sim.agents.device import Device
 from dva_sim.agents.guard import GuardAgent
 from dva_sim.agents.operator.strategies import Truth
@@ -86,7 +86,7 @@ class Field:
         for number, incident in enumerate(self.incidents, 1):
             self._schedule(number, incident)
 
-    def truth(self, robot: str) -> Truth:
+    def truth(self, robot: str) -> Truth[Observation]:
         """The true state of a robot."""
         return Truth(self.robots[robot].observe())
 

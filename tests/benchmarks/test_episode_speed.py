@@ -15,7 +15,7 @@ from typing import Any
 from dva_sim import scenario as scenarios
 from dva_sim.agents.camera import Observation
 from dva_sim.agents.operator.person import Population, draw_person
-from dva_sim.agents.operator.strategies import Pursuit, Reach
+from dva_sim.agents.operator.strategies import Pursuit, Reach, View
 from dva_sim.agents.steering import Route
 from dva_sim.simulation import simulate
 from dva_sim.simulation.field import PHYSICS_TICK
@@ -41,7 +41,7 @@ def bare_drive() -> float:
         world.advance_to(now)
         pose = robot.pose()
         seen = Observation(0, *pose, robot.speed, robot.turn_rate, ())
-        intent = driver.drive(route, seen, 0.1, 1.2)
+        intent = driver.drive(route, View(now, seen, 0.1), 1.2)
         robot.drive(intent.speed, intent.turn_rate, now + 1.0)
         now += 0.1
     return now

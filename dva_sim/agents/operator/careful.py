@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from dva_sim.agents.camera import Observation
 from dva_sim.agents.operator.person import Person
-from dva_sim.agents.operator.strategies import TURN_MARGIN, Intent, Reach
+from dva_sim.agents.operator.strategies import Intent, Reach, gain_at
 from dva_sim.agents.steering import Route
 from dva_sim.worlds.planning import Planner
 
@@ -89,7 +89,7 @@ class Careful:
         """See `Strategy`: turn on the spot towards a point close by on the way, then go there."""
         ahead = route.ahead(seen.x, seen.y, seen.heading, LOOK)
         most = self._reach.turn_rate
-        gain = min(self._person.crossover, TURN_MARGIN / delay)
+        gain = gain_at(self._person.crossover, self._person.margin, delay)
         turn = min(max(gain * ahead.bearing, -most), most)
         self._turning = abs(ahead.bearing) > (TURN_UNTIL if self._turning else TURN_FROM)
         speed = min(SLOWLY * self._reach.speed, self._person.caution * LOOK / delay)

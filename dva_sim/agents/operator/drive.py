@@ -10,7 +10,7 @@ from dva_sim.agents.commands import CommandSender, PublishedCommands, RequestedC
 from dva_sim.agents.operator.careful import Careful
 from dva_sim.agents.operator.delay import DelayEstimate
 from dva_sim.agents.operator.seat import DriverSeat
-from dva_sim.agents.operator.strategies import Intent, Oracle, Pursuit
+from dva_sim.agents.operator.strategies import Intent, Oracle, Strategy, View
 from dva_sim.agents.operator.work import Work
 from dva_sim.agents.steering import Route
 from dva_sim.network.patterns import Requester
@@ -82,7 +82,7 @@ class Drive(Work):
     def _see(self, observation: Observation) -> None:
         """A frame is on the screen; the person perceives it a little later."""
         self._seen_tick = observation.tick
-        if self._sender is not None and isinstance(self._strategy, Pursuit):
+        if self._sender is not None and isinstance(self._strategy, Strategy):
             delay = self._seat.person.perceptual_delay
             self._clock.call_after(delay, self._perceive, observation)
 
@@ -122,7 +122,7 @@ class Drive(Work):
     def _perceive(self, observation: Observation) -> None:
         """A frame has reached the person's mind."""
         seat, now = self._seat, self._clock.now
-        if self.over or not isinstance(self._strategy, Pursuit):
+        if self.over or not isinstance(self._strategy, Strategy):
             return
         seat.delay.see(now, observation.speed, observation.turn_rate)
         judged = seat.judge(observation)
@@ -131,7 +131,8 @@ class Drive(Work):
         if route is not None:
             # The guess is made when a frame is perceived, so it holds the perceptual delay.
             drive, delay = self._strategy.drive, seat.delay.value
-            usual = lambda way, keep: drive(way, judged, delay, keep)  # noqa: E731
+            view = View(now, judged, delay)
+            usual = lambda way, keep: drive(way, view, keep)  # noqa: E731
             self._intend(self._steer(route, judged, delay, usual))
 
     def _steer(
@@ -162,7 +163,7 @@ class Drive(Work):
         self._seen_tick = truth.state.tick
         route = self._consider(truth.state)
         if route is not None:
-            drive = self._strategy.drive_by_truth
+            drive = self._strategy.drive
             usual = lambda way, keep: drive(way, truth, keep)  # noqa: E731
             self._intend(self._steer(route, truth.state, Oracle.DELAY, usual))
         return not self.over

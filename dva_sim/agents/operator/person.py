@@ -1,7 +1,15 @@
-"""Simulated persons: who they are does not depend on what they are asked to do."""
+"""Simulated persons: who they are does not depend on what they are asked to do.
+
+References:
+    D. T. McRuer, H. R. Jex: A review of quasi-linear pilot models. IEEE Trans. Human Factors in
+    Electronics HFE-8 (1967): gain and margin of who closes a loop.
+    C. M. Harris, D. M. Wolpert: Signal-dependent noise determines motor planning. Nature 394
+    (1998): the standard deviation of what a hand does grows with what it does.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -9,6 +17,7 @@ import numpy as np
 from pydantic import Field
 
 from dva_sim.config import Config
+from dva_sim.errors import ConfigError
 from dva_sim.streams import Streams
 
 Positive = Annotated[float, Field(gt=0)]
@@ -39,6 +48,12 @@ class Population(Config):
         reading_s: From an order on the screen to acting on it.
         position_error_m: How well the robot's place is judged from the picture.
         heading_error_rad: The same for its heading.
+        reaction_s: From the sight of a new goal to the first movement, the perceptual delay in it.
+        margin: Gain x delay of the loops that the person closes stays below this; pi/2 is the
+            limit of stability.
+        motor_noise: Standard deviation of what the hand does, as a share of it; assumed.
+        pointing_rad_s: Gain of bringing a cursor to its target, however short the delay; assumed,
+            of the order that manual control finds for the simplest things to steer.
     """
 
     description: str = ""
@@ -51,6 +66,32 @@ class Population(Config):
     reading_s: Trait = Trait(median=2.0, spread=0.3)
     position_error_m: Trait = Trait(median=0.04, spread=0.3)
     heading_error_rad: Trait = Trait(median=0.02, spread=0.3)
+    reaction_s: Trait = Trait(median=0.30, spread=0.15)
+    margin: Trait = Trait(median=0.5, spread=0.15)
+    motor_noise: Trait = Trait(median=0.05, spread=0.3)
+    pointing_rad_s: Trait = Trait(median=4.0, spread=0.15)
+
+    def with_medians(self, medians: Mapping[str, float]) -> Population:
+        """The same population around other medians; the spreads between persons stay.
+
+        Args:
+            medians: By the name of the trait, such as `{"margin": 0.4}`.
+
+        Raises:
+            ConfigError: there is no such trait, or its median is not above 0.
+        """
+        traits = {name: value for name, value in self if isinstance(value, Trait)}
+        for name, median in medians.items():
+            if name not in traits:
+                known = ", ".join(traits)
+                raise ConfigError(f"operator.traits {name!r} is unknown; known: {known}")
+            if not median > 0:
+                raise ConfigError(f"operator.traits {name!r} is {median!r}; should be above 0")
+        changed = {
+            name: Trait(median=median, spread=traits[name].spread)
+            for name, median in medians.items()
+        }
+        return self.model_copy(update=changed)
 
 
 @dataclass(frozen=True)
@@ -66,6 +107,10 @@ class Person:
     reading: float
     position_error: float
     heading_error: float
+    reaction: float
+    margin: float
+    motor_noise: float
+    pointing: float
 
 
 def draw_person(population: Population, seed: int, index: int) -> Person:
@@ -81,4 +126,15 @@ def draw_person(population: Population, seed: int, index: int) -> Person:
         reading=population.reading_s.draw(rng),
         position_error=population.position_error_m.draw(rng),
         heading_error=population.heading_error_rad.draw(rng),
+        reaction=population.reaction_s.draw(rng),
+        margin=population.margin.draw(rng),
+        motor_noise=population.motor_noise.draw(rng),
+        pointing=population.pointing_rad_s.draw(rng),
     )
+
+
+def median_person(population: Population) -> Person:
+    """The person in the middle of a population: every trait at its median."""
+    traits = {name: value for name, value in population if isinstance(value, Trait)}
+    still = {name: Trait(median=trait.median) for name, trait in traits.items()}
+    return draw_person(population.model_copy(update=still), 0, 0)

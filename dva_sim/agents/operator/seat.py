@@ -11,7 +11,7 @@ from dva_sim.agents.camera import Observation
 from dva_sim.agents.device import Device
 from dva_sim.agents.operator.delay import DelayEstimate
 from dva_sim.agents.operator.person import Person
-from dva_sim.agents.operator.strategies import Oracle, Pursuit, Reach, Truth
+from dva_sim.agents.operator.strategies import Driver, Reach, Truth
 from dva_sim.agents.tilt import Phone
 from dva_sim.worlds.planning import Planner
 
@@ -36,7 +36,7 @@ class OperatorSetup:
     rate_hz: float
     timeout: float
     attempts: int
-    truth: Callable[[str], Truth] | None = None
+    truth: Callable[[str], Truth[Observation]] | None = None
     guarded: bool = False
 
 
@@ -62,7 +62,7 @@ class DriverSeat:
         device: Device,
         person: Person,
         phone: Phone,
-        strategy: Callable[[Person, Reach], Pursuit | Oracle],
+        strategy: Callable[[Person, Reach], Driver],
         reach: Callable[[str], Reach],
         planner: Planner,
         setup: OperatorSetup,

@@ -1,0 +1,133 @@
+"""What a strategy is asked, what it answers, and how it moves a cursor if it says nothing else.
+
+A strategy is how a kind of person turns what it sees into what it wants. It sees frames that are
+late by perception and judged with an error, and what the person takes the delay to be; there is no
+way from any of these to the true state.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from dva_sim.agents.camera import Observation
+from dva_sim.agents.operator.person import Person
+from dva_sim.agents.operator.strategies.cursor import Sighting, Velocity, through, towards
+from dva_sim.agents.steering import Route
+
+
+class View(NamedTuple):
+    """What a person knows of the robot that it drives.
+
+    Attributes:
+        now: The person's own clock [s].
+        seen: The newest frame perceived, as the person judges it.
+        delay: What the person takes the whole delay to be, from an intent to its effect seen [s].
+    """
+
+    now: float
+    seen: Observation
+    delay: float
+
+
+class Intent(NamedTuple):
+    """What an operator wants the robot to do now: speed [m/s], turn rate [rad/s]."""
+
+    speed: float
+    turn_rate: float
+
+
+class PointView(NamedTuple):
+    """What a person knows who moves a cursor to a target; as in `View`."""
+
+    now: float
+    seen: Sighting
+    delay: float
+
+
+class PathView(NamedTuple):
+    """What a person knows who moves a cursor through a tunnel; as in `View`.
+
+    Attributes:
+        path: The middle line of the tunnel [m]; its end is the target.
+    """
+
+    now: float
+    seen: Sighting
+    delay: float
+    path: Route
+
+
+@dataclass(frozen=True)
+class Reach:
+    """What the robot, or the cursor, can do.
+
+    Attributes:
+        speed: At most [m/s].
+        turn_rate: At most, either way [rad/s].
+        radius: Of its sharpest curve [m]; 0: it turns on the spot.
+    """
+
+    speed: float
+    turn_rate: float
+    radius: float = 0.0
+
+    def turn(self, turn_rate: float) -> Intent:
+        """Turn at a rate [rad/s], as nearly on the spot as the robot can."""
+        return Intent(min(abs(turn_rate) * self.radius, self.speed), turn_rate)
+
+
+class Strategy:
+    """How a kind of operator steers; derive from this to make another kind.
+
+    One is made for each drive or trial: it may remember what it saw in that, and nothing else.
+    It has no luck: errors and noise are the person's, outside.
+
+    Args:
+        person: Whose gains, caution and pace it steers with.
+        reach: Limits of what is steered.
+
+    Attributes:
+        failures: How often it gave no answer that is one; only strategies of users do that.
+        first_failure: What was wrong with it first, in a line.
+    """
+
+    failures = 0
+    first_failure = ""
+
+    def __init__(self, person: Person, reach: Reach) -> None:
+        self.person, self.reach = person, reach
+
+    def drive(self, route: Route, view: View, stop_before: float) -> Intent:
+        """What to ask a robot for, to follow a route.
+
+        Args:
+            route: The way to go.
+            view: What is seen, and when.
+            stop_before: Where to stop: so far before the end of the route [m].
+        """
+        raise NotImplementedError
+
+    def point(self, view: PointView) -> Velocity:
+        """What velocity to give a cursor, to bring it to its target and keep it there [m/s].
+
+        If a strategy says nothing else: the crossover law, as `cursor.towards` has it.
+        """
+        return towards(view.seen, view.delay, self.person, self._most)
+
+    def follow(self, view: PathView) -> Velocity:
+        """What velocity to give a cursor, to go through a tunnel without leaving it [m/s].
+
+        If a strategy says nothing else: as fast as the delay allows, as `cursor.through` has it.
+        """
+        return through(view.path, view.seen, view.delay, self.person, self._most)
+
+    def workload(self) -> Mapping[str, float]:
+        """What this way of steering asked of the person so far, by name with its unit."""
+        return {}
+
+    @property
+    def _most(self) -> float:
+        """As fast as the person cares to go [m/s]."""
+        return self.person.pace * self.reach.speed

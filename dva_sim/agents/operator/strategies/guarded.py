@@ -1,0 +1,67 @@
+"""A strategy of a user, kept within what can be done whatever it answers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from dva_sim.agents.operator.strategies.base import Intent, PathView, PointView, Strategy, View
+from dva_sim.agents.operator.strategies.cursor import Velocity
+from dva_sim.agents.steering import Route
+from dva_sim.plugins import said
+
+
+class Guarded(Strategy):
+    """A strategy of a user: what raises or answers no two finite numbers is counted, and stands.
+
+    Attributes:
+        strategy: The user's own.
+    """
+
+    def __init__(self, strategy: Strategy) -> None:
+        super().__init__(strategy.person, strategy.reach)
+        self.strategy = strategy
+
+    def drive(self, route: Route, view: View, stop_before: float) -> Intent:
+        """Within the limits of the robot; it stands where there is no answer."""
+        speed, turn = self._answer(self.strategy.drive, route, view, stop_before) or (0.0, 0.0)
+        most = self.reach.turn_rate
+        return Intent(min(max(speed, 0.0), self.reach.speed), min(max(turn, -most), most))
+
+    def point(self, view: PointView) -> Velocity:
+        """No faster than the cursor can."""
+        return self._slowed(self._answer(self.strategy.point, view))
+
+    def follow(self, view: PathView) -> Velocity:
+        """No faster than the cursor can."""
+        return self._slowed(self._answer(self.strategy.follow, view))
+
+    def workload(self) -> Mapping[str, float]:
+        """What the user's counts, if it can tell."""
+        try:
+            return {str(name): float(value) for name, value in self.strategy.workload().items()}
+        except Exception as error:
+            self._count(said(error))
+            return {}
+
+    def _slowed(self, got: Velocity | None) -> Velocity:
+        vx, vy = got or (0.0, 0.0)
+        speed, most = math.hypot(vx, vy), self.reach.speed
+        return (vx * most / speed, vy * most / speed) if speed > most else (vx, vy)
+
+    def _answer(self, ask: Callable[..., Any], *given: Any) -> tuple[float, float] | None:
+        """Two finite numbers, or None."""
+        try:
+            one, other = ask(*given)
+            if math.isfinite(one) and math.isfinite(other):
+                return float(one), float(other)
+            problem = f"answers {one!r}, {other!r}"
+        except Exception as error:
+            problem = said(error)
+        self._count(problem)
+        return None
+
+    def _count(self, problem: str) -> None:
+        self.failures += 1
+        self.first_failure = self.first_failure or problem

@@ -1,0 +1,74 @@
+"""Strategies by name: the shipped ones, a class in a file of the user, or a package's."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, Final
+
+from dva_sim.agents.operator.person import Person, Population, median_person
+from dva_sim.agents.operator.strategies.base import Reach, Strategy
+from dva_sim.agents.operator.strategies.guarded import Guarded
+from dva_sim.agents.operator.strategies.oracle import Oracle
+from dva_sim.agents.operator.strategies.pursuit import Pursuit
+from dva_sim.plugins import Plugins
+
+Driver = Strategy | Oracle
+
+STRATEGIES: Final[dict[str, Callable[..., Driver]]] = {
+    "oracle": Oracle,
+    "pursuit": Pursuit,
+}
+
+_PLUGINS: Final = Plugins[Driver](
+    "operator",
+    Strategy,
+    STRATEGIES,
+    folder="agents/operators",
+    group="dva_sim.operators",
+    needs="drive(route, view, stop_before)",
+    public="dva_sim.agents.operator.strategies.Strategy",
+)
+
+
+def known_strategies() -> list[str]:
+    """Names that a configuration can use: shipped and installed ones; files come on top."""
+    return _PLUGINS.known()
+
+
+def load_strategy(
+    name: str, options: Mapping[str, Any] | None = None, base: Path | None = None
+) -> Callable[[Person, Reach], Driver]:
+    """What makes the strategy that `name` means, for a person and what it steers.
+
+    Those of users are kept within the limits, whatever they answer (`Guarded`).
+
+    Args:
+        name: A shipped one such as `pursuit`, a class in a file such as `mine.py:Mine`, or the
+            name under which an installed package offers one (entry point, `dva_sim.operators`).
+        options: Keyword arguments of its constructor, besides person and reach.
+        base: Folder that a file is looked for in first; then the working folder, and
+            `agents/operators`.
+
+    Raises:
+        ConfigError: there is none of that name, its file or package cannot be loaded, or it is
+            not a strategy; a bad option is told when it is made.
+    """
+    factory, given = _PLUGINS.find(name, base), dict(options or {})
+
+    def make(person: Person, reach: Reach) -> Driver:
+        made = _PLUGINS.make(name, factory, given, person, reach)
+        if name in STRATEGIES or isinstance(made, Oracle):
+            return made
+        return Guarded(made)
+
+    return make
+
+
+def try_strategy(name: str, options: Mapping[str, Any] | None = None) -> None:
+    """See whether one can be loaded, and knows its options.
+
+    Raises:
+        ConfigError: it cannot, or does not; the line says what would be right.
+    """
+    load_strategy(name, options)(median_person(Population()), Reach(0.5, 0.5))
