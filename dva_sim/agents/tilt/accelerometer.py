@@ -1,0 +1,174 @@
+"""The accelerometer: from the angles of a phone to what its app is told, sample by sample."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from functools import cache
+from typing import Annotated, Final
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from dva_sim import resources
+from dva_sim.agents.tilt.hand import rows
+from dva_sim.config import Config, load_yaml, validate
+
+GRAVITY: Final = 9.80665  # [m/s^2]
+WARMING_K: Final = 5.0  # how much warmer or colder a session is, standard deviation; assumed
+
+NonNegative = Annotated[float, Field(ge=0)]
+Positive = Annotated[float, Field(gt=0)]
+Triple = tuple[float, float, float]
+
+
+class AccelerometerPart(Config):
+    """A part, with the numbers of its data sheet; `mg` are thousandths of gravity.
+
+    Attributes:
+        data_sheet: Where the numbers are from.
+        assumed: Keys whose numbers are not in it.
+        rate_hz: Samples per second.
+        noise_density_ug: White noise [micro-g per root hertz]; with `bandwidth_hz`.
+        bandwidth_hz: Of the part's own low-pass filter.
+        noise_mg: White noise of a sample, standard deviation; instead of the two before.
+        offset_mg: Output at no acceleration, standard deviation over parts.
+        offset_mg_per_k: How that changes with temperature.
+        drift_mg_per_sqrt_min: Random walk of the output within a session.
+        resolution_mg: Step of the output; 0: none.
+        range_g: Largest output, either way.
+    """
+
+    description: str = ""
+    data_sheet: str = ""
+    assumed: tuple[str, ...] = ()
+    rate_hz: Annotated[float, Field(gt=0, le=1000)] = 100.0
+    noise_density_ug: NonNegative | None = None
+    bandwidth_hz: Positive | None = None
+    noise_mg: NonNegative | None = None
+    offset_mg: NonNegative = 0.0
+    offset_mg_per_k: NonNegative = 0.0
+    drift_mg_per_sqrt_min: NonNegative = 0.0
+    resolution_mg: NonNegative = 0.0
+    range_g: Annotated[float, Field(ge=1.0)] = 2.0
+
+    @model_validator(mode="after")
+    def _one_noise(self) -> AccelerometerPart:
+        density = self.noise_density_ug is not None, self.bandwidth_hz is not None
+        if density[0] != density[1] or density[0] == (self.noise_mg is not None):
+            wanted = "noise_density_ug and bandwidth_hz, or noise_mg"
+            raise ValueError(f"noise should be given as {wanted}")
+        for key in self.assumed:
+            if key not in type(self).model_fields:
+                raise ValueError(f"assumed names {key!r}, which is no key of a part")
+        return self
+
+    @property
+    def noise(self) -> float:
+        """White noise of a sample, standard deviation [m/s^2]."""
+        if self.noise_mg is not None:
+            return 1e-3 * GRAVITY * self.noise_mg
+        assert self.noise_density_ug is not None
+        assert self.bandwidth_hz is not None
+        return 1e-6 * GRAVITY * self.noise_density_ug * math.sqrt(self.bandwidth_hz)
+
+
+@cache
+def load_part(name: str) -> AccelerometerPart:
+    """The part of that name, or in that file.
+
+    Raises:
+        ConfigError: there is none, or it cannot be read.
+    """
+    document = load_yaml(resources.find(name, "agents/accelerometers"))
+    return validate(AccelerometerPart, document.data, document.error)
+
+
+class Accelerometer:
+    """One copy of a part, in one phone.
+
+    Pitch forward and roll to the right turn gravity into the x and y axes of the phone; z looks
+    out of the screen. A sample is that, wrong by an offset (of this copy, of this session, and
+    slowly drifting) and by white noise, rounded to the part's step and cut off at its range.
+
+    Args:
+        part: Which.
+        rng: Luck of this run: sessions, noise, drift, times.
+        own: Luck that makes this copy differ from others of the part, the same in all runs of
+            its owner; if not given, of this run.
+        rate_hz: How often the app is told, if not as the part measures.
+        jitter: Standard deviation of the time of a sample, as a share of the time between two.
+        block: How many samples of luck are drawn at once; changes no number.
+
+    Attributes:
+        period: Mean time between two samples [s].
+        offset: Of this copy, as it was when new [m/s^2].
+    """
+
+    def __init__(
+        self,
+        part: AccelerometerPart,
+        rng: np.random.Generator,
+        own: np.random.Generator | None = None,
+        rate_hz: float | None = None,
+        jitter: float = 0.0,
+        block: int = 256,
+    ) -> None:
+        noise, times, self._sessions, spare = rng.spawn(4)
+        self.period = 1.0 / (rate_hz or part.rate_hz)
+        mg = 1e-3 * GRAVITY
+        self.offset: Triple = tuple((own or spare).normal(0.0, mg * part.offset_mg, 3).tolist())
+        self._warming = mg * part.offset_mg_per_k * WARMING_K
+        self._drift = mg * part.drift_mg_per_sqrt_min * math.sqrt(self.period / 60.0)
+        self._errors = self._drawn(noise, part.noise, block)
+        self._step, self._range = mg * part.resolution_mg, GRAVITY * part.range_g
+        self._late = _lateness(times, jitter * self.period, 0.4 * self.period, block)
+        self._was_late = 0.0
+        self.begin_session()
+
+    def begin_session(self) -> None:
+        """The phone is taken into the hand anew: it is warmer or colder than when calibrated."""
+        x, y, z = self._sessions.normal(0.0, self._warming, 3).tolist()
+        self._x, self._y, self._z = self.offset[0] + x, self.offset[1] + y, self.offset[2] + z
+
+    def interval(self) -> float:
+        """Time from the sample before to the next one [s]; asked once for each."""
+        was, self._was_late = self._was_late, next(self._late)
+        return self.period + self._was_late - was
+
+    def sample(self, pitch: float, roll: float) -> Triple:
+        """What the part tells of a phone at rest at these angles [rad]: x, y, z [m/s^2]."""
+        x, y, z = next(self._errors)
+        flat = GRAVITY * math.cos(pitch)
+        x += self._x + GRAVITY * math.sin(pitch)
+        y += self._y + flat * math.sin(roll)
+        z += self._z + flat * math.cos(roll)
+        step, most = self._step, self._range
+        if step:
+            x, y, z = round(x / step) * step, round(y / step) * step, round(z / step) * step
+        if -most < x < most and -most < y < most and -most < z < most:
+            return x, y, z
+        return _cut(x, most), _cut(y, most), _cut(z, most)
+
+    def _drawn(self, rng: np.random.Generator, noise: float, block: int) -> Iterator[list[float]]:
+        """Noise and drift of each sample [m/s^2]."""
+        drift = np.zeros(3)
+        while True:
+            luck = rng.normal(size=(block, 6))
+            steps = luck[:, 3:] * self._drift
+            steps[0] += drift  # added up one after the other, so that a block changes no number
+            walk = np.cumsum(steps, axis=0)
+            drift = walk[-1]
+            yield from (walk + luck[:, :3] * noise).tolist()
+
+
+def _lateness(rng: np.random.Generator, spread: float, most: float, block: int) -> Iterator[float]:
+    """How late each sample is [s]; cut off so that none overtakes another."""
+    while spread == 0.0:
+        yield 0.0
+    for (late,) in rows(rng, 1, block):
+        yield _cut(late * spread, most)
+
+
+def _cut(value: float, most: float) -> float:
+    return min(max(value, -most), most)

@@ -1,0 +1,125 @@
+"""The hand that holds the phone: it lags, it trembles, and it cannot tilt as far as it likes."""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+TREMOR_HZ: Final = 10.0  # middle of the 8-12 Hz band of physiological hand tremor
+TREMOR_WIDTH_HZ: Final = 2.0  # between the half-power frequencies; assumed
+TREMOR: Final = 0.0043  # apparent tilt, standard deviation [rad]; assumed
+MAX_TILT: Final = math.radians(45.0)  # beyond it the screen is hard to read; assumed [rad]
+MAX_SPEED: Final = math.radians(200.0)  # of tilting while looking at a picture; assumed [rad/s]
+
+
+@dataclass(frozen=True)
+class Grip:
+    """What a phone needs to know of the person who holds it.
+
+    Attributes:
+        lag: Time constant of the hand [s].
+        perceptual_delay: From what the phone's display shows to what the person makes of it [s].
+        motor_noise: Standard deviation of the tilt that is aimed at, as a share of it.
+    """
+
+    lag: float = 0.15
+    perceptual_delay: float = 0.22
+    motor_noise: float = 0.0
+
+
+class Hand:
+    """Angles of a held phone, away from how it is held at rest.
+
+    The hand follows what it aims at with a first-order lag, no faster than `max_speed` and no
+    farther than `max_tilt`. What it aims at is off by a share of itself that wanders within the
+    lag (signal-dependent noise), and the whole trembles: a resonance around 10 Hz, driven by
+    noise, that has 70 % of its power between 8 and 12 Hz. Both are exact for any length of a
+    step, so that the rate of sampling changes nothing but where one looks.
+
+    An accelerometer cannot tell the tilt of a tremor from its linear acceleration; `tremor`
+    is both, as the tilt that would look the same.
+
+    Args:
+        lag: Time constant [s]; 0: it is where it aims at once.
+        rng: Its luck.
+        motor_noise: Standard deviation of the error of aiming, as a share of the tilt.
+        tremor: Apparent tilt, standard deviation of each axis [rad].
+        max_tilt: Away from rest, each axis [rad].
+        max_speed: Of tilting, each axis [rad/s].
+        block: How many steps of luck are drawn at once; changes no number.
+
+    References:
+        M. Lakie, C. A. Vernooij, C. J. Osler et al.: Increased gravitational force reveals the
+        mechanical, resonant nature of physiological tremor. J. Physiology 593(19), 2015.
+        C. M. Harris, D. M. Wolpert: Signal-dependent noise determines motor planning. Nature
+        394, 1998.
+    """
+
+    def __init__(
+        self,
+        lag: float,
+        rng: np.random.Generator,
+        motor_noise: float = 0.0,
+        tremor: float = TREMOR,
+        max_tilt: float = MAX_TILT,
+        max_speed: float = MAX_SPEED,
+        block: int = 256,
+    ) -> None:
+        self._lag, self._noise, self._tremor = lag, motor_noise, tremor
+        self._max_tilt, self._max_speed = max_tilt, max_speed
+        self._luck = rows(rng, 6, block)
+        a, b, c, d, self._off_pitch, self._off_roll = next(self._luck)
+        self._shake_pitch, self._shake_roll = complex(a, b), complex(c, d)
+        self._pitch = self._roll = 0.0
+        self._dt = -1.0
+
+    def rest(self) -> None:
+        """Back to how it is held at rest, at once."""
+        self._pitch = self._roll = 0.0
+
+    def step(self, pitch: float, roll: float, dt: float) -> tuple[float, float]:
+        """Where the phone is after `dt` [s] of aiming at `pitch` and `roll` [rad]."""
+        if dt != self._dt:
+            self._tune(dt)
+        a, b, c, d, e, f = next(self._luck)
+        if self._noise:
+            keep, new = self._keep, self._new
+            self._off_pitch = self._off_pitch * keep + e * new
+            self._off_roll = self._off_roll * keep + f * new
+            pitch += pitch * self._noise * self._off_pitch
+            roll += roll * self._noise * self._off_roll
+        self._pitch = self._towards(self._pitch, pitch)
+        self._roll = self._towards(self._roll, roll)
+        swing, drive, tremor = self._swing, self._drive, self._tremor
+        self._shake_pitch = self._shake_pitch * swing + complex(a, b) * drive
+        self._shake_roll = self._shake_roll * swing + complex(c, d) * drive
+        return (
+            self._pitch + tremor * self._shake_pitch.real,
+            self._roll + tremor * self._shake_roll.real,
+        )
+
+    def _towards(self, now: float, aim: float) -> float:
+        most = self._max_tilt
+        aim = -most if aim < -most else most if aim > most else aim
+        way, most = (aim - now) * self._follow, self._reach
+        return now + (-most if way < -most else most if way > most else way)
+
+    def _tune(self, dt: float) -> None:
+        """What depends on the length of a step alone."""
+        self._dt, self._reach = dt, self._max_speed * dt
+        self._keep = math.exp(-dt / self._lag) if self._lag > 0.0 else 0.0
+        self._follow, self._new = 1.0 - self._keep, math.sqrt(1.0 - self._keep**2)
+        damping = math.pi * TREMOR_WIDTH_HZ
+        self._swing = cmath.exp(complex(-damping, 2.0 * math.pi * TREMOR_HZ) * dt)
+        self._drive = math.sqrt(1.0 - math.exp(-2.0 * damping * dt))
+
+
+def rows(rng: np.random.Generator, width: int, block: int) -> Iterator[list[float]]:
+    """Rows of standard normal numbers without end; the same ones whatever the block."""
+    while True:
+        yield from rng.normal(size=(block, width)).tolist()
