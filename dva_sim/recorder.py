@@ -40,11 +40,13 @@ class Issued(NamedTuple):
         made: When the app made it from the tilt [s].
         sent: When the pattern let it go [s].
         sample_age: Mean age of the tilt samples behind it when it was made [s].
+        captured: When the pictures behind it were captured, on average [s].
     """
 
     made: float
     sent: float
     sample_age: float
+    captured: float
 
 
 class Applied(NamedTuple):
@@ -57,6 +59,7 @@ class Applied(NamedTuple):
         time: When it took effect.
         until: When it ceases to be in force, if no newer one comes.
         sample_age: Mean age of the tilt samples behind it when it was made.
+        captured: When the pictures behind it were captured, on average.
     """
 
     issued: float
@@ -65,6 +68,35 @@ class Applied(NamedTuple):
     time: float
     until: float
     sample_age: float
+    captured: float
+
+
+class Shown(NamedTuple):
+    """A frame on the operator's screen.
+
+    Attributes:
+        captured: When the camera took it [s].
+        time: When it was shown [s].
+        tick: The robot's own clock when it was taken [ms].
+    """
+
+    captured: float
+    time: float
+    tick: int
+
+
+class Followed(NamedTuple):
+    """What an operator wants, by which picture; times in [s].
+
+    Attributes:
+        captured: When that picture was captured.
+        shown: When it was shown.
+        time: From when on it is wanted.
+    """
+
+    captured: float
+    shown: float
+    time: float
 
 
 @dataclass
@@ -78,7 +110,9 @@ class DriveLog:
         outcome: `confirmed`, `refuted`, `gave up`, `lost link` or `timeout`.
         applied: Commands in the order they took effect; those still under way when the
             drive ended, too.
-        frame_times: (captured, arrived) of each frame shown [s].
+        hand_lag: Time constant with which the hand follows what is wanted [s].
+        frames: Those shown, in order.
+        intents: What was wanted, in order.
     """
 
     robot: str
@@ -90,12 +124,27 @@ class DriveLog:
     outcome: str = "timeout"
     sent: int = 0
     superseded: int = 0
-    human_delay: float = 0.0
+    hand_lag: float = 0.0
     timeouts: int = 0
     alerts: int = 0
     round_trips: list[float] = field(default_factory=list)
     applied: list[Applied] = field(default_factory=list)
-    frame_times: list[tuple[float, float]] = field(default_factory=list)
+    frames: list[Shown] = field(default_factory=list)
+    intents: list[Followed] = field(default_factory=list)
+
+    def followed(self, tick: int, now: float) -> float:
+        """Something is wanted by the frame of that tick: when that was captured [s].
+
+        What is wanted by no frame, but by the truth, is by what is so now.
+        """
+        for frame in reversed(self.frames):
+            if frame.tick == tick:
+                self.intents.append(Followed(frame.captured, frame.time, now))
+                return frame.captured
+            if frame.tick < tick:
+                break
+        self.intents.append(Followed(now, now, now))
+        return now
 
 
 class Recorder:
@@ -150,7 +199,15 @@ class Recorder:
         issued = self._issued.pop((source, message_id), None)
         if issued is not None:
             drive.applied.append(
-                Applied(issued.made, issued.sent, arrived, now, until, issued.sample_age)
+                Applied(
+                    issued.made,
+                    issued.sent,
+                    arrived,
+                    now,
+                    until,
+                    issued.sample_age,
+                    issued.captured,
+                )
             )
 
     def drive_ordered(self, drive: DriveLog) -> None:

@@ -96,7 +96,7 @@ class CommandSender:
         now, command = self._clock.now, made.command
         body = SetTeleOp(command.speed, command.turn_rate, made.seen_tick)
         message = self._outbox.message(self._drive.robot, body, now, self._session)
-        issued = Issued(made.time, now, command.sample_age)
+        issued = Issued(made.time, now, command.sample_age, command.captured)
         self._recorder.command_issued(message.source, message.message_id, issued)
         self._drive.sent += 1
         return encode(message)

@@ -6,16 +6,15 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dva_sim.agents.bystander import DOWN
 from dva_sim.core.events import Event
-from dva_sim.recorder import Applied, DriveLog
+from dva_sim.experiments.budget import command_ages, delay_budget, driven
+from dva_sim.recorder import DriveLog
 from dva_sim.simulation import Recording
 
 Row = dict[str, Any]
 NAN = math.nan
-QUANTILES = (5, 25, 50, 75, 95)
 
 
 def run_row(recording: Recording) -> Row:
@@ -117,109 +116,36 @@ def _command_measures(attempts: list[DriveLog], recording: Recording) -> Row:
     """Age, rate and fate of the commands of all attempts."""
     spans = [_span(d, recording) for d in attempts]
     driving = sum(end - start for start, end in spans)
-    applied = [a for d, (_, end) in zip(attempts, spans, strict=True) for a in _until(d, end)]
-    hold = np.concatenate([_holds(d, end) for d, (_, end) in zip(attempts, spans, strict=True)])
+    drives = [driven(d, end) for d, (_, end) in zip(attempts, spans, strict=True)]
+    applied, in_force = sum(len(d.applied) for d in drives), sum(d.hold.sum() for d in drives)
     trips = [t for d in attempts for t in d.round_trips]
     inboxes = [recording.robots[robot].inbox for robot in sorted({d.robot for d in attempts})]
     if not any(d.sent for d in attempts):
         driving = 0.0  # nobody drove: the robot was on a mission
-    row = command_ages(applied, hold) | {
-        "command_rate_hz": len(applied) / driving if driving else NAN,
-        "commands_sent": sum(d.sent for d in attempts),
-        "commands_applied": len(applied),
-        "commands_stale": recording.recorder.counters["robot refused: stale"],
-        "commands_superseded": sum(d.superseded for d in attempts)
-        + sum(inbox.superseded for inbox in inboxes),
-        "round_trip_p50_s": float(np.median(trips)) if trips else NAN,
-        "queue_max": max(inbox.longest for inbox in inboxes),
-        "timeouts": sum(d.timeouts for d in attempts),
-        "alerts": sum(d.alerts for d in attempts),
-        "stop_share": 1.0 - float(hold.sum()) / driving if driving else NAN,
-    }
-    return row | delay_stages(attempts, applied, hold, recording)
+    motor = recording.robots[attempts[0].robot].body.spec.motor_time_constant
+    return (
+        command_ages(drives)
+        | delay_budget(drives, motor)
+        | {
+            "command_rate_hz": applied / driving if driving else NAN,
+            "commands_sent": sum(d.sent for d in attempts),
+            "commands_applied": applied,
+            "commands_stale": recording.recorder.counters["robot refused: stale"],
+            "commands_superseded": sum(d.superseded for d in attempts)
+            + sum(inbox.superseded for inbox in inboxes),
+            "round_trip_p50_s": float(np.median(trips)) if trips else NAN,
+            "queue_max": max(inbox.longest for inbox in inboxes),
+            "timeouts": sum(d.timeouts for d in attempts),
+            "alerts": sum(d.alerts for d in attempts),
+            "stop_share": 1.0 - float(in_force) / driving if driving else NAN,
+        }
+    )
 
 
 def _span(drive: DriveLog, recording: Recording) -> tuple[float, float]:
     """From when to when a drive was under way [s]; nothing if it never started."""
     end = drive.ended if drive.ended is not None else recording.duration
     return (drive.started if drive.started is not None else end), end
-
-
-def _holds(drive: DriveLog, end: float) -> NDArray[np.float64]:
-    """How long each command of a drive was in force, shape `(n,)` [s]."""
-    applied = _until(drive, end)
-    times = np.array([*(a.time for a in applied), end])
-    until = np.array([a.until for a in applied])
-    hold: NDArray[np.float64] = np.maximum(np.minimum(times[1:], until) - times[:-1], 0.0)
-    return hold
-
-
-def _until(drive: DriveLog, end: float) -> list[Applied]:
-    """The commands that took effect while the drive lasted."""
-    return [a for a in drive.applied if a.time <= end]
-
-
-def command_ages(applied: list[Applied], hold: NDArray[np.float64]) -> Row:
-    """Age at application (made to effect), and in force (averaged over time in force)."""
-    if not applied:
-        names = ["mean", *(f"p{q:02}" for q in QUANTILES)]
-        empty: Row = {f"command_age_{n}_s": NAN for n in names}
-        return empty | {"age_in_force_mean_s": NAN}
-    ages = np.array([a.time - a.issued for a in applied])
-    row: Row = {"command_age_mean_s": float(ages.mean())}
-    for q, value in zip(QUANTILES, np.percentile(ages, QUANTILES), strict=True):
-        row[f"command_age_p{q:02}_s"] = float(value)
-    total = float(hold.sum())
-    in_force = float((hold * (ages + hold / 2)).sum() / total) if total else NAN
-    return row | {"age_in_force_mean_s": in_force}
-
-
-STAGES = (
-    *("frame", "downlink", "human", "filter", "pattern", "uplink"),
-    *("processing", "sampling", "motor"),
-)
-
-
-def delay_stages(
-    attempts: list[DriveLog],
-    applied: list[Applied],
-    hold: NDArray[np.float64],
-    recording: Recording,
-) -> Row:
-    """The loop's delay as a sum of mean stages, from a frame's capture to its effect.
-
-    Frame (half the time until the next one is shown) and downlink are means per frame; human
-    is the person's perception and hand; filter, pattern (waiting to be sent), uplink and
-    processing are means per command; sampling is half the time a command is in force,
-    weighted by time; motor is the robot's time constant.
-    """
-    frames = [np.array(d.frame_times) for d in attempts if len(d.frame_times) > 1]
-    if not applied or not frames:
-        return {f"{name}_s": NAN for name in ("frame_age_mean", "loop_delay_mean")}
-    captured, shown = np.concatenate(frames).T
-    gaps = np.concatenate([np.diff(f[:, 1]) for f in frames])
-    robot = recording.robots[attempts[0].robot]
-    stages = {
-        "frame": _half_hold(gaps),
-        "downlink": float((shown - captured).mean()),
-        "human": attempts[0].human_delay,
-        "filter": float(np.mean([a.sample_age for a in applied])),
-        "pattern": float(np.mean([a.sent - a.issued for a in applied])),
-        "uplink": float(np.mean([a.arrived - a.sent for a in applied])),
-        "processing": float(np.mean([a.time - a.arrived for a in applied])),
-        "sampling": _half_hold(hold),
-        "motor": robot.body.spec.motor_time_constant,
-    }
-    row: Row = {f"delay_{name}_s": value for name, value in stages.items()}
-    row["frame_age_mean_s"] = stages["downlink"] + stages["frame"]
-    row["loop_delay_mean_s"] = sum(stages.values())
-    return row
-
-
-def _half_hold(gaps: NDArray[np.float64]) -> float:
-    """Mean age that holding a value adds at a random moment: E[g^2] / 2 E[g]."""
-    total = float(gaps.sum())
-    return float((gaps**2).sum() / (2 * total)) if total else NAN
 
 
 def event_rows(recording: Recording) -> list[Row]:

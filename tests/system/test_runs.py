@@ -15,6 +15,7 @@ from dva_sim import scenario as scenarios
 from dva_sim.agents.modes import Decision, RobotController
 from dva_sim.agents.operator.delay import DelayEstimate
 from dva_sim.experiments import metrics
+from dva_sim.experiments.budget import STAGES
 from dva_sim.network.link import Link
 from dva_sim.simulation import Recording, simulate
 from dva_sim.streams import derive_seed
@@ -137,7 +138,7 @@ def test_the_oracle_is_faster_than_any_operator() -> None:
 
 def test_each_stage_of_the_delay_budget_is_what_it_is_made_of() -> None:
     row = metrics.run_row(run(link__delay_s=0.25))
-    stages = {s: row[f"delay_{s}_s"] for s in metrics.STAGES}
+    stages = {s: row[f"delay_{s}_s"] for s in STAGES}
     assert stages["uplink"] == pytest.approx(0.25, abs=0.002)
     assert stages["downlink"] == pytest.approx(0.255, abs=0.003)
     assert stages["processing"] == pytest.approx(0.05, abs=0.001)

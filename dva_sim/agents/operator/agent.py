@@ -98,7 +98,6 @@ class OperatorAgent:
         assert order.device is not None
         device = self.device
         log = DriveLog(order.device, device.id_tag, order.event_id, self._ordered)
-        log.human_delay = self._seat.person.perceptual_delay + self._seat.person.hand_lag
         device.recorder.drive_ordered(log)
         drive = self._drive = self._kind(self._seat, order, log, self._finish)
         robot = device.label_of(order.device)

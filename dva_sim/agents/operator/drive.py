@@ -63,6 +63,7 @@ class Drive(Work):
         """The robot has agreed to be driven: look, and tilt."""
         seat, now = self._seat, self._clock.now
         self.log.started = self._last_frame = now
+        self.log.hand_lag = seat.phone.hand_lag
         self._device.recorder.drive_begins(self._device.id_tag)
         seat.delay = DelayEstimate(now, seat.delay.value)
         self._sender = self._make_sender()
@@ -133,7 +134,7 @@ class Drive(Work):
             drive, delay = self._strategy.drive, seat.delay.value
             view = View(now, judged, delay)
             usual = lambda way, keep: drive(way, view, keep)  # noqa: E731
-            self._intend(self._steer(route, judged, delay, usual))
+            self._intend(self._steer(route, judged, delay, usual), judged.tick)
 
     def _steer(
         self, route: Route, seen: Observation, delay: float, usual: Callable[[Route, float], Intent]
@@ -165,7 +166,7 @@ class Drive(Work):
         if route is not None:
             drive = self._strategy.drive
             usual = lambda way, keep: drive(way, truth, keep)  # noqa: E731
-            self._intend(self._steer(route, truth.state, Oracle.DELAY, usual))
+            self._intend(self._steer(route, truth.state, Oracle.DELAY, usual), truth.state.tick)
         return not self.over
 
     def _consider(self, seen: Observation) -> Route | None:
@@ -222,10 +223,11 @@ class Drive(Work):
             self._standing_since = now
         return now - self._standing_since > STUCK_AFTER + 2.0 * self._seat.delay.value
 
-    def _intend(self, intent: Intent) -> None:
+    def _intend(self, intent: Intent, tick: int) -> None:
         now = self._clock.now
+        captured = self.log.followed(tick, now)
         if now < self._let_go_until:
             intent = Intent(0.0, 0.0)
         self._intent = intent
-        self._seat.phone.ask(now, intent.speed, intent.turn_rate)
+        self._seat.phone.ask(now, intent.speed, intent.turn_rate, captured)
         self._seat.delay.intend(now, intent.speed, intent.turn_rate)

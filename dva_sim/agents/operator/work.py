@@ -10,7 +10,7 @@ from dva_sim.agents.operator.looking import Looking
 from dva_sim.agents.operator.seat import DriverSeat
 from dva_sim.network.patterns import Subscription
 from dva_sim.protocol import messages as m
-from dva_sim.recorder import DriveLog
+from dva_sim.recorder import DriveLog, Shown
 
 BLIND_AFTER = 20.0  # without a frame for so long, the link counts as lost [s]
 
@@ -76,7 +76,7 @@ class Work:
             return
         now = self._clock.now
         self._last_frame = now
-        self.log.frame_times.append((frame.captured, now))
+        self.log.frames.append(Shown(frame.captured, now, frame.observation.tick))
         self._see(frame.observation)
 
     def link_lost(self) -> None:

@@ -15,6 +15,7 @@ import numpy as np
 from pydantic import Field
 
 from dva_sim.agents.tilt.filters import BATCH, FILTERS
+from dva_sim.agents.tilt.trail import Trail
 from dva_sim.config import Config
 
 LEVELS = 10  # speed levels of the phone; one is SPEED_PER_LEVEL
@@ -62,11 +63,13 @@ class TiltCommand(NamedTuple):
         speed: [m/s]
         turn_rate: [rad/s]
         sample_age: Mean age of the samples behind it when it was made [s].
+        captured: When the pictures behind it were captured, on average [s]; for the recorder.
     """
 
     speed: float
     turn_rate: float
     sample_age: float
+    captured: float
 
 
 class Phone:
@@ -80,11 +83,16 @@ class Phone:
         profile: Phone and app.
         hand_lag: Time constant of the hand [s].
         rng: Luck of this phone.
+
+    Attributes:
+        hand_lag: Time constant with which a command follows what is asked [s].
     """
 
     def __init__(self, profile: PhoneProfile, hand_lag: float, rng: np.random.Generator) -> None:
         self._profile = profile
         self._filter = FILTERS[profile.filter]()
+        self._trail = Trail(FILTERS[profile.filter])
+        self.hand_lag = 0.0 if profile.ideal else hand_lag
         self._period = 1.0 / profile.sample_rate_hz
         self._decay = math.exp(-self._period / hand_lag) if hand_lag > 0 else 0.0
         self._noise = _axis_noise(profile, rng)
@@ -93,12 +101,16 @@ class Phone:
         self._samples_taken = 0
         self._last_key: tuple[int, int] | None = None
 
-    def ask(self, now: float, speed: float, turn_rate: float) -> None:
+    def ask(
+        self, now: float, speed: float, turn_rate: float, captured: float | None = None
+    ) -> None:
         """What the person wants from `now` on: speed [m/s], turn rate [rad/s].
 
-        A person who wants to stand tilts a level beyond the reference, to be sure.
+        A person who wants to stand tilts a level beyond the reference, to be sure. When the
+        picture behind it was `captured` [s] is carried along for the recorder; now, if none was.
         """
         self._sample_until(now)
+        self._trail.follow(now if captured is None else captured)
         level = speed / SPEED_PER_LEVEL if speed > 0 else -1.0
         self._asked = level, math.degrees(turn_rate)
 
@@ -113,19 +125,21 @@ class Phone:
         self._samples_taken = int(now * self._profile.sample_rate_hz)
         self._last_key = None
         self._asked = self._hand = (0.0, 0.0)
+        self._trail.begin(now)
 
     def look(self, now: float) -> TiltCommand | None:
         """The command to send at `now`, or None if there is nothing new to say."""
         self._sample_until(now)
         age = 0.0 if self._profile.ideal else 0.5 * self._filter.span * self._period
         level, turn = self._asked if self._profile.ideal else self._filter.value()
+        captured = self._trail.asked if self._profile.ideal else self._trail.captured()
         level = min(max(level, 0.0), float(LEVELS))
         turn = min(max(turn, -MAX_TURN_DEG), MAX_TURN_DEG)
         key = round(level), int(turn)
         if self._profile.send == "on_change" and key == self._last_key:
             return None
         self._last_key = key
-        return TiltCommand(level * SPEED_PER_LEVEL, math.radians(turn), age)
+        return TiltCommand(level * SPEED_PER_LEVEL, math.radians(turn), age, captured)
 
     @property
     def keeps_alive(self) -> bool:
@@ -144,6 +158,7 @@ class Phone:
             turn = asked_turn + (turn - asked_turn) * decay
             add((level + noise_level, turn + noise_turn))
         self._hand = level, turn
+        self._trail.sample(new, decay)
         self._samples_taken = due
 
 

@@ -151,5 +151,5 @@ def _shown(drive: DriveLog, time: float) -> float | None:
     """When the picture was taken that the driver looks at, if there is one."""
     if drive.started is None or not drive.started <= time < (drive.ended or math.inf):
         return None
-    shown = [frame for frame in drive.frame_times if frame[1] <= time]
-    return shown[-1][0] if shown and time - shown[-1][1] < FRESH else None
+    shown = [frame for frame in drive.frames if frame.time <= time]
+    return shown[-1].captured if shown and time - shown[-1].time < FRESH else None
