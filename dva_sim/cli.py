@@ -46,6 +46,18 @@ def run(
 
 
 @app.command()
+def tune(
+    study: Annotated[str, typer.Argument(help="A study by name or path.")],
+    out: Annotated[Path | None, typer.Option("-o", "--out", help="Folder of the trials.")] = None,
+    jobs: Annotated[int | None, typer.Option(help="Processes; default: all cores.")] = None,
+) -> None:
+    """Choose what a study has tuned, on persons who take no part in it, and keep it beside it."""
+    from dva_sim.experiments import console
+
+    raise typer.Exit(console.tune(study, out, jobs))
+
+
+@app.command()
 def report(folder: Annotated[Path, typer.Argument(help="A results folder.")]) -> None:
     """Make the report of a results folder again."""
     from dva_sim.experiments.report import write_report

@@ -41,9 +41,23 @@ answer:
 """
 RUNS = 6 + 4 * 6 + 4 * 3
 
+REPEATED = (
+    STUDY
+    + """\
+robustness:
+  sets: 3
+  bands: bands.yaml
+  persons: 2
+  replications: 2
+"""
+)
+BANDS = "bands: {crossover_rad_s: [1.0, 2.0], hand_lag_s: [0.1, 0.2]}\n"
+REPEATED_RUNS = RUNS + 3 * 2 * 4  # with the usual parameters they are runs of the part itself
+
 
 def write_study(folder: Path, text: str = STUDY) -> Path:
     (folder / "one.yaml").write_text("description: one robot\nhorizon_s: 60\n")
+    (folder / "bands.yaml").write_text(BANDS)
     path = folder / "study.yaml"
     path.write_text(text)
     return path

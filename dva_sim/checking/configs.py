@@ -14,14 +14,16 @@ from PIL import Image
 from dva_sim.agents.operator.person import Population
 from dva_sim.agents.people import BystanderProfile, GuardProfile
 from dva_sim.agents.profile import RobotProfile, read_robot
-from dva_sim.agents.tilt.phone import PhoneProfile
+from dva_sim.agents.tilt import PhoneProfile
 from dva_sim.checking.problem import Problem
 from dva_sim.config import Config, Document, Path_, validate
 from dva_sim.errors import ConfigError
 from dva_sim.experiments import design
 from dva_sim.experiments.design import Cell
 from dva_sim.experiments.models import model_for, model_of
+from dva_sim.experiments.repeats import Bands
 from dva_sim.experiments.study import Study, load_study
+from dva_sim.experiments.tuned import Tuned
 from dva_sim.experiments.validation.dispatch.cases import CaseFile, load_cases
 from dva_sim.experiments.validation.operators.targets import SplitFile, TargetFile, load_split
 from dva_sim.scenario import Scenario
@@ -228,4 +230,6 @@ KINDS: Final = (
     Kind("guard", GuardProfile, "agents/people", _check_model(GuardProfile)),
     Kind("bystanders", BystanderProfile, "agents/people", _check_model(BystanderProfile)),
     Kind("operators", Population, "agents/people", _check_model(Population)),
+    Kind("bands of operators", Bands, "agents/people", _check_model(Bands)),
+    Kind("tuned values", Tuned, "experiments/tuned", _check_model(Tuned)),
 )

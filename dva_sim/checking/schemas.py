@@ -29,13 +29,14 @@ def schema_text(kind: str) -> str:
 
 
 def _json_schema(kind: str) -> dict[str, Any]:
-    """From the models that read the files; an agent may be of any of five kinds."""
+    """From the models that read the files; an agent may be of any of six kinds."""
     from pydantic import TypeAdapter
 
     from dva_sim.agents.operator.person import Population
     from dva_sim.agents.people import BystanderProfile, GuardProfile
     from dva_sim.agents.profile import RobotProfile
-    from dva_sim.agents.tilt.phone import PhoneProfile
+    from dva_sim.agents.tilt import PhoneProfile
+    from dva_sim.experiments.repeats import Bands
     from dva_sim.experiments.study import Study
     from dva_sim.experiments.validation.dispatch.cases import CaseFile
     from dva_sim.scenario import Scenario
@@ -47,6 +48,6 @@ def _json_schema(kind: str) -> dict[str, Any]:
         "scenario": Scenario | TimedScenario,
         "cases": CaseFile,
         "site": SiteFile,
-        "agent": RobotProfile | PhoneProfile | GuardProfile | BystanderProfile | Population,
+        "agent": RobotProfile | PhoneProfile | GuardProfile | BystanderProfile | Population | Bands,
     }
     return TypeAdapter(kinds[kind]).json_schema()

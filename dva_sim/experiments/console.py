@@ -15,6 +15,7 @@ from rich.progress import (
     Progress,
     ProgressColumn,
     Task,
+    TaskID,
     TextColumn,
     TimeRemainingColumn,
 )
@@ -163,13 +164,8 @@ def run(name: str, pairs: list[str], out: Path | None, jobs: int | None, limit_s
     try:
         with _bar() as bar:
             task = bar.add_task("running", total=before.runs)
-            run_study(
-                study,
-                folder,
-                jobs=jobs,
-                progress=lambda n, _: bar.update(task, completed=n),
-                limit_s=limit_s,
-            )
+            show = partial(_show, bar, task)
+            run_study(study, folder, jobs=jobs, progress=show, limit_s=limit_s)
     except KeyboardInterrupt as stopped:
         say(f"Stopped. {stopped}")
         return INTERRUPTED
@@ -183,6 +179,35 @@ def run(name: str, pairs: list[str], out: Path | None, jobs: int | None, limit_s
         say(f"[red]{len(failures)} runs failed[/red]; the same command tries them again")
     say(f"Report: {report}")
     return 1 if failures else 0
+
+
+def tune(name: str, out: Path | None, jobs: int | None) -> int:
+    """Choose what a study has tuned, and write it beside the study; the exit code."""
+    from dva_sim.experiments.runner import dry_run
+    from dva_sim.experiments.study import load_study
+    from dva_sim.experiments.tuned import save_tuned
+    from dva_sim.experiments.tuning import tune as try_all
+    from dva_sim.experiments.tuning import tuning_study
+
+    study = load_study(name)
+    trials = tuning_study(study)
+    folder = out if out is not None else Path("results") / f"{Path(name).stem}-tuning"
+    say(f"[bold]{escape(trials.question)}[/bold]")
+    before = dry_run(trials, folder, jobs=jobs)
+    _say_plan(before, folder)
+    try:
+        with _bar() as bar:
+            task = bar.add_task("trying", total=before.runs)
+            show = partial(_show, bar, task)
+            tuned = try_all(study, folder, jobs=jobs, progress=show)
+    except KeyboardInterrupt as stopped:
+        say(f"Stopped. {stopped}")
+        return INTERRUPTED
+    for choice in tuned.chosen:
+        when = ", ".join(f"{name} {level}" for name, level in choice.when.items())
+        say(f"{when}: {tuned.tuning.key} {choice.value:g}")
+    say(f"Kept in {save_tuned(study, tuned)}")
+    return 0
 
 
 def plan(name: str, pairs: list[str], out: Path | None, jobs: int | None) -> None:
@@ -217,6 +242,10 @@ def _bar() -> Progress:
         TimeRemainingColumn(),
         console=console,
     )
+
+
+def _show(bar: Progress, task: TaskID, done: int, total: int) -> None:
+    bar.update(task, completed=done, total=total)
 
 
 class _Rate(ProgressColumn):

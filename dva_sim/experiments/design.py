@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import itertools
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,8 +13,17 @@ from typing import Any
 from dva_sim import scenario as scenarios
 from dva_sim.config import Document
 from dva_sim.errors import ConfigError
+from dva_sim.experiments.asking import REPEATS, TUNED, TUNING, Level, Part
 from dva_sim.experiments.models import AnyScenario, model_for, model_of
-from dva_sim.experiments.study import Level, Part, Study
+from dva_sim.experiments.repeats import (
+    PARAMETERS,
+    TRAITS,
+    factors_of_repeats,
+    parameter_sets,
+    settings_of_repeats,
+)
+from dva_sim.experiments.study import Study
+from dva_sim.experiments.tuned import load_tuned
 from dva_sim.streams import derive_seed
 
 REFERENCE = -1
@@ -71,6 +80,11 @@ class Job:
         return self.index == REFERENCE
 
     @property
+    def is_repeat(self) -> bool:
+        """Whether it repeats the answer under another model of the persons."""
+        return self.part == REPEATS
+
+    @property
     def key(self) -> Key:
         """What tells this run from all others; equal keys are the same run."""
         return self.config, self.seed
@@ -79,10 +93,13 @@ class Job:
 def cells(study: Study) -> list[Cell]:
     """All configurations, by part, the reference first, then the grid with the last factor fastest.
 
+    The repeats of the answer come last, as if they were a part of their own.
+
     Raises:
         ConfigError: a scenario that cannot be read, or is not valid with some change.
     """
-    return [cell for name in study.parts for cell in _cells_of(study, name)]
+    own = [cell for name in study.parts for cell in _cells_of(study, name)]
+    return [*own, *_repeats_of(study)]
 
 
 def base_scenario(study: Study, part: str) -> AnyScenario:
@@ -91,7 +108,7 @@ def base_scenario(study: Study, part: str) -> AnyScenario:
 
 
 def jobs(study: Study, grid: Sequence[Cell] | None = None) -> list[Job]:
-    """All runs in a fixed order: part, cell, person, trial.
+    """All runs in a fixed order: part, cell, person, trial; the repeats last.
 
     Args:
         study: What is asked.
@@ -101,7 +118,8 @@ def jobs(study: Study, grid: Sequence[Cell] | None = None) -> list[Job]:
         ConfigError: a scenario that cannot be read, or is not valid with some change.
     """
     every = cells(study) if grid is None else grid
-    parts = [(name, [cell for cell in every if cell.part == name]) for name in study.parts]
+    names = dict.fromkeys(cell.part for cell in every)
+    parts = [(name, [cell for cell in every if cell.part == name]) for name in names]
     return [job for name, part_cells in parts for job in _jobs_of(study, name, part_cells)]
 
 
@@ -141,17 +159,53 @@ def _cells_of(study: Study, name: str) -> Iterator[Cell]:
     part = study.parts[name]
     source = _source(study, part)
     if part.reference is not None:
-        yield _cell(name, REFERENCE, (), _build(study, name, source, part.reference))
-    for index, levels in enumerate(itertools.product(*study.factors.values())):
-        changes = dict(zip(study.factors, levels, strict=True))
-        scenario = _build(study, name, source, changes)
-        yield _cell(name, index, tuple(changes.items()), scenario)
+        yield _cell(name, REFERENCE, {}, _build(study, name, source, part.reference))
+    change = _changer(study)
+    for index, levels in enumerate(_grid(study.factors)):
+        yield _cell(name, index, levels, _build(study, name, source, change(levels)))
 
 
-def _cell(
-    part: str, index: int, levels: tuple[tuple[str, Level], ...], scenario: AnyScenario
-) -> Cell:
-    return Cell(part, index, levels, scenario, stable_hash(scenario.model_dump(mode="json")))
+def _repeats_of(study: Study) -> Iterator[Cell]:
+    """The answer's contrast under every strategy and every set of parameters."""
+    factors = factors_of_repeats(study)
+    if not factors or study.answer is None:
+        return
+    part, fixed, sets = study.answer.part, settings_of_repeats(study), parameter_sets(study)
+    source, change = _source(study, study.parts[part]), _changer(study)
+    for index, levels in enumerate(_grid(factors)):
+        chosen = dict(levels)
+        traits = sets[int(str(chosen.pop(PARAMETERS)))]
+        changes = change(fixed | chosen) | ({TRAITS: traits} if traits else {})
+        yield _cell(REPEATS, index, levels, _build(study, part, source, changes))
+
+
+def _grid(factors: Mapping[str, Sequence[Level]]) -> Iterator[dict[str, Level]]:
+    """Every combination of levels, the last factor fastest."""
+    for levels in itertools.product(*factors.values()):
+        yield dict(zip(factors, levels, strict=True))
+
+
+def _changer(study: Study) -> Callable[[Mapping[str, Level]], dict[str, Any]]:
+    """What the levels of a cell change in the scenario."""
+    tuned = load_tuned(study) if TUNED in study.factors.get(TUNING, ()) else None
+
+    def change(levels: Mapping[str, Level]) -> dict[str, Any]:
+        changes: dict[str, Any] = {}
+        for factor, level in levels.items():
+            if factor in study.treatments:
+                changes |= study.treatments[factor][str(level)]
+            elif factor != TUNING:
+                changes[factor] = level
+            elif level == TUNED and tuned is not None:
+                changes[tuned.tuning.key] = tuned.value_for(levels)
+        return changes
+
+    return change
+
+
+def _cell(part: str, index: int, levels: Mapping[str, Level], scenario: AnyScenario) -> Cell:
+    config = stable_hash(scenario.model_dump(mode="json"))
+    return Cell(part, index, tuple(levels.items()), scenario, config)
 
 
 def _source(study: Study, part: Part) -> Document:
@@ -180,20 +234,31 @@ def _located(changes: dict[str, Any], folder: Path) -> dict[str, Any]:
 def _blamed(
     study: Study, part: str, error: ConfigError, changes: Mapping[str, Any]
 ) -> ConfigError | None:
-    for key in changes:
-        for path in (("factors", key), ("parts", part, "reference", key)):
-            if key in error.problem and study.is_from_file(path):
-                return study.error(error.problem, path)
+    places: list[tuple[str, ...]] = [("parts", part, "reference"), ("factors",)]
+    places += [("treatments", f, level) for f, named in study.treatments.items() for level in named]
+    for key, value in changes.items():
+        named = key in error.problem or (isinstance(value, str) and repr(value) in error.problem)
+        for place in places if named else ():
+            if study.is_from_file((*place, key)):
+                return study.error(error.problem, (*place, key))
     return None
 
 
 def _jobs_of(study: Study, name: str, part_cells: Sequence[Cell]) -> Iterator[Job]:
     # Persons of one cluster follow each other, so that no two clusters share an operator.
     team = max(1, *(model_for(cell.scenario).team(cell.scenario) for cell in part_cells))
-    trials = study.parts[name].replications or study.replications
+    persons, trials, luck = _size(study, name)
     for cell in part_cells:
-        for person in range(study.persons):
+        for person in range(persons):
             scenario = model_for(cell.scenario).played_by(cell.scenario, person * team)
             for trial in range(trials):
-                seed = derive_seed(study.seed, name, person, trial)
+                seed = derive_seed(study.seed, luck, person, trial)
                 yield Job(name, cell.levels, cell.index, person, trial, seed, scenario, cell.config)
+
+
+def _size(study: Study, name: str) -> tuple[int, int, str]:
+    """Persons, trials, and the part whose luck is met: a repeat shares that of its part."""
+    if name == REPEATS and study.robustness is not None and study.answer is not None:
+        persons = min(study.robustness.persons, study.persons)
+        return persons, study.robustness.replications, study.answer.part
+    return study.persons, study.parts[name].replications or study.replications, name

@@ -18,13 +18,16 @@ from typing import Any
 from dva_sim import __version__
 from dva_sim.errors import ConfigError, DvaSimError
 from dva_sim.experiments import design, pool
+from dva_sim.experiments.asking import TUNED, TUNING
 from dva_sim.experiments.design import Cell, Job, Key
 from dva_sim.experiments.fingerprint import fingerprint
 from dva_sim.experiments.journal import FILE, Journal
 from dva_sim.experiments.pool import Episode
+from dva_sim.experiments.repeats import parameter_sets
 from dva_sim.experiments.results import MANIFEST
 from dva_sim.experiments.study import Study
 from dva_sim.experiments.tables import design_row, write_tables
+from dva_sim.experiments.tuned import load_tuned
 
 MACHINE = "machine.json"
 _PACKAGES = ("duckdb", "lxml", "numpy", "pymunk", "scipy", "shapely", "simpy")
@@ -186,12 +189,14 @@ def _manifest(study: Study, cells: Sequence[Cell], todo: Sequence[Job]) -> dict[
         "changes": dict(study.changes),
         "inputs": design.inputs(cells),
         "cells": [_cell_row(cell) for cell in cells],
+        "parameter_sets": parameter_sets(study),
+        "tuned": load_tuned(study).model_dump(mode="json") if _is_tuned(study) else None,
         "runs": len({job.key for job in todo}),
         "seeds": {
             "study": study.seed,
             "population": study.seed,
             "rule": "a run's seed depends on the study's seed, the part, the person and the "
-            "trial, never on the cell: all cells share their luck",
+            "trial, never on the cell: all cells share their luck, and repeats share it too",
         },
         "versions": {"dva-sim": __version__, "fingerprint": fingerprint()},
     }
@@ -199,6 +204,10 @@ def _manifest(study: Study, cells: Sequence[Cell], todo: Sequence[Job]) -> dict[
     content["versions"]["python"] = platform.python_version()
     content["versions"] |= {name: version(name) for name in _PACKAGES}
     return content | {"hash": identity}
+
+
+def _is_tuned(study: Study) -> bool:
+    return TUNED in study.factors.get(TUNING, ())
 
 
 def _cell_row(cell: Cell) -> dict[str, Any]:

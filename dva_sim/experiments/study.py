@@ -8,71 +8,27 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, Field, PrivateAttr, field_validator
+from pydantic import Field, PrivateAttr, field_validator
 
 from dva_sim import resources
 from dva_sim.config import Config, Document, Path_, load_yaml, parse_changes, validate
 from dva_sim.errors import ConfigError
+from dva_sim.experiments import faults
+from dva_sim.experiments.asking import (
+    REPEATS,
+    Answer,
+    Changes,
+    Count,
+    Levels,
+    Part,
+    Prediction,
+    Robustness,
+    Seed,
+    Tuning,
+    refuse_keys_of_the_design,
+)
 
 FOLDER = "experiments"
-SET_BY_DESIGN = {"operator.person": "persons", "operator.population_seed": "seed"}
-
-Level = bool | int | float | str | None
-
-
-def _distinct(levels: tuple[Level, ...]) -> tuple[Level, ...]:
-    for index, level in enumerate(levels):
-        if level in levels[:index]:
-            raise ValueError(f"level {level!r} stands twice")
-    return levels
-
-
-Levels = Annotated[tuple[Level, ...], Field(min_length=1), AfterValidator(_distinct)]
-Count = Annotated[int, Field(ge=1)]
-
-
-class Part(Config):
-    """One scenario that is run in every cell.
-
-    Attributes:
-        scenario: By name or path, also relative to the study's file.
-        reference: Changes that make the reference run, one for each person and trial.
-        replications: Trials per person, if not those of the study.
-    """
-
-    scenario: str
-    reference: dict[str, Any] | None = None
-    replications: Count | None = None
-
-    @field_validator("reference")
-    @classmethod
-    def _person_is_the_designs(cls, value: dict[str, Any] | None) -> dict[str, Any] | None:
-        _refuse_keys_of_the_design(value or {})
-        return value
-
-
-class Answer(Config):
-    """The contrast declared to answer the question, before anything is run.
-
-    Attributes:
-        part: Part it is measured in.
-        measure: Column of the table `runs`; in excess of the reference run where there is one.
-        factor: Factor whose two levels are compared.
-        contrast: The two levels: the first minus the second.
-        over: Factor along which the difference is followed.
-        within: Levels of the other factors.
-        smallest_effect: Smallest difference that matters, in the measure's own unit.
-        smallest_effect_s: The same for a measure in seconds [s].
-    """
-
-    part: str
-    measure: str
-    factor: str
-    contrast: tuple[Level, Level]
-    over: str
-    within: dict[str, Level] = Field(default_factory=dict)
-    smallest_effect: Annotated[float, Field(gt=0)] | None = None
-    smallest_effect_s: Annotated[float, Field(gt=0)] | None = None
 
 
 class Study(Config):
@@ -80,36 +36,66 @@ class Study(Config):
 
     Attributes:
         question: In words.
+        predictions: What was expected before anything was run.
         seed: Of the whole study; the population of persons is drawn from it too.
         persons: Simulated persons, the clusters.
         replications: Paired trials per person.
         factors: Levels of each scenario key that is varied; the cells are their full grid.
+        treatments: Factors whose levels are names of several changes at once.
         parts: Scenarios by name, each run in every cell.
         answer: The declared contrast.
+        tuning: How the level `tuned` of the factor `tuning` comes by its value.
+        robustness: The answer again under other models of the persons.
     """
 
     question: str
-    seed: Annotated[int, Field(ge=0, lt=2**63)] = 1
+    predictions: tuple[Prediction, ...] = ()
+    seed: Seed = 1
     persons: Count = 24
     replications: Count = 5
     factors: dict[str, Levels] = Field(default_factory=dict)
+    treatments: dict[str, dict[str, Changes]] = Field(default_factory=dict)
     parts: Annotated[dict[str, Part], Field(min_length=1)]
     answer: Answer | None = None
+    tuning: Tuning | None = None
+    robustness: Robustness | None = None
 
     _document: Document = PrivateAttr(default_factory=lambda: Document({}, Path()))
-    _changes: dict[str, Any] = PrivateAttr(default_factory=dict)
+    _changes: Changes = PrivateAttr(default_factory=dict)
     _settings: tuple[str, ...] = PrivateAttr(default=())
 
     @field_validator("factors")
     @classmethod
     def _varies_the_scenario(cls, value: dict[str, Levels]) -> dict[str, Levels]:
-        _refuse_keys_of_the_design(value)
+        refuse_keys_of_the_design(value)
         return value
+
+    @field_validator("treatments")
+    @classmethod
+    def _changes_the_scenario(
+        cls, value: dict[str, dict[str, Changes]]
+    ) -> dict[str, dict[str, Changes]]:
+        for levels in value.values():
+            for changes in levels.values():
+                refuse_keys_of_the_design(changes)
+        return value
+
+    @field_validator("parts")
+    @classmethod
+    def _leaves_room_for_repeats(cls, value: dict[str, Part]) -> dict[str, Part]:
+        if REPEATS in value:
+            raise ValueError(f"a part cannot be called {REPEATS!r}: the repeats are")
+        return value
+
+    @property
+    def file(self) -> Path:
+        """The study's file."""
+        return self._document.file
 
     @property
     def folder(self) -> Path:
         """Where the study's file lies."""
-        return self._document.file.parent
+        return self.file.parent
 
     @property
     def changes(self) -> Mapping[str, Any]:
@@ -144,8 +130,7 @@ def load_study(name: str | Path, settings: Iterable[str] = ()) -> Study:
     """
     document = load_yaml(resources.find(str(name), FOLDER))
     study = validate(Study, document.data, document.error)
-    problem = _unanswerable(study)
-    if problem:
+    for problem in (*faults.of_factors(study), *faults.of_claims(study)):
         raise document.error(*problem)
     study._document = document
     return _with_settings(study, document, tuple(settings))
@@ -165,8 +150,12 @@ def _with_settings(study: Study, document: Document, settings: Sequence[str]) ->
             touched.append(path)
     _refuse_design(changes)
     changed = validate(Study, data, lambda problem, _: ConfigError(f"--set: {problem}"))
-    if _unanswerable(changed):  # its levels are gone, which is no mistake but leaves no contrast
-        changed = changed.model_copy(update={"answer": None})
+    for problem, _ in faults.of_factors(changed):
+        raise ConfigError(f"--set: {problem}")
+    if any(faults.of_answer(changed)):  # levels are gone: no mistake, but no contrast
+        changed = changed.model_copy(update={"answer": None, "robustness": None})
+    elif any(faults.of_robustness(changed)):
+        changed = changed.model_copy(update={"robustness": None})
     kept = {
         p: at for p, at in document.places.items() if not any(p[: len(t)] == t for t in touched)
     }
@@ -199,40 +188,8 @@ def _put(data: dict[str, Any], path: tuple[str, ...], value: Any) -> None:
     data[path[-1]] = value
 
 
-def _refuse_keys_of_the_design(keys: Iterable[str]) -> None:
-    for key in keys:
-        if key in SET_BY_DESIGN:
-            raise ValueError(f"{key!r} is set by the study; change {SET_BY_DESIGN[key]!r} instead")
-
-
 def _refuse_design(changes: Iterable[str]) -> None:
     try:
-        _refuse_keys_of_the_design(changes)
+        refuse_keys_of_the_design(changes)
     except ValueError as error:
         raise ConfigError(f"--set: {error}") from None
-
-
-def _unanswerable(study: Study) -> tuple[str, Path_] | None:
-    """Why the declared contrast cannot be computed, and where that is said."""
-    answer = study.answer
-    if answer is None:
-        return None
-    if answer.part not in study.parts:
-        known = ", ".join(study.parts)
-        return f"answer.part {answer.part!r} is not a part; parts: {known}", ("answer", "part")
-    wanted: list[tuple[Path_, str, tuple[Level, ...]]] = [
-        (("answer", "factor"), answer.factor, answer.contrast),
-        (("answer", "over"), answer.over, ()),
-        *((("answer", "within", key), key, (level,)) for key, level in answer.within.items()),
-    ]
-    for path, factor, levels in wanted:
-        if factor not in study.factors:
-            known = ", ".join(study.factors)
-            return f"{factor!r} is not a factor; factors: {known}", path
-        for level in levels:
-            if level not in study.factors[factor]:
-                known = ", ".join(map(str, study.factors[factor]))
-                return f"{level!r} is not a level of {factor!r}; levels: {known}", path
-    if answer.contrast[0] == answer.contrast[1]:
-        return "contrast compares a level with itself", ("answer", "contrast")
-    return None

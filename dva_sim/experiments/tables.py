@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dva_sim.errors import DvaSimError
+from dva_sim.experiments.asking import REPEATS
 from dva_sim.experiments.design import Job
 from dva_sim.experiments.journal import Journal, Value
 from dva_sim.experiments.results import TABLES
@@ -28,8 +29,9 @@ Row = dict[str, Value]
 def write_tables(folder: Path, jobs: list[Job], journal: Journal) -> None:
     """Write `tables/<name>.parquet` for every table that some run filled.
 
-    Rows are in the order of `jobs`: part, cell, person, trial. Memory stays bounded: rows
-    pass in batches through a database file that is removed afterwards.
+    Rows are in the order of `jobs`: part, cell, person, trial. The runs of repeats make a table
+    of their own. Memory stays bounded: rows pass in batches through a database file that is
+    removed afterwards.
 
     Raises:
         DvaSimError: the disk is full or refuses to be written.
@@ -40,10 +42,14 @@ def write_tables(folder: Path, jobs: list[Job], journal: Journal) -> None:
     try:
         target.mkdir(exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=".tables-", dir=folder) as name:
+            own = [job for job in jobs if not job.is_repeat]
+            repeats = [job for job in jobs if job.is_repeat]
             made = [
-                _write(Path(name), table, kinds, _rows(jobs, journal, table))
-                for table, kinds in _columns(jobs, journal).items()
+                _write(Path(name), table, kinds, _rows(own, journal, table))
+                for table, kinds in _columns(own, journal).items()
             ]
+            if kinds := _columns(repeats, journal).get("runs"):
+                made.append(_write(Path(name), REPEATS, kinds, _rows(repeats, journal, "runs")))
             for path in made:
                 path.replace(target / path.name)
         for stale in set(target.glob("*.parquet")) - {target / path.name for path in made}:

@@ -125,6 +125,16 @@ def test_a_runner_killed_again_and_again_ends_with_the_same_bytes(tmp_path, plai
     assert kit.files(run_study(kit.study_in(tmp_path), out, jobs=1, episode=kit.cheap)) == plain
 
 
+def test_repeats_go_on_after_a_kill_too_and_end_with_the_same_bytes(tmp_path):
+    study, out = kit.write_study(tmp_path, kit.REPEATED), tmp_path / "killed"
+    whole = run_study(kit.load_study(study), tmp_path / "whole", jobs=1, episode=kit.cheap)
+    stopped(started(study, out), kit.RUNS + 4, signal.SIGKILL)
+    assert kit.RUNS < dry_run(kit.load_study(study), out).done < kit.REPEATED_RUNS
+    again = run_study(kit.load_study(study), out, jobs=2, episode=kit.cheap)
+    assert kit.files(again) == kit.files(whole)
+    assert "robustness.parquet" in kit.files(whole)
+
+
 def test_ctrl_c_keeps_what_is_done_and_says_how_to_go_on(tmp_path, plain):
     study, out = kit.write_study(tmp_path), tmp_path / "stopped"
     runner = started(study, out)

@@ -41,7 +41,7 @@ def test_an_impossible_level_is_told_where_the_study_names_it(tmp_path):
 
 def test_a_wrong_reference_is_told_where_the_study_makes_it(tmp_path):
     told = complaint(tmp_path, "strategy: oracle", "strategy: oracel")
-    assert told.startswith("study:11:17: operator.strategy 'oracel' is unknown")
+    assert told.startswith("study:11:17: operator 'oracel' is unknown")
 
 
 @pytest.mark.parametrize(
@@ -102,3 +102,78 @@ def test_a_setting_that_makes_no_sense_is_refused_in_one_line(tmp_path, setting,
     assert told in str(caught.value)
     assert "\n" not in str(caught.value)
     assert caught.value.file is None
+
+
+TREATED = STUDY.replace("pattern: [req-rep, latest-wins]", "remedy: [none, both]").replace(
+    "factor: pattern\n  contrast: [req-rep, latest-wins]",
+    "factor: remedy\n  contrast: [none, both]",
+)
+TREATMENTS = """\
+treatments:
+  remedy:
+    none: {pattern: req-rep}
+    both: {pattern: latest-wins, robot.processing_s: 0.01}
+"""
+
+
+def test_a_treatment_is_a_level_that_changes_several_keys(tmp_path):
+    cells = design.cells(study_in(tmp_path, text=TREATED + TREATMENTS))
+    seen = {
+        (dict(cell.levels)["remedy"], cell.scenario.pattern, cell.scenario.robot.processing_s)
+        for cell in cells
+        if cell.levels
+    }
+    usual = cells[0].scenario.robot.processing_s
+    assert seen == {("none", "req-rep", usual), ("both", "latest-wins", 0.01)}
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("[none, both]", "[none, all]", "study:6:3: 'all' is not a treatment; named: none, both"),
+        ("pattern: latest", "link.delay_s: 1, pattern: latest", "'link.delay_s' is set by two"),
+        ("pattern: latest", "operator.person: 1, pattern: latest", "is set by the study"),
+        ("pattern: latest-wins", "pattern: latest-winz", "study:24:12: pattern: "),
+    ],
+)
+def test_a_treatment_that_makes_no_sense_is_refused(tmp_path, old, new, told):
+    path = write_study(tmp_path, (TREATED + TREATMENTS).replace(old, new, 1))
+    with pytest.raises(ConfigError) as caught:
+        design.jobs(load_study(path))
+    assert told in str(caught.value).replace(str(path), "study")
+
+
+PREDICTED = (
+    STUDY
+    + """\
+predictions:
+  - text: Waiting costs.
+    direction: above
+    expects_s: [3, 9]
+    at: {link.delay_s: 0.25}
+  - text: Nobody will notice.
+"""
+)
+
+
+def test_predictions_are_kept_in_words_and_numbers(tmp_path):
+    first, second = study_in(tmp_path, text=PREDICTED).predictions
+    assert (first.direction, first.expected, first.at) == ("above", (3, 9), {"link.delay_s": 0.25})
+    assert (second.text, second.direction, second.expected) == ("Nobody will notice.", None, None)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("at: {link.delay_s: 0.25}", "at: {link.delay_s: 9}", "study:26:10: 9 is not a level"),
+        ("direction: above", "direction: up", "study:24:5: predictions.0.direction"),
+        ("    direction: above\n", "", "needs a direction"),
+        ("[3, 9]", "[9, 3]", "should ascend"),
+        ("direction: above", "direction: above\n    factor: pattern", "needs its contrast"),
+    ],
+)
+def test_predictions_that_make_no_sense_are_refused(tmp_path, old, new, told):
+    path = write_study(tmp_path, PREDICTED.replace(old, new, 1))
+    with pytest.raises(ConfigError) as caught:
+        load_study(path)
+    assert told in str(caught.value).replace(str(path), "study")

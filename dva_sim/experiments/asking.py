@@ -1,0 +1,197 @@
+"""The keys of a study's file below its top level: what is asked, expected, tuned and repeated."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, Field, field_validator, model_validator
+
+from dva_sim.config import Config
+
+SET_BY_DESIGN = {"operator.person": "persons", "operator.population_seed": "seed"}
+
+TUNING = "tuning"  # name of the factor whose levels are these:
+UNTUNED, TUNED = "untuned", "tuned"
+REPEATS = "robustness"  # name of the table of repeats, so of no part
+STRATEGY = "operator.strategy"
+
+Level = bool | int | float | str | None
+
+
+def _distinct(levels: tuple[Level, ...]) -> tuple[Level, ...]:
+    for index, level in enumerate(levels):
+        if level in levels[:index]:
+            raise ValueError(f"level {level!r} stands twice")
+    return levels
+
+
+def _ascending(range_: tuple[float, float]) -> tuple[float, float]:
+    if range_[0] > range_[1]:
+        raise ValueError(f"range should ascend, not go from {range_[0]:g} to {range_[1]:g}")
+    return range_
+
+
+Levels = Annotated[tuple[Level, ...], Field(min_length=1), AfterValidator(_distinct)]
+Count = Annotated[int, Field(ge=1)]
+Seed = Annotated[int, Field(ge=0, lt=2**63)]
+Range = Annotated[tuple[float, float], AfterValidator(_ascending)]
+Changes = dict[str, Any]
+
+
+def refuse_keys_of_the_design(keys: Iterable[str]) -> None:
+    """Persons are the study's own to choose.
+
+    Raises:
+        ValueError: a key that the study sets itself.
+    """
+    for key in keys:
+        if key in SET_BY_DESIGN:
+            raise ValueError(f"{key!r} is set by the study; change {SET_BY_DESIGN[key]!r} instead")
+
+
+class Part(Config):
+    """One scenario that is run in every cell.
+
+    Attributes:
+        scenario: By name or path, also relative to the study's file.
+        reference: Changes that make the reference run, one for each person and trial.
+        replications: Trials per person, if not those of the study.
+    """
+
+    scenario: str
+    reference: Changes | None = None
+    replications: Count | None = None
+
+    @field_validator("reference")
+    @classmethod
+    def _person_is_the_designs(cls, value: Changes | None) -> Changes | None:
+        refuse_keys_of_the_design(value or {})
+        return value
+
+
+class Answer(Config):
+    """The contrast declared to answer the question, before anything is run.
+
+    Attributes:
+        part: Part it is measured in.
+        measure: Column of the table `runs`; in excess of the reference run where there is one.
+        factor: Factor whose two levels are compared.
+        contrast: The two levels: the first minus the second.
+        over: Factor along which the difference is followed.
+        within: Levels of the other factors.
+        smallest_effect: Smallest difference that matters, in the measure's own unit.
+        smallest_effect_s: The same for a measure in seconds [s].
+    """
+
+    part: str
+    measure: str
+    factor: str
+    contrast: tuple[Level, Level]
+    over: str
+    within: dict[str, Level] = Field(default_factory=dict)
+    smallest_effect: Annotated[float, Field(gt=0)] | None = None
+    smallest_effect_s: Annotated[float, Field(gt=0)] | None = None
+
+    @property
+    def smallest(self) -> float | None:
+        """Smallest difference that matters, in the measure's unit."""
+        if self.measure.endswith("_s") and self.smallest_effect_s is not None:
+            return self.smallest_effect_s
+        return self.smallest_effect
+
+
+class Prediction(Config):
+    """What is expected of one contrast, written down before the first run.
+
+    Attributes:
+        text: In words.
+        direction: Of the first level minus the second: `above` zero, `below` it, or the `same`
+            but for less than the smallest effect that matters. Without it nothing is judged.
+        factor: Whose levels are compared; by default the answer's.
+        contrast: The two levels; by default the answer's.
+        at: Levels of other factors. By default those the answer is `within`, and the last level
+            of the factor it runs `over`.
+        expects: Range in which the mean difference is expected, in the measure's unit.
+        expects_s: The same for a measure in seconds [s].
+    """
+
+    text: Annotated[str, Field(min_length=1)]
+    direction: Literal["above", "below", "same"] | None = None
+    factor: str | None = None
+    contrast: tuple[Level, Level] | None = None
+    at: dict[str, Level] = Field(default_factory=dict)
+    expects: Range | None = None
+    expects_s: Range | None = None
+
+    @model_validator(mode="after")
+    def _can_be_judged(self) -> Prediction:
+        judged = self.direction is not None
+        if not judged and (self.at or self.factor or self.contrast or self.expected):
+            raise ValueError("a prediction with a contrast or a range needs a direction")
+        if self.factor is not None and self.contrast is None:
+            raise ValueError("a prediction of another factor needs its contrast")
+        return self
+
+    @property
+    def expected(self) -> Range | None:
+        """Range of the mean difference, in the measure's unit."""
+        return self.expects if self.expects is not None else self.expects_s
+
+
+class Tuning(Config):
+    """One rule, with one budget for all, by which a key is chosen for each level of some factors.
+
+    The rule: least mean of the measure over persons who take no part in the study; of equal ones
+    the nearest to 1.
+
+    Attributes:
+        key: What is tuned.
+        levels: Its values tried, the same for all.
+        by: Factors for each of whose levels it is tuned on its own.
+        at: Levels of the other factors while it is tuned.
+        part: Part it is tuned in.
+        measure: Column of the table `runs` that should be small.
+        persons: Simulated persons, others than the study's.
+        replications: Trials of each.
+        seed: Of the tuning; not that of the study.
+    """
+
+    key: str
+    levels: Annotated[tuple[Annotated[float, Field(gt=0)], ...], Field(min_length=2)]
+    by: Annotated[tuple[str, ...], Field(min_length=1)]
+    at: dict[str, Level] = Field(default_factory=dict)
+    part: str
+    measure: str
+    persons: Count = 8
+    replications: Count = 2
+    seed: Seed
+
+    @field_validator("levels")
+    @classmethod
+    def _tried_once(cls, value: tuple[float, ...]) -> tuple[float, ...]:
+        _distinct(value)
+        return value
+
+
+class Robustness(Config):
+    """The answer's contrast again, under other models of the persons.
+
+    Every strategy is tried with the persons' usual parameters and with each of `sets` others,
+    which fill the bands of calibration evenly (Latin hypercube, on a logarithmic scale).
+
+    Attributes:
+        strategies: Of the operators; by default the scenario's alone.
+        sets: How many other sets of parameters.
+        bands: File of the bands, in `agents/people` or by path: `[low, high]` for each trait.
+        at: Levels of the factor that the answer runs `over`; by default its last.
+        persons: Simulated persons in each repeat: the first of the study's.
+        replications: Trials of each.
+    """
+
+    strategies: Annotated[tuple[str, ...], AfterValidator(_distinct)] = ()
+    sets: Annotated[int, Field(ge=0, le=1000)] = 8
+    bands: str = "operators-bands"
+    at: Levels | None = None
+    persons: Annotated[int, Field(ge=2)] = 6
+    replications: Count = 2

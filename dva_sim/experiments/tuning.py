@@ -1,0 +1,124 @@
+"""Tuning: every value of a key is tried alike for all, on persons who take no part in the study."""
+
+from __future__ import annotations
+
+import itertools
+from pathlib import Path
+
+from dva_sim import __version__
+from dva_sim.errors import ConfigError, DvaSimError
+from dva_sim.experiments.asking import Level, Levels, Tuning
+from dva_sim.experiments.effects import Factor, Floats, Part
+from dva_sim.experiments.fingerprint import fingerprint
+from dva_sim.experiments.pool import LIMIT_S, Episode
+from dva_sim.experiments.results import Results
+from dva_sim.experiments.runner import Progress, run_study
+from dva_sim.experiments.statistics import mean_interval
+from dva_sim.experiments.study import Study
+from dva_sim.experiments.tuned import Chosen, Seen, Tuned, choose
+
+_DIGITS = 6  # of what was seen, in the file
+
+
+def tuning_study(study: Study) -> Study:
+    """The study that tries every value: its own persons and luck, the same budget for all.
+
+    Raises:
+        ConfigError: the study tunes nothing.
+    """
+    rule = _rule_of(study)
+    factors: dict[str, Levels] = {name: (level,) for name, level in rule.at.items()}
+    factors |= {name: study.factors[name] for name in rule.by}
+    factors[rule.key] = rule.levels
+    part = study.parts[rule.part]
+    return study.model_copy(
+        update={
+            "question": f"Which {rule.key} for each {', '.join(rule.by)}?",
+            "predictions": (),
+            "seed": rule.seed,
+            "persons": rule.persons,
+            "replications": rule.replications,
+            "factors": factors,
+            "parts": {rule.part: part.model_copy(update={"reference": None, "replications": None})},
+            "answer": None,
+            "tuning": None,
+            "robustness": None,
+        }
+    )
+
+
+def tune(
+    study: Study,
+    out: str | Path,
+    *,
+    jobs: int | None = None,
+    episode: Episode | None = None,
+    progress: Progress | None = None,
+    limit_s: float = LIMIT_S,
+) -> Tuned:
+    """Try every value, or go on with trying, and choose by the rule.
+
+    Args:
+        study: What is asked.
+        out: Results folder of the trials.
+        jobs: Processes; by default one for each core.
+        episode: Makes the tables of one run; by default a simulation.
+        progress: Called with the number of runs done and of all runs, as they finish.
+        limit_s: A run that takes longer, by the wall clock, has failed.
+
+    Raises:
+        ConfigError: the study tunes nothing, or lacks the measure.
+        DvaSimError: runs failed, so that values would be judged by different persons.
+    """
+    rule, trials = _rule_of(study), tuning_study(study)
+    run_study(trials, out, jobs=jobs, episode=episode, progress=progress, limit_s=limit_s)
+    results = Results.load(out)
+    if results.failures:
+        error = str(results.failures[0]["error"])
+        raise DvaSimError(f"{len(results.failures)} runs failed, so nothing is chosen: {error}")
+    factors = [Factor(name, levels) for name, levels in trials.factors.items()]
+    part = Part(results.table("runs"), rule.part, factors)
+    if not part.has(rule.measure):
+        raise ConfigError(f"tuning.measure {rule.measure!r} is not a measure of these runs")
+    seen = _seen(part, rule)
+    return Tuned(
+        study=study.file.stem,
+        made_with=f"{__version__} {fingerprint()}",
+        tuning=rule,
+        chosen=tuple(_choice(seen, when) for when in _whens(part, rule)),
+        seen=tuple(seen),
+    )
+
+
+def _rule_of(study: Study) -> Tuning:
+    if study.tuning is None:
+        raise ConfigError(f"{study.file} tunes nothing: it has no key 'tuning'")
+    return study.tuning
+
+
+def _whens(part: Part, rule: Tuning) -> list[dict[str, Level]]:
+    levels = {f.name: f.levels for f in part.factors if f.name in rule.by}
+    return [
+        dict(zip(levels, chosen, strict=True)) for chosen in itertools.product(*levels.values())
+    ]
+
+
+def _seen(part: Part, rule: Tuning) -> list[Seen]:
+    grid = part.grid(rule.measure)
+    return [
+        _tried(part, part.where(grid, {**rule.at, **when, rule.key: value}), when, value)
+        for when in _whens(part, rule)
+        for value in rule.levels
+    ]
+
+
+def _tried(part: Part, cell: Floats, when: dict[str, Level], value: float) -> Seen:
+    """One value, judged by `(persons, trials)` of the measure."""
+    found = mean_interval(cell.ravel(), part.persons.repeat(len(part.trials)))
+    low, high = (found.low, found.high) if found.n_persons > 1 else (found.mean, found.mean)
+    mean, low, high = (round(x, _DIGITS) for x in (found.mean, low, high))
+    return Seen(when=when, value=value, mean=mean, low=low, high=high)
+
+
+def _choice(seen: list[Seen], when: dict[str, Level]) -> Chosen:
+    return Chosen(when=when, value=choose({s.value: s.mean for s in seen if s.when == when}))
