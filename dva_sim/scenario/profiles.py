@@ -10,9 +10,10 @@ from dva_sim import resources
 from dva_sim.agents.operator.person import Population
 from dva_sim.agents.people import BystanderProfile, GuardProfile
 from dva_sim.agents.profile import RobotProfile, load_robot
-from dva_sim.agents.tilt.phone import PhoneProfile
+from dva_sim.agents.tilt import PhoneProfile
 from dva_sim.config import Config, Document, Fail, M, Path_, load_yaml, validate
 from dva_sim.errors import ConfigError
+from dva_sim.scenario.parts import OperatorConfig
 from dva_sim.scenario.scenario import Scenario
 from dva_sim.worlds.site import Site, load_site, map_site
 
@@ -68,6 +69,16 @@ def bystander_profile(scenario: Scenario) -> BystanderProfile:
 def population(scenario: Scenario) -> Population:
     """The population that the scenario's operators are drawn from."""
     return _profile(Population, scenario.operator.population, "agents/people")
+
+
+def population_of(operator: OperatorConfig) -> Population:
+    """The population that persons are drawn from, around the medians that are named otherwise.
+
+    Raises:
+        ConfigError: there is no such population or trait.
+    """
+    people = _profile(Population, operator.population, "agents/people")
+    return people.with_medians(operator.traits)
 
 
 def _profile(model: type[M], name: str, folder: str) -> M:

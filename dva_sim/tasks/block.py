@@ -1,0 +1,144 @@
+"""A block of trials: one person does what a scenario asks for, trial after trial."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+from dva_sim.agents.operator.delay import DelayEstimate
+from dva_sim.agents.operator.person import Person, draw_person
+from dva_sim.agents.operator.strategies import load_strategy
+from dva_sim.scenario.profiles import population_of
+from dva_sim.streams import Streams, derive_seed
+from dva_sim.tasks.cursor import CursorTrial, Goal
+from dva_sim.tasks.driving import DriveTrial
+from dva_sim.tasks.kinds import Pointing, Reach, Tracking, Tunnel
+from dva_sim.tasks.pointing import PointGoal, ReachGoal, TrackGoal
+from dva_sim.tasks.scenario import TaskScenario
+from dva_sim.tasks.trial import Seat, Trace
+from dva_sim.tasks.tunnel import TunnelGoal
+
+Row = dict[str, Any]
+PAUSE = 1.0  # between two trials, nothing is done [s]
+FINE = 0.01  # resolution at which the delay is learnt from a cursor [s]
+
+
+def play(scenario: TaskScenario, seed: int) -> list[Row]:
+    """Do all trials; one row each, in order.
+
+    The luck of a trial is its own: it depends on seed, person and number alone, so that two
+    devices or delays meet the same noise.
+
+    Args:
+        scenario: The task, the person and what lies between.
+        seed: Decides all luck but who the person is.
+    """
+    return [row for row, _ in _play(scenario, seed, drawn=None)]
+
+
+def trace_of(scenario: TaskScenario, seed: int, number: int = 0) -> tuple[Row, Trace]:
+    """Row and trace of one of the trials that are kept, to be drawn."""
+    for index, (row, trace) in enumerate(_play(scenario, seed, drawn=number)):
+        if index == number:
+            return row, trace
+    raise IndexError(f"there is no trial {number}")
+
+
+def seat_of(scenario: TaskScenario) -> Seat:
+    """Who sits down to the block, without any idea yet how late the link makes it."""
+    operator = scenario.operator
+    person = draw_person(population_of(operator), operator.population_seed, operator.person)
+    guess = person.perceptual_delay + person.hand_lag
+    delay = DelayEstimate(0.0, guess)
+    if not scenario.is_driven:
+        pace = max(first for first, _ in scenario.task.conditions())  # in a second; assumed
+        delay = DelayEstimate(0.0, guess, FINE, (pace, pace))
+    return Seat(person, load_strategy(operator.strategy, operator.options), delay)
+
+
+def _play(scenario: TaskScenario, seed: int, drawn: int | None) -> Iterator[tuple[Row, Trace]]:
+    seat, operator = seat_of(scenario), scenario.operator
+    conditions = list(scenario.task.conditions())
+    plan = [(conditions[0], -1)] * scenario.practice
+    plan += [(c, n) for n, c in enumerate(conditions) for _ in range(scenario.trials)]
+    for number, (condition, cell) in enumerate(plan):
+        kept = number - scenario.practice
+        streams = Streams(derive_seed(seed, operator.population_seed, operator.person, number))
+        trial = _trial(scenario, seat, condition, number, streams)
+        trial.run(keep=kept == drawn)
+        seat.delay.intend(seat.begun + trial.now, 0.0, 0.0)
+        seat.begun += trial.now + PAUSE
+        if kept >= 0:
+            trial.draw_goal()
+            yield _row(trial, condition, cell, kept), trial.trace
+        if drawn is not None and kept == drawn:
+            return
+
+
+def _trial(
+    scenario: TaskScenario,
+    seat: Seat,
+    condition: tuple[float, float],
+    number: int,
+    streams: Streams,
+) -> CursorTrial | DriveTrial:
+    if scenario.is_driven:
+        return DriveTrial(scenario, seat, condition, streams)
+    task, cue = scenario.task, 0.0
+    if isinstance(task, Pointing) and task.cue == "unexpected":
+        cue = seat.person.reaction + scenario.link.down.delay_s + scenario.frames.extra_s
+    goal = _goal(scenario, seat.person, condition, number, streams)
+    return CursorTrial(scenario, seat, goal, streams, cue)
+
+
+def _goal(
+    scenario: TaskScenario,
+    person: Person,
+    condition: tuple[float, float],
+    number: int,
+    streams: Streams,
+) -> Goal:
+    task, (first, second) = scenario.task, condition
+    if isinstance(task, Pointing):
+        angle = 0.0 if task.axes == 1 else number * (math.pi + math.pi / task.targets)
+        return PointGoal(task, first, second, angle, person.hand_lag + scenario.link.up.delay_s)
+    if isinstance(task, Tunnel):
+        return TunnelGoal(task, first, second)
+    if isinstance(task, Tracking):
+        rng = streams.fresh("forcing")
+        return TrackGoal(task, rng.uniform(0.0, 2.0 * math.pi, len(task.frequencies)).tolist())
+    assert isinstance(task, Reach)
+    return ReachGoal(task, 0.5 * second)
+
+
+def _row(
+    trial: CursorTrial | DriveTrial, condition: tuple[float, float], cell: int, kept: int
+) -> Row:
+    """The measures of a trial, with what tells it from the others."""
+    goal = trial.row() if isinstance(trial, DriveTrial) else trial.goal.row(trial)
+    names = NAMES[trial.scenario.task.kind]
+    return {
+        "number": kept,
+        "condition": cell,
+        **dict(zip(names, condition, strict=True)),
+        **goal,
+        "trial_time_s": trial.now,
+        "path_m": trial.path,
+        "waits": trial.waits.count,
+        "wait_s": trial.waits.seconds,
+        "delay_felt_s": trial.seat.delay.value,
+        "hand_most": trial.device.most,
+    }
+
+
+NAMES = {
+    "pointing": ("amplitude_m", "width_m"),
+    "tunnel": ("length_m", "width_m"),
+    "tracking": ("excursion_m", "bandwidth_rad_s"),
+    "corner": ("length_m", "width_m"),
+    "slalom": ("spacing_m", "width_m"),
+    "course": ("length_m", "width_m"),
+    "reach": ("length_m", "width_m"),
+}
+"""What the two numbers of a condition are, by kind of task."""

@@ -1,0 +1,73 @@
+"""How late: frames to the person, readings to the machine, and noise in the hand.
+
+Both directions are the links of the network, so that delay, jitter and loss mean what they mean
+everywhere else; a trial without any of them costs no event.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+from typing import Generic, TypeVar
+
+import numpy as np
+
+from dva_sim.network.link import Link, make_serialiser
+from dva_sim.streams import Streams
+from dva_sim.tasks.scenario import OneWay
+
+T = TypeVar("T")
+EARLY = 1e-9  # what is due now comes now, whatever the rounding [s]
+SIZE = 100  # of a reading or frame [B]: the line is so fast that it does not matter
+
+
+class Channel(Generic[T]):
+    """One direction: what is put in at one end comes out late, in order, or not at all.
+
+    Args:
+        way: Delay, jitter, loss.
+        extra: On top of them, always [s].
+        streams: The luck of the trial.
+        name: Of this direction, for its luck.
+    """
+
+    def __init__(self, way: OneWay, extra: float, streams: Streams, name: str) -> None:
+        config = way.link()
+        self._link = Link(config, make_serialiser(config, "up", streams, name), streams, name)
+        self._is_plain = not way.jitter_s and not way.loss
+        self._extra, self._delay = extra, way.delay_s + extra
+        self._queue: deque[tuple[float, T]] = deque()
+
+    def put(self, now: float, item: T) -> None:
+        """Send something at `now` [s]."""
+        if self._is_plain:
+            self._queue.append((now + self._delay, item))
+            return
+        arrival = self._link.carry(now, SIZE)
+        if arrival is not None:
+            self._queue.append((arrival + self._extra, item))
+
+    def take(self, now: float) -> list[T]:
+        """Everything that has arrived by `now` [s], oldest first."""
+        queue, due = self._queue, now + EARLY
+        if not queue or queue[0][0] > due:
+            return []
+        out = []
+        while queue and queue[0][0] <= due:
+            out.append(queue.popleft()[1])
+        return out
+
+
+def normals(rng: np.random.Generator, block: int = 512) -> Iterator[float]:
+    """Standard normal numbers without end, drawn in blocks."""
+    while True:
+        yield from rng.normal(size=block).tolist()
+
+
+def slow_noise(rng: np.random.Generator, keep: float) -> Iterator[float]:
+    """Normal numbers of variance one, each keeping a share of the last one, without end."""
+    fresh, draws = (1.0 - keep * keep) ** 0.5, normals(rng)
+    value = next(draws)
+    for draw in draws:
+        value = keep * value + fresh * draw
+        yield value

@@ -1,0 +1,164 @@
+"""Trials in which a cursor, or the tip of an arm, is moved; what is to be done is a goal."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from typing import Any
+
+from dva_sim.agents.operator.strategies import (
+    Driver,
+    Oracle,
+    PathView,
+    PointView,
+    Reach,
+    Sighting,
+    Truth,
+    Velocity,
+)
+from dva_sim.agents.steering import Route
+from dva_sim.streams import Streams
+from dva_sim.tasks.channel import Channel
+from dva_sim.tasks.devices import Pair, make_device
+from dva_sim.tasks.kinds import Reach as ReachTask
+from dva_sim.tasks.plants import Cursor
+from dva_sim.tasks.scenario import OneWay, TaskScenario
+from dva_sim.tasks.trial import Seat, Trace, Trial
+
+MOVED = 1e-3  # a cursor that has gone so far has moved [m]; assumed
+
+
+class Goal(ABC):
+    """What is to be done with a cursor, and what is measured of it.
+
+    Attributes:
+        flat: Whether the cursor only moves along x.
+        path: The middle line, if the cursor is led along one.
+        tolerance: Half the width of the target or tunnel [m].
+    """
+
+    flat = False
+    path: Route | None = None
+    tolerance: float
+
+    @abstractmethod
+    def target(self, now: float) -> Pair:
+        """Where the target is [m]."""
+
+    @abstractmethod
+    def check(self, now: float, x: float, y: float, dt: float) -> bool:
+        """The cursor is at a place [m] for `dt` [s]: is the trial over?"""
+
+    @abstractmethod
+    def corrected(self, share: float, now: float, at: Cursor, wanted: Velocity) -> Velocity:
+        """The command when a machine makes a share of the correction itself [m/s]."""
+
+    @abstractmethod
+    def row(self, trial: CursorTrial) -> dict[str, Any]:
+        """What is measured."""
+
+    @abstractmethod
+    def draw(self, trace: Trace) -> None:
+        """Add the geometry to a picture."""
+
+    def notice(self, now: float, seen: Sighting, delay: float) -> None:  # noqa: B027
+        """The person has seen a frame; some goals are reached by what it then does."""
+
+    def holds(self, now: float) -> bool:
+        """Whether something else is being done now, during which the cursor stays."""
+        return False
+
+
+class CursorTrial(Trial[Sighting]):
+    """One trial with a cursor.
+
+    Args:
+        scenario: Device, links, frames.
+        seat: Who does it.
+        goal: What is to be done.
+        streams: The luck of this trial.
+        cue: See `Trial`.
+
+    Attributes:
+        path: Way gone so far [m].
+        moved_at: When the cursor first moved [s], or None.
+    """
+
+    STEP = 0.002
+
+    def __init__(
+        self, scenario: TaskScenario, seat: Seat, goal: Goal, streams: Streams, cue: float = 0.0
+    ) -> None:
+        top = math.inf if scenario.plant.speed_mps is None else scenario.plant.speed_mps
+        config = scenario.device
+        if isinstance(scenario.task, ReachTask):
+            config = config.model_copy(update={"gain": top})
+        self.device = make_device(config, seat.person, streams, self.STEP)
+        self.plant = Cursor(scenario.plant.lag_s, top)
+        reach = Reach(min(top, self.device.top), 0.0)
+        super().__init__(scenario, seat, reach, streams, cue)
+        self.goal = goal
+        way = OneWay() if self.is_oracle else scenario.link.up
+        self._up: Channel[Pair] = Channel(way, 0.0, streams, "up")
+        self._last: tuple[float, float, float, float, float] | None = None
+        self._next_reading, self.path = 0.0, 0.0
+        self.moved_at: float | None = None
+
+    def sight(self) -> Sighting:
+        """Velocities are what two frames in a row tell of them."""
+        now, (x, y) = self.now, (self.plant.x, self.plant.y)
+        tx, ty = self.goal.target(now)
+        vx = vy = tvx = tvy = 0.0
+        if self._last is not None:
+            then, old_x, old_y, old_tx, old_ty = self._last
+            vx, vy = (x - old_x) / (now - then), (y - old_y) / (now - then)
+            tvx, tvy = (tx - old_tx) / (now - then), (ty - old_ty) / (now - then)
+        self._last = now, x, y, tx, ty
+        return Sighting(round(1000 * now), x, y, vx, vy, tx, ty, tvx, tvy, self.goal.tolerance)
+
+    def decide(self, driver: Driver, seen: Sighting, now: float) -> None:
+        """See `Trial`."""
+        delay = self.seat.delay
+        delay.see(now, seen.vx, seen.vy)
+        vx, vy = self._ask(driver, seen, now, delay.value)
+        self.goal.notice(self.now, seen, delay.value)
+        if self.goal.flat:
+            vy = 0.0
+        self.device.aim(vx, vy)
+        self.intended(now, vx, vy)
+
+    def _ask(self, driver: Driver, seen: Sighting, now: float, delay: float) -> Velocity:
+        path = self.goal.path
+        if isinstance(driver, Oracle):
+            truth = Truth(seen)
+            return driver.point(truth) if path is None else driver.follow(path, truth)
+        if path is None:
+            return driver.point(PointView(now, seen, delay))
+        return driver.follow(PathView(now, seen, delay, path))
+
+    def advance(self, dt: float) -> None:
+        """See `Trial`."""
+        now, device, plant, goal = self.now, self.device, self.plant, self.goal
+        device.move(dt)
+        if now >= self._next_reading - 0.5 * dt:
+            self._up.put(now, device.reading())
+            self._next_reading += device.period
+        arrived = self._up.take(now + 0.5 * dt)
+        wanted = device.command(arrived[-1] if arrived else None, dt)
+        if self.scenario.automation:
+            wanted = goal.corrected(self.scenario.automation, now, plant, wanted)
+        if goal.holds(now):
+            wanted = 0.0, 0.0
+        plant.step(wanted[0], 0.0 if goal.flat else wanted[1], dt)
+        self.path += math.hypot(plant.vx, plant.vy) * dt
+        if self.moved_at is None and self.path > MOVED:
+            self.moved_at = now + dt
+        self.over = goal.check(now + dt, plant.x, plant.y, dt)
+
+    def point_now(self) -> tuple[float, float, float]:
+        """See `Trial`."""
+        return self.plant.x, self.plant.y, math.hypot(self.plant.vx, self.plant.vy)
+
+    def draw_goal(self) -> None:
+        """Add the geometry to the trace."""
+        self.goal.draw(self.trace)

@@ -1,0 +1,191 @@
+"""One trial: frames come, a person perceives them and wants something, a hand does it.
+
+The way is that of a real drive: frames at a rate -> link -> perceptual delay -> strategy, told the
+delay as the person has learnt it -> hand and device -> link -> what is moved. Only the oracle sees
+and moves it without frames, links and perception. Time goes by fixed steps; what is due is done at
+the step nearest to it, so that no delay is longer or shorter on average.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Generic, TypeVar
+
+from dva_sim.agents.operator.delay import DelayEstimate
+from dva_sim.agents.operator.person import Person
+from dva_sim.agents.operator.strategies import Driver, Oracle, Reach
+from dva_sim.streams import Streams
+from dva_sim.tasks.channel import Channel
+from dva_sim.tasks.scenario import TaskScenario
+
+S = TypeVar("S")  # what a frame shows
+Pair = tuple[float, float]
+
+WAIT_FROM = 0.1  # who wants nothing for so long waits [s]; assumed
+MACHINE_GAIN = 2.0  # of a machine that corrects by itself [rad/s]; assumed
+TRACE_EVERY = 0.02  # [s]
+
+
+@dataclass
+class Seat:
+    """Who does the trials of a block, and what stays from one to the next.
+
+    Attributes:
+        person: Who it is.
+        strategy: Makes the strategy for what is steered.
+        delay: What the person has learnt of the delay, on a clock that runs on over trials.
+        begun: When this trial begins, on that clock [s].
+    """
+
+    person: Person
+    strategy: Callable[[Person, Reach], Driver]
+    delay: DelayEstimate
+    begun: float = 0.0
+
+
+@dataclass
+class Trace:
+    """What can be drawn of a trial.
+
+    Attributes:
+        times: [s]
+        places: [m]
+        speeds: [m/s]
+        touched: Where a wall was crossed, or a target left again [m].
+        walls: Lines that show the geometry, each a list of places [m].
+        marks: Circles that show targets: x, y and radius [m].
+    """
+
+    times: list[float] = field(default_factory=list)
+    places: list[Pair] = field(default_factory=list)
+    speeds: list[float] = field(default_factory=list)
+    touched: list[Pair] = field(default_factory=list)
+    walls: list[list[Pair]] = field(default_factory=list)
+    marks: list[tuple[float, float, float]] = field(default_factory=list)
+
+
+class Waits:
+    """Counts how often, and how long, a person wants nothing and waits to see.
+
+    Attributes:
+        count: How often.
+        seconds: In all [s].
+    """
+
+    def __init__(self) -> None:
+        self.count, self.seconds = 0, 0.0
+        self._since: float | None = None
+
+    def note(self, now: float, moves: bool) -> None:
+        """From `now` [s] on the person wants to move something, or wants it to stand."""
+        if moves:
+            if self._since is not None and now - self._since >= WAIT_FROM:
+                self.count += 1
+                self.seconds += now - self._since
+            self._since = None
+        elif self._since is None:
+            self._since = now
+
+
+class Trial(ABC, Generic[S]):
+    """What all trials have in common.
+
+    Args:
+        scenario: Rates, links, horizon.
+        seat: Who does it.
+        reach: What can be done with what is moved.
+        streams: The luck of this trial.
+        cue: Time before the first frame is acted on, beyond perception [s].
+
+    Attributes:
+        now: Since the trial began [s].
+        over: Whether it is done.
+        first_move: When the person first wanted to move anything [s], or None.
+    """
+
+    STEP: float  # [s]
+
+    def __init__(
+        self, scenario: TaskScenario, seat: Seat, reach: Reach, streams: Streams, cue: float = 0.0
+    ) -> None:
+        self.scenario, self.seat, self.trace = scenario, seat, Trace()
+        self.waits, self.now, self.over = Waits(), 0.0, False
+        self.first_move: float | None = None
+        self._driver, self._cue = seat.strategy(seat.person, reach), cue
+        perception = seat.person.perceptual_delay
+        extra = scenario.frames.extra_s + perception
+        self._frames: Channel[S] = Channel(scenario.link.down, extra, streams, "down")
+
+    @abstractmethod
+    def sight(self) -> S:
+        """What a frame taken now shows."""
+
+    @abstractmethod
+    def decide(self, driver: Driver, seen: S, now: float) -> None:
+        """A frame is perceived: want something; `now` is the person's clock [s]."""
+
+    @abstractmethod
+    def advance(self, dt: float) -> None:
+        """Let `dt` [s] pass for hand, link and what is moved."""
+
+    @abstractmethod
+    def point_now(self) -> tuple[float, float, float]:
+        """Where it is [m, m], and how fast [m/s], for the picture."""
+
+    def run(self, keep: bool = False) -> None:
+        """Play the trial to its end; `keep` its trace to be drawn."""
+        step, half, look = self.STEP, 0.5 * self.STEP, self._look_of()
+        steps, next_frame, next_trace = 0, 0.0, 0.0
+        horizon = self.scenario.horizon_s
+        while not self.over and self.now < horizon:
+            now = self.now
+            if now >= next_frame - half:
+                self._frames_due(now)
+                next_frame += look
+            seen = self._frames.take(now + half)
+            if seen and now >= self._cue - half:
+                self._perceive(seen[-1])
+            if keep and now >= next_trace - half:
+                self._draw()
+                next_trace += TRACE_EVERY
+            self.advance(step)
+            steps += 1
+            self.now = steps * step
+        if keep:
+            self._draw()
+        self.waits.note(self.now, moves=True)
+
+    def intended(self, now: float, one: float, other: float) -> None:
+        """The person wants this from now on: the delay is learnt from it, and waits are counted."""
+        self.seat.delay.intend(now, one, other)
+        moves = one != 0.0 or other != 0.0
+        if moves and self.first_move is None:
+            self.first_move = self.now
+        if self.first_move is not None:
+            self.waits.note(self.now, moves)
+
+    def _look_of(self) -> float:
+        """Between two frames [s]."""
+        return Oracle.DELAY if self.is_oracle else 1.0 / self.scenario.frames.rate_hz
+
+    @property
+    def is_oracle(self) -> bool:
+        """Whether the reference steers, which no delay reaches."""
+        return isinstance(self._driver, Oracle)
+
+    def _frames_due(self, now: float) -> None:
+        if self.is_oracle:
+            self.decide(self._driver, self.sight(), self.seat.begun + now)
+        else:
+            self._frames.put(now, self.sight())
+
+    def _perceive(self, seen: S) -> None:
+        self.decide(self._driver, seen, self.seat.begun + self.now)
+
+    def _draw(self) -> None:
+        x, y, speed = self.point_now()
+        self.trace.times.append(self.now)
+        self.trace.places.append((x, y))
+        self.trace.speeds.append(speed)
