@@ -185,7 +185,8 @@ def _commands(pattern: str, delay: float, profile: str, rng: np.random.Generator
         for q, factor in {"p05": 0.9, "p25": 0.95, "p50": 1, "p75": 1.2, "p95": 1.6}.items()
     }
     stages = {
-        "delay_human_s": 0.35,
+        "delay_human_s": 0.2,
+        "delay_hand_s": 0.15,
         "delay_filter_s": 0.07 if profile == "default" else 0.45,
         "delay_sampling_s": period / 2,
         "delay_uplink_s": delay,
@@ -197,5 +198,6 @@ def _commands(pattern: str, delay: float, profile: str, rng: np.random.Generator
         {"command_rate_hz": 0.97 / period, "stop_share": 0.05 * delay, "contacts": 0}
         | ages
         | stages
-        | {"loop_delay_mean_s": sum(stages.values())}
+        | {"loop_delay_mean_s": sum(stages.values()), "command_age_mean_s": age}
+        | {"loop_delay_measured_s": sum(stages.values()) + 0.01}
     )

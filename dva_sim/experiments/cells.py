@@ -43,7 +43,10 @@ class CellTable:
 _Summarise = Callable[[Floats], Any]
 Summary = tuple[str, str, _Summarise, Callable[[float], str]]
 _SUMMARIES: tuple[Summary, ...] = (
-    ("command_age_p50_s", "command age, median [s]", np.mean, number),
+    ("command_age_mean_s", "age of commands at application [s]", np.mean, number),
+    ("age_in_force_mean_s", "age of the command in force [s]", np.mean, number),
+    ("loop_delay_mean_s", "observation to effect, sum of stages [s]", np.mean, number),
+    ("loop_delay_measured_s", "the same, measured [s]", np.mean, number),
     ("command_rate_hz", "applied commands [Hz]", np.mean, number),
     ("stop_share", "in safe stop", np.mean, percent),
     ("contacts", "contacts per run", np.mean, number),

@@ -9,7 +9,7 @@ from typing import Any
 
 from dva_sim.experiments.cadence import Cadence, cadence
 from dva_sim.experiments.effects import Setting, Table, View
-from dva_sim.experiments.figures import commands, distribution, effect, ground, story
+from dva_sim.experiments.figures import budget, commands, distribution, effect, ground, story
 from dva_sim.experiments.figures.style import Drawn, styled
 from dva_sim.experiments.labels import Level
 
@@ -32,7 +32,7 @@ def draw_all(view: View, tables: Mapping[str, Table], scenario: Mapping[str, Any
             distribution.distributions(view),
             commands.command_age(view),
             commands.command_rate(view, cadence_of),
-            commands.delay_budget(view),
+            budget.delay_budget(view),
         ]
         if "tracks" in tables:
             drawn.append(ground.trajectories(view, tables["tracks"], scenario))

@@ -1,4 +1,4 @@
-"""What becomes of the commands: how old they are, how many arrive, where the delay is spent."""
+"""What becomes of the commands: how old they are, and how many arrive."""
 
 from __future__ import annotations
 
@@ -20,29 +20,15 @@ from dva_sim.experiments.figures.style import (
     finish,
     legend,
     name_lines,
-    outer_labels,
     panel_title,
     panels,
     stops_axis,
 )
-from dva_sim.experiments.labels import level_name
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _QUANTILES = ("p05", "p25", "p50", "p75", "p95")
-# The way around the loop, from what the camera saw; blue the link, orange the phone.
-_STAGES = {
-    "delay_frame_s": ("frame", "#6b6b6b"),
-    "delay_downlink_s": ("down-link", "#8fc1e3"),
-    "delay_human_s": ("human", "#cccccc"),
-    "delay_filter_s": ("filter", "#d98200"),
-    "delay_pattern_s": ("pattern", "#c23b22"),
-    "delay_sampling_s": ("sampling", "#f6cd82"),
-    "delay_uplink_s": ("up-link", "#1f6fa8"),
-    "delay_processing_s": ("processing", "#a0508a"),
-    "delay_motor_s": ("motor", "#4a7a4a"),
-}
 
 
 def command_age(view: View) -> Drawn | None:
@@ -105,37 +91,6 @@ def command_rate(view: View, cadence_of: CadenceOf) -> Drawn | None:
     return finish(figure, "command_rate", "Commands applied per second", caption)
 
 
-def delay_budget(view: View) -> Drawn | None:
-    """The delay of the whole loop as the sum it is."""
-    from matplotlib.patches import Patch
-
-    stages = [column for column in _STAGES if view.part.has(column)]
-    if not stages:
-        return None
-    shown = view.shown
-    figure, axes = panels(len(shown), len(view.lines), 2.5, sharex=True, sharey=True)
-    for row, panel in zip(axes, shown, strict=True):
-        for ax, level in zip(row, view.lines, strict=True):
-            means = {s: _cell_means(view.curve(view.part.grid(s), panel, level)) for s in stages}
-            _stack(ax, means)
-            stops_axis(ax, view.over)
-            if view.line and row is axes[0]:
-                ax.set_title(level_name(view.line.name, level))
-    outer_labels(axes, shown, "Loop delay [s]")
-    figure.legend(
-        handles=[Patch(color=_STAGES[stage][1], label=_STAGES[stage][0]) for stage in stages],
-        loc="outside upper left",
-        ncols=len(stages),
-        handlelength=1.2,
-    )
-    caption = (
-        "Mean time spent in each stage, from what a camera saw to the effect of the command it "
-        "led to: stacked, because a delay is a sum. Frame and sampling are the time that a value "
-        "stands before the next one replaces it."
-    )
-    return finish(figure, "delay_budget", "Where the delay of the loop is spent", caption)
-
-
 def _cell_means(values: Floats) -> Floats:
     """`(stops, persons, trials)` to means over all runs of a stop."""
     return nan_mean(values.reshape(len(values), -1), axis=1)
@@ -156,12 +111,3 @@ def _closed_form(ax: Axes, view: View, cadence: Cadence | None) -> None:
     rates = [cadence.lock_step_rate(d) for d in np.interp(x, np.arange(len(delays)), delays)]
     ax.plot(x, rates, color=INK, lw=1, ls=(0, (4, 2)), zorder=3)
     mark_boundary(ax, view.over, cadence, text=False)
-
-
-def _stack(ax: Axes, means: dict[str, Floats]) -> None:
-    """The stages on top of each other."""
-    floor = np.zeros(len(next(iter(means.values()))))
-    for stage, values in means.items():
-        x, heights = range(len(values)), np.nan_to_num(values)
-        ax.bar(x, heights, 0.72, floor, color=_STAGES[stage][1], edgecolor="white", lw=0.4)
-        floor = floor + heights
