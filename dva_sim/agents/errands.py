@@ -3,30 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from dva_sim.agents.modes import Mission
-from dva_sim.agents.operator.person import Person
+from dva_sim.agents.operator.person import Population, median_person
 from dva_sim.protocol import messages as m
 
 Point = tuple[float, float]
 
 # The robot's own loop has no delay to speak of: a brisk, steady driver.
-AUTOPILOT = Person(
-    perceptual_delay=0.0,
-    hand_lag=0.0,
-    crossover=2.0,
-    caution=0.3,
-    pace=1.0,
-    confirm_look=0.0,
-    reading=0.0,
-    position_error=0.0,
-    heading_error=0.0,
-    reaction=0.0,
-    margin=0.5,
-    motor_noise=0.0,
-    pointing=2.0,
-)
+AUTOPILOT = replace(median_person(Population()), crossover=2.0, pace=1.0)
 
 
 @dataclass(frozen=True)

@@ -4,62 +4,82 @@ from __future__ import annotations
 
 import numpy as np
 
-STEP = 0.1  # resolution of the memory and of the guess [s]
-LONGEST = 8.0  # [s]
-LOOKS = 0.2  # how often the guess is looked at [s]
-MEMORY = 0.96  # share of the old evidence kept at each look: it fades in about 5 s
+STEP = 0.1  # resolution of the memory and of the guess while driving [s]
+LONGEST = 12.0  # nobody remembers what it did longer ago [s]; assumed
+LOOK_STEPS = 2  # the guess is looked at every so many steps
+FADES_IN = 5.0  # evidence counts e times less after so long [s]; assumed
+FIRM = 0.004  # what was learnt before counts as so much misfit for each second off it; assumed
+MOST = 0.5  # misfit of one look, whatever is seen
+DRIVING = (0.5, 1.0)  # by so much the motions must differ to count one [m/s, rad/s]
 
 
 class DelayEstimate:
     """A running guess of the time from an intent to its effect in the picture.
 
-    For each candidate lag it keeps how badly the motion seen now fits what was asked for
-    that long ago, forgetting slowly; the guess is the lag that fits best. While nothing
-    changes all lags fit alike, and the guess stays.
+    For each candidate lag it keeps how badly the motion seen now fits what was asked for that
+    long ago, forgetting slowly; the guess is the lag that fits best. While nothing changes all lags
+    fit alike, and the guess stays. Nobody tells a person the delay: this is all that it knows.
 
     Args:
-        start: When the drive begins [s].
-        guess: What the person expects at first [s].
+        start: When the drive or the trial begins [s].
+        guess: What the person expects at first: what it learnt before [s].
+        step: Resolution of the guess [s].
+        scale: For each of the two channels, the difference that counts one, in its unit.
+
+    Attributes:
+        value: The guess [s].
     """
 
-    def __init__(self, start: float, guess: float) -> None:
+    def __init__(
+        self,
+        start: float,
+        guess: float,
+        step: float = STEP,
+        scale: tuple[float, float] = DRIVING,
+    ) -> None:
         self._start = self._next_look = start
-        self._lags = np.arange(1, round(LONGEST / STEP) + 1) * STEP
+        self._step, self._period = step, LOOK_STEPS * step
+        self._keep = float(np.exp(-self._period / FADES_IN))
+        self._weights = 1.0 / scale[0], 1.0 / scale[1]
+        self._lags = np.arange(1, round(LONGEST / step) + 1) * step
         self._offset = self._filled = len(self._lags)
-        self._speeds, self._turns = np.zeros(4096), np.zeros(4096)
+        self._asked = np.zeros((2, 4 * len(self._lags)))
         self._intent = (0.0, 0.0)
-        self._misfit = 0.02 * np.abs(self._lags - guess)
+        self._misfit = FIRM * np.abs(self._lags - guess)
         self.value = guess
 
-    def intend(self, now: float, speed: float, turn_rate: float) -> None:
-        """The person asks for this from `now` [s] on: speed [m/s], turn rate [rad/s]."""
+    def intend(self, now: float, one: float, other: float) -> None:
+        """The person asks for this from `now` [s] on: speed and turn rate, or two velocities."""
         self._remember(now)
-        self._intent = speed, turn_rate
+        self._intent = one, other
 
-    def see(self, now: float, speed: float, turn_rate: float) -> None:
+    def see(self, now: float, one: float, other: float) -> None:
         """The picture shows this motion at `now` [s]."""
         if now < self._next_look:
             return
-        self._next_look = now + LOOKS
+        self._next_look = now + self._period
         self._remember(now)
         newest = self._filled
         past = slice(newest - len(self._lags), newest)
-        error = np.abs(self._speeds[past] - speed)
-        error *= 2.0
-        error += np.abs(self._turns[past] - turn_rate)
-        np.minimum(error, 0.5, out=error)
+        error = np.abs(self._asked[0, past] - one)
+        error *= self._weights[0]
+        turn = np.abs(self._asked[1, past] - other)
+        turn *= self._weights[1]
+        error += turn
+        np.minimum(error, MOST, out=error)
+        error *= self._period
         misfit = self._misfit
-        misfit *= MEMORY
+        misfit *= self._keep
         misfit += error[::-1]
         self.value = float(self._lags[misfit.argmin()])
 
     def _remember(self, now: float) -> None:
         """Fill the memory with the standing intent up to `now`."""
-        due = self._offset + int((now - self._start) / STEP + 1e-6)
+        due = self._offset + int((now - self._start) / self._step + 1e-6)
         if due <= self._filled:
             return
-        while due >= len(self._speeds):
-            self._speeds = np.append(self._speeds, np.zeros_like(self._speeds))
-            self._turns = np.append(self._turns, np.zeros_like(self._turns))
-        self._speeds[self._filled : due], self._turns[self._filled : due] = self._intent
+        while due >= self._asked.shape[1]:
+            self._asked = np.hstack([self._asked, np.zeros_like(self._asked)])
+        self._asked[0, self._filled : due] = self._intent[0]
+        self._asked[1, self._filled : due] = self._intent[1]
         self._filled = due

@@ -1,5 +1,6 @@
 """How operators steer: from what they see, or (the reference) from what is."""
 
+from dva_sim.agents.operator.strategies.adaptive import Adaptive
 from dva_sim.agents.operator.strategies.base import (
     Intent,
     PathView,
@@ -16,21 +17,28 @@ from dva_sim.agents.operator.strategies.loading import (
     load_strategy,
     try_strategy,
 )
+from dva_sim.agents.operator.strategies.move_and_wait import MoveAndWait
 from dva_sim.agents.operator.strategies.oracle import Oracle, Truth
+from dva_sim.agents.operator.strategies.predictor import Predictor
 from dva_sim.agents.operator.strategies.pursuit import Pursuit
+from dva_sim.agents.operator.strategies.two_point import TwoPoint
 
 __all__ = [
+    "Adaptive",
     "Driver",
     "Guarded",
     "Intent",
+    "MoveAndWait",
     "Oracle",
     "PathView",
     "PointView",
+    "Predictor",
     "Pursuit",
     "Reach",
     "Sighting",
     "Strategy",
     "Truth",
+    "TwoPoint",
     "Velocity",
     "View",
     "gain_at",

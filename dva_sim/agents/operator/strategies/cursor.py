@@ -92,7 +92,7 @@ def through(path: Route, seen: Sighting, delay: float, person: Person, most: flo
         most: As fast as the person cares to go [m/s].
     """
     delay, room = max(delay, SHORTEST), person.caution * seen.tolerance
-    speed = min(most, room / (delay * max(person.motor_noise, SHORTEST)))
+    speed = fastest(seen.tolerance, delay, person, most)
     look = max(speed * delay / person.caution, seen.tolerance)
     ahead = path.ahead(seen.x, seen.y, 0.0, look)
     bend = _bend(path, path.length - ahead.remaining, look)
@@ -103,6 +103,19 @@ def through(path: Route, seen: Sighting, delay: float, person: Person, most: flo
     if ahead.remaining < look:  # the end is a target like any other
         speed = min(speed, gain_at(person.pointing, person.margin, delay) * ahead.distance)
     return speed * math.cos(ahead.bearing), speed * math.sin(ahead.bearing)
+
+
+def fastest(half_width: float, delay: float, person: Person, most: float) -> float:
+    """The speed at which the noise of the hand, during the delay, takes up the person's caution.
+
+    Args:
+        half_width: Of the tunnel [m].
+        delay: What the person takes the whole delay to be [s].
+        person: Caution and noise.
+        most: As fast as the person cares to go [m/s].
+    """
+    noise = max(delay, SHORTEST) * max(person.motor_noise, SHORTEST)
+    return min(most, person.caution * half_width / noise)
 
 
 def _bend(path: Route, along: float, look: float) -> float:

@@ -7,17 +7,25 @@ from pathlib import Path
 from typing import Any, Final
 
 from dva_sim.agents.operator.person import Person, Population, median_person
+from dva_sim.agents.operator.strategies.adaptive import Adaptive
 from dva_sim.agents.operator.strategies.base import Reach, Strategy
 from dva_sim.agents.operator.strategies.guarded import Guarded
+from dva_sim.agents.operator.strategies.move_and_wait import MoveAndWait
 from dva_sim.agents.operator.strategies.oracle import Oracle
+from dva_sim.agents.operator.strategies.predictor import Predictor
 from dva_sim.agents.operator.strategies.pursuit import Pursuit
+from dva_sim.agents.operator.strategies.two_point import TwoPoint
 from dva_sim.plugins import Plugins
 
 Driver = Strategy | Oracle
 
 STRATEGIES: Final[dict[str, Callable[..., Driver]]] = {
+    "adaptive": Adaptive,
+    "move_and_wait": MoveAndWait,
     "oracle": Oracle,
+    "predictor": Predictor,
     "pursuit": Pursuit,
+    "two_point": TwoPoint,
 }
 
 _PLUGINS: Final = Plugins[Driver](

@@ -48,10 +48,18 @@ class Pursuit(Strategy):
             gain = gain_at(person.crossover, person.margin, delay)
             return reach.turn(self._clamp(gain * ahead.bearing))
         speed = min(wanted, person.caution * look / delay, ahead.remaining / (2.0 * delay + 1.0))
-        return self._along(route, view, ahead, speed)
+        return self._along(route, view, ahead, look, speed)
 
-    def _along(self, route: Route, view: View, ahead: Ahead, speed: float) -> Intent:
-        """Towards the point ahead on an arc, slower where that would be too sharp."""
+    def _along(self, route: Route, view: View, ahead: Ahead, look: float, speed: float) -> Intent:
+        """Towards the point ahead on an arc, slower where that would be too sharp.
+
+        Args:
+            route: The way to go.
+            view: What is seen, and when.
+            ahead: The point ahead.
+            look: How far ahead on the route it lies [m].
+            speed: As fast as one may [m/s].
+        """
         curvature = 2.0 * math.sin(ahead.bearing) / max(ahead.distance, 0.2)
         most = IN_CURVES * self.reach.turn_rate
         if abs(curvature) * speed > most:

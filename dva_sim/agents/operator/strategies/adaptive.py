@@ -1,0 +1,124 @@
+"""Steers in a closed loop, or moves and waits: whichever the person expects to be done sooner.
+
+References:
+    W. R. Ferrell: Remote manipulation with transmission delay. IEEE Trans. Human Factors in
+    Electronics HFE-6 (1965): with long delays people come to move and wait by themselves.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from dva_sim.agents.operator.person import Person
+from dva_sim.agents.operator.strategies.base import (
+    Intent,
+    PathView,
+    PointView,
+    Reach,
+    Strategy,
+    View,
+)
+from dva_sim.agents.operator.strategies.cursor import SHORTEST, Velocity, fastest, gain_at
+from dva_sim.agents.operator.strategies.move_and_wait import MoveAndWait
+from dva_sim.agents.operator.strategies.moves import SHORT
+from dva_sim.agents.operator.strategies.pursuit import FARTHEST_LOOK
+from dva_sim.agents.steering import Route
+from dva_sim.errors import ConfigError
+
+BETTER = 0.8  # one changes to what takes less than this share of the time; assumed
+GAP = 1.0  # a longer time between two frames is not counted as driving [s]
+
+
+class Adaptive(Strategy):
+    """Compares two expected times to finish, and changes to what is clearly better.
+
+    Expected are, from the delay as estimated and the way left: in a closed loop, the pace that the
+    delay allows, or the time that the person's gain takes to close an error; moving and waiting,
+    full pace and a wait after each move. Moving and waiting begins with a wait, and is left only
+    between two moves.
+
+    Args:
+        person: Who steers.
+        reach: Limits of what is steered.
+        closed: Strategy of the closed loop.
+
+    Attributes:
+        using: What is used now: `closed` or `move_and_wait`.
+        switches: How often that has changed.
+
+    Raises:
+        ConfigError: the strategy of the closed loop is none.
+    """
+
+    def __init__(self, person: Person, reach: Reach, closed: str = "pursuit") -> None:
+        from dva_sim.agents.operator.strategies.loading import load_strategy
+
+        super().__init__(person, reach)
+        made = load_strategy(closed)(person, reach)
+        if not isinstance(made, Strategy):
+            raise ConfigError(f"option 'closed' is {closed!r}, which closes no loop by eye")
+        self._closed, self._moves = made, MoveAndWait(person, reach)
+        self.using = "closed"
+        self.switches = 0
+        self._times = {"closed": 0.0, "move_and_wait": 0.0}
+        self._last: float | None = None
+
+    def drive(self, route: Route, view: View, stop_before: float) -> Intent:
+        """See `Strategy`."""
+        seen, person = view.seen, self.person
+        left = route.ahead(seen.x, seen.y, seen.heading, 0.0).remaining - stop_before
+        delay = max(view.delay, SHORTEST)
+        pace = min(self._most, person.caution * FARTHEST_LOOK / delay)
+        turn = 1.0 / gain_at(person.crossover, person.margin, delay)
+        count = max(left / self._moves.trusted, 1.0)
+        self._choose(view.now, max(left, 0.0) / pace + turn, self._waiting(left, count, delay))
+        return self._now.drive(route, view, stop_before)
+
+    def point(self, view: PointView) -> Velocity:
+        """See `Strategy`."""
+        seen, person = view.seen, self.person
+        away = math.hypot(seen.target_x - seen.x, seen.target_y - seen.y)
+        folds = math.log(max(away / max(seen.tolerance, SHORTEST), 1.0))
+        gain = gain_at(person.pointing, person.margin, view.delay)
+        count = max(folds / -math.log(max(person.motor_noise, SHORTEST)), 1.0)
+        waiting = self._waiting(away, count, view.delay)
+        self._choose(view.now, folds / gain + away / self._most, waiting)
+        return self._now.point(view)
+
+    def follow(self, view: PathView) -> Velocity:
+        """See `Strategy`."""
+        seen, person = view.seen, self.person
+        left = view.path.ahead(seen.x, seen.y, 0.0, 0.0).remaining
+        pace = fastest(seen.tolerance, view.delay, person, self._most)
+        count = max(left / self._moves.trusted_in(seen.tolerance), 1.0)
+        self._choose(view.now, left / pace, self._waiting(left, count, view.delay))
+        return self._now.follow(view)
+
+    def workload(self) -> Mapping[str, float]:
+        """How often the person waited, and how much of the time it moved and waited."""
+        total = sum(self._times.values())
+        share = self._times["move_and_wait"] / total if total else 0.0
+        return {**self._moves.workload(), "move_and_wait_share": share}
+
+    @property
+    def _now(self) -> Strategy:
+        return self._closed if self.using == "closed" else self._moves
+
+    def _waiting(self, way: float, moves: float, delay: float) -> float:
+        """Expected time to finish by so many moves, each with its wait [s]."""
+        a_move = SHORT + self._moves.moves.usual_wait(delay)
+        return max(way, 0.0) / self._most + moves * a_move
+
+    def _choose(self, now: float, closed: float, waiting: float) -> None:
+        """Change the way of steering if the other one takes clearly less time [s]."""
+        if self._last is not None:
+            self._times[self.using] += min(now - self._last, GAP)
+        self._last = now
+        if self.using == "closed" and waiting < BETTER * closed:
+            self.using = "move_and_wait"
+            self._moves.halt(now)
+            self.switches += 1
+        elif self.using != "closed" and closed < BETTER * waiting and self._moves.moves.rests:
+            self.using = "closed"
+            self.switches += 1

@@ -1,0 +1,150 @@
+"""Move and wait: as far as one trusts an open-loop move, then stop and see what came of it.
+
+References:
+    W. R. Ferrell: Remote manipulation with transmission delay. IEEE Trans. Human Factors in
+    Electronics HFE-6 (1965).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from dva_sim.agents.camera import Observation
+from dva_sim.agents.operator.person import Person
+from dva_sim.agents.operator.strategies.base import (
+    Intent,
+    PathView,
+    PointView,
+    Reach,
+    Strategy,
+    View,
+)
+from dva_sim.agents.operator.strategies.cursor import SHORTEST, Velocity
+from dva_sim.agents.operator.strategies.moves import SHORT, Moves, Part, straight_way
+from dva_sim.agents.operator.strategies.pursuit import IN_CURVES
+from dva_sim.agents.steering import Ahead, Route
+
+OFF = 0.15  # a robot may be so far off its way after a move [m]; assumed
+FACES = 0.1  # bearing at which one goes without turning first [rad]; assumed
+LEAST = 0.1  # shorter moves are not worth a wait [m]
+
+
+class MoveAndWait(Strategy):
+    """Makes one open-loop move after the other, and waits until it has seen each one's result.
+
+    A move of a robot turns towards a place ahead and goes there straight, as far as the person's
+    errors of heading and hand leave it near its way. A move of a cursor goes all the way to the
+    target; through a tunnel as far as the hand's noise leaves it inside.
+    """
+
+    def __init__(self, person: Person, reach: Reach) -> None:
+        super().__init__(person, reach)
+        self.moves = Moves(person.reaction)
+
+    def drive(self, route: Route, view: View, stop_before: float) -> Intent:
+        """See `Strategy`."""
+        seen = view.seen
+        left = route.ahead(seen.x, seen.y, seen.heading, 0.0).remaining  # kept track of in moves
+        wanted = self.moves.next(view.now, view.delay, self._pace(seen.speed, seen.turn_rate))
+        if wanted is None:
+            parts = self._way(route, seen, left, stop_before)
+            peak = max((self._pace(*part[1:]) for part in parts), default=0.0)
+            wanted = self.moves.begin(view.now, parts, peak) if parts else (0.0, 0.0)
+        return Intent(*wanted)
+
+    def point(self, view: PointView) -> Velocity:
+        """See `Strategy`; leads a target that moves by the time until the move is seen."""
+        seen = view.seen
+        wanted = self.moves.next(view.now, view.delay, self._flow(seen.vx, seen.vy))
+        if wanted is not None:
+            return wanted
+        dx, dy = seen.target_x - seen.x, seen.target_y - seen.y
+        lead = view.delay + self._lasting(math.hypot(dx, dy), self._most)
+        dx, dy = dx + seen.target_vx * lead, dy + seen.target_vy * lead
+        if math.hypot(dx, dy) <= seen.tolerance:
+            return 0.0, 0.0
+        return self._straight(view.now, dx, dy)
+
+    def follow(self, view: PathView) -> Velocity:
+        """See `Strategy`."""
+        seen, path = view.seen, view.path
+        left = path.ahead(seen.x, seen.y, 0.0, 0.0).remaining
+        wanted = self.moves.next(view.now, view.delay, self._flow(seen.vx, seen.vy))
+        if wanted is not None:
+            return wanted
+        if left <= 0.0:
+            return 0.0, 0.0
+        along, room = path.length - left, self.person.caution * seen.tolerance
+        way = min(self.trusted_in(seen.tolerance), left)
+        way = straight_way(path, (seen.x, seen.y), along, way, room)
+        x, y = path.point_at(along + way)
+        return self._straight(view.now, x - seen.x, y - seen.y)
+
+    def workload(self) -> Mapping[str, float]:
+        """How often the person waited to see the result of a move."""
+        return {"waits": float(self.moves.waits)}
+
+    @property
+    def trusted(self) -> float:
+        """How far a robot is driven in one move [m]."""
+        return OFF / max(self.person.heading_error + self.person.motor_noise, SHORTEST)
+
+    def trusted_in(self, half_width: float) -> float:
+        """How far a cursor is moved in a tunnel in one move [m]."""
+        return self.person.caution * half_width / max(self.person.motor_noise, SHORTEST)
+
+    def halt(self, now: float) -> None:
+        """Come from another way of steering: let go, and wait."""
+        self.moves.halt(now, 0.25)
+
+    # --- moves -------------------------------------------------------------------------
+
+    def _way(self, route: Route, seen: Observation, left: float, stop_before: float) -> list[Part]:
+        """The next move of a robot, with so much way left [m]; none where it has come to stay."""
+        here, turns, go = (seen.x, seen.y), self.reach.radius == 0.0, left - stop_before
+        most = max(min(self.trusted, go), LEAST)
+        way = straight_way(route, here, route.length - left, most, OFF)
+        ahead = route.ahead(*here, seen.heading, max(way, stop_before if go <= 0.0 else 0.0))
+        if go <= 0.0:
+            return [self._turn(ahead.bearing)] if turns and abs(ahead.bearing) > FACES else []
+        if turns and abs(ahead.bearing) > FACES:
+            lasts = self._lasting(ahead.distance, self._most)
+            return [self._turn(ahead.bearing), (lasts, ahead.distance / lasts, 0.0)]
+        return [self._curve(ahead)]
+
+    def _turn(self, angle: float) -> Part:
+        """On the spot by an angle [rad]."""
+        most = IN_CURVES * self.reach.turn_rate
+        lasts = max(abs(angle) / most, SHORT)
+        return (lasts, *self.reach.turn(angle / lasts))
+
+    def _curve(self, ahead: Ahead) -> Part:
+        """On an arc to a place ahead, no sharper than the robot can."""
+        curvature = 2.0 * math.sin(ahead.bearing) / max(ahead.distance, LEAST)
+        if self.reach.radius > 0.0:
+            most = 1.0 / self.reach.radius
+            curvature = min(max(curvature, -most), most)
+        fast = min(self._most, IN_CURVES * self.reach.turn_rate / max(abs(curvature), SHORTEST))
+        lasts = self._lasting(ahead.distance, fast)
+        speed = ahead.distance / lasts
+        return lasts, speed, curvature * speed
+
+    def _straight(self, now: float, dx: float, dy: float) -> Velocity:
+        """A move of a cursor by so much [m]."""
+        lasts = self._lasting(math.hypot(dx, dy), self._most)
+        vx, vy = dx / lasts, dy / lasts
+        return self.moves.begin(now, [(lasts, vx, vy)], self._flow(vx, vy))
+
+    @staticmethod
+    def _lasting(way: float, most: float) -> float:
+        """How long a move takes [s]."""
+        return max(way / most, SHORT)
+
+    def _pace(self, speed: float, turn_rate: float) -> float:
+        """How fast a robot moves, driving or turning, as a share of what it can."""
+        return abs(speed) / self.reach.speed + abs(turn_rate) / self.reach.turn_rate
+
+    def _flow(self, vx: float, vy: float) -> float:
+        """How fast a cursor moves, as a share of what it can."""
+        return math.hypot(vx, vy) / self.reach.speed

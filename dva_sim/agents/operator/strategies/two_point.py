@@ -1,0 +1,83 @@
+"""Steering by two points of the road, a near and a far one, in small corrections.
+
+The published law gives increments of a car's steering: k_f d(theta_f) + k_n d(theta_n) +
+k_I min(theta_n, theta_max) dt, of the visual directions theta of a far and a near point. A robot is
+steered by its turn rate, which takes the place of the steering angle, and it is slower by far. What
+is kept are proportions, nothing is fitted:
+
+- of the three gains, 16 : 4 : 3/s; their size follows from the person's own crossover gain, under
+  delay within its margin, which k_f + k_n becomes;
+- of the near to the far point, 0.37 s to 0.93 s ahead; the far point is the look-ahead that the
+  person takes under delay, and times scale with it.
+
+References:
+    D. D. Salvucci, R. Gray: A two-point visual control model of steering. Perception 33 (2004).
+    D. D. Salvucci: Modeling driver behavior in a cognitive architecture. Human Factors 48 (2006):
+    gains 16, 4, 3 and the bound of 0.07, as in the driver model published with it.
+    M. Land, J. Horwood: Which parts of the road guide steering? Nature 377 (1995): the two points.
+    P. Gawthrop et al.: Intermittent control: a computational theory of human control. Biological
+    Cybernetics 104 (2011).
+"""
+
+from __future__ import annotations
+
+import math
+
+from dva_sim.agents.operator.person import Person
+from dva_sim.agents.operator.strategies.base import Intent, Reach, View
+from dva_sim.agents.operator.strategies.cursor import SHORTEST, gain_at
+from dva_sim.agents.operator.strategies.pursuit import Pursuit
+from dva_sim.agents.steering import Ahead, Route, wrap
+
+FAR, NEAR, INTEGRAL = 16.0, 4.0, 3.0  # gains as published, the last one in 1/s
+NEAR_TIME, FAR_TIME = 0.37, 0.93  # to the points, on the road [s]
+LARGEST = 0.07  # direction of the near point that the integral counts at most [rad]
+CYCLE = (
+    0.2  # between two corrections; assumed, about the refractory time of intermittent control [s]
+)
+
+
+class TwoPoint(Pursuit):
+    """Corrects the turn rate by how the directions of two points change.
+
+    Speed, stopping and turning on the spot are those of `Pursuit`, and so is pointing.
+    """
+
+    def __init__(self, person: Person, reach: Reach) -> None:
+        super().__init__(person, reach)
+        self._begin()
+
+    def drive(self, route: Route, view: View, stop_before: float) -> Intent:
+        """See `Strategy`."""
+        intent = super().drive(route, view, stop_before)
+        if self._turning:
+            self._begin()
+        return intent
+
+    def _begin(self) -> None:
+        """As if one had driven straight along a straight road so far."""
+        self._near = self._far = self._turn_rate = 0.0
+        self._corrected = -math.inf
+
+    def _along(self, route: Route, view: View, ahead: Ahead, look: float, speed: float) -> Intent:
+        speed = super()._along(route, view, ahead, look, speed).speed
+        passed = view.now - self._corrected
+        if passed >= CYCLE - 1e-6:
+            self._corrected = view.now
+            self._correct(route, view, ahead, look, speed, min(passed, 2.0 * CYCLE))
+        return Intent(speed, self._clamp(self._turn_rate))
+
+    def _correct(
+        self, route: Route, view: View, ahead: Ahead, look: float, speed: float, passed: float
+    ) -> None:
+        """One correction, `passed` [s] after the last one."""
+        seen, person = view.seen, self.person
+        x, y = route.point_at(route.length - ahead.remaining + look * NEAR_TIME / FAR_TIME)
+        near = wrap(math.atan2(y - seen.y, x - seen.x) - seen.heading)
+        counted = min(max(near, -LARGEST), LARGEST)
+        slower = FAR_TIME * speed / look  # than on the road
+        change = FAR * (ahead.bearing - self._far) + NEAR * (near - self._near)
+        change += INTEGRAL * slower * counted * passed
+        gain = gain_at(person.crossover, person.margin, max(view.delay, SHORTEST))
+        self._turn_rate += gain / (FAR + NEAR) * change
+        self._near, self._far = near, ahead.bearing
