@@ -6,6 +6,9 @@ from collections import Counter, defaultdict
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 
 class Moment(NamedTuple):
     """One line of the timeline.
@@ -113,6 +116,12 @@ class DriveLog:
         hand_lag: Time constant with which the hand follows what is wanted [s].
         frames: Those shown, in order.
         intents: What was wanted, in order.
+        taken_up: When the operator turned to the order [s].
+        attended: From when to when the operator looked at this robot's picture [s].
+        turned_to: How often it turned to that from another one.
+        waits_from: When the robot had come to where its operator has to judge [s].
+        commands: Made from the tilt: when [s], speed [m/s], turn rate [rad/s].
+        ways: Those planned by the operator: when [s], points `(n, 2)` [m].
     """
 
     robot: str
@@ -131,6 +140,12 @@ class DriveLog:
     applied: list[Applied] = field(default_factory=list)
     frames: list[Shown] = field(default_factory=list)
     intents: list[Followed] = field(default_factory=list)
+    taken_up: float | None = None
+    attended: list[tuple[float, float]] = field(default_factory=list)
+    turned_to: int = 0
+    waits_from: float | None = None
+    commands: list[tuple[float, float, float]] = field(default_factory=list)
+    ways: list[tuple[float, NDArray[np.float64]]] = field(default_factory=list)
 
     def followed(self, tick: int, now: float) -> float:
         """Something is wanted by the frame of that tick: when that was captured [s].

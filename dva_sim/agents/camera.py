@@ -1,4 +1,10 @@
-"""What a robot's camera shows: the only thing an operator ever sees of the world."""
+"""What a robot's camera shows: the only thing an operator ever sees of the world.
+
+References:
+    T. Jin: Visibility and human behavior in fire smoke. SFPE Handbook of Fire Protection
+    Engineering (what does not shine is made out through an optical depth of 3).
+    Contrast falls with the optical depth as exp(-depth): H. Koschmieder, 1924.
+"""
 
 from __future__ import annotations
 
@@ -15,13 +21,27 @@ Point = tuple[float, float]
 CAMERA_SCHEME = "zmq+tcp://"  # host, port, topic: where simulated robots publish their frames
 
 
+CLEAR = 1000.0  # visibility where there is no smoke [m]
+
+
 class SeenHazard(NamedTuple):
-    """A hazard in the picture: kind, place [m] and distance from the camera [m]."""
+    """A hazard in the picture.
+
+    Attributes:
+        kind: `fire`, `gas_leak` or `flood`.
+        x: Where it is, judged from the picture and the map [m].
+        y: The same to the north [m].
+        distance: From the camera [m].
+        angle: How large it looks: the angle that it fills [rad].
+        contrast: Share of its contrast that the smoke before it leaves.
+    """
 
     kind: str
     x: float
     y: float
     distance: float
+    angle: float
+    contrast: float
 
 
 class Observation(NamedTuple):
@@ -35,6 +55,8 @@ class Observation(NamedTuple):
         speed: How fast the picture says it goes [m/s].
         turn_rate: How fast the picture says it turns [rad/s].
         hazards: What burns, leaks or floods in view.
+        visibility: How far the camera sees what does not shine, through the smoke before it
+            [m]; `CLEAR` where there is none.
     """
 
     tick: int
@@ -44,6 +66,7 @@ class Observation(NamedTuple):
     speed: float
     turn_rate: float
     hazards: tuple[SeenHazard, ...]
+    visibility: float = CLEAR
 
 
 class Frame(NamedTuple):
@@ -63,18 +86,27 @@ class Frame(NamedTuple):
     def unpack(cls, data: bytes) -> Frame | None:
         """The frame in `data`; None if there is none."""
         try:
-            (*values, hazards), captured = json.loads(data)
+            (*values, hazards, visibility), captured = json.loads(data)
             tick, *pose = (float(value) for value in values)
             x, y, heading, speed, turn_rate = pose
-            seen = tuple(
-                SeenHazard(str(kind), float(hx), float(hy), float(distance))
-                for kind, hx, hy, distance in hazards
-            )
-            at = Observation(int(tick), x, y, heading, speed, turn_rate, seen)
-            sound = 0 <= tick < 2**53 and math.isfinite(sum(pose))
+            seen = tuple(_hazard(*hazard) for hazard in hazards)
+            at = Observation(int(tick), x, y, heading, speed, turn_rate, seen, float(visibility))
+            sound = 0 <= tick < 2**53 and math.isfinite(sum(pose) + at.visibility)
             return cls(at, float(captured)) if sound else None
         except (ValueError, TypeError, OverflowError, RecursionError):
             return None
+
+
+def _hazard(kind: object, *numbers: float) -> SeenHazard:
+    """A hazard out of a message that may be anything.
+
+    Raises:
+        ValueError: what is no finite number.
+    """
+    values = [float(number) for number in numbers]
+    if not math.isfinite(sum(values)):
+        raise ValueError("not a number")
+    return SeenHazard(str(kind), *values)
 
 
 class HazardSpot(NamedTuple):
@@ -87,8 +119,9 @@ class HazardSpot(NamedTuple):
 
 
 SEEN_THROUGH = 3.0
-"""Optical depth of smoke through which what does not shine is still made out (T. Jin, Visibility
-and human behavior in fire smoke, SFPE Handbook). Smoke hides no fire: who sees it has found one."""
+"""Optical depth of smoke through which what does not shine is still made out (Jin). Smoke hides no
+fire: who sees it has found one."""
+NEAR = 0.5  # smoke so far before the camera stands between it and everything [m]
 
 
 def no_smoke(a: Point, b: Point) -> float:
@@ -129,6 +162,21 @@ class View:
             here, there = (x, y), (hazard.x, hazard.y)
             if not self.line_of_sight(here, there):
                 continue
-            if hazard.kind == "fire" or self.smoke(here, there) < SEEN_THROUGH:
-                seen.append(SeenHazard(hazard.kind, hazard.x, hazard.y, distance))
+            depth = 0.0 if hazard.kind == "fire" else self.smoke(here, there)
+            if depth < SEEN_THROUGH:
+                looks = 2.0 * half_width, math.exp(-depth)
+                seen.append(SeenHazard(hazard.kind, hazard.x, hazard.y, distance, *looks))
         return tuple(seen)
+
+    def visibility(self, x: float, y: float, heading: float) -> float:
+        """How far what does not shine is made out from a pose [m, rad], at most `CLEAR` [m].
+
+        By the thicker of the smoke just before the camera and that along its axis: clean air
+        beyond a wall lets nobody see through the smoke before it.
+        """
+        ahead = math.cos(heading), math.sin(heading)
+        thickest = max(
+            self.smoke((x, y), (x + far * ahead[0], y + far * ahead[1])) / far
+            for far in (NEAR, self.range)
+        )
+        return min(SEEN_THROUGH / thickest, CLEAR) if thickest > 0.0 else CLEAR

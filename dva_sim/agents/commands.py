@@ -99,6 +99,7 @@ class CommandSender:
         issued = Issued(made.time, now, command.sample_age, command.captured)
         self._recorder.command_issued(message.source, message.message_id, issued)
         self._drive.sent += 1
+        self._drive.commands.append((made.time, command.speed, command.turn_rate))
         return encode(message)
 
 

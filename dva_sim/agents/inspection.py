@@ -12,6 +12,7 @@ from dva_sim.agents.steering import wrap
 
 Point = tuple[float, float]
 
+IN_VIEW = "in view"  # so ends what a robot says while it looks at a place
 LOOK_FROM = 4.0  # an event in view no farther than this is looked at from here [m]; assumed
 KEEP_OFF = 1.2  # from here the place is looked at, whatever is in view [m]
 MATCH_WITHIN = 4.0  # a hazard so near the place is the one to look at [m]
@@ -54,7 +55,7 @@ class Inspection:
     def finding(self, seen: Seen) -> str:
         """What is in view, in words."""
         what = self._event.replace("_", " ") if self._in_view(seen) else "nothing"
-        return f"{what} in view"
+        return f"{what} {IN_VIEW}"
 
     def step(self, seen: Seen) -> Intent:
         """Face the event; with nothing in view, first its place, then all around, once."""

@@ -119,10 +119,11 @@ class RobotAgent:
         now = self.device.clock.now
         self._world.advance_to(now)
         pose = self.body.pose()
-        hazards = self._setup.view.look(pose.x, pose.y, pose.heading, self._setup.hazards(now))
+        view, at = self._setup.view, (pose.x, pose.y, pose.heading)
+        hazards, visibility = view.look(*at, self._setup.hazards(now)), view.visibility(*at)
         speed, turn_rate = self.body.speed, self.body.turn_rate
         tick = self.controller.tick(now)
-        return Observation(tick, pose.x, pose.y, pose.heading, speed, turn_rate, hazards)
+        return Observation(tick, *at, speed, turn_rate, hazards, visibility)
 
     def power(self, on: bool) -> None:
         """Give motors, computer and radio power, or none: then it brakes, and is silent."""

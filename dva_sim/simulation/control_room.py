@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 import shapely
@@ -58,7 +59,7 @@ def add_dva(
     desk = Desk(
         policy,
         _Ways(stage),
-        dispatch.rules(),
+        replace(dispatch.rules(), operator_span=stage.scenario.operator.span),
         stage.streams["dva/policy"],
         Sessions(permissions),
         _ground(stage) if policy.relocates else Ground(),
@@ -190,7 +191,9 @@ def add_operator(
         stage.planner,
         setup,
         stage.streams[f"{device.label}/judgement"],
+        lambda what: stage.streams.fresh(f"{device.label}/look/{what}"),
     )
-    operator = OperatorAgent(seat, Supervise if scenario.control == "supervisory" else Drive)
+    kind = Supervise if scenario.control == "supervisory" else Drive
+    operator = OperatorAgent(seat, kind, config.span)
     device.register()
     return operator

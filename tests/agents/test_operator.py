@@ -119,8 +119,7 @@ def test_no_robot_drives_on_if_the_newer_order_comes_while_it_starts() -> None:
         operator = dva.operator()
         dva.order(1, EAST, robot=ROBOT)
         dva.run_for(ordered + took + 0.01 - early - dva.now)
-        drive = operator._drive
-        assert drive is not None
+        drive = operator.works[ROBOT]
         states.add((drive.session > 0, drive.log.started is not None))
         dva.order(2, WEST, robot=OTHER_ROBOT)
         dva.run_until(lambda dva=dva: "departed" in dva.progress(2))

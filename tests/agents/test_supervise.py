@@ -9,7 +9,6 @@ from pretended_dva import OPERATOR, OTHER_ROBOT, ROBOT, PretendedDva
 
 from dva_sim.agents.modes import Mode
 from dva_sim.agents.operator.agent import OperatorAgent
-from dva_sim.agents.operator.looking import SEARCH_FOR
 from dva_sim.protocol import messages as m
 
 EAST, WEST = (30.0, 12.0), (4.0, 12.0)  # both ends of the main corridor [m]
@@ -76,7 +75,7 @@ def test_where_nothing_is_it_says_so_after_having_looked_around(
     dva.run_until(lambda: "done" in dva.progress(1))
     assert dva.progress(1) == ["departed", "arrived", "refuted", "done"]
     looked = dva.when(1, "refuted") - dva.when(1, "arrived")
-    assert looked == pytest.approx(SEARCH_FOR, abs=1.0)
+    assert looked == pytest.approx(operator._seat.person.search, abs=1.0)
     assert dva.stage.recorder.drives[0].outcome == "refuted"
 
 

@@ -1,6 +1,9 @@
 """An operator at work: takes an order, gets permission, drives or supervises, reports, is free.
 
-The newest order holds: it takes the place of the present work, whose robot is stopped first.
+An operator has so many orders in hand at once, one robot for each. The newest order holds: it takes
+the place of an older one of the same robot, or of the oldest where the hands are full; a robot
+that was on its way is stopped first. Robots that do missions are watched all at once; of those that
+are driven, all but one stand until it is their turn.
 """
 
 from __future__ import annotations
@@ -25,29 +28,32 @@ class OperatorAgent:
     Args:
         seat: Who it is, and what is at hand.
         kind: How it has robots look at events: `Drive` them, or `Supervise` their missions.
+        span: How many orders it has in hand at most.
+
+    Attributes:
+        works: What is under way, also while it is wound up, by robot.
     """
 
-    def __init__(self, seat: DriverSeat, kind: type[Work] = Drive) -> None:
-        self.device, self._seat, self._kind = seat.device, seat, kind
-        self._drive: Work | None = None
-        self._next: m.Order | None = None  # what to do when the present drive has ended
-        self._ordered = 0.0  # when the newest order came [s]
+    def __init__(self, seat: DriverSeat, kind: type[Work] = Drive, span: int = 1) -> None:
+        self.device, self._seat, self._kind, self._span = seat.device, seat, kind, span
+        self.works: dict[str, Work] = {}
+        self._waiting: list[tuple[float, m.Order]] = []  # since when [s]; oldest first
         self.device.serve(self._on_request)
 
     @property
     def activity(self) -> str:
         """What the person is doing, in words."""
-        drive = self._drive
-        if drive is None:
-            return "waiting"
-        robot = self.device.label_of(drive.robot)
-        return f"{'reads of' if drive.log.started is None else drive.verb} {robot}"
+        return ", ".join(map(self._doing, self.works.values())) or "waiting"
+
+    def _doing(self, work: Work) -> str:
+        verb = "reads of" if work.log.started is None else work.verb
+        return f"{verb} {self.device.label_of(work.robot)}"
 
     def put_down(self) -> None:
-        """Leave: a drive that is going on ends here, and its robot is told to stop."""
-        self._next = None
-        if self._drive is not None:
-            self._drive.end("gave up", "the operator leaves")
+        """Leave: what is going on ends here, and the robots are told to stop."""
+        self._waiting.clear()
+        for work in list(self.works.values()):
+            work.end("gave up", "the operator leaves")
 
     def _on_request(self, message: m.Message) -> m.Reply:
         if message.source != self.device.dva:
@@ -65,41 +71,61 @@ class OperatorAgent:
 
     def _on_revocation(self, body: m.PermissionRevocation) -> None:
         """The robot is no longer ours to drive; it has been told, too."""
-        drive = self._drive
-        if drive is not None and (drive.robot, drive.session) == (body.device, body.session):
-            drive.end("gave up", "the permission was revoked")
+        work = self.works.get(body.device)
+        if work is not None and work.session == body.session:
+            work.end("gave up", "the permission was revoked")
+
+    # --- what there is to do -----------------------------------------------------------
 
     @property
-    def _order(self) -> m.Order | None:
-        """The newest order that the DVA has not taken back."""
-        if self._next is not None or self._drive is None:
-            return self._next
-        return None if self._drive.log.outcome in BY_DVA else self._drive.order
+    def _orders(self) -> list[m.Order]:
+        """Those in hand that the DVA has not taken back."""
+        begun = [w.order for w in self.works.values() if w.log.outcome not in BY_DVA]
+        return begun + [order for _, order in self._waiting]
 
     def _on_order(self, order: m.Order) -> None:
-        held = self._order
-        if held is not None and (held.event_id, held.device) == (order.event_id, order.device):
+        if (order.event_id, order.device) in {(o.event_id, o.device) for o in self._orders}:
             return  # the DVA says again what it has said before
-        self._ordered = self.device.clock.now
-        if self._drive is None:
-            self._take_up(order)
-        else:
-            self._next = order
-            self._drive.end(REDIRECTED)
+        self._make_room(order)
+        self._waiting.append((self.device.clock.now, order))
+        self._go_on()
+
+    def _make_room(self, order: m.Order) -> None:
+        """Put down what a new order takes the place of, if anything."""
+        going_on = [w for w in self.works.values() if not w.over]
+        in_hand = [(w.log.ordered, w.order) for w in going_on] + self._waiting
+        same = [old for old in in_hand if old[1].device == order.device]
+        if same or len(in_hand) >= self._span:
+            _, replaced = min(same or in_hand, key=lambda old: old[0])
+            self._drop(replaced, REDIRECTED)
+
+    def _drop(self, order: m.Order, outcome: str) -> None:
+        self._waiting = [old for old in self._waiting if old[1] is not order]
+        for work in list(self.works.values()):
+            if work.order is order:
+                work.end(outcome)
 
     def _on_recall(self, event_id: int) -> None:
         """The DVA says that an order is over."""
-        if self._order is not None and self._order.event_id == event_id:
-            self._next = None
-            if self._drive is not None and self._drive.order.event_id == event_id:
-                self._drive.end(RECALLED)
+        for order in self._orders:
+            if order.event_id == event_id:
+                self._drop(order, RECALLED)
 
-    def _take_up(self, order: m.Order) -> None:
+    def _go_on(self) -> None:
+        """Take up what waits, as far as there are hands; each robot does one thing at a time."""
+        most = self._kind.at_once or self._span
+        for since, order in list(self._waiting):
+            if len(self.works) < most and order.device not in self.works:
+                self._waiting.remove((since, order))
+                self._take_up(order, since)
+
+    def _take_up(self, order: m.Order, ordered: float) -> None:
         assert order.device is not None
         device = self.device
-        log = DriveLog(order.device, device.id_tag, order.event_id, self._ordered)
+        log = DriveLog(order.device, device.id_tag, order.event_id, ordered)
+        log.taken_up = device.clock.now
         device.recorder.drive_ordered(log)
-        drive = self._drive = self._kind(self._seat, order, log, self._finish)
+        drive = self.works[order.device] = self._kind(self._seat, order, log, self._finish)
         robot = device.label_of(order.device)
         device.tell(f"shall {drive.wish} {robot} to event {order.event_id}", "order")
         device.clock.call_after(self._seat.person.reading, self._ask_permission, drive)
@@ -185,21 +211,18 @@ class OperatorAgent:
             device.ask(drive.robot, drive.ending(), give_back, give_back, drive.session)
 
     def _give_back(self, robot: str, session: int) -> None:
-        """A permission is needed no longer, unless the next drive is of the same robot."""
-        if session and (self._order is None or self._order.device != robot):
+        """A permission is needed no longer, unless what is next is of the same robot."""
+        if session and robot not in {order.device for order in self._orders}:
             body = m.PermissionRevocation(robot, self.device.id_tag, session)
             self.device.ask(self.device.dva, body)
 
     def _be_free(self, drive: Work) -> None:
         """The robot was told to stop: what is next?"""
-        if self._next is None:
-            self._drive = None
-        elif drive.session == 0:
-            self._go_on()  # nothing moves
+        if self._waiting and drive.session:
+            self.device.clock.call_after(STANDSTILL, self._put_away, drive)
         else:
-            self.device.clock.call_after(STANDSTILL, self._go_on)
+            self._put_away(drive)  # nothing moves
 
-    def _go_on(self) -> None:
-        order, self._drive, self._next = self._next, None, None
-        if order is not None:
-            self._take_up(order)
+    def _put_away(self, drive: Work) -> None:
+        del self.works[drive.robot]
+        self._go_on()

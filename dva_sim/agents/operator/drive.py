@@ -22,9 +22,9 @@ ASKED_SPEED, ASKED_TURN = 0.05, 0.1  # from here on one expects to see it move [
 STUCK_AFTER = 4.0  # standing for so long though asked to drive, a person plans anew [s]
 LET_GO_FOR = 1.0  # one who sees no effect levels the phone for so long, and tilts again [s]
 NEARER = 0.5  # less is no progress [m]
-NO_NEARER_FOR = 90.0  # of no progress; then a person gives up on the robot [s]; assumed
-GIVE_UP_AFTER = 4  # after so many attempts in a row without any motion, the link is lost
+ATTEMPTS = 3  # in a row without any motion: the link is lost, as after three unanswered sends
 KEEP_OFF = 1.2  # distance kept to the event [m]
+KEEP_OFF_IN_SMOKE = 0.5  # by who sees nothing from there [m]; assumed
 
 
 class Drive(Work):
@@ -37,6 +37,7 @@ class Drive(Work):
         on_end: Told once how it ended: the drive, the outcome, and why.
     """
 
+    at_once = 1  # two hands, one phone
     level, verb, wish = "teleoperation", "drives", "drive"
 
     def __init__(
@@ -62,13 +63,12 @@ class Drive(Work):
     def begin(self) -> None:
         """The robot has agreed to be driven: look, and tilt."""
         seat, now = self._seat, self._clock.now
-        self.log.started = self._last_frame = now
+        super().begin()
         self.log.hand_lag = seat.phone.hand_lag
         self._device.recorder.drive_begins(self._device.id_tag)
         seat.delay = DelayEstimate(now, seat.delay.value)
         self._sender = self._make_sender()
         self._sender.start()
-        self._clock.every(1.0, self._watch_picture)
         if isinstance(self._strategy, Oracle):
             self._clock.every(Oracle.DELAY, self._look_at_truth)
 
@@ -178,7 +178,9 @@ class Drive(Work):
 
     def _keep_off(self, seen: Observation) -> float:
         """How far before the event to stop [m]; no wall may stand between."""
-        return KEEP_OFF if self._looking.has_place_before_it(seen, 2 * KEEP_OFF) else 0.0
+        if not self._looking.has_place_before_it(seen, 2 * KEEP_OFF):
+            return 0.0
+        return KEEP_OFF_IN_SMOKE if self._looking.wants_nearer else KEEP_OFF
 
     # --- steering ----------------------------------------------------------------------
 
@@ -189,7 +191,7 @@ class Drive(Work):
             self._let_go_until = self._clock.now + LET_GO_FOR
             self._device.recorder.counters["replans"] += 1
             self._without_effect += 1
-            if self._without_effect >= GIVE_UP_AFTER:
+            if self._without_effect >= ATTEMPTS:
                 self.end("lost link", "the robot does not move")
                 return None
         if self._route is None:
@@ -198,6 +200,7 @@ class Drive(Work):
                 self.end("gave up", "no way there")
                 return None
             self._route = Route(points)
+            self.log.ways.append((self._clock.now, points))
         if self._gets_nowhere(self._route.left):
             self.end("gave up", "the robot gets no nearer")
             return None
@@ -206,9 +209,11 @@ class Drive(Work):
     def _gets_nowhere(self, left: float) -> bool:
         """Whether the way left [m] has not become less for a long time, whatever was tried."""
         now = self._clock.now
+        if self._looking.at_place:
+            return False
         if left < self._least_left - NEARER:
             self._least_left, self._nearer_at = left, now
-        return left > NEARER and now - self._nearer_at > NO_NEARER_FOR
+        return left > NEARER and now - self._nearer_at > self._seat.person.patience
 
     def _is_stuck(self, seen: Observation) -> bool:
         """Whether the robot has stood for too long although it was asked to move."""

@@ -44,7 +44,8 @@ class Population(Config):
         crossover_rad_s: Gain of turning towards a target.
         caution: Share of the look-ahead that the robot may cover during the whole delay.
         pace: Share of the robot's top speed that the person cares to drive.
-        confirm_look_s: How long an event must stay in view to be sure.
+        confirm_look_s: How long an event in plain view is looked at until the person is sure, on
+            average: its criterion; who is in haste takes less, and is wrong more often.
         reading_s: From an order on the screen to acting on it.
         position_error_m: How well the robot's place is judged from the picture.
         heading_error_rad: The same for its heading.
@@ -54,6 +55,13 @@ class Population(Config):
         motor_noise: Standard deviation of what the hand does, as a share of it; assumed.
         pointing_rad_s: Gain of bringing a cursor to its target, however short the delay; assumed,
             of the order that manual control finds for the simplest things to steer.
+        sensitivity: How well a second in plain view tells an event from none, in standard
+            deviations [1/sqrt(s)]; assumed, so that with good pictures errors are rare.
+        search_s: How long the person looks around at a place before it says that nothing is
+            there; assumed.
+        patience_s: How long it goes on without getting anywhere, or without seeing anything;
+            assumed.
+        switch_s: From turning to another robot's picture to understanding it; assumed.
     """
 
     description: str = ""
@@ -70,6 +78,10 @@ class Population(Config):
     margin: Trait = Trait(median=0.5, spread=0.15)
     motor_noise: Trait = Trait(median=0.05, spread=0.3)
     pointing_rad_s: Trait = Trait(median=4.0, spread=0.15)
+    sensitivity: Trait = Trait(median=4.5, spread=0.15)
+    search_s: Trait = Trait(median=25.0, spread=0.2)
+    patience_s: Trait = Trait(median=90.0, spread=0.25)
+    switch_s: Trait = Trait(median=1.0, spread=0.3)
 
     def with_medians(self, medians: Mapping[str, float]) -> Population:
         """The same population around other medians; the spreads between persons stay.
@@ -111,6 +123,10 @@ class Person:
     margin: float
     motor_noise: float
     pointing: float
+    sensitivity: float
+    search: float
+    patience: float
+    switch: float
 
 
 def draw_person(population: Population, seed: int, index: int) -> Person:
@@ -130,6 +146,10 @@ def draw_person(population: Population, seed: int, index: int) -> Person:
         margin=population.margin.draw(rng),
         motor_noise=population.motor_noise.draw(rng),
         pointing=population.pointing_rad_s.draw(rng),
+        sensitivity=population.sensitivity.draw(rng),
+        search=population.search_s.draw(rng),
+        patience=population.patience_s.draw(rng),
+        switch=population.switch_s.draw(rng),
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from dva_sim.agents.camera import Observation
 from dva_sim.agents.device import Device
+from dva_sim.agents.operator.attention import Attention
 from dva_sim.agents.operator.delay import DelayEstimate
 from dva_sim.agents.operator.person import Person
 from dva_sim.agents.operator.strategies import Driver, Reach, Truth
@@ -52,9 +54,11 @@ class DriverSeat:
         planner: The person knows the building.
         setup: Pattern, rate, time-outs.
         rng: Luck of this person's judgement.
+        looks: Luck of its looks at an event, by a name for each time that it goes there.
 
     Attributes:
         delay: What the person has learnt of the delay.
+        attention: Which robot's picture it looks at.
     """
 
     def __init__(
@@ -67,24 +71,28 @@ class DriverSeat:
         planner: Planner,
         setup: OperatorSetup,
         rng: np.random.Generator,
+        looks: Callable[[str], np.random.Generator],
     ) -> None:
         self.device, self.person, self.phone = device, person, phone
         self.strategy, self.reach = strategy, reach
         self.planner, self.setup = planner, setup
         self.delay = DelayEstimate(0.0, FIRST_GUESS)
+        self.attention = Attention(device.clock, person.switch)
         self._errors = _normals(rng)
+        self._looks, self._times = looks, Counter[int]()
+
+    def luck(self, event: int) -> Iterator[float]:
+        """Standard normal numbers for one more time at an event, whatever the pattern."""
+        self._times[event] += 1
+        return _normals(self._looks(f"{event}/{self._times[event]}"), block=64)
 
     def judge(self, seen: Observation) -> Observation:
         """A frame as the person takes it: place and heading with an error."""
         person, error = self.person, self._errors
-        return Observation(
-            seen.tick,
-            seen.x + person.position_error * next(error),
-            seen.y + person.position_error * next(error),
-            seen.heading + person.heading_error * next(error),
-            seen.speed,
-            seen.turn_rate,
-            seen.hazards,
+        return seen._replace(
+            x=seen.x + person.position_error * next(error),
+            y=seen.y + person.position_error * next(error),
+            heading=seen.heading + person.heading_error * next(error),
         )
 
 

@@ -7,6 +7,7 @@ References:
 from __future__ import annotations
 
 from dva_sim.agents.camera import Observation
+from dva_sim.agents.inspection import IN_VIEW
 from dva_sim.agents.operator.work import Work
 from dva_sim.protocol import messages as m
 
@@ -32,13 +33,12 @@ class Supervise(Work):
 
     def begin(self) -> None:
         """The robot is on its way: watch the picture, and ask now and then how it stands."""
-        self.log.started = self._last_frame = self._clock.now
-        self._clock.every(1.0, self._watch_picture)
+        super().begin()
         self._clock.call_after(ASK_PERIOD, self._ask)
 
     def _see(self, observation: Observation) -> None:
-        """A frame is on the screen; the person perceives it a little later."""
-        if self.log.started is not None:
+        """A frame is on the screen; who looks at that perceives it a little later."""
+        if self._seat.attention.looks_at(self):
             delay = self._seat.person.perceptual_delay
             self._clock.call_after(delay, self._perceive, observation)
 
@@ -62,8 +62,14 @@ class Supervise(Work):
                 return
             if status.mission_state in ("done", "failed"):
                 self.end("gave up", f"the robot: {status.reason or status.mission_state}")
-            else:
-                self._clock.call_after(ASK_PERIOD, self._ask)
+                return
+            self._note(status)
+            self._clock.call_after(ASK_PERIOD, self._ask)
 
         body = m.GetMissionStatus()
         self._device.ask(self.robot, body, answered, self.link_lost, self.session)
+
+    def _note(self, status: m.MissionStatus) -> None:
+        """A robot that says what is in view is there, and waits for the judgement."""
+        if self.waits_since is None and status.reason.endswith(IN_VIEW):
+            self.waits_since = self.log.waits_from = self._clock.now

@@ -25,14 +25,17 @@ class Work:
         on_end: Told once how it ended: the work, the outcome, and why.
 
     Attributes:
+        at_once: How many of its kind one person does at once; None: as many as it may.
         level: Of the permission that it needs.
         verb: What the person does with the robot, in words.
         wish: What the person shall do with it, in words.
         session: Of the permission; 0 before there is one.
         picture: The robot's camera, once it is watched.
         over: Whether it has ended.
+        waits_since: From when on the robot has waited for a judgement [s]; None: it does not.
     """
 
+    at_once: ClassVar[int | None] = None
     level: ClassVar[str]
     verb: ClassVar[str]
     wish: ClassVar[str]
@@ -49,11 +52,13 @@ class Work:
         self.session = 0
         self.picture: Subscription | None = None
         self.over = False
+        self.waits_since: float | None = None
         place = order.position
         self._goal = seat.device.frame.to_xy(place.latitude, place.longitude)
         self._last_frame = self._clock.now
         self._looking = Looking(
-            order.kind, self._goal, seat.planner, seat.person.confirm_look, self._arrive
+            *(order.kind, self._goal, seat.planner, seat.person),
+            *(seat.luck(order.event_id), self._arrive),
         )
 
     def beginning(self) -> m.Body:
@@ -65,8 +70,14 @@ class Work:
         raise NotImplementedError
 
     def begin(self) -> None:
-        """The robot has agreed."""
-        raise NotImplementedError
+        """The robot has agreed: from now on there is something to look at."""
+        self.log.started = self._last_frame = self._clock.now
+        self._clock.every(1.0, self._watch_picture)
+        self._seat.attention.begin(self)
+
+    def look_away(self) -> None:
+        """The person looks at another screen."""
+        self._looking.look_away()
 
     def on_frame(self, shown: Frame | bytes) -> None:
         """A frame is on the screen."""
@@ -90,6 +101,7 @@ class Work:
         self.over = True
         self.log.ended, self.log.outcome = self._clock.now, outcome
         self._put_down()
+        self._seat.attention.end(self)
         if self.picture is not None:
             self.picture.close()
         self._on_end(self, outcome, why)
