@@ -1,0 +1,1 @@
+"""Dispatch against exact answers: worlds that theory knows, played again and compared."""

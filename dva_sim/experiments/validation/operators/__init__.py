@@ -1,0 +1,1 @@
+"""Operators against people: exact answers, and published experiments played again."""

@@ -1,0 +1,81 @@
+"""A verdict for each line, and what they come to."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from dva_sim.experiments.validation.operators.targets import Kind, Line, RuleConfig
+from dva_sim.experiments.validation.operators.trials import Found
+
+Word = Literal["passes", "misses", "shown only"]
+COUNTED: tuple[Kind, ...] = ("exact", "held-out")
+_ROUNDING = 1e-9  # what adding up the share may cost
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """One line, and what was simulated.
+
+    Attributes:
+        line: What it should be.
+        found: What it is.
+    """
+
+    line: Line
+    found: Found
+
+    @property
+    def inside(self) -> bool:
+        """Whether what is simulated lies in the band."""
+        return not math.isnan(self.found.value) and self.line.holds(self.found.value)
+
+    @property
+    def word(self) -> Word:
+        """`shown only` where the line is not counted, wherever it lies."""
+        if self.line.kind not in COUNTED:
+            return "shown only"
+        return "passes" if self.inside else "misses"
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What all verdicts come to.
+
+    Attributes:
+        exact: Exact lines that pass, and all of them.
+        held_out: Held-out lines that pass, and all of them.
+        rule: The shares that must pass.
+    """
+
+    exact: tuple[int, int]
+    held_out: tuple[int, int]
+    rule: RuleConfig
+
+    @property
+    def passes(self) -> bool:
+        """Whether both shares are reached."""
+        return _reaches(self.exact, self.rule.exact) and _reaches(self.held_out, self.rule.held_out)
+
+
+def judge(lines: Sequence[Line], found: Mapping[str, Found]) -> list[Verdict]:
+    """A verdict for each line; what was not simulated is nan, and misses."""
+    missing = Found(math.nan, math.nan, math.nan)
+    return [Verdict(line, found.get(line.id, missing)) for line in lines]
+
+
+def outcome_of(verdicts: Sequence[Verdict], rule: RuleConfig) -> Outcome:
+    """What the verdicts come to, by the rule of the split."""
+    return Outcome(_share(verdicts, "exact"), _share(verdicts, "held-out"), rule)
+
+
+def _share(verdicts: Sequence[Verdict], kind: Kind) -> tuple[int, int]:
+    counted = [v for v in verdicts if v.line.kind == kind]
+    return sum(v.word == "passes" for v in counted), len(counted)
+
+
+def _reaches(counts: tuple[int, int], share: float) -> bool:
+    passed, of = counts
+    return passed >= share * of - _ROUNDING

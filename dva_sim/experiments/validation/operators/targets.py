@@ -1,0 +1,256 @@
+"""What operators are compared with, and which of it may be fitted to: two files, read together."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from dva_sim import resources
+from dva_sim.config import Config, load_yaml, validate
+from dva_sim.errors import ConfigError
+
+FOLDER = "experiments/validation"
+TARGETS, SPLIT = "operators", "operators-split"
+
+Kind = Literal["exact", "fitted", "held-out", "remembered"]
+Share = Annotated[float, Field(ge=0, le=1)]
+
+
+class LineConfig(Config):
+    """One number to compare with.
+
+    Attributes:
+        what: What it is, in words.
+        unit: Empty for a plain number.
+        target: As published, if a single number was.
+        low: What passes begins here; left out, anywhere below `high`.
+        high: What passes ends here.
+    """
+
+    what: str
+    unit: str = ""
+    target: float | None = None
+    low: float | None = None
+    high: float | None = None
+
+    @model_validator(mode="after")
+    def _in_order(self) -> LineConfig:
+        if self.low is None and self.high is None:
+            raise ValueError("a line needs low or high, or anything would pass")
+        if self.low is not None and self.high is not None and self.low > self.high:
+            raise ValueError("low should not be above high")
+        return self
+
+
+class CheckConfig(Config):
+    """One published result.
+
+    Attributes:
+        metric: What was measured.
+        tag: How sure its numbers are; the file says what the letters mean.
+        source: The publication, or the derivation.
+        lines: Its numbers, by name; each is a verdict of its own.
+    """
+
+    metric: str
+    tag: str
+    source: str
+    lines: Annotated[dict[str, LineConfig], Field(min_length=1)]
+
+
+class SupportConfig(Config):
+    """Which delays published data cover.
+
+    Attributes:
+        strategies: Whom they speak of.
+        low_s: From.
+        high_s: To.
+        why: Whose data.
+    """
+
+    strategies: tuple[str, ...]
+    low_s: Annotated[float, Field(ge=0)]
+    high_s: Annotated[float, Field(gt=0)]
+    why: str
+
+
+class TargetFile(Config):
+    """The file of targets.
+
+    Attributes:
+        description: What it is.
+        tags: What the letters of a tag mean.
+        checks: Published results by their short name.
+        support: Delays that published data cover.
+    """
+
+    description: str = ""
+    tags: dict[str, str]
+    checks: Annotated[dict[str, CheckConfig], Field(min_length=1)]
+    support: dict[str, SupportConfig]
+
+    @model_validator(mode="after")
+    def _known_tags(self) -> TargetFile:
+        for name, check in self.checks.items():
+            for letter in check.tag.split(","):
+                if letter not in self.tags:
+                    known = ", ".join(self.tags)
+                    raise ValueError(f"tag {letter!r} of {name} is unknown; known: {known}")
+        return self
+
+
+class RuleConfig(Config):
+    """When a validation passes: shares of the lines that must pass."""
+
+    exact: Share
+    held_out: Share
+
+
+class SplitFile(Config):
+    """Which checks may be fitted to: lists of checks by publication.
+
+    Attributes:
+        description: What it is.
+        rule: When the whole passes.
+        strategy: How the persons of every task drive unless asked otherwise.
+        strategy_why: Why that one.
+        exact: Answers that nobody measured on persons.
+        fit: May influence parameters; shown, never counted.
+        held_out: May influence nothing; counted.
+        memory: Nobody has seen their source; shown, never counted.
+    """
+
+    description: str = ""
+    rule: RuleConfig
+    strategy: str
+    strategy_why: str = ""
+    exact: dict[str, tuple[str, ...]]
+    fit: dict[str, tuple[str, ...]]
+    held_out: dict[str, tuple[str, ...]]
+    memory: dict[str, tuple[str, ...]]
+
+    def kinds(self) -> dict[str, Kind]:
+        """The kind of each check.
+
+        Raises:
+            ConfigError: a check that is assigned twice.
+        """
+        kinds: dict[str, Kind] = {}
+        groups: tuple[tuple[Kind, dict[str, tuple[str, ...]]], ...] = (
+            ("exact", self.exact),
+            ("fitted", self.fit),
+            ("held-out", self.held_out),
+            ("remembered", self.memory),
+        )
+        for kind, publications in groups:
+            for check in (c for checks in publications.values() for c in checks):
+                if check in kinds:
+                    raise ConfigError(f"check {check!r} is assigned twice")
+                kinds[check] = kind
+        return kinds
+
+
+@dataclass(frozen=True)
+class Line:
+    """One line to judge.
+
+    Attributes:
+        check: Short name of the published result.
+        name: Of the line within it.
+        metric: What the publication measured.
+        what: What this line is.
+        source: Where its numbers come from.
+        tag: How sure they are.
+        kind: Whether it counts.
+        unit: Empty for a plain number.
+        target: As published, if a single number was.
+        low: What passes begins here; None: anywhere below `high`.
+        high: What passes ends here; None: anywhere above `low`.
+    """
+
+    check: str
+    name: str
+    metric: str
+    what: str
+    source: str
+    tag: str
+    kind: Kind
+    unit: str
+    target: float | None
+    low: float | None
+    high: float | None
+
+    @property
+    def id(self) -> str:
+        """`check/name`."""
+        return f"{self.check}/{self.name}"
+
+    def holds(self, value: float) -> bool:
+        """Whether a value lies in the band; nan never does."""
+        above = self.low is None or value >= self.low
+        return above and (self.high is None or value <= self.high)
+
+
+def load_targets(name: str = TARGETS) -> TargetFile:
+    """The targets, by name or path.
+
+    Raises:
+        ConfigError: no such file, or a mistake in it, with its place.
+    """
+    document = load_yaml(resources.find(name, FOLDER))
+    return validate(TargetFile, document.data, document.error)
+
+
+def load_split(name: str = SPLIT) -> SplitFile:
+    """The split, by name or path.
+
+    Raises:
+        ConfigError: no such file, or a mistake in it, with its place.
+    """
+    document = load_yaml(resources.find(name, FOLDER))
+    split = validate(SplitFile, document.data, document.error)
+    try:
+        split.kinds()
+    except ConfigError as error:
+        raise document.error(str(error)) from None
+    return split
+
+
+def lines_of(targets: TargetFile, split: SplitFile) -> list[Line]:
+    """All lines with their kind, in the order of the file of targets.
+
+    Raises:
+        ConfigError: a check that is not assigned, or is not there; a tag M that would count.
+    """
+    kinds = split.kinds()
+    _complete(targets.checks, kinds)
+    return [
+        Line(
+            check=check,
+            name=name,
+            metric=config.metric,
+            what=line.what,
+            source=" ".join(config.source.split()),
+            tag=config.tag,
+            kind=kinds[check],
+            unit=line.unit,
+            target=line.target,
+            low=line.low,
+            high=line.high,
+        )
+        for check, config in targets.checks.items()
+        for name, line in config.lines.items()
+    ]
+
+
+def _complete(checks: Mapping[str, CheckConfig], kinds: Mapping[str, Kind]) -> None:
+    if missing := [name for name in checks if name not in kinds]:
+        raise ConfigError(f"the split does not say what {', '.join(missing)} is for")
+    if unknown := [name for name in kinds if name not in checks]:
+        raise ConfigError(f"the split names {', '.join(unknown)}, which are no checks")
+    for name, check in checks.items():
+        if "M" in check.tag.split(",") and kinds[name] != "remembered":
+            raise ConfigError(f"{name} is known from memory: it cannot be {kinds[name]}")
