@@ -116,6 +116,7 @@ class DriveLog:
         hand_lag: Time constant with which the hand follows what is wanted [s].
         frames: Those shown, in order.
         intents: What was wanted, in order.
+        workload: What its way of steering asked of the operator, such as `waits`.
         taken_up: When the operator turned to the order [s].
         attended: From when to when the operator looked at this robot's picture [s].
         turned_to: How often it turned to that from another one.
@@ -140,6 +141,7 @@ class DriveLog:
     applied: list[Applied] = field(default_factory=list)
     frames: list[Shown] = field(default_factory=list)
     intents: list[Followed] = field(default_factory=list)
+    workload: dict[str, float] = field(default_factory=dict)
     taken_up: float | None = None
     attended: list[tuple[float, float]] = field(default_factory=list)
     turned_to: int = 0

@@ -57,7 +57,7 @@ class Drive(Work):
         self._careful = Careful(seat.person, reach) if seat.setup.guarded else None
         self._standing_since: float | None = None
         self._let_go_until = 0.0
-        self._without_effect = 0
+        self._without_effect = self._failures = 0
         self._least_left, self._nearer_at = math.inf, 0.0
 
     def begin(self) -> None:
@@ -71,6 +71,8 @@ class Drive(Work):
         self._sender.start()
         if isinstance(self._strategy, Oracle):
             self._clock.every(Oracle.DELAY, self._look_at_truth)
+        else:
+            self._let_go_until = now + seat.person.reaction
 
     def beginning(self) -> m.Body:
         """What to ask the robot for."""
@@ -90,6 +92,8 @@ class Drive(Work):
     def _put_down(self) -> None:
         if self._sender is not None:
             self._sender.stop()
+        if isinstance(self._strategy, Strategy):
+            self.log.workload = dict(self._strategy.workload())
 
     def _make_sender(self) -> CommandSender:
         """The pattern decides how commands travel, and nothing else."""
@@ -135,6 +139,18 @@ class Drive(Work):
             view = View(now, judged, delay)
             usual = lambda way, keep: drive(way, view, keep)  # noqa: E731
             self._intend(self._steer(route, judged, delay, usual), judged.tick)
+            self._count_failures(self._strategy)
+
+    def _count_failures(self, strategy: Strategy) -> None:
+        """Count what a strategy of a user got wrong, and tell of the first time."""
+        known, self._failures = self._failures, strategy.failures
+        if self._failures > known:
+            count = self._device.recorder.counters
+            count["failed: an answer of an operator"] += self._failures - known
+            if not known:
+                self._device.tell(
+                    f"lets go, as its strategy fails: {strategy.first_failure}", "drive"
+                )
 
     def _steer(
         self, route: Route, seen: Observation, delay: float, usual: Callable[[Route, float], Intent]
