@@ -38,12 +38,17 @@ class Trail:
         asked, hand, add = self._asked, self._hand, self._filter.add
         for _ in range(count):
             hand = asked + (hand - asked) * decay
-            add((hand, 0.0))
+            add((hand, hand))
         self._hand = hand
 
     def captured(self) -> float:
         """When the pictures behind the filter's value were captured, on average [s]."""
         return self._begun + self._filter.value()[0]
+
+    @property
+    def age(self) -> float:
+        """Mean age of what the filter's value is made of, in samples: of the value taken last."""
+        return self._filter.age
 
     @property
     def asked(self) -> float:
