@@ -6,7 +6,7 @@ conditions. How, was settled before anything was compared.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -24,14 +24,14 @@ from dva_sim.tasks.measures import fit_line
 
 FOLDER = "experiments/scenarios/tasks"
 
-LAGS_MS = (8.3, 25.0, 75.0, 225.0)
-SHORTEST_LAG = "8.3"
+LAGS_S = {"8.3": 0.0, "25": 1 / 60, "75": 4 / 60, "225": 13 / 60}  # by the lag's name [ms]
+SHORTEST_LAG = "8.3"  # half a frame
 AT_BITS = 4.0
-GAINS = (25, 50, 100, 200)
+GAINS = {25: 0.2435, 50: 0.487, 100: 0.974, 200: 1.948}  # pixels/s per degree: [m/s per rad]
 PUBLISHED_GAIN = 50
 SELECTIONS = {"first-entry": "first_entry", "dwell": "dwell"}
 LATENCY_S = 0.05  # of the machine in the steering experiment; assumed
-LESS_S = 1.0 / 60.0
+STEP_S = 1.0 / 60.0
 WAITS_S = (1.0, 1.5, 2.0, 2.5, 3.2)
 EXCAVATOR_S = 1.5
 FRAME_RATES = (5, 10, 20, 60)
@@ -95,7 +95,7 @@ def tilt_values(cells: Cells) -> Values:
         for g in GAINS
     ]
     tilts = [np.degrees(mean(trials, "hand_most")) for trials in cells.values()]
-    values["S10/best"] = float(GAINS[int(np.argmin(times))])
+    values["S10/best"] = float(list(GAINS)[int(np.argmin(times))])
     return values | {"S10/least-tilt": float(min(tilts)), "S10/most-tilt": float(max(tilts))}
 
 
@@ -190,3 +190,60 @@ def _parabola(x: Floats, y: Floats) -> float:
     """R2 of the least-squares parabola."""
     rest = y - np.polyval(np.polyfit(x, y, 2), x)
     return 1.0 - float(rest.var() / y.var())
+
+
+# --- all of them -----------------------------------------------------------------------------
+
+LATE = "link.down.delay_s"
+
+
+def _tilt_cells() -> dict[str, dict[str, Any]]:
+    return {
+        tilt_cell(gain, name): {"device.gain": scale, "task.selection": selection}
+        for gain, scale in GAINS.items()
+        for name, selection in SELECTIONS.items()
+    }
+
+
+def _frame_cells() -> dict[str, dict[str, Any]]:
+    return {
+        frame_cell(rate, delay): {"frames.rate_hz": rate, LATE: delay}
+        for rate in FRAME_RATES
+        for delay in FRAME_DELAYS_S
+    }
+
+
+def _both_ways(delay: float) -> dict[str, Any]:
+    return {"link.up.delay_s": 0.5 * delay, LATE: 0.5 * delay}
+
+
+_FEW = {"trials": 2, "practice": 1}
+
+EXPERIMENTS: tuple[Experiment, ...] = (
+    Experiment("lag", "fitts-lag", {lag: {LATE: s} for lag, s in LAGS_S.items()}, lag_values, _FEW),
+    Experiment("tilt", "fitts-tilt", _tilt_cells(), tilt_values, _FEW),
+    Experiment("steering", "steering-law", {"tunnel": {}}, steering_values),
+    Experiment(
+        "latency",
+        "steering-law",
+        {
+            "less": {LATE: LATENCY_S - STEP_S},
+            "as it is": {LATE: LATENCY_S},
+            "more": {LATE: LATENCY_S + STEP_S},
+        },
+        latency_values,
+        _FEW,
+    ),
+    Experiment(
+        "waiting", "move-and-wait", {f"{s:g}": _both_ways(s) for s in WAITS_S}, wait_values, _FEW
+    ),
+    Experiment(
+        "excavator",
+        "excavator",
+        {"0": {LATE: 0.0}, str(EXCAVATOR_S): {LATE: EXCAVATOR_S}},
+        excavator_values,
+    ),
+    Experiment("tracking", "tracking", {"tracking": {}}, tracking_values),
+    Experiment("frames", "frame-rate", _frame_cells(), frame_values, _FEW),
+)
+"""Every experiment; which of them may be fitted to, the split file says."""

@@ -10,8 +10,9 @@ from typing import Any, cast
 from dva_sim import resources
 from dva_sim.config import load_yaml
 from dva_sim.errors import DvaSimError
-from dva_sim.experiments.design import AnyScenario, Job
+from dva_sim.experiments.design import Job
 from dva_sim.experiments.journal import Tables
+from dva_sim.experiments.models import AnyScenario
 from dva_sim.experiments.pool import run_all
 from dva_sim.experiments.validation.operators.exact import EXACT
 from dva_sim.experiments.validation.operators.experiments import FOLDER, Experiment
@@ -40,21 +41,18 @@ class Setting:
     Attributes:
         strategy: How the persons steer.
         seed: Of all luck, who the persons are included.
-        quick: Few persons and trials.
+        persons: How many.
+        quick: Few trials.
         workers: Processes.
         traits: Medians that take the place of the population's, for a fit.
     """
 
     strategy: str
     seed: int = 1
+    persons: int = PERSONS
     quick: bool = False
     workers: int = 1
     traits: Traits | None = None
-
-    @property
-    def persons(self) -> int:
-        """How many."""
-        return QUICK_PERSONS if self.quick else PERSONS
 
 
 def play_exact(

@@ -45,8 +45,10 @@ def helpers(seed: int) -> Values:
     recording = simulate_timed(timed.build(document, {"horizon_s": HELP_S}), seed)
     row, names = recording.columns, recording.streams
     came = np.isfinite(row["arrived"])
-    turnout = (row["departed"] - row["assigned"])[came]
-    travel = (row["arrived"] - row["departed"])[came]
+    assigned, departed, arrived = (
+        np.asarray(row[name][came], dtype=float) for name in ("assigned", "departed", "arrived")
+    )
+    turnout, travel = departed - assigned, arrived - departed
     stream = np.asarray(names)[row["stream"][came].astype(int)]
     rng, guard = Streams(seed).fresh("guards"), _guard()
     guards = np.array([Walker.draw(guard, rng).mobilisation for _ in range(PERSONS)])
