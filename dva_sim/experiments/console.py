@@ -262,7 +262,7 @@ class _Rate(ProgressColumn):
 def list_all() -> None:
     """Everything that can be named in a configuration."""
     from dva_sim.agents.operator.strategies import known_strategies
-    from dva_sim.agents.tilt import FILTERS
+    from dva_sim.agents.tilt import known_filters, known_mappings
     from dva_sim.core.dispatch import known_policies
 
     from_files = {
@@ -270,6 +270,7 @@ def list_all() -> None:
         "scenarios": "experiments/scenarios",
         "sites": "worlds",
         "phones (phone.profile)": "agents/phones",
+        "accelerometers": "agents/accelerometers",
         "robots": "agents/robots",
         "people": "agents/people",
     }
@@ -278,6 +279,7 @@ def list_all() -> None:
         table.add_row(title, ", ".join(sorted(resources.available(folder))))
     table.add_row("patterns", ", ".join(PATTERNS))
     table.add_row("operators", ", ".join(known_strategies()))
-    table.add_row("filters", ", ".join(sorted(FILTERS)))
+    table.add_row("filters", ", ".join(known_filters()))
+    table.add_row("mappings", ", ".join(known_mappings()))
     table.add_row("policies", ", ".join(known_policies()))
     console.print(table)

@@ -32,6 +32,7 @@ from dva_sim.scenario import Scenario, guard_profile, phone_profile, population
 from dva_sim.simulation.dva import DvaAgent
 from dva_sim.simulation.names import DVA
 from dva_sim.simulation.stage import Stage, middle_of
+from dva_sim.streams import Streams
 from dva_sim.worlds.site import FOOTPRINT
 
 
@@ -185,7 +186,12 @@ def add_operator(
     seat = DriverSeat(
         device,
         person,
-        Phone(phone_profile(scenario), person.hand_lag, stage.streams[f"{device.label}/phone"]),
+        Phone(
+            phone_profile(scenario),
+            person,
+            stage.streams[f"{device.label}/phone"],
+            Streams(config.population_seed).fresh(f"person-{config.person + number - 1}/phone"),
+        ),
         strategy,
         stage.reach,
         stage.planner,

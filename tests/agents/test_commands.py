@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dva_sim.agents.commands import PublishedCommands, topic_of
+from dva_sim.agents.operator.person import Population, draw_person
 from dva_sim.agents.tilt import Phone, PhoneProfile
 from dva_sim.clock import Clock
 from dva_sim.network.link import ConstantRate, Link, LinkConfig
@@ -28,7 +29,7 @@ def test_no_command_leaves_the_phone_before_the_first_picture() -> None:
 
     seen: list[int | None] = [None]
     drive = DriveLog(ROBOT, PHONE, 1, ordered=0.0)
-    phone = Phone(PhoneProfile(), 0.15, np.random.default_rng(1))
+    phone = Phone(PhoneProfile(), draw_person(Population(), 1, 0), np.random.default_rng(1))
     sender = PublishedCommands(
         network, Outbox(PHONE), drive, 7, phone, 10.0, Recorder(), lambda: seen[-1]
     )

@@ -1,6 +1,26 @@
-"""The tilt phone: accelerometer, calibration, filter, mapping, and when a command is sent."""
+"""The tilt phone: hand, accelerometer, calibration, filter, mapping, and when a command is sent."""
 
-from dva_sim.agents.tilt.filters import FILTERS, Filter
-from dva_sim.agents.tilt.phone import Phone, PhoneProfile, TiltCommand
+from dva_sim.agents.tilt.accelerometer import Accelerometer, AccelerometerPart, load_part
+from dva_sim.agents.tilt.calibration import Calibration
+from dva_sim.agents.tilt.filters import Filter, known_filters, load_filter
+from dva_sim.agents.tilt.hand import Hand
+from dva_sim.agents.tilt.mappings import Mapping, known_mappings, load_mapping
+from dva_sim.agents.tilt.phone import Phone, TiltCommand
+from dva_sim.agents.tilt.profile import PhoneProfile
 
-__all__ = ["FILTERS", "Filter", "Phone", "PhoneProfile", "TiltCommand"]
+__all__ = [
+    "Accelerometer",
+    "AccelerometerPart",
+    "Calibration",
+    "Filter",
+    "Hand",
+    "Mapping",
+    "Phone",
+    "PhoneProfile",
+    "TiltCommand",
+    "known_filters",
+    "known_mappings",
+    "load_filter",
+    "load_mapping",
+    "load_part",
+]

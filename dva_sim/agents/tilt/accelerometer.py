@@ -5,16 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from functools import cache
+from math import cos, sin
 from typing import Annotated, Final
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from dva_sim import resources
-from dva_sim.agents.tilt.hand import rows
 from dva_sim.config import Config, load_yaml, validate
 
 GRAVITY: Final = 9.80665  # [m/s^2]
+TICK: Final = 2.0**-12  # of the clock that tells when a sample is taken [s]
 WARMING_K: Final = 5.0  # how much warmer or colder a session is, standard deviation; assumed
 
 NonNegative = Annotated[float, Field(ge=0)]
@@ -87,7 +88,7 @@ def load_part(name: str) -> AccelerometerPart:
 class Accelerometer:
     """One copy of a part, in one phone.
 
-    Pitch forward and roll to the right turn gravity into the x and y axes of the phone; z looks
+    Pitch forward and roll to the left turn gravity into the x and y axes of the phone; z looks
     out of the screen. A sample is that, wrong by an offset (of this copy, of this session, and
     slowly drifting) and by white noise, rounded to the part's step and cut off at its range.
 
@@ -122,7 +123,8 @@ class Accelerometer:
         self._drift = mg * part.drift_mg_per_sqrt_min * math.sqrt(self.period / 60.0)
         self._errors = self._drawn(noise, part.noise, block)
         self._step, self._range = mg * part.resolution_mg, GRAVITY * part.range_g
-        self._late = _lateness(times, jitter * self.period, 0.4 * self.period, block)
+        spread, most = jitter * self.period, 0.4 * self.period
+        self._late = _lateness(times, spread, most, block) if jitter else None
         self._was_late = 0.0
         self.begin_session()
 
@@ -133,16 +135,18 @@ class Accelerometer:
 
     def interval(self) -> float:
         """Time from the sample before to the next one [s]; asked once for each."""
+        if self._late is None:
+            return self.period
         was, self._was_late = self._was_late, next(self._late)
-        return self.period + self._was_late - was
+        return self.period + (self._was_late - was)
 
     def sample(self, pitch: float, roll: float) -> Triple:
         """What the part tells of a phone at rest at these angles [rad]: x, y, z [m/s^2]."""
         x, y, z = next(self._errors)
-        flat = GRAVITY * math.cos(pitch)
-        x += self._x + GRAVITY * math.sin(pitch)
-        y += self._y + flat * math.sin(roll)
-        z += self._z + flat * math.cos(roll)
+        flat = GRAVITY * cos(pitch)
+        x += self._x + GRAVITY * sin(pitch)
+        y += self._y + flat * sin(roll)
+        z += self._z + flat * cos(roll)
         step, most = self._step, self._range
         if step:
             x, y, z = round(x / step) * step, round(y / step) * step, round(z / step) * step
@@ -163,11 +167,10 @@ class Accelerometer:
 
 
 def _lateness(rng: np.random.Generator, spread: float, most: float, block: int) -> Iterator[float]:
-    """How late each sample is [s]; cut off so that none overtakes another."""
-    while spread == 0.0:
-        yield 0.0
-    for (late,) in rows(rng, 1, block):
-        yield _cut(late * spread, most)
+    """How late each sample is [s]; cut off so that none overtakes another, in ticks of a clock."""
+    while True:
+        late = np.clip(rng.normal(0.0, spread, block), -most, most)
+        yield from (np.round(late / TICK) * TICK).tolist()
 
 
 def _cut(value: float, most: float) -> float:

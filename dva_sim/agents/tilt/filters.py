@@ -1,76 +1,139 @@
-"""Filters between the accelerometer and the command, one kind per name.
+"""Filters between the accelerometer and the command: one class each, shipped or a user's.
 
-All take samples one by one and are asked for a value when a command is due.
+All take samples one by one and are asked for a value when one is due. A filter is told the mean
+time between samples and nothing else: no clock, no luck.
 """
 
 from __future__ import annotations
 
+import math
+from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Callable, Iterable
-from typing import Protocol
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any, ClassVar, Final
 
-Sample = tuple[float, float]
-BATCH = 20  # size of the dissertation's buffer
+from dva_sim.errors import ConfigError
+from dva_sim.plugins import Plugins
+
+Sample = tuple[float, float]  # speed level, turn [deg/s]
+BATCH: Final = 20  # slots of the dissertation's buffer
 
 
-class Filter(Protocol):
-    """What a phone needs of a filter; samples are (speed level, turn [deg])."""
+class Filter(ABC):
+    """Base of all filters; derive from this to make another one.
 
+    Args:
+        period: Mean time between two samples [s].
+
+    Attributes:
+        batch: After so many fresh samples, or when the app's longest delay has passed, the
+            value is taken, and stands until the next time; None: the value is of use at any
+            time, and asking for it changes nothing.
+    """
+
+    batch: ClassVar[int | None] = None
+
+    def __init__(self, period: float) -> None:
+        self.period = period
+
+    @abstractmethod
     def add(self, sample: Sample) -> None:
         """Take the next sample."""
 
+    @abstractmethod
     def value(self) -> Sample:
-        """The filtered value now; a filter that works in batches starts the next one."""
+        """The filtered value now; before the first sample, zero."""
 
     @property
-    def span(self) -> int:
-        """How many fresh samples the value rests on."""
+    def age(self) -> float:
+        """Mean age of what the value is made of, in samples: 0 if it is the newest one alone.
+
+        It is by how many samples the value lags behind an input that rises steadily.
+        """
+        return 0.0
 
 
-class BatchMedian:
+class BatchMedian(Filter):
     """The dissertation's filter: the median over a buffer of which only a part is fresh.
 
     When the time runs out before the buffer is full, the slots not yet refreshed keep what
     they held: with few fresh samples the median of a sorted copy stays frozen at the old
     values, and sorting in place (the fresh samples then overwrite the smallest) ratchets up.
 
+    Its age is that of an input that rises steadily, taken through the same slots. With f fresh
+    samples of n slots, more than half of them, the stale slots are lowest and shift the middle to
+    (n - 1) / 2 samples behind the newest, whatever f is; a buffer of f slots alone would be
+    (f - 1) / 2 behind. The value then stands for f samples, (f - 1) / 2 on average when one
+    comes. At 34 samples per second and a longest delay of 0.5 s (f = 17) the mean age of what
+    stands is therefore (8 + 8) / 34 = 0.471 s for 17 slots, all fresh, and (9.5 + 8) / 34 =
+    0.515 s for 20; averaged over time, not over samples, each is half a sample (15 ms) more.
+    Where half or less is fresh, the median is frozen, and its age grows without end.
+
     Args:
+        period: Mean time between two samples [s].
         slots: Size of the buffer.
         in_place: Sort the buffer itself rather than a copy of it.
     """
 
-    def __init__(self, slots: int = BATCH, in_place: bool = False) -> None:
-        self._slots, self._in_place, self._filled = slots, in_place, 0
-        self._speed, self._turn = [0.0] * slots, [0.0] * slots
+    batch = BATCH
+
+    def __init__(self, period: float, slots: int = BATCH, in_place: bool = False) -> None:
+        super().__init__(period)
+        self._slots, self._in_place = slots, in_place
+        self._filled, self._taken, self._age = 0, 0, 0.0
+        self._speed, self._turn, self._rise = [0.0] * slots, [0.0] * slots, [0.0] * slots
 
     def add(self, sample: Sample) -> None:
         """See `Filter`."""
+        self._taken += 1
         if self._filled < self._slots:
             self._speed[self._filled], self._turn[self._filled] = sample
+            self._rise[self._filled] = self._taken
             self._filled += 1
 
-    @property
-    def span(self) -> int:
-        """See `Filter`."""
-        return self._filled
-
     def value(self) -> Sample:
-        """See `Filter`."""
+        """The median of the buffer; the next batch begins."""
         self._filled = 0
         if self._in_place:
             self._speed.sort()
             self._turn.sort()
-        return _median(self._speed), _median(self._turn)
+            self._rise.sort()
+        self._age = self._taken - median(self._rise)
+        return median(self._speed), median(self._turn)
+
+    @property
+    def age(self) -> float:
+        """See `Filter`; of the value that was taken last."""
+        return self._age
 
 
-class MovingMedian:
+class InPlaceMedian(BatchMedian):
+    """The same with the buffer itself sorted."""
+
+    def __init__(self, period: float) -> None:
+        super().__init__(period, in_place=True)
+
+
+class CopyMedian(BatchMedian):
+    """The same with a copy of the buffer sorted."""
+
+    def __init__(self, period: float) -> None:
+        super().__init__(period)
+
+
+class MovingMedian(Filter):
     """The median of the newest samples: the mended filter.
 
     Args:
+        period: Mean time between two samples [s].
         window: How many samples it covers.
     """
 
-    def __init__(self, window: int = 5) -> None:
+    def __init__(self, period: float, window: int = 5) -> None:
+        super().__init__(period)
+        if not (isinstance(window, int) and 1 <= window <= 1000):
+            raise ConfigError(f"option 'window' is {window!r}; should be a whole number, 1 to 1000")
         self._speed: deque[float] = deque(maxlen=window)
         self._turn: deque[float] = deque(maxlen=window)
 
@@ -79,39 +142,71 @@ class MovingMedian:
         self._speed.append(sample[0])
         self._turn.append(sample[1])
 
-    @property
-    def span(self) -> int:
-        """See `Filter`."""
-        return len(self._speed)
-
     def value(self) -> Sample:
         """See `Filter`."""
         if not self._speed:
             return 0.0, 0.0
-        return _median(self._speed), _median(self._turn)
+        return median(self._speed), median(self._turn)
+
+    @property
+    def age(self) -> float:
+        """See `Filter`."""
+        return 0.5 * max(len(self._speed) - 1, 0)
 
 
-class Last:
-    """No filter: the newest sample as it is."""
+class OnePole(Filter):
+    """A first-order low-pass: the newest samples count most, older ones ever less.
 
-    def __init__(self) -> None:
+    Args:
+        period: Mean time between two samples [s].
+        time_constant_s: In which it follows [s]; the mean age of its value, the wait for the
+            next sample included.
+    """
+
+    def __init__(self, period: float, time_constant_s: float = 0.1) -> None:
+        super().__init__(period)
+        if not (isinstance(time_constant_s, int | float) and 0.0 < time_constant_s <= 60.0):
+            raise ConfigError(
+                f"option 'time_constant_s' is {time_constant_s!r}; should be above 0, at most 60"
+            )
+        self._keep = math.exp(-period / time_constant_s)
+        self._speed = self._turn = 0.0
+        self._begun = False
+
+    def add(self, sample: Sample) -> None:
+        """See `Filter`."""
+        keep = self._keep if self._begun else 0.0
+        self._begun = True
+        self._speed = sample[0] + (self._speed - sample[0]) * keep
+        self._turn = sample[1] + (self._turn - sample[1]) * keep
+
+    def value(self) -> Sample:
+        """See `Filter`."""
+        return self._speed, self._turn
+
+    @property
+    def age(self) -> float:
+        """See `Filter`: the sum of k keep^k (1 - keep) over all k from 0 on."""
+        return self._keep / (1.0 - self._keep)
+
+
+class NoFilter(Filter):
+    """The newest sample as it is."""
+
+    def __init__(self, period: float) -> None:
+        super().__init__(period)
         self._sample: Sample = (0.0, 0.0)
 
     def add(self, sample: Sample) -> None:
         """See `Filter`."""
         self._sample = sample
 
-    @property
-    def span(self) -> int:
-        """See `Filter`."""
-        return 1
-
     def value(self) -> Sample:
         """See `Filter`."""
         return self._sample
 
 
-def _median(values: Iterable[float]) -> float:
+def median(values: Iterable[float]) -> float:
     """Of a short list: `sorted` is many times faster than `numpy.median` here."""
     ordered = sorted(values)
     middle = len(ordered) // 2
@@ -120,9 +215,45 @@ def _median(values: Iterable[float]) -> float:
     return 0.5 * (ordered[middle - 1] + ordered[middle])
 
 
-FILTERS: dict[str, Callable[[], Filter]] = {
-    "median20-copy": BatchMedian,
-    "median20-inplace": lambda: BatchMedian(in_place=True),
-    "median5": MovingMedian,
-    "none": Last,
+FILTERS: Final[dict[str, Callable[..., Filter]]] = {
+    "median20-copy": CopyMedian,
+    "median20-inplace": InPlaceMedian,
+    "median": MovingMedian,
+    "one_pole": OnePole,
+    "none": NoFilter,
 }
+
+_PLUGINS: Final = Plugins(
+    "filter",
+    Filter,  # type: ignore[type-abstract]
+    FILTERS,
+    folder="agents/filters",
+    group="dva_sim.filters",
+    needs="add(sample)",
+    public="dva_sim.agents.tilt.Filter",
+)
+
+
+def known_filters() -> list[str]:
+    """Names that a phone can use: shipped and installed ones; files come on top."""
+    return _PLUGINS.known()
+
+
+def load_filter(
+    name: str, options: Mapping[str, Any] | None = None, base: Path | None = None
+) -> Callable[[float], Filter]:
+    """What makes the filter that `name` means, told the mean time between samples [s].
+
+    Args:
+        name: A shipped name, a class in a file such as `mine.py:Mine`, or the name under which
+            an installed package offers one (entry point, `dva_sim.filters`).
+        options: Keyword arguments of its constructor, besides the period.
+        base: Folder that a file is looked for in first; then the working folder, and
+            `agents/filters`.
+
+    Raises:
+        ConfigError: there is none of that name, its file or package cannot be loaded, or it is
+            not a filter; a bad option is told when it is made.
+    """
+    factory, given = _PLUGINS.find(name, base), dict(options or {})
+    return lambda period: _PLUGINS.make(name, factory, given, period)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -15,21 +14,6 @@ TREMOR_WIDTH_HZ: Final = 2.0  # between the half-power frequencies; assumed
 TREMOR: Final = 0.0043  # apparent tilt, standard deviation [rad]; assumed
 MAX_TILT: Final = math.radians(45.0)  # beyond it the screen is hard to read; assumed [rad]
 MAX_SPEED: Final = math.radians(200.0)  # of tilting while looking at a picture; assumed [rad/s]
-
-
-@dataclass(frozen=True)
-class Grip:
-    """What a phone needs to know of the person who holds it.
-
-    Attributes:
-        lag: Time constant of the hand [s].
-        perceptual_delay: From what the phone's display shows to what the person makes of it [s].
-        motor_noise: Standard deviation of the tilt that is aimed at, as a share of it.
-    """
-
-    lag: float = 0.15
-    perceptual_delay: float = 0.22
-    motor_noise: float = 0.0
 
 
 class Hand:
@@ -76,7 +60,7 @@ class Hand:
         a, b, c, d, self._off_pitch, self._off_roll = next(self._luck)
         self._shake_pitch, self._shake_roll = complex(a, b), complex(c, d)
         self._pitch = self._roll = 0.0
-        self._dt = -1.0
+        self._tuned: dict[float, tuple[float, float, float, complex, float]] = {}
 
     def rest(self) -> None:
         """Back to how it is held at rest, at once."""
@@ -84,39 +68,35 @@ class Hand:
 
     def step(self, pitch: float, roll: float, dt: float) -> tuple[float, float]:
         """Where the phone is after `dt` [s] of aiming at `pitch` and `roll` [rad]."""
-        if dt != self._dt:
-            self._tune(dt)
+        keep, new, most, swing, drive = self._tuned.get(dt) or self._tune(dt)
         a, b, c, d, e, f = next(self._luck)
         if self._noise:
-            keep, new = self._keep, self._new
-            self._off_pitch = self._off_pitch * keep + e * new
-            self._off_roll = self._off_roll * keep + f * new
-            pitch += pitch * self._noise * self._off_pitch
-            roll += roll * self._noise * self._off_roll
-        self._pitch = self._towards(self._pitch, pitch)
-        self._roll = self._towards(self._roll, roll)
-        swing, drive, tremor = self._swing, self._drive, self._tremor
-        self._shake_pitch = self._shake_pitch * swing + complex(a, b) * drive
-        self._shake_roll = self._shake_roll * swing + complex(c, d) * drive
-        return (
-            self._pitch + tremor * self._shake_pitch.real,
-            self._roll + tremor * self._shake_roll.real,
-        )
+            self._off_pitch = off = self._off_pitch * keep + e * new
+            pitch += pitch * self._noise * off
+            self._off_roll = off = self._off_roll * keep + f * new
+            roll += roll * self._noise * off
+        far = self._max_tilt
+        pitch = -far if pitch < -far else far if pitch > far else pitch
+        roll = -far if roll < -far else far if roll > far else roll
+        way = (pitch - self._pitch) * (1.0 - keep)
+        self._pitch += -most if way < -most else most if way > most else way
+        way = (roll - self._roll) * (1.0 - keep)
+        self._roll += -most if way < -most else most if way > most else way
+        self._shake_pitch = one = self._shake_pitch * swing + complex(a, b) * drive
+        self._shake_roll = other = self._shake_roll * swing + complex(c, d) * drive
+        return self._pitch + self._tremor * one.real, self._roll + self._tremor * other.real
 
-    def _towards(self, now: float, aim: float) -> float:
-        most = self._max_tilt
-        aim = -most if aim < -most else most if aim > most else aim
-        way, most = (aim - now) * self._follow, self._reach
-        return now + (-most if way < -most else most if way > most else way)
-
-    def _tune(self, dt: float) -> None:
-        """What depends on the length of a step alone."""
-        self._dt, self._reach = dt, self._max_speed * dt
-        self._keep = math.exp(-dt / self._lag) if self._lag > 0.0 else 0.0
-        self._follow, self._new = 1.0 - self._keep, math.sqrt(1.0 - self._keep**2)
+    def _tune(self, dt: float) -> tuple[float, float, float, complex, float]:
+        """What depends on the length of a step alone; there are few of them."""
+        keep = math.exp(-dt / self._lag) if self._lag > 0.0 else 0.0
         damping = math.pi * TREMOR_WIDTH_HZ
-        self._swing = cmath.exp(complex(-damping, 2.0 * math.pi * TREMOR_HZ) * dt)
-        self._drive = math.sqrt(1.0 - math.exp(-2.0 * damping * dt))
+        swing = cmath.exp(complex(-damping, 2.0 * math.pi * TREMOR_HZ) * dt)
+        drive = math.sqrt(1.0 - math.exp(-2.0 * damping * dt))
+        if len(self._tuned) > 1000:
+            self._tuned.clear()
+        tuned = keep, math.sqrt(1.0 - keep * keep), self._max_speed * dt, swing, drive
+        self._tuned[dt] = tuned
+        return tuned
 
 
 def rows(rng: np.random.Generator, width: int, block: int) -> Iterator[list[float]]:

@@ -1,59 +1,49 @@
-"""From the tilt of a hand to the command that is sent.
+"""A phone in a hand: what is wanted goes in, commands come out, by a chain of small stages.
 
-The way is the dissertation's: accelerometer, calibration (reference, speed step, radius
-step), filter, clamping, and a rule for when a value is worth a message.
+The way is the dissertation's: wanted -> the reading to tilt to (`Mapping.tilt_for`) -> `Hand` ->
+`Accelerometer` -> `Calibration` -> `Filter` -> `Mapping.command` -> a rule for when it is sent.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from itertools import islice
-from typing import Annotated, Literal, NamedTuple
+from collections import deque
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final, NamedTuple, Protocol
 
 import numpy as np
-from pydantic import Field
 
-from dva_sim.agents.tilt.filters import BATCH, FILTERS
+from dva_sim.agents.tilt.accelerometer import Accelerometer, load_part
+from dva_sim.agents.tilt.calibration import SPEED_PER_LEVEL, Calibration
+from dva_sim.agents.tilt.filters import BATCH, Filter, load_filter
+from dva_sim.agents.tilt.hand import Hand
+from dva_sim.agents.tilt.mappings import Pair, limited, load_mapping
+from dva_sim.agents.tilt.profile import PhoneProfile
 from dva_sim.agents.tilt.trail import Trail
-from dva_sim.config import Config
 
-LEVELS = 10  # speed levels of the phone; one is SPEED_PER_LEVEL
-SPEED_PER_LEVEL = 0.05  # [m/s]
-MAX_TURN_DEG = 30.0
-TREMOR_HZ = 9.5  # middle of the 8-12 Hz band of physiological hand tremor
-
-NonNegative = Annotated[float, Field(ge=0)]
+SURELY: Final = -1.0  # the level that a person tilts to who wants to stand
+_TIE: Final = 1e-9  # moments nearer than this are the same [s]
 
 
-class PhoneProfile(Config):
-    """A phone and how its app sends.
+class Holder(Protocol):
+    """What a phone needs of the person who holds it; as `Person` has it."""
 
-    Attributes:
-        sample_rate_hz: Accelerometer samples per second.
-        noise_mps2: White noise of the sensor, standard deviation.
-        bias_mps2: Constant error per person and axis, standard deviation.
-        tremor_mps2: Amplitude of hand tremor.
-        speed_step_mps2: Acceleration along the tilt axis for one level of speed.
-        turn_step_mps2: Acceleration across it for one degree per second of turn.
-        filter: Name of the filter.
-        send: `on_change` sends a value that differs from the last one sent when a batch is
-            full or `max_delay_s` has passed; `keep_alive` sends at the wanted rate always.
-        max_delay_s: Longest time between two looks at the filter (`on_change` only).
-        ideal: The hand's intent becomes the command at once: a reference, not a phone.
-    """
+    @property
+    def hand_lag(self) -> float:
+        """Time constant of the hand [s]."""
 
-    description: str = ""
-    sample_rate_hz: Annotated[float, Field(gt=0, le=1000)] = 34.0
-    noise_mps2: NonNegative = 0.05
-    bias_mps2: NonNegative = 0.08
-    tremor_mps2: NonNegative = 0.06
-    speed_step_mps2: Annotated[float, Field(gt=0)] = 0.35
-    turn_step_mps2: Annotated[float, Field(gt=0)] = 0.12
-    filter: Literal["median20-copy", "median20-inplace", "median5", "none"] = "median5"
-    send: Literal["on_change", "keep_alive"] = "keep_alive"
-    max_delay_s: Annotated[float, Field(gt=0, le=10)] = 0.5
-    ideal: bool = False
+    @property
+    def perceptual_delay(self) -> float:
+        """From what a display shows to what the person makes of it [s]."""
+
+    @property
+    def motor_noise(self) -> float:
+        """Standard deviation of the tilt that is aimed at, as a share of it."""
+
+    @property
+    def margin(self) -> float:
+        """Crossover times delay, at which the person closes what the display lacks."""
 
 
 class TiltCommand(NamedTuple):
@@ -62,7 +52,10 @@ class TiltCommand(NamedTuple):
     Attributes:
         speed: [m/s]
         turn_rate: [rad/s]
-        sample_age: Mean age of the samples behind it when it was made [s].
+        sample_age: Mean age of the information in the reading that the command was made of:
+            from the samples that the filter holds, each with its weight in the value, to now [s].
+            All that the phone delays is in it once: waiting for the next sample, the filter, and
+            how long its value has stood. The lag of the hand is before it, the mapping after it.
         captured: When the pictures behind it were captured, on average [s]; for the recorder.
     """
 
@@ -73,33 +66,114 @@ class TiltCommand(NamedTuple):
 
 
 class Phone:
-    """A hand holding a phone.
+    """A phone, its app, and the hand that holds it.
 
-    The hand follows what it is asked to do with a first-order lag. Samples are made when
-    the app looks, for all the time since it last looked: the same numbers as sample by
-    sample, without an event for each.
+    Samples are made when somebody looks, for all the time since: the same numbers as sample by
+    sample, without an event for each. What comes of a sample, and of a batch, depends on when it
+    was due, never on when somebody looked.
+
+    A practised person knows the reading that gives a command. With a mapping that integrates the
+    person also reads the display, a perceptual delay late, and closes the gap to what is wanted
+    in so long a time that the crossover times the delay from display to display is `margin`.
 
     Args:
         profile: Phone and app.
-        hand_lag: Time constant of the hand [s].
-        rng: Luck of this phone.
+        holder: Who holds it.
+        rng: Luck of this run.
+        own: Luck of this person's copy of the phone and its calibration, the same in all runs;
+            if not given, of this run.
+        base: Folder that files of filters and mappings are looked for in first.
 
     Attributes:
-        hand_lag: Time constant with which a command follows what is asked [s].
+        hand_lag: By how much the hand makes a command follow later what is asked, on average [s].
+            The hand is moved from sample to sample, so that it is less than the time constant.
+        shown: The command on the display: level, turn [deg/s].
+
+    Raises:
+        ConfigError: the part, the filter or the mapping cannot be had.
     """
 
-    def __init__(self, profile: PhoneProfile, hand_lag: float, rng: np.random.Generator) -> None:
+    def __init__(
+        self,
+        profile: PhoneProfile,
+        holder: Holder,
+        rng: np.random.Generator,
+        own: np.random.Generator | None = None,
+        base: Path | None = None,
+    ) -> None:
+        of_hand, of_part, spare = rng.spawn(3)
+        own = own or spare
         self._profile = profile
-        self._filter = FILTERS[profile.filter]()
-        self._trail = Trail(FILTERS[profile.filter])
-        self.hand_lag = 0.0 if profile.ideal else hand_lag
-        self._period = 1.0 / profile.sample_rate_hz
-        self._decay = math.exp(-self._period / hand_lag) if hand_lag > 0 else 0.0
-        self._noise = _axis_noise(profile, rng)
-        self._asked = (0.0, 0.0)
-        self._hand = (0.0, 0.0)
-        self._samples_taken = 0
+        self._accelerometer = Accelerometer(
+            load_part(profile.accelerometer),
+            of_part,
+            own,
+            profile.sample_rate_hz,
+            profile.sample_jitter,
+        )
+        self._hand = Hand(
+            holder.hand_lag,
+            of_hand,
+            holder.motor_noise,
+            math.radians(profile.tremor_deg),
+            math.radians(profile.max_tilt_deg),
+            math.radians(profile.max_tilt_speed_deg_s),
+        )
+        self._period = period = self._accelerometer.period
+        self._calibrate(own)
+        filters = load_filter(profile.filter, profile.filter_options, base)
+        self._make_filter: Callable[[], Filter] = lambda: filters(period)
+        self._batch = self._make_filter().batch
+        self._mapping = load_mapping(profile.mapping, profile.mapping_options, base)()
+        self._watches = self._mapping.integrates
+        self._within = self._time_to_close(holder)
+        self._late = round(holder.perceptual_delay / period)
+        self._trail = Trail(self._make_filter)
+        self._decay = math.exp(-period / holder.hand_lag) if holder.hand_lag > 0.0 else 0.0
+        keep = 0.0 if profile.ideal else self._decay
+        self.hand_lag = period * keep / (1.0 - keep)
+        self.pick_up(0.0)
+
+    def _calibrate(self, own: np.random.Generator) -> None:
+        """The owner held the phone as meant, roughly; what it then measured is the reference."""
+        profile, offset = self._profile, self._accelerometer.offset
+        x, y, z = profile.reference_mps2
+        dx, dy = own.normal(0.0, profile.reference_error_mps2, 2).tolist()
+        steps = profile.speed_step_mps2, profile.turn_step_mps2
+        measured = x + offset[0] + dx, y + offset[1] + dy, z + offset[2]
+        self._app = Calibration(measured, *steps, profile.max_delay_s)
+        self._felt = Calibration(profile.reference_mps2, *steps, profile.max_delay_s)
+        self._rest = self._felt.pose(0.0, 0.0)
+
+    def _time_to_close(self, holder: Holder) -> float:
+        """In what time a gap on the display is closed [s]."""
+        if self._batch is not None:
+            held = min(self._app.max_delay, self._batch * self._period)
+        else:
+            probe = self._make_filter()
+            for _ in range(200):
+                probe.add((0.0, 0.0))
+            held = (probe.age + 0.5) * self._period
+        return (holder.perceptual_delay + holder.hand_lag + held) / holder.margin
+
+    # --- what others ask ---------------------------------------------------------------
+
+    def pick_up(self, now: float) -> None:
+        """Begin a drive: the hand is at rest, the app starts with nothing in its filter."""
+        self._accelerometer.begin_session()
+        self._hand.rest()
+        self._mapping.begin()
+        self._filter = self._make_filter()
+        self._trail.begin(now)
+        self._wanted = self.shown = (0.0, 0.0)
+        self._aim = 0.0, 0.0
+        self._perceived = deque([self.shown], maxlen=self._late + 1)
         self._last_key: tuple[int, int] | None = None
+        self._step = self._accelerometer.interval()
+        self._sample_at = now + self._step
+        self._fresh = self._untrailed = 0
+        self._taken_at = self._stems_from = self._sampled_at = self._captured = now
+        self._due = math.inf if self._batch is None else now + self._app.max_delay
 
     def ask(
         self, now: float, speed: float, turn_rate: float, captured: float | None = None
@@ -109,68 +183,104 @@ class Phone:
         A person who wants to stand tilts a level beyond the reference, to be sure. When the
         picture behind it was `captured` [s] is carried along for the recorder; now, if none was.
         """
-        self._sample_until(now)
+        self._advance(now)
         self._trail.follow(now if captured is None else captured)
-        level = speed / SPEED_PER_LEVEL if speed > 0 else -1.0
-        self._asked = level, math.degrees(turn_rate)
+        level, turn = limited(speed / SPEED_PER_LEVEL, math.degrees(turn_rate))
+        self._wanted = level or SURELY, turn
+        if not self._watches:
+            self._aim = self._aim_at(self.shown)
 
     def next_look(self, now: float, rate_hz: float) -> float:
         """When the app next considers sending [s]: its period, or when a batch is complete."""
-        if self._profile.send == "keep_alive":
+        if self.keeps_alive:
             return now + 1.0 / rate_hz
-        return now + min(self._profile.max_delay_s, BATCH * self._period)
-
-    def pick_up(self, now: float) -> None:
-        """Begin a drive: the hand is level, the filter keeps what it held."""
-        self._samples_taken = int(now * self._profile.sample_rate_hz)
-        self._last_key = None
-        self._asked = self._hand = (0.0, 0.0)
-        self._trail.begin(now)
+        if self._batch is None or self._profile.ideal:
+            return now + min(self._app.max_delay, BATCH * self._period)
+        self._advance(now)
+        return min(self._due, self._sample_at + (self._batch - self._fresh - 1) * self._period)
 
     def look(self, now: float) -> TiltCommand | None:
         """The command to send at `now`, or None if there is nothing new to say."""
-        self._sample_until(now)
-        age = 0.0 if self._profile.ideal else 0.5 * self._filter.span * self._period
-        level, turn = self._asked if self._profile.ideal else self._filter.value()
-        captured = self._trail.asked if self._profile.ideal else self._trail.captured()
-        level = min(max(level, 0.0), float(LEVELS))
-        turn = min(max(turn, -MAX_TURN_DEG), MAX_TURN_DEG)
+        self._advance(now)
+        if self._profile.ideal:
+            self.shown = limited(*self._wanted)
+            self._stems_from, self._captured = now, self._trail.asked
+        elif self._batch is None:
+            if not self._watches:
+                self.shown = limited(*self._mapping.command(*self._filter.value(), 0.0))
+            self._captured = self._trail.captured()
+            self._stems_from = self._sampled_at - self._trail.age * self._period
+        level, turn = self.shown
         key = round(level), int(turn)
-        if self._profile.send == "on_change" and key == self._last_key:
+        if key == self._last_key and not self.keeps_alive:
             return None
         self._last_key = key
-        return TiltCommand(level * SPEED_PER_LEVEL, math.radians(turn), age, captured)
+        age = now - self._stems_from
+        return TiltCommand(level * SPEED_PER_LEVEL, math.radians(turn), age, self._captured)
 
     @property
     def keeps_alive(self) -> bool:
         """Whether the newest value is sent at every chance, changed or not."""
         return self._profile.send == "keep_alive"
 
-    def _sample_until(self, now: float) -> None:
-        due = int(now * self._profile.sample_rate_hz + 1e-9)
-        new = due - self._samples_taken
-        if self._profile.ideal or new <= 0:
+    # --- what happens meanwhile --------------------------------------------------------
+
+    def _advance(self, now: float) -> None:
+        """All samples and values that were due."""
+        end = now + _TIE
+        if (self._sample_at > end and self._due > end) or self._profile.ideal:
             return
-        (asked_level, asked_turn), (level, turn), decay = self._asked, self._hand, self._decay
-        add = self._filter.add
-        for noise_level, noise_turn in islice(self._noise, new):
-            level = asked_level + (level - asked_level) * decay
-            turn = asked_turn + (turn - asked_turn) * decay
-            add((level + noise_level, turn + noise_turn))
-        self._hand = level, turn
-        self._trail.sample(new, decay)
-        self._samples_taken = due
+        while True:
+            if self._due < self._sample_at - _TIE:
+                if self._due > end:
+                    break
+                self._take_value(self._due)
+            elif self._sample_at > end:
+                break
+            else:
+                self._sample()
+        self._carry_on()
 
+    def _sample(self) -> None:
+        """The sample that is due: one way through hand, part, calibration and filter."""
+        watches = self._watches
+        if watches:
+            self._aim = self._aim_at(self._perceived[0])
+        one, other = self._aim
+        pitch, roll = self._hand.step(one, other, self._step)
+        one, other = self._rest
+        x, y, z = self._accelerometer.sample(one + pitch, other + roll)
+        self._filter.add(self._app.reading(x, y, z))
+        self._sampled_at = self._sample_at
+        self._untrailed += 1
+        if self._batch is not None:
+            self._fresh += 1
+            if self._fresh == self._batch:
+                self._take_value(self._sample_at)
+        elif watches:
+            self.shown = limited(*self._mapping.command(*self._filter.value(), self._step))
+        if watches:
+            self._perceived.append(self.shown)
+        self._step = self._accelerometer.interval()
+        self._sample_at += self._step
 
-def _axis_noise(profile: PhoneProfile, rng: np.random.Generator) -> Iterator[list[float]]:
-    """Error of each sample in (levels, deg/s): bias, white noise and tremor, drawn in blocks."""
-    scale = np.array([1 / profile.speed_step_mps2, 1 / profile.turn_step_mps2])
-    bias = rng.normal(0.0, 1.0, 2) * profile.bias_mps2
-    phase = rng.uniform(0.0, 2 * math.pi, 2)
-    start, block = 0, 512
-    while True:
-        angle = 2 * math.pi * TREMOR_HZ / profile.sample_rate_hz * np.arange(start, start + block)
-        tremor = profile.tremor_mps2 * np.sin(angle[:, None] + phase)
-        white = rng.normal(0.0, 1.0, (block, 2)) * profile.noise_mps2
-        yield from ((bias + white + tremor) * scale).tolist()
-        start += block
+    def _take_value(self, at: float) -> None:
+        """A batch is complete, or its time is over."""
+        self._carry_on()
+        reading = self._filter.value()
+        self._captured = self._trail.captured()
+        self._stems_from = self._sampled_at - self._trail.age * self._period
+        self.shown = limited(*self._mapping.command(*reading, at - self._taken_at))
+        self._taken_at, self._due, self._fresh = at, at + self._app.max_delay, 0
+
+    def _aim_at(self, perceived: Pair) -> Pair:
+        """Angles away from rest that the hand aims at [rad]."""
+        reading = self._mapping.tilt_for(self._wanted, perceived, self._within)
+        pitch, roll = self._felt.pose(*reading)
+        return pitch - self._rest[0], roll - self._rest[1]
+
+    def _carry_on(self) -> None:
+        """The recorder's trail goes the same way."""
+        if self._untrailed:
+            self._trail.sample(self._untrailed, self._decay)
+            self._untrailed = 0

@@ -1,0 +1,56 @@
+"""The app's calibration: what a tilt means, and how often the app says it."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from dva_sim.agents.tilt.accelerometer import GRAVITY, Triple
+
+LEVELS: Final = 10.0  # speed levels of the phone; one is SPEED_PER_LEVEL
+SPEED_PER_LEVEL: Final = 0.05  # [m/s]
+MAX_TURN_DEG: Final = 30.0  # either way, per second
+
+
+class Calibration:
+    """From accelerations to a reading: a speed level, and a turn rate in degrees per second.
+
+    The reading counts steps of acceleration away from the reference pose, forwards and to the
+    left. It is not limited here: limits come after the mapping, and a median of what is limited
+    later is the limited median.
+
+    Args:
+        reference: x, y, z at rest in the pose that means nothing [m/s^2].
+        speed_step: Acceleration along x for one level of speed [m/s^2].
+        turn_step: Acceleration along y for one degree per second [m/s^2].
+        max_delay: Longest time between two looks at the filter [s].
+    """
+
+    def __init__(
+        self,
+        reference: Triple = (0.0, 0.0, GRAVITY),
+        speed_step: float = 0.35,
+        turn_step: float = 0.12,
+        max_delay: float = 0.5,
+    ) -> None:
+        self.reference, self.max_delay = reference, max_delay
+        self._x, self._y, self._z = reference
+        self._speed_step, self._turn_step = speed_step, turn_step
+
+    def reading(self, ax: float, ay: float, az: float) -> tuple[float, float]:
+        """What is read from a sample: level, turn [deg/s]; z only tells which side is up."""
+        if az * self._z < 0.0:
+            return 0.0, 0.0  # upside down against the reference: nobody steers so
+        return (ax - self._x) / self._speed_step, (ay - self._y) / self._turn_step
+
+    def pose(self, level: float, turn: float) -> tuple[float, float]:
+        """The angles that read so on a perfect part: pitch, roll [rad]; the nearest there are."""
+        along = _share(self._x + level * self._speed_step, GRAVITY)
+        pitch = math.asin(along)
+        flat = GRAVITY * math.sqrt(1.0 - along * along)
+        across = _share(self._y + turn * self._turn_step, flat) if flat > 0.0 else 0.0
+        return pitch, math.asin(across)
+
+
+def _share(part: float, whole: float) -> float:
+    return min(max(part / whole, -1.0), 1.0)

@@ -1,0 +1,240 @@
+"""Mappings from a filtered reading to a command: one class each, shipped or a user's.
+
+Whatever happens on the phone, what it sends is absolute: a speed and a turn rate.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from collections.abc import Mapping as Options
+from pathlib import Path
+from typing import Any, ClassVar, Final
+
+from dva_sim.agents.tilt.calibration import LEVELS, MAX_TURN_DEG
+from dva_sim.errors import ConfigError
+from dva_sim.plugins import Plugins
+
+Pair = tuple[float, float]  # speed level, turn [deg/s]
+
+
+class Mapping(ABC):
+    """Base of all mappings; derive from this to make another one.
+
+    Attributes:
+        integrates: Whether a command depends on those before. If so, every value of the filter
+            is told once, with the time that it stands for, and the person watches the display.
+    """
+
+    integrates: ClassVar[bool] = True
+
+    @abstractmethod
+    def command(self, level: float, turn: float, dt: float) -> Pair:
+        """The command now, which is also what the display shows.
+
+        Args:
+            level: Of the reading.
+            turn: Of the reading [deg/s].
+            dt: For how long the reading stands [s].
+
+        Returns:
+            A level from 0 to `LEVELS`, and a turn rate of at most `MAX_TURN_DEG` either way.
+        """
+
+    @abstractmethod
+    def tilt_for(self, wanted: Pair, shown: Pair, within: float) -> Pair:
+        """The reading that a practised hand tilts to.
+
+        Args:
+            wanted: What the command should be; a level below 0 means: surely stand.
+            shown: What the display shows, as the person has perceived it.
+            within: In what time to get there [s].
+        """
+
+    def begin(self) -> None:  # noqa: B027 - most mappings have nothing to forget
+        """A drive begins: what was integrated is forgotten."""
+
+
+class Absolute(Mapping):
+    """The tilt is the command.
+
+    Args:
+        gain: Of the turn rate.
+        speed_gain: Of the speed.
+        dead_zone: Share of the full reading around the reference that means nothing.
+    """
+
+    integrates = False
+
+    def __init__(self, gain: float = 1.0, speed_gain: float = 1.0, dead_zone: float = 0.0) -> None:
+        self._gain, self._speed_gain = (
+            above_zero("gain", gain),
+            above_zero("speed_gain", speed_gain),
+        )
+        self._dead_level, self._dead_turn = dead_zones(dead_zone)
+
+    def command(self, level: float, turn: float, dt: float) -> Pair:
+        """See `Mapping`."""
+        return limited(
+            self._speed_gain * outside(level, self._dead_level),
+            self._gain * outside(turn, self._dead_turn),
+        )
+
+    def tilt_for(self, wanted: Pair, shown: Pair, within: float) -> Pair:
+        """See `Mapping`; the display is not needed."""
+        level = beyond(wanted[0] / self._speed_gain, self._dead_level)
+        return level, beyond(wanted[1] / self._gain, self._dead_turn)
+
+
+class Differential(Absolute):
+    """Tilting makes the turn rate grow, the faster the more, up to its limit.
+
+    A phone held level keeps its turn rate. The speed is absolute.
+
+    Args:
+        gain: Growth of the turn rate for each degree per second of the reading [1/s].
+        speed_gain: Of the speed.
+        dead_zone: Share of the full reading around the reference that means nothing.
+    """
+
+    integrates = True
+
+    def __init__(self, gain: float = 1.0, speed_gain: float = 1.0, dead_zone: float = 0.0) -> None:
+        super().__init__(gain, speed_gain, dead_zone)
+        self._turn = 0.0
+
+    def begin(self) -> None:
+        """See `Mapping`."""
+        self._turn = 0.0
+
+    def command(self, level: float, turn: float, dt: float) -> Pair:
+        """See `Mapping`."""
+        grown = self._turn + self._gain * outside(turn, self._dead_turn) * dt
+        level, self._turn = limited(self._speed_gain * outside(level, self._dead_level), grown)
+        return level, self._turn
+
+    def tilt_for(self, wanted: Pair, shown: Pair, within: float) -> Pair:
+        """See `Mapping`."""
+        return super().tilt_for((wanted[0], (wanted[1] - shown[1]) / within), shown, within)
+
+
+class Leaky(Differential):
+    """The same, but a phone held level lets its turn rate go back to zero.
+
+    Args:
+        gain: Growth of the turn rate for each degree per second of the reading [1/s].
+        speed_gain: Of the speed.
+        dead_zone: Share of the full reading around the reference that means nothing.
+        leak_s: Time constant in which it goes back [s].
+    """
+
+    def __init__(
+        self,
+        gain: float = 1.0,
+        speed_gain: float = 1.0,
+        dead_zone: float = 0.0,
+        leak_s: float = 1.0,
+    ) -> None:
+        super().__init__(gain, speed_gain, dead_zone)
+        self._leak = above_zero("leak_s", leak_s)
+
+    def command(self, level: float, turn: float, dt: float) -> Pair:
+        """See `Mapping`; exact for a reading that stands for all of `dt`."""
+        keep = math.exp(-dt / self._leak)
+        steady = self._gain * outside(turn, self._dead_turn) * self._leak
+        grown = steady + (self._turn - steady) * keep
+        level, self._turn = limited(self._speed_gain * outside(level, self._dead_level), grown)
+        return level, self._turn
+
+    def tilt_for(self, wanted: Pair, shown: Pair, within: float) -> Pair:
+        """See `Mapping`: what closes the gap, and what holds the shown rate against the leak."""
+        held = within * shown[1] / self._leak
+        return super().tilt_for((wanted[0], wanted[1] + held), shown, within)
+
+
+# --- parts of mappings -----------------------------------------------------------------
+
+
+def outside(value: float, zone: float) -> float:
+    """By how much a value is outside a zone around zero."""
+    if zone == 0.0:
+        return value
+    return math.copysign(max(abs(value) - zone, 0.0), value)
+
+
+def beyond(value: float, zone: float) -> float:
+    """The inverse of `outside`: a value that is so much outside; zero stays zero."""
+    return value + math.copysign(zone, value) if value else 0.0
+
+
+def limited(level: float, turn: float) -> Pair:
+    """Within what a command can be: no reverse, and the limits of speed and turn rate."""
+    return (
+        0.0 if level < 0.0 else LEVELS if level > LEVELS else level,
+        -MAX_TURN_DEG if turn < -MAX_TURN_DEG else MAX_TURN_DEG if turn > MAX_TURN_DEG else turn,
+    )
+
+
+def dead_zones(share: float) -> Pair:
+    """Of level and turn, for a share of the full reading.
+
+    Raises:
+        ConfigError: it is not from 0 to below 1.
+    """
+    if not (isinstance(share, int | float) and 0.0 <= share < 1.0):
+        raise ConfigError(f"option 'dead_zone' is {share!r}; should be at least 0, below 1")
+    return share * LEVELS, share * MAX_TURN_DEG
+
+
+def above_zero(option: str, value: float) -> float:
+    """An option that has to be a number above 0.
+
+    Raises:
+        ConfigError: it is not.
+    """
+    if not (isinstance(value, int | float) and 0.0 < value < math.inf):
+        raise ConfigError(f"option {option!r} is {value!r}; should be above 0")
+    return float(value)
+
+
+MAPPINGS: Final[dict[str, Callable[..., Mapping]]] = {
+    "absolute": Absolute,
+    "differential": Differential,
+    "leaky": Leaky,
+}
+
+_PLUGINS: Final = Plugins(
+    "mapping",
+    Mapping,  # type: ignore[type-abstract]
+    MAPPINGS,
+    folder="agents/mappings",
+    group="dva_sim.mappings",
+    needs="command(level, turn, dt)",
+    public="dva_sim.agents.tilt.Mapping",
+)
+
+
+def known_mappings() -> list[str]:
+    """Names that a phone can use: shipped and installed ones; files come on top."""
+    return _PLUGINS.known()
+
+
+def load_mapping(
+    name: str, options: Options[str, Any] | None = None, base: Path | None = None
+) -> Callable[[], Mapping]:
+    """What makes the mapping that `name` means.
+
+    Args:
+        name: A shipped name, a class in a file such as `mine.py:Mine`, or the name under which
+            an installed package offers one (entry point, `dva_sim.mappings`).
+        options: Keyword arguments of its constructor.
+        base: Folder that a file is looked for in first; then the working folder, and
+            `agents/mappings`.
+
+    Raises:
+        ConfigError: there is none of that name, its file or package cannot be loaded, or it is
+            not a mapping; a bad option is told when it is made.
+    """
+    factory, given = _PLUGINS.find(name, base), dict(options or {})
+    return lambda: _PLUGINS.make(name, factory, given)
