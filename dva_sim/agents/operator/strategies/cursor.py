@@ -78,11 +78,11 @@ def towards(seen: Sighting, delay: float, person: Person, most: float) -> Veloci
 
 
 def through(path: Route, seen: Sighting, delay: float, person: Person, most: float) -> Velocity:
-    """Towards a point ahead on the middle line, as fast as the delay allows.
+    """Along the tunnel as it will be where one is when it takes effect, and back to its middle.
 
-    While nothing can be seen of it, the noise of the hand and the bend of the tunnel drive the
-    cursor aside; the speed keeps each within a share of the half width, the person's caution. The
-    look-ahead is the way covered during the delay over that same caution, or half a width.
+    While nothing can be seen of it, the noise of the hand drives the cursor aside, and so does a
+    bend that is not foreseen well; the speed keeps each within a share of the half width, the
+    person's caution. The end is a target like any other.
 
     Args:
         path: The middle line [m].
@@ -91,18 +91,20 @@ def through(path: Route, seen: Sighting, delay: float, person: Person, most: flo
         person: Caution, gain and noise.
         most: As fast as the person cares to go [m/s].
     """
-    delay, room = max(delay, SHORTEST), person.caution * seen.tolerance
+    delay, gain = max(delay, SHORTEST), gain_at(person.pointing, person.margin, delay)
     speed = fastest(seen.tolerance, delay, person, most)
-    look = max(speed * delay / person.caution, seen.tolerance)
-    ahead = path.ahead(seen.x, seen.y, 0.0, look)
-    bend = _bend(path, path.length - ahead.remaining, look)
+    left = path.ahead(seen.x, seen.y, 0.0, 0.0).remaining
+    along = path.length - left
+    bend, room = _bend(path, along, speed * delay + seen.tolerance), seen.tolerance * person.caution
     if 0.5 * bend * (speed * delay) ** 2 > room:
         speed = math.sqrt(2.0 * room / bend) / delay
-        look = max(speed * delay / person.caution, seen.tolerance)
-        ahead = path.ahead(seen.x, seen.y, 0.0, look)
-    if ahead.remaining < look:  # the end is a target like any other
-        speed = min(speed, gain_at(person.pointing, person.margin, delay) * ahead.distance)
-    return speed * math.cos(ahead.bearing), speed * math.sin(ahead.bearing)
+    if left < speed * max(delay, 1.0 / gain):
+        x, y = path.point_at(path.length)
+        end = seen._replace(target_x=x, target_y=y, target_vx=0.0, target_vy=0.0)
+        return towards(end, delay, person, speed)
+    dx, dy = _direction(path, along + speed * delay, 0.5 * seen.tolerance)
+    x, y = path.point_at(along)
+    return speed * dx + gain * (x - seen.x), speed * dy + gain * (y - seen.y)
 
 
 def fastest(half_width: float, delay: float, person: Person, most: float) -> float:
@@ -120,9 +122,14 @@ def fastest(half_width: float, delay: float, person: Person, most: float) -> flo
 
 def _bend(path: Route, along: float, look: float) -> float:
     """Mean curvature of the path from a place on it to a look-ahead [1/m]."""
-    ax, ay = path.point_at(along)
-    bx, by = path.point_at(along + 0.5 * look)
-    cx, cy = path.point_at(along + look)
-    turn = math.atan2(cy - by, cx - bx) - math.atan2(by - ay, bx - ax)
-    near_end = (cx, cy) == (bx, by)
-    return 0.0 if near_end else abs(math.remainder(turn, 2.0 * math.pi)) / (0.5 * look)
+    ax, ay = _direction(path, along, 0.1 * look)
+    bx, by = _direction(path, along + look, 0.1 * look)
+    return abs(math.atan2(ax * by - ay * bx, ax * bx + ay * by)) / look
+
+
+def _direction(path: Route, along: float, by: float) -> Velocity:
+    """Which way a path goes at a place on it, seen over so much of it either way [m]."""
+    along = min(max(along, by), path.length - by)
+    (ax, ay), (bx, cy) = path.point_at(along - by), path.point_at(along + by)
+    length = math.hypot(bx - ax, cy - ay)
+    return ((bx - ax) / length, (cy - ay) / length) if length else (0.0, 0.0)
