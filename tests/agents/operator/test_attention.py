@@ -1,0 +1,101 @@
+"""Which of several robots one person looks at."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import pytest
+
+from dva_sim.agents.operator.attention import GLANCE, Attention, next_screen
+from dva_sim.clock import Clock
+from dva_sim.recorder import DriveLog
+
+
+@dataclass
+class Robot:
+    """A screen that notes when the person looks away."""
+
+    waits_since: float | None = None
+    log: DriveLog = field(default_factory=lambda: DriveLog("robot", "operator", 1, 0.0))
+    left: int = 0
+
+    def look_away(self) -> None:
+        self.left += 1
+
+
+@pytest.mark.parametrize(
+    ("why", "waits", "chosen"),
+    [
+        ("who is judged now is judged to the end", (90.0, 10.0, 20.0), 0),
+        ("who has waited longest comes first", (None, 30.0, 20.0), 2),
+        ("a robot that only drives is left for one that waits", (None, None, 99.9), 2),
+    ],
+)
+def test_judgements_come_first(why: str, waits: tuple[float | None, ...], chosen: int) -> None:
+    assert next_screen(100.0, 0, 99.0, waits, (0.0, 50.0, 40.0)) == chosen, why
+
+
+def test_while_none_waits_each_is_glanced_at_in_turn_for_3_s() -> None:
+    waits, seen = (None, None, None), (0.0, 50.0, 40.0)
+    assert GLANCE == 3.0
+    assert next_screen(100.0, 0, 97.1, waits, seen) == 0
+    assert next_screen(100.0, 0, 97.0, waits, seen) == 2  # not looked at for longest
+
+
+def test_of_a_single_robot_everything_is_seen_at_once_and_all_the_time() -> None:
+    clock, robot = Clock(), Robot()
+    attention = Attention(clock, switch=1.0)
+    attention.begin(robot)
+    assert attention.looks_at(robot)
+    clock.run(60.0)
+    assert attention.looks_at(robot)
+    attention.end(robot)
+    assert robot.log.attended == [(0.0, 60.0)]
+    assert robot.log.turned_to == 0
+
+
+def test_two_robots_share_the_eyes_and_each_turn_costs_the_switch() -> None:
+    """3 s of looking, up to 0.5 s until the person moves on, 1 s to find into the other."""
+    clock, one, two = Clock(), Robot(), Robot()
+    attention = Attention(clock, switch=1.0)
+    attention.begin(one)
+    attention.begin(two)
+    clock.run(90.0)
+    attention.end(one)
+    attention.end(two)
+    for robot in (one, two):
+        seen = sum(until - since for since, until in robot.log.attended)
+        assert seen == pytest.approx(90.0 / 2 * 3.0 / 4.0, rel=0.15)
+    turns = one.log.turned_to + two.log.turned_to
+    assert turns == pytest.approx(90.0 / 4.0, abs=3)
+    spans = sorted(one.log.attended + two.log.attended)
+    gaps = [after[0] - before[1] for before, after in pairwise(spans)]
+    assert gaps == pytest.approx([1.0] * len(gaps))
+
+
+def test_who_waits_for_a_judgement_keeps_the_eyes_until_it_is_over() -> None:
+    clock, one, two = Clock(), Robot(), Robot()
+    attention = Attention(clock, switch=1.0)
+    attention.begin(one)
+    attention.begin(two)
+    clock.run(0.2)
+    two.waits_since = 0.2
+    clock.run(50.0)
+    assert attention.looks_at(two)
+    assert (one.left, one.log.turned_to, two.log.turned_to) == (1, 0, 1)
+    attention.end(two)
+    assert not attention.looks_at(one)
+    clock.run(51.0)
+    assert attention.looks_at(one)
+
+
+def test_the_last_screen_that_goes_off_leaves_nothing_to_look_at() -> None:
+    clock, one, two = Clock(), Robot(), Robot()
+    attention = Attention(clock, switch=1.0)
+    attention.begin(one)
+    attention.end(one)
+    attention.end(one)  # said twice
+    attention.begin(two)
+    assert not attention.looks_at(one)
+    assert attention.looks_at(two)
