@@ -65,6 +65,7 @@ class FireField:
         self._room = building.space_at(*fire.position)
         self._course: Course | None = None
         self._seen: tuple[Floats, NDArray[np.bool_]] | None = None
+        self._known: tuple[Floats, Floats, bool] = np.empty(0), np.empty(0), True
 
     def at(self, x: float, y: float, time: float) -> Conditions:
         """See `HazardField`."""
@@ -114,22 +115,41 @@ class FireField:
             time: [s]
             where: At `breathing` height, the `mean` from floor to ceiling, or in the `layer`.
         """
-        spaces = self._building.spaces
         if self._room == NOWHERE or time <= self._fire.start:
-            return np.zeros(spaces.count + 1)
+            return np.zeros(self._building.spaces.count + 1)
         before, after, weight = self._states(time)
         state = (before + weight * (after - before))[:-1]
-        room = spaces.area * spaces.ceiling
-        volume = (state[:, MASS] + state[:, HEAT] / (HEAT_CAPACITY * KELVIN)) / DENSITY
-        volume = np.maximum(volume, 1e-9)
+        volume, share = self._filled(state)
         value = SOOT_EXTINCTION * state[:, SOOT] / volume
-        share = np.minimum(1.0, volume / room)
         if where == "breathing":
-            bottom = spaces.ceiling * (1.0 - share)
+            bottom = self._building.spaces.ceiling * (1.0 - share)
             share = np.clip((BREATHING_HEIGHT - bottom) / BLUR + 0.5, 0.0, 1.0)
         elif where == "layer":
             share = np.ones_like(share)
         return np.append(value * share, 0.0)
+
+    def _filled(self, state: Floats) -> tuple[Floats, Floats]:
+        """Of each space: volume of its smoke [m^3], and the share of the space that it fills."""
+        spaces = self._building.spaces
+        volume = (state[:, MASS] + state[:, HEAT] / (HEAT_CAPACITY * KELVIN)) / DENSITY
+        volume = np.maximum(volume, 1e-9)
+        return volume, np.minimum(1.0, volume / (spaces.area * spaces.ceiling))
+
+    def is_above_heads(self, time: float) -> bool:
+        """Whether there is no smoke at breathing height anywhere: quick, as cameras ask often.
+
+        Volumes change on straight lines from one state of the field to the next, so that it is
+        enough to look at both, once.
+        """
+        if self._room == NOWHERE or time <= self._fire.start:
+            return True
+        before, after, _ = self._states(time)
+        if before is not self._known[0] or after is not self._known[1]:
+            ceiling = self._building.spaces.ceiling
+            bottoms = [ceiling * (1.0 - self._filled(s[:-1])[1]) for s in (before, after)]
+            above = bool(np.min(bottoms) > BREATHING_HEIGHT + BLUR / 2 + 1e-6)
+            self._known = before, after, above
+        return self._known[2]
 
     def picture(self, what: str, places: Places, time: float) -> Floats | None:
         """See `HazardField`."""

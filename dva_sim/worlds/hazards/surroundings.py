@@ -58,6 +58,10 @@ class Surroundings:
         building, sight = building_of(self._site), Sight(self._site.walls)
         return [field_of(hazard, building, sight) for hazard in self._hazards]
 
+    @cached_property
+    def _fires(self) -> list[FireField]:
+        return [field for field in self._fields if isinstance(field, FireField)]
+
     @property
     def has_any(self) -> bool:
         """Whether there is any hazard."""
@@ -83,14 +87,14 @@ class Surroundings:
 
     def optical_depth(self, a: Point, b: Point, time: float) -> float:
         """Extinction by smoke along the straight line between two places, at eye height."""
-        fires = [f for f in self._fields if isinstance(f, FireField)]
-        if not fires:
+        smoky = [f for f in self._fires if not f.is_above_heads(time)]
+        if not smoky:
             return 0.0
         length = math.dist(a, b)
         count = max(1, round(length / RAY))
         along = ((np.arange(count) + 0.5) / count)[:, None]
         spaces = self._spaces(np.array(a) + along * (np.array(b) - np.array(a)))
-        total = sum(float(f.extinctions(time)[spaces].sum()) for f in fires)
+        total = sum(float(f.extinctions(time)[spaces].sum()) for f in smoky)
         return total * length / count
 
     def raster(self, what: str, time: float, cell: float = 0.25) -> Raster:
