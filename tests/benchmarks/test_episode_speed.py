@@ -12,6 +12,9 @@ import time
 from collections.abc import Callable, Mapping
 from typing import Any
 
+import pytest
+from replayed_operator import replay, taped
+
 from dva_sim import scenario as scenarios
 from dva_sim.agents.camera import Observation
 from dva_sim.agents.operator.person import Population, draw_person
@@ -84,6 +87,32 @@ def test_a_one_robot_episode_against_its_physics_and_control(benchmark: Any) -> 
         print(f"\n{name}: {speed[name]} simulated s per CPU s; episode / bare {over[name]}", end="")
     assert max(over.values()) < MOST
     benchmark(runs["latest-wins"])
+
+
+@pytest.mark.parametrize("profile", ["default", "dissertation"])
+def test_operator_and_phone_are_less_than_half_of_an_episode(benchmark: Any, profile: str) -> None:
+    """The share is 1 - CPU time of the replay / CPU time of the episode, each the best of several.
+
+    The replay is the same run with somebody who repeats the commands: the same messages at the
+    same moments, the same robot, links and DVA. Gone are perceiving, judging, looking for the
+    event, estimating the delay, deciding, planning, hand, accelerometer, filter and mapping.
+    """
+    changes = {"pattern": "latest-wins", "phone.profile": profile}
+    scenario = scenarios.build(scenarios.load("drive-to-event"), changes)
+    tape, full = taped(scenario, 1)
+    bare = replay(scenario, 1, tape)
+    assert bare.recorder.counters == full.recorder.counters
+    assert bare.recorder.tracks == full.recorder.tracks
+    runs = {
+        "episode": lambda: simulate(scenario, 1).duration,
+        "replay": lambda: replay(scenario, 1, tape).duration,
+    }
+    cost = cpu_per_second(runs)
+    share = 1.0 - cost["replay"] / cost["episode"]
+    benchmark.extra_info.update(share_of_operator_and_phone=round(share, 3))
+    print(f"\n{profile}: operator and phone take {100 * share:.0f} % of an episode", end="")
+    assert 0.0 < share < 0.5
+    benchmark(runs["replay"])
 
 
 def test_what_a_robot_and_a_guard_cost_as_there_are_more(benchmark: Any) -> None:
