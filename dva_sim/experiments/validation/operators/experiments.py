@@ -6,6 +6,7 @@ conditions. How, was settled before anything was compared.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -36,6 +37,7 @@ WAITS_S = (1.0, 1.5, 2.0, 2.5, 3.2)
 EXCAVATOR_S = 1.5
 FRAME_RATES = (5, 10, 20, 60)
 FRAME_DELAYS_S = (0.0, 0.1, 0.2, 0.3)
+_NOTHING = 1e-9  # times that differ by less are the same [s]
 _C = np.linspace(0.0, 2.0, 201)  # tried for the collapse
 
 
@@ -144,9 +146,11 @@ def latency_values(cells: Cells) -> Values:
 def wait_values(cells: Cells) -> Values:
     """How straight completion times are in the delay, and their slope less the waits."""
     delays = [float(name) for name in cells]
-    line = fit_line(delays, [mean(trials, "movement_time_s") for trials in cells.values()])
+    times = [mean(trials, "movement_time_s") for trials in cells.values()]
+    line = fit_line(delays, times)
     waits = float(np.mean([mean(trials, "waits") for trials in cells.values()]))
-    return {"S13/linear": line.r2, "S13/slope": line.slope - waits}
+    straight = line.r2 if np.ptp(times) >= _NOTHING else math.nan  # nothing there to explain
+    return {"S13/linear": straight, "S13/slope": line.slope - waits}
 
 
 def excavator_values(cells: Cells) -> Values:
@@ -182,12 +186,14 @@ def frame_values(cells: Cells) -> Values:
     """The share of the time between frames that acts as delay, if times lie on one parabola."""
     delays, gaps, times = frame_points(cells)
     fits = [_parabola(delays + c * gaps, times) for c in _C]
-    best = int(np.argmax(fits))
+    best = int(np.argmax(fits))  # the first of all if none is a number
     return {"S15/c": float(_C[best]), "S15/collapse": fits[best]}
 
 
 def _parabola(x: Floats, y: Floats) -> float:
-    """R2 of the least-squares parabola."""
+    """R2 of the least-squares parabola; nan where nothing varies that could be explained."""
+    if np.ptp(y) < _NOTHING:
+        return math.nan
     rest = y - np.polyval(np.polyfit(x, y, 2), x)
     return 1.0 - float(rest.var() / y.var())
 

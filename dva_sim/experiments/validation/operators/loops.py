@@ -18,6 +18,7 @@ from dva_sim.agents.operator.strategies.cursor import Sighting, towards
 from dva_sim.agents.steering import Route
 
 STEPS = 200  # of time in a delay
+SMITH_STEPS = 2000  # the same under a Smith predictor
 DELAYS = 80  # a run lasts so many of them
 BISECTIONS = 14
 
@@ -109,24 +110,25 @@ def linear_pursuit(speed_delay: float) -> list[float]:
     return errors
 
 
-def smith_response(gain: float, delay: float, at: float) -> float:
-    """Where an integrator under a Smith predictor is, some time after a unit step is asked for.
+def smith_response(gain: float, delay: float, end: float) -> list[float]:
+    """Where an integrator under a Smith predictor is, step by step after a unit step is asked for.
 
     The predictor adds to what is seen what was asked for since and cannot be seen yet, so the
     loop is closed on the present: y(t) = 1 - exp(-gain (t - delay)) from the delay on.
 
     Args:
         gain: [1/s]
-        delay: Between a command and its effect [s].
-        at: [s]
+        delay: Between a command and its effect [s]; a step is a part of it, see `SMITH_STEPS`.
+        end: [s]
     """
-    dt = delay / STEPS / 10.0
-    on_the_way = deque([0.0] * (10 * STEPS), maxlen=10 * STEPS)
-    place = coming = 0.0
-    for _ in range(round(at / dt)):
+    dt = delay / SMITH_STEPS
+    on_the_way = deque([0.0] * SMITH_STEPS, maxlen=SMITH_STEPS)
+    place, coming, places = 0.0, 0.0, []
+    for _ in range(round(end / dt)):
         command = gain * (1.0 - (place + coming))
         arriving = on_the_way[0]
         on_the_way.append(command)
         place += arriving * dt
         coming += (command - arriving) * dt
-    return place
+        places.append(place)
+    return places

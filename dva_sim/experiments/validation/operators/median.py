@@ -15,6 +15,8 @@ Values = dict[str, float]
 
 RATE = 34.0  # samples per second: 17 in 500 ms, as its tablet managed
 COPY, IN_PLACE = "median20-copy", "median20-inplace"
+STEP_LOOK = 0.2  # [s]
+STEP_LEVELS = [2.0] * 102 + [8.0] * 102 + [2.0] * 204  # 3 s, 3 s, 6 s
 BATCHES = 20_000  # of noise
 
 
@@ -32,9 +34,13 @@ def ages() -> Values:
 
 def steps() -> Values:
     """What the two variants make of a level of 2, then 8, then 2, with a longest delay of 0.2 s."""
-    levels = [2.0] * 100 + [8.0] * 100 + [2.0] * 200
-    copy, in_place = (_outputs(load_filter(n)(1.0 / RATE), levels, 0.2) for n in (COPY, IN_PLACE))
+    copy, in_place = step_outputs(COPY), step_outputs(IN_PLACE)
     return {"copy": max(copy), "rises": max(in_place), "never-returns": in_place[-1]}
+
+
+def step_outputs(name: str) -> list[float]:
+    """What a filter makes of that, look by look, `STEP_LOOK` apart."""
+    return _outputs(load_filter(name)(1.0 / RATE), STEP_LEVELS, STEP_LOOK)
 
 
 def smoothing(seed: int) -> Values:

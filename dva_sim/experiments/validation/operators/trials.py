@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -112,12 +113,19 @@ def with_intervals(measure: Measure, cells: Cells, rng: np.random.Generator) -> 
         again = measure({name: trials.drawn(who) for name, trials in cells.items()})
         for name, drawn in draws.items():
             drawn.append(again[name])
-    tail = 50 * (1.0 - LEVEL)
-    found = {}
-    for name, value in values.items():
-        low, high = np.nanpercentile(draws[name], [tail, 100 - tail])
-        found[name] = Found(value, float(low), float(high), len(persons))
-    return found
+    return {
+        name: Found(value, *_middle(draws[name]), len(persons)) for name, value in values.items()
+    }
+
+
+def _middle(draws: Sequence[float]) -> tuple[float, float]:
+    """From where to where the middle of some draws lies, without those that are no number."""
+    known = [draw for draw in draws if not math.isnan(draw)]
+    if not known:
+        return math.nan, math.nan
+    tail = 0.5 * (1.0 - LEVEL)
+    low, high = np.quantile(known, [tail, 1.0 - tail])
+    return float(low), float(high)
 
 
 def person_means(trials: Trials, name: str) -> Floats:

@@ -1,0 +1,89 @@
+"""What the command line does with a validation of operators: play, tell, write."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from dva_sim.experiments.validation.operators import output
+from dva_sim.experiments.validation.operators.exact import EXACT
+from dva_sim.experiments.validation.operators.experiments import EXPERIMENTS
+from dva_sim.experiments.validation.operators.judging import Verdict, judge, outcome_of
+from dva_sim.experiments.validation.operators.playing import (
+    PERSONS,
+    QUICK_PERSONS,
+    Setting,
+    jobs_of,
+    measured,
+    play_exact,
+    play_experiments,
+)
+from dva_sim.experiments.validation.operators.targets import lines_of, load_split, load_targets
+from dva_sim.experiments.validation.operators.trials import Cells, Found
+from dva_sim.experiments.validation.telling import WIDTH, console, progress_bar, say
+
+STYLES = {"passes": "green", "misses": "bold red", "shown only": "dim"}
+
+
+def validate(strategy: str | None, out: Path | None, quick: bool, jobs: int, seed: int) -> int:
+    """Play every check, print the comparison, write it if asked to; the exit code.
+
+    Raises:
+        ConfigError: there is no such strategy, or a mistake in the files.
+    """
+    started = time.perf_counter()
+    split = load_split()
+    lines = lines_of(load_targets(), split)
+    persons = QUICK_PERSONS if quick else PERSONS
+    setting = Setting(strategy or split.strategy, seed, persons, quick, jobs)
+    found, played = _play(setting)
+    verdicts = judge(lines, found)
+    outcome = outcome_of(verdicts, split.rule)
+    _tell(verdicts)
+    say(f"[bold]{output.headline(outcome)}[/bold]")
+    for note in output.notes(verdicts):
+        say(escape(note))
+    say(f"{time.perf_counter() - started:.0f} s")
+    if out is not None:
+        page = output.write(out, verdicts, outcome, played, _conditions(setting))
+        say(f"Report: {page}")
+    return int(not outcome.passes)
+
+
+def _play(setting: Setting) -> tuple[dict[str, Found], dict[str, Cells]]:
+    with progress_bar() as bar:
+        exact = len(EXACT)
+        task = bar.add_task("exact", total=exact + jobs_of(EXPERIMENTS, setting))
+        found = play_exact(list(EXACT), setting, lambda n: bar.update(task, completed=n))
+        bar.update(task, description="persons")
+        played = play_experiments(
+            EXPERIMENTS, setting, lambda n: bar.update(task, completed=exact + n)
+        )
+    return found | measured(EXPERIMENTS, played, setting.seed), played
+
+
+def _conditions(setting: Setting) -> dict[str, str]:
+    return {
+        "operators": setting.strategy,
+        "persons": str(setting.persons),
+        "seed": str(setting.seed),
+        "length": "quick" if setting.quick else "full",
+    }
+
+
+def _tell(verdicts: Sequence[Verdict]) -> None:
+    """The table, kind by kind."""
+    table = Table(box=None, pad_edge=False)
+    for head in output.HEADS:
+        table.add_column(head, no_wrap=head == "line")
+    for kind, title in output.TITLES.items():
+        table.add_row("", f"[bold]{title}[/bold]")
+        for verdict in (v for v in verdicts if v.line.kind == kind):
+            *cells, said = output.words(verdict)
+            table.add_row(*map(escape, cells), f"[{STYLES[verdict.word]}]{said}[/]")
+    Console(highlight=False, width=max(console.width, WIDTH)).print(table)
