@@ -28,6 +28,31 @@ SCENARIO = {
     "camera": {"rate_hz": 10.0, "frame_bytes": 12000},
     "horizon_s": HORIZON_S,
 }
+CLAIMS = {
+    "predictions": [
+        {"text": "Waiting costs.", "direction": "above", "expects_s": [20.0, 40.0]},
+        {"text": "Nobody will notice."},
+    ],
+    "robustness": {"strategies": ["pursuit", "adaptive"], "sets": 1, "at": None},
+}
+TUNED = {
+    "study": "synthetic",
+    "made_with": "nothing",
+    "tuning": {
+        "key": "phone.mapping_options.gain",
+        "levels": [0.5, 1.0],
+        "by": ["phone.mapping"],
+        "part": "drive",
+        "measure": "drive_time_s",
+        "seed": 2,
+    },
+    "chosen": [{"when": {"phone.mapping": "absolute"}, "value": 1.0}],
+    "seen": [
+        {"when": {"phone.mapping": "absolute"}, "value": value, "mean": mean}
+        | {"low": mean - 10, "high": mean + 10}
+        for value, mean in ((0.5, 50.0), (1.0, 48.0))
+    ],
+}
 Rows = list[dict[str, Any]]
 
 
@@ -139,6 +164,26 @@ def track_rows() -> Rows:
                 | {"x_m": float(x), "y_m": float(y), "heading_rad": 0.0, "mode": "teleoperation"}
             )
     return rows
+
+
+def repeat_rows(effects: dict[tuple[str, int], float]) -> Rows:
+    """Repeats at 1 s whose effect is known: of 4 persons with 2 trials each.
+
+    Args:
+        effects: What request/reply adds, by strategy and set of parameters.
+    """
+    rng = np.random.default_rng(4)
+    who = list(itertools.product(range(4), range(2)))
+    ways = {key: rng.uniform(40, 60) for key in who}
+    return [
+        {"part": "robustness", "operator.strategy": strategy, "parameters": number}
+        | {"pattern": pattern, "link.delay_s": 1.0, "is_reference": False}
+        | {"person": person, "trial": trial, "seed": 10 * person + trial}
+        | {"drive_time_s": ways[person, trial] + (pattern == "req-rep") * (effect + 0.1 * person)}
+        for (strategy, number), effect in effects.items()
+        for pattern in ("req-rep", "latest-wins")
+        for person, trial in who
+    ]
 
 
 def columns(rows: Rows) -> dict[str, Any]:

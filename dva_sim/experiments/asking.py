@@ -55,15 +55,17 @@ class Part(Config):
 
     Attributes:
         scenario: By name or path, also relative to the study's file.
+        changes: What this study has otherwise than the scenario, in every cell of the part.
         reference: Changes that make the reference run, one for each person and trial.
         replications: Trials per person, if not those of the study.
     """
 
     scenario: str
+    changes: Changes = Field(default_factory=dict)
     reference: Changes | None = None
     replications: Count | None = None
 
-    @field_validator("reference")
+    @field_validator("changes", "reference")
     @classmethod
     def _person_is_the_designs(cls, value: Changes | None) -> Changes | None:
         refuse_keys_of_the_design(value or {})
@@ -110,8 +112,8 @@ class Prediction(Config):
             but for less than the smallest effect that matters. Without it nothing is judged.
         factor: Whose levels are compared; by default the answer's.
         contrast: The two levels; by default the answer's.
-        at: Levels of other factors. By default those the answer is `within`, and the last level
-            of the factor it runs `over`.
+        at: Levels of other factors. By default those the answer is `within`, the last level of
+            the factor it runs `over`, and the second of its contrast.
         expects: Range in which the mean difference is expected, in the measure's unit.
         expects_s: The same for a measure in seconds [s].
     """

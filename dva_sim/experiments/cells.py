@@ -18,6 +18,7 @@ from dva_sim.experiments.labels import (
     unit_of,
 )
 from dva_sim.experiments.statistics import mean_interval
+from dva_sim.experiments.support import Support
 
 
 @dataclass(frozen=True)
@@ -30,13 +31,15 @@ class CellTable:
         labels: How many leading columns name the cell.
         rows: Printed values.
         empty: How many cells have no run.
+        note: What a mark in it means.
     """
 
     part: str
     heads: list[str]
     labels: int
     rows: list[list[str]]
-    empty: int
+    empty: int = 0
+    note: str = ""
 
 
 # column of the runs, head, how the runs of a cell become one number, how it is printed
@@ -54,11 +57,16 @@ _SUMMARIES: tuple[Summary, ...] = (
 )
 
 
-def cell_table(part: Part, measure: str, summaries: Sequence[Summary] = _SUMMARIES) -> CellTable:
+def cell_table(
+    part: Part,
+    measure: str,
+    summaries: Sequence[Summary] = _SUMMARIES,
+    support: Support | None = None,
+) -> CellTable:
     """Every cell of a part: size, confirmed share, the measure with its interval, and the rest."""
     settings = list(part.settings())
     columns = [_counts(part), _confirmed(part), *_measure(part, measure)]
-    columns += _others(part, summaries)
+    columns += [*_others(part, summaries), _beyond(support)]
     there = [c for c in columns if c is not None]
     names = [factor_name(f.name) for f in part.factors]
     rows = [
@@ -66,10 +74,12 @@ def cell_table(part: Part, measure: str, summaries: Sequence[Summary] = _SUMMARI
         for i, setting in enumerate(settings)
     ]
     empty = sum(1 for values in _cells(part, "seed") if not len(values))
-    return CellTable(part.name, [*names, *(h for h, _ in there)], len(names), rows, empty)
+    note = _what_is_covered(support)
+    return CellTable(part.name, [*names, *(h for h, _ in there)], len(names), rows, empty, note)
 
 
 _Column = tuple[str, list[str]]
+_MARK = "\N{NO-BREAK SPACE}†"
 
 
 def _cells(part: Part, column: str) -> list[Floats]:
@@ -116,6 +126,24 @@ def _others(part: Part, summaries: Sequence[Summary]) -> list[_Column]:
         for column, head, summary, text in summaries
         if part.has(column)
     ]
+
+
+def _beyond(support: Support | None) -> _Column | None:
+    """The delay that people would have been watched at, marked where nobody was."""
+    if support is None:
+        return None
+    pairs = zip(support.delays.ravel(), support.outside.ravel(), strict=True)
+    marked = [number(delay) + (_MARK if outside else "") for delay, outside in pairs]
+    return "loop without the person [s]", marked
+
+
+def _what_is_covered(support: Support | None) -> str:
+    if support is None or not support.outside.any():
+        return ""
+    return (
+        f"{_MARK.strip()} Extrapolated: published data do not cover the delay of this loop, taken "
+        f"without the person's own share (covered: {support.words})."
+    )
 
 
 def _text(summary: _Summarise, cell: Floats, text: Callable[[float], str]) -> str:

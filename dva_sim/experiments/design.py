@@ -215,11 +215,12 @@ def _source(study: Study, part: Part) -> Document:
 def _build(study: Study, part: str, source: Document, changes: Mapping[str, Any]) -> AnyScenario:
     """The part's scenario; a mistake in a change is told where the study makes it."""
     model = model_of(source)
-    fixed = {**study.changes, **model.set_by_study(study.seed)}
+    fixed = {**study.parts[part].changes, **study.changes, **model.set_by_study(study.seed)}
     try:
         return model.build(source, _located({**fixed, **changes}, study.folder))
     except ConfigError as error:
-        blamed = _blamed(study, part, error, changes) if error.file is None else None
+        every = {**study.parts[part].changes, **changes}
+        blamed = _blamed(study, part, error, every) if error.file is None else None
         raise (blamed or error) from None
 
 
@@ -234,7 +235,8 @@ def _located(changes: dict[str, Any], folder: Path) -> dict[str, Any]:
 def _blamed(
     study: Study, part: str, error: ConfigError, changes: Mapping[str, Any]
 ) -> ConfigError | None:
-    places: list[tuple[str, ...]] = [("parts", part, "reference"), ("factors",)]
+    places: list[tuple[str, ...]] = [("factors",)]
+    places += [("parts", part, "reference"), ("parts", part, "changes")]
     places += [("treatments", f, level) for f, named in study.treatments.items() for level in named]
     for key, value in changes.items():
         named = key in error.problem or (isinstance(value, str) and repr(value) in error.problem)

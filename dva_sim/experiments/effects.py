@@ -124,6 +124,8 @@ class View:
         contrast: The two levels of `line` compared, the first minus the second; or None.
         within: The panel that the answer speaks of.
         smallest_effect: Smallest difference declared to matter, in the measure's unit.
+        outside: Whether each cell `(levels of factor 1, ...)` is an extrapolation, beyond the
+            delays at which people were watched; None where nothing is known of that.
     """
 
     part: Part
@@ -133,6 +135,7 @@ class View:
     contrast: tuple[Level, Level] | None
     within: Setting
     smallest_effect: float | None = None
+    outside: NDArray[np.bool_] | None = None
 
     @property
     def lines(self) -> tuple[Level, ...]:
@@ -172,6 +175,17 @@ class View:
         if self.part.has_reference(self.measure):
             return self.part.excess(self.measure)
         return self.part.grid(self.measure)
+
+    def stops_outside(self, panel: Setting) -> list[int]:
+        """The stops of a panel at which at least one line is an extrapolation."""
+        if self.outside is None:
+            return []
+        marks = np.array([self._marks(panel, line) for line in self.lines]).any(axis=0)
+        return [int(stop) for stop in np.flatnonzero(marks)]
+
+    def _marks(self, panel: Setting, line: Level) -> NDArray[np.bool_]:
+        setting = dict(panel) | ({self.line.name: line} if self.line else {})
+        return np.atleast_1d(self.part.where(np.asarray(self.outside, dtype=float), setting) > 0)
 
     def difference(self, panel: Setting, first: Level, second: Level) -> Floats:
         """First minus second, paired by person and trial, as person means `(persons, stops)`."""

@@ -21,7 +21,10 @@ _FACTORS = {
     "phone.filter": "filter",
     "phone.mapping": "mapping",
     "phone.send": "sending",
-    "phone.gain": "gain of the phone",
+    "phone.mapping_options.gain": "gain of the phone",
+    "robot.watchdog_s": "watchdog of the robot",
+    "tuning": "gain",
+    "parameters": "set of parameters",
     "robot.profile": "robot",
     "bystander.count": "bystanders",
     "dispatch.policy": "dispatch policy",
@@ -35,6 +38,14 @@ _LEVELS = {
     "direct": "direct control",
     "coordinated": "coordinated control",
     "supervisory": "supervisory control",
+    "pursuit": "pursuit",
+    "two_point": "two-point steering",
+    "move_and_wait": "move and wait",
+    "median20-copy": "median of 20 (copy)",
+    "median20-inplace": "median of 20 (in place)",
+    "one_pole": "one-pole filter",
+    "keep_alive": "keep-alive",
+    "on_change": "on change",
 }
 _SHORT_LEVELS = _LEVELS | {
     name: name for name in ("latest-wins", "direct", "coordinated", "supervisory")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +13,7 @@ import numpy as np
 
 from dva_sim.experiments import statistics
 from dva_sim.experiments.answer import Answer, answer
+from dva_sim.experiments.asking import REPEATS
 from dva_sim.experiments.cells import CellTable, cell_table
 from dva_sim.experiments.conditions import conditions, timeout_remark
 from dva_sim.experiments.dispatch import figures as dispatch_figures
@@ -20,8 +22,13 @@ from dva_sim.experiments.dispatch.shifts import Shifts, is_dispatch
 from dva_sim.experiments.effects import Part, Table, View, as_floats
 from dva_sim.experiments.figures import Drawn, draw_all
 from dva_sim.experiments.labels import factor_name, level_name, listing
+from dva_sim.experiments.predictions import judge_all
 from dva_sim.experiments.reading import factors_of, finding_of, view_of
 from dva_sim.experiments.results import Results
+from dva_sim.experiments.robustness import Robustness, robustness_of, sentences
+from dva_sim.experiments.support import support_of_part
+from dva_sim.experiments.tuning import tuned_table
+from dva_sim.experiments.variance import spread_table
 
 if TYPE_CHECKING:
     import jinja2
@@ -38,7 +45,7 @@ def write_report(folder: Path) -> Path:
     """
     results = Results.load(folder)
     runs = results.table("runs") if results.has("runs") else {}
-    view = view_of(results.study, runs) if runs else None
+    view = _view(results, runs) if runs else None
     drawn = _draw(view, results) if view else []
     _write_figures(results.folder / "figures", drawn)
     report = results.folder / "report.html"
@@ -46,12 +53,34 @@ def write_report(folder: Path) -> Path:
     return report
 
 
+def _view(results: Results, runs: Table) -> View | None:
+    """How the study is read, with its extrapolations known."""
+    view = view_of(results.study, runs)
+    if view is None:
+        return None
+    support = support_of_part(view.part, _scenario_of(results, view.part.name))
+    return replace(view, outside=support.outside if support else None)
+
+
+def _scenario_of(results: Results, part: str) -> Mapping[str, Any]:
+    found: Mapping[str, Any] = results.manifest.get("scenarios", {}).get(part, {})
+    return found
+
+
 def _draw(view: View, results: Results) -> list[Drawn]:
     tables = {name: results.table(name) for name in _OPTIONAL if results.has(name)}
     if shifts := _shifts(view, results):
         return dispatch_figures.draw_all(shifts)
-    scenario = results.manifest.get("scenarios", {}).get(view.part.name, {})
-    return draw_all(view, tables, scenario)
+    scenario = _scenario_of(results, view.part.name)
+    return draw_all(view, tables, scenario, _robustness(view, results))
+
+
+def _robustness(view: View | None, results: Results) -> Robustness | None:
+    """The answer under other models of the persons, where it was repeated."""
+    finding = finding_of(view) if view is not None else None
+    if view is None or finding is None or not results.has(REPEATS):
+        return None
+    return robustness_of(results.study, results.table(REPEATS), view, finding)
 
 
 def _shifts(view: View | None, results: Results) -> Shifts | None:
@@ -79,13 +108,17 @@ def _page(results: Results, runs: Table, view: View | None, drawn: list[Drawn]) 
         question=study.get("question", "A study without a question"),
         changes=[_as_words(change) for change in manifest.get("set", [])],
         answer=_answer(view, shifts),
+        predictions=judge_all(study, view),
+        robustness=_words_of(_robustness(view, results)),
         warnings=_warnings(results, runs),
         parts=list(scenarios),
         conditions=stated(scenarios, factors),
         timeout_remark=timeout_remark(next(iter(scenarios.values()), {}), factors),
         factors=[_levels(f.name, f.levels) for f in factors],
         figures=drawn,
-        tables=_tables(study, runs, view, shifts),
+        tables=_tables(results, runs, view, shifts),
+        spread=spread_table(view) if view else None,
+        tuned=tuned_table(manifest.get("tuned")),
         persons=study.get("persons"),
         replications=study.get("replications"),
         correlation=_pair_correlation(view),
@@ -108,20 +141,25 @@ def _template() -> jinja2.Template:
     return environment.get_template("report.html.j2")
 
 
+def _words_of(robustness: Robustness | None) -> list[str]:
+    return sentences(robustness) if robustness else []
+
+
 def _tables(
-    study: Mapping[str, Any], runs: Table, view: View | None, shifts: Shifts | None
+    results: Results, runs: Table, view: View | None, shifts: Shifts | None
 ) -> list[CellTable]:
     """A table of cells for each part that has runs."""
     if view is None:
         return []
     names = dict.fromkeys(str(name) for name in runs["part"])
-    parts = [Part(runs, name, factors_of(study)) for name in names]
-    return [_cells(part, view, shifts) for part in parts if len(part)]
+    parts = [Part(runs, name, factors_of(results.study)) for name in names]
+    return [_cells(part, view, shifts, results) for part in parts if len(part)]
 
 
-def _cells(part: Part, view: View, shifts: Shifts | None) -> CellTable:
+def _cells(part: Part, view: View, shifts: Shifts | None, results: Results) -> CellTable:
     if shifts is None:
-        return cell_table(part, view.measure)
+        support = support_of_part(part, _scenario_of(results, part.name))
+        return cell_table(part, view.measure, support=support)
     if part.name == view.part.name:
         return dispatch_page.cells(shifts)
     return cell_table(part, view.measure, dispatch_page.SUMMARIES)

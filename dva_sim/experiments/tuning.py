@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from dva_sim import __version__
 from dva_sim.errors import ConfigError, DvaSimError
 from dva_sim.experiments.asking import Level, Levels, Tuning
+from dva_sim.experiments.cells import CellTable
 from dva_sim.experiments.effects import Factor, Floats, Part
 from dva_sim.experiments.fingerprint import fingerprint
+from dva_sim.experiments.labels import factor_name, level_name, measure_name, number, setting
 from dva_sim.experiments.pool import LIMIT_S, Episode
 from dva_sim.experiments.results import Results
 from dva_sim.experiments.runner import Progress, run_study
@@ -88,6 +92,31 @@ def tune(
         chosen=tuple(_choice(seen, when) for when in _whens(part, rule)),
         seen=tuple(seen),
     )
+
+
+def tuned_table(data: Mapping[str, Any] | None) -> CellTable | None:
+    """All that a tuning saw, as a report prints it; None where nothing was tuned."""
+    if not data:
+        return None
+    tuned = Tuned.model_validate(data)
+    rule, chosen = tuned.tuning, {(str(c.when), c.value) for c in tuned.chosen}
+    rows = [
+        [
+            *(level_name(name, level) for name, level in seen.when.items()),
+            f"{seen.value:g}",
+            f"{number(seen.mean)} ({number(seen.low)} to {number(seen.high)})",
+            "chosen" if (str(seen.when), seen.value) in chosen else "",
+        ]
+        for seen in tuned.seen
+    ]
+    heads = [*(factor_name(name) for name in rule.by), factor_name(rule.key)]
+    heads += [f"{measure_name(rule.measure)}, mean (95 % interval)", ""]
+    at = f", at {setting(rule.at)}" if rule.at else ""
+    note = (
+        f"Rule: the least mean, of equal ones the nearest to 1; {rule.persons} persons who take "
+        f"no part in the study, {rule.replications} trials of each{at}."
+    )
+    return CellTable(rule.part, heads, len(rule.by), rows, note=note)
 
 
 def _rule_of(study: Study) -> Tuning:

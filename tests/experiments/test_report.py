@@ -9,6 +9,7 @@ from dva_sim.experiments.report import write_report
 
 FIGURES = [
     "differences",
+    "robustness",
     "levels",
     "distributions",
     "command_age",
@@ -37,9 +38,14 @@ def report(tmp_path_factory):
         "runs": of_one_profile(synthetic_study.drive_rows(6, 2, effect_s=30.0, missed=0.5)),
         "events": of_one_profile(synthetic_study.story_rows(6)),
         "tracks": of_one_profile(synthetic_study.track_rows()),
+        "robustness": synthetic_study.repeat_rows(
+            {("pursuit", 0): 20, ("pursuit", 1): 5, ("adaptive", 0): 1, ("adaptive", 1): -4}
+        ),
     }
     facts = synthetic_study.manifest(6, 2)
     facts["study"]["factors"] |= {"profile": ["default"]}
+    facts["study"] |= synthetic_study.CLAIMS
+    facts["tuned"] = synthetic_study.TUNED
     return write_report(
         synthetic_study.write(tmp_path_factory.mktemp("study") / "results", tables, facts)
     )
@@ -58,6 +64,32 @@ def test_the_report_says_how_many_events_were_missed(report):
     text = words(report)
     assert re.search(r"Not confirmed at a one-way delay of 1 s: REQ/REP \d+ % \(\d of 12\)", text)
     assert re.search(r"The question stays open up to 250 ms: an effect as large as", text)
+
+
+def test_predictions_stand_beside_what_was_found(report):
+    text = words(report)
+    assert re.search(
+        r"Waiting costs\. REQ/REP minus latest-wins PUB/SUB in driving time to confirmation, "
+        r"profile default, one-way delay 1 s: above zero, 20.0 to 40.0 s [\d.]+ s \([\d.]+ to "
+        r"[\d.]+ s\) (held|open|did not hold)",
+        text,
+    )
+    assert "Nobody will notice. not judged" in text
+
+
+def test_the_report_says_how_far_the_conclusion_survives_other_models(report):
+    text = words(report)
+    assert "each of pursuit and adaptive, with the usual parameters and one other set" in text
+    assert "At one-way delay 1 s the sign holds in 3 of 4 (75 %) repeats" in text
+    assert "in 2 of 4 (50 %) the effect exceeds the smallest that matters, in 1 it is below" in text
+
+
+def test_the_report_splits_the_spread_and_shows_all_that_tuning_saw(report):
+    text = words(report)
+    assert "Between and within persons" in text
+    assert "absolute 0.5 50.0 (40.0 to 60.0)" in text
+    assert "absolute 1 48.0 (38.0 to 58.0) chosen" in text
+    assert "No learning is modelled" in text
 
 
 def test_the_conditions_are_stated_and_the_time_out_is_checked(report):
@@ -92,7 +124,7 @@ def test_the_report_made_again_has_the_same_bytes(report):
 
 def test_every_cell_has_its_row(report):
     rows = re.findall(r"<tr.*?</tr>", report.read_text(encoding="utf-8"))
-    cells = [row for row in rows if row.count("<td") > 3]
+    cells = [row for row in rows if row.count("<td") > 5]
     assert len(cells) == 3 * 6
 
 

@@ -9,25 +9,41 @@ from typing import Any
 
 from dva_sim.experiments.cadence import Cadence, cadence
 from dva_sim.experiments.effects import Setting, Table, View
-from dva_sim.experiments.figures import budget, commands, distribution, effect, ground, story
+from dva_sim.experiments.figures import (
+    budget,
+    commands,
+    distribution,
+    effect,
+    ground,
+    repeats,
+    story,
+)
 from dva_sim.experiments.figures.style import Drawn, styled
 from dva_sim.experiments.labels import Level
+from dva_sim.experiments.robustness import Robustness
 
 __all__ = ["Drawn", "draw_all"]
 
 
-def draw_all(view: View, tables: Mapping[str, Table], scenario: Mapping[str, Any]) -> list[Drawn]:
+def draw_all(
+    view: View,
+    tables: Mapping[str, Table],
+    scenario: Mapping[str, Any],
+    robustness: Robustness | None = None,
+) -> list[Drawn]:
     """Every figure that the tables have the columns for, in the order of the report.
 
     Args:
         view: How to look at the part the answer is about.
         tables: `events` and `tracks`, where the study has them.
         scenario: The part's scenario before any factor changed it.
+        robustness: The contrast under other models of the persons.
     """
     cadence_of = _cadences(view, scenario)
     with styled():
         drawn = [
             effect.differences(view, cadence_of),
+            repeats.repeats(view, robustness) if robustness else None,
             effect.measure_levels(view),
             distribution.distributions(view),
             commands.command_age(view),

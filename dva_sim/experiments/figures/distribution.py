@@ -17,6 +17,8 @@ from dva_sim.experiments.figures.style import (
     colours,
     dodge,
     finish,
+    hatch_stops,
+    hatch_words,
     legend,
     panel_title,
     panels,
@@ -48,6 +50,7 @@ def distributions(view: View) -> Drawn:
         _reference_line(ax, view)
         panel_title(ax, panel)
         stops_axis(ax, view.over)
+        hatch_stops(ax, view.stops_outside(panel))
         if ax is not axes[-1][0]:
             ax.set_xlabel("")
         ax.set_ylabel(axis_label(view.measure, wrapped(measure_name(view.measure), 24)))
@@ -56,6 +59,7 @@ def distributions(view: View) -> Drawn:
     caption = (
         "Each dot is one run, none left out; the bar is the median, the box the middle half. "
         "Hollow dots were not confirmed and count with all the time they were given."
+        f"{hatch_words(view)}"
     )
     title = f"{capital(measure_name(view.measure))} of all {len(view.part):,} runs"
     return finish(figure, "distributions", title, caption)

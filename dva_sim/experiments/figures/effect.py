@@ -26,6 +26,8 @@ from dva_sim.experiments.figures.style import (
     capital,
     colours,
     finish,
+    hatch_stops,
+    hatch_words,
     name_lines,
     panel_title,
     panels,
@@ -65,7 +67,7 @@ def differences(view: View, cadence_of: CadenceOf) -> Drawn | None:
     caption = (
         f"Above zero, {name} has the lower value. Means of differences paired by person and trial; "
         "shaded, the 95 % band that covers all levels of a line at once; bars, the 95 % interval "
-        f"of each level alone.{zoomed}{_boundary_words(view, cadence_of)}"
+        f"of each level alone.{zoomed}{_boundary_words(view, cadence_of)}{hatch_words(view)}"
     )
     return finish(figure, "differences", title, caption)
 
@@ -85,7 +87,7 @@ def measure_levels(view: View) -> Drawn:
     caption = (
         f"Mean over persons; shaded, its simultaneous 95 % band. {excess}Bands of two lines may "
         "overlap although their paired difference is clear: persons differ more from each other "
-        "than from themselves."
+        f"than from themselves.{hatch_words(view)}"
     )
     title = f"{what} under each {factor_name(view.line.name)}" if view.line else what
     return finish(figure, "levels", title, caption)
@@ -129,6 +131,7 @@ def _curves(
             ends[level] = _band(ax, curve(panel, level), paint[level], shift)
         panel_title(ax, panel)
         stops_axis(ax, view.over)
+        hatch_stops(ax, view.stops_outside(panel))
         every.append(ends)
     axes[0].set_ylabel(ylabel)
     return figure, axes, every

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dva_sim.experiments.effects import Factor, Setting
+from dva_sim.experiments.effects import Factor, Setting, View
 from dva_sim.experiments.labels import (
     Level,
     factor_name,
@@ -174,6 +174,21 @@ def _tick_names(over: Factor) -> tuple[list[str], str]:
     if unit == "s" and max(values) <= 5 and any(0 < v < 1 for v in values):
         return [f"{1000 * v:g}" for v in values], "ms"
     return [f"{v:g}" for v in values], unit
+
+
+def hatch_stops(axes: Axes, stops: Sequence[int]) -> None:
+    """Mark stops that are extrapolations."""
+    for stop in stops:
+        axes.axvspan(
+            stop - 0.5, stop + 0.5, facecolor="none", edgecolor=FAINT, hatch="///", lw=0, zorder=0
+        )
+
+
+def hatch_words(view: View) -> str:
+    """What the hatching means, if a panel has any."""
+    if not any(view.stops_outside(panel) for panel in view.shown):
+        return ""
+    return " Hatched: extrapolation, beyond the delays at which people were watched."
 
 
 def panel_title(axes: Axes, panel: Setting) -> None:

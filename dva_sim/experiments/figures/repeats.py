@@ -1,0 +1,89 @@
+"""The contrast under other models of the persons: every repeat with its interval."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from dva_sim.experiments.asking import STRATEGY
+from dva_sim.experiments.effects import Factor, View
+from dva_sim.experiments.figures.style import (
+    FAINT,
+    INK,
+    SOFT,
+    Drawn,
+    axis_label,
+    colours,
+    finish,
+    panels,
+)
+from dva_sim.experiments.labels import factor_name, level_name, measure_name
+from dva_sim.experiments.robustness import Repeat, Robustness, Stop
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_ROW = 0.14  # height of a repeat [in]
+_GAP = 1.5  # rows between two strategies
+
+
+def repeats(view: View, robustness: Robustness) -> Drawn | None:
+    """Effect and interval of every repeat, by strategy, sorted; the study's own as a band."""
+    stops = [stop for stop in robustness.stops if stop.repeats]
+    if not stops or view.contrast is None or view.line is None:
+        return None
+    rows = max(len(stop.repeats) for stop in stops) + _GAP * (len(robustness.strategies) + 1)
+    figure, (axes,) = panels(1, len(stops), max(2.4, _ROW * rows + 0.9), sharey=True)
+    first, second = (level_name(view.line.name, level) for level in view.contrast)
+    for ax, stop in zip(axes, stops, strict=True):
+        _own(ax, stop)
+        _groups(ax, stop, robustness.strategies)
+        ax.set_title(f"{factor_name(robustness.over)} {level_name(robustness.over, stop.level)}")
+        ax.set_xlabel(axis_label(view.measure, f"{first} minus {second}"))
+        ax.grid(axis="x")
+        ax.grid(axis="y", visible=False)
+    caption = (
+        "Each row is the contrast under one model of the persons, with its own 95 % interval, "
+        "sorted within a strategy; diamonds have the usual parameters, dots one of the other "
+        "sets. Line and blue band: the study's own result. Grey, differences declared too small "
+        "to matter. Repeats have fewer persons than the study, so their intervals are wider."
+    )
+    title = f"The contrast in {measure_name(view.measure)} under other models of the persons"
+    return finish(figure, "robustness", title, caption)
+
+
+def _own(ax: Axes, stop: Stop) -> None:
+    if stop.smallest is not None:
+        ax.axvspan(-stop.smallest, stop.smallest, color=FAINT, alpha=0.5, lw=0, zorder=0)
+    ax.axvspan(stop.low, stop.high, color="#0072B2", alpha=0.15, lw=0, zorder=0)
+    ax.axvline(stop.found, color="#0072B2", lw=1, zorder=1)
+    ax.axvline(0, color=INK, lw=0.8, zorder=1)
+
+
+def _groups(ax: Axes, stop: Stop, strategies: tuple[str, ...]) -> None:
+    """A block of rows for each strategy, named at its middle."""
+    names = strategies or ("",)
+    paint = colours(Factor(STRATEGY, names))
+    row, ticks = 0.0, []
+    for name in names:
+        block = sorted((r for r in stop.repeats if r.strategy == name), key=lambda r: r.mean)
+        for place, repeat in enumerate(block):
+            _row(ax, row + place, repeat, paint[name])
+        ticks.append(row + (len(block) - 1) / 2)
+        row += len(block) + _GAP
+    ax.set_yticks(ticks, [level_name(STRATEGY, name) if name else "" for name in names])
+    ax.set_ylim(row - _GAP, -1)
+
+
+def _row(ax: Axes, y: float, repeat: Repeat, colour: str) -> None:
+    ax.hlines(y, repeat.low, repeat.high, color=colour, lw=1, alpha=0.6)
+    usual = repeat.parameters == 0
+    edge = INK if usual else SOFT
+    ax.plot(
+        repeat.mean,
+        y,
+        "D" if usual else "o",
+        ms=5 if usual else 3.5,
+        color=colour,
+        mec=edge,
+        mew=0.5,
+    )

@@ -1,0 +1,88 @@
+"""Which cells lie beyond the delays at which people were watched: extrapolations, marked so.
+
+What counts is the delay of the loop as measured in the cell without the person's own share, not
+the delay of the link: that is what published experiments report.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dva_sim.errors import ConfigError
+from dva_sim.experiments.asking import STRATEGY
+from dva_sim.experiments.conditions import get
+from dva_sim.experiments.effects import Floats, Part, nan_mean
+from dva_sim.experiments.validation.operators.support import delay_support
+
+LOOP = "loop_delay_mean_s"
+PERSONAL = ("delay_human_s", "delay_hand_s")
+
+Marks = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Support:
+    """The delays of a part's cells, and which of them no published data cover.
+
+    Attributes:
+        delays: Of the loop without the person, for each cell `(levels of factor 1, ...)` [s]; nan
+            where nobody drives.
+        outside: Which of them lie outside.
+        words: What is covered, for each strategy.
+    """
+
+    delays: Floats
+    outside: Marks
+    words: str
+
+
+def support_of_part(part: Part, scenario: Mapping[str, Any]) -> Support | None:
+    """What published data cover of a part; None where nobody's loop has a delay.
+
+    Args:
+        part: The runs.
+        scenario: The part's before any factor changed it, for the strategy.
+    """
+    strategies = _strategies(part, scenario)
+    if not part.has(LOOP) or not strategies:
+        return None
+    runs = part.grid(LOOP)
+    for column in PERSONAL:
+        runs = runs - np.nan_to_num(part.grid(column))
+    delays = nan_mean(runs.reshape(*runs.shape[:-2], -1), axis=-1)
+    outside = np.isfinite(delays)
+    ranges = {name: _range_of(name) for name in strategies}
+    for name, covered in ranges.items():
+        low, high = covered or (np.inf, -np.inf)
+        outside &= ~(_has(part, name) & (delays >= low) & (delays <= high))
+    words = "; ".join(f"{name}, {_told(covered)}" for name, covered in ranges.items())
+    return Support(delays, outside, words)
+
+
+def _strategies(part: Part, scenario: Mapping[str, Any]) -> tuple[str, ...]:
+    factor = next((f for f in part.factors if f.name == STRATEGY), None)
+    names = factor.levels if factor else (get(scenario, STRATEGY),)
+    return tuple(str(name) for name in names if name is not None)
+
+
+def _has(part: Part, strategy: str) -> Marks:
+    """Which cells are driven by a strategy."""
+    has = [setting.get(STRATEGY, strategy) == strategy for setting in part.settings()]
+    return np.array(has).reshape([len(f.levels) for f in part.factors])
+
+
+def _range_of(strategy: str) -> tuple[float, float] | None:
+    """Nothing for a strategy that no published data speak of."""
+    try:
+        return delay_support(strategy)
+    except ConfigError:
+        return None
+
+
+def _told(covered: tuple[float, float] | None) -> str:
+    return f"{covered[0]:g} to {covered[1]:g} s" if covered else "no published data"
