@@ -119,6 +119,7 @@ class DriveLog:
         workload: What its way of steering asked of the operator, such as `waits`.
         taken_up: When the operator turned to the order [s].
         attended: From when to when the operator looked at this robot's picture [s].
+        looks_since: From when on it has been looking [s]; None: it looks elsewhere.
         turned_to: How often it turned to that from another one.
         waits_from: When the robot had come to where its operator has to judge [s].
         commands: Made from the tilt: when [s], speed [m/s], turn rate [rad/s].
@@ -144,6 +145,7 @@ class DriveLog:
     workload: dict[str, float] = field(default_factory=dict)
     taken_up: float | None = None
     attended: list[tuple[float, float]] = field(default_factory=list)
+    looks_since: float | None = None
     turned_to: int = 0
     waits_from: float | None = None
     commands: list[tuple[float, float, float]] = field(default_factory=list)

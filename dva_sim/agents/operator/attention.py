@@ -85,7 +85,7 @@ class Attention:
         self._screens.append(screen)
         self._seen.append(-math.inf)
         if self._current is None:
-            self._current, self._since = screen, self._clock.now
+            self._look(screen, self._clock.now)
         elif not self._choosing:
             self._choosing = True
             self._clock.every(RECONSIDER, self._reconsider)
@@ -119,15 +119,19 @@ class Attention:
         return next_screen(self._clock.now, current, self._since, waits, self._seen)
 
     def _turn_to(self, place: int) -> None:
-        self._current = self._screens[place]
-        self._current.log.turned_to += 1
-        self._since = self._clock.now + self._switch
+        self._screens[place].log.turned_to += 1
+        self._look(self._screens[place], self._clock.now + self._switch)
+
+    def _look(self, screen: Screen, since: float) -> None:
+        self._current, self._since = screen, since
+        screen.log.looks_since = since
 
     def _turn_away(self) -> None:
         now, left = self._clock.now, self._current
         assert left is not None
         if now > self._since:
             left.log.attended.append((self._since, now))
+        left.log.looks_since = None
         self._seen[self._screens.index(left)] = now
         left.look_away()
         self._current = None

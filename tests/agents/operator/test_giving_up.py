@@ -1,0 +1,78 @@
+"""When a link counts as lost and when a person gives up, by whatever pattern commands travel."""
+
+from __future__ import annotations
+
+import pytest
+from pretended_dva import ROBOT, PretendedDva
+
+from dva_sim.agents.operator.drive import ATTEMPTS
+from dva_sim.agents.operator.work import BLIND_AFTER
+
+EAST = (30.0, 12.0)  # the end of the main corridor [m]
+ASKED = ("req-rep", "pipelined")
+PATTERNS = (*ASKED, "pub-sub", "latest-wins")
+
+
+def driving(pattern: str, **changes: object) -> PretendedDva:
+    dva = PretendedDva(robots=1, pattern=pattern, **changes)
+    dva.operator()
+    dva.order(1, EAST, robot=ROBOT)
+    dva.run_until(lambda: "departed" in dva.progress(1))
+    dva.run_for(5.0)
+    assert abs(dva.field.robots[ROBOT].body.speed) > 0.1
+    return dva
+
+
+def lost_after(dva: PretendedDva) -> tuple[str, float]:
+    """How the drive ends, and how long that takes [s]."""
+    now, (log,) = dva.now, dva.stage.recorder.drives
+    dva.run_until(lambda: log.ended is not None, limit=120.0)
+    assert log.ended is not None
+    dva.run_for(1.0)
+    assert "failed" in dva.progress(1)
+    return log.outcome, log.ended - now
+
+
+@pytest.mark.parametrize("pattern", PATTERNS)
+def test_a_robot_that_says_nothing_any_more_is_lost_after_20_s_without_a_picture(
+    pattern: str,
+) -> None:
+    dva = driving(pattern)
+    dva.field.robots[ROBOT].device.silent = True
+    outcome, took = lost_after(dva)
+    assert (outcome, BLIND_AFTER) == ("lost link", 20.0)
+    assert took == pytest.approx(20.5, abs=0.8)
+
+
+@pytest.mark.parametrize("pattern", PATTERNS)
+def test_commands_that_do_not_arrive_are_a_lost_link_after_three_attempts(pattern: str) -> None:
+    """The picture goes on; nobody moves any more, whatever is tried."""
+    dva = driving(pattern)
+    dva.field.robots[ROBOT].inbox._put = lambda *_: None  # type: ignore[method-assign]
+    outcome, took = lost_after(dva)
+    assert (outcome, ATTEMPTS) == ("lost link", 3)
+    assert 12.0 < took < 45.0
+    tried = dva.stage.recorder.counters["replans"]
+    assert tried <= 3 if pattern in ASKED else tried == 3
+
+
+@pytest.mark.parametrize("pattern", ASKED)
+def test_the_app_alerts_after_three_sends_of_2_s_without_an_answer(pattern: str) -> None:
+    dva = driving(pattern, **{"command.timeout_s": 2.0})
+    dva.field.robots[ROBOT].inbox._put = lambda *_: None  # type: ignore[method-assign]
+    outcome, took = lost_after(dva)
+    (log,) = dva.stage.recorder.drives
+    assert outcome == "lost link"
+    assert took == pytest.approx(6.0, abs=0.5)
+    assert log.alerts >= 1
+
+
+def test_who_gets_no_nearer_gives_up_when_its_patience_ends() -> None:
+    """A robot that turns and never drives: patience is of the person."""
+    dva = driving("latest-wins", **{"operator.traits": {"patience_s": 30.0}})
+    body = dva.field.robots[ROBOT].body
+    drive = body.drive
+    body.drive = lambda speed, turn, until: drive(0.0, 0.3, until)  # type: ignore[method-assign]
+    outcome, took = lost_after(dva)
+    assert outcome == "gave up"
+    assert 15.0 < took < 60.0
