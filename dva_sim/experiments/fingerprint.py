@@ -17,6 +17,7 @@ _CODE = (
     "protocol",
     "scenario",
     "simulation",
+    "tasks",
     "timed",
     "worlds",
     "clock.py",
@@ -24,6 +25,7 @@ _CODE = (
     "streams.py",
     "experiments/episode.py",
     "experiments/metrics.py",
+    "experiments/workload.py",
 )
 _EDITED = ("agents", "protocol", "worlds")
 _SUFFIXES = {".yaml", ".geojson", ".xsd", ".pgm", ".png", ".py"}

@@ -1,7 +1,8 @@
 """The models that a scenario can be played in, as a study sees them.
 
 `full`: bodies, cameras, persons with phones and every byte on the network. `timed`: travel and
-service times only, a thousand times faster; the DVA's core is the same in both.
+service times only, a thousand times faster; the DVA's core is the same in both. `task`: one
+person at a task of the literature, with the operators and hands of the full model.
 """
 
 from __future__ import annotations
@@ -12,10 +13,12 @@ from typing import Any, Protocol
 from dva_sim import scenario as scenarios
 from dva_sim.config import Document
 from dva_sim.scenario import Scenario
+from dva_sim.tasks import scenario as tasks
+from dva_sim.tasks.scenario import TaskScenario
 from dva_sim.timed import scenario as timed
 from dva_sim.timed.scenario import TimedScenario
 
-AnyScenario = Scenario | TimedScenario
+AnyScenario = Scenario | TimedScenario | TaskScenario
 Tables = dict[str, list[dict[str, Any]]]
 
 
@@ -63,7 +66,7 @@ def model_of(document: Document) -> Model:
 
 def model_for(scenario: AnyScenario) -> Model:
     """The model of a scenario that has been read."""
-    return MODELS["timed" if isinstance(scenario, TimedScenario) else "full"]
+    return MODELS[scenario.model]
 
 
 class _Full:
@@ -89,7 +92,7 @@ class _Full:
         rehearse(scenario, seed)
 
     def tables(self, scenario: AnyScenario, seed: int, with_tracks: bool) -> Tables:
-        from dva_sim.experiments import metrics
+        from dva_sim.experiments import metrics, workload
         from dva_sim.simulation import simulate
 
         assert isinstance(scenario, Scenario)
@@ -98,6 +101,7 @@ class _Full:
             "runs": [metrics.run_row(recording)],
             "events": metrics.event_rows(recording),
             "people": metrics.people_rows(recording),
+            "operators": workload.operator_rows(recording),
         }
         if with_tracks:
             tables["tracks"] = metrics.track_rows(recording)
@@ -133,4 +137,36 @@ class _Timed:
         return tables(simulate_timed(scenario, seed))
 
 
-MODELS: dict[str, Model] = {"full": _Full(), "timed": _Timed()}
+class _Task:
+    """A run is a block of trials of one person; `trials` has a row for each."""
+
+    def build(self, source: Document, changes: Mapping[str, Any]) -> TaskScenario:
+        return tasks.build(source, changes)
+
+    def set_by_study(self, seed: int) -> dict[str, Any]:
+        return {"operator.population_seed": seed}
+
+    def team(self, scenario: AnyScenario) -> int:
+        return 1
+
+    def played_by(self, scenario: AnyScenario, person: int) -> TaskScenario:
+        assert isinstance(scenario, TaskScenario)
+        operator = scenario.operator.model_copy(update={"person": person})
+        return scenario.model_copy(update={"operator": operator})
+
+    def rehearse(self, scenario: AnyScenario, seed: int) -> None:
+        from dva_sim.tasks import rehearse
+
+        assert isinstance(scenario, TaskScenario)
+        rehearse(scenario)
+
+    def tables(self, scenario: AnyScenario, seed: int, with_tracks: bool) -> Tables:
+        from dva_sim.tasks import play
+        from dva_sim.tasks.summary import run_row
+
+        assert isinstance(scenario, TaskScenario)
+        trials = play(scenario, seed)
+        return {"runs": [run_row(trials)], "trials": trials}
+
+
+MODELS: dict[str, Model] = {"full": _Full(), "timed": _Timed(), "task": _Task()}

@@ -5,8 +5,8 @@ joystick, over links with delay, jitter and loss. No site, no DVA and no message
 their strategies are those of the full model, and so are hands, accelerometers and links.
 """
 
-from dva_sim.tasks.block import play, trace_of
+from dva_sim.tasks.block import play, rehearse, trace_of
 from dva_sim.tasks.scenario import TaskScenario, build
 from dva_sim.tasks.trial import Trace
 
-__all__ = ["TaskScenario", "Trace", "build", "play", "trace_of"]
+__all__ = ["TaskScenario", "Trace", "build", "play", "rehearse", "trace_of"]

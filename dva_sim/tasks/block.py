@@ -45,6 +45,16 @@ def trace_of(scenario: TaskScenario, seed: int, number: int = 0) -> tuple[Row, T
     raise IndexError(f"there is no trial {number}")
 
 
+def rehearse(scenario: TaskScenario) -> None:
+    """Make the first trial, and let no time pass in it.
+
+    Raises:
+        ConfigError: who does it, or with what, cannot be made.
+    """
+    first = next(iter(scenario.task.conditions()))
+    _trial(scenario, seat_of(scenario), first, 0, Streams(0))
+
+
 def seat_of(scenario: TaskScenario) -> Seat:
     """Who sits down to the block, without any idea yet how late the link makes it."""
     operator = scenario.operator
@@ -84,7 +94,7 @@ def _trial(
     streams: Streams,
 ) -> CursorTrial | DriveTrial:
     if scenario.is_driven:
-        return DriveTrial(scenario, seat, condition, streams)
+        return DriveTrial(scenario, seat, condition, streams, seat.person.reaction)
     task, cue = scenario.task, 0.0
     if isinstance(task, Pointing) and task.cue == "unexpected":
         cue = seat.person.reaction + scenario.link.down.delay_s + scenario.frames.extra_s

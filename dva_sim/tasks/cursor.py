@@ -84,7 +84,7 @@ class CursorTrial(Trial[Sighting]):
         moved_at: When the cursor first moved [s], or None.
     """
 
-    STEP = 0.002
+    STEP = 0.004
 
     def __init__(
         self, scenario: TaskScenario, seat: Seat, goal: Goal, streams: Streams, cue: float = 0.0
@@ -155,9 +155,9 @@ class CursorTrial(Trial[Sighting]):
             self.moved_at = now + dt
         self.over = goal.check(now + dt, plant.x, plant.y, dt)
 
-    def point_now(self) -> tuple[float, float, float]:
+    def place_now(self) -> Pair:
         """See `Trial`."""
-        return self.plant.x, self.plant.y, math.hypot(self.plant.vx, self.plant.vy)
+        return self.plant.x, self.plant.y
 
     def draw_goal(self) -> None:
         """Add the geometry to the trace."""

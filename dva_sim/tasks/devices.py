@@ -112,7 +112,7 @@ class Joystick(Device):
         (ax, ay), (x, y), keep = self._aim, self._hand, self._keep
         self._hand = x, y = ax + (x - ax) * keep, ay + (y - ay) * keep
         x, y = shaken(x, y, self._noise)
-        self._shown = clamped(x, 1.0), clamped(y, 1.0)
+        self._shown = x, y = clamped(x, 1.0), clamped(y, 1.0)
         self.most = max(self.most, abs(x), abs(y))
 
     def reading(self) -> Pair:

@@ -69,17 +69,23 @@ class DriveTrial(Trial[Observation]):
         seat: Who drives.
         condition: See the kinds of tasks.
         streams: The luck of this trial.
+        cue: See `Trial`.
     """
 
     STEP = 0.01
 
     def __init__(
-        self, scenario: TaskScenario, seat: Seat, condition: tuple[float, float], streams: Streams
+        self,
+        scenario: TaskScenario,
+        seat: Seat,
+        condition: tuple[float, float],
+        streams: Streams,
+        cue: float = 0.0,
     ) -> None:
         plant = scenario.plant
         assert plant.speed_mps is not None
         self._top = plant.speed_mps, math.radians(plant.turn_rate_deg_s)
-        super().__init__(scenario, seat, Reach(*self._top), streams)
+        super().__init__(scenario, seat, Reach(*self._top), streams, cue)
         self.points = way_of(scenario.task, *condition)
         self.length, self.width = length_of(self.points), condition[1]
         self._limit = 0.5 * (self.width - plant.width_m)
@@ -164,9 +170,9 @@ class DriveTrial(Trial[Observation]):
             "path_error_rms_m": math.sqrt(self._squares / self.now),
         }
 
-    def point_now(self) -> tuple[float, float, float]:
+    def place_now(self) -> Pair:
         """See `Trial`."""
-        return self.plant.x, self.plant.y, self.plant.speed
+        return self.plant.x, self.plant.y
 
     def draw_goal(self) -> None:
         """Add the geometry to the trace."""

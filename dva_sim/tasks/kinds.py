@@ -89,6 +89,16 @@ class Tunnel(Config):
         """Length and width [m] of each condition."""
         yield from itertools.product(values_of(self.length_m), values_of(self.width_m))
 
+    @model_validator(mode="after")
+    def _goes_around(self) -> Tunnel:
+        for length, width in self.conditions():
+            if self.shape == "circular" and width * math.pi >= length:
+                raise ValueError(
+                    f"width_m {width:g} leaves no middle of a circle of length_m {length:g}; it "
+                    "should be below its diameter"
+                )
+        return self
+
 
 class Tracking(Config):
     """Follow a target that moves as a sum of sines, on a line.

@@ -15,7 +15,7 @@ from dva_sim.tasks.kinds import Pointing, Reach, Tracking
 from dva_sim.tasks.plants import Cursor
 from dva_sim.tasks.trial import MACHINE_GAIN, Trace
 
-SAMPLE_STEPS = 10  # a tracking record keeps every tenth step
+SAMPLE_STEPS = 5  # a tracking record keeps every fifth step
 
 
 class ToTarget(Goal):

@@ -8,6 +8,7 @@ the step nearest to it, so that no delay is longer or shorter on average.
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -52,7 +53,7 @@ class Trace:
     Attributes:
         times: [s]
         places: [m]
-        speeds: [m/s]
+        speeds: Since the time before [m/s].
         touched: Where a wall was crossed, or a target left again [m].
         walls: Lines that show the geometry, each a list of places [m].
         marks: Circles that show targets: x, y and radius [m].
@@ -131,8 +132,8 @@ class Trial(ABC, Generic[S]):
         """Let `dt` [s] pass for hand, link and what is moved."""
 
     @abstractmethod
-    def point_now(self) -> tuple[float, float, float]:
-        """Where it is [m, m], and how fast [m/s], for the picture."""
+    def place_now(self) -> Pair:
+        """Where it is, for the picture [m]."""
 
     def run(self, keep: bool = False) -> None:
         """Play the trial to its end; `keep` its trace to be drawn."""
@@ -153,7 +154,7 @@ class Trial(ABC, Generic[S]):
             self.advance(step)
             steps += 1
             self.now = steps * step
-        if keep:
+        if keep and self.now > self.trace.times[-1] + 0.5 * TRACE_EVERY:
             self._draw()
         self.waits.note(self.now, moves=True)
 
@@ -185,7 +186,11 @@ class Trial(ABC, Generic[S]):
         self.decide(self._driver, seen, self.seat.begun + self.now)
 
     def _draw(self) -> None:
-        x, y, speed = self.point_now()
-        self.trace.times.append(self.now)
-        self.trace.places.append((x, y))
-        self.trace.speeds.append(speed)
+        place, trace = self.place_now(), self.trace
+        if trace.times:
+            since = self.now - trace.times[-1]
+            trace.speeds.append(math.dist(place, trace.places[-1]) / since)
+        else:
+            trace.speeds.append(0.0)
+        trace.times.append(self.now)
+        trace.places.append(place)

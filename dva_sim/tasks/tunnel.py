@@ -19,11 +19,12 @@ from dva_sim.tasks.trial import MACHINE_GAIN, Trace
 
 Floats = NDArray[np.float64]
 
+RUN_OUT = 2.0  # the way goes on so far beyond the end, so that nobody stops before it [m]
 CORNERS = 60  # of the polygon that stands for the middle of a circle, for the person
 
 
 class TunnelGoal(Goal):
-    """Get through, without crossing a wall.
+    """Get through, without crossing a wall; to cross the end is enough.
 
     A circle begins at its lowest point and is gone around counter-clockwise.
 
@@ -37,7 +38,7 @@ class TunnelGoal(Goal):
         self._task, self.length, self.width = task, length, width
         self.tolerance = 0.5 * width
         self._radius = length / (2.0 * math.pi) if task.shape == "circular" else 0.0
-        self.path = Route(self._line(0.0))
+        self.path = Route(self._way())
         self._along, self._inside, self._errors = 0.0, True, 0
         self._squares, self._time = 0.0, 0.0
         self._touched: list[Pair] = []
@@ -94,6 +95,14 @@ class TunnelGoal(Goal):
         for side in (-self.tolerance, self.tolerance):
             trace.walls.append([(x, y) for x, y in self._line(side).tolist()])
         trace.touched += self._touched
+
+    def _way(self) -> Floats:
+        """The middle, going on after the end as before it: nobody has to stop there."""
+        if not self._radius:
+            return np.array([(0.0, 0.0), (self.length + RUN_OUT, 0.0)])
+        ring = self._line(0.0)
+        laps = 1 + math.ceil(RUN_OUT / self.length)
+        return np.concatenate([ring, *[ring[1:]] * (laps - 1)])
 
     def _line(self, aside: float) -> Floats:
         """A line beside the middle, to its right [m]."""

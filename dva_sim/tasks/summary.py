@@ -1,0 +1,80 @@
+"""From the trials of a block to the one row of its run."""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from dva_sim.tasks.measures import fit_line, throughput
+
+Row = dict[str, Any]
+
+MEANS = (
+    "movement_time_s",
+    "completed",
+    "error",
+    "overshoots",
+    "wall_crossings",
+    "stops",
+    "path_error_rms_m",
+    "tracking_error_rms_m",
+    "crossover_rad_s",
+    "phase_margin_deg",
+    "path_m",
+    "waits",
+    "wait_s",
+    "delay_felt_s",
+)
+"""Columns of the trials whose mean is a column of the run, as far as the task has them."""
+SHARES = {"completed": "completed_share", "error": "error_share"}
+
+
+def run_row(trials: Sequence[Mapping[str, Any]]) -> Row:
+    """The means over all trials, and what is measured of them together.
+
+    `throughput_bps` is the mean over conditions of the nominal throughput, and
+    `effective_throughput_bps` of that with effective width and amplitude, over the trials that
+    were done; `id_slope` is the time that one more of the index of difficulty takes (seconds per
+    bit, or per width of a tunnel), where there are several.
+
+    Args:
+        trials: Rows of `play`.
+    """
+    row: Row = {"trials": len(trials)}
+    for name in MEANS:
+        if name in trials[0]:
+            row[SHARES.get(name, name)] = mean(trial[name] for trial in trials)
+    row["hand_most"] = max(float(trial["hand_most"]) for trial in trials)
+    done = [trial for trial in trials if trial["completed"]]
+    if "id_bits" in trials[0]:
+        row |= _throughputs(done)
+    for key in ("id_bits", "steering_id"):
+        if key in trials[0]:
+            row["id_slope"] = _slope(done, key)
+    return row | {"simulated_s": sum(float(trial["trial_time_s"]) for trial in trials)}
+
+
+def mean(values: Iterable[float]) -> float:
+    """The mean of what is finite; nan of nothing."""
+    finite = [float(value) for value in values if math.isfinite(value)]
+    return sum(finite) / len(finite) if finite else math.nan
+
+
+def _throughputs(done: Sequence[Mapping[str, Any]]) -> Row:
+    cells: dict[tuple[float, float], list[Mapping[str, Any]]] = defaultdict(list)
+    for trial in done:
+        cells[trial["amplitude_m"], trial["width_m"]].append(trial)
+    nominal, effective = [], []
+    for (amplitude, width), trials in cells.items():
+        times = [trial["movement_time_s"] for trial in trials]
+        ends = [trial["end_m"] for trial in trials]
+        nominal.append(throughput(amplitude, width, times))
+        effective.append(throughput(amplitude, width, times, ends))
+    return {"throughput_bps": mean(nominal), "effective_throughput_bps": mean(effective)}
+
+
+def _slope(done: Sequence[Mapping[str, Any]], key: str) -> float:
+    x, y = [t[key] for t in done], [t["movement_time_s"] for t in done]
+    return fit_line(x, y).slope if len(set(x)) > 1 else math.nan
