@@ -73,8 +73,7 @@ def towards(seen: Sighting, delay: float, person: Person, most: float) -> Veloci
     gain = gain_at(person.pointing, person.margin, delay)
     vx = seen.target_vx + gain * (seen.target_x - seen.x)
     vy = seen.target_vy + gain * (seen.target_y - seen.y)
-    speed = math.hypot(vx, vy)
-    return (vx * most / speed, vy * most / speed) if speed > most else (vx, vy)
+    return slowed(vx, vy, most)
 
 
 def through(path: Route, seen: Sighting, delay: float, person: Person, most: float) -> Velocity:
@@ -104,7 +103,13 @@ def through(path: Route, seen: Sighting, delay: float, person: Person, most: flo
         return towards(end, delay, person, speed)
     dx, dy = _direction(path, along + speed * delay, 0.5 * seen.tolerance)
     x, y = path.point_at(along)
-    return speed * dx + gain * (x - seen.x), speed * dy + gain * (y - seen.y)
+    return slowed(speed * dx + gain * (x - seen.x), speed * dy + gain * (y - seen.y), most)
+
+
+def slowed(vx: float, vy: float, most: float) -> Velocity:
+    """The same direction, no faster than `most` [m/s]."""
+    speed = math.hypot(vx, vy)
+    return (vx * most / speed, vy * most / speed) if speed > most else (vx, vy)
 
 
 def fastest(half_width: float, delay: float, person: Person, most: float) -> float:

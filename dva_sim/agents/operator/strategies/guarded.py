@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from dva_sim.agents.operator.strategies.base import Intent, PathView, PointView, Strategy, View
-from dva_sim.agents.operator.strategies.cursor import Velocity
+from dva_sim.agents.operator.strategies.cursor import Velocity, slowed
 from dva_sim.agents.steering import Route
 from dva_sim.plugins import said
 
@@ -31,11 +31,13 @@ class Guarded(Strategy):
 
     def point(self, view: PointView) -> Velocity:
         """No faster than the cursor can."""
-        return self._slowed(self._answer(self.strategy.point, view))
+        got = self._answer(self.strategy.point, view) or (0.0, 0.0)
+        return slowed(*got, self.reach.speed)
 
     def follow(self, view: PathView) -> Velocity:
         """No faster than the cursor can."""
-        return self._slowed(self._answer(self.strategy.follow, view))
+        got = self._answer(self.strategy.follow, view) or (0.0, 0.0)
+        return slowed(*got, self.reach.speed)
 
     def workload(self) -> Mapping[str, float]:
         """What the user's counts, if it can tell."""
@@ -44,11 +46,6 @@ class Guarded(Strategy):
         except Exception as error:
             self._count(said(error))
             return {}
-
-    def _slowed(self, got: Velocity | None) -> Velocity:
-        vx, vy = got or (0.0, 0.0)
-        speed, most = math.hypot(vx, vy), self.reach.speed
-        return (vx * most / speed, vy * most / speed) if speed > most else (vx, vy)
 
     def _answer(self, ask: Callable[..., Any], *given: Any) -> tuple[float, float] | None:
         """Two finite numbers, or None."""

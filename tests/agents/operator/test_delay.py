@@ -1,0 +1,60 @@
+"""What a person comes to know of the delay, from what it did and what it sees alone."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dva_sim.agents.operator.delay import DelayEstimate
+
+
+def learn(
+    guess: DelayEstimate, delay: float, seconds: float, frame: float, size: float = 0.5
+) -> float:
+    """What is guessed after seeing, `delay` [s] later, something new asked for every second."""
+    asked = np.random.default_rng(1).uniform(0.0, size, round(seconds) + 1)
+    for now in np.arange(0.0, seconds, frame).tolist():
+        then = now - delay
+        guess.see(now, float(asked[int(then)]) if then >= 0 else 0.0, 0.0)
+        guess.intend(now, float(asked[int(now)]), 0.0)
+    return guess.value
+
+
+@pytest.mark.parametrize("delay", [0.2, 0.6, 1.5, 4.0, 10.0])
+def test_the_delay_is_learnt_to_a_tenth_of_a_second(delay: float) -> None:
+    assert learn(DelayEstimate(0.0, 0.6), delay, 60.0, 0.1) == pytest.approx(delay, abs=0.11)
+
+
+@pytest.mark.parametrize("delay", [0.05, 0.21, 0.6])
+def test_a_finer_resolution_learns_it_to_a_hundredth(delay: float) -> None:
+    guess = DelayEstimate(0.0, 0.3, step=0.01)
+    assert learn(guess, delay, 10.0, 0.01) == pytest.approx(delay, abs=0.015)
+
+
+def test_channels_in_other_units_are_weighed_by_their_scale() -> None:
+    """A cursor that moves by millimetres a second tells as much as a robot by metres."""
+    coarse = DelayEstimate(0.0, 0.3, step=0.01)
+    assert learn(coarse, 0.8, 10.0, 0.01, size=1e-4) == pytest.approx(0.3, abs=0.015)
+    fine = DelayEstimate(0.0, 0.3, step=0.01, scale=(1e-4, 1e-4))
+    assert learn(fine, 0.8, 10.0, 0.01, size=1e-4) == pytest.approx(0.8, abs=0.015)
+
+
+def test_while_nothing_changes_the_guess_is_what_was_learnt_before() -> None:
+    guess = DelayEstimate(0.0, 1.7)
+    for now in np.arange(0.0, 20.0, 0.1).tolist():
+        guess.intend(now, 0.0, 0.0)
+        guess.see(now, 0.0, 0.0)
+    assert guess.value == pytest.approx(1.7)
+
+
+def test_a_delay_that_changes_is_learnt_anew_within_half_a_minute() -> None:
+    guess = DelayEstimate(0.0, 0.6)
+    asked = np.random.default_rng(2).uniform(0.0, 0.5, 200)
+    values = []
+    for now in np.arange(0.0, 120.0, 0.1).tolist():
+        then = now - (0.5 if now < 60.0 else 2.0)
+        guess.see(now, float(asked[int(then)]) if then >= 0 else 0.0, 0.0)
+        guess.intend(now, float(asked[int(now)]), 0.0)
+        values.append(guess.value)
+    assert values[590] == pytest.approx(0.5, abs=0.11)
+    assert all(value == pytest.approx(2.0, abs=0.11) for value in values[900:])

@@ -1,0 +1,139 @@
+"""Strategies by name, and those that users bring."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+from closed_loops import CURSOR, ROBOT, drive, person, way
+
+from dva_sim import scenario as scenarios
+from dva_sim.agents.camera import Observation
+from dva_sim.agents.operator.strategies import (
+    Guarded,
+    Oracle,
+    PointView,
+    Predictor,
+    Pursuit,
+    Sighting,
+    Strategy,
+    Truth,
+    known_strategies,
+    load_strategy,
+)
+from dva_sim.errors import ConfigError
+from dva_sim.simulation import simulate
+
+HEAD = "from dva_sim.agents.operator.strategies import Intent, Strategy\n\n"
+
+
+def written(folder: Path, body: str) -> str:
+    """A file with one class, `Mine`, and the name that means it."""
+    path = folder / "mine.py"
+    path.write_text(f"{HEAD}class Mine(Strategy):\n{body}")
+    return f"{path}:Mine"
+
+
+def test_all_ways_of_steering_have_names() -> None:
+    names = {"adaptive", "move_and_wait", "oracle", "predictor", "pursuit", "two_point"}
+    assert names <= set(known_strategies())
+    for name in names - {"oracle"}:
+        assert isinstance(load_strategy(name)(person(), ROBOT), Strategy)
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "problem"),
+    [
+        ("clever", {}, "operator 'clever' is unknown; known: adaptive, move_and_wait, oracle, "),
+        ("pursuit", {"gain": 2}, "operator 'pursuit' has no option 'gain'; it has none"),
+        ("predictor", {"gain": 2}, "has no option 'gain'; known: inner, quality"),
+        ("predictor", {"quality": 1.5}, "option 'quality' is 1.5; should be from 0 to 1"),
+        ("predictor", {"inner": "oracle"}, "option 'inner' is 'oracle', which needs no prediction"),
+        ("adaptive", {"closed": "nothing"}, "operator 'nothing' is unknown"),
+    ],
+)
+def test_a_mistake_is_told_in_one_line(name: str, options: dict, problem: str) -> None:
+    with pytest.raises(ConfigError) as told:
+        load_strategy(name, options)(person(), ROBOT)
+    assert problem in str(told.value)
+
+
+def test_a_scenario_refuses_a_strategy_that_there_is_not() -> None:
+    with pytest.raises(ConfigError, match="operator 'clever' is unknown"):
+        scenarios.build(scenarios.load("drive-to-event"), {"operator.strategy": "clever"})
+
+
+def test_only_the_oracle_is_told_the_truth_and_it_is_no_strategy_that_sees() -> None:
+    oracle = load_strategy("oracle")(person(), ROBOT)
+    assert isinstance(oracle, Oracle)
+    assert not isinstance(oracle, Strategy)
+    state = Observation(0, 0.0, 0.0, 0.0, 0.0, 0.0, ())
+    assert oracle.drive(way((0, 0), (9, 0)), Truth(state), 0.5).speed == pytest.approx(0.475)
+    with pytest.raises(AttributeError):
+        Pursuit(person(), ROBOT).drive(way((0, 0), (9, 0)), Truth(state), 0.5)  # type: ignore[arg-type]
+
+
+def test_the_strategy_of_a_user_steers(tmp_path: Path) -> None:
+    name = written(
+        tmp_path,
+        "    def drive(self, route, view, stop_before):\n"
+        "        ahead = route.ahead(view.seen.x, view.seen.y, view.seen.heading, 1.0)\n"
+        "        if ahead.remaining < stop_before:\n"
+        "            return Intent(0.0, 0.0)\n"
+        "        return Intent(self.person.caution, ahead.bearing)\n",
+    )
+    mine = load_strategy(name)(person(), ROBOT)
+    assert isinstance(mine, Guarded)
+    track = drive(mine, way((0, 0), (5, 0), (5, 5)), 0.2, 60.0)
+    assert math.dist((track[-1].x, track[-1].y), (5.0, 5.0)) < 0.5
+    predicted = Predictor(person(), ROBOT, inner=name)
+    assert drive(predicted, way((0, 0), (5, 0)), 2.0, 30.0)[-1].x == pytest.approx(4.7, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("answer", "problem"),
+    [
+        ("Intent(float('nan'), 0.0)", "answers nan, 0.0"),
+        ("Intent(0.1, float('inf'))", "answers 0.1, inf"),
+        ("None", "TypeError: cannot unpack non-iterable NoneType object"),
+        ("1 / 0", "ZeroDivisionError: division by zero"),
+        ("('fast', 'left')", "TypeError: must be real number, not str"),
+    ],
+)
+def test_one_that_answers_nonsense_lets_the_robot_stand(
+    tmp_path: Path, answer: str, problem: str
+) -> None:
+    name = written(tmp_path, f"    def drive(self, route, view, stop_before): return {answer}\n")
+    mine = load_strategy(name)(person(), ROBOT)
+    track = drive(mine, way((0, 0), (5, 0)), 0.0, 2.0)
+    assert {tuple(at.wanted) for at in track} == {(0.0, 0.0)}
+    assert mine.failures == 20
+    assert mine.first_failure == problem
+
+
+def test_one_that_wants_too_much_gets_what_the_robot_can_do(tmp_path: Path) -> None:
+    body = "    def drive(self, route, view, stop_before): return 1e9, -1e9\n"
+    body += "    def point(self, view): return 3e9, 4e9\n"
+    mine = load_strategy(written(tmp_path, body))(person(), CURSOR)
+    assert drive(mine, way((0, 0), (5, 0)), 0.0, 0.1)[0].wanted == (0.5, -1.0)
+    seen = Sighting(0, *[0.0] * 8, tolerance=0.01)
+    assert mine.point(PointView(0.0, seen, 0.3)) == pytest.approx((0.3, 0.4))
+
+
+def test_in_a_run_failures_are_counted_and_told_once_a_drive(tmp_path: Path) -> None:
+    name = written(tmp_path, "    def drive(self, route, view, stop_before): return 1 / 0\n")
+    run = simulate(
+        scenarios.build(scenarios.load("drive-to-event"), {"operator.strategy": name}), 1
+    )
+    told = [moment.what for moment in run.recorder.timeline if "strategy fails" in moment.what]
+    line = "lets go, as its strategy fails: ZeroDivisionError: division by zero"
+    assert told == [line] * len(run.recorder.drives)
+    assert run.recorder.counters["failed: an answer of an operator"] > 100
+
+
+def test_a_run_logs_what_the_way_of_steering_asked_of_the_person() -> None:
+    changes = {"operator.strategy": "move_and_wait", "link.delay_s": 0.5}
+    (log,) = simulate(scenarios.build(scenarios.load("drive-to-event"), changes), 1).recorder.drives
+    assert log.outcome == "confirmed"
+    assert log.workload["waits"] >= 5
