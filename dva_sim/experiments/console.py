@@ -26,10 +26,12 @@ from dva_sim import scenario as scenarios
 from dva_sim.config import parse_changes
 from dva_sim.errors import ConfigError
 from dva_sim.experiments import shifts
+from dva_sim.experiments import trials as tasks
 from dva_sim.experiments.models import model_of
 from dva_sim.experiments.pictures import Wanted
 from dva_sim.scenario import Scenario
 from dva_sim.simulation import Recording, simulate
+from dva_sim.tasks import TaskScenario
 from dva_sim.timed import TimedScenario
 
 INTERRUPTED = 130  # exit code of a program ended by Ctrl-C
@@ -55,6 +57,9 @@ def episode(
             raise ConfigError(f"{name} is a timed scenario: there is nothing to see or to send")
         shifts.tell(scenario, seed, console)
         return
+    if isinstance(scenario, TaskScenario):
+        _task(name, scenario, seed, side_by_side, pictures)
+        return
     settings: list[dict[str, Any]] = [changes]
     if side_by_side is not None:
         settings = [changes | {"pattern": p} for p in _two_patterns(side_by_side)]
@@ -65,6 +70,18 @@ def episode(
             written = list(pictures.write(runs))
         for line in written:
             say(line)
+
+
+def _task(
+    name: str, scenario: TaskScenario, seed: int, side_by_side: str | None, pictures: Wanted
+) -> None:
+    """Play a block of trials, and draw the first one if asked for."""
+    if side_by_side is not None or (pictures.any and not pictures.is_plain_still):
+        raise ConfigError(f"{name} is a task: only --still shows something of it, its first trial")
+    tasks.tell(scenario, seed, console)
+    if pictures.still is not None:
+        tasks.draw(scenario, seed, pictures.still)
+        say(f"Still: {pictures.still}")
 
 
 def _two_patterns(text: str) -> list[str]:
@@ -268,6 +285,7 @@ def list_all() -> None:
     from_files = {
         "studies": "experiments",
         "scenarios": "experiments/scenarios",
+        "tasks (tasks/NAME)": "experiments/scenarios/tasks",
         "sites": "worlds",
         "phones (phone.profile)": "agents/phones",
         "accelerometers": "agents/accelerometers",

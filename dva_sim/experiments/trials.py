@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 SHOWN = 20  # trials in the table; the lines below it count them all
+LONGEST = 30.0  # of what moves on a line, in a picture [s]
 SMOOTH = 5  # speeds that are averaged for the picture: readings of a device come in steps
 PATH, TOUCHED = "#0072B2", "#D55E00"
 COLUMNS = {
@@ -92,11 +93,11 @@ def draw(scenario: TaskScenario, seed: int, path: Path, number: int = 0) -> None
     with styled():
         figure, ((way, speed),) = panels(1, 2, 3.6)
         _speed(speed, trace)
-        if scenario.task.kind == "tracking":
-            _follow(way, trace)
-            speed.set_xlim(way.get_xlim())
-        else:
+        if any(y for _, y in trace.places):
             _way(way, trace)
+        else:
+            _place(way, trace)
+            speed.set_xlim(way.get_xlim())
         figure.suptitle(_title(scenario, row), x=0.01, ha="left", fontsize=9.5, color=INK)
         figure.savefig(path)
 
@@ -121,16 +122,20 @@ def _way(ax: Axes, trace: Trace) -> None:
     if trace.touched:
         ax.plot(*zip(*trace.touched, strict=True), "x", color=TOUCHED, ms=6, mew=1.6)
     ax.set_aspect("equal", adjustable="datalim")
+    ax.grid(False)
     ax.set(title="Way", xlabel="x [m]", ylabel="y [m]")
 
 
-def _follow(ax: Axes, trace: Trace) -> None:
-    (target,) = trace.walls
-    ax.plot(*zip(*target, strict=True), color=SOFT, lw=1.2, label="target")
-    ax.plot(trace.times, [x for x, _ in trace.places], color=PATH, lw=1.2, label="cursor")
-    ax.set(title="Target and cursor", xlabel="Time [s]", ylabel="x [m]")
-    ax.set_xlim(0, min(30.0, trace.times[-1]))
-    ax.legend(loc="upper right", ncols=2)
+def _place(ax: Axes, trace: Trace) -> None:
+    """Of what moves on a line: where it is over time, and its target."""
+    for target in trace.walls:
+        ax.plot(*zip(*target, strict=True), color=SOFT, lw=1.2, label="target")
+    for x, _, radius in trace.marks:
+        ax.axhspan(x - radius, x + radius, color=FAINT, lw=0, label="target")
+    ax.plot(trace.times, [x for x, _ in trace.places], color=PATH, lw=1.4, label="cursor")
+    ax.set(title="Place", xlabel="Time [s]", ylabel="x [m]")
+    ax.set_xlim(0, min(LONGEST, trace.times[-1]))
+    ax.legend(loc="best")
 
 
 def _speed(ax: Axes, trace: Trace) -> None:

@@ -22,6 +22,7 @@ from dva_sim.tasks.trial import Seat, Trial
 
 RUN_OUT = 5.0  # the way goes on so far beyond the finish, so that nobody stops before it [m]
 MACHINE_LOOK = 1.0  # of a machine that steers by itself [m]; assumed
+CONE = 0.1  # radius in a picture [m]
 CONE_STEP = 0.1  # between corners of the line that stands for a slalom [m]
 Points = list[Pair]
 
@@ -38,7 +39,7 @@ def way_of(task: Task, first: float, width: float) -> Points:
         leg = 0.5 * first
         return [(0.0, 0.0), (leg, 0.0), (leg, leg)]
     if isinstance(task, Slalom):
-        end = (task.cones + 1) * first
+        end = task.cones * first
         steps = np.linspace(0.0, end, max(2, round(end / CONE_STEP)) + 1)
         return [(float(x), task.swing_m * math.sin(math.pi * x / first)) for x in steps]
     assert isinstance(task, Course)
@@ -178,6 +179,10 @@ class DriveTrial(Trial[Observation]):
         """Add the geometry to the trace."""
         for side in (-1.0, 1.0):
             self.trace.walls.append(beside(self.points, side * 0.5 * self.width))
+        task = self.scenario.task
+        if isinstance(task, Slalom):
+            spacing = self.points[-1][0] / task.cones
+            self.trace.marks += [((n + 0.5) * spacing, 0.0, CONE) for n in range(task.cones)]
 
 
 def beside(points: Points, aside: float) -> Points:

@@ -168,12 +168,22 @@ class Slalom(Config):
     kind: Literal["slalom"] = "slalom"
     cones: Annotated[int, Field(ge=1, le=100)] = 6
     spacing_m: Values = 4.0
-    swing_m: Positive = 0.75
+    swing_m: Positive = 1.0
     width_m: Values = 1.5
 
     def conditions(self) -> Iterator[tuple[float, float]]:
         """Spacing and width [m] of each condition."""
         yield from itertools.product(values_of(self.spacing_m), values_of(self.width_m))
+
+    @model_validator(mode="after")
+    def _cones_stand_beside(self) -> Slalom:
+        widest = max(values_of(self.width_m))
+        if widest > 2.0 * self.swing_m:
+            raise ValueError(
+                f"width_m {widest:g} is above twice swing_m {self.swing_m:g}: the cones would "
+                "stand in the way"
+            )
+        return self
 
 
 class Course(Config):

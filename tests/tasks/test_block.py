@@ -178,7 +178,7 @@ def test_tracking_tells_crossover_and_margin_of_a_stable_loop():
     "task",
     [
         {"kind": "corner", "leg_m": 3.0, "width_m": 2.0},
-        {"kind": "slalom", "cones": 3, "spacing_m": 3.0, "swing_m": 0.5, "width_m": 2.0},
+        {"kind": "slalom", "cones": 3, "spacing_m": 4.0, "swing_m": 1.0, "width_m": 2.0},
         {"kind": "course", "points_m": [[0, 0], [4, 0], [8, 4]], "width_m": 2.0},
     ],
 )

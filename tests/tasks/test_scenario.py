@@ -66,6 +66,7 @@ def test_a_study_can_put_one_value_in_the_place_of_several():
             ":2:1",
             "width_m 0.05 leaves no middle of a circle of length_m 0.1",
         ),
+        ("task: {kind: slalom, swing_m: 0.5}", ":2:1", "the cones would stand in the way"),
         ("task: {kind: corner}", ":1:1", "a corner needs device.kind joystick, not 'mouse'"),
         (
             "task: {kind: corner}\ndevice: {kind: joystick}",

@@ -66,6 +66,12 @@ class Wanted:
         return any(path is not None for path in (self.video, self.still, self.strip))
 
     @property
+    def is_plain_still(self) -> bool:
+        """Whether one drawing is asked for, of no moment and no camera in particular."""
+        others = (self.video, self.strip, self.at, self.camera)
+        return self.still is not None and all(other is None for other in others)
+
+    @property
     def times(self) -> tuple[float, ...]:
         """The moments given [s].
 
