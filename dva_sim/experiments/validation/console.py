@@ -41,15 +41,15 @@ def validate(
         if what == "dispatch":
             if strategy is not None:
                 raise ConfigError("--strategy is for `validate operators`: dispatch has none")
-            from dva_sim.experiments.validation.dispatch import console as dispatch
+            from dva_sim.experiments.validation.dispatch.console import validate_dispatch
 
-            return dispatch.validate(cases, out, quick, workers, seed)
+            return validate_dispatch(cases, out, quick, workers, seed)
         if what == "operators":
             if cases is not None:
                 raise ConfigError("--cases is for `validate dispatch`: operators have no cases")
-            from dva_sim.experiments.validation.operators import console as operators
+            from dva_sim.experiments.validation.operators.console import validate_operators
 
-            return operators.validate(strategy, out, quick, workers, seed)
+            return validate_operators(strategy, out, quick, workers, seed)
     except KeyboardInterrupt:
         say("Stopped.")
         return INTERRUPTED

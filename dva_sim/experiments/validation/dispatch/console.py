@@ -29,7 +29,9 @@ TOLD = {
 STYLES = {"agrees": "green", "too rough": "yellow", "differs": "bold red"}
 
 
-def validate(cases: str | None, out: Path | None, quick: bool, jobs: int, seed: int) -> int:
+def validate_dispatch(
+    cases: str | None, out: Path | None, quick: bool, jobs: int, seed: int
+) -> int:
     """Play every case, print the comparison, write it if asked to; the exit code.
 
     Raises:

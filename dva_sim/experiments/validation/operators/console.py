@@ -30,7 +30,9 @@ from dva_sim.experiments.validation.telling import WIDTH, console, progress_bar,
 STYLES = {"passes": "green", "misses": "bold red", "shown only": "dim"}
 
 
-def validate(strategy: str | None, out: Path | None, quick: bool, jobs: int, seed: int) -> int:
+def validate_operators(
+    strategy: str | None, out: Path | None, quick: bool, jobs: int, seed: int
+) -> int:
     """Play every check, print the comparison, write it if asked to; the exit code.
 
     Raises:
