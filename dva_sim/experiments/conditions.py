@@ -26,6 +26,12 @@ _CONDITIONS = {
     "camera rate": "camera.rate_hz",
     "size of a frame": "camera.frame_bytes",
     "field of view": "camera.field_of_view_deg",
+    "task": "task.kind",
+    "device": "device.kind",
+    "frames per second": "frames.rate_hz",
+    "delay of commands": "link.up.delay_s",
+    "delay of frames": "link.down.delay_s",
+    "share of the correction that the machine makes": "automation",
     "operator strategy": "operator.strategy",
     "control": "control",
     "robot": "robot.profile",
@@ -36,6 +42,7 @@ _CONDITIONS = {
     "dispatch policy": "dispatch.policy",
     "horizon of a run": "horizon_s",
 }
+_NOWHERE = "–"
 _SAFE_ROUND_TRIPS = 4
 
 
@@ -46,7 +53,8 @@ def conditions(
     if not scenarios:
         return []
     varied = {factor.name for factor in factors}
-    rows = [("site", [_site(s) for s in scenarios.values()])]
+    sites = [_site(s) for s in scenarios.values()]
+    rows = [("site", sites)] if any(site != _NOWHERE for site in sites) else []
     for name, key in _CONDITIONS.items():
         values = [get(s, key) for s in scenarios.values()]
         if key in varied:
@@ -81,7 +89,7 @@ def timeout_remark(scenario: Mapping[str, Any], factors: Sequence[Factor]) -> st
 
 def _site(scenario: Mapping[str, Any]) -> str:
     chosen = get(scenario, "site.map") or get(scenario, "site.name")
-    return str(chosen).rpartition("/")[2] if chosen else "–"
+    return str(chosen).rpartition("/")[2] if chosen else _NOWHERE
 
 
 def _text(key: str, value: Any) -> str:

@@ -15,6 +15,13 @@ _FACTORS = {
     "link.rate_bps": "link rate",
     "robot.processing_s": "processing time at the robot",
     "command.rate_hz": "wanted command rate",
+    "link.up.delay_s": "delay of commands",
+    "link.down.delay_s": "delay of frames",
+    "frames.rate_hz": "frame rate",
+    "device.kind": "device",
+    "device.gain": "gain of the device",
+    "automation": "share of the correction that the machine makes",
+    "operator.options.quality": "quality of the prediction",
     "operator.strategy": "operator strategy",
     "control": "control",
     "phone.profile": "phone",
@@ -51,6 +58,11 @@ _SHORT_LEVELS = _LEVELS | {
     name: name for name in ("latest-wins", "direct", "coordinated", "supervisory")
 }
 _MEASURES = {
+    "completed_share": "share of trials done",
+    "error_share": "share of trials with an error",
+    "effective_throughput_bps": "throughput with effective width",
+    "delay_felt_s": "delay as the person takes it",
+    "id_slope": "time for one more of the index of difficulty",
     "drive_time_s": "driving time to confirmation",
     "path_m": "path length",
     "command_age_p50_s": "median command age at application",

@@ -155,6 +155,12 @@ def test_a_narrower_tunnel_takes_longer_and_delay_more_so(shape):
     assert late_wide < late_narrow
 
 
+def test_a_circle_so_small_that_one_is_around_within_the_delay_is_gone_around():
+    task = {"kind": "tunnel", "shape": "circular", "length_m": 0.0625, "width_m": 0.015}
+    row = play(build({"model": "task", "task": task}), 1)[0]
+    assert row["completed"] == 1.0
+
+
 def test_who_is_led_through_a_tunnel_leaves_its_middle_less():
     task = {"kind": "tunnel", "length_m": 0.3, "width_m": 0.01}
     scenario = {"model": "task", "task": task, "trials": 5, "horizon_s": 200}

@@ -10,6 +10,7 @@ References:
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import NamedTuple
 
 from dva_sim.agents.operator.person import Person
@@ -17,6 +18,7 @@ from dva_sim.agents.steering import Route
 
 Velocity = tuple[float, float]
 
+BEND_PIECES = 8  # in which a path is looked at for bends
 SHORTEST = 1e-3  # a delay, or a share of noise, below this counts as this
 
 
@@ -126,10 +128,14 @@ def fastest(half_width: float, delay: float, person: Person, most: float) -> flo
 
 
 def _bend(path: Route, along: float, look: float) -> float:
-    """Mean curvature of the path from a place on it to a look-ahead [1/m]."""
-    ax, ay = _direction(path, along, 0.1 * look)
-    bx, by = _direction(path, along + look, 0.1 * look)
-    return abs(math.atan2(ax * by - ay * bx, ax * bx + ay * by)) / look
+    """Mean curvature of the path from a place on it to a look-ahead [1/m].
+
+    Turns are added up piece by piece: the two ends of a whole turn point the same way.
+    """
+    step = look / BEND_PIECES
+    ways = [_direction(path, along + n * step, 0.5 * step) for n in range(BEND_PIECES + 1)]
+    turns = (abs(math.atan2(a * d - b * c, a * c + b * d)) for (a, b), (c, d) in pairwise(ways))
+    return sum(turns) / look
 
 
 def _direction(path: Route, along: float, by: float) -> Velocity:
