@@ -29,6 +29,7 @@ GAP = 0.1  # a smaller change of the turn rate is no reversal [rad/s]; assumed
 STEP = 0.15  # of resampling for the entropy, as published [s]
 BAND = 0.05  # of prediction errors, see `steering_entropy` [rad/s]; assumed
 EDGES = (-5.0, -2.5, -1.0, -0.5, 0.5, 1.0, 2.5, 5.0)  # of the nine bins, in bands, as published
+TRACK_STEP = 0.5  # between the points of a track that was not filmed [s]
 LEVEL_SPEED, LEVEL_TURN = 0.025, 0.035  # half a step of the phone, two degrees a second
 
 
@@ -171,11 +172,16 @@ def off_the_way(log: DriveLog, track: Iterable[TrackPoint], end: float) -> Float
     starts = np.array([time for time, _ in log.ways])
     ways = [shapely.linestrings(points) if len(points) > 1 else None for _, points in log.ways]
     gaps = []
-    for point in track:
+    for point in filter(_is_sample, track):
         way = ways[max(int(np.searchsorted(starts, point.time, side="right")) - 1, 0)]
         if starts[0] <= point.time <= until and way is not None:
             gaps.append(float(shapely.distance(way, shapely.points(point.x, point.y))))
     return np.array(gaps)
+
+
+def _is_sample(point: TrackPoint) -> bool:
+    """Whether a point is one of those that every track has, however closely it was filmed."""
+    return abs(point.time / TRACK_STEP - round(point.time / TRACK_STEP)) < 1e-6
 
 
 def path_error(recording: Recording) -> Row:

@@ -126,7 +126,8 @@ def test_where_nobody_steered_nothing_is_known_of_it() -> None:
 def test_the_path_error_is_the_distance_from_the_way_that_held_at_the_time() -> None:
     along, across = np.array([[0.0, 0.0], [10.0, 0.0]]), np.array([[0.0, 3.0], [10.0, 3.0]])
     made = log(0.0, 10.0, started=1.0, ways=[(1.0, along), (5.0, across)])
-    track = [TrackPoint(t, t, 1.0, 0.0, "TeleOp") for t in (0.5, 2.0, 4.0, 6.0, 11.0)]
+    times = (0.5, 2.0, 2.1, 4.0, 6.0, 11.0)  # before, too closely filmed, and after
+    track = [TrackPoint(t, t, 1.0, 0.0, "TeleOp") for t in times]
     assert workload.off_the_way(made, track, 20.0).tolist() == [1.0, 1.0, 2.0]
 
 
