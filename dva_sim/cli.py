@@ -229,16 +229,16 @@ def check(
         list[str],
         typer.Argument(
             help="Messages, studies, scenarios, sites, plans, maps, agents; - reads a message. "
-            "Or the word policy or robot, and names of such or mine.py:Mine."
+            "Or policy, robot, operator, filter or mapping, and names of such or mine.py:Mine."
         ),
     ],
     set_: Annotated[
         list[str] | None,
-        typer.Option("--set", metavar="KEY=VALUE", help="An option of the policies or motors."),
+        typer.Option("--set", metavar="KEY=VALUE", help="An option of what is tried."),
     ] = None,
 ) -> None:
-    """Tell of each file whether it is valid, and if not where and why; of a policy or a robot,
-    whether it keeps its promises."""
+    """Tell of each file whether it is valid, and if not where and why; of a policy, a robot,
+    an operator, a filter or a mapping, whether it keeps its promises."""
     from dva_sim.checking import console
 
     raise typer.Exit(console.check(files, set_ or []))

@@ -9,12 +9,13 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
 from PIL import Image
 
-from dva_sim.agents.operator.person import Population
+from dva_sim.agents.operator.person import Population, draw_person
 from dva_sim.agents.people import BystanderProfile, GuardProfile
 from dva_sim.agents.profile import RobotProfile, read_robot
-from dva_sim.agents.tilt import PhoneProfile
+from dva_sim.agents.tilt import AccelerometerPart, Phone, PhoneProfile
 from dva_sim.checking.problem import Problem
 from dva_sim.config import Config, Document, Path_, validate
 from dva_sim.errors import ConfigError
@@ -27,6 +28,7 @@ from dva_sim.experiments.tuned import Tuned
 from dva_sim.experiments.validation.dispatch.cases import CaseFile, load_cases
 from dva_sim.experiments.validation.operators.targets import SplitFile, TargetFile, load_split
 from dva_sim.scenario import Scenario
+from dva_sim.tasks import TaskScenario
 from dva_sim.timed.scenario import TimedScenario
 from dva_sim.worlds.geo import GeoFrame
 from dva_sim.worlds.maps import RosMap
@@ -80,8 +82,9 @@ def check_plan(path: Path) -> list[Problem]:
 def recognise(document: Document) -> Kind | None:
     """The kind that knows most of the keys; among equals, the one whose folder it lies in."""
     keys = document.data.keys() - {"description"}
-    timed = document.data.get("model") == "timed"
-    kinds = [kind for kind in KINDS if timed or kind.model is not TimedScenario]
+    model = document.data.get("model")
+    others = {TimedScenario: "timed", TaskScenario: "task"}
+    kinds = [kind for kind in KINDS if others.get(kind.model, model) == model]
     shared = {kind.name: len(keys & kind.model.model_fields.keys()) for kind in kinds}
     likely = [kind for kind in kinds if shared[kind.name] == max(shared.values())]
     if len(likely) == 1:
@@ -195,6 +198,18 @@ def _check_robot(document: Document) -> Iterator[ConfigError]:
     return iter(())
 
 
+def _check_phone(document: Document) -> Iterator[ConfigError]:
+    """The profile, and its chain made once, in the hand of anybody."""
+    profile = validate(PhoneProfile, document.data, document.error)
+    Phone(
+        profile,
+        draw_person(Population(), 1, 0),
+        np.random.default_rng(1),
+        base=document.file.parent,
+    )
+    return iter(())
+
+
 def _check_model(model: type[Config]) -> Check:
     def check(document: Document) -> Iterator[ConfigError]:
         validate(model, document.data, document.error)
@@ -220,13 +235,17 @@ KINDS: Final = (
     Kind("study", Study, "experiments", _check_study),
     Kind("scenario", Scenario, "experiments/scenarios", _check_scenario),
     Kind("timed scenario", TimedScenario, "experiments/scenarios", _check_scenario),
+    Kind("task", TaskScenario, "experiments/scenarios/tasks", _check_scenario),
     Kind("validation cases", CaseFile, "experiments/validation", _check_cases),
     Kind("targets", TargetFile, "experiments/validation", _check_model(TargetFile)),
     Kind("split", SplitFile, "experiments/validation", _check_split),
     Kind("site", SiteFile, "worlds", _check_site),
     Kind("ROS map", RosMap, "worlds", _check_map),
     Kind("robot", RobotProfile, "agents/robots", _check_robot),
-    Kind("phone", PhoneProfile, "agents/phones", _check_model(PhoneProfile)),
+    Kind("phone", PhoneProfile, "agents/phones", _check_phone),
+    Kind(
+        "accelerometer", AccelerometerPart, "agents/accelerometers", _check_model(AccelerometerPart)
+    ),
     Kind("guard", GuardProfile, "agents/people", _check_model(GuardProfile)),
     Kind("bystanders", BystanderProfile, "agents/people", _check_model(BystanderProfile)),
     Kind("operators", Population, "agents/people", _check_model(Population)),

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import sys
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
 from dva_sim.checking.files import NotReadError, Verdict, check_file
 from dva_sim.checking.messages import READ_BYTES, check_message
-from dva_sim.checking.promises import Outcome
 from dva_sim.checking.schemas import schema_text
+from dva_sim.checking.trials import TRIALS, Trial
 from dva_sim.config import parse_changes
 from dva_sim.errors import ConfigError
 
 STDIN: Final = "-"
-POLICY, ROBOT = "policy", "robot"  # as the first name: what follows are such, not files
 VALID, INVALID, NOT_READ = 0, 1, 2  # exit codes; the highest of all files counts
 _SHOWN: Final = 50  # problems of one file
 
@@ -26,75 +24,33 @@ def check(names: Sequence[str], options: Sequence[str] = ()) -> int:
     """Tell of each file whether it is valid, and if not, why; the exit code.
 
     Args:
-        names: Paths of files; or the word `policy` or `robot`, and names of such. A file of that
-            name is `./policy`.
-        options: `key=value` pairs for the policies, or for the motors of the robots.
+        names: Paths of files; or a word of `TRIALS`, such as `policy`, and names of such. A file
+            of that name is `./policy`.
+        options: `key=value` pairs for what is tried.
 
     Raises:
         ConfigError: none is named, or options are given for files.
     """
-    if names and names[0] == POLICY:
-        return _check_policies(names[1:], parse_changes(options))
-    if names and names[0] == ROBOT:
-        return _check_robots(names[1:], parse_changes(options))
+    if names and names[0] in TRIALS:
+        return _try_all(names[0], names[1:], parse_changes(options))
     if options:
-        problem = "--set is for policies and robots"
-        raise ConfigError(f"{problem}: dva-sim check policy NAME --set key=value")
-    return _sum_up("file", [_check_one(name) for name in names])
+        tried = ", ".join(trial.many for trial in TRIALS.values())
+        raise ConfigError(f"--set is for {tried}: dva-sim check policy NAME --set key=value")
+    return _sum_up("file", "files", [_check_one(name) for name in names])
 
 
-def _check_policies(names: Sequence[str], options: Mapping[str, Any]) -> int:
-    from dva_sim.core.dispatch import known_policies
-
+def _try_all(kind: str, names: Sequence[str], options: Mapping[str, Any]) -> int:
+    trial = TRIALS[kind]
     if not names:
-        known = ", ".join(known_policies())
-        raise ConfigError(f"check policy: which one? mine.py:Mine, or one of {known}")
-    return _sum_up("policy", [_check_policy(name, options) for name in names])
+        known = ", ".join(trial.known())
+        raise ConfigError(f"check {kind}: which one? mine.py:Mine, or one of {known}")
+    return _sum_up(kind, trial.many, [_try(kind, trial, name, options) for name in names])
 
 
-def _check_policy(name: str, options: Mapping[str, Any]) -> int:
-    from dva_sim.checking.policies import try_policy
-    from dva_sim.core.dispatch import load_policy
-
-    def ways(outcome: Outcome) -> str:
-        slowest = f"slowest decision {1000 * outcome.slowest:.1f} ms"
-        return f"{outcome.tries} situations, {slowest}"
-
-    return _tell(name, "policy", lambda: try_policy(partial(load_policy, name, options)), ways)
-
-
-def _check_robots(names: Sequence[str], options: Mapping[str, Any]) -> int:
-    from dva_sim.resources import available
-
-    if not names:
-        known = ", ".join(sorted(available("agents/robots")))
-        raise ConfigError(f"check robot: which one? mine.py:Mine, or one of {known}")
-    return _sum_up("robot", [_check_robot(name, options) for name in names])
-
-
-def _check_robot(name: str, options: Mapping[str, Any]) -> int:
-    """A profile; or motors in a file, in the body that a profile has if it says nothing else."""
-    from dva_sim.agents.profile import RobotProfile, load_robot
-    from dva_sim.checking.robots import try_robot
-
-    def trial() -> Outcome:
-        bare = ".py" in name
-        profile = RobotProfile(drive=name) if bare else load_robot(name)
-        changed = profile.model_copy(update={"options": {**profile.options, **options}})
-        return try_robot(changed.drive_spec())
-
-    def ways(outcome: Outcome) -> str:
-        return f"{outcome.tries} drives, {1e6 * outcome.slowest:.0f} microseconds a tick"
-
-    return _tell(name, "robot", trial, ways)
-
-
-def _tell(
-    name: str, kind: str, trial: Callable[[], Outcome], ways: Callable[[Outcome], str]
-) -> int:
+def _try(kind: str, trial: Trial, name: str, options: Mapping[str, Any]) -> int:
     """Try something and say what came of it."""
     try:
-        outcome = trial()
+        outcome = trial.run(name, options)
     except ConfigError as error:
         _say(f"{name}: {error}")
         return INVALID
@@ -103,16 +59,15 @@ def _tell(
     for text in outcome.warnings:
         _say(f"{name}: warning: {text}")
     word = f"invalid, breaks {len(outcome.broken)} of its promises" if outcome.broken else "valid"
-    _say(f"{name}: {kind}: {word}; {ways(outcome)}")
+    _say(f"{name}: {kind}: {word}; {trial.ways(outcome)}")
     return INVALID if outcome.broken else VALID
 
 
-def _sum_up(what: str, codes: Sequence[int]) -> int:
+def _sum_up(one: str, many: str, codes: Sequence[int]) -> int:
     count = Counter(codes)
     words = {VALID: "valid", INVALID: "invalid", NOT_READ: "not read"}
-    many = {"file": "files", "policy": "policies", "robot": "robots"}[what]
     found = ", ".join(f"{count[code]} {word}" for code, word in words.items() if count[code])
-    print(f"{len(codes)} {what if len(codes) == 1 else many}: {found}")
+    print(f"{len(codes)} {one if len(codes) == 1 else many}: {found}")
     return max(codes, default=VALID)
 
 

@@ -29,25 +29,32 @@ def schema_text(kind: str) -> str:
 
 
 def _json_schema(kind: str) -> dict[str, Any]:
-    """From the models that read the files; an agent may be of any of six kinds."""
+    """From the models that read the files; an agent may be of any of seven kinds."""
     from pydantic import TypeAdapter
 
     from dva_sim.agents.operator.person import Population
     from dva_sim.agents.people import BystanderProfile, GuardProfile
     from dva_sim.agents.profile import RobotProfile
-    from dva_sim.agents.tilt import PhoneProfile
+    from dva_sim.agents.tilt import AccelerometerPart, PhoneProfile
     from dva_sim.experiments.repeats import Bands
     from dva_sim.experiments.study import Study
     from dva_sim.experiments.validation.dispatch.cases import CaseFile
     from dva_sim.scenario import Scenario
+    from dva_sim.tasks import TaskScenario
     from dva_sim.timed.scenario import TimedScenario
     from dva_sim.worlds.site import SiteFile
 
     kinds: dict[str, Any] = {
         "study": Study,
-        "scenario": Scenario | TimedScenario,
+        "scenario": Scenario | TimedScenario | TaskScenario,
         "cases": CaseFile,
         "site": SiteFile,
-        "agent": RobotProfile | PhoneProfile | GuardProfile | BystanderProfile | Population | Bands,
+        "agent": RobotProfile
+        | PhoneProfile
+        | AccelerometerPart
+        | GuardProfile
+        | BystanderProfile
+        | Population
+        | Bands,
     }
     return TypeAdapter(kinds[kind]).json_schema()

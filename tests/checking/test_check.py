@@ -49,8 +49,9 @@ def test_all_that_is_shipped_is_valid(check):
     assert code == 0
     assert lines[-1] == f"{len(files)} files: {len(files)} valid"
     kinds = {line.split(": ")[1] for line in lines[:-1]}
-    agents = {"robot", "phone", "guard", "bystanders", "operators"}
-    runs = {"study", "scenario", "timed scenario", "validation cases", "targets", "split"}
+    agents = {"robot", "phone", "accelerometer", "guard", "bystanders", "operators"}
+    agents |= {"bands of operators"}
+    runs = {"study", "scenario", "timed scenario", "validation cases", "targets", "split", "task"}
     assert kinds == {"site", "plan", "message"} | runs | agents
 
 
@@ -109,7 +110,9 @@ def test_the_place_tells_the_kind_where_the_keys_do_not(check, here):
         ("question: what?\nparts: {a: {scenario: fire-drill, x: 1}}\n", "2:35: unknown key 'parts"),
         ("name: x\nplan: no.geojson\norigin: {latitude: 1, longitude: 1}\n", "2:1: plan 'no.geo"),
         ("mass_kg: 60\nradius_m: wide\n", "2:1: radius_m: input should be"),
-        ("bias_mps2: 1\nfilter: mean\n", "2:1: filter: input should be 'median20-copy'"),
+        ("tremor_deg: 1\nfilter: mean\n", "2:1: filter 'mean' is unknown; known: median, "),
+        ("mapping: leaky\nmapping_options: {leak: 1}\n", "1:1: mapping 'leaky' has no option 'l"),
+        ("noise_mg: 1\nrange_g: 0.5\n", "2:1: range_g: input should be greater than or equal"),
         ("image: no.pgm\nresolution: 1\norigin: [0, 0, 0]\noccupied_thresh: 0.6\n", "1:1: missing"),
         ("colour: blue\n", "1:1: cannot be recognised; should be a message (.xml), a plan"),
         ("- 1\n", "1:1: should be a mapping"),
