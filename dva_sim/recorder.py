@@ -180,6 +180,7 @@ class Recorder:
         self.violations: Counter[str] = Counter()
         self.drives: list[DriveLog] = []
         self.newest_drive: dict[str, DriveLog] = {}  # of each robot
+        self.newest_command: dict[str, Applied] = {}  # of each robot, whoever's drive it is
         self.views: dict[str, list[TrackPoint]] = defaultdict(list)
         self.traffic: list[tuple[float, str, str, int]] | None = [] if keep_traffic else None
         self.exposure: dict[str, float] = defaultdict(float)
@@ -216,18 +217,12 @@ class Recorder:
     ) -> None:
         """A command takes effect, and stays in force `until` [s] at the latest."""
         issued = self._issued.pop((source, message_id), None)
-        if issued is not None:
-            drive.applied.append(
-                Applied(
-                    issued.made,
-                    issued.sent,
-                    arrived,
-                    now,
-                    until,
-                    issued.sample_age,
-                    issued.captured,
-                )
-            )
+        if issued is None:
+            return
+        ages = issued.sample_age, issued.captured
+        command = Applied(issued.made, issued.sent, arrived, now, until, *ages)
+        drive.applied.append(command)
+        self.newest_command[drive.robot] = command
 
     def drive_ordered(self, drive: DriveLog) -> None:
         """An operator shall drive a robot."""

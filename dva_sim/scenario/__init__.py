@@ -1,7 +1,7 @@
 """What one run consists of: site, team, network, phone, events; units are in the keys."""
 
 from dva_sim.scenario.building import FOLDER, build, load
-from dva_sim.scenario.names import check_policy, locate_policy
+from dva_sim.scenario.names import check_policy, locate_files
 from dva_sim.scenario.parts import EventConfig, RobotConfig
 from dva_sim.scenario.profiles import (
     bystander_profile,
@@ -26,7 +26,7 @@ __all__ = [
     "check_policy",
     "guard_profile",
     "load",
-    "locate_policy",
+    "locate_files",
     "phone_profile",
     "population",
     "robot_profiles",

@@ -9,7 +9,7 @@ from typing import Any
 from dva_sim import config, resources
 from dva_sim.config import Document, Fail, load_yaml
 from dva_sim.errors import ConfigError
-from dva_sim.scenario.names import check_names, locate_policy
+from dva_sim.scenario.names import check_names, check_phone, locate_files
 from dva_sim.scenario.profiles import phone_profile, robot_profiles, site_of
 from dva_sim.scenario.scenario import Scenario
 from dva_sim.worlds.site import load_site
@@ -38,14 +38,14 @@ def build(
     Raises:
         ConfigError: an unknown key, a wrong type, a value out of range, a missing profile.
     """
-    return config.build(Scenario, source, changes or {}, _complete, locate_policy)
+    return config.build(Scenario, source, changes or {}, _complete, locate_files)
 
 
 def _complete(scenario: Scenario, error: Fail) -> Scenario:
     """With what follows from the profiles; refuses what does not go together."""
     check_names(scenario, error)
     _check_options(scenario, error)
-    phone_profile(scenario, error)
+    check_phone(phone_profile(scenario, error), error)
     _check_draughts(scenario, error)
     processing = {profile.processing_s for profile in robot_profiles(scenario)}
     longest = scenario.robot.processing_s

@@ -11,17 +11,27 @@ from dva_sim.config import Fail, Path_
 from dva_sim.errors import ConfigError
 
 if TYPE_CHECKING:
+    from dva_sim.agents.tilt import PhoneProfile
     from dva_sim.scenario.scenario import Scenario
 
 
-def locate_policy(data: dict[str, Any], folders: Sequence[Path]) -> None:
-    """Let a policy in a file beside the one that names it be found from anywhere."""
-    dispatch = data.get("dispatch")
-    named = dispatch.get("policy") if isinstance(dispatch, dict) else None
-    file, colon, wanted = named.rpartition(":") if isinstance(named, str) else ("", "", "")
-    beside = [folder / file for folder in folders if colon and (folder / file).is_file()]
-    if beside and isinstance(dispatch, dict):
-        dispatch["policy"] = f"{beside[0]}:{wanted}"
+_IN_FILES = (
+    ("dispatch", "policy"),
+    ("operator", "strategy"),
+    ("phone", "filter"),
+    ("phone", "mapping"),
+)
+
+
+def locate_files(data: dict[str, Any], folders: Sequence[Path]) -> None:
+    """Let a class in a file beside the one that names it be found from anywhere."""
+    for part, key in _IN_FILES:
+        holder = data.get(part)
+        named = holder.get(key) if isinstance(holder, dict) else None
+        file, colon, wanted = named.rpartition(":") if isinstance(named, str) else ("", "", "")
+        beside = [folder / file for folder in folders if colon and (folder / file).is_file()]
+        if beside and isinstance(holder, dict):
+            holder[key] = f"{beside[0]}:{wanted}"
 
 
 def check_names(scenario: Scenario, error: Fail) -> None:
@@ -67,3 +77,18 @@ def check_policy(policy: str, options: Mapping[str, Any], error: Fail) -> None:
             raise
         key = "options" if "option" in problem.problem else "policy"
         raise error(problem.problem, ("dispatch", key)) from None
+
+
+def check_phone(profile: PhoneProfile, error: Fail) -> None:
+    """Refuse a phone whose part, filter or mapping cannot be had, or does not know its options."""
+    from dva_sim.agents.tilt import try_phone
+
+    try:
+        try_phone(profile)
+    except ConfigError as problem:
+        if problem.file is not None:
+            raise
+        key = "mapping" if problem.problem.startswith("mapping") else "filter"
+        key = "accelerometer" if problem.problem.startswith("accelerometer") else key
+        key += "_options" if "option" in problem.problem else ""
+        raise error(problem.problem, ("phone", key)) from None

@@ -66,12 +66,7 @@ def bystander_profile(scenario: Scenario) -> BystanderProfile:
     return _profile(BystanderProfile, scenario.bystander.profile, "agents/people")
 
 
-def population(scenario: Scenario) -> Population:
-    """The population that the scenario's operators are drawn from."""
-    return _profile(Population, scenario.operator.population, "agents/people")
-
-
-def population_of(operator: OperatorConfig) -> Population:
+def population(operator: OperatorConfig) -> Population:
     """The population that persons are drawn from, around the medians that are named otherwise.
 
     Raises:

@@ -168,8 +168,7 @@ def add_operator(
     """
     scenario, config = stage.scenario, stage.scenario.operator
     device = stage.device("operator", number)
-    people = population(scenario).with_medians(config.traits)
-    person = draw_person(people, config.population_seed, config.person + number - 1)
+    person = draw_person(population(config), config.population_seed, config.person + number - 1)
     strategy = load_strategy(config.strategy, config.options)
     needs_truth = config.strategy == "oracle"
     if needs_truth and truth is None:

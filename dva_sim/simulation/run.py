@@ -190,7 +190,9 @@ class Run:
                 self._last_mission[label] = now
             drive = self.field.newest_drive(robot.device.id_tag)
             mission = self._last_mission.get(label, 0.0)
-            for rule, what in broken_rules(robot, drive, self.scenario.robot, mission, now):
+            command = recorder.newest_command.get(robot.device.id_tag)
+            limits = self.scenario.robot
+            for rule, what in broken_rules(robot, drive, command, limits, mission, now):
                 recorder.violated(rule, now, label, what)
 
     def _watch_person(

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dva_sim.agents.modes import Mode
 from dva_sim.agents.robot import RobotAgent
 from dva_sim.core.events import ACT_STEPS, STEPS, EventBook
-from dva_sim.recorder import DriveLog
+from dva_sim.recorder import Applied, DriveLog
 from dva_sim.scenario import RobotConfig
 from dva_sim.worlds.bodies import G
 
@@ -25,6 +25,7 @@ Broken = tuple[str, str]
 def broken_rules(
     robot: RobotAgent,
     drive: DriveLog | None,
+    command: Applied | None,
     config: RobotConfig,
     last_mission: float,
     now: float,
@@ -34,6 +35,7 @@ def broken_rules(
     Args:
         robot: The robot.
         drive: Its newest drive, over or not.
+        command: The newest one that took effect; its drive may be over and another ordered.
         config: Its limits as the scenario states them.
         last_mission: When it was last seen on a mission, driving by itself [s].
         now: Time [s].
@@ -45,7 +47,7 @@ def broken_rules(
     # What another robot has pushed moves on, until its own brakes have stopped it.
     pushed = robot.body.last_touch + stopping >= now
     if mode is not Mode.MISSION and abs(speed) > MOVING and not pushed:
-        allowed = max(_allowed_until(drive, config), last_mission)
+        allowed = max(_allowed_until(command, config), last_mission)
         if now > allowed + stopping:
             yield "S1", f"moves at {speed:.2f} m/s, {now - allowed:.1f} s after it had to stop"
     driven = mode is Mode.TELEOPERATION and robot.body.powered
@@ -61,12 +63,11 @@ def broken_rules(
         yield "S4", f"moves at {speed:.2f} m/s and {turn_rate:.2f} rad/s"
 
 
-def _allowed_until(drive: DriveLog | None, config: RobotConfig) -> float:
-    """When the newest command ceases to hold, by its true age and its reception [s]."""
-    if drive is None or not drive.applied:
+def _allowed_until(command: Applied | None, config: RobotConfig) -> float:
+    """When a command ceases to hold, by its true age and its reception [s]."""
+    if command is None:
         return 0.0
-    last = drive.applied[-1]
-    return min(last.arrived + config.watchdog_s, last.issued + config.max_age_s)
+    return min(command.arrived + config.watchdog_s, command.issued + config.max_age_s)
 
 
 def _moved_by_the_past(robot: RobotAgent, drive: DriveLog) -> bool:

@@ -9,7 +9,7 @@ from typing import Any
 from dva_sim.agents.operator.delay import DelayEstimate
 from dva_sim.agents.operator.person import Person, draw_person
 from dva_sim.agents.operator.strategies import load_strategy
-from dva_sim.scenario.profiles import population_of
+from dva_sim.scenario.profiles import population
 from dva_sim.streams import Streams, derive_seed
 from dva_sim.tasks.cursor import CursorTrial, Goal
 from dva_sim.tasks.driving import DriveTrial
@@ -58,7 +58,7 @@ def rehearse(scenario: TaskScenario) -> None:
 def seat_of(scenario: TaskScenario) -> Seat:
     """Who sits down to the block, without any idea yet how late the link makes it."""
     operator = scenario.operator
-    person = draw_person(population_of(operator), operator.population_seed, operator.person)
+    person = draw_person(population(operator), operator.population_seed, operator.person)
     guess = person.perceptual_delay + person.hand_lag
     delay = DelayEstimate(0.0, guess)
     if not scenario.is_driven:

@@ -15,7 +15,7 @@ from dva_sim.errors import ConfigError
 from dva_sim.network.link import LinkConfig
 from dva_sim.scenario.names import check_strategy
 from dva_sim.scenario.parts import OperatorConfig
-from dva_sim.scenario.profiles import population_of
+from dva_sim.scenario.profiles import population
 from dva_sim.tasks.kinds import VEHICLES, Pointing, Reach, Task, Tracking
 
 T = TypeVar("T")
@@ -201,7 +201,7 @@ def _complete(scenario: TaskScenario, error: Fail) -> TaskScenario:
     operator, device = scenario.operator, scenario.device
     check_strategy(operator.strategy, operator.options, error)
     traits: Path_ = ("operator", "traits" if operator.traits else "population")
-    _try(lambda: population_of(operator), error, traits)
+    _try(lambda: population(operator), error, traits)
     if device.kind.startswith("tilt"):
         _try(lambda: load_part(device.accelerometer), error, ("device", "accelerometer"))
         name, options = device.filter, device.filter_options

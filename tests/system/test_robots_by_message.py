@@ -158,7 +158,7 @@ def test_a_new_mission_right_after_an_emergency_is_driven_by_one_loop_alone() ->
 
 def rules_broken(run: Run, robot: RobotAgent) -> list[str]:
     now = run.clock.now
-    return [rule for rule, _ in broken_rules(robot, None, run.scenario.robot, 0.0, now)]
+    return [rule for rule, _ in broken_rules(robot, None, None, run.scenario.robot, 0.0, now)]
 
 
 def test_a_robot_that_another_has_pushed_breaks_no_rule_but_one_that_drives_on_does() -> None:

@@ -18,7 +18,6 @@ from dva_sim.experiments import metrics
 from dva_sim.experiments.budget import STAGES
 from dva_sim.network.link import Link
 from dva_sim.simulation import Recording, simulate
-from dva_sim.streams import derive_seed
 
 NEAR = [{"kind": "fire", "room": "Main corridor", "at_s": 10, "reported": True}]
 
@@ -189,12 +188,17 @@ def test_a_robot_without_watchdog_is_found_out(monkeypatch: pytest.MonkeyPatch) 
 
 def test_commands_still_under_way_when_a_drive_ends_are_known_to_the_checks() -> None:
     """At a second's delay they move the robot once more, lawfully, before the stop arrives."""
-    operator = {"operator__person": 18, "operator__population_seed": 2014}
-    seed = derive_seed(2014, "drive", 18, 0)
-    recording = run(seed=seed, phone__profile="dissertation", link__delay_s=1.0, **operator)
+    recording = run(link__delay_s=1.0)
     drive = recording.recorder.drives[0]
     assert drive.ended is not None
     assert drive.applied[-1].time > drive.ended
+    assert recording.recorder.violations == {}
+
+
+def test_a_robot_that_brakes_while_its_next_drive_is_ordered_breaks_no_rule() -> None:
+    recording = run("search-and-confirm", seed=1)
+    first, second = recording.recorder.drives[:2]
+    assert first.robot == second.robot
     assert recording.recorder.violations == {}
 
 
