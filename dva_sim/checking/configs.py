@@ -9,13 +9,12 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
-import numpy as np
 from PIL import Image
 
-from dva_sim.agents.operator.person import Population, draw_person
+from dva_sim.agents.operator.person import Population
 from dva_sim.agents.people import BystanderProfile, GuardProfile
 from dva_sim.agents.profile import RobotProfile, read_robot
-from dva_sim.agents.tilt import AccelerometerPart, Phone, PhoneProfile
+from dva_sim.agents.tilt import AccelerometerPart, PhoneProfile, try_phone
 from dva_sim.checking.problem import Problem
 from dva_sim.config import Config, Document, Path_, validate
 from dva_sim.errors import ConfigError
@@ -199,14 +198,8 @@ def _check_robot(document: Document) -> Iterator[ConfigError]:
 
 
 def _check_phone(document: Document) -> Iterator[ConfigError]:
-    """The profile, and its chain made once, in the hand of anybody."""
-    profile = validate(PhoneProfile, document.data, document.error)
-    Phone(
-        profile,
-        draw_person(Population(), 1, 0),
-        np.random.default_rng(1),
-        base=document.file.parent,
-    )
+    """The profile, and all that it names made once."""
+    try_phone(validate(PhoneProfile, document.data, document.error))
     return iter(())
 
 

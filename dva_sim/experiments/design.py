@@ -228,7 +228,7 @@ def _located(changes: dict[str, Any], folder: Path) -> dict[str, Any]:
     """A policy in a file beside the study is found from anywhere."""
     key = "dispatch.policy"
     named: dict[str, Any] = {"dispatch": {"policy": changes.get(key)}}
-    scenarios.locate_policy(named, [folder])
+    scenarios.locate_files(named, [folder])
     return {**changes, key: named["dispatch"]["policy"]} if key in changes else changes
 
 

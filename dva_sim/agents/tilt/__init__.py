@@ -5,7 +5,7 @@ from dva_sim.agents.tilt.calibration import Calibration
 from dva_sim.agents.tilt.filters import Filter, known_filters, load_filter
 from dva_sim.agents.tilt.hand import Hand
 from dva_sim.agents.tilt.mappings import Mapping, known_mappings, load_mapping
-from dva_sim.agents.tilt.phone import Phone, TiltCommand
+from dva_sim.agents.tilt.phone import Phone, TiltCommand, try_phone
 from dva_sim.agents.tilt.profile import PhoneProfile
 
 __all__ = [
@@ -23,4 +23,5 @@ __all__ = [
     "load_filter",
     "load_mapping",
     "load_part",
+    "try_phone",
 ]

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable
-from pathlib import Path
 from typing import Final, NamedTuple, Protocol
 
 import numpy as np
@@ -82,7 +81,6 @@ class Phone:
         rng: Luck of this run.
         own: Luck of this person's copy of the phone and its calibration, the same in all runs;
             if not given, of this run.
-        base: Folder that files of filters and mappings are looked for in first.
 
     Attributes:
         hand_lag: By how much the hand makes a command follow later what is asked, on average [s].
@@ -99,7 +97,6 @@ class Phone:
         holder: Holder,
         rng: np.random.Generator,
         own: np.random.Generator | None = None,
-        base: Path | None = None,
     ) -> None:
         of_hand, of_part, spare = rng.spawn(3)
         own = own or spare
@@ -121,10 +118,10 @@ class Phone:
         )
         self._period = period = self._accelerometer.period
         self._calibrate(own)
-        filters = load_filter(profile.filter, profile.filter_options, base)
+        filters = load_filter(profile.filter, profile.filter_options)
         self._make_filter: Callable[[], Filter] = lambda: filters(period)
         self._batch = self._make_filter().batch
-        self._mapping = load_mapping(profile.mapping, profile.mapping_options, base)()
+        self._mapping = load_mapping(profile.mapping, profile.mapping_options)()
         self._watches = self._mapping.integrates
         self._within = self._time_to_close(holder)
         self._late = round(holder.perceptual_delay / period)
@@ -284,3 +281,14 @@ class Phone:
         if self._untrailed:
             self._trail.sample(self._untrailed, self._decay)
             self._untrailed = 0
+
+
+def try_phone(profile: PhoneProfile) -> None:
+    """Load all that a profile names, and make it once.
+
+    Raises:
+        ConfigError: a part, a filter or a mapping that cannot be had, or an option of them.
+    """
+    load_part(profile.accelerometer)
+    load_filter(profile.filter, profile.filter_options)(1.0 / profile.sample_rate_hz)
+    load_mapping(profile.mapping, profile.mapping_options)()

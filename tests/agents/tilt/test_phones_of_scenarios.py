@@ -1,0 +1,60 @@
+"""A scenario names the stages of its phones; what it names wrongly is told before anything runs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from dva_sim import scenario as scenarios
+from dva_sim.config import load_yaml
+from dva_sim.errors import ConfigError
+from dva_sim.simulation import simulate
+
+FILTER = """
+from dva_sim.agents.tilt import Filter
+class Mine(Filter):
+    now = (0.0, 0.0)
+    def add(self, sample):
+        self.now = sample
+    def value(self):
+        return self.now
+"""
+
+
+@pytest.mark.parametrize(
+    ("changes", "line"),
+    [
+        ({"phone.filter": "mean"}, "filter 'mean' is unknown; known: median, "),
+        ({"phone.mapping": "cubic"}, "mapping 'cubic' is unknown; known: absolute, "),
+        ({"phone.mapping_options.leak_s": 1}, "mapping 'absolute' has no option 'leak_s'; "),
+        ({"phone.accelerometer": "adxl"}, "accelerometer 'adxl' not found; did you mean 'adxl3"),
+        ({"phone.noise_mps2": 1}, "phone: unknown key 'noise_mps2'; "),
+    ],
+)
+def test_a_wrong_stage_is_refused_before_the_run(changes: dict[str, Any], line: str) -> None:
+    with pytest.raises(ConfigError) as told:
+        scenarios.build(scenarios.load("drive-to-event"), changes)
+    assert line in str(told.value)
+
+
+def test_a_filter_beside_its_scenario_drives_as_the_shipped_one_of_its_kind(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "mine.py").write_text(FILTER)
+    text = "horizon_s: 20\nevents: [{kind: fire, room: North office, at_s: 2, reported: true}]\n"
+    ways = []
+    for name in ("mine.py:Mine", "none"):
+        file = tmp_path / "scenario.yaml"
+        file.write_text(text + f"phone: {{filter: '{name}'}}\n")
+        recording = simulate(scenarios.build(load_yaml(file)), 3)
+        ways.append([(a.time, a.sample_age) for d in recording.recorder.drives for a in d.applied])
+    assert ways[0] == ways[1]
+    assert len(ways[0]) > 50
+
+
+@pytest.mark.parametrize("mapping", ["absolute", "differential", "leaky"])
+def test_a_robot_arrives_with_every_mapping(mapping: str) -> None:
+    built = scenarios.build(scenarios.load("drive-to-event"), {"phone.mapping": mapping})
+    assert [d.outcome for d in simulate(built, 1).recorder.drives] == ["confirmed"]
