@@ -26,8 +26,9 @@ from dva_sim.simulation.stage import planner_of
 from dva_sim.worlds.physics import DriveSpec, World
 from dva_sim.worlds.site import load_site
 
-# Goal: 3.5. What remains is spread over a thousand small steps of each simulated second.
-MOST = 10.0
+# Goal: 3.5. It is 5 to 9: what remains is spread over a thousand small steps of each simulated
+# second, five sixths of it in the interpreter.
+MOST = 12.0
 GOAL = (37.3, 22.5)  # in the server room, the farthest corner
 
 
@@ -107,7 +108,7 @@ def test_operator_and_phone_are_less_than_half_of_an_episode(benchmark: Any, pro
         "episode": lambda: simulate(scenario, 1).duration,
         "replay": lambda: replay(scenario, 1, tape).duration,
     }
-    cost = cpu_per_second(runs)
+    cost = cpu_per_second(runs, rounds=12)
     share = 1.0 - cost["replay"] / cost["episode"]
     benchmark.extra_info.update(share_of_operator_and_phone=round(share, 3))
     print(f"\n{profile}: operator and phone take {100 * share:.0f} % of an episode", end="")
