@@ -11,7 +11,7 @@ from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Any, ClassVar, Final
+from typing import Any, Final
 
 from dva_sim.errors import ConfigError
 from dva_sim.plugins import Plugins
@@ -30,9 +30,13 @@ class Filter(ABC):
         batch: After so many fresh samples, or when the app's longest delay has passed, the
             value is taken, and stands until the next time; None: the value is of use at any
             time, and asking for it changes nothing.
+        failures: How often it gave no answer that is one; only filters of users do that.
+        first_failure: What was wrong with it first, in a line.
     """
 
-    batch: ClassVar[int | None] = None
+    batch: int | None = None
+    failures = 0
+    first_failure = ""
 
     def __init__(self, period: float) -> None:
         self.period = period

@@ -10,7 +10,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from collections.abc import Mapping as Options
 from pathlib import Path
-from typing import Any, ClassVar, Final
+from typing import Any, Final
 
 from dva_sim.agents.tilt.calibration import LEVELS, MAX_TURN_DEG
 from dva_sim.errors import ConfigError
@@ -25,9 +25,13 @@ class Mapping(ABC):
     Attributes:
         integrates: Whether a command depends on those before. If so, every value of the filter
             is told once, with the time that it stands for, and the person watches the display.
+        failures: How often it gave no answer that is one; only mappings of users do that.
+        first_failure: What was wrong with it first, in a line.
     """
 
-    integrates: ClassVar[bool] = True
+    integrates: bool = True
+    failures = 0
+    first_failure = ""
 
     @abstractmethod
     def command(self, level: float, turn: float, dt: float) -> Pair:

@@ -15,9 +15,10 @@ import numpy as np
 
 from dva_sim.agents.tilt.accelerometer import Accelerometer, load_part
 from dva_sim.agents.tilt.calibration import SPEED_PER_LEVEL, Calibration
-from dva_sim.agents.tilt.filters import BATCH, Filter, load_filter
+from dva_sim.agents.tilt.filters import BATCH, FILTERS, Filter, load_filter
+from dva_sim.agents.tilt.guarded import GuardedFilter, GuardedMapping
 from dva_sim.agents.tilt.hand import Hand
-from dva_sim.agents.tilt.mappings import Pair, limited, load_mapping
+from dva_sim.agents.tilt.mappings import MAPPINGS, Pair, limited, load_mapping
 from dva_sim.agents.tilt.profile import PhoneProfile
 from dva_sim.agents.tilt.trail import Trail
 
@@ -119,9 +120,13 @@ class Phone:
         self._period = period = self._accelerometer.period
         self._calibrate(own)
         filters = load_filter(profile.filter, profile.filter_options)
-        self._make_filter: Callable[[], Filter] = lambda: filters(period)
+        own_filter = profile.filter not in FILTERS
+        self._make_filter: Callable[[], Filter] = lambda: (
+            GuardedFilter(filters(period)) if own_filter else filters(period)
+        )
         self._batch = self._make_filter().batch
-        self._mapping = load_mapping(profile.mapping, profile.mapping_options)()
+        mapping = load_mapping(profile.mapping, profile.mapping_options)()
+        self._mapping = mapping if profile.mapping in MAPPINGS else GuardedMapping(mapping)
         self._watches = self._mapping.integrates
         self._within = self._time_to_close(holder)
         self._late = round(holder.perceptual_delay / period)
@@ -204,7 +209,7 @@ class Phone:
             self._stems_from, self._captured = now, self._trail.asked
         elif self._batch is None:
             if not self._watches:
-                self.shown = limited(*self._mapping.command(*self._filter.value(), 0.0))
+                self.shown = self._mapping.command(*self._filter.value(), 0.0)
             self._captured = self._trail.captured()
             self._stems_from = self._sampled_at - self._trail.age * self._period
         level, turn = self.shown
@@ -219,6 +224,16 @@ class Phone:
     def keeps_alive(self) -> bool:
         """Whether the newest value is sent at every chance, changed or not."""
         return self._profile.send == "keep_alive"
+
+    @property
+    def failures(self) -> int:
+        """How often in this drive a user's filter or mapping gave no answer that is one."""
+        return self._filter.failures + self._mapping.failures
+
+    @property
+    def first_failure(self) -> str:
+        """What was wrong with it first, in a line."""
+        return self._filter.first_failure or self._mapping.first_failure
 
     # --- what happens meanwhile --------------------------------------------------------
 
@@ -255,7 +270,7 @@ class Phone:
             if self._fresh == self._batch:
                 self._take_value(self._sample_at)
         elif watches:
-            self.shown = limited(*self._mapping.command(*self._filter.value(), self._step))
+            self.shown = self._mapping.command(*self._filter.value(), self._step)
         if watches:
             self._perceived.append(self.shown)
         self._step = self._accelerometer.interval()
@@ -267,7 +282,7 @@ class Phone:
         reading = self._filter.value()
         self._captured = self._trail.captured()
         self._stems_from = self._sampled_at - self._trail.age * self._period
-        self.shown = limited(*self._mapping.command(*reading, at - self._taken_at))
+        self.shown = self._mapping.command(*reading, at - self._taken_at)
         self._taken_at, self._due, self._fresh = at, at + self._app.max_delay, 0
 
     def _aim_at(self, perceived: Pair) -> Pair:

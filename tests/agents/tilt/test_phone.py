@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -210,3 +211,36 @@ def test_a_chain_with_a_wrong_part_is_refused_in_a_line(
 def test_a_reference_that_is_no_pose_is_refused(reference: list[float]) -> None:
     with pytest.raises(ConfigError, match="reference_mps2 should"):
         validate(PhoneProfile, {"reference_mps2": reference})
+
+
+BROKEN = """
+from dva_sim.agents.tilt import Filter, Mapping
+class NoNumber(Filter):
+    def add(self, sample): pass
+    def value(self): return float("nan"), 1.0
+class Fails(Mapping):
+    integrates = False
+    def command(self, level, turn, dt): return 1 / 0
+    def tilt_for(self, wanted, shown, within): return wanted
+"""
+
+
+@pytest.mark.parametrize(
+    ("settings", "first"),
+    [
+        ({"filter": "own.py:NoNumber"}, "answers nan, 1.0"),
+        ({"mapping": "own.py:Fails"}, "ZeroDivisionError: division by zero"),
+    ],
+)
+def test_what_a_users_class_cannot_say_is_to_stand_and_is_counted(
+    settings: dict[str, Any], first: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "own.py").write_text(BROKEN)
+    monkeypatch.chdir(tmp_path)
+    app = phone(**settings)
+    app.ask(0.0, 0.5, 0.5)
+    sent = [command(app, tick / 10) for tick in range(1, 11)]
+    assert {(c.speed, c.turn_rate) for c in sent} == {(0.0, 0.0)}
+    assert (app.failures, app.first_failure) == (10, first)
+    app.pick_up(2.0)
+    assert app.failures == 0

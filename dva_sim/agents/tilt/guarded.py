@@ -1,0 +1,88 @@
+"""Filters and mappings of users, kept within what can be sent whatever they answer."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+from dva_sim.agents.tilt.filters import Filter, Sample
+from dva_sim.agents.tilt.mappings import Mapping, Pair, limited
+from dva_sim.plugins import said
+
+STAND: Pair = (0.0, 0.0)
+
+
+class _Guard:
+    """Counts what raises or answers no two finite numbers."""
+
+    failures: int
+    first_failure: str
+
+    def _answer(self, ask: Callable[..., Any], *given: Any) -> Pair | None:
+        """Two finite numbers, or None."""
+        try:
+            one, other = ask(*given)
+            if math.isfinite(one) and math.isfinite(other):
+                return float(one), float(other)
+            self._count(f"answers {one!r}, {other!r}")
+        except Exception as error:
+            self._count(said(error))
+        return None
+
+    def _count(self, problem: str) -> None:
+        self.failures += 1
+        self.first_failure = self.first_failure or problem
+
+
+class GuardedFilter(_Guard, Filter):
+    """A filter of a user; where it gives no answer, the reading is that of a phone at rest."""
+
+    def __init__(self, filter_: Filter) -> None:
+        super().__init__(filter_.period)
+        self._filter = filter_
+        self.batch = filter_.batch
+
+    def add(self, sample: Sample) -> None:
+        """See `Filter`."""
+        try:
+            self._filter.add(sample)
+        except Exception as error:
+            self._count(said(error))
+
+    def value(self) -> Sample:
+        """See `Filter`."""
+        return self._answer(self._filter.value) or STAND
+
+    @property
+    def age(self) -> float:
+        """See `Filter`; what is no age is none."""
+        try:
+            age = float(self._filter.age)
+            if 0.0 <= age < math.inf:
+                return age
+            self._count(f"is {age!r} samples old")
+        except Exception as error:
+            self._count(said(error))
+        return 0.0
+
+
+class GuardedMapping(_Guard, Mapping):
+    """A mapping of a user; where it gives no answer, the command is to stand."""
+
+    def __init__(self, mapping: Mapping) -> None:
+        self._mapping = mapping
+        self.integrates = bool(mapping.integrates)
+
+    def begin(self) -> None:
+        """See `Mapping`; failures are counted by drives."""
+        self.failures, self.first_failure = 0, ""
+        self._mapping.begin()
+
+    def command(self, level: float, turn: float, dt: float) -> Pair:
+        """See `Mapping`; within the limits."""
+        return limited(*(self._answer(self._mapping.command, level, turn, dt) or STAND))
+
+    def tilt_for(self, wanted: Pair, shown: Pair, within: float) -> Pair:
+        """See `Mapping`; the hand holds the phone at rest where it is told nothing."""
+        return self._answer(self._mapping.tilt_for, wanted, shown, within) or STAND
