@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from dva_sim.agents.camera import Observation
 from dva_sim.agents.operator.person import Person
-from dva_sim.agents.operator.strategies import Intent, Reach, gain_at
+from dva_sim.agents.operator.strategies import SHORTEST, Intent, Reach, gain_at
 from dva_sim.agents.steering import Route
 from dva_sim.worlds.planning import Planner
 
@@ -92,7 +92,7 @@ class Careful:
         gain = gain_at(self._person.crossover, self._person.margin, delay)
         turn = min(max(gain * ahead.bearing, -most), most)
         self._turning = abs(ahead.bearing) > (TURN_UNTIL if self._turning else TURN_FROM)
-        speed = min(SLOWLY * self._reach.speed, self._person.caution * LOOK / delay)
+        speed = min(SLOWLY * self._reach.speed, self._person.caution * LOOK / max(delay, SHORTEST))
         speed = max(speed, CRAWL)
         stands = self._turning or ahead.remaining < stop_before
         return Intent(0.0 if stands else speed, turn)

@@ -10,7 +10,7 @@ from dva_sim.agents.commands import CommandSender, PublishedCommands, RequestedC
 from dva_sim.agents.operator.careful import Careful
 from dva_sim.agents.operator.delay import DelayEstimate
 from dva_sim.agents.operator.seat import DriverSeat
-from dva_sim.agents.operator.strategies import Intent, Oracle, Strategy, View
+from dva_sim.agents.operator.strategies import Intent, Oracle, Strategy, Truth, View
 from dva_sim.agents.operator.work import Work
 from dva_sim.agents.steering import Route
 from dva_sim.network.patterns import Requester
@@ -90,8 +90,13 @@ class Drive(Work):
             self._clock.call_after(delay, self._perceive, observation)
 
     def _put_down(self) -> None:
-        if self._sender is not None:
-            self._sender.stop()
+        if self._sender is None:
+            return
+        self._sender.stop()
+        phone = self._seat.phone
+        if phone.failures:
+            self._device.recorder.counters["failed: an answer of a phone"] += phone.failures
+            self._device.tell(f"puts the phone down, as it fails: {phone.first_failure}", "drive")
         if isinstance(self._strategy, Strategy):
             self.log.workload = dict(self._strategy.workload())
 
@@ -176,13 +181,15 @@ class Drive(Work):
         seat = self._seat
         if self.over or seat.setup.truth is None or not isinstance(self._strategy, Oracle):
             return False
-        truth = seat.setup.truth(self.robot)
-        self._seen_tick = truth.state.tick
-        route = self._consider(truth.state)
+        state = seat.setup.truth(self.robot).state
+        applied = self.log.applied[-1:]
+        truth = Truth(state, sum(command.time - command.captured for command in applied))
+        self._seen_tick = state.tick
+        route = self._consider(state)
         if route is not None:
             drive = self._strategy.drive
             usual = lambda way, keep: drive(way, truth, keep)  # noqa: E731
-            self._intend(self._steer(route, truth.state, Oracle.DELAY, usual), truth.state.tick)
+            self._intend(self._steer(route, state, truth.delay, usual), state.tick)
         return not self.over
 
     def _consider(self, seen: Observation) -> Route | None:

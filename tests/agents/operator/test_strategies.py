@@ -5,19 +5,25 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from itertools import groupby, pairwise
+from typing import Any
 
 import pytest
 from closed_loops import CURSOR, ROBOT, At, arc, drive, follow, offsets, person, point, way
 
 from dva_sim.agents.operator.strategies import (
     Adaptive,
+    Intent,
     MoveAndWait,
+    Oracle,
     Predictor,
     Pursuit,
     Reach,
     Strategy,
+    Truth,
     TwoPoint,
+    View,
 )
+from dva_sim.agents.steering import Route
 
 FREE = 1e9  # a margin that holds nobody back
 LIMITLESS = Reach(speed=1e6, turn_rate=1e6)
@@ -239,6 +245,24 @@ def test_the_better_the_prediction_the_sooner_one_arrives() -> None:
         return next(at.time for at in track if at.x > 9.5)
 
     assert time(0.0) > time(0.5) + 5.0 > time(1.0) + 10.0
+
+
+class Told(Strategy):
+    """An oracle in a closed loop: everything is seen without delay."""
+
+    def __init__(self, *given: Any) -> None:
+        super().__init__(*given)
+        self.oracle = Oracle(*given)
+
+    def drive(self, route: Route, view: View, stop_before: float) -> Intent:
+        return self.oracle.drive(route, Truth(view.seen, view.delay), stop_before)
+
+
+def test_the_oracle_steers_from_where_what_it_asks_for_takes_effect() -> None:
+    without = drive(Pursuit(person(), ROBOT), way(*CORNER), 0.0, 40.0)
+    told = drive(Told(person(), ROBOT), way(*CORNER), 2.0, 40.0)
+    for ideal, at in zip(without, told, strict=True):
+        assert at.wanted == pytest.approx(ideal.wanted, abs=1e-6)
 
 
 # --- adaptive --------------------------------------------------------------------------------

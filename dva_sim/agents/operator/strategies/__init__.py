@@ -9,7 +9,7 @@ from dva_sim.agents.operator.strategies.base import (
     Strategy,
     View,
 )
-from dva_sim.agents.operator.strategies.cursor import Sighting, Velocity, gain_at
+from dva_sim.agents.operator.strategies.cursor import SHORTEST, Sighting, Velocity, gain_at
 from dva_sim.agents.operator.strategies.guarded import Guarded
 from dva_sim.agents.operator.strategies.loading import (
     Driver,
@@ -24,6 +24,7 @@ from dva_sim.agents.operator.strategies.pursuit import Pursuit
 from dva_sim.agents.operator.strategies.two_point import TwoPoint
 
 __all__ = [
+    "SHORTEST",
     "Adaptive",
     "Driver",
     "Guarded",

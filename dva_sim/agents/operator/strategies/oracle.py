@@ -1,4 +1,4 @@
-"""The reference: steering on the true state, without delay. Not a person."""
+"""The reference: steering on the true state, by a perfect prediction. Not a person."""
 
 from __future__ import annotations
 
@@ -9,21 +9,30 @@ from dva_sim.agents.camera import Observation
 from dva_sim.agents.operator.person import Person
 from dva_sim.agents.operator.strategies.base import Intent, PathView, PointView, Reach, View
 from dva_sim.agents.operator.strategies.cursor import Sighting, Velocity
-from dva_sim.agents.operator.strategies.pursuit import Pursuit
+from dva_sim.agents.operator.strategies.predictor import Predictor
 from dva_sim.agents.steering import Route
 
 S = TypeVar("S")
+T = TypeVar("T", Observation, Sighting)
 
 
 @dataclass(frozen=True, slots=True)
 class Truth(Generic[S]):
-    """The true state now, told without delay or error: for the oracle alone."""
+    """The true state now, told without delay or error: for the oracle alone.
+
+    Attributes:
+        state: As a frame would show it.
+        delay: Until what is asked for now takes effect [s].
+    """
 
     state: S
+    delay: float = 0.0
 
 
 class Oracle:
-    """The same steering as `Pursuit`, on the true state; it is no `Strategy`, as it sees nothing.
+    """The same steering as `Pursuit`, from where what is asked for now takes effect.
+
+    It is no `Strategy`, as it sees nothing.
 
     Args:
         person: Gain, caution and pace.
@@ -33,16 +42,21 @@ class Oracle:
     DELAY = 0.1  # its own period [s]
 
     def __init__(self, person: Person, reach: Reach) -> None:
-        self._pursuit = Pursuit(person, reach)
+        self._inner = Predictor(person, reach, "pursuit")
 
     def drive(self, route: Route, truth: Truth[Observation], stop_before: float) -> Intent:
         """What to ask a robot for."""
-        return self._pursuit.drive(route, View(0.0, truth.state, self.DELAY), stop_before)
+        return self._inner.drive(route, View(*_known(truth)), stop_before)
 
     def point(self, truth: Truth[Sighting]) -> Velocity:
         """What velocity to give a cursor [m/s]."""
-        return self._pursuit.point(PointView(0.0, truth.state, self.DELAY))
+        return self._inner.point(PointView(*_known(truth)))
 
     def follow(self, path: Route, truth: Truth[Sighting]) -> Velocity:
         """What velocity to give a cursor in a tunnel [m/s]."""
-        return self._pursuit.follow(PathView(0.0, truth.state, self.DELAY, path))
+        return self._inner.follow(PathView(*_known(truth), path))
+
+
+def _known(truth: Truth[T]) -> tuple[float, T, float]:
+    """When that is, by the clock of what is steered [s], the state, and the delay [s]."""
+    return 1e-3 * truth.state.tick, truth.state, truth.delay

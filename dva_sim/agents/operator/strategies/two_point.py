@@ -25,7 +25,7 @@ import math
 
 from dva_sim.agents.operator.person import Person
 from dva_sim.agents.operator.strategies.base import Intent, Reach, View
-from dva_sim.agents.operator.strategies.cursor import SHORTEST, gain_at
+from dva_sim.agents.operator.strategies.cursor import gain_at
 from dva_sim.agents.operator.strategies.pursuit import Pursuit
 from dva_sim.agents.steering import Ahead, Route, wrap
 
@@ -56,7 +56,7 @@ class TwoPoint(Pursuit):
 
     def _begin(self) -> None:
         """As if one had driven straight along a straight road so far."""
-        self._near = self._far = self._turn_rate = 0.0
+        self._near = self._far = self._steering = self._turn_rate = 0.0
         self._corrected = -math.inf
 
     def _along(self, route: Route, view: View, ahead: Ahead, look: float, speed: float) -> Intent:
@@ -78,6 +78,7 @@ class TwoPoint(Pursuit):
         slower = FAR_TIME * speed / look  # than on the road
         change = FAR * (ahead.bearing - self._far) + NEAR * (near - self._near)
         change += INTEGRAL * slower * counted * passed
-        gain = gain_at(person.crossover, person.margin, max(view.delay, SHORTEST))
-        self._turn_rate += gain / (FAR + NEAR) * change
+        self._steering += change / (FAR + NEAR)
+        # The gain is applied to the sum: it changes while the delay is being learnt.
+        self._turn_rate = gain_at(person.crossover, person.margin, view.delay) * self._steering
         self._near, self._far = near, ahead.bearing
