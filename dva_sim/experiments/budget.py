@@ -74,12 +74,15 @@ def command_ages(drives: Sequence[Driven]) -> Row:
 def delay_budget(drives: Sequence[Driven], motor: float) -> Row:
     """The mean of each stage, their sum, and the whole as it was measured.
 
+    Nothing (nan) where no command rests on a picture: nobody tilts, or the filter is frozen.
+
     Args:
         drives: Those of one event.
         motor: Time constant of the robot's motors [s].
     """
     parts = [_stages(drive) for drive in drives if drive.log.intents and drive.applied]
     *stages, measured, hold = np.concatenate([np.empty((0, len(STAGES) + 1)), *parts]).T
+    motor = motor if hold.any() else NAN
     means = [*(_mean(stage, hold) for stage in stages), motor]
     row: Row = {f"delay_{name}_s": mean for name, mean in zip(STAGES, means, strict=True)}
     row["frame_age_mean_s"] = row["delay_frame_s"] + row["delay_downlink_s"]

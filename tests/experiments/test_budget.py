@@ -11,6 +11,7 @@ import pytest
 from dva_sim import scenario as scenarios
 from dva_sim.agents.tilt import load_filter
 from dva_sim.agents.tilt.trail import Trail
+from dva_sim.experiments import metrics
 from dva_sim.experiments.budget import STAGES, Driven, command_ages, delay_budget, driven
 from dva_sim.recorder import Applied, DriveLog, Followed, Shown
 from dva_sim.simulation import Recording, simulate
@@ -45,6 +46,9 @@ CELLS: dict[str, dict[str, Any]] = {
         "pattern": "pub-sub",
         "robot.processing_s": 0.2,
     },
+    "differential": {"phone.mapping": "differential"},
+    "move and wait": {"operator.strategy": "move_and_wait", "link.delay_s": 0.5},
+    "few frames": {"camera.rate_hz": 2},
     "no phone": {"phone.profile": "ideal"},
     "oracle": {"phone.profile": "ideal", "operator.strategy": "oracle"},
 }
@@ -148,6 +152,16 @@ def test_what_was_made_in_the_drive_before_or_by_no_picture_is_left_out() -> Non
     assert driven(log(before, started=2.0), 3.0).applied == []
     row = delay_budget([driven(log(unseen), 3.0)], MOTOR)
     assert np.isnan([row["loop_delay_mean_s"], row["loop_delay_measured_s"]]).all()
+
+
+def test_a_frozen_filter_lets_no_picture_through_and_who_supervises_sends_no_command() -> None:
+    """7 fresh samples of 20 in 0.2 s: the median never sees them."""
+    frozen = {"phone.profile": "dissertation", "phone.max_delay_s": 0.2, "horizon_s": 60}
+    for changes in (frozen, {"control": "supervisory"}):
+        scenario = scenarios.build(scenarios.load("drive-to-event"), changes)
+        row = metrics.run_row(simulate(scenario, 1))
+        stages = [row[f"delay_{name}_s"] for name in STAGES]
+        assert np.isnan([*stages, row["loop_delay_mean_s"], row["loop_delay_measured_s"]]).all()
 
 
 def test_an_intent_is_traced_to_the_picture_it_was_formed_by_or_to_now() -> None:
