@@ -140,7 +140,8 @@ def steering(logs: Sequence[DriveLog], end: float) -> Row:
     minutes = sum(map(len, samples)) * STEP / 60.0
     if not minutes:
         names = ("reversals_per_min", "command_changes_per_min", "steering_entropy")
-        return dict.fromkeys((*names, "waiting_share"), math.nan)
+        own = ("move_waits", "move_and_wait_share")
+        return dict.fromkeys((*names, "waiting_share", *own), math.nan)
     entropies = [(len(s), steering_entropy(s[:, 1])) for s in samples]
     known = [(weight, value) for weight, value in entropies if not math.isnan(value)]
     level = sum(int(_is_level(s).sum()) for s in samples) * STEP / 60.0
@@ -152,6 +153,20 @@ def steering(logs: Sequence[DriveLog], end: float) -> Row:
         "command_changes_per_min": made / minutes,
         "steering_entropy": sum(w * v for w, v in known) / weights if known else math.nan,
         "waiting_share": level / minutes,
+        **_strategies(logs, [len(s) for s in samples]),
+    }
+
+
+def _strategies(logs: Sequence[DriveLog], weights: Sequence[int]) -> Row:
+    """What the ways of steering count themselves: 0 for those that neither wait nor change.
+
+    `move_waits` is how often the operators waited to see the result of a move,
+    `move_and_wait_share` how much of their driving they spent in that way of steering.
+    """
+    shares = [log.workload.get("move_and_wait_share", 0.0) for log in logs]
+    return {
+        "move_waits": sum(log.workload.get("waits", 0.0) for log in logs),
+        "move_and_wait_share": float(np.average(shares, weights=weights)),
     }
 
 

@@ -23,6 +23,7 @@ from dva_sim.agents.operator.strategies import (
     load_strategy,
 )
 from dva_sim.errors import ConfigError
+from dva_sim.experiments import metrics
 from dva_sim.simulation import simulate
 
 HEAD = "from dva_sim.agents.operator.strategies import Intent, Strategy\n\n"
@@ -132,8 +133,16 @@ def test_in_a_run_failures_are_counted_and_told_once_a_drive(tmp_path: Path) -> 
     assert run.recorder.counters["failed: an answer of an operator"] > 100
 
 
-def test_a_run_logs_what_the_way_of_steering_asked_of_the_person() -> None:
-    changes = {"operator.strategy": "move_and_wait", "link.delay_s": 0.5}
-    (log,) = simulate(scenarios.build(scenarios.load("drive-to-event"), changes), 1).recorder.drives
-    assert log.outcome == "confirmed"
-    assert log.workload["waits"] >= 5
+@pytest.mark.parametrize(
+    ("strategy", "least", "most", "share"),
+    [("pursuit", 0, 0, 0.0), ("move_and_wait", 5, 15, 1.0), ("adaptive", 3, 15, 0.9)],
+)
+def test_a_run_tells_how_often_its_operator_waited_and_how_long_it_steered_so(
+    strategy: str, least: int, most: int, share: float
+) -> None:
+    """At a link delay of a second each way, adaptive persons come to move and wait."""
+    changes = {"operator.strategy": strategy, "link.delay_s": 1.0}
+    run = simulate(scenarios.build(scenarios.load("drive-to-event"), changes), 1)
+    row = metrics.run_row(run)
+    assert least <= row["move_waits"] <= most
+    assert row["move_and_wait_share"] == pytest.approx(share, abs=0.1)

@@ -82,8 +82,8 @@ class MoveAndWait(Strategy):
         return self._straight(view.now, x - seen.x, y - seen.y)
 
     def workload(self) -> Mapping[str, float]:
-        """How often the person waited to see the result of a move."""
-        return {"waits": float(self.moves.waits)}
+        """How often the person waited to see the result of a move, and that it always does so."""
+        return {"waits": float(self.moves.waits), "move_and_wait_share": 1.0}
 
     @property
     def trusted(self) -> float:
