@@ -117,6 +117,7 @@ class Phone:
             math.radians(profile.max_tilt_deg),
             math.radians(profile.max_tilt_speed_deg_s),
         )
+        self._interval = self._accelerometer.interval
         self._period = period = self._accelerometer.period
         self._calibrate(own)
         filters = load_filter(profile.filter, profile.filter_options)
@@ -171,9 +172,9 @@ class Phone:
         self._aim = 0.0, 0.0
         self._perceived = deque([self.shown], maxlen=self._late + 1)
         self._last_key: tuple[int, int] | None = None
-        self._step = self._accelerometer.interval()
+        self._step = self._interval()
         self._sample_at = now + self._step
-        self._fresh = self._untrailed = 0
+        self._fresh = 0
         self._taken_at = self._stems_from = self._sampled_at = self._captured = now
         self._due = math.inf if self._batch is None else now + self._app.max_delay
 
@@ -243,45 +244,46 @@ class Phone:
         if (self._sample_at > end and self._due > end) or self._profile.ideal:
             return
         while True:
-            if self._due < self._sample_at - _TIE:
-                if self._due > end:
-                    break
-                self._take_value(self._due)
-            elif self._sample_at > end:
-                break
-            else:
-                self._sample()
-        self._carry_on()
-
-    def _sample(self) -> None:
-        """The sample that is due: one way through hand, part, calibration and filter."""
-        watches = self._watches
-        if watches:
-            self._aim = self._aim_at(self._perceived[0])
-        one, other = self._aim
-        pitch, roll = self._hand.step(one, other, self._step)
-        one, other = self._rest
-        x, y, z = self._accelerometer.sample(one + pitch, other + roll)
-        self._filter.add(self._app.reading(x, y, z))
-        self._sampled_at = self._sample_at
-        self._untrailed += 1
-        if self._batch is not None:
-            self._fresh += 1
+            self._sample_until(min(end, self._due + _TIE))
             if self._fresh == self._batch:
-                self._take_value(self._sample_at)
-        elif watches:
-            self.shown = self._mapping.command(*self._filter.value(), self._step)
-        if watches:
-            self._perceived.append(self.shown)
-        self._step = self._accelerometer.interval()
-        self._sample_at += self._step
+                self._take_value(self._sampled_at)
+            elif self._due <= end:
+                self._take_value(self._due)
+            else:
+                return
+
+    def _sample_until(self, end: float) -> None:
+        """Samples that are due, or until a batch is complete: hand, part, calibration, filter."""
+        step, sample, interval = self._hand.step, self._accelerometer.sample, self._interval
+        read, add, watches, batch = self._app.reading, self._filter.add, self._watches, self._batch
+        (rest_pitch, rest_roll), (pitch, roll) = self._rest, self._aim
+        at, dt, fresh = self._sample_at, self._step, self._fresh
+        while at <= end and fresh != batch:
+            if watches:
+                pitch, roll = self._aim_at(self._perceived[0])
+            tilt, lean = step(pitch, roll, dt)
+            x, y, z = sample(rest_pitch + tilt, rest_roll + lean)
+            add(read(x, y, z))
+            fresh += 1
+            if watches:
+                self._watch(dt)
+            self._sampled_at, dt = at, interval()
+            at += dt
+        if fresh != self._fresh:
+            self._trail.sample(fresh - self._fresh, self._decay)
+        self._sample_at, self._step, self._fresh = at, dt, fresh
+
+    def _watch(self, dt: float) -> None:
+        """What the display shows after a sample."""
+        if self._batch is None:
+            self.shown = self._mapping.command(*self._filter.value(), dt)
+        self._perceived.append(self.shown)
 
     def _take_value(self, at: float) -> None:
         """A batch is complete, or its time is over."""
-        self._carry_on()
         reading = self._filter.value()
+        self._stems_from = self._sampled_at - self._filter.age * self._period
         self._captured = self._trail.captured()
-        self._stems_from = self._sampled_at - self._trail.age * self._period
         self.shown = self._mapping.command(*reading, at - self._taken_at)
         self._taken_at, self._due, self._fresh = at, at + self._app.max_delay, 0
 
@@ -290,12 +292,6 @@ class Phone:
         reading = self._mapping.tilt_for(self._wanted, perceived, self._within)
         pitch, roll = self._felt.pose(*reading)
         return pitch - self._rest[0], roll - self._rest[1]
-
-    def _carry_on(self) -> None:
-        """The recorder's trail goes the same way."""
-        if self._untrailed:
-            self._trail.sample(self._untrailed, self._decay)
-            self._untrailed = 0
 
 
 def try_phone(profile: PhoneProfile) -> None:
