@@ -26,6 +26,8 @@ Triple = tuple[float, float, float]
 class AccelerometerPart(Config):
     """A part, with the numbers of its data sheet; `mg` are thousandths of gravity.
 
+    What a data sheet calls typical is taken to be a standard deviation, which is assumed.
+
     Attributes:
         data_sheet: Where the numbers are from.
         assumed: Keys whose numbers are not in it.
