@@ -26,6 +26,7 @@ _FACTORS = {
     "control": "control",
     "phone.profile": "phone",
     "phone.filter": "filter",
+    "phone.filter_options.time_constant_s": "time constant of the filter",
     "phone.mapping": "mapping",
     "phone.send": "sending",
     "phone.mapping_options.gain": "gain of the phone",

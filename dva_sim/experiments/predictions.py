@@ -13,9 +13,10 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from dva_sim.experiments.asking import Level, Prediction, Range
-from dva_sim.experiments.effects import Setting, View, person_means
+from dva_sim.experiments.effects import Setting, View
 from dva_sim.experiments.labels import level_name, measure_name, number, quantity, setting, unit_of
-from dva_sim.experiments.statistics import Interval, band
+from dva_sim.experiments.reading import interval_of
+from dva_sim.experiments.statistics import Interval
 
 Verdict = Literal["held", "did not hold", "open", "not judged"]
 _SIDES = {"above": "above zero", "below": "below zero", "same": "the same"}
@@ -122,11 +123,7 @@ def _asked(prediction: Prediction, view: View) -> tuple[str, tuple[Level, Level]
 def _measured(
     view: View, factor: str, contrast: tuple[Level, Level], where: Setting
 ) -> Interval | None:
-    """The paired difference at one place, with persons drawn anew for its interval."""
+    """The paired difference at one place."""
     first, second = (view.part.where(view.values, where | {factor: level}) for level in contrast)
-    found = band(person_means((first - second)[None]))
-    if found.n_persons < 2:
-        return None
-    return Interval(
-        float(found.mean[0]), float(found.low[0]), float(found.high[0]), found.n_persons
-    )
+    found = interval_of(first - second)
+    return found if found is not None and found.n_persons > 1 else None

@@ -8,9 +8,19 @@ from typing import Any
 import numpy as np
 
 from dva_sim.experiments.answer import Finding, Missed
-from dva_sim.experiments.effects import Factor, Part, Table, View, as_floats, present
+from dva_sim.experiments.asking import TUNING
+from dva_sim.experiments.effects import (
+    Factor,
+    Floats,
+    Part,
+    Table,
+    View,
+    as_floats,
+    person_means,
+    present,
+)
 from dva_sim.experiments.labels import Level, unit_of
-from dva_sim.experiments.statistics import band
+from dva_sim.experiments.statistics import Interval, band
 
 _KEYS = {"part", "cell", "config", "is_reference", "person", "trial", "seed"}
 
@@ -18,6 +28,22 @@ _KEYS = {"part", "cell", "config", "is_reference", "person", "trial", "seed"}
 def factors_of(study: Mapping[str, Any]) -> list[Factor]:
     """The declared factors, in order."""
     return [Factor(name, tuple(levels)) for name, levels in study.get("factors", {}).items()]
+
+
+def keys_of(study: Mapping[str, Any]) -> list[Factor]:
+    """The scenario keys that vary, with their levels: treatments by what they change."""
+    keys: dict[str, list[Level]] = {}
+    for factor, levels in study.get("factors", {}).items():
+        named = study.get("treatments", {}).get(factor)
+        if factor == TUNING:
+            keys[study["tuning"]["key"]] = list(study["tuning"]["levels"])
+        elif named is None:
+            keys[factor] = list(levels)
+        else:
+            for level in levels:
+                for key, value in named[level].items():
+                    keys.setdefault(key, []).append(value)
+    return [Factor(key, tuple(dict.fromkeys(levels))) for key, levels in keys.items()]
 
 
 def view_of(study: Mapping[str, Any], runs: Table) -> View | None:
@@ -70,6 +96,20 @@ def finding_of(view: View) -> Finding | None:
         missed=_missed(view),
         horizon=_horizon(view),
     )
+
+
+def interval_of(values: Floats) -> Interval | None:
+    """Mean over persons of `(persons, trials)`, with persons drawn anew for its 95 % interval.
+
+    The interval of persons who are all alike is that one value. None where nobody has a value.
+    """
+    found = band(person_means(values[np.newaxis]))
+    mean, low, high = (float(x[0]) for x in (found.mean, found.low, found.high))
+    if not np.isfinite(mean):
+        return None
+    if found.n_persons > 1 and not np.isfinite(low):
+        low = high = mean
+    return Interval(mean, low, high, found.n_persons)
 
 
 def _missed(view: View) -> tuple[Missed, ...]:

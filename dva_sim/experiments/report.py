@@ -21,9 +21,9 @@ from dva_sim.experiments.dispatch import page as dispatch_page
 from dva_sim.experiments.dispatch.shifts import Shifts, is_dispatch
 from dva_sim.experiments.effects import Part, Table, View, as_floats
 from dva_sim.experiments.figures import Drawn, draw_all
-from dva_sim.experiments.labels import factor_name, level_name, listing
+from dva_sim.experiments.labels import factor_name, level_name, listing, setting
 from dva_sim.experiments.predictions import judge_all
-from dva_sim.experiments.reading import factors_of, finding_of, view_of
+from dva_sim.experiments.reading import factors_of, finding_of, keys_of, view_of
 from dva_sim.experiments.results import Results
 from dva_sim.experiments.robustness import Robustness, robustness_of, sentences
 from dva_sim.experiments.support import support_of_part
@@ -112,9 +112,10 @@ def _page(results: Results, runs: Table, view: View | None, drawn: list[Drawn]) 
         robustness=_words_of(_robustness(view, results)),
         warnings=_warnings(results, runs),
         parts=list(scenarios),
-        conditions=stated(scenarios, factors),
-        timeout_remark=timeout_remark(next(iter(scenarios.values()), {}), factors),
+        conditions=stated(scenarios, keys_of(study)),
+        timeout_remark=timeout_remark(next(iter(scenarios.values()), {}), keys_of(study)),
         factors=[_levels(f.name, f.levels) for f in factors],
+        treatments=_treatments(study),
         figures=drawn,
         tables=_tables(results, runs, view, shifts),
         spread=spread_table(view) if view else None,
@@ -194,6 +195,15 @@ def _warnings(results: Results, runs: Table) -> list[str]:
 
 def _levels(name: str, levels: tuple[Any, ...]) -> tuple[str, str]:
     return factor_name(name), listing([level_name(name, level) for level in levels])
+
+
+def _treatments(study: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """What each named level changes."""
+    return [
+        (level_name(factor, level), setting(changes) or "nothing")
+        for factor, named in study.get("treatments", {}).items()
+        for level, changes in named.items()
+    ]
 
 
 def _as_words(change: Any) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 
 from dva_sim.experiments.answer import Finding
 from dva_sim.experiments.asking import REPEATS, STRATEGY, Level
-from dva_sim.experiments.effects import Factor, Part, Table, View, person_means
+from dva_sim.experiments.effects import Factor, Part, Table, View
 from dva_sim.experiments.labels import (
     factor_name,
     level_name,
@@ -20,8 +20,8 @@ from dva_sim.experiments.labels import (
     quantity,
     unit_of,
 )
+from dva_sim.experiments.reading import interval_of
 from dva_sim.experiments.repeats import PARAMETERS
-from dva_sim.experiments.statistics import band
 
 
 @dataclass(frozen=True)
@@ -169,15 +169,15 @@ def _repeat(part: Part, finding: Finding, where: dict[str, Level]) -> Repeat | N
         part.where(grid, where | {finding.factor: level})
         for level in (finding.first, finding.second)
     )
-    found = band(person_means((first - second)[None]))
-    if not np.isfinite(found.mean).all():
+    found = interval_of(first - second)
+    if found is None:
         return None
     return Repeat(
         strategy=str(where.get(STRATEGY, "")),
         parameters=int(str(where[PARAMETERS])),
-        mean=float(found.mean[0]),
-        low=float(found.low[0]),
-        high=float(found.high[0]),
+        mean=found.mean,
+        low=found.low,
+        high=found.high,
     )
 
 
@@ -190,9 +190,10 @@ def _what_was_repeated(r: Robustness) -> str:
     strategies = [level_name(STRATEGY, name) for name in r.strategies]
     under = f" under each of {listing(strategies)}," if strategies else ""
     others = "one other set" if r.sets == 1 else f"{r.sets} other sets"
+    trials = "one trial" if r.trials == 1 else f"{r.trials} trials"
     return (
         f"Repeated{under} with the usual parameters and {others} within the bands that "
-        f"calibration leaves open ({r.persons} persons, {r.trials} trials of each; the same "
+        f"calibration leaves open ({r.persons} persons, {trials} of each; the same "
         "persons and luck as above, so that only the model differs)."
     )
 
@@ -209,7 +210,18 @@ def _told(r: Robustness, stop: Stop) -> str:
         told += f"; in {_of(stop.relevant, count)} the effect exceeds the smallest that matters"
         told += f", in {stop.negligible} it is below that either way"
     reach = f"{number(min(means))} to {quantity(max(means), unit)}"
-    return f"{told}. Effects run from {reach}."
+    return f"{told}. Effects run from {reach}.{_where_it_fails(r, stop)}"
+
+
+def _where_it_fails(r: Robustness, stop: Stop) -> str:
+    """Under which strategies the sign is another."""
+    failed = []
+    for name in r.strategies:
+        means = [x.mean for x in stop.repeats if x.strategy == name]
+        others = sum(not mean * stop.found > 0 for mean in means)
+        if others:
+            failed.append(f"{level_name(STRATEGY, name)} ({others} of {len(means)})")
+    return f" The sign is another under {listing(failed)}." if failed else ""
 
 
 def _of(part: int, whole: int) -> str:

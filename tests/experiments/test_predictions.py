@@ -79,3 +79,21 @@ def test_words_alone_are_shown_and_not_judged():
 def test_a_contrast_that_was_not_run_is_not_judged():
     (found,) = judged({"text": "Far.", "direction": "above", "at": {"link.delay_s": 9}})
     assert (found.verdict, found.found) == ("not judged", "not run")
+
+
+def test_persons_who_are_all_alike_leave_no_doubt():
+    same = {
+        "text": "Queues do nothing here.",
+        "direction": "below",
+        "contrast": ["latest-wins", "latest-wins-too"],
+    }
+    runs = synthetic_study.drive_rows(4, 1, missed=0.0)
+    runs += [r | {"pattern": "latest-wins-too"} for r in runs if r["pattern"] == "latest-wins"]
+    study = synthetic_study.manifest(4, 1)["study"] | {"predictions": [same]}
+    patterns = [*synthetic_study.PATTERNS, "latest-wins-too"]
+    study["factors"] = study["factors"] | {"pattern": patterns}
+    (found,) = judge_all(study, view_of(study, synthetic_study.columns(runs)))
+    assert (found.verdict, found.found) == (
+        "did not hold",
+        "0\N{NO-BREAK SPACE}s (0 to 0\N{NO-BREAK SPACE}s)",
+    )

@@ -183,3 +183,18 @@ def test_a_study_of_which_no_run_was_completed_says_so(tmp_path):
 def test_a_folder_without_results_is_refused_in_one_line(tmp_path):
     with pytest.raises(ConfigError, match="holds no finished results"):
         write_report(tmp_path)
+
+
+def test_what_a_treatment_changes_is_said_and_counts_as_varied(tmp_path):
+    runs = [r for r in synthetic_study.drive_rows(2, 1) if r["link.delay_s"] in (0.0, 1.0)]
+    for run in runs:
+        run["way"] = "far" if run.pop("link.delay_s") else "near"
+    facts = synthetic_study.manifest(2, 1)
+    treatments = {"way": {"near": {}, "far": {"link.delay_s": 1.0}}}
+    factors = {"pattern": synthetic_study.PATTERNS, "way": ["near", "far"]}
+    factors |= {"profile": synthetic_study.PROFILES}
+    facts["study"] |= {"treatments": treatments, "factors": factors, "answer": None}
+    text = words(write_report(synthetic_study.write(tmp_path / "r", {"runs": runs}, facts)))
+    assert "near : nothing far : one-way delay 1 s" in text
+    assert "one-way delay varied varied" in text
+    assert "The time-out is above four round trips and the processing time" in text

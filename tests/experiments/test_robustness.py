@@ -57,7 +57,8 @@ def test_the_sentences_give_shares_and_reach():
     assert told == (
         "At one-way delay 1 s the sign holds in 3 of 4 (75 %) repeats, in 3 of them with its "
         "whole interval; in 2 of 4 (50 %) the effect exceeds the smallest that matters, in 1 it "
-        "is below that either way. Effects run from −3.8 to 20.2 s."
+        "is below that either way. Effects run from −3.8 to 20.2 s. The sign is another "
+        "under adaptive (1 of 2)."
     )
 
 
