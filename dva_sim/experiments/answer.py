@@ -258,7 +258,10 @@ def _at(f: Finding, where: Sequence[int]) -> str:
     if not f.over:
         return "throughout"
     names = listing([level_name(f.over, f.levels[i]) for i in where])
-    return f"at {'a ' if len(where) == 1 else ''}{factor_name(f.over)} {_of(f)}{names}"
+    name = factor_name(f.over)
+    vowel = name[0] in "aeiou" and not name.startswith("one")
+    article = "" if len(where) > 1 else "an " if vowel else "a "
+    return f"at {article}{name} {_of(f)}{names}"
 
 
 def _of(f: Finding) -> str:

@@ -138,12 +138,13 @@ def _beyond(support: Support | None) -> _Column | None:
 
 
 def _what_is_covered(support: Support | None) -> str:
-    if support is None or not support.outside.any():
+    if support is None:
         return ""
-    return (
-        f"{_MARK.strip()} Extrapolated: published data do not cover the delay of this loop, taken "
-        f"without the person's own share (covered: {support.words})."
-    )
+    covered = f"Delays of the loop that published data cover: {support.words}."
+    if not support.outside.any():
+        return covered
+    mark = f"{_MARK.strip()} Extrapolated: beyond these delays, taken without the person's own."
+    return f"{mark} {covered}"
 
 
 def _text(summary: _Summarise, cell: Floats, text: Callable[[float], str]) -> str:

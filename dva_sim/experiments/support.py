@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.errors import ConfigError
 from dva_sim.experiments.asking import STRATEGY
 from dva_sim.experiments.conditions import get
 from dva_sim.experiments.effects import Floats, Part, nan_mean
-from dva_sim.experiments.validation.operators.support import delay_support
+from dva_sim.experiments.validation.operators.support import support_of
+from dva_sim.experiments.validation.operators.targets import SupportConfig
 
 LOOP = "loop_delay_mean_s"
 PERSONAL = ("delay_human_s", "delay_hand_s")
@@ -56,12 +56,12 @@ def support_of_part(part: Part, scenario: Mapping[str, Any]) -> Support | None:
         runs = runs - np.nan_to_num(part.grid(column))
     delays = nan_mean(runs.reshape(*runs.shape[:-2], -1), axis=-1)
     outside = np.isfinite(delays)
-    ranges = {name: _range_of(name) for name in strategies}
-    for name, covered in ranges.items():
-        low, high = covered or (np.inf, -np.inf)
-        outside &= ~(_has(part, name) & (delays >= low) & (delays <= high))
-    words = "; ".join(f"{name}, {_told(covered)}" for name, covered in ranges.items())
-    return Support(delays, outside, words)
+    known = {name: support_of(name) for name in strategies}
+    for name, covered in known.items():
+        if covered is not None:
+            inside = (delays >= covered.low_s) & (delays <= covered.high_s)
+            outside &= ~(_has(part, name) & inside)
+    return Support(delays, outside, "; ".join(_told(*item) for item in known.items()))
 
 
 def _strategies(part: Part, scenario: Mapping[str, Any]) -> tuple[str, ...]:
@@ -76,13 +76,7 @@ def _has(part: Part, strategy: str) -> Marks:
     return np.array(has).reshape([len(f.levels) for f in part.factors])
 
 
-def _range_of(strategy: str) -> tuple[float, float] | None:
-    """Nothing for a strategy that no published data speak of."""
-    try:
-        return delay_support(strategy)
-    except ConfigError:
-        return None
-
-
-def _told(covered: tuple[float, float] | None) -> str:
-    return f"{covered[0]:g} to {covered[1]:g} s" if covered else "no published data"
+def _told(strategy: str, covered: SupportConfig | None) -> str:
+    if covered is None:
+        return f"{strategy}: no published data"
+    return f"{strategy}: {covered.low_s:g} to {covered.high_s:g} s, {' '.join(covered.why.split())}"

@@ -47,7 +47,9 @@ def test_each_strategy_has_the_support_of_its_own_data():
 def test_a_strategy_that_no_data_speak_of_is_an_extrapolation_everywhere():
     part = part_of()
     one = Part(part.treated, "drive", [DELAY])
-    assert support_of_part(one, {"operator": {"strategy": "mine.py:Mine"}}).outside.all()
+    found = support_of_part(one, {"operator": {"strategy": "mine.py:Mine"}})
+    assert found.outside.all()
+    assert found.words == "mine.py:Mine: no published data"
 
 
 def test_nothing_is_said_where_nobody_drives():
@@ -63,8 +65,8 @@ def test_the_table_marks_the_cells_and_explains_the_mark():
         *("1.1\N{NO-BREAK SPACE}†", "1.1"),
         *("10.1\N{NO-BREAK SPACE}†", "10.1\N{NO-BREAK SPACE}†"),
     ]
-    assert table.note.startswith("† Extrapolated: published data do not cover")
-    assert "pursuit, 0 to 0.225 s" in table.note
+    assert table.note.startswith("† Extrapolated: beyond these delays")
+    assert "pursuit: 0 to 0.225 s, pointing" in table.note
 
 
 @pytest.mark.parametrize(("panel", "stops"), [("pursuit", [1, 2]), ("adaptive", [2])])

@@ -4,7 +4,7 @@ import pytest
 import small_study as kit
 
 from dva_sim.errors import ConfigError, DvaSimError
-from dva_sim.experiments import design
+from dva_sim.experiments import console, design
 from dva_sim.experiments.study import load_study
 from dva_sim.experiments.tuned import choose, file_of, load_tuned, save_tuned
 from dva_sim.experiments.tuning import tune, tuning_study
@@ -148,6 +148,20 @@ def test_a_tuning_that_makes_no_sense_is_refused(tmp_path, old, new, told):
     with pytest.raises(ConfigError) as caught:
         study_in(tmp_path, old=old, new=new)
     assert told in str(caught.value)
+
+
+def test_the_command_tries_chooses_tells_and_keeps(tmp_path, capsys):
+    rule = {"levels: [1, 2, 4, 8]": "levels: [5, 10]", "persons: 2\n": "persons: 1\n"}
+    text = STUDY.replace("replications: 3", "replications: 1").replace("latest-wins]", "pipelined]")
+    for old, new in rule.items():
+        text = text.replace(old, new)
+    path = kit.write_study(tmp_path, text)
+    (tmp_path / "one.yaml").write_text("description: no time to arrive\nhorizon_s: 1\n")
+    assert console.tune(str(path), tmp_path / "trials", 1) == 0
+    said = capsys.readouterr().out
+    assert "Which command.rate_hz for each pattern?" in said
+    assert f"Kept in {tmp_path / 'tuned' / 'study.yaml'}" in said
+    assert [c.value for c in load_tuned(load_study(path)).chosen] == [5.0, 5.0]
 
 
 def test_a_study_without_a_rule_tunes_nothing(tmp_path):
