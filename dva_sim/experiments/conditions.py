@@ -100,8 +100,6 @@ def _site(scenario: Mapping[str, Any]) -> str:
 def _text(key: str, value: Any) -> str:
     if value is None:
         return "–"
-    if key == "link.loss":
-        return f"{100 * value:g} %"
     if key == "link.rate_bps":
         return f"{value / 1e6:g} Mbit/s"
     if key.endswith("_bytes"):

@@ -143,6 +143,8 @@ def level_name(factor: str, level: Level, short: bool = False) -> str:
         return (_SHORT_LEVELS if short else _LEVELS).get(level, level)
     if level is None or isinstance(level, bool):
         return {None: "none", True: "yes", False: "no"}[level]
+    if factor.endswith(".loss"):
+        return percent(level)
     unit = unit_of(factor)
     if unit == "s" and 0 < abs(level) < 1:
         return f"{1000 * level:g}\N{NO-BREAK SPACE}ms"

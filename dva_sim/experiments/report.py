@@ -119,7 +119,7 @@ def _page(results: Results, runs: Table, view: View | None, drawn: list[Drawn]) 
         figures=drawn,
         tables=_tables(results, runs, view, shifts),
         spread=spread_table(view) if view else None,
-        tuned=tuned_table(manifest.get("tuned")),
+        tuned=tuned_table(manifest),
         persons=study.get("persons"),
         replications=study.get("replications"),
         correlation=_pair_correlation(view),

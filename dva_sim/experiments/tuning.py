@@ -94,11 +94,11 @@ def tune(
     )
 
 
-def tuned_table(data: Mapping[str, Any] | None) -> CellTable | None:
+def tuned_table(manifest: Mapping[str, Any]) -> CellTable | None:
     """All that a tuning saw, as a report prints it; None where nothing was tuned."""
-    if not data:
+    if not manifest.get("tuned"):
         return None
-    tuned = Tuned.model_validate(data)
+    tuned = Tuned.model_validate(manifest["tuned"])
     rule, chosen = tuned.tuning, {(str(c.when), c.value) for c in tuned.chosen}
     rows = [
         [
@@ -116,6 +116,8 @@ def tuned_table(data: Mapping[str, Any] | None) -> CellTable | None:
         f"Rule: the least mean, of equal ones the nearest to 1; {rule.persons} persons who take "
         f"no part in the study, {rule.replications} trials of each{at}."
     )
+    if str(manifest["versions"].get("fingerprint")) not in tuned.made_with:
+        note += " It was tuned with another version of the program than the study was run with."
     return CellTable(rule.part, heads, len(rule.by), rows, note=note)
 
 

@@ -49,4 +49,4 @@ def test_words_are_listed_as_people_do():
     assert listing([]) == ""
     assert listing(["a"]) == "a"
     assert listing(["a", "b", "c"]) == "a, b and c"
-    assert setting({"profile": "default", "link.loss": 0.1}) == "profile default, packet loss 0.1"
+    assert setting({"profile": "default", "link.loss": 0.1}) == "profile default, packet loss 10\N{NO-BREAK SPACE}%"

@@ -89,6 +89,7 @@ def test_the_report_splits_the_spread_and_shows_all_that_tuning_saw(report):
     assert "Between and within persons" in text
     assert "absolute 0.5 50.0 (40.0 to 60.0)" in text
     assert "absolute 1 48.0 (38.0 to 58.0) chosen" in text
+    assert "tuned with another version of the program" in text
     assert "No learning is modelled" in text
 
 
