@@ -188,7 +188,10 @@ def hatch_words(view: View) -> str:
     """What the hatching means, if a panel has any."""
     if not any(view.stops_outside(panel) for panel in view.shown):
         return ""
-    return " Hatched: extrapolation, beyond the delays at which people were watched."
+    return (
+        " Hatched: at least one line is an extrapolation there, beyond the delays at which people "
+        "were watched; the table marks each cell."
+    )
 
 
 def panel_title(axes: Axes, panel: Setting) -> None:
