@@ -50,7 +50,7 @@ def test_all_that_is_shipped_is_valid(check):
     assert lines[-1] == f"{len(files)} files: {len(files)} valid"
     kinds = {line.split(": ")[1] for line in lines[:-1]}
     agents = {"robot", "phone", "accelerometer", "guard", "bystanders", "operators"}
-    agents |= {"bands of operators"}
+    agents |= {"bands of operators", "tuned values"}
     runs = {"study", "scenario", "timed scenario", "validation cases", "targets", "split", "task"}
     assert kinds == {"site", "plan", "message"} | runs | agents
 
