@@ -9,6 +9,7 @@ import numpy as np
 
 from dva_sim.agents.bystander import DOWN
 from dva_sim.core.events import Event
+from dva_sim.experiments import workload
 from dva_sim.experiments.budget import command_ages, delay_budget, driven
 from dva_sim.recorder import DriveLog
 from dva_sim.simulation import Recording
@@ -23,7 +24,7 @@ def run_row(recording: Recording) -> Row:
     exposure = recording.recorder.exposure
     row["events"] = len(recording.events)
     row["person_exposure_s"] = float(sum(exposure.values()))
-    row |= _people_measures(recording)
+    row |= _people_measures(recording) | workload.run_measures(recording)
     row["replans"] = recording.recorder.counters["replans"]
     row["messages"] = recording.recorder.counters["messages"]
     row["bytes"] = recording.recorder.counters["bytes"]
@@ -182,6 +183,12 @@ def _event_row(recording: Recording, number: int) -> Row:
     row["containment_s"] = row["t_contained_s"] - row["t_detected_s"]
     row["closing_s"] = row["t_closed_s"] - row["t_detected_s"]
     row["watched_s"] = recording.duration - row["t_detected_s"]
+    row["missed"] = (
+        event is not None
+        and row["outcome"] == "refuted"
+        and workload.was_there(recording, event.number, row["t_closed_s"])
+    )
+    row["false_confirmation"] = incident.false_alarm and row["t_confirmed_s"] < math.inf
     return row
 
 
