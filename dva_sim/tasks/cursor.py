@@ -33,11 +33,14 @@ class Goal(ABC):
 
     Attributes:
         flat: Whether the cursor only moves along x.
+        stands: Whether the target stands where it is; one that takes another's place has no
+            velocity, and nobody leads it.
         path: The middle line, if the cursor is led along one.
         tolerance: Half the width of the target or tunnel [m].
     """
 
     flat = False
+    stands = True
     path: Route | None = None
     tolerance: float
 
@@ -112,7 +115,8 @@ class CursorTrial(Trial[Sighting]):
         if self._last is not None:
             then, old_x, old_y, old_tx, old_ty = self._last
             vx, vy = (x - old_x) / (now - then), (y - old_y) / (now - then)
-            tvx, tvy = (tx - old_tx) / (now - then), (ty - old_ty) / (now - then)
+            if not self.goal.stands:
+                tvx, tvy = (tx - old_tx) / (now - then), (ty - old_ty) / (now - then)
         self._last = now, x, y, tx, ty
         return Sighting(round(1000 * now), x, y, vx, vy, tx, ty, tvx, tvy, self.goal.tolerance)
 

@@ -117,7 +117,7 @@ class TrackGoal(ToTarget):
         phases: Of them, `(k,)` [rad].
     """
 
-    flat = True
+    flat, stands = True, False
 
     def __init__(self, task: Tracking, phases: list[float]) -> None:
         self._task, self.tolerance = task, 0.0

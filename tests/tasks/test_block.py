@@ -8,7 +8,13 @@ from dva_sim.tasks import build, play, trace_of
 from dva_sim.tasks.block import seat_of
 from dva_sim.tasks.measures import fit_line
 
-EXACT = {"motor_noise": 1e-9, "perceptual_delay_s": 0.1, "hand_lag_s": 0.02, "reaction_s": 0.1}
+EXACT = {
+    "motor_noise": 1e-9,
+    "perceptual_delay_s": 0.1,
+    "hand_lag_s": 0.02,
+    "reaction_s": 0.1,
+    "margin": 0.5,
+}
 DRIVEN = {
     "device": {"kind": "joystick", "rate_hz": 20},
     "plant": {"speed_mps": 0.5, "lag_s": 0.15, "width_m": 0.6},
@@ -102,6 +108,19 @@ def test_the_person_comes_to_feel_the_delay_that_there_is():
     person = seat_of(scenario).person
     whole = 0.8 + person.perceptual_delay + person.hand_lag
     assert play(scenario, 1)[0]["delay_felt_s"] == pytest.approx(whole, abs=0.1)
+
+
+@pytest.mark.parametrize("strategy", ["pursuit", "move_and_wait", "adaptive"])
+def test_a_target_that_takes_the_place_of_another_is_not_seen_to_fly_there(strategy):
+    """Who led it would aim far beyond: 8 m in a thirtieth of a second are 240 m/s."""
+    stops = [{"swing_m": 2.0, "reach_m": 0.0}, {"swing_m": -6.0, "reach_m": 0.0}]
+    arm = {"kind": "reach", "stops": stops, "tolerance_m": 0.3}
+    plant = {"speed_mps": 1.0, "lag_s": 0.3}
+    rest = {"device": {"kind": "joystick"}, "plant": plant, "horizon_s": 60}
+    scenario = {"model": "task", "task": arm, "operator": {"strategy": strategy}, **rest}
+    (row,) = play(build(scenario), 1)
+    assert row["completed"]
+    assert row["path_m"] == pytest.approx(10.0, abs=0.8)
 
 
 def test_a_dwell_ends_as_much_later_as_it_lasts():

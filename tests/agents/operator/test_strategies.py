@@ -183,13 +183,14 @@ def spells(track: list[At]) -> list[tuple[bool, float, float]]:
 def test_who_moves_and_waits_moves_again_only_when_the_result_is_seen_to_have_settled(
     delay: float,
 ) -> None:
-    """Reaction 0.3 s, the delay, and 0.3 s of a picture that stands still."""
+    """The delay, and both the reaction of 0.3 s and 0.3 s of a picture that stands still."""
     strategy = MoveAndWait(person(), ROBOT)
     track = drive(strategy, way(*CORNER), delay, 200.0, stop_before=0.5)
     waits = [until - since for moves, since, until in spells(track) if not moves]
     assert len(waits) == strategy.moves.waits == strategy.workload()["waits"] > 3
     assert all(wait >= 0.3 + delay - 1e-6 for wait in waits)
     assert all(wait < 0.3 + delay + 0.7 for wait in waits[:-1])
+    assert min(waits) == pytest.approx(strategy.moves.usual_wait(delay), abs=0.2)
 
 
 def test_time_by_moving_and_waiting_grows_with_the_delay_by_the_number_of_waits() -> None:
@@ -278,6 +279,13 @@ def test_who_adapts_changes_once_as_the_delay_grows_and_says_for_how_long() -> N
     assert 1.0 < told(since) < 3.0
     share = strategy.workload()["move_and_wait_share"]
     assert share == pytest.approx((100.0 - since) / 100.0, abs=0.01)
+
+
+def test_who_adapts_does_not_wait_for_what_it_has_not_done() -> None:
+    strategy = Adaptive(person(), ROBOT)
+    track = drive(strategy, way((0, 0), (10, 0)), 4.0, 20.0)
+    assert strategy.using == "move_and_wait"
+    assert track[0].wanted != (0.0, 0.0)
 
 
 def test_a_delay_that_comes_and_goes_a_little_changes_nothing() -> None:

@@ -35,8 +35,8 @@ class Adaptive(Strategy):
 
     Expected are, from the delay as estimated and the way left: in a closed loop, the pace that the
     delay allows, or the time that the person's gain takes to close an error; moving and waiting,
-    full pace and a wait after each move. Moving and waiting begins with a wait, and is left only
-    between two moves.
+    full pace and a wait after each move. Moving and waiting begins with a wait, unless nothing was
+    asked for yet that one could wait for, and is left only between two moves.
 
     Args:
         person: Who steers.
@@ -63,6 +63,7 @@ class Adaptive(Strategy):
         self.switches = 0
         self._times = {"closed": 0.0, "move_and_wait": 0.0}
         self._last: float | None = None
+        self._has_asked = False
 
     def drive(self, route: Route, view: View, stop_before: float) -> Intent:
         """See `Strategy`."""
@@ -73,7 +74,9 @@ class Adaptive(Strategy):
         turn = 1.0 / gain_at(person.crossover, person.margin, delay)
         count = max(left / self._moves.trusted, 1.0)
         self._choose(view.now, max(left, 0.0) / pace + turn, self._waiting(left, count, delay))
-        return self._now.drive(route, view, stop_before)
+        wanted = self._now.drive(route, view, stop_before)
+        self._has_asked = self._has_asked or any(wanted)
+        return wanted
 
     def point(self, view: PointView) -> Velocity:
         """See `Strategy`."""
@@ -84,7 +87,9 @@ class Adaptive(Strategy):
         count = max(folds / -math.log(max(person.motor_noise, SHORTEST)), 1.0)
         waiting = self._waiting(away, count, view.delay)
         self._choose(view.now, folds / gain + away / self._most, waiting)
-        return self._now.point(view)
+        wanted = self._now.point(view)
+        self._has_asked = self._has_asked or any(wanted)
+        return wanted
 
     def follow(self, view: PathView) -> Velocity:
         """See `Strategy`."""
@@ -93,7 +98,9 @@ class Adaptive(Strategy):
         pace = fastest(seen.tolerance, view.delay, person, self._most)
         count = max(left / self._moves.trusted_in(seen.tolerance), 1.0)
         self._choose(view.now, left / pace, self._waiting(left, count, view.delay))
-        return self._now.follow(view)
+        wanted = self._now.follow(view)
+        self._has_asked = self._has_asked or any(wanted)
+        return wanted
 
     def workload(self) -> Mapping[str, float]:
         """How often the person waited, and how much of the time it moved and waited."""
@@ -117,7 +124,8 @@ class Adaptive(Strategy):
         self._last = now
         if self.using == "closed" and waiting < BETTER * closed:
             self.using = "move_and_wait"
-            self._moves.halt(now)
+            if self._has_asked:
+                self._moves.halt(now)
             self.switches += 1
         elif self.using != "closed" and closed < BETTER * waiting and self._moves.moves.rests:
             self.using = "closed"

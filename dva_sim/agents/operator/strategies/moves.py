@@ -42,7 +42,7 @@ class Moves:
 
     def usual_wait(self, delay: float) -> float:
         """How long a wait takes if all goes well, at this delay [s]."""
-        return self._reaction + delay + SETTLED_FOR
+        return delay + max(self._reaction, SETTLED_FOR)
 
     @property
     def rests(self) -> bool:
