@@ -9,11 +9,14 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from itertools import pairwise
+from itertools import islice, pairwise
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+REACH = 2.0  # on a route in a building, one looks for one's place so far ahead of the last [m]
+BENT = 1.5  # way along a route to what one moves straight; around a right angle, up to 1.41
 
 
 def wrap(angle: float) -> float:
@@ -50,11 +53,18 @@ class _Leg(NamedTuple):
 class Route:
     """A polyline to follow, and how far along it one has come.
 
+    One's place on it is the nearest one that can have been reached: not behind the piece where one
+    was, and ahead of that no farther along the route than one may have come since, and `reach`. So
+    it does not matter how finely a route is cut nor how seldom one looks, and a later part of a
+    route that folds back beside an earlier one is not taken for it.
+
     Args:
         points: Corners, shape `(n, 2)` [m], n >= 2.
+        reach: How far ahead, beyond what one may have come [m]. A corner may be cut by so much of
+            the route; where laps lie on each other, it should be well below a lap.
     """
 
-    def __init__(self, points: NDArray[np.float64]) -> None:
+    def __init__(self, points: NDArray[np.float64], reach: float = REACH) -> None:
         self._points = [(float(x), float(y)) for x, y in points]
         steps = np.hypot(*np.diff(points, axis=0).T)
         self._legs = [
@@ -62,7 +72,8 @@ class Route:
             for (ax, ay), (bx, by) in pairwise(self._points)
         ]
         self._at: list[float] = [0.0, *np.cumsum(steps).tolist()]
-        self._segment = 0
+        self._segment, self._along, self._seen = 0, 0.0, self._points[0]
+        self._reach = reach
         self.points = points
 
     @property
@@ -91,15 +102,24 @@ class Route:
         return Ahead(bearing, distance, self.length - along, offset)
 
     def _project(self, x: float, y: float) -> tuple[float, float]:
-        """Nearest place on the next three segments: (way along the route, distance) [m]."""
-        nearest, along, first = math.inf, 0.0, self._segment
-        for i, (ax, ay, dx, dy, square) in enumerate(self._legs[first : first + 3], first):
+        """Nearest place within reach of the last one: (way along the route, distance) [m]."""
+        nearest, along, at, first = math.inf, 0.0, self._at, self._segment
+        last_x, last_y = self._seen
+        end = self._along + self._reach + BENT * math.hypot(x - last_x, y - last_y)
+        for i, (ax, ay, dx, dy, square) in enumerate(islice(self._legs, first, None), first):
+            if at[i] > end:
+                break
             share = ((x - ax) * dx + (y - ay) * dy) / square if square else 0.0
             share = 0.0 if share < 0.0 else 1.0 if share > 1.0 else share
+            way = share * math.sqrt(square)
+            if at[i] + way > end:
+                way = end - at[i]
+                share = way / math.sqrt(square)
             distance = math.hypot(ax + share * dx - x, ay + share * dy - y)
             if distance < nearest:
-                nearest, along = distance, self._at[i] + share * math.sqrt(square)
+                nearest, along = distance, at[i] + way
                 self._segment = i
+        self._seen, self._along = (x, y), along
         return along, nearest
 
     def point_at(self, along: float) -> tuple[float, float]:

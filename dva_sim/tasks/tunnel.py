@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dva_sim.agents.operator.strategies import Velocity
-from dva_sim.agents.steering import Route
+from dva_sim.agents.steering import REACH, Route
 from dva_sim.tasks import measures
 from dva_sim.tasks.cursor import CursorTrial, Goal
 from dva_sim.tasks.devices import Pair
@@ -20,6 +20,7 @@ from dva_sim.tasks.trial import MACHINE_GAIN, Trace
 Floats = NDArray[np.float64]
 
 RUN_OUT = 2.0  # the way goes on so far beyond the end, so that nobody stops before it [m]
+WITHIN = 0.25  # of the tunnel one looks for one's place ahead of the last: laps lie on each other
 CORNERS = 60  # of the polygon that stands for the middle of a circle, for the person
 
 
@@ -38,7 +39,7 @@ class TunnelGoal(Goal):
         self._task, self.length, self.width = task, length, width
         self.tolerance = 0.5 * width
         self._radius = length / (2.0 * math.pi) if task.shape == "circular" else 0.0
-        self.path = Route(self._way())
+        self.path = Route(self._way(), min(REACH, WITHIN * length))
         self._along, self._inside, self._errors = 0.0, True, 0
         self._squares, self._time = 0.0, 0.0
         self._touched: list[Pair] = []

@@ -7,6 +7,7 @@ import pytest
 from dva_sim.tasks import build, play, trace_of
 from dva_sim.tasks.block import seat_of
 from dva_sim.tasks.measures import fit_line
+from dva_sim.tasks.tunnel import TunnelGoal
 
 EXACT = {
     "motor_noise": 1e-9,
@@ -178,6 +179,14 @@ def test_a_circle_so_small_that_one_is_around_within_the_delay_is_gone_around():
     task = {"kind": "tunnel", "shape": "circular", "length_m": 0.0625, "width_m": 0.015}
     row = play(build({"model": "task", "task": task}), 1)[0]
     assert row["completed"] == 1.0
+
+
+def test_who_slips_back_a_little_is_not_taken_to_be_a_lap_ahead():
+    task = build({"model": "task", "task": {"kind": "tunnel", "shape": "circular"}}).task
+    path = TunnelGoal(task, length=0.25, width=0.02).path
+    for along in (0.0, 0.05, 0.1, 0.09, 0.15):
+        left = path.ahead(*path.point_at(along), 0.0, 0.0).remaining
+        assert path.length - left == pytest.approx(along, abs=0.011)
 
 
 def test_who_is_led_through_a_tunnel_leaves_its_middle_less():
