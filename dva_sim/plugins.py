@@ -11,12 +11,15 @@ from dataclasses import dataclass
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import ModuleType
-from typing import Any, Generic, TypeVar
+from typing import Any, Final, Generic, TypeVar
 
 from dva_sim import resources
 from dva_sim.errors import ConfigError
 
 T = TypeVar("T")
+A = TypeVar("A")
+
+FAILURES: Final = (Exception, SystemExit)  # what is wrong with a plug-in: it may not end us either
 
 
 @dataclass(frozen=True)
@@ -72,11 +75,19 @@ class Plugins(Generic[T]):
             ConfigError: an option is unknown or bad, or it cannot be made.
         """
         self._check_options(name, factory, options, len(given))
+        return self.ask(name, lambda: factory(*given, **options))
+
+    def ask(self, name: str, what: Callable[[], A]) -> A:
+        """Do what runs code of one that was found, and tell what is wrong with that.
+
+        Raises:
+            ConfigError: it fails, or ends the program.
+        """
         try:
-            return factory(*given, **options)
+            return what()
         except ConfigError as error:
             raise ConfigError(f"{self.kind} {name!r}: {error}") from None
-        except Exception as error:
+        except FAILURES as error:
             problem = f"{self.kind} {name!r} cannot be made: {said(error)}"
             raise ConfigError(problem) from error
 
@@ -131,7 +142,7 @@ class Plugins(Generic[T]):
     def _offered(self, name: str, entry: EntryPoint) -> Any:
         try:
             return entry.load()
-        except Exception as error:
+        except FAILURES as error:
             problem = f"{entry.value} cannot be loaded: {said(error)}"
             raise ConfigError(f"{self.kind} {name!r}: {problem}") from error
 
@@ -164,7 +175,7 @@ def _run(path: Path, kind: str) -> ModuleType:
         raise ConfigError(f"is not valid Python: {error.msg}", path, error.lineno) from None
     except OSError as error:
         raise ConfigError(f"cannot be read: {error.strerror or error}", path) from None
-    except (Exception, SystemExit) as error:
+    except FAILURES as error:
         raise ConfigError(f"cannot be loaded: {said(error)}", path, _line(error, path)) from error
     return module
 

@@ -10,6 +10,7 @@ from typing import Any, Final
 
 from dva_sim.checking.files import NotReadError, Verdict, check_file
 from dva_sim.checking.messages import READ_BYTES, check_message
+from dva_sim.checking.promises import said
 from dva_sim.checking.schemas import schema_text
 from dva_sim.checking.trials import TRIALS, Trial
 from dva_sim.config import parse_changes
@@ -53,6 +54,9 @@ def _try(kind: str, trial: Trial, name: str, options: Mapping[str, Any]) -> int:
         outcome = trial.run(name, options)
     except ConfigError as error:
         _say(f"{name}: {error}")
+        return INVALID
+    except SystemExit as error:
+        _say(f"{name}: {kind}: invalid, ends the program: {said(error)}")
         return INVALID
     for text in outcome.broken:
         _say(f"{name}: {text}")

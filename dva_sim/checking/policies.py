@@ -19,6 +19,7 @@ from dva_sim.core.dispatch import (
     Relocation,
     Situation,
 )
+from dva_sim.plugins import FAILURES
 
 SITUATIONS: Final = 200
 SLOW: Final = 0.1  # [s] of one decision; above that an episode is no longer fast
@@ -69,7 +70,7 @@ def _ask(policy: Policy, situation: Situation, seed: int) -> _Answer:
     started = time.perf_counter()
     try:
         advice = policy.advise(situation, rng)
-    except Exception as error:
+    except FAILURES as error:
         return _Answer((), time.perf_counter() - started, (("raises", f"{said(error)} "),))
     took = time.perf_counter() - started
     changed = before != _contents(situation)

@@ -32,7 +32,7 @@ def line(promise: str, cases: Sequence[str]) -> str:
     return f"{promise}: {cases[0]}{more}"
 
 
-def said(error: Exception) -> str:
+def said(error: BaseException) -> str:
     """An error in one line, with the line of the file that it comes from."""
     frame = traceback.extract_tb(error.__traceback__)[-1]
     text = " ".join(f"{type(error).__name__}: {error}".split())

@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 
 from dva_sim.checking.promises import Case, Outcome, line, said
+from dva_sim.plugins import FAILURES
 from dva_sim.worlds.drives import LONGEST_TICK, Drive, DriveSpec, Guarded
 from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.hall import hall
@@ -91,7 +92,7 @@ class _Trial:
         for part in parts:
             try:
                 broken = list(part())
-            except Exception as error:
+            except FAILURES as error:
                 broken = [("raises", said(error))]
             yield from broken
             if broken:

@@ -11,7 +11,9 @@ import numpy as np
 
 from dva_sim.agents.tilt import Filter, Mapping
 from dva_sim.agents.tilt.calibration import LEVELS, MAX_TURN_DEG
+from dva_sim.agents.tilt.filters import check_filter, is_age
 from dva_sim.checking.promises import Case, Outcome, line, said
+from dva_sim.plugins import FAILURES
 
 Pair = tuple[float, float]
 Part = Callable[[], Iterator[Case]]
@@ -34,7 +36,11 @@ def try_filter(make: Callable[[float], Filter], seed: int = 1, slow: float = SLO
         make: Makes a copy, told the time between samples.
         seed: Of the samples.
         slow: A sample that takes longer earns a warning [s].
+
+    Raises:
+        ConfigError: it cannot be made, or no phone could work with it.
     """
+    check_filter(make(PERIOD))
     trial = _FilterTrial(lambda: make(PERIOD), np.random.default_rng(seed))
     return _outcome(trial.parts, trial.sticks, trial.took, slow)
 
@@ -46,7 +52,11 @@ def try_mapping(make: Callable[[], Mapping], seed: int = 1, slow: float = SLOW) 
         make: Makes a copy.
         seed: Of the readings.
         slow: A reading that takes longer earns a warning [s].
+
+    Raises:
+        ConfigError: it cannot be made.
     """
+    make()
     trial = _MappingTrial(make, np.random.default_rng(seed))
     return _outcome(trial.parts, lambda: iter(()), trial.took, slow)
 
@@ -60,7 +70,7 @@ def _outcome(
         try:
             for promise, case in part():
                 found.setdefault(promise, []).append(case)
-        except Exception as error:
+        except FAILURES as error:
             found.setdefault("raises", []).append(said(error))
         if found:
             break
@@ -159,11 +169,11 @@ class _FilterTrial:
         value = self._values(filter_, [(n / 100, -n / 100) for n in range(count)])[-1]
         newest = count - 1
         for lag in (newest - 100 * value[0], newest + 100 * value[1]):
-            if abs(lag - filter_.age) > 0.5:
-                yield (
-                    "is not as old as it says",
-                    (f"{lag:.1f} samples behind a rising input; age says {filter_.age:.1f}"),
-                )
+            age = filter_.age
+            if not (is_age(age) and abs(lag - age) <= 0.5):
+                says = f"age says {age:.1f}" if is_age(age) else f"age is {age!r}"
+                case = f"{lag:.1f} samples behind a rising input; {says}"
+                yield "is not as old as it says", case
 
     def sticks(self) -> Iterator[str]:
         """A doubt: batches that end early, as when the longest delay of the app is short."""

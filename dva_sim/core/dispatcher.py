@@ -24,6 +24,7 @@ from dva_sim.core.lookout import Lookout, View, same_place
 from dva_sim.core.orders import Orders
 from dva_sim.core.registry import ROBOT
 from dva_sim.core.send import Send
+from dva_sim.plugins import FAILURES
 from dva_sim.protocol import messages as m
 
 DECISIONS = 4  # in a row, where one makes the next necessary
@@ -84,7 +85,7 @@ class Dispatcher:
         try:
             advice = list(self.policy.advise(situation, self._rng))
             _check_form(advice, situation)
-        except Exception as error:
+        except FAILURES as error:
             self.orders.counters["policy failed"] += 1
             self.last_failure = f"{type(error).__name__}: {error}"
             return self._default.advise(situation, self._rng)

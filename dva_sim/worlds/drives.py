@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from dva_sim.errors import ConfigError
-from dva_sim.plugins import Plugins, said
+from dva_sim.plugins import FAILURES, Plugins, said
 
 LONGEST_TICK: Final = 0.04  # that profiles are made for [s]
 CREEP: Final = 0.01  # below this a car stands, and its steering turns nothing [m/s]
@@ -188,7 +188,7 @@ class Guarded(Drive):
             if math.isfinite(one) and math.isfinite(other):
                 return float(one), float(other)
             problem = f"answers {one!r}, {other!r}"
-        except Exception as error:
+        except FAILURES as error:
             problem = said(error)
         self.failures += 1
         self.first_failure = self.first_failure or problem

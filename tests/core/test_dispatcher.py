@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
@@ -214,6 +215,7 @@ def mutates(situation: Situation) -> Any:
         lambda s: [Assignment(10**30, 0)],
         lambda s: [Assignment(0, 0), Assignment(1, 0)],
         lambda s: [Announcement(7)],
+        lambda s: sys.exit(3),
         lambda s: [Relocation(0, 0)],
     ],
 )

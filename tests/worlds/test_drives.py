@@ -202,7 +202,7 @@ def answering(what):
             return self.accelerations()
 
         def accelerations(self, *_):
-            if isinstance(what, Exception):
+            if isinstance(what, BaseException):
                 raise what
             return what
 
@@ -219,6 +219,7 @@ def answering(what):
         ((1.0, 2.0, 3.0), "ValueError: too many values to unpack (expected 2)"),
         ((10**400, 0.0), "OverflowError: int too large to convert to float"),
         (ValueError("broken\nwire"), "ValueError: broken wire"),
+        (SystemExit(3), "SystemExit: 3"),
     ],
 )
 def test_a_drive_without_an_answer_brakes_and_is_counted(answer, told):

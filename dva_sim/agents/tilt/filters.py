@@ -10,6 +10,7 @@ import math
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
+from numbers import Real
 from pathlib import Path
 from typing import Any, Final
 
@@ -18,6 +19,7 @@ from dva_sim.plugins import Plugins
 
 Sample = tuple[float, float]  # speed level, turn [deg/s]
 BATCH: Final = 20  # slots of the dissertation's buffer
+MOST_BATCH: Final = 1000  # samples of a batch
 
 
 class Filter(ABC):
@@ -27,8 +29,8 @@ class Filter(ABC):
         period: Mean time between two samples [s].
 
     Attributes:
-        batch: After so many fresh samples, or when the app's longest delay has passed, the
-            value is taken, and stands until the next time; None: the value is of use at any
+        batch: After so many fresh samples, 1 to 1000, or when the app's longest delay has passed,
+            the value is taken, and stands until the next time; None: the value is of use at any
             time, and asking for it changes nothing.
         failures: How often it gave no answer that is one; only filters of users do that.
         first_failure: What was wrong with it first, in a line.
@@ -257,7 +259,33 @@ def load_filter(
 
     Raises:
         ConfigError: there is none of that name, its file or package cannot be loaded, or it is
-            not a filter; a bad option is told when it is made.
+            not a filter; a bad option, `batch` or `age` is told when it is made.
     """
     factory, given = _PLUGINS.find(name, base), dict(options or {})
-    return lambda period: _PLUGINS.make(name, factory, given, period)
+
+    def make(period: float) -> Filter:
+        filter_ = _PLUGINS.make(name, factory, given, period)
+        if name not in FILTERS:
+            _PLUGINS.ask(name, lambda: check_filter(filter_))
+        return filter_
+
+    return make
+
+
+def check_filter(filter_: Filter) -> None:
+    """Refuse a filter with which a phone could not work.
+
+    Raises:
+        ConfigError: its `batch` is neither None nor from 1 to 1000, or its `age` is no age.
+    """
+    batch, age = filter_.batch, filter_.age
+    if batch is not None and not (type(batch) is int and 1 <= batch <= MOST_BATCH):
+        wanted = f"None or a whole number, 1 to {MOST_BATCH}"
+        raise ConfigError(f"its batch is {batch!r}; should be {wanted}")
+    if not is_age(age):
+        raise ConfigError(f"its age is {age!r}; should be a number of samples, at least 0")
+
+
+def is_age(age: object) -> bool:
+    """Whether it can be an age: a finite number, at least 0."""
+    return isinstance(age, Real) and 0.0 <= float(age) < math.inf

@@ -6,9 +6,9 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from dva_sim.agents.tilt.filters import Filter, Sample
+from dva_sim.agents.tilt.filters import Filter, Sample, check_filter, is_age
 from dva_sim.agents.tilt.mappings import Mapping, Pair, limited
-from dva_sim.plugins import said
+from dva_sim.plugins import FAILURES, said
 
 STAND: Pair = (0.0, 0.0)
 
@@ -26,7 +26,7 @@ class _Guard:
             if math.isfinite(one) and math.isfinite(other):
                 return float(one), float(other)
             self._count(f"answers {one!r}, {other!r}")
-        except Exception as error:
+        except FAILURES as error:
             self._count(said(error))
         return None
 
@@ -36,18 +36,26 @@ class _Guard:
 
 
 class GuardedFilter(_Guard, Filter):
-    """A filter of a user; where it gives no answer, the reading is that of a phone at rest."""
+    """A filter of a user; where it gives no answer, the reading is that of a phone at rest.
 
-    def __init__(self, filter_: Filter) -> None:
-        super().__init__(filter_.period)
-        self._filter = filter_
-        self.batch = filter_.batch
+    Args:
+        filter_: The user's own.
+        period: Mean time between two samples [s].
+
+    Raises:
+        ConfigError: no phone could work with it.
+    """
+
+    def __init__(self, filter_: Filter, period: float) -> None:
+        check_filter(filter_)
+        super().__init__(period)
+        self._filter, self.batch = filter_, filter_.batch
 
     def add(self, sample: Sample) -> None:
         """See `Filter`."""
         try:
             self._filter.add(sample)
-        except Exception as error:
+        except FAILURES as error:
             self._count(said(error))
 
     def value(self) -> Sample:
@@ -58,11 +66,11 @@ class GuardedFilter(_Guard, Filter):
     def age(self) -> float:
         """See `Filter`; what is no age is none."""
         try:
-            age = float(self._filter.age)
-            if 0.0 <= age < math.inf:
-                return age
+            age = self._filter.age
+            if is_age(age):
+                return float(age)
             self._count(f"is {age!r} samples old")
-        except Exception as error:
+        except FAILURES as error:
             self._count(said(error))
         return 0.0
 
@@ -77,7 +85,10 @@ class GuardedMapping(_Guard, Mapping):
     def begin(self) -> None:
         """See `Mapping`; failures are counted by drives."""
         self.failures, self.first_failure = 0, ""
-        self._mapping.begin()
+        try:
+            self._mapping.begin()
+        except FAILURES as error:
+            self._count(said(error))
 
     def command(self, level: float, turn: float, dt: float) -> Pair:
         """See `Mapping`; within the limits."""

@@ -123,7 +123,7 @@ class Phone:
         filters = load_filter(profile.filter, profile.filter_options)
         own_filter = profile.filter not in FILTERS
         self._make_filter: Callable[[], Filter] = lambda: (
-            GuardedFilter(filters(period)) if own_filter else filters(period)
+            GuardedFilter(filters(period), period) if own_filter else filters(period)
         )
         self._batch = self._make_filter().batch
         mapping = load_mapping(profile.mapping, profile.mapping_options)()

@@ -222,6 +222,8 @@ class Fails(Mapping):
     integrates = False
     def command(self, level, turn, dt): return 1 / 0
     def tilt_for(self, wanted, shown, within): return wanted
+class Leaves(NoNumber):
+    def value(self): raise SystemExit(3)
 """
 
 
@@ -229,6 +231,7 @@ class Fails(Mapping):
     ("settings", "first"),
     [
         ({"filter": "own.py:NoNumber"}, "answers nan, 1.0"),
+        ({"filter": "own.py:Leaves"}, "SystemExit: 3"),
         ({"mapping": "own.py:Fails"}, "ZeroDivisionError: division by zero"),
     ],
 )
