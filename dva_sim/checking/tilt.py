@@ -202,7 +202,8 @@ class _MappingTrial:
     def __init__(self, make: Callable[[], Mapping], rng: np.random.Generator) -> None:
         self.make, self.rng, self.took = make, rng, list[float]()
         self.parts: tuple[Part, ...] = (
-            self._limits, self._copies, self._rest, self._way, self._tilts, self._steered
+            self._limits, self._copies, self._steps, self._rest, self._way, self._tilts,
+            self._steered,
         )  # fmt: skip
 
     def _readings(self, count: int = SAMPLES) -> list[Pair]:
@@ -240,6 +241,21 @@ class _MappingTrial:
             backwards = [one.command(*reading, PERIOD) for reading in reversed(readings)]
             if backwards[::-1] != alone:
                 yield "depends on readings before, though it does not integrate", "in other order"
+
+    def _steps(self) -> Iterator[Case]:
+        """How a second is cut into steps is no matter to what a reading that stands leads to."""
+        if not self.make().integrates:
+            return
+        for share in (1.0, 0.3, 0.1, 0.03):
+            reading, count = (share * HAND[0], share * HAND[1]), round(1.0 / PERIOD)
+            whole, halves = self.make(), self.make()
+            for _ in range(count):
+                one = whole.command(*reading, PERIOD)
+                halves.command(*reading, PERIOD / 2)
+                two = halves.command(*reading, PERIOD / 2)
+            if not all(math.isclose(a, b, rel_tol=NEAR) for a, b in zip(one, two, strict=True)):
+                case = f"{_told(two)} after {2 * count} half steps, "
+                yield "integrates by steps, not by time", f"{case}{_told(one)} after {count} whole"
 
     def _rest(self) -> Iterator[Case]:
         """A phone held at rest stands, and turns no faster than when it came to rest."""

@@ -25,6 +25,8 @@ class Mapping(ABC):
     Attributes:
         integrates: Whether a command depends on those before. If so, every value of the filter
             is told once, with the time that it stands for, and the person watches the display.
+            It is time that counts then, not steps: a second of a reading that stands, in whole
+            samples or in halves, comes to the same within 2 %.
         failures: How often it gave no answer that is one; only mappings of users do that.
         first_failure: What was wrong with it first, in a line.
     """
