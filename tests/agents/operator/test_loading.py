@@ -50,7 +50,11 @@ def test_all_ways_of_steering_have_names() -> None:
         ("pursuit", {"gain": 2}, "operator 'pursuit' has no option 'gain'; it has none"),
         ("predictor", {"gain": 2}, "has no option 'gain'; known: inner, quality"),
         ("predictor", {"quality": 1.5}, "option 'quality' is 1.5; should be from 0 to 1"),
-        ("predictor", {"inner": "oracle"}, "option 'inner' is 'oracle', which needs no prediction"),
+        ("predictor", {"quality": math.nan}, "option 'quality' is nan; should be from 0 to 1"),
+        ("predictor", {"quality": "nan"}, "option 'quality' is 'nan'; should be from 0 to 1"),
+        ("predictor", {"inner": "oracle"}, "option 'inner' is 'oracle', which sees nothing"),
+        ("adaptive", {"closed": "oracle"}, "option 'closed' is 'oracle', which sees nothing"),
+        ("adaptive", {"closed": 5}, "option 'closed' is 5; should be the name of an operator"),
         ("adaptive", {"closed": "nothing"}, "operator 'nothing' is unknown"),
     ],
 )
@@ -73,6 +77,42 @@ def test_only_the_oracle_is_told_the_truth_and_it_is_no_strategy_that_sees() -> 
     assert oracle.drive(way((0, 0), (9, 0)), Truth(state), 0.5).speed == pytest.approx(0.475)
     with pytest.raises(AttributeError):
         Pursuit(person(), ROBOT).drive(way((0, 0), (9, 0)), Truth(state), 0.5)  # type: ignore[arg-type]
+
+
+CHEAT = """
+from dva_sim.agents.operator.strategies import Oracle, Pursuit
+class Mine(Pursuit, Oracle):
+    pass
+"""
+OTHER = """
+from dva_sim.agents.operator.strategies import Oracle, Pursuit
+class Mine(Pursuit):
+    def __new__(cls, person, reach):
+        return Oracle(person, reach)
+"""
+POSING = """
+from dva_sim.agents.operator.strategies import Oracle, Pursuit
+class Mine(Pursuit):
+    __class__ = Oracle
+"""
+
+
+def test_no_class_of_a_user_derives_from_the_oracle_to_be_told_the_truth(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(CHEAT)
+    with pytest.raises(ConfigError, match="Mine cannot derive from Oracle, which alone is told"):
+        load_strategy("mine.py:Mine", base=tmp_path)
+
+
+def test_nor_does_one_make_an_oracle_of_itself(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(OTHER)
+    with pytest.raises(ConfigError, match="makes no operator, but Oracle"):
+        load_strategy("mine.py:Mine", base=tmp_path)(person(), ROBOT)
+
+
+def test_one_that_poses_as_the_oracle_is_not_taken_for_it(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(POSING)
+    made = load_strategy("mine.py:Mine", base=tmp_path)(person(), ROBOT)
+    assert not isinstance(made, Oracle)
 
 
 def test_the_strategy_of_a_user_steers(tmp_path: Path) -> None:

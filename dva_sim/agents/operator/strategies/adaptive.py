@@ -24,7 +24,6 @@ from dva_sim.agents.operator.strategies.move_and_wait import MoveAndWait
 from dva_sim.agents.operator.strategies.moves import SHORT
 from dva_sim.agents.operator.strategies.pursuit import FARTHEST_LOOK
 from dva_sim.agents.steering import Route
-from dva_sim.errors import ConfigError
 
 BETTER = 0.8  # one changes to what takes less than this share of the time; assumed
 GAP = 1.0  # a longer time between two frames is not counted as driving [s]
@@ -52,13 +51,11 @@ class Adaptive(Strategy):
     """
 
     def __init__(self, person: Person, reach: Reach, closed: str = "pursuit") -> None:
-        from dva_sim.agents.operator.strategies.loading import load_strategy
+        from dva_sim.agents.operator.strategies.loading import load_inner
 
         super().__init__(person, reach)
-        made = load_strategy(closed)(person, reach)
-        if not isinstance(made, Strategy):
-            raise ConfigError(f"option 'closed' is {closed!r}, which closes no loop by eye")
-        self._closed, self._moves = made, MoveAndWait(person, reach)
+        self._closed = load_inner("closed", closed, person, reach)
+        self._moves = MoveAndWait(person, reach)
         self.using = "closed"
         self.switches = 0
         self._times = {"closed": 0.0, "move_and_wait": 0.0}

@@ -15,6 +15,7 @@ from dva_sim.agents.operator.strategies.oracle import Oracle
 from dva_sim.agents.operator.strategies.predictor import Predictor
 from dva_sim.agents.operator.strategies.pursuit import Pursuit
 from dva_sim.agents.operator.strategies.two_point import TwoPoint
+from dva_sim.errors import ConfigError
 from dva_sim.plugins import Plugins
 
 Driver = Strategy | Oracle
@@ -66,11 +67,27 @@ def load_strategy(
 
     def make(person: Person, reach: Reach) -> Driver:
         made = _PLUGINS.make(name, factory, given, person, reach)
-        if name in STRATEGIES or isinstance(made, Oracle):
+        if name in STRATEGIES:
             return made
+        if not isinstance(made, Strategy):  # its class may make something else of itself
+            raise ConfigError(f"operator {name!r} makes no operator, but {type(made).__name__}")
         return Guarded(made)
 
     return make
+
+
+def load_inner(option: str, name: object, person: Person, reach: Reach) -> Strategy:
+    """The strategy that another one is told to use, by an option of that name.
+
+    Raises:
+        ConfigError: it is none, or it sees nothing.
+    """
+    if not isinstance(name, str):
+        raise ConfigError(f"option {option!r} is {name!r}; should be the name of an operator")
+    made = load_strategy(name)(person, reach)
+    if not isinstance(made, Strategy):
+        raise ConfigError(f"option {option!r} is {name!r}, which sees nothing")
+    return made
 
 
 def try_strategy(name: str, options: Mapping[str, Any] | None = None) -> None:

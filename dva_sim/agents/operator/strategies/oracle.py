@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Generic, TypeVar
+from typing import Generic, TypeVar, final
 
 from dva_sim.agents.camera import Observation
 from dva_sim.agents.operator.person import Person
@@ -29,10 +29,11 @@ class Truth(Generic[S]):
     delay: float = 0.0
 
 
+@final
 class Oracle:
     """The same steering as `Pursuit`, from where what is asked for now takes effect.
 
-    It is no `Strategy`, as it sees nothing.
+    It is no `Strategy`, as it sees nothing. Nothing derives from it: it alone is told the truth.
 
     Args:
         person: Gain, caution and pace.
@@ -43,6 +44,9 @@ class Oracle:
 
     def __init__(self, person: Person, reach: Reach) -> None:
         self._inner = Predictor(person, reach, "pursuit")
+
+    def __init_subclass__(cls) -> None:
+        raise TypeError(f"{cls.__name__} cannot derive from Oracle, which alone is told the truth")
 
     def drive(self, route: Route, truth: Truth[Observation], stop_before: float) -> Intent:
         """What to ask a robot for."""

@@ -48,15 +48,12 @@ class Predictor(Strategy):
     def __init__(
         self, person: Person, reach: Reach, inner: str = "pursuit", quality: float = 1.0
     ) -> None:
-        from dva_sim.agents.operator.strategies.loading import load_strategy
+        from dva_sim.agents.operator.strategies.loading import load_inner
 
         super().__init__(person, reach)
-        if not 0.0 <= quality <= 1.0:
+        if not isinstance(quality, int | float) or not 0.0 <= quality <= 1.0:
             raise ConfigError(f"option 'quality' is {quality!r}; should be from 0 to 1")
-        made = load_strategy(inner)(person, reach)
-        if not isinstance(made, Strategy):
-            raise ConfigError(f"option 'inner' is {inner!r}, which needs no prediction")
-        self._inner, self._quality = made, quality
+        self._inner, self._quality = load_inner("inner", inner, person, reach), quality
         self._asked: deque[tuple[float, float, float]] = deque()
 
     def drive(self, route: Route, view: View, stop_before: float) -> Intent:
