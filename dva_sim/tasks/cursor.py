@@ -1,10 +1,19 @@
-"""Trials in which a cursor, or the tip of an arm, is moved; what is to be done is a goal."""
+"""Trials in which a cursor, or the tip of an arm, is moved; what is to be done is a goal.
+
+References:
+    R. J. Snowden, O. J. Braddick: The temporal integration and resolution of velocity signals.
+    Vision Research 31, 1991 (the speed of what is seen for longer than about 100 ms is told apart
+    no better).
+    D. C. Burr: Temporal summation of moving images by the human visual system. Proc. R. Soc.
+    Lond. B 211, 1981 (moving dots are summed over about 100 ms).
+"""
 
 from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from typing import Any
+from collections import deque
+from typing import Any, NamedTuple
 
 from dva_sim.agents.operator.strategies import (
     Driver,
@@ -26,6 +35,48 @@ from dva_sim.tasks.scenario import OneWay, TaskScenario
 from dva_sim.tasks.trial import Seat, Trace, Trial
 
 MOVED = 1e-3  # a cursor that has gone so far has moved [m]; assumed
+SUMMED = 0.1  # over so long vision sums motion before it tells a velocity [s]
+
+
+class Places(NamedTuple):
+    """Where cursor and target were at a time [s, m]."""
+
+    time: float
+    x: float
+    y: float
+    target_x: float
+    target_y: float
+
+
+class Motion:
+    """Velocities as they are seen: from the frames of the last tenth of a second, two at least.
+
+    Steps that a device makes within that time are not seen one by one, so that a cursor which
+    is updated at another rate than it is shown seems to move evenly all the same.
+    """
+
+    def __init__(self) -> None:
+        self._frames: deque[Places] = deque()
+
+    def add(self, frame: Places) -> None:
+        """One more frame is shown."""
+        frames, since = self._frames, frame.time - SUMMED - 1e-9
+        while len(frames) > 1 and frames[0].time < since:
+            frames.popleft()
+        frames.append(frame)
+
+    def velocities(self) -> tuple[float, float, float, float]:
+        """Of cursor and target along x and y: slopes of the least-squares lines [m/s]."""
+        frames = self._frames
+        middle = sum(frame.time for frame in frames) / len(frames)
+        squares = sum((frame.time - middle) ** 2 for frame in frames)
+        sums = [0.0, 0.0, 0.0, 0.0]
+        if squares:
+            for time, *places in frames:
+                share = (time - middle) / squares
+                sums = [so_far + share * at for so_far, at in zip(sums, places, strict=True)]
+        vx, vy, target_vx, target_vy = sums
+        return vx, vy, target_vx, target_vy
 
 
 class Goal(ABC):
@@ -103,27 +154,24 @@ class CursorTrial(Trial[Sighting]):
         self.goal = goal
         way = OneWay() if self.is_oracle else scenario.link.up
         self._up: Channel[Pair] = Channel(way, 0.0, streams, "up")
-        self._last: tuple[float, float, float, float, float] | None = None
+        self._motion = Motion()
         self._next_reading, self.path = 0.0, 0.0
         self.moved_at: float | None = None
 
     def sight(self) -> Sighting:
-        """Velocities are what two frames in a row tell of them."""
+        """Velocities are those of the last frames; see `Motion`."""
         now, (x, y) = self.now, (self.plant.x, self.plant.y)
         tx, ty = self.goal.target(now)
-        vx = vy = tvx = tvy = 0.0
-        if self._last is not None:
-            then, old_x, old_y, old_tx, old_ty = self._last
-            vx, vy = (x - old_x) / (now - then), (y - old_y) / (now - then)
-            if not self.goal.stands:
-                tvx, tvy = (tx - old_tx) / (now - then), (ty - old_ty) / (now - then)
-        self._last = now, x, y, tx, ty
+        self._motion.add(Places(now, x, y, tx, ty))
+        vx, vy, tvx, tvy = self._motion.velocities()
+        if self.goal.stands:
+            tvx = tvy = 0.0
         return Sighting(round(1000 * now), x, y, vx, vy, tx, ty, tvx, tvy, self.goal.tolerance)
 
     def decide(self, driver: Driver, seen: Sighting, now: float) -> None:
-        """See `Trial`."""
+        """See `Trial`; a velocity is that of the middle of the time over which it is summed."""
         delay = self.seat.delay
-        delay.see(now, seen.vx, seen.vy)
+        delay.see(now - 0.5 * SUMMED, seen.vx, seen.vy)
         vx, vy = self._ask(driver, seen, now, delay.value)
         self.goal.notice(self.now, seen, delay.value)
         if self.goal.flat:

@@ -54,12 +54,12 @@ class DelayEstimate:
         self._intent = one, other
 
     def see(self, now: float, one: float, other: float) -> None:
-        """The picture shows this motion at `now` [s]."""
+        """The picture shows the motion that was at `now` [s]; intents may be newer."""
         if now < self._next_look:
             return
         self._next_look = now + self._period
         self._remember(now)
-        newest = self._filled
+        newest = self._due(now)
         past = slice(newest - len(self._lags), newest)
         error = np.abs(self._asked[0, past] - one)
         error *= self._weights[0]
@@ -75,7 +75,7 @@ class DelayEstimate:
 
     def _remember(self, now: float) -> None:
         """Fill the memory with the standing intent up to `now`."""
-        due = self._offset + int((now - self._start) / self._step + 1e-6)
+        due = self._due(now)
         if due <= self._filled:
             return
         while due >= self._asked.shape[1]:
@@ -83,3 +83,7 @@ class DelayEstimate:
         self._asked[0, self._filled : due] = self._intent[0]
         self._asked[1, self._filled : due] = self._intent[1]
         self._filled = due
+
+    def _due(self, now: float) -> int:
+        """How much of the memory is filled at `now`."""
+        return self._offset + int((now - self._start) / self._step + 1e-6)
