@@ -1,12 +1,13 @@
 import numpy as np
 import pytest
 import synthetic_study
+from matplotlib.figure import Figure
 
 from dva_sim.experiments.cadence import Cadence
 from dva_sim.experiments.effects import Factor, Part, View
 from dva_sim.experiments.figures.ground import Ways
 from dva_sim.experiments.figures.story import Events, fates
-from dva_sim.experiments.figures.style import _apart, colours, place_of
+from dva_sim.experiments.figures.style import _apart, colours, log_axis, place_of
 
 DELAY = Factor("link.delay_s", (0.0, 0.05, 0.1, 0.25, 0.5, 1.0))
 PATTERN = Factor("pattern", ("req-rep", "pub-sub", "latest-wins"))
@@ -80,3 +81,24 @@ def test_a_way_is_found_by_its_pattern_delay_and_profile(view):
     ]
     np.testing.assert_array_equal(way, wanted)
     assert len(ways.reference()) == 1
+
+
+@pytest.mark.parametrize(
+    ("ends", "numbers"),
+    [
+        ((0.05, 0.7), ["0.05", "0.1", "0.2", "0.5"]),
+        ((0.3, 0.45), ["0.3", "0.4"]),
+        ((0.02, 30.0), ["0.02", "0.05", "0.1", "0.2", "0.5", "1", "2", "5", "10", "20"]),
+    ],
+)
+def test_a_logarithmic_axis_has_plain_numbers_at_round_places_only(ends, numbers):
+    figure = Figure()
+    axes = figure.subplots()
+    axes.plot([0, 1], ends)
+    log_axis(axes)
+    figure.draw_without_rendering()
+    low, high = axes.get_ylim()
+    ticks = axes.yaxis.get_major_ticks()
+    shown = [t.label1.get_text() for t in ticks if low <= t.get_loc() <= high]
+    assert shown == numbers
+    assert axes.yaxis.get_minorticklocs().size == 0

@@ -19,6 +19,7 @@ from dva_sim.experiments.figures.style import (
     dodge,
     finish,
     legend,
+    log_axis,
     name_lines,
     panel_title,
     panels,
@@ -44,10 +45,9 @@ def command_age(view: View) -> Drawn | None:
         for level, offset in dodge(view.lines):
             ages = [_cell_means(view.curve(grid, panel, level)) for grid in grids]
             _ranges(ax, [stop + offset for stop in range(len(view.stops))], ages, paint[level])
-        ax.set_yscale("log")
-        ax.yaxis.set_major_formatter("{x:g}")
         panel_title(ax, panel)
         stops_axis(ax, view.over)
+    log_axis(axes[0][0])
     axes[0][0].set_ylabel(axis_label("age_s", "Command age at application"))
     legend(figure, view.line, paint)
     caption = (

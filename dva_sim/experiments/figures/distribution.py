@@ -20,6 +20,7 @@ from dva_sim.experiments.figures.style import (
     hatch_stops,
     hatch_words,
     legend,
+    log_axis,
     panel_title,
     panels,
     stops_axis,
@@ -100,13 +101,8 @@ def _boxes(ax: Axes, offset: float, width: float, values: Floats) -> None:
 
 def _spread(ax: Axes, values: Floats) -> None:
     """A logarithmic axis where the slowest run takes many times as long as the fastest."""
-    from matplotlib.ticker import LogLocator, NullLocator
-
     if len(values) and values.min() > 0 and values.max() > 5 * values.min():
-        ax.set_yscale("log")
-        ax.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-        ax.yaxis.set_major_formatter("{x:g}")
-        ax.yaxis.set_minor_locator(NullLocator())
+        log_axis(ax)
 
 
 def _reference_line(ax: Axes, view: View) -> None:

@@ -176,6 +176,17 @@ def _tick_names(over: Factor) -> tuple[list[str], str]:
     return [f"{v:g}" for v in values], unit
 
 
+def log_axis(axes: Axes) -> None:
+    """A logarithmic axis for what is drawn, with plain numbers at round places and no others."""
+    from matplotlib.ticker import LogLocator, NullLocator
+
+    axes.set_yscale("log")
+    low, high = axes.get_ylim()
+    axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5) if high > 5 * low else range(1, 10)))
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.yaxis.set_minor_locator(NullLocator())
+
+
 def hatch_stops(axes: Axes, stops: Sequence[int]) -> None:
     """Mark stops that are extrapolations."""
     for stop in stops:
