@@ -118,17 +118,20 @@ def open_loop(
 def crossover(frequencies: Sequence[float], loop: NDArray[np.complex128]) -> Crossover:
     """Read crossover frequency and phase margin off a measured open loop.
 
-    Between frequencies the gain is straight in log over log, and so is the phase in log
-    frequency; where the gain is below one everywhere, or nowhere, there is nan.
+    Between the two frequencies around the crossover the gain is straight in log over log, and the
+    phase in log frequency, the shorter way round. Of the phase nothing else counts: the lowest
+    sines, of whose periods a record holds few, are the noisiest. Where the gain is below one
+    everywhere, or nowhere, there is nan.
+
+    Returns:
+        The margin is within (-pi, pi]: whole turns cannot be told.
     """
     log_w, gain = np.log(np.asarray(frequencies)), np.log(np.abs(loop))
-    phase = np.unwrap(np.angle(loop))
-    phase -= 2.0 * math.pi * np.round((phase[0] + math.pi / 2) / (2.0 * math.pi))
     falls = np.flatnonzero((gain[:-1] >= 0.0) & (gain[1:] < 0.0))
     if not len(falls):
         return Crossover(math.nan, math.nan)
     i = int(falls[0])
     share = gain[i] / (gain[i] - gain[i + 1])
     at = log_w[i] + share * (log_w[i + 1] - log_w[i])
-    angle = phase[i] + share * (phase[i + 1] - phase[i])
-    return Crossover(float(np.exp(at)), float(math.pi + angle))
+    angle = float(np.angle(loop[i]) + share * np.angle(loop[i + 1] / loop[i]))
+    return Crossover(float(np.exp(at)), math.pi - (-angle) % (2.0 * math.pi))

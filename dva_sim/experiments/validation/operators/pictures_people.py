@@ -24,7 +24,7 @@ from dva_sim.experiments.validation.operators.strokes import (
     straight,
     value,
 )
-from dva_sim.experiments.validation.operators.trials import Cells, person_means
+from dva_sim.experiments.validation.operators.trials import Cells, mean, person_means
 from dva_sim.tasks.measures import fit_line
 
 if TYPE_CHECKING:
@@ -62,12 +62,13 @@ def _lag(lines: ByLine, cells: Cells) -> Drawn:
     left.set_title("Fitts' law by lag")
     left.legend(loc="upper left", fontsize=8, title="lag")
     _ratios(right, lines, cells)
-    slope = lines["S8/slope"]
+    slope, first = lines["S8/slope"], mean(cells[of.SHORTEST_LAG], TIME)
     text = (
         "Pointing with a mouse whose cursor is late (MacKenzie & Ware 1993). Left: means of each "
         "condition and lines through them. Right: movement time against that at 8.3 ms; rings are "
         f"published, grey are the bands. A millisecond of lag costs {slope.found.value:.2f} ms at "
-        f"4 bits; the band is {slope.line.low:g} to {slope.line.high:g}."
+        f"4 bits; the band is {slope.line.low:g} to {slope.line.high:g}. Only such differences are "
+        f"compared: simulated persons need {first:.2f} s at 8.3 ms, published ones needed 0.91 s."
     )
     return finish(figure, "lag", "Pointing under lag", text)
 
@@ -230,7 +231,7 @@ def _tracking(lines: ByLine, cells: Cells) -> Drawn:
     axes.fill_between([low, high], below, above, color=FAINT, alpha=0.55, lw=0, label="band")
     axes.plot(trials["crossover_rad_s"], trials["phase_margin_deg"], "o", color=BLUE, ms=5)
     axes.set_xlim(0, max(5.4, 1.1 * np.nanmax(trials["crossover_rad_s"], initial=0.0)))
-    axes.set_ylim(0, max(95.0, 1.1 * np.nanmax(trials["phase_margin_deg"], initial=0.0)))
+    axes.set_ylim(0, 95)
     axes.set_xlabel("crossover frequency [rad/s]")
     axes.set_ylabel("phase margin [deg]")
     axes.legend(loc="upper right", fontsize=8)
