@@ -5,6 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
+import numpy as np
+from numpy.typing import NDArray
+
 from dva_sim.agents.camera import Observation
 from dva_sim.agents.commands import CommandSender, PublishedCommands, RequestedCommands
 from dva_sim.agents.operator.careful import Careful
@@ -50,6 +53,9 @@ class Drive(Work):
         super().__init__(seat, order, log, on_end)
         self._sender: CommandSender | None = None
         self._route: Route | None = None
+        self._lent: Route | None = (
+            None  # the same to the strategy, which may do with it as it likes
+        )
         self._intent = Intent(0.0, 0.0)
         self._seen_tick: int | None = None
         reach = seat.reach(self.robot)
@@ -142,8 +148,8 @@ class Drive(Work):
             # The guess is made when a frame is perceived, so it holds the perceptual delay.
             drive, delay = self._strategy.drive, seat.delay.value
             view = View(now, judged, delay)
-            usual = lambda way, keep: drive(way, view, keep)  # noqa: E731
-            self._intend(self._steer(route, judged, delay, usual), judged.tick)
+            usual = lambda keep: drive(route, view, keep)  # noqa: E731
+            self._intend(self._steer(judged, delay, usual), judged.tick)
             self._count_failures(self._strategy)
 
     def _count_failures(self, strategy: Strategy) -> None:
@@ -157,24 +163,24 @@ class Drive(Work):
                     f"lets go, as its strategy fails: {strategy.first_failure}", "drive"
                 )
 
-    def _steer(
-        self, route: Route, seen: Observation, delay: float, usual: Callable[[Route, float], Intent]
-    ) -> Intent:
+    def _steer(self, seen: Observation, delay: float, usual: Callable[[float], Intent]) -> Intent:
         """What to ask for; close quarters are for who knows that a guard holds the robot back.
 
         Args:
-            route: The way to go.
             seen: What is seen now.
             delay: What the whole delay is taken to be [s].
-            usual: How the person drives otherwise, told the way and where to stop before its end.
+            usual: How the person drives otherwise, told where to stop before the end of the way.
         """
         careful, keep = self._careful, self._keep_off(seen)
         if careful is None:
-            return usual(route, keep)
+            return usual(keep)
         if careful.notice(self._clock.now, seen, self._intent.speed, delay):
             points = careful.way((seen.x, seen.y), self._goal, self._seat.planner)
-            route = self._route = route if points is None else Route(points)
-        return careful.drive(route, seen, delay, keep) if careful.on else usual(route, keep)
+            if points is not None:
+                self._take(points)
+        if not careful.on or self._route is None:
+            return usual(keep)
+        return careful.drive(self._route, seen, delay, keep)
 
     def _look_at_truth(self) -> bool:
         """The oracle's own loop; False ends it."""
@@ -188,12 +194,12 @@ class Drive(Work):
         route = self._consider(state)
         if route is not None:
             drive = self._strategy.drive
-            usual = lambda way, keep: drive(way, truth, keep)  # noqa: E731
-            self._intend(self._steer(route, state, truth.delay, usual), state.tick)
+            usual = lambda keep: drive(route, truth, keep)  # noqa: E731
+            self._intend(self._steer(state, truth.delay, usual), state.tick)
         return not self.over
 
     def _consider(self, seen: Observation) -> Route | None:
-        """Is the event in view, is the place empty, is there a way? The way, if still needed."""
+        """Is the event in view, is the place empty? The strategy's way, if still needed."""
         found = self._looking.look(self._clock.now, seen)
         if found is not None:
             self.end(*found)
@@ -208,25 +214,32 @@ class Drive(Work):
     # --- steering ----------------------------------------------------------------------
 
     def _way(self, seen: Observation) -> Route | None:
-        """The way to the goal; planned anew when the robot does not get on."""
+        """The way to the goal, for the strategy; planned anew when the robot does not get on."""
         if self._is_stuck(seen):
-            self._route, self._standing_since = None, None
+            self._route = self._lent = self._standing_since = None
             self._let_go_until = self._clock.now + LET_GO_FOR
             self._device.recorder.counters["replans"] += 1
             self._without_effect += 1
             if self._without_effect >= ATTEMPTS:
                 self.end("lost link", "the robot does not move")
                 return None
-        if self._route is None:
+        route = self._route
+        if route is None:
             points = self._seat.planner.path((seen.x, seen.y), self._goal)
             if points is None:
                 self.end("gave up", "no way there")
                 return None
-            self._route = Route(points)
+            route = self._take(points)
             self.log.ways.append((self._clock.now, points))
-        if self._gets_nowhere(self._route.left):
+        if self._gets_nowhere(route.left):
             self.end("gave up", "the robot gets no nearer")
             return None
+        route.ahead(seen.x, seen.y, seen.heading, 0.0)  # a strategy need not follow it this way
+        return self._lent
+
+    def _take(self, points: NDArray[np.float64]) -> Route:
+        """Go this way `(n, 2)` [m] from now on."""
+        self._route, self._lent = Route(points), Route(points.copy())
         return self._route
 
     def _gets_nowhere(self, left: float) -> bool:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 from pretended_dva import ROBOT, PretendedDva
 
@@ -10,6 +12,23 @@ from dva_sim.agents.operator.work import BLIND_AFTER
 
 EAST = (30.0, 12.0)  # the end of the main corridor [m]
 ASKED = ("req-rep", "pipelined")
+BY_PLACES = """
+import math
+from dva_sim.agents.operator.strategies import Intent, Strategy
+
+class Mine(Strategy):
+    along = 0.0
+
+    def drive(self, route, view, stop_before):
+        seen = view.seen
+        ways = [min(self.along + 0.05 * n, route.length) for n in range(40)]
+        self.along = min(ways, key=lambda s: math.dist(route.point_at(s), (seen.x, seen.y)))
+        x, y = route.point_at(self.along + 0.8)
+        bearing = math.remainder(math.atan2(y - seen.y, x - seen.x) - seen.heading, math.tau)
+        most = self.reach.turn_rate
+        turn = min(max(0.6 * bearing, -most), most)
+        return Intent(0.0 if abs(bearing) > 0.5 else 0.25, turn)
+"""
 PATTERNS = (*ASKED, "pub-sub", "latest-wins")
 
 
@@ -76,3 +95,18 @@ def test_who_gets_no_nearer_gives_up_when_its_patience_ends() -> None:
     outcome, took = lost_after(dva)
     assert outcome == "gave up"
     assert 15.0 < took < 60.0
+
+
+def test_a_robot_gets_nearer_whatever_its_strategy_asks_of_the_way(tmp_path: Path) -> None:
+    """Who steers by places alone never asks the route where it is on it."""
+    path = tmp_path / "mine.py"
+    path.write_text(BY_PLACES)
+    changes = {"operator.strategy": f"{path}:Mine", "operator.traits": {"patience_s": 20.0}}
+    dva = PretendedDva(robots=1, pattern="latest-wins", **changes)
+    dva.operator()
+    dva.order(1, EAST, robot=ROBOT)
+    dva.run_until(lambda: "departed" in dva.progress(1))
+    (log,) = dva.stage.recorder.drives
+    dva.run_until(lambda: "arrived" in dva.progress(1) or log.ended is not None, limit=300.0)
+    assert "arrived" in dva.progress(1)
+    assert dva.now - log.started > 40.0
