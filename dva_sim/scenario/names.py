@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
     from dva_sim.scenario.scenario import Scenario
 
 
+_OPTION = re.compile(r"option '([^']+)'")  # as those who make things by name say it
 _IN_FILES = (
     ("dispatch", "policy"),
     ("operator", "strategy"),
@@ -62,8 +64,7 @@ def check_strategy(strategy: str, options: Mapping[str, Any], error: Fail) -> No
     except ConfigError as problem:
         if problem.file is not None:
             raise
-        key = "options" if "option" in problem.problem else "strategy"
-        raise error(problem.problem, ("operator", key)) from None
+        raise error(problem.problem, _place(problem, "operator", "strategy", "options")) from None
 
 
 def check_policy(policy: str, options: Mapping[str, Any], error: Fail) -> None:
@@ -75,8 +76,7 @@ def check_policy(policy: str, options: Mapping[str, Any], error: Fail) -> None:
     except ConfigError as problem:
         if problem.file is not None:
             raise
-        key = "options" if "option" in problem.problem else "policy"
-        raise error(problem.problem, ("dispatch", key)) from None
+        raise error(problem.problem, _place(problem, "dispatch", "policy", "options")) from None
 
 
 def check_phone(profile: PhoneProfile, error: Fail) -> None:
@@ -90,5 +90,10 @@ def check_phone(profile: PhoneProfile, error: Fail) -> None:
             raise
         key = "mapping" if problem.problem.startswith("mapping") else "filter"
         key = "accelerometer" if problem.problem.startswith("accelerometer") else key
-        key += "_options" if "option" in problem.problem else ""
-        raise error(problem.problem, ("phone", key)) from None
+        raise error(problem.problem, _place(problem, "phone", key, f"{key}_options")) from None
+
+
+def _place(problem: ConfigError, part: str, key: str, options: str) -> Path_:
+    """The key that a problem is told at: the option that it speaks of, or the name."""
+    found = _OPTION.search(problem.problem)
+    return (part, options, found[1]) if found else (part, key)

@@ -39,6 +39,31 @@ def test_a_wrong_stage_is_refused_before_the_run(changes: dict[str, Any], line: 
     assert line in str(told.value)
 
 
+@pytest.mark.parametrize(
+    ("key", "told"),
+    [
+        ("phone.mapping_options.x", "mapping 'absolute' has no option 'x'; known: gain, "),
+        ("phone.filter_options.window", "filter 'median': option 'window' is 0; should be "),
+        ("operator.options.x", "operator 'pursuit' has no option 'x'; it has none"),
+        ("dispatch.options.x", "policy 'min_eta' has no option 'x'; it has none"),
+    ],
+)
+def test_an_option_is_placed_where_it_stands_and_nowhere_if_it_came_as_a_change(
+    key: str, told: str, tmp_path: Path
+) -> None:
+    part, options, name = key.split(".")
+    file = tmp_path / "scenario.yaml"
+    file.write_text(f"horizon_s: 20\n{part}:\n  {options}:\n    {name}: 0\n")
+    plain = tmp_path / "plain.yaml"
+    plain.write_text(f"horizon_s: 20\n{part}: {{}}\n")
+    with pytest.raises(ConfigError) as in_file:
+        scenarios.build(load_yaml(file))
+    assert str(in_file.value).startswith(f"{file}:4:5: {told}")
+    with pytest.raises(ConfigError) as changed:
+        scenarios.build(load_yaml(plain), {key: 0})
+    assert str(changed.value).startswith(told)
+
+
 def test_a_filter_beside_its_scenario_drives_as_the_shipped_one_of_its_kind(
     tmp_path: Path,
 ) -> None:
