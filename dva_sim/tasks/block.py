@@ -93,13 +93,12 @@ def _trial(
     number: int,
     streams: Streams,
 ) -> CursorTrial | DriveTrial:
+    task, reaction = scenario.task, seat.person.reaction
     if scenario.is_driven:
-        return DriveTrial(scenario, seat, condition, streams, seat.person.reaction)
-    task, cue = scenario.task, 0.0
-    if isinstance(task, Pointing) and task.cue == "unexpected":
-        cue = seat.person.reaction + scenario.link.down.delay_s + scenario.frames.extra_s
+        return DriveTrial(scenario, seat, condition, streams, reaction)
+    surprises = isinstance(task, Pointing) and task.cue == "unexpected"
     goal = _goal(scenario, seat.person, condition, number, streams)
-    return CursorTrial(scenario, seat, goal, streams, cue)
+    return CursorTrial(scenario, seat, goal, streams, reaction if surprises else 0.0)
 
 
 def _goal(

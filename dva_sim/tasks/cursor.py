@@ -131,7 +131,7 @@ class CursorTrial(Trial[Sighting]):
         seat: Who does it.
         goal: What is to be done.
         streams: The luck of this trial.
-        cue: See `Trial`.
+        reaction: See `Trial`.
 
     Attributes:
         path: Way gone so far [m].
@@ -141,7 +141,12 @@ class CursorTrial(Trial[Sighting]):
     STEP = 0.004
 
     def __init__(
-        self, scenario: TaskScenario, seat: Seat, goal: Goal, streams: Streams, cue: float = 0.0
+        self,
+        scenario: TaskScenario,
+        seat: Seat,
+        goal: Goal,
+        streams: Streams,
+        reaction: float = 0.0,
     ) -> None:
         top = math.inf if scenario.plant.speed_mps is None else scenario.plant.speed_mps
         config = scenario.device
@@ -150,7 +155,7 @@ class CursorTrial(Trial[Sighting]):
         self.device = make_device(config, seat.person, streams, self.STEP)
         self.plant = Cursor(scenario.plant.lag_s, top)
         reach = Reach(min(top, self.device.top), 0.0)
-        super().__init__(scenario, seat, reach, streams, cue)
+        super().__init__(scenario, seat, reach, streams, reaction)
         self.goal = goal
         way = OneWay() if self.is_oracle else scenario.link.up
         self._up: Channel[Pair] = Channel(way, 0.0, streams, "up")

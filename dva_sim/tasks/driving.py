@@ -70,7 +70,7 @@ class DriveTrial(Trial[Observation]):
         seat: Who drives.
         condition: See the kinds of tasks.
         streams: The luck of this trial.
-        cue: See `Trial`.
+        reaction: See `Trial`.
     """
 
     STEP = 0.01
@@ -81,12 +81,12 @@ class DriveTrial(Trial[Observation]):
         seat: Seat,
         condition: tuple[float, float],
         streams: Streams,
-        cue: float = 0.0,
+        reaction: float = 0.0,
     ) -> None:
         plant = scenario.plant
         assert plant.speed_mps is not None
         self._top = plant.speed_mps, math.radians(plant.turn_rate_deg_s)
-        super().__init__(scenario, seat, Reach(*self._top), streams, cue)
+        super().__init__(scenario, seat, Reach(*self._top), streams, reaction)
         self.points = way_of(scenario.task, *condition)
         self.length, self.width = length_of(self.points), condition[1]
         self._limit = 0.5 * (self.width - plant.width_m)

@@ -39,7 +39,8 @@ class Pointing(Config):
             person presses a button; a press outside the target is an error.
         dwell_s: How long it must stay inside.
         cue: `known`: where the next target will be is known, so one sets off as soon as one
-            sees it. `unexpected`: one needs one's reaction time.
+            sees it. `unexpected`: one acts a reaction time after the first frame is on the screen.
+            Who drives a vehicle always does.
         timed_from: When the movement time begins: with the `target`, or the first `movement`.
     """
 

@@ -4,6 +4,10 @@ The way is that of a real drive: frames at a rate -> link -> perceptual delay ->
 delay as the person has learnt it -> hand and device -> link -> what is moved. Only the oracle sees
 and moves it without frames, links and perception. Time goes by fixed steps; what is due is done at
 the step nearest to it, so that no delay is longer or shorter on average.
+
+A trial begins when its goal appears, at the machine. A person who did not expect it acts a reaction
+after the first frame is on its screen, on the newest one that it has perceived by then; so link,
+encoding and lost frames come before the reaction, and how many frames there are does not matter.
 """
 
 from __future__ import annotations
@@ -98,7 +102,8 @@ class Trial(ABC, Generic[S]):
         seat: Who does it.
         reach: What can be done with what is moved.
         streams: The luck of this trial.
-        cue: Time before the first frame is acted on, beyond perception [s].
+        reaction: From the first frame on the screen to the first that is acted on, perception in
+            it [s]; 0 for who expects the goal: it acts as soon as it has perceived a frame.
 
     Attributes:
         now: Since the trial began [s].
@@ -109,13 +114,21 @@ class Trial(ABC, Generic[S]):
     STEP: float  # [s]
 
     def __init__(
-        self, scenario: TaskScenario, seat: Seat, reach: Reach, streams: Streams, cue: float = 0.0
+        self,
+        scenario: TaskScenario,
+        seat: Seat,
+        reach: Reach,
+        streams: Streams,
+        reaction: float = 0.0,
     ) -> None:
         self.scenario, self.seat, self.trace = scenario, seat, Trace()
         self.waits, self.now, self.over = Waits(), 0.0, False
         self.first_move: float | None = None
-        self._driver, self._cue = seat.strategy(seat.person, reach), cue
+        self._driver = seat.strategy(seat.person, reach)
         perception = seat.person.perceptual_delay
+        self._surprise = max(reaction - perception, 0.0)
+        self._acts_from: float | None = None  # known once a frame is perceived
+        self._newest: S | None = None
         extra = scenario.frames.extra_s + perception
         self._frames: Channel[S] = Channel(scenario.link.down, extra, streams, "down")
 
@@ -145,9 +158,7 @@ class Trial(ABC, Generic[S]):
             if now >= next_frame - half:
                 self._frames_due(now)
                 next_frame += look
-            seen = self._frames.take(now + half)
-            if seen and now >= self._cue - half:
-                self._perceive(seen[-1])
+            self._perceive(now, half)
             if keep and now >= next_trace - half:
                 self._draw()
                 next_trace += TRACE_EVERY
@@ -182,8 +193,22 @@ class Trial(ABC, Generic[S]):
         else:
             self._frames.put(now, self.sight())
 
-    def _perceive(self, seen: S) -> None:
-        self.decide(self._driver, seen, self.seat.begun + self.now)
+    def _perceive(self, now: float, half: float) -> None:
+        """Act on the newest frame, if there is one that was not acted on, and not before the cue.
+
+        Args:
+            now: [s]
+            half: Of a step [s].
+        """
+        seen = self._frames.take(now + half)
+        if seen:
+            self._newest = seen[-1]
+            if self._acts_from is None:
+                self._acts_from = now + self._surprise
+        newest, acts_from = self._newest, self._acts_from
+        if newest is not None and acts_from is not None and now >= acts_from - half:
+            self._newest = None
+            self.decide(self._driver, newest, self.seat.begun + now)
 
     def _draw(self) -> None:
         place, trace = self.place_now(), self.trace

@@ -4,7 +4,8 @@ import math
 
 import pytest
 
-from dva_sim.tasks import build, play, trace_of
+from dva_sim.streams import Streams
+from dva_sim.tasks import block, build, play, trace_of
 from dva_sim.tasks.block import seat_of
 from dva_sim.tasks.measures import fit_line
 from dva_sim.tasks.tunnel import TunnelGoal
@@ -142,6 +143,37 @@ def test_who_is_surprised_begins_after_its_reaction():
         for cue in ("known", "unexpected")
     )
     assert surprised[0] > known[0] + 0.15
+
+
+def first_move(scenario, changes):
+    """When the person of the first trial wants to move [s], and whose reaction that follows."""
+    built = build(scenario, changes)
+    seat, condition = seat_of(built), next(iter(built.task.conditions()))
+    trial = block._trial(built, seat, condition, 0, Streams(3))
+    trial.run()
+    return trial.first_move, seat.person.reaction
+
+
+SURPRISED = pointing(task={"cue": "unexpected"}, operator={"traits": {}}, horizon_s=4)
+CORNER = {"model": "task", "task": {"kind": "corner", "leg_m": 3.0, "width_m": 2.0}, **DRIVEN}
+
+
+@pytest.mark.parametrize("scenario", [SURPRISED, {**CORNER, "horizon_s": 4}])
+@pytest.mark.parametrize("rate", [0.5, 1, 10, 60])
+def test_who_is_surprised_moves_a_reaction_after_the_first_picture_however_many_follow(
+    scenario, rate
+):
+    """Link and encoding come first, for who points and for who drives alike."""
+    late = {"frames.rate_hz": rate, "link.down.delay_s": 0.5, "frames.extra_s": 0.2}
+    moves, reaction = first_move(scenario, late)
+    assert moves == pytest.approx(0.7 + reaction, abs=0.011)
+
+
+def test_a_first_frame_that_is_lost_is_waited_for():
+    lossy = {"frames.rate_hz": 2, "link.down.loss": 0.9, "horizon_s": 60}
+    moves, reaction = first_move(SURPRISED, lossy)
+    assert math.remainder(moves - reaction, 0.5) == pytest.approx(0.0, abs=0.01)
+    assert moves > 0.5
 
 
 def test_a_trial_that_is_not_done_by_the_horizon_counts_with_it():
