@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -22,6 +22,16 @@ from dva_sim.experiments.labels import (
 )
 
 Floats = NDArray[np.float64]
+
+# What is not there at a level of zero.
+_ABSENT = {
+    "link.delay_s": "delay",
+    "link.up.delay_s": "delay of commands",
+    "link.down.delay_s": "delay of frames",
+    "link.jitter_s": "jitter",
+    "link.loss": "packet loss",
+    "robot.processing_s": "processing time",
+}
 
 
 @dataclass(frozen=True)
@@ -55,6 +65,8 @@ class Finding:
         missed: Runs without confirmation at the last level, per level of `factor`.
         horizon: What such a run counts with [s], if all count with the same.
         cluster: What the band rests on: persons, or shifts.
+        widest: The greatest difference that is possible; a band of that size says nothing.
+        all_confirmed: Whether no run of any cell was missed.
     """
 
     measure: str
@@ -73,6 +85,8 @@ class Finding:
     missed: tuple[Missed, ...] = ()
     horizon: float | None = None
     cluster: str = "person"
+    widest: float = np.inf
+    all_confirmed: bool = False
 
     @property
     def unit(self) -> str:
@@ -109,7 +123,7 @@ def _tellable(f: Finding) -> list[str]:
         where = np.flatnonzero(chosen)
         if len(where):
             head = "Elsewhere it turns round: " if sentences else _condition(f)
-            sentences.append(f"{head}{_effect(f, where)}")
+            sentences.append(_capital(f"{head}{_effect(f, where)}"))
     return sentences
 
 
@@ -144,12 +158,19 @@ def _ruled_out(f: Finding) -> list[str]:
     if len(settled := np.flatnonzero(holds_zero & (bounds > 0) & (bounds <= limit))):
         sentences.append(_settled(f, settled, float(bounds[settled].max()), nowhere))
     if len(undecided := np.flatnonzero(holds_zero & (bounds > limit))):
-        size = quantity(float(bounds[undecided].max()), f.unit)
-        sentences.append(
-            f"The question stays open {_places(f, undecided)}: an effect as large as {size} is "
-            f"not ruled out, so more {f.cluster}s are needed."
-        )
+        sentences.append(_undecided(f, undecided, float(bounds[undecided].max())))
     return sentences
+
+
+def _undecided(f: Finding, where: NDArray[np.intp], bound: float) -> str:
+    """Nothing is ruled out: say how large an effect may be, unless as large as it ever can."""
+    still = f"The question stays open {_places(f, where)}: "
+    if bound >= f.widest:
+        return f"{still}{f.persons} {f.cluster}s rule out nothing at all; more are needed."
+    return (
+        f"{still}an effect as large as {quantity(bound, f.unit)} is not ruled out, so more "
+        f"{f.cluster}s are needed."
+    )
 
 
 def _settled(f: Finding, where: NDArray[np.intp], bound: float, nowhere: bool) -> str:
@@ -163,7 +184,7 @@ def _settled(f: Finding, where: NDArray[np.intp], bound: float, nowhere: bool) -
 def _no_difference(f: Finding) -> str:
     first, second = level_name(f.factor, f.first), level_name(f.factor, f.second)
     anywhere = f" at any {factor_name(f.over)} tried" if f.over else ""
-    return (
+    return _capital(
         f"{_condition(f)}no difference between {first} and {second} can be told from zero"
         f"{anywhere} (95 % Monte Carlo band, given the model)."
     )
@@ -192,10 +213,16 @@ def _without_band(f: Finding) -> str:
     return f"{why} In the runs that were made, {seen}."
 
 
+def _capital(sentence: str) -> str:
+    return sentence[:1].upper() + sentence[1:]
+
+
 def _misses(f: Finding) -> list[str]:
     """Misses are a result of their own: the mean alone would hide them behind the horizon."""
     if not f.missed:
         return []
+    if f.all_confirmed:
+        return ["Every event was confirmed, in every cell."]
     where = _at(f, [len(f.levels) - 1])
     if not any(m.missed for m in f.missed):
         return [f"Every event was confirmed {where}, under each {factor_name(f.factor)}."]
@@ -257,6 +284,8 @@ def _is_ordered(f: Finding) -> bool:
 def _at(f: Finding, where: Sequence[int]) -> str:
     if not f.over:
         return "throughout"
+    if spoken := _spoken(f, where):
+        return spoken
     names = listing([level_name(f.over, f.levels[i]) for i in where])
     name = factor_name(f.over)
     vowel = name[0] in "aeiou" and not name.startswith("one")
@@ -280,4 +309,17 @@ def _places(f: Finding, where: NDArray[np.intp]) -> str:
         return f"from {names[0]} on"
     if solid and where[0] == 0:
         return f"up to {names[-1]}"
-    return f"at {listing(names)}"
+    return _spoken(f, where) or f"at {listing(names)}"
+
+
+def _spoken(f: Finding, where: Iterable[int]) -> str:
+    """`without delay`, `on the poor link`, `with filter none`: where a bare level is no English."""
+    levels = [f.levels[int(i)] for i in where]
+    if len(levels) == 1 and levels[0] == 0 and f.over in _ABSENT:
+        return f"without {_ABSENT[f.over]}"
+    if all(isinstance(level, int | float) and not isinstance(level, bool) for level in levels):
+        return ""
+    names = listing([level_name(f.over, level) for level in levels])
+    if f.over == "link":
+        return f"on the {names} link{'s' if len(levels) > 1 else ''}"
+    return f"with {factor_name(f.over)} {names}"

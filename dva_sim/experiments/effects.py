@@ -7,6 +7,7 @@ Subtracting two slices of it pairs them by person and trial, which is the whole 
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -126,6 +127,7 @@ class View:
         smallest_effect: Smallest difference declared to matter, in the measure's unit.
         outside: Whether each cell `(levels of factor 1, ...)` is an extrapolation, beyond the
             delays at which people were watched; None where nothing is known of that.
+        possible: The least and the greatest value that the measure can take at all.
     """
 
     part: Part
@@ -136,6 +138,7 @@ class View:
     within: Setting
     smallest_effect: float | None = None
     outside: NDArray[np.bool_] | None = None
+    possible: tuple[float, float] = (-math.inf, math.inf)
 
     @property
     def lines(self) -> tuple[Level, ...]:
@@ -149,19 +152,23 @@ class View:
 
     @property
     def panels(self) -> list[Setting]:
-        """Settings of all other factors, the answer's first."""
+        """Settings of all other factors, the last fastest; of each, the answer's level first."""
         names = [f.name for f in (self.line, self.over) if f]
         every = list(self.part.settings(but=names))
-        return sorted(every, key=lambda panel: not self.speaks_of(panel))
+        return sorted(every, key=lambda panel: [self._is_aside(*item) for item in panel.items()])
 
     @property
     def shown(self) -> list[Setting]:
         """The panels that a figure has room for."""
         return self.panels[:MOST_PANELS]
 
-    def speaks_of(self, panel: Setting) -> bool:
-        """Whether this is the panel of the answer."""
-        return all(panel.get(key) == level for key, level in self.within.items())
+    def _is_aside(self, factor: str, level: Level) -> bool:
+        return level != self.within.get(factor, level)
+
+    @property
+    def widest(self) -> float:
+        """The greatest difference between two values that the measure can take."""
+        return self.possible[1] - self.possible[0]
 
     def curve(self, grid: Floats, panel: Setting, line: Level) -> Floats:
         """Values along x as `(stops, persons, trials)`."""

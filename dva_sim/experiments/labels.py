@@ -138,9 +138,10 @@ def percent(share: float) -> str:
 
 
 def level_name(factor: str, level: Level, short: bool = False) -> str:
-    """One level with its unit: 0.05 of `link.delay_s` is `50 ms`."""
+    """One level with its unit: 0.05 of `link.delay_s` is `50 ms`; a class without its file."""
     if isinstance(level, str):
-        return (_SHORT_LEVELS if short else _LEVELS).get(level, level)
+        name = level.rpartition(":")[2] if is_in_file(level) else level
+        return (_SHORT_LEVELS if short else _LEVELS).get(name, name)
     if level is None or isinstance(level, bool):
         return {None: "none", True: "yes", False: "no"}[level]
     if factor.endswith(".loss"):
@@ -149,6 +150,31 @@ def level_name(factor: str, level: Level, short: bool = False) -> str:
     if unit == "s" and 0 < abs(level) < 1:
         return f"{1000 * level:g}\N{NO-BREAK SPACE}ms"
     return f"{level:g}\N{NO-BREAK SPACE}{unit}" if unit and level else f"{level:g}"
+
+
+def is_in_file(level: Level) -> bool:
+    """Whether a level names a class in a file, as in `mine.py:Mine`."""
+    return isinstance(level, str) and ".py:" in level
+
+
+def brief(levels: Mapping[str, Level]) -> str:
+    """Levels in a row, without the names of factors that go without saying.
+
+    Words speak for themselves, as do quantities whose unit no other factor here has:
+    `250 ms, latest-wins`.
+    """
+    units = [unit_of(factor) for factor in levels]
+    return ", ".join(_brief(factor, level, units) for factor, level in levels.items())
+
+
+def _brief(factor: str, level: Level, units: Sequence[str]) -> str:
+    unit, name = unit_of(factor), level_name(factor, level, short=True)
+    if isinstance(level, str):
+        return name
+    is_quantity = unit and units.count(unit) == 1 and not isinstance(level, bool)
+    if not is_quantity or level is None:
+        return f"{factor_name(factor)} {name}"
+    return name if level else f"0\N{NO-BREAK SPACE}{'ms' if unit == 's' else unit}"
 
 
 def setting(levels: Mapping[str, Level]) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -22,6 +23,7 @@ from dva_sim.experiments.effects import (
 from dva_sim.experiments.labels import Level, unit_of
 from dva_sim.experiments.statistics import Interval, band
 
+_NEVER_NEGATIVE = ("s", "m", "Hz", "bit/s", "N s")
 _KEYS = {"part", "cell", "config", "is_reference", "person", "trial", "seed"}
 
 
@@ -89,13 +91,23 @@ def finding_of(view: View) -> Finding | None:
         levels=view.stops,
         within=panel,
         mean=found.mean,
-        low=found.low,
-        high=found.high,
+        low=np.maximum(found.low, -view.widest),
+        high=np.minimum(found.high, view.widest),
         persons=found.n_persons,
         smallest_effect=view.smallest_effect,
         missed=_missed(view),
         horizon=_horizon(view),
+        widest=view.widest,
+        all_confirmed=_all_confirmed(view),
     )
+
+
+def possible_values(measure: str, scenario: Mapping[str, Any]) -> tuple[float, float]:
+    """The least and the greatest value that a measure can take in a run of a scenario."""
+    if measure in ("drive_time_s", "confirmed") or measure.endswith("_share"):
+        horizon = scenario.get("horizon_s", math.inf)
+        return 0.0, float(horizon) if measure == "drive_time_s" else 1.0
+    return (0.0 if unit_of(measure) in _NEVER_NEGATIVE else -math.inf), math.inf
 
 
 def interval_of(values: Floats) -> Interval | None:
@@ -122,6 +134,11 @@ def _missed(view: View) -> tuple[Missed, ...]:
         seen = present(view.curve(grid, view.panels[0], level)[-1])
         found.append(Missed(level, int((seen == 0).sum()), len(seen)))
     return tuple(found)
+
+
+def _all_confirmed(view: View) -> bool:
+    """Whether no run of any cell ended without a confirmation."""
+    return view.part.has("confirmed") and bool(present(view.part.grid("confirmed")).all())
 
 
 def _horizon(view: View) -> float | None:

@@ -23,7 +23,7 @@ from dva_sim.experiments.effects import Part, Table, View, as_floats
 from dva_sim.experiments.figures import Drawn, draw_all
 from dva_sim.experiments.labels import factor_name, level_name, listing, setting
 from dva_sim.experiments.predictions import judge_all
-from dva_sim.experiments.reading import factors_of, finding_of, keys_of, view_of
+from dva_sim.experiments.reading import factors_of, finding_of, keys_of, possible_values, view_of
 from dva_sim.experiments.results import Results
 from dva_sim.experiments.robustness import Robustness, robustness_of, sentences
 from dva_sim.experiments.support import support_of_part
@@ -58,8 +58,10 @@ def _view(results: Results, runs: Table) -> View | None:
     view = view_of(results.study, runs)
     if view is None:
         return None
-    support = support_of_part(view.part, _scenario_of(results, view.part.name))
-    return replace(view, outside=support.outside if support else None)
+    scenario = _scenario_of(results, view.part.name)
+    support = support_of_part(view.part, scenario)
+    possible = possible_values(view.measure, scenario)
+    return replace(view, outside=support.outside if support else None, possible=possible)
 
 
 def _scenario_of(results: Results, part: str) -> Mapping[str, Any]:

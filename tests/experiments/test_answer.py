@@ -68,7 +68,7 @@ def test_without_any_effect_the_whole_range_is_ruled_out_and_compared_with_what_
 def test_levels_where_every_pair_is_equal_are_told_apart_from_those_that_are_settled():
     half_width = np.array([0.0, 1.0, 1.0, 1.0, 1.0, 1.0])
     text = lead(finding([0, 0.2, 0, 3.0, 6.0, 9.0], half_width=half_width))
-    assert "No person fares differently at 0." in text
+    assert "No person fares differently without delay." in text
     assert "It cannot be told from zero at 50 ms and 100 ms, where an effect above 1.2 s" in text
 
 
@@ -170,3 +170,40 @@ def test_a_study_of_one_factor_gets_a_sentence_without_a_range(mean):
 def test_another_measure_is_compared_in_its_own_unit():
     text = lead(finding(GROWING, measure="path_m", in_excess=False, smallest_effect=None))
     assert "REQ/REP lies 14.2 m above latest-wins PUB/SUB" in text
+
+
+def test_a_band_as_wide_as_all_that_is_possible_is_told_to_rule_out_nothing():
+    text = lead(finding([0] * 6, half_width=240, widest=240.0, persons=2))
+    assert text.endswith(
+        "The question stays open at every one-way delay tried: 2 persons rule out nothing at "
+        "all; more are needed."
+    )
+    assert "240" not in text
+
+
+@pytest.mark.parametrize("mean", [GROWING, [0.0] * 6])
+def test_a_sentence_begins_with_a_capital_letter_also_without_conditions(mean):
+    assert lead(finding(mean, within={}, first="on_change"))[0] in "ON"
+
+
+def test_that_every_event_was_confirmed_everywhere_is_told_of_every_cell():
+    missed = (Missed("req-rep", 0, 120), Missed("latest-wins", 0, 120))
+    text = notes(finding(GROWING, missed=missed, all_confirmed=True))
+    assert text.startswith("Every event was confirmed, in every cell.")
+
+
+@pytest.mark.parametrize(
+    ("over", "levels", "words"),
+    [
+        ("link", ("good", "poor"), "takes 9.0 s longer than latest-wins PUB/SUB on the poor link"),
+        ("phone.filter", ("none", "one_pole"), "PUB/SUB with filter one-pole filter"),
+    ],
+)
+def test_levels_that_are_words_are_told_in_english(over, levels, words):
+    found = finding([0.0, 9.0], over=over, levels=levels)
+    assert words in lead(found)
+
+
+def test_a_delay_of_zero_is_no_delay():
+    text = lead(finding([9.0, 0.0], over="link.delay_s", levels=(0.0, 0.5)))
+    assert "longer than latest-wins PUB/SUB without delay (95 %" in text

@@ -5,9 +5,18 @@ from matplotlib.figure import Figure
 
 from dva_sim.experiments.cadence import Cadence
 from dva_sim.experiments.effects import Factor, Part, View
+from dva_sim.experiments.figures.effect import _band, _fit_to
 from dva_sim.experiments.figures.ground import Ways
-from dva_sim.experiments.figures.story import Events, fates
-from dva_sim.experiments.figures.style import _apart, colours, log_axis, place_of
+from dva_sim.experiments.figures.story import Events, fates, outcomes, responses
+from dva_sim.experiments.figures.style import (
+    _apart,
+    colours,
+    log_axis,
+    panel_grid,
+    panel_name,
+    panels,
+    place_of,
+)
 
 DELAY = Factor("link.delay_s", (0.0, 0.05, 0.1, 0.25, 0.5, 1.0))
 PATTERN = Factor("pattern", ("req-rep", "pub-sub", "latest-wins"))
@@ -102,3 +111,47 @@ def test_a_logarithmic_axis_has_plain_numbers_at_round_places_only(ends, numbers
     shown = [t.label1.get_text() for t in ticks if low <= t.get_loc() <= high]
     assert shown == numbers
     assert axes.yaxis.get_minorticklocs().size == 0
+
+
+def test_four_settings_stand_two_by_two_with_the_answers_levels_first():
+    runs = synthetic_study.columns(synthetic_study.drive_rows(2, 1))
+    part = Part(runs, "drive", [PATTERN, Factor("link.delay_s", (0.0, 0.25)), PROFILE])
+    view = View(part, "drive_time_s", PATTERN, None, None, {"link.delay_s": 0.25})
+    assert [panel_name(panel).replace("\N{NO-BREAK SPACE}", " ") for panel in view.shown] == [
+        "250 ms, default",
+        "250 ms, dissertation",
+        "0 ms, default",
+        "0 ms, dissertation",
+    ]
+    _, axes = panel_grid(view, 3.0)
+    assert [ax.get_subplotspec().rowspan.start for ax in axes] == [0, 0, 1, 1]
+
+
+def test_bands_end_where_nothing_is_possible_and_do_not_flatten_the_lines():
+    few = np.array([[40.0, 60.0], [80.0, 90.0]])  # two persons, so bands of hundreds of seconds
+    _, ((ax,),) = panels(1, 1, 3.0)
+    _band(ax, few, "black", 0.0, (0.0, 240.0))
+    heights = ax.collections[0].get_paths()[0].vertices[:, 1]
+    assert (heights.min(), heights.max()) == (0.0, 240.0)
+    assert "they are cut" in _fit_to(ax, few.ravel())
+    assert ax.get_ylim() == pytest.approx((32.5, 97.5))
+
+
+def test_narrow_bands_are_shown_whole():
+    _, ((ax,),) = panels(1, 1, 3.0)
+    many = np.linspace([40.0, 45.0], [60.0, 65.0], 24)
+    _band(ax, many, "black", 0.0, (0.0, 240.0))
+    before = ax.get_ylim()
+    assert _fit_to(ax, many.ravel()) == ""
+    assert ax.get_ylim() == before
+
+
+def test_nobody_who_never_came_has_a_panel_and_one_fate_needs_no_picture(view):
+    rows = synthetic_study.columns(synthetic_study.story_rows(4))
+    rows["responder_kind"] = np.full(len(rows["part"]), "robot")
+    rows["outcome"] = np.full(len(rows["part"]), "confirmed")
+    events = Events(rows, "story", view)
+    assert list(events.kinds_of_times()) == ["Robot arrives", "Robot confirms"]
+    assert outcomes(view, events) is None
+    drawn = responses(view, events)
+    assert f"all {len(events):,} were confirmed by a robot" in drawn.caption

@@ -1,6 +1,14 @@
 import pytest
 
-from dva_sim.experiments.labels import level_name, listing, number, percent, setting, unit_of
+from dva_sim.experiments.labels import (
+    brief,
+    level_name,
+    listing,
+    number,
+    percent,
+    setting,
+    unit_of,
+)
 
 
 @pytest.mark.parametrize(
@@ -13,6 +21,7 @@ from dva_sim.experiments.labels import level_name, listing, number, percent, set
         ("pattern", "req-rep", "REQ/REP"),
         ("operator.strategy", "pursuit", "pursuit"),
         ("phone.ideal", True, "yes"),
+        ("phone.filter", "/tmp/mine.py:MyFilter", "MyFilter"),
     ],
 )
 def test_a_level_is_named_with_its_unit(factor, level, text):
@@ -49,4 +58,20 @@ def test_words_are_listed_as_people_do():
     assert listing([]) == ""
     assert listing(["a"]) == "a"
     assert listing(["a", "b", "c"]) == "a, b and c"
-    assert setting({"profile": "default", "link.loss": 0.1}) == "profile default, packet loss 10\N{NO-BREAK SPACE}%"
+    assert (
+        setting({"profile": "default", "link.loss": 0.1})
+        == "profile default, packet loss 10\N{NO-BREAK SPACE}%"
+    )
+
+
+@pytest.mark.parametrize(
+    ("levels", "text"),
+    [
+        ({"link.delay_s": 0.25, "pattern": "latest-wins"}, "250 ms, latest-wins"),
+        ({"link.delay_s": 0}, "0 ms"),
+        ({"link.delay_s": 0.25, "link.jitter_s": 0.02}, "one-way delay 250 ms, jitter 20 ms"),
+        ({"bystander.count": 3, "phone.ideal": True}, "bystanders 3, phone ideal yes"),
+    ],
+)
+def test_briefly_told_levels_leave_out_what_goes_without_saying(levels, text):
+    assert brief(levels).replace("\N{NO-BREAK SPACE}", " ") == text

@@ -19,10 +19,12 @@ from dva_sim.experiments.figures import (
     story,
 )
 from dva_sim.experiments.figures.style import Drawn, styled
-from dva_sim.experiments.labels import Level
+from dva_sim.experiments.labels import Level, factor_name, listing
 from dva_sim.experiments.robustness import Robustness
 
 __all__ = ["Drawn", "draw_all"]
+
+_OF_ONE_PANEL = ("trajectories", "robustness")
 
 
 def draw_all(
@@ -54,15 +56,21 @@ def draw_all(
             drawn.append(ground.trajectories(view, tables["tracks"], scenario))
         if "events" in tables:
             drawn.extend(_story(view, tables["events"]))
-    note = _what_is_not_shown(view)
-    return [replace(f, caption=f.caption + note) for f in drawn if f is not None]
+    note = _what_panels_are(view)
+    there = [f for f in drawn if f is not None]
+    return [replace(f, caption=f.caption + note * (f.name not in _OF_ONE_PANEL)) for f in there]
 
 
-def _what_is_not_shown(view: View) -> str:
-    if len(view.shown) == len(view.panels):
+def _what_panels_are(view: View) -> str:
+    """Which factors a panel stands for, and whether there is one for each of their settings."""
+    if len(view.panels) < 2:
         return ""
+    names = listing([factor_name(name) for name in view.panels[0]])
+    words = f" Panels: {names}."
+    if len(view.shown) == len(view.panels):
+        return words
     return (
-        f" Shown are {len(view.shown)} of {len(view.panels)} settings of the other factors; "
+        f"{words} Shown are {len(view.shown)} of {len(view.panels)} settings of the other factors; "
         "the table holds them all."
     )
 
@@ -81,7 +89,7 @@ def _cadences(view: View, scenario: Mapping[str, Any]) -> effect.CadenceOf:
     return cadence_of
 
 
-def _story(view: View, table: Table) -> list[Drawn]:
+def _story(view: View, table: Table) -> list[Drawn | None]:
     part = story.story_part(table, view)
     if part is None:
         return []

@@ -14,6 +14,7 @@ from dva_sim.experiments.figures.style import (
     outer_labels,
     panels,
     stops_axis,
+    wrapped,
 )
 from dva_sim.experiments.labels import Level, level_name
 
@@ -44,14 +45,15 @@ def delay_budget(view: View) -> Drawn | None:
     if not stages:
         return None
     shown = view.shown
-    figure, axes = panels(len(shown), len(view.lines), 2.7, sharex=True, sharey=True)
+    height = 2.7 if len(shown) < 3 else 2.2
+    figure, axes = panels(len(shown), len(view.lines), height, sharex=True, sharey=True)
     for row, panel in zip(axes, shown, strict=True):
         for ax, level in zip(row, view.lines, strict=True):
             _stack(ax, {stage: _means(view, stage, panel, level) for stage in stages})
             _mark(ax, _means(view, _MEASURED, panel, level))
             stops_axis(ax, view.over)
             if view.line and row is axes[0]:
-                ax.set_title(level_name(view.line.name, level))
+                ax.set_title(wrapped(level_name(view.line.name, level), 80 // len(view.lines)))
     outer_labels(axes, shown, "Delay [s]")
     _key(figure, stages)
     caption = (

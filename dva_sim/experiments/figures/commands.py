@@ -18,17 +18,18 @@ from dva_sim.experiments.figures.style import (
     colours,
     dodge,
     finish,
+    label_panels,
     legend,
     log_axis,
     name_lines,
-    panel_title,
-    panels,
-    stops_axis,
+    panel_grid,
+    wrapped,
 )
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+_ROOM = 1.08  # above the highest mark
 _QUANTILES = ("p05", "p25", "p50", "p75", "p95")
 
 
@@ -37,18 +38,15 @@ def command_age(view: View) -> Drawn | None:
     columns = [f"command_age_{q}_s" for q in _QUANTILES]
     if not all(view.part.has(column) for column in columns):
         return None
-    shown = view.shown
-    figure, axes = panels(1, len(shown), 3.0, sharey=True)
+    figure, axes = panel_grid(view, 3.0)
     paint = colours(view.line)
     grids = [view.part.grid(column) for column in columns]
-    for ax, panel in zip(axes[0], shown, strict=True):
+    for ax, panel in zip(axes, view.shown, strict=True):
         for level, offset in dodge(view.lines):
             ages = [_cell_means(view.curve(grid, panel, level)) for grid in grids]
             _ranges(ax, [stop + offset for stop in range(len(view.stops))], ages, paint[level])
-        panel_title(ax, panel)
-        stops_axis(ax, view.over)
-    log_axis(axes[0][0])
-    axes[0][0].set_ylabel(axis_label("age_s", "Command age at application"))
+    log_axis(axes[0])
+    label_panels(axes, view, axis_label("age_s", wrapped("Command age at application", 22)))
     legend(figure, view.line, paint)
     caption = (
         "From the moment a command is issued to its effect at the motors: dot, the median; thick, "
@@ -62,11 +60,10 @@ def command_rate(view: View, cadence_of: CadenceOf) -> Drawn | None:
     """Commands applied per second, beside what arithmetic allows request/reply."""
     if not view.part.has("command_rate_hz"):
         return None
-    shown = view.shown
-    figure, axes = panels(1, len(shown), 3.0, sharey=True)
+    figure, axes = panel_grid(view, 3.0)
     paint, every = colours(view.line), []
     grid = view.part.grid("command_rate_hz")
-    for ax, panel in zip(axes[0], shown, strict=True):
+    for ax, panel in zip(axes, view.shown, strict=True):
         ends: Ends = {}
         for i, level in enumerate(view.lines):
             means = _cell_means(view.curve(grid, panel, level))
@@ -75,14 +72,12 @@ def command_rate(view: View, cadence_of: CadenceOf) -> Drawn | None:
             ax.plot(means, "o", ms=size, color=paint[level])
             ends[level] = float(means[-1])
         _closed_form(ax, view, cadence_of(panel))
-        panel_title(ax, panel)
-        stops_axis(ax, view.over)
-        ax.set_ylim(bottom=0)
         every.append(ends)
-    name_lines(axes[0], every, view.line, paint)
-    axes[0][0].set_ylabel(axis_label("command_rate_hz"))
+    axes[0].set_ylim(0, _ROOM * axes[0].dataLim.union([ax.dataLim for ax in axes]).y1)
+    label_panels(axes, view, axis_label("command_rate_hz"))
+    name_lines(axes, every, view.line, paint)
     caption = "Mean over runs. Commands that came too old or were overtaken are not counted."
-    if any(cadence_of(panel) for panel in shown):
+    if any(cadence_of(panel) for panel in view.shown):
         caption += (
             " Dashed: the closed form for lock-step messaging, min(1/T, 1/(2 d + P)), with T the "
             "wanted period (where the app only sends what has changed, the shortest it allows), "

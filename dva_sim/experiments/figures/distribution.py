@@ -38,7 +38,7 @@ _GOLDEN = 0.6180339887498949
 def distributions(view: View) -> Drawn:
     """Every run as a dot, with median and middle half."""
     shown = view.shown
-    figure, axes = panels(len(shown), 1, 2.7, sharex=True, sharey=True)
+    figure, axes = panels(len(shown), 1, 2.7 if len(shown) < 3 else 2.2, sharex=True, sharey=True)
     paint = colours(view.line)
     raw, confirmed = view.part.grid(view.measure), _confirmed(view)
     for (ax,), panel in zip(axes, shown, strict=True):
@@ -58,12 +58,17 @@ def distributions(view: View) -> Drawn:
     _spread(axes[0][0], present(raw))
     legend(figure, view.line, paint)
     caption = (
-        "Each dot is one run, none left out; the bar is the median, the box the middle half. "
-        "Hollow dots were not confirmed and count with all the time they were given."
-        f"{hatch_words(view)}"
+        "Each dot is one run, none left out; the bar is the median, the box the middle half."
+        f"{_hollow_words(confirmed)}{hatch_words(view)}"
     )
     title = f"{capital(measure_name(view.measure))} of all {len(view.part):,} runs"
     return finish(figure, "distributions", title, caption)
+
+
+def _hollow_words(confirmed: Floats) -> str:
+    if not (confirmed == 0).any():
+        return ""
+    return " Hollow dots were not confirmed and count with all the time they were given."
 
 
 def _dots(

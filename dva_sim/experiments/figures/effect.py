@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
@@ -28,11 +29,10 @@ from dva_sim.experiments.figures.style import (
     finish,
     hatch_stops,
     hatch_words,
+    label_panels,
     name_lines,
-    panel_title,
-    panels,
+    panel_grid,
     place_of,
-    stops_axis,
     wrapped,
 )
 from dva_sim.experiments.labels import Level, factor_name, level_name, measure_name
@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+_ROOM = 0.15  # share of what persons span that is left free beyond them, where bands are cut
 CadenceOf = Callable[[Setting], Cadence | None]
 
 
@@ -57,7 +58,8 @@ def differences(view: View, cadence_of: CadenceOf) -> Drawn | None:
 
     name = level_name(view.line.name, baseline)
     label = axis_label(view.measure, f"Difference against\n{name}")
-    figure, axes, ends = _curves(view, others, curve, ylabel=label)
+    limit = view.widest
+    figure, axes, ends, cut = _curves(view, others, curve, label, (-limit, limit), home=0.0)
     for ax, panel in zip(axes, view.shown, strict=True):
         ax.axhline(0, color=INK, lw=0.8, zorder=1)
         mark_boundary(ax, view.over, cadence_of(panel), text=True)
@@ -67,7 +69,7 @@ def differences(view: View, cadence_of: CadenceOf) -> Drawn | None:
     caption = (
         f"Above zero, {name} has the lower value. Means of differences paired by person and trial; "
         "shaded, the 95 % band that covers all levels of a line at once; bars, the 95 % interval "
-        f"of each level alone.{zoomed}{_boundary_words(view, cadence_of)}{hatch_words(view)}"
+        f"of each level alone.{cut}{zoomed}{_boundary_words(view, cadence_of)}{hatch_words(view)}"
     )
     return finish(figure, "differences", title, caption)
 
@@ -81,13 +83,14 @@ def measure_levels(view: View) -> Drawn:
 
     what = capital(_what(view))
     label = axis_label(view.measure, wrapped(what))
-    figure, axes, ends = _curves(view, view.lines, curve, label)
+    limits = (-view.widest, view.widest) if _in_excess(view) else view.possible
+    figure, axes, ends, cut = _curves(view, view.lines, curve, label, limits)
     name_lines(axes, ends, view.line, colours(view.line))
     excess = "Zero is the reference run of the same person and trial. " if _in_excess(view) else ""
     caption = (
         f"Mean over persons; shaded, its simultaneous 95 % band. {excess}Bands of two lines may "
         "overlap although their paired difference is clear: persons differ more from each other "
-        f"than from themselves.{hatch_words(view)}"
+        f"than from themselves.{cut}{hatch_words(view)}"
     )
     title = f"{what} under each {factor_name(view.line.name)}" if view.line else what
     return finish(figure, "levels", title, caption)
@@ -119,22 +122,50 @@ def _curves(
     lines: tuple[Level, ...],
     curve: Callable[[Setting, Level], Floats],
     ylabel: str,
-) -> tuple[Figure, list[Axes], list[Ends]]:
-    """A panel for each setting, in it a line with its band for each level, and where it ends."""
-    shown = view.shown
-    figure, (axes,) = panels(1, len(shown), 3.4, sharey=True)
-    paint, every = colours(view.line), []
-    for ax, panel in zip(axes, shown, strict=True):
+    limits: tuple[float, float],
+    home: float = math.nan,
+) -> tuple[Figure, list[Axes], list[Ends], str]:
+    """A panel for each setting, in it a line with its band for each level, and where it ends.
+
+    Args:
+        view: How the part is looked at.
+        lines: Levels drawn.
+        curve: Means of persons `(persons, stops)` for each panel and level.
+        ylabel: Of what.
+        limits: Least and greatest value that are possible; bands end there.
+        home: A value that must be seen, such as zero.
+
+    Returns:
+        The figure, its axes, the end of each line, and what a caption must say of cut bands.
+    """
+    figure, axes = panel_grid(view, 3.4)
+    paint, every, seen = colours(view.line), [], [np.array([home])]
+    for ax, panel in zip(axes, view.shown, strict=True):
         ends: Ends = {}
         for i, level in enumerate(lines):
             shift = 0.12 * (i - (len(lines) - 1) / 2)  # bars of two lines stand side by side
-            ends[level] = _band(ax, curve(panel, level), paint[level], shift)
-        panel_title(ax, panel)
-        stops_axis(ax, view.over)
+            seen.append(curve(panel, level).ravel())
+            ends[level] = _band(ax, curve(panel, level), paint[level], shift, limits)
         hatch_stops(ax, view.stops_outside(panel))
         every.append(ends)
-    axes[0].set_ylabel(ylabel)
-    return figure, axes, every
+    label_panels(axes, view, ylabel)
+    return figure, axes, every, _fit_to(axes[0], present(np.concatenate(seen)))
+
+
+def _fit_to(ax: Axes, values: Floats) -> str:
+    """Cut bands far beyond what any person did, lest they flatten all else; says if it did."""
+    bottom, top = ax.get_ylim()
+    if not len(values):
+        return ""
+    room = _ROOM * (float(np.ptp(values)) or abs(float(values[0])) or 1.0)
+    low, high = max(bottom, values.min() - room), min(top, values.max() + room)
+    ax.set_ylim(low, high)
+    if (low, high) == (bottom, top):
+        return ""
+    return (
+        " So few persons give wide bands and bars: where they go far beyond what any person did, "
+        "they are cut."
+    )
 
 
 def _zoom_on_small(axes: list[Axes], smallest: float | None) -> str:
@@ -158,12 +189,17 @@ def _zoom_on_small(axes: list[Axes], smallest: float | None) -> str:
     return f"{words} The axis is linear near zero and logarithmic beyond."
 
 
-def _band(ax: Axes, matrix: Floats, colour: str, shift: float) -> float:
+def _band(
+    ax: Axes, matrix: Floats, colour: str, shift: float, limits: tuple[float, float]
+) -> float:
     """One line with its band and bars from `(persons, stops)`; gives the height of its end."""
     bands = band(matrix)
     x = np.arange(matrix.shape[1]) + shift
-    ax.fill_between(x, bands.low, bands.high, color=colour, alpha=0.16, lw=0)
-    ax.vlines(x, bands.pointwise_low, bands.pointwise_high, color=colour, lw=1.2)
+    low, high = np.clip([bands.low, bands.high], *limits)
+    ax.fill_between(x, low, high, color=colour, alpha=0.16, lw=0)
+    ax.vlines(
+        x, *np.clip([bands.pointwise_low, bands.pointwise_high], *limits), color=colour, lw=1.2
+    )
     ax.plot(x, bands.mean, "-o", color=colour, ms=4)
     seen = present(bands.mean)
     return float(seen[-1]) if len(seen) else float("nan")

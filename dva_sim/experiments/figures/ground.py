@@ -36,7 +36,7 @@ def trajectories(view: View, tracks: Table, scenario: Mapping[str, Any]) -> Draw
     if not ways:
         return None
     stops = list(dict.fromkeys((view.stops[0], view.stops[-1])))
-    site = _site(scenario)
+    site, aside = _site(scenario), ways.reference()
     low, high = _frame(ways.all_points)
     height = _row_height(high - low, columns=len(view.lines))
     figure, axes = panels(len(stops), len(view.lines), height, sharex=True, sharey=True)
@@ -44,7 +44,7 @@ def trajectories(view: View, tracks: Table, scenario: Mapping[str, Any]) -> Draw
     for row, stop in zip(axes, stops, strict=True):
         for ax, level in zip(row, view.lines, strict=True):
             _ground(ax, site)
-            for way in ways.reference():
+            for way in aside:
                 ax.plot(*way.T, color=SOFT, lw=1.3, ls=(0, (3, 2)), zorder=8)
             for way in ways.under(level, stop):
                 _way(ax, way, paint[level])
@@ -53,8 +53,8 @@ def trajectories(view: View, tracks: Table, scenario: Mapping[str, Any]) -> Draw
     axes[0][0].set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     _scale_bar(axes[-1][0], low)
     caption = (
-        "The same person and trial everywhere; dashed, the reference drive. Ring: where a way "
-        "begins; dot: where it ends."
+        f"The same person and trial everywhere{'; dashed, the reference drive' if aside else ''}. "
+        "Ring: where a way begins; dot: where it ends."
         f"{'' if site else ' The files of the site were not found, so it is left out.'}"
     )
     within = f" ({setting(view.panels[0])})" if view.panels[0] else ""

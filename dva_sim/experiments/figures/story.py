@@ -24,6 +24,7 @@ from dva_sim.experiments.figures.style import (
     outer_labels,
     panels,
     stops_axis,
+    wrapped,
 )
 from dva_sim.experiments.labels import Level, level_name
 
@@ -107,6 +108,19 @@ class Events:
         found = fates(self.rows["outcome"][mask], self.rows["responder_kind"][mask])
         return {fate: float(np.mean(found == fate)) for fate in _FATES}
 
+    def kinds_of_times(self) -> dict[str, tuple[str, str]]:
+        """Those of `_TIMES` that at least one event has."""
+        return {
+            title: (kind, column)
+            for title, (kind, column) in _TIMES.items()
+            if len(self.times(column, self.by(kind)))
+        }
+
+    def one_fate(self) -> str | None:
+        """What became of every event, if it was the same for all."""
+        found = np.unique(fates(self.rows["outcome"], self.rows["responder_kind"]))
+        return str(found[0]) if len(found) == 1 else None
+
 
 def story_part(table: Table, view: View) -> str | None:
     """The part that tells a story: the one with events that the answer is not about."""
@@ -115,13 +129,15 @@ def story_part(table: Table, view: View) -> str | None:
     return next(iter(others or parts), None)
 
 
-def responses(view: View, events: Events) -> Drawn:
-    """Times of the events that were reached, guards and robots apart."""
-    shown = view.shown
-    figure, axes = panels(len(shown), len(_TIMES), 2.4, sharex=True, sharey=True)
+def responses(view: View, events: Events) -> Drawn | None:
+    """Times of the events that were reached, guards and robots apart; of those who came."""
+    shown, met = view.shown, events.kinds_of_times()
+    if not met:
+        return None
+    figure, axes = panels(len(shown), len(met), 2.4, sharex=True, sharey=True)
     paint = colours(view.line)
     for row, panel in zip(axes, shown, strict=True):
-        for ax, (title, (kind, column)) in zip(row, _TIMES.items(), strict=True):
+        for ax, (title, (kind, column)) in zip(row, met.items(), strict=True):
             for level, offset in dodge(view.lines):
                 masks = [events.by(kind) & events.under(panel, level, v) for v in view.stops]
                 times = [events.times(column, mask) for mask in masks]
@@ -133,13 +149,15 @@ def responses(view: View, events: Events) -> Drawn:
     legend(figure, view.line, paint)
     caption = (
         "Dot, the median; bar, the middle half. Only events that were reached or confirmed have "
-        "such a time, so this is to be read beside the outcomes: a fast median may hide misses."
+        f"such a time{_what_else_came(events)}."
     )
     return finish(figure, "story_times", "Response, by who responded", caption)
 
 
-def outcomes(view: View, events: Events) -> Drawn:
-    """What became of every event, as shares that add up to one."""
+def outcomes(view: View, events: Events) -> Drawn | None:
+    """What became of every event, as shares that add up to one; None if all met one fate."""
+    if events.one_fate() is not None:
+        return None
     shown = view.shown
     figure, axes = panels(len(shown), len(view.lines), 2.3, sharex=True, sharey=True)
     for row, panel in zip(axes, shown, strict=True):
@@ -147,13 +165,20 @@ def outcomes(view: View, events: Events) -> Drawn:
             _stack(ax, [events.shares(events.under(panel, level, v)) for v in view.stops])
             stops_axis(ax, view.over)
             if view.line and row is axes[0]:
-                ax.set_title(level_name(view.line.name, level))
+                ax.set_title(wrapped(level_name(view.line.name, level), 80 // len(view.lines)))
     axes[0][0].yaxis.set_major_formatter(lambda y, _: f"{100 * y:.0f} %")
     axes[0][0].set_ylim(0, 1)
     outer_labels(axes, shown, "Share of events")
     _key(figure, events)
     caption = f"All {len(events):,} events, none left out: each has one of these outcomes."
     return finish(figure, "story_outcomes", "What became of the events", caption)
+
+
+def _what_else_came(events: Events) -> str:
+    """What became of all events, or where that is to be seen."""
+    if (fate := events.one_fate()) is not None:
+        return f"; all {len(events):,} were {fate}" if len(events) > 1 else f"; it was {fate}"
+    return ", so this is to be read beside the outcomes: a fast median may hide misses"
 
 
 def _quartiles(ax: Axes, offset: float, times: list[Floats], colour: str) -> None:

@@ -14,10 +14,10 @@ import numpy as np
 from dva_sim.experiments.effects import Factor, Setting, View
 from dva_sim.experiments.labels import (
     Level,
+    brief,
     factor_name,
     level_name,
     measure_name,
-    setting,
     unit_of,
 )
 
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+_TITLE = 90  # characters of a title that the width holds
+_ROW_LABEL = 28  # characters that the height of a row holds
 WIDTH = 9.6  # [in], the width of the report's column at 96 dots per inch
 INK, SOFT, FAINT = "#222222", "#6b6b6b", "#d9d9d9"
 
@@ -205,20 +207,42 @@ def hatch_words(view: View) -> str:
     )
 
 
-def panel_title(axes: Axes, panel: Setting) -> None:
-    """Say which levels a panel shows; nothing if there is but one panel."""
-    axes.set_title(panel_name(panel))
+def panel_grid(view: View, height: float) -> tuple[Figure, list[Axes]]:
+    """Axes for each setting shown, up to three abreast, four as two by two; `height` each [in]."""
+    count = len(view.shown)
+    columns = 2 if count == 4 else count
+    rows = count // columns
+    options = {"sharex": True, "sharey": True}
+    figure, axes = panels(rows, columns, height if rows == 1 else 0.85 * height, **options)
+    return figure, [ax for row in axes for ax in row]
+
+
+def label_panels(axes: Sequence[Axes], view: View, text: str) -> None:
+    """Titles and x for a grid of panels; what is common to them on its outer edges only."""
+    columns = 2 if len(axes) == 4 else len(axes)
+    for index, (ax, panel) in enumerate(zip(axes, view.shown, strict=True)):
+        panel_title(ax, panel, _TITLE // columns)
+        stops_axis(ax, view.over)
+        ax.set_ylabel(text if index % columns == 0 else "")
+        if index < len(axes) - columns:
+            ax.set_xlabel("")
+
+
+def panel_title(axes: Axes, panel: Setting, width: int = 90) -> None:
+    """Say which levels a panel shows, in lines of `width`; nothing if there is but one panel."""
+    axes.set_title(wrapped(panel_name(panel), width))
 
 
 def panel_name(panel: Setting) -> str:
-    """`Profile default`; nothing if there is but one panel."""
-    return capital(setting(panel))
+    """`250 ms, latest-wins`; nothing if there is but one panel."""
+    return capital(brief(panel))
 
 
 def outer_labels(axes: list[list[Axes]], shown: Sequence[Setting], text: str) -> None:
     """In a grid with a row for each panel: label the left and the lower edge only."""
     for row, panel in zip(axes, shown, strict=True):
-        row[0].set_ylabel(f"{panel_name(panel)}\n{text}" if panel else text)
+        name = wrapped(panel_name(panel), _ROW_LABEL)
+        row[0].set_ylabel(f"{name}\n{text}" if panel else text)
         for ax in row if row is not axes[-1] else ():
             ax.set_xlabel("")
 
