@@ -115,7 +115,12 @@ def _tell(scenario: Scenario, seed: int, keep_traffic: bool) -> Recording:
 
 
 def _summarise(recording: Recording, took: float) -> None:
-    from dva_sim.experiments.metrics import drive_measures, event_rows, run_row
+    from dva_sim.experiments.metrics import (
+        drive_measures,
+        event_rows,
+        plugin_failures,
+        run_row,
+    )
 
     say()
     for row in event_rows(recording):
@@ -135,6 +140,8 @@ def _summarise(recording: Recording, took: float) -> None:
         f"{recording.duration:.0f} s simulated in {took:.2f} s, "
         f"{recording.recorder.counters['messages']} messages, {broken} safety rules broken"
     )
+    if failures := plugin_failures(recording):
+        say(f"{failures} times an operator, filter, mapping or drive of yours gave no answer")
 
 
 def _driven(row: dict[str, Any]) -> str:
@@ -244,6 +251,8 @@ def _folder(name: str, out: Path | None) -> Path:
 
 
 def _say_plan(plan: Any, folder: Path) -> None:
+    if plan.remark:
+        say(f"[yellow]{escape(plan.remark)}[/yellow]")
     done = f", {plan.done} of them done already" if plan.done else ""
     about = "" if plan.estimate_s is None else f", about {plan.estimate_s:.0f} s to go"
     say(f"{plan.runs} runs in {plan.cells} configurations{done}{about}; into {folder}")

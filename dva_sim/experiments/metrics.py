@@ -29,9 +29,16 @@ def run_row(recording: Recording) -> Row:
     row["messages"] = recording.recorder.counters["messages"]
     row["bytes"] = recording.recorder.counters["bytes"]
     row["refused"] = recording.recorder.counters["refused"]
+    row["plugin_failures"] = plugin_failures(recording)
     row["violations"] = sum(recording.recorder.violations.values())
     row["simulated_s"] = recording.duration
     return row
+
+
+def plugin_failures(recording: Recording) -> int:
+    """How often an operator, filter, mapping or drive of a user gave no answer that is one."""
+    counted = recording.recorder.counters.items()
+    return sum(count for what, count in counted if what.startswith("failed: an answer of "))
 
 
 def _people_measures(recording: Recording) -> Row:

@@ -78,6 +78,7 @@ def _play(scenario: TaskScenario, seed: int, drawn: int | None) -> Iterator[tupl
         trial = _trial(scenario, seat, condition, number, streams)
         trial.run(keep=kept == drawn)
         seat.delay.intend(seat.begun + trial.now, 0.0, 0.0)
+        seat.delay.rest()
         seat.begun += trial.now + PAUSE
         if kept >= 0:
             trial.draw_goal()
@@ -138,6 +139,7 @@ def _row(
         "wait_s": trial.waits.seconds,
         "delay_felt_s": trial.seat.delay.value,
         "hand_most": trial.device.most,
+        "plugin_failures": trial.failures + trial.device.failures,
     }
 
 

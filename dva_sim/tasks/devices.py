@@ -18,7 +18,8 @@ from collections.abc import Callable, Iterator
 
 from dva_sim.agents.operator.person import Person
 from dva_sim.agents.tilt.accelerometer import GRAVITY, Accelerometer, load_part
-from dva_sim.agents.tilt.filters import load_filter
+from dva_sim.agents.tilt.filters import FILTERS, load_filter
+from dva_sim.agents.tilt.guarded import GuardedFilter
 from dva_sim.agents.tilt.hand import MAX_SPEED, Hand
 from dva_sim.streams import Streams
 from dva_sim.tasks.channel import slow_noise
@@ -37,11 +38,13 @@ class Device(ABC):
         top: The fastest cursor that it can ask for [m/s].
         period: Between two readings [s].
         most: The farthest that the hand went: tilt [rad], deflection, or 0 for a mouse.
+        failures: How often a filter of a user gave no answer that is one.
     """
 
     top: float
     period: float
     most = 0.0
+    failures = 0
 
     @abstractmethod
     def aim(self, vx: float, vy: float) -> None:
@@ -141,7 +144,9 @@ class Tilt(Device):
         noise = person.motor_noise
         self._hand = Hand(person.hand_lag, streams.fresh("hand"), noise, max_tilt=self._limit)
         self._sensor = Accelerometer(part, streams.fresh("accelerometer"), rate_hz=rate)
-        self._filter = load_filter(config.filter, config.filter_options)(self.period)
+        made = load_filter(config.filter, config.filter_options)(self.period)
+        own = config.filter not in FILTERS
+        self._filter = GuardedFilter(made, self.period) if own else made
         rest = [self._measured(0.0, 0.0) for _ in range(CALIBRATING)]
         self._rest = sum(r for r, _ in rest) / CALIBRATING, sum(p for _, p in rest) / CALIBRATING
         self._aim = self._told = (0.0, 0.0)
@@ -155,7 +160,9 @@ class Tilt(Device):
         self.most = max(self.most, abs(pitch), abs(roll))
         x, y = self._measured(pitch, roll)
         self._filter.add((x - self._rest[0], y - self._rest[1]))
-        return self._filter.value()
+        value = self._filter.value()
+        self.failures = self._filter.failures
+        return value
 
     def _measured(self, pitch: float, roll: float) -> Pair:
         """Roll and pitch as the accelerometer tells them [rad]."""

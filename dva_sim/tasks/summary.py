@@ -46,6 +46,7 @@ def run_row(trials: Sequence[Mapping[str, Any]]) -> Row:
     for name in MEANS:
         if name in trials[0]:
             row[SHARES.get(name, name)] = mean(trial[name] for trial in trials)
+    row["plugin_failures"] = sum(trial["plugin_failures"] for trial in trials)
     row["hand_most"] = max(float(trial["hand_most"]) for trial in trials)
     done = [trial for trial in trials if trial["completed"]]
     if "id_bits" in trials[0]:

@@ -20,7 +20,7 @@ from typing import Generic, TypeVar
 
 from dva_sim.agents.operator.delay import DelayEstimate
 from dva_sim.agents.operator.person import Person
-from dva_sim.agents.operator.strategies import Driver, Oracle, Reach
+from dva_sim.agents.operator.strategies import Driver, Oracle, Reach, Strategy
 from dva_sim.streams import Streams
 from dva_sim.tasks.channel import Channel
 from dva_sim.tasks.scenario import TaskScenario
@@ -186,6 +186,11 @@ class Trial(ABC, Generic[S]):
     def is_oracle(self) -> bool:
         """Whether the reference steers, which no delay reaches."""
         return isinstance(self._driver, Oracle)
+
+    @property
+    def failures(self) -> int:
+        """How often a strategy of a user gave no answer that is one."""
+        return self._driver.failures if isinstance(self._driver, Strategy) else 0
 
     def _frames_due(self, now: float) -> None:
         if self.is_oracle:

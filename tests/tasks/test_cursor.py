@@ -7,6 +7,7 @@ import pytest
 from dva_sim.tasks import build, play
 from dva_sim.tasks.block import seat_of
 from dva_sim.tasks.cursor import Motion, Places
+from dva_sim.tasks.summary import run_row
 
 EXACT = {"motor_noise": 1e-9, "perceptual_delay_s": 0.1, "hand_lag_s": 0.02, "margin": 0.5}
 TILT = {
@@ -102,3 +103,29 @@ def test_at_two_frames_a_second_the_delay_felt_follows_that_of_the_link():
     now, later, latest = (row["delay_felt_s"] for row in felt)
     assert later - now == pytest.approx(0.5, abs=0.1)
     assert latest - now == pytest.approx(1.0, abs=0.1)
+
+
+FAILS = """
+from dva_sim.agents.operator.strategies import Strategy
+from dva_sim.agents.tilt import Filter
+class Steers(Strategy):
+    def drive(self, route, view, stop_before): return 0, 0
+    def point(self, view): return 1 / 0
+class Smooths(Filter):
+    def add(self, sample): pass
+    def value(self): return 1 / 0
+"""
+
+
+@pytest.mark.parametrize(
+    ("key", "name"), [("operator.strategy", "Steers"), ("device.filter", "Smooths")]
+)
+def test_what_a_user_brings_may_fail_and_the_trial_tells_how_often(tmp_path, key, name):
+    file = tmp_path / "mine.py"
+    file.write_text(FAILS)
+    own = {key: f"{file}:{name}", "horizon_s": 2, "practice": 0}
+    rows = play(build(pointing(**TILT), own), 1)
+    assert all(row["plugin_failures"] > 50 for row in rows)
+    assert not any(row["completed"] for row in rows)
+    assert run_row(rows)["plugin_failures"] == sum(row["plugin_failures"] for row in rows)
+    assert play(build(pointing(**TILT), {"trials": 1}), 1)[0]["plugin_failures"] == 0

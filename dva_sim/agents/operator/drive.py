@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable
 
 import numpy as np
@@ -63,7 +64,8 @@ class Drive(Work):
         self._careful = Careful(seat.person, reach) if seat.setup.guarded else None
         self._standing_since: float | None = None
         self._let_go_until = 0.0
-        self._without_effect = self._failures = 0
+        self._without_effect = 0
+        self._failures: Counter[str] = Counter()
         self._least_left, self._nearer_at = math.inf, 0.0
 
     def begin(self) -> None:
@@ -99,12 +101,9 @@ class Drive(Work):
         if self._sender is None:
             return
         self._sender.stop()
-        phone = self._seat.phone
-        if phone.failures:
-            self._device.recorder.counters["failed: an answer of a phone"] += phone.failures
-            self._device.tell(f"puts the phone down, as it fails: {phone.first_failure}", "drive")
         if isinstance(self._strategy, Strategy):
             self.log.workload = dict(self._strategy.workload())
+        self._count_failures()
 
     def _make_sender(self) -> CommandSender:
         """The pattern decides how commands travel, and nothing else."""
@@ -150,18 +149,23 @@ class Drive(Work):
             view = View(now, judged, delay)
             usual = lambda keep: drive(route, view, keep)  # noqa: E731
             self._intend(self._steer(judged, delay, usual), judged.tick)
-            self._count_failures(self._strategy)
 
-    def _count_failures(self, strategy: Strategy) -> None:
-        """Count what a strategy of a user got wrong, and tell of the first time."""
-        known, self._failures = self._failures, strategy.failures
-        if self._failures > known:
+    def _count_failures(self) -> None:
+        """Count what a strategy, filter or mapping of a user got wrong; tell of the first time."""
+        phone, strategy = self._seat.phone, self._strategy
+        line = f"holds a phone that fails: {phone.first_failure}"
+        self._note("a phone", phone.failures, line)
+        if isinstance(strategy, Strategy):
+            line = f"lets go, as its strategy fails: {strategy.first_failure}"
+            self._note("an operator", strategy.failures, line)
+
+    def _note(self, whose: str, failures: int, line: str) -> None:
+        known, self._failures[whose] = self._failures[whose], failures
+        if failures > known:
             count = self._device.recorder.counters
-            count["failed: an answer of an operator"] += self._failures - known
+            count[f"failed: an answer of {whose}"] += failures - known
             if not known:
-                self._device.tell(
-                    f"lets go, as its strategy fails: {strategy.first_failure}", "drive"
-                )
+                self._device.tell(line, "drive")
 
     def _steer(self, seen: Observation, delay: float, usual: Callable[[float], Intent]) -> Intent:
         """What to ask for; close quarters are for who knows that a guard holds the robot back.
@@ -272,3 +276,4 @@ class Drive(Work):
         self._intent = intent
         self._seat.phone.ask(now, intent.speed, intent.turn_rate, captured)
         self._seat.delay.intend(now, intent.speed, intent.turn_rate)
+        self._count_failures()

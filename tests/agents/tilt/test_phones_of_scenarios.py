@@ -10,6 +10,7 @@ import pytest
 from dva_sim import scenario as scenarios
 from dva_sim.config import load_yaml
 from dva_sim.errors import ConfigError
+from dva_sim.experiments import metrics
 from dva_sim.simulation import simulate
 
 FILTER = """
@@ -83,3 +84,43 @@ def test_a_filter_beside_its_scenario_drives_as_the_shipped_one_of_its_kind(
 def test_a_robot_arrives_with_every_mapping(mapping: str) -> None:
     built = scenarios.build(scenarios.load("drive-to-event"), {"phone.mapping": mapping})
     assert [d.outcome for d in simulate(built, 1).recorder.drives] == ["confirmed"]
+
+
+@pytest.mark.parametrize(
+    ("stage", "key", "body"),
+    [
+        (
+            "Filter",
+            "phone.filter",
+            "    def value(self): return 1 / 0\n    def add(self, s): pass\n",
+        ),
+        (
+            "Mapping",
+            "phone.mapping",
+            "    def command(self, level, turn, dt): return 1 / 0\n"
+            "    def tilt_for(self, wanted, shown, within): return wanted\n",
+        ),
+    ],
+)
+def test_a_stage_that_fails_is_told_at_once_and_counted_in_the_row_of_its_run(
+    stage: str, key: str, body: str, tmp_path: Path
+) -> None:
+    file = tmp_path / "mine.py"
+    file.write_text(f"from dva_sim.agents.tilt import {stage}\nclass Mine({stage}):\n{body}")
+    run = simulate(
+        scenarios.build(scenarios.load("drive-to-event"), {key: f"{file}:Mine", "horizon_s": 60}), 1
+    )
+    told = [moment for moment in run.recorder.timeline if "holds a phone" in moment.what]
+    line = "holds a phone that fails: ZeroDivisionError: division by zero"
+    assert [moment.what for moment in told] == [line] * sum(
+        d.started is not None for d in run.recorder.drives
+    )
+    begun = run.recorder.drives[0].started
+    assert begun is not None
+    assert begun <= told[0].time < begun + 3.0
+    assert metrics.run_row(run)["plugin_failures"] > 100
+
+
+def test_in_a_run_of_shipped_parts_no_plugin_fails() -> None:
+    run = simulate(scenarios.build(scenarios.load("drive-to-event"), {"horizon_s": 60}), 1)
+    assert metrics.run_row(run)["plugin_failures"] == 0
