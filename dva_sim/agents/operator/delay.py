@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 STEP = 0.1  # resolution of the memory and of the guess while driving [s]
@@ -17,8 +19,10 @@ class DelayEstimate:
     """A running guess of the time from an intent to its effect in the picture.
 
     For each candidate lag it keeps how badly the motion seen now fits what was asked for that
-    long ago, forgetting slowly; the guess is the lag that fits best. While nothing changes all lags
-    fit alike, and the guess stays. Nobody tells a person the delay: this is all that it knows.
+    long ago, forgetting slowly; the guess is the lag that fits best. A look counts for the time
+    since the one before, and as much is forgotten by it: how fast a delay is learnt hardly depends
+    on how many frames there are. While nothing changes all lags fit alike, and the guess stays.
+    Nobody tells a person the delay: this is all that it knows.
 
     Args:
         start: When the drive or the trial begins [s].
@@ -39,7 +43,7 @@ class DelayEstimate:
     ) -> None:
         self._start = self._next_look = start
         self._step, self._period = step, LOOK_STEPS * step
-        self._keep = float(np.exp(-self._period / FADES_IN))
+        self._last: float | None = None
         self._weights = 1.0 / scale[0], 1.0 / scale[1]
         self._lags = np.arange(1, round(LONGEST / step) + 1) * step
         self._offset = self._filled = len(self._lags)
@@ -67,11 +71,17 @@ class DelayEstimate:
         turn *= self._weights[1]
         error += turn
         np.minimum(error, MOST, out=error)
-        error *= self._period
+        passed = self._period if self._last is None else min(now - self._last, FADES_IN)
+        self._last = now
+        error *= passed
         misfit = self._misfit
-        misfit *= self._keep
+        misfit *= math.exp(-passed / FADES_IN)
         misfit += error[::-1]
         self.value = float(self._lags[misfit.argmin()])
+
+    def rest(self) -> None:
+        """Nothing is looked at for a while; that time stands for nothing seen."""
+        self._last = None
 
     def _remember(self, now: float) -> None:
         """Fill the memory with the standing intent up to `now`."""

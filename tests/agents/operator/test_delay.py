@@ -58,3 +58,49 @@ def test_a_delay_that_changes_is_learnt_anew_within_half_a_minute() -> None:
         values.append(guess.value)
     assert values[590] == pytest.approx(0.5, abs=0.11)
     assert all(value == pytest.approx(2.0, abs=0.11) for value in values[900:])
+
+
+def learns_a_jump_after(frames_per_second: float, luck: int) -> float:
+    """How long until a delay that went from 1 to 3 s is taken to be that, within 0.35 s [s].
+
+    New speeds and turn rates are asked for every two seconds on average.
+    """
+    rng = np.random.default_rng(luck)
+    changes = np.cumsum(rng.exponential(2.0, 400))
+    asked = rng.uniform((0.0, -0.5), (0.5, 0.5), (401, 2)).tolist()
+    guess, next_look = DelayEstimate(0.0, 0.6), 0.0
+    for now in (np.arange(0, 6000) / 20.0).tolist():
+        guess.intend(now, *asked[int(np.searchsorted(changes, now))])
+        then = now - (1.0 if now < 100.0 else 3.0)
+        if now > next_look - 1e-9:
+            shown = asked[int(np.searchsorted(changes, then))] if then >= 0.0 else (0.0, 0.0)
+            guess.see(now, *shown)
+            next_look += 1.0 / frames_per_second
+        if now >= 100.0 and abs(guess.value - 3.0) < 0.35:
+            return now - 100.0
+    return float("inf")
+
+
+@pytest.mark.parametrize(("frames_per_second", "most"), [(10, 7), (5, 7), (1, 9), (0.5, 14)])
+def test_how_fast_a_delay_is_learnt_hardly_depends_on_how_many_frames_there_are(
+    frames_per_second: float, most: float
+) -> None:
+    """Two looks at the least are needed, whatever they count."""
+    took = [learns_a_jump_after(frames_per_second, luck) for luck in range(9)]
+    assert 2.0 < float(np.median(took)) < most
+
+
+def test_a_break_stands_for_nothing_seen() -> None:
+    """After 4 s in which nobody looked, one wrong picture is one wrong picture."""
+    values = []
+    for rests in (True, False):
+        guess = DelayEstimate(0.0, 0.6)
+        learn(guess, 0.6, 20.0, 0.1)
+        guess.intend(20.0, 0.5, 1.0)
+        if rests:
+            guess.rest()
+        guess.intend(22.5, 0.0, 0.0)
+        guess.see(24.0, 0.5, 1.0)
+        values.append(guess.value)
+    assert values[0] == pytest.approx(0.6, abs=0.11)
+    assert values[1] > 1.4
