@@ -139,6 +139,7 @@ def _row(
         "wait_s": trial.waits.seconds,
         "delay_felt_s": trial.seat.delay.value,
         "hand_most": trial.device.most,
+        "plugin_failures": trial.failures + trial.device.failures,
     }
 
 
