@@ -35,6 +35,9 @@ ROUTES: Final = {
     "a corner": ((0.0, 0.0), (5.0, 0.0), (5.0, 5.0)),
     "a double bend": ((0.0, 0.0), (4.0, 0.0), (6.0, 2.0), (10.0, 2.0)),
 }
+STAIRS: Final = tuple((4.0 * (n // 2), 4.0 * ((n + 1) // 2)) for n in range(16))  # 60 m
+WAYS: Final = {**ROUTES, "a long way": STAIRS}
+LONG: Final = 120.0  # so long one is watched there, to see what it does late in a drive [s]
 DELAYS: Final = (0.0, 1.0)  # [s]
 STOP: Final = 0.5  # before the end of a way [m]
 CORRIDOR: Final = 1.0  # either side of a way [m]
@@ -134,7 +137,7 @@ class _Trial:
     def _robots(self) -> Iterator[Case]:
         """Finite and within reach, whatever is seen."""
         for reach in ROBOTS:
-            strategy, now, route = self.new(self._persons[0], reach), 0.0, _way(ROUTES["a corner"])
+            strategy, now, route = self.new(self._persons[0], reach), 0.0, _way(WAYS["a corner"])
             for number in range(LOOKS):
                 now += self._one_of(WAITS)
                 x, y, heading, speed, turn = (self._anything() for _ in range(5))
@@ -174,13 +177,14 @@ class _Trial:
     # --- drives ------------------------------------------------------------------------
 
     def _alike(self) -> Iterator[Case]:
-        """The same again, and the same beside another one."""
-        route = "a double bend"
+        """The same again, and the same beside another one; by one of them for long."""
         for person in self._persons:
-            alone = self._drive(person, ROBOTS[0], route, 1.0, seconds=20.0)
+            is_first = person is self._persons[0]
+            route, seconds = ("a long way", LONG) if is_first else ("a double bend", 20.0)
+            alone = self._drive(person, ROBOTS[0], route, 1.0, seconds)
             beside = self.new(self._persons[-1], ROBOTS[1])
             self._drive(person, ROBOTS[1], "a corner", 0.0, seconds=20.0, strategy=beside)
-            again = self._drive(person, ROBOTS[0], route, 1.0, seconds=20.0)
+            again = self._drive(person, ROBOTS[0], route, 1.0, seconds)
             if again != alone:
                 yield "remembers what another one did, or has luck of its own", f"on {route}"
 
@@ -226,7 +230,7 @@ class _Trial:
     ) -> list[_Step]:
         """A drive of a robot that does at once what it is told; pictures are late by `delay`."""
         self.count += 1
-        strategy, route = strategy or self.new(person, reach), _way(ROUTES[name])
+        strategy, route = strategy or self.new(person, reach), _way(WAYS[name])
         x = y = heading = 0.0
         late = round(delay / FRAME)
         pictures = [Observation(0, 0.0, 0.0, 0.0, 0.0, 0.0, ())] * (late + 1)

@@ -73,6 +73,19 @@ class Lucky(Pursuit):
         return Intent(random.uniform(0.0, 0.5), 0.0)
 
 
+class LuckyLater(Pursuit):
+    def drive(self, route, view, stop_before):
+        wanted = super().drive(route, view, stop_before)
+        return wanted if view.now < 60.0 else Intent(random.uniform(0.0, 0.5), wanted.turn_rate)
+
+
+class ClockedLater(Pursuit):
+    def drive(self, route, view, stop_before):
+        wanted = super().drive(route, view, stop_before)
+        share = 1.0 if view.now < 60.0 else time.perf_counter() % 1.0
+        return Intent(share * wanted.speed, wanted.turn_rate)
+
+
 class Peeping(Pursuit):
     def drive(self, route, view, stop_before):
         caller = sys._getframe(1).f_locals
@@ -107,6 +120,8 @@ class Restless(Pursuit):
         (Divider, "raises"),
         (Forgetless, "remembers what another one did, or has luck of its own"),
         (Lucky, "remembers what another one did, or has luck of its own"),
+        (LuckyLater, "remembers what another one did, or has luck of its own"),
+        (ClockedLater, "remembers what another one did, or has luck of its own"),
         (Peeping, "sees what no picture has shown yet"),
         (Straight, "leaves a wide corridor"),
         (Lazy, "does not arrive"),
