@@ -137,6 +137,7 @@ def _row(
         "path_m": trial.path,
         "waits": trial.waits.count,
         "wait_s": trial.waits.seconds,
+        "move_and_wait_share": trial.move_and_wait_share,
         "delay_felt_s": trial.seat.delay.value,
         "hand_most": trial.device.most,
         "plugin_failures": trial.failures + trial.device.failures,

@@ -25,6 +25,7 @@ MEANS = (
     "path_m",
     "waits",
     "wait_s",
+    "move_and_wait_share",
     "delay_felt_s",
 )
 """Columns of the trials whose mean is a column of the run, as far as the task has them."""

@@ -188,6 +188,12 @@ class Trial(ABC, Generic[S]):
         return isinstance(self._driver, Oracle)
 
     @property
+    def move_and_wait_share(self) -> float:
+        """For how much of its time the strategy moved and waited, if it can tell."""
+        told = self._driver.workload() if isinstance(self._driver, Strategy) else {}
+        return told.get("move_and_wait_share", 0.0)
+
+    @property
     def failures(self) -> int:
         """How often a strategy of a user gave no answer that is one."""
         return self._driver.failures if isinstance(self._driver, Strategy) else 0

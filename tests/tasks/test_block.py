@@ -8,6 +8,7 @@ from dva_sim.streams import Streams
 from dva_sim.tasks import block, build, play, trace_of
 from dva_sim.tasks.block import seat_of
 from dva_sim.tasks.measures import fit_line
+from dva_sim.tasks.summary import run_row
 from dva_sim.tasks.tunnel import TunnelGoal
 
 EXACT = {
@@ -174,6 +175,26 @@ def test_a_first_frame_that_is_lost_is_waited_for():
     moves, reaction = first_move(SURPRISED, lossy)
     assert math.remainder(moves - reaction, 0.5) == pytest.approx(0.0, abs=0.01)
     assert moves > 0.5
+
+
+@pytest.mark.parametrize(
+    ("strategy", "least", "most"),
+    [
+        ("pursuit", 0.0, 0.0),
+        ("oracle", 0.0, 0.0),
+        ("move_and_wait", 1.0, 1.0),
+        ("adaptive", 0.1, 1.0),
+    ],
+)
+@pytest.mark.parametrize("scenario", [pointing(trials=2), {**CORNER, "trials": 2}])
+def test_rows_tell_for_how_much_of_its_time_a_person_moved_and_waited(
+    strategy, least, most, scenario
+):
+    late = {"operator.strategy": strategy, "link.down.delay_s": 3.0}
+    rows = play(build(scenario, late), 1)
+    shares = [row["move_and_wait_share"] for row in rows]
+    assert all(least <= share <= most for share in shares)
+    assert run_row(rows)["move_and_wait_share"] == pytest.approx(sum(shares) / 2)
 
 
 def test_a_trial_that_is_not_done_by_the_horizon_counts_with_it():
