@@ -38,6 +38,7 @@ CLAIMS = {
 TUNED = {
     "study": "synthetic",
     "made_with": "nothing",
+    "basis": {"persons": "others", "phones": "these"},
     "tuning": {
         "key": "phone.mapping_options.gain",
         "levels": [0.5, 1.0],

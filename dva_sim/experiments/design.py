@@ -23,7 +23,7 @@ from dva_sim.experiments.repeats import (
     settings_of_repeats,
 )
 from dva_sim.experiments.study import Study
-from dva_sim.experiments.tuned import load_tuned
+from dva_sim.experiments.tuned import Basis, load_tuned
 from dva_sim.streams import derive_seed
 
 REFERENCE = -1
@@ -96,15 +96,44 @@ def cells(study: Study) -> list[Cell]:
     The repeats of the answer come last, as if they were a part of their own.
 
     Raises:
-        ConfigError: a scenario that cannot be read, or is not valid with some change.
+        ConfigError: a scenario that cannot be read, or is not valid with some change, or a
+            measure that its runs do not have.
     """
+    refuse_unknown_measures(study)
     own = [cell for name in study.parts for cell in _cells_of(study, name)]
     return [*own, *_repeats_of(study)]
+
+
+def refuse_unknown_measures(study: Study) -> None:
+    """What is asked for must be a column of the runs; better told before they are made.
+
+    Raises:
+        ConfigError: it is none.
+    """
+    for key, asked in (("answer", study.answer), ("tuning", study.tuning)):
+        if asked is None:
+            continue
+        known = model_of(_source(study, study.parts[asked.part])).measures()
+        if asked.measure not in known:
+            problem = f"measure {asked.measure!r} is unknown; known: {', '.join(known)}"
+            raise study.error(problem, (key, "measure"))
 
 
 def base_scenario(study: Study, part: str) -> AnyScenario:
     """A part's scenario before any factor has changed it."""
     return _build(study, part, _source(study, study.parts[part]), {})
+
+
+def basis_of_tuning(study: Study) -> Basis:
+    """The persons and phones that tuned values should rest on."""
+    assert study.tuning is not None
+    scenario = base_scenario(study, study.tuning.part).model_dump(mode="json")
+    return Basis.of(scenario.get("operator", {}).get("population", "operators"))
+
+
+def is_tuned(study: Study) -> bool:
+    """Whether some cells have tuned values."""
+    return TUNED in study.factors.get(TUNING, ())
 
 
 def jobs(study: Study, grid: Sequence[Cell] | None = None) -> list[Job]:
@@ -187,7 +216,7 @@ def _grid(factors: Mapping[str, Sequence[Level]]) -> Iterator[dict[str, Level]]:
 
 def _changer(study: Study) -> Callable[[Mapping[str, Level]], dict[str, Any]]:
     """What the levels of a cell change in the scenario."""
-    tuned = load_tuned(study) if TUNED in study.factors.get(TUNING, ()) else None
+    tuned = load_tuned(study) if is_tuned(study) else None
 
     def change(levels: Mapping[str, Level]) -> dict[str, Any]:
         changes: dict[str, Any] = {}

@@ -27,7 +27,7 @@ from dva_sim.experiments.reading import factors_of, finding_of, keys_of, possibl
 from dva_sim.experiments.results import Results
 from dva_sim.experiments.robustness import Robustness, robustness_of, sentences
 from dva_sim.experiments.support import support_of_part
-from dva_sim.experiments.tuning import tuned_table
+from dva_sim.experiments.tuning import tuned_table, tuning_warning
 from dva_sim.experiments.variance import spread_table
 
 if TYPE_CHECKING:
@@ -192,6 +192,8 @@ def _warnings(results: Results, runs: Table) -> list[str]:
     broken = int((as_floats(runs["violations"]) > 0).sum()) if "violations" in runs else 0
     if broken:
         found.append(f"Safety invariants were broken in {broken} runs.")
+    if tuning := tuning_warning(results.manifest):
+        found.append(tuning)
     return found
 
 

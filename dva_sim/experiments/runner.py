@@ -18,7 +18,6 @@ from typing import Any
 from dva_sim import __version__
 from dva_sim.errors import ConfigError, DvaSimError
 from dva_sim.experiments import design, pool
-from dva_sim.experiments.asking import TUNED, TUNING
 from dva_sim.experiments.design import Cell, Job, Key
 from dva_sim.experiments.fingerprint import fingerprint
 from dva_sim.experiments.journal import FILE, Journal
@@ -44,12 +43,14 @@ class DryRun:
         done: How many of them the results folder already holds.
         cells: Configurations, with the reference runs' own.
         estimate_s: Time for the rest [s], if runs done before tell their cost.
+        remark: What is doubtful about tuned values; empty if nothing is.
     """
 
     runs: int
     done: int
     cells: int
     estimate_s: float | None
+    remark: str = ""
 
 
 def run_study(
@@ -116,7 +117,7 @@ def dry_run(study: Study, out: str | Path, *, jobs: int | None = None) -> DryRun
     left = len(keys - costs.keys())
     mean = sum(costs.values()) / len(costs) if costs else None
     estimate = None if mean is None else mean * left / (jobs or cores())
-    return DryRun(len(keys), len(keys) - left, len(cells), estimate)
+    return DryRun(len(keys), len(keys) - left, len(cells), estimate, _remark(study))
 
 
 def cores() -> int:
@@ -179,6 +180,7 @@ def _open(out: Path, manifest: dict[str, Any]) -> Journal:
 
 def _manifest(study: Study, cells: Sequence[Cell], todo: Sequence[Job]) -> dict[str, Any]:
     """What was asked and run: nothing in it depends on when, where or how fast."""
+    tuned = design.is_tuned(study)
     content: dict[str, Any] = {
         "question": study.question,
         "study": study.model_dump(mode="json"),
@@ -190,7 +192,8 @@ def _manifest(study: Study, cells: Sequence[Cell], todo: Sequence[Job]) -> dict[
         "inputs": design.inputs(cells),
         "cells": [_cell_row(cell) for cell in cells],
         "parameter_sets": parameter_sets(study),
-        "tuned": load_tuned(study).model_dump(mode="json") if _is_tuned(study) else None,
+        "tuned": load_tuned(study).model_dump(mode="json") if tuned else None,
+        "basis": design.basis_of_tuning(study).model_dump(mode="json") if tuned else None,
         "runs": len({job.key for job in todo}),
         "seeds": {
             "study": study.seed,
@@ -206,8 +209,10 @@ def _manifest(study: Study, cells: Sequence[Cell], todo: Sequence[Job]) -> dict[
     return content | {"hash": identity}
 
 
-def _is_tuned(study: Study) -> bool:
-    return TUNED in study.factors.get(TUNING, ())
+def _remark(study: Study) -> str:
+    if not design.is_tuned(study):
+        return ""
+    return load_tuned(study).remark(design.basis_of_tuning(study))
 
 
 def _cell_row(cell: Cell) -> dict[str, Any]:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from dva_sim import resources
 from dva_sim.config import Config, load_yaml, validate
 from dva_sim.errors import ConfigError
 from dva_sim.experiments.asking import Level, Tuning
@@ -46,12 +48,38 @@ class Seen(Config):
     high: float
 
 
+class Basis(Config):
+    """What users edit and tuned values rest on: hashes over the values in those files.
+
+    Attributes:
+        persons: Of the population.
+        phones: Of all phones.
+    """
+
+    persons: str
+    phones: str
+
+    @classmethod
+    def of(cls, population: str) -> Basis:
+        """As the files are now."""
+        phones = resources.available("agents/phones")
+        return cls(
+            persons=_hash_of([resources.find(population, "agents/people")]),
+            phones=_hash_of([phones[name] for name in sorted(phones)]),
+        )
+
+    def unlike(self, other: Basis) -> list[str]:
+        """Which of them are others."""
+        return [name for name in Basis.model_fields if getattr(self, name) != getattr(other, name)]
+
+
 class Tuned(Config):
     """What a tuning chose, and all that it saw.
 
     Attributes:
         study: Name of the study.
         made_with: Version of the program, and the fingerprint of what simulates.
+        basis: The persons and phones that it was made with.
         tuning: The rule as it was then.
         chosen: A value for each combination of levels.
         seen: Every value tried.
@@ -59,9 +87,15 @@ class Tuned(Config):
 
     study: str
     made_with: str
+    basis: Basis
     tuning: Tuning
     chosen: tuple[Chosen, ...]
     seen: tuple[Seen, ...]
+
+    def remark(self, now: Basis) -> str:
+        """That it was tuned with others than there are now; empty if it was not."""
+        others = " and ".join(self.basis.unlike(now))
+        return f"tuned with other {others}: run 'dva-sim tune {self.study}' again" if others else ""
 
     def value_for(self, levels: Mapping[str, Level]) -> float:
         """The value chosen for the cell with these levels.
@@ -109,7 +143,7 @@ def save_tuned(study: Study, tuned: Tuned) -> Path:
     data = tuned.model_dump(mode="json")
     lines = [
         f"# Written by `dva-sim tune {tuned.study}`; what it says is not to be edited.",
-        *(f"{key}: {_flow(data[key])}" for key in ("study", "made_with")),
+        *(f"{key}: {_flow(data[key])}" for key in ("study", "made_with", "basis")),
         "tuning:",
         *(f"  {key}: {_flow(value)}" for key, value in data["tuning"].items()),
     ]
@@ -119,6 +153,12 @@ def save_tuned(study: Study, tuned: Tuned) -> Path:
     path.parent.mkdir(exist_ok=True)
     path.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
     return path
+
+
+def _hash_of(files: Iterable[Path]) -> str:
+    """64 bits over names and values; what describes a file, or comments on it, is none of them."""
+    data = [[path.name, {**load_yaml(path).data, "description": ""}] for path in files]
+    return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()[:16]
 
 
 def _flow(data: Any) -> str:

@@ -8,18 +8,27 @@ from pathlib import Path
 from typing import Any
 
 from dva_sim import __version__
+from dva_sim.config import validate
 from dva_sim.errors import ConfigError, DvaSimError
 from dva_sim.experiments.asking import Level, Levels, Tuning
 from dva_sim.experiments.cells import CellTable
+from dva_sim.experiments.design import basis_of_tuning
 from dva_sim.experiments.effects import Factor, Floats, Part
 from dva_sim.experiments.fingerprint import fingerprint
-from dva_sim.experiments.labels import factor_name, level_name, measure_name, number, setting
+from dva_sim.experiments.labels import (
+    factor_name,
+    level_name,
+    listing,
+    measure_name,
+    number,
+    setting,
+)
 from dva_sim.experiments.pool import LIMIT_S, Episode
 from dva_sim.experiments.results import Results
 from dva_sim.experiments.runner import Progress, run_study
 from dva_sim.experiments.statistics import mean_interval
 from dva_sim.experiments.study import Study
-from dva_sim.experiments.tuned import Chosen, Seen, Tuned, choose
+from dva_sim.experiments.tuned import Basis, Chosen, Seen, Tuned, choose
 
 _DIGITS = 6  # of what was seen, in the file
 
@@ -88,6 +97,7 @@ def tune(
     return Tuned(
         study=study.file.stem,
         made_with=f"{__version__} {fingerprint()}",
+        basis=basis_of_tuning(study),
         tuning=rule,
         chosen=tuple(_choice(seen, when) for when in _whens(part, rule)),
         seen=tuple(seen),
@@ -98,7 +108,7 @@ def tuned_table(manifest: Mapping[str, Any]) -> CellTable | None:
     """All that a tuning saw, as a report prints it; None where nothing was tuned."""
     if not manifest.get("tuned"):
         return None
-    tuned = Tuned.model_validate(manifest["tuned"])
+    tuned = validate(Tuned, manifest["tuned"])
     rule, chosen = tuned.tuning, {(str(c.when), c.value) for c in tuned.chosen}
     rows = [
         [
@@ -119,6 +129,20 @@ def tuned_table(manifest: Mapping[str, Any]) -> CellTable | None:
     if str(manifest["versions"].get("fingerprint")) not in tuned.made_with:
         note += " It was tuned with another version of the program than the study was run with."
     return CellTable(rule.part, heads, len(rule.by), rows, note=note)
+
+
+def tuning_warning(manifest: Mapping[str, Any]) -> str:
+    """That values were tuned with other persons or phones than the study was run with."""
+    if not manifest.get("tuned"):
+        return ""
+    tuned = validate(Tuned, manifest["tuned"])
+    others = listing(tuned.basis.unlike(validate(Basis, manifest["basis"])))
+    if not others:
+        return ""
+    return (
+        f"The {factor_name(tuned.tuning.key)} was tuned with other {others} than the study was run "
+        f"with: 'dva-sim tune {tuned.study}' chooses anew."
+    )
 
 
 def _rule_of(study: Study) -> Tuning:

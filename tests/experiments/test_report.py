@@ -46,6 +46,7 @@ def report(tmp_path_factory):
     facts["study"]["factors"] |= {"profile": ["default"]}
     facts["study"] |= synthetic_study.CLAIMS
     facts["tuned"] = synthetic_study.TUNED
+    facts["basis"] = {"persons": "these", "phones": "these"}
     return write_report(
         synthetic_study.write(tmp_path_factory.mktemp("study") / "results", tables, facts)
     )
@@ -90,6 +91,10 @@ def test_the_report_splits_the_spread_and_shows_all_that_tuning_saw(report):
     assert "absolute 0.5 50.0 (40.0 to 60.0)" in text
     assert "absolute 1 48.0 (38.0 to 58.0) chosen" in text
     assert "tuned with another version of the program" in text
+    warned = (
+        "The gain of the phone was tuned with other persons than the study was run with: 'dva-sim "
+    )
+    assert f"{warned}tune synthetic' chooses anew." in text
     assert "No learning is modelled" in text
 
 

@@ -3,8 +3,10 @@ import math
 import pytest
 import small_study as kit
 
+from dva_sim import resources
 from dva_sim.errors import ConfigError, DvaSimError
 from dva_sim.experiments import console, design
+from dva_sim.experiments.runner import dry_run
 from dva_sim.experiments.study import load_study
 from dva_sim.experiments.tuned import choose, file_of, load_tuned, save_tuned
 from dva_sim.experiments.tuning import tune, tuning_study
@@ -96,6 +98,35 @@ def test_what_was_tuned_is_kept_with_all_that_was_seen_and_the_same_bytes(tmp_pa
     assert file_of(study).read_bytes() == before
     assert len(tuned.seen) == 8
     assert tuned.tuning == study.tuning
+
+
+def test_other_persons_or_phones_are_told_and_their_descriptions_are_none_of_it(
+    tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    kept(tmp_path)
+
+    def remark():
+        return dry_run(study_in(tmp_path), tmp_path / "out", jobs=1).remark
+
+    def edit(folder, name, old, new):
+        path = tmp_path / "agents" / folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        text = resources.find(name, f"agents/{folder}").read_text()
+        assert old in text
+        path.write_text(text.replace(old, new))
+
+    assert remark() == ""
+    edit("people", "operators.yaml", "Persons who drive", "Those who drive")
+    edit("people", "operators.yaml", "margin:", "# less is calmer\nmargin:")
+    assert remark() == ""
+    edit(
+        "people", "operators.yaml", "crossover_rad_s:", "crossover_rad_s: {median: 9, spread: 0} #"
+    )
+    assert remark() == "tuned with other persons: run 'dva-sim tune study' again"
+    edit("phones", "default.yaml", "accelerometer:", "accelerometer: perfect #")
+    assert remark() == "tuned with other persons and phones: run 'dva-sim tune study' again"
+    assert dry_run(study_in(tmp_path, "tuning=untuned"), tmp_path / "out", jobs=1).remark == ""
 
 
 def test_a_study_that_was_not_tuned_says_how(tmp_path):
