@@ -1,7 +1,9 @@
 """Which cells lie beyond the delays at which people were watched: extrapolations, marked so.
 
 What counts is the delay of the loop as measured in the cell without the person's own share, not
-the delay of the link: that is what published experiments report.
+the delay of the link: that is what published experiments report. Marked are cells and repeats
+whose runs tell that delay (`loop_delay_mean_s`), which is those of scenarios with robots. Tasks do
+not tell it, so that nothing of theirs is marked, however long their links are.
 """
 
 from __future__ import annotations
@@ -16,8 +18,7 @@ from numpy.typing import NDArray
 from dva_sim.experiments.asking import STRATEGY
 from dva_sim.experiments.conditions import get
 from dva_sim.experiments.effects import Floats, Part, nan_mean
-from dva_sim.experiments.validation.operators.support import support_of
-from dva_sim.experiments.validation.operators.targets import SupportConfig
+from dva_sim.experiments.validation.operators.support import ranges, supports_of
 
 LOOP = "loop_delay_mean_s"
 PERSONAL = ("delay_human_s", "delay_hand_s")
@@ -56,12 +57,10 @@ def support_of_part(part: Part, scenario: Mapping[str, Any]) -> Support | None:
         runs = runs - np.nan_to_num(part.grid(column))
     delays = nan_mean(runs.reshape(*runs.shape[:-2], -1), axis=-1)
     outside = np.isfinite(delays)
-    known = {name: support_of(name) for name in strategies}
-    for name, covered in known.items():
-        if covered is not None:
-            inside = (delays >= covered.low_s) & (delays <= covered.high_s)
-            outside &= ~(_has(part, name) & inside)
-    return Support(delays, outside, "; ".join(_told(*item) for item in known.items()))
+    for name in strategies:
+        for low, high in ranges(name):
+            outside &= ~(_has(part, name) & (delays >= low) & (delays <= high))
+    return Support(delays, outside, "; ".join(map(_told, strategies)))
 
 
 def _strategies(part: Part, scenario: Mapping[str, Any]) -> tuple[str, ...]:
@@ -76,7 +75,9 @@ def _has(part: Part, strategy: str) -> Marks:
     return np.array(has).reshape([len(f.levels) for f in part.factors])
 
 
-def _told(strategy: str, covered: SupportConfig | None) -> str:
-    if covered is None:
-        return f"{strategy}: no published data"
-    return f"{strategy}: {covered.low_s:g} to {covered.high_s:g} s, {' '.join(covered.why.split())}"
+def _told(strategy: str) -> str:
+    told = [
+        f"{known.low_s:g} to {known.high_s:g} s, {' '.join(known.why.split())}"
+        for known in supports_of(strategy)
+    ]
+    return f"{strategy}: {', and '.join(told) or 'no published data'}"

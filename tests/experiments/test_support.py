@@ -4,7 +4,7 @@ import pytest
 from dva_sim.experiments.cells import cell_table
 from dva_sim.experiments.effects import Factor, Part, View
 from dva_sim.experiments.support import support_of_part
-from dva_sim.experiments.validation.operators.support import delay_support
+from dva_sim.experiments.validation.operators.support import ranges
 
 DELAY = Factor("link.delay_s", (0.0, 0.5, 5.0))
 STRATEGY = Factor("operator.strategy", ("pursuit", "adaptive"))
@@ -39,9 +39,17 @@ def test_the_loop_without_the_person_decides_not_the_link():
 
 
 def test_each_strategy_has_the_support_of_its_own_data():
-    assert delay_support("pursuit")[1] < 1.1 < delay_support("adaptive")[1]
+    assert ranges("pursuit")[-1][1] < 1.1 < ranges("adaptive")[-1][1]
     found = support_of_part(part_of(), {})
     assert found.outside.tolist() == [[False, False], [True, False], [True, True]]
+
+
+def test_between_two_ranges_nobody_was_watched():
+    part = part_of(extra={"loop_delay_mean_s": np.repeat([0.5, 1.0, 1.4], 2) + 0.3}.items())
+    found = support_of_part(part, {})
+    assert found.outside[:, 1].tolist() == [True, False, False]
+    assert "adaptive: 0 to 0.225 s, pointing" in found.words
+    assert ", and 1 to 1.5 s, move-and-wait" in found.words
 
 
 def test_a_strategy_that_no_data_speak_of_is_an_extrapolation_everywhere():

@@ -8,7 +8,7 @@ import pytest
 from dva_sim.config import validate
 from dva_sim.errors import ConfigError
 from dva_sim.experiments.validation.operators.exact import EXACT
-from dva_sim.experiments.validation.operators.support import delay_support
+from dva_sim.experiments.validation.operators.support import ranges
 from dva_sim.experiments.validation.operators.targets import (
     SplitFile,
     TargetFile,
@@ -103,10 +103,9 @@ def test_a_tag_without_a_meaning_is_refused():
 
 
 def test_people_were_watched_up_to_a_delay_of_one_and_a_half_seconds():
-    assert delay_support() == (0.0, 1.5)
-    assert delay_support("pursuit") == (0.0, 0.225)
+    assert ranges("adaptive") == ((0.0, 0.225), (1.0, 1.5))  # nobody was watched in between
+    assert ranges("pursuit") == ((0.0, 0.225),)
 
 
 def test_of_the_oracle_nothing_was_published():
-    with pytest.raises(ConfigError, match="'oracle'"):
-        delay_support("oracle")
+    assert ranges("oracle") == ()
