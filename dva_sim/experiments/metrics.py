@@ -10,12 +10,30 @@ import numpy as np
 from dva_sim.agents.bystander import DOWN
 from dva_sim.core.events import Event
 from dva_sim.experiments import workload
-from dva_sim.experiments.budget import command_ages, delay_budget, driven
+from dva_sim.experiments.budget import QUANTILES, STAGES, command_ages, delay_budget, driven
 from dva_sim.recorder import DriveLog
 from dva_sim.simulation import Recording
 
 Row = dict[str, Any]
 NAN = math.nan
+
+MEASURES = (
+    *("confirmed", "drive_time_s", "attempts"),
+    *("path_m", "contacts", "contact_impulse_ns", "person_contacts", "jams"),
+    *("command_age_mean_s", *(f"command_age_p{q:02}_s" for q in QUANTILES), "age_in_force_mean_s"),
+    *(f"delay_{stage}_s" for stage in STAGES),
+    *("frame_age_mean_s", "loop_delay_mean_s", "loop_delay_measured_s"),
+    *("command_rate_hz", "commands_sent", "commands_applied", "commands_stale"),
+    *("commands_superseded", "round_trip_p50_s", "queue_max", "timeouts", "alerts", "stop_share"),
+    *("events", "person_exposure_s", "dose_heat_max", "dose_toxic_max", "incapacitated"),
+    *("evacuated_share", "evacuated_s"),
+    *("utilisation", "attending_share", "queue_mean", "turns_per_min"),
+    *("reversals_per_min", "command_changes_per_min", "steering_entropy", "waiting_share"),
+    *("move_waits", "move_and_wait_share", "path_error_rms_m", "path_error_max_m"),
+    *("missed", "false_confirmations", "replans", "messages", "bytes", "refused"),
+    *("plugin_failures", "violations", "simulated_s"),
+)
+"""Numbers that a row of `run_row` may hold, and so what a study may ask for."""
 
 
 def run_row(recording: Recording) -> Row:

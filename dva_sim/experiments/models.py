@@ -25,6 +25,9 @@ Tables = dict[str, list[dict[str, Any]]]
 class Model(Protocol):
     """What a study does with a scenario."""
 
+    def measures(self) -> tuple[str, ...]:
+        """Columns of the runs that a study may ask for."""
+
     def build(self, source: Document, changes: Mapping[str, Any]) -> AnyScenario:
         """The scenario of a file, with some keys changed.
 
@@ -70,6 +73,11 @@ def model_for(scenario: AnyScenario) -> Model:
 
 
 class _Full:
+    def measures(self) -> tuple[str, ...]:
+        from dva_sim.experiments import metrics
+
+        return metrics.MEASURES
+
     def build(self, source: Document, changes: Mapping[str, Any]) -> Scenario:
         return scenarios.build(source, changes)
 
@@ -111,6 +119,11 @@ class _Full:
 class _Timed:
     """Its persons are but names for independent runs."""
 
+    def measures(self) -> tuple[str, ...]:
+        from dva_sim.experiments.dispatch.measures import MEASURES
+
+        return MEASURES
+
     def build(self, source: Document, changes: Mapping[str, Any]) -> TimedScenario:
         return timed.build(source, changes)
 
@@ -139,6 +152,11 @@ class _Timed:
 
 class _Task:
     """A run is a block of trials of one person; `trials` has a row for each."""
+
+    def measures(self) -> tuple[str, ...]:
+        from dva_sim.tasks.summary import MEASURES
+
+        return MEASURES
 
     def build(self, source: Document, changes: Mapping[str, Any]) -> TaskScenario:
         return tasks.build(source, changes)

@@ -30,6 +30,11 @@ MEANS = (
 )
 """Columns of the trials whose mean is a column of the run, as far as the task has them."""
 SHARES = {"completed": "completed_share", "error": "error_share"}
+MEASURES = (
+    *("trials", *(SHARES.get(name, name) for name in MEANS), "hand_most"),
+    *("throughput_bps", "effective_throughput_bps", "id_slope", "plugin_failures", "simulated_s"),
+)
+"""Numbers that a row of `run_row` may hold, and so what a study may ask for."""
 
 
 def run_row(trials: Sequence[Mapping[str, Any]]) -> Row:

@@ -44,6 +44,19 @@ PERCENTILES = (50, 90, 95)
 FEWEST_IN_ZONE = 3  # events without which a zone's mean says nothing
 SLACK = 1e-6  # [s]
 
+MEASURES = (
+    *("follow_s", "events", "true_share", "on_scene_share"),
+    *("response_mean_s", "confirmation_mean_s", *(f"response_p{q}_s" for q in PERCENTILES)),
+    *("robot_share", *(f"{fate}_share" for fate in FATES), "open_share"),
+    *("escalated_later_share", "confirmed_of_true_share", "contained_share", "containment_mean_s"),
+    *("zone_ratio", "bound_mean_s", "beats_bound_share"),
+    *("use_of_guards", "evenness_of_guards", "use_of_robots", "evenness_of_robots"),
+    *("use_of_operators", "load", "exposure_s", "exposure_look_s", "exposure_max_s"),
+    *("preempted", "relocated", "auctions", "overruled", "policy_failed", "messages"),
+    *("violations", "simulated_s"),
+)
+"""Numbers that a row of `run_row` may hold, and so what a study may ask for."""
+
 Row = dict[str, Any]
 Columns = dict[str, NDArray[Any]]
 
