@@ -82,7 +82,8 @@ def _robustness(view: View | None, results: Results) -> Robustness | None:
     finding = finding_of(view) if view is not None else None
     if view is None or finding is None or not results.has(REPEATS):
         return None
-    return robustness_of(results.study, results.table(REPEATS), view, finding)
+    scenario = _scenario_of(results, view.part.name)
+    return robustness_of(results.study, results.table(REPEATS), view, finding, scenario)
 
 
 def _shifts(view: View | None, results: Results) -> Shifts | None:

@@ -10,6 +10,7 @@ import numpy as np
 
 from dva_sim.experiments.answer import Finding
 from dva_sim.experiments.asking import REPEATS, STRATEGY, Level
+from dva_sim.experiments.conditions import get
 from dva_sim.experiments.effects import Factor, Part, Table, View
 from dva_sim.experiments.labels import (
     factor_name,
@@ -22,6 +23,7 @@ from dva_sim.experiments.labels import (
 )
 from dva_sim.experiments.reading import interval_of
 from dva_sim.experiments.repeats import PARAMETERS
+from dva_sim.experiments.support import support_of_part
 
 
 @dataclass(frozen=True)
@@ -34,6 +36,8 @@ class Repeat:
         mean: First minus second.
         low: Lower end of its own 95 % interval.
         high: Upper end.
+        is_own: Whether it is the study's own model, and so no evidence for or against it.
+        is_beyond: Whether people were not watched with that strategy at the delays it was run at.
     """
 
     strategy: str
@@ -41,6 +45,8 @@ class Repeat:
     mean: float
     low: float
     high: float
+    is_own: bool = False
+    is_beyond: bool = False
 
 
 @dataclass(frozen=True)
@@ -64,26 +70,31 @@ class Stop:
     smallest: float | None
 
     @property
+    def others(self) -> list[Repeat]:
+        """Those that count: under another model than the study's own."""
+        return [r for r in self.repeats if not r.is_own]
+
+    @property
     def same_sign(self) -> int:
-        """In how many repeats the effect has the sign of the study's own."""
-        return sum(r.mean * self.found > 0 for r in self.repeats)
+        """In how many of the others the effect has the sign of the study's own."""
+        return sum(r.mean * self.found > 0 for r in self.others)
 
     @property
     def clear(self) -> int:
         """In how many of them the whole interval has it."""
-        return sum(r.low > 0 if self.found > 0 else r.high < 0 for r in self.repeats)
+        return sum(r.low > 0 if self.found > 0 else r.high < 0 for r in self.others)
 
     @property
     def relevant(self) -> int:
         """In how many the effect has that sign and exceeds the smallest that matters."""
         sign, least = np.sign(self.found), self.smallest or 0.0
-        return sum(bool(sign * r.mean > least) for r in self.repeats)
+        return sum(bool(sign * r.mean > least) for r in self.others)
 
     @property
     def negligible(self) -> int:
         """In how many the effect, either way, is below the smallest that matters."""
         least = self.smallest or 0.0
-        return sum(abs(r.mean) <= least for r in self.repeats)
+        return sum(abs(r.mean) <= least for r in self.others)
 
 
 @dataclass(frozen=True)
@@ -110,7 +121,11 @@ class Robustness:
 
 
 def robustness_of(
-    study: Mapping[str, Any], table: Table, view: View, finding: Finding
+    study: Mapping[str, Any],
+    table: Table,
+    view: View,
+    finding: Finding,
+    scenario: Mapping[str, Any],
 ) -> Robustness | None:
     """Read the table of repeats; None where none were declared.
 
@@ -119,6 +134,7 @@ def robustness_of(
         table: Of the repeats.
         view: How the study is read.
         finding: The study's own result.
+        scenario: Of the answer's part before any factor changed it, for the study's own strategy.
     """
     declared = study.get("robustness")
     if not declared or view.over is None or view.line is None or view.contrast is None:
@@ -132,7 +148,8 @@ def robustness_of(
         Factor(view.over.name, at),
     ]
     part = Part(table, REPEATS, factors)
-    stops = tuple(_stop(part, view, finding, level) for level in at)
+    read = _Reading(part, finding, scenario)
+    stops = tuple(_stop(read, view, level) for level in at)
     return Robustness(
         stops=stops,
         over=view.over.name,
@@ -144,13 +161,36 @@ def robustness_of(
     )
 
 
-def _stop(part: Part, view: View, finding: Finding, level: Level) -> Stop:
+class _Reading:
+    """The repeats of a study, and what is known of each besides its effect."""
+
+    def __init__(self, part: Part, finding: Finding, scenario: Mapping[str, Any]) -> None:
+        self.part, self.finding = part, finding
+        self._own, support = get(scenario, STRATEGY), support_of_part(part, scenario)
+        self._outside = None if support is None else support.outside.astype(float)
+
+    def is_own(self, where: dict[str, Level]) -> bool:
+        """Whether that is the model of the study itself."""
+        return where[PARAMETERS] == 0 and where.get(STRATEGY, self._own) == self._own
+
+    def is_beyond(self, where: dict[str, Level]) -> bool:
+        """Whether either side of the contrast is an extrapolation."""
+        if self._outside is None:
+            return False
+        sides = (self.finding.first, self.finding.second)
+        return any(
+            self.part.where(self._outside, where | {self.finding.factor: side}) > 0
+            for side in sides
+        )
+
+
+def _stop(read: _Reading, view: View, level: Level) -> Stop:
     assert view.over is not None
-    at = view.stops.index(level)
+    finding, at = read.finding, view.stops.index(level)
     repeats = [
         repeat
-        for model in part.settings(but=(str(finding.factor), view.over.name))
-        if (repeat := _repeat(part, finding, model | {view.over.name: level})) is not None
+        for model in read.part.settings(but=(str(finding.factor), view.over.name))
+        if (repeat := _repeat(read, model | {view.over.name: level})) is not None
     ]
     return Stop(
         level=level,
@@ -162,8 +202,9 @@ def _stop(part: Part, view: View, finding: Finding, level: Level) -> Stop:
     )
 
 
-def _repeat(part: Part, finding: Finding, where: dict[str, Level]) -> Repeat | None:
+def _repeat(read: _Reading, where: dict[str, Level]) -> Repeat | None:
     """The paired difference under one model; the reference run drops out of it."""
+    part, finding = read.part, read.finding
     grid = part.grid(finding.measure)
     first, second = (
         part.where(grid, where | {finding.factor: level})
@@ -178,6 +219,8 @@ def _repeat(part: Part, finding: Finding, where: dict[str, Level]) -> Repeat | N
         mean=found.mean,
         low=found.low,
         high=found.high,
+        is_own=read.is_own(where),
+        is_beyond=read.is_beyond(where),
     )
 
 
@@ -194,30 +237,42 @@ def _what_was_repeated(r: Robustness) -> str:
     return (
         f"Repeated{under} with the usual parameters and {others} within the bands that "
         f"calibration leaves open ({r.persons} persons, {trials} of each; the same "
-        "persons and luck as above, so that only the model differs)."
+        "persons and luck as above, so that only the model differs). The study's own model is "
+        "no evidence for itself and does not count."
     )
 
 
 def _told(r: Robustness, stop: Stop) -> str:
-    count = len(stop.repeats)
+    count = len(stop.others)
     where = f"At {factor_name(r.over)} {level_name(r.over, stop.level)}"
     if not count:
-        return f"{where} no repeat is complete."
-    unit, means = unit_of(r.measure), [x.mean for x in stop.repeats]
+        return f"{where} no repeat under another model is complete."
+    unit, means = unit_of(r.measure), [x.mean for x in stop.others]
     told = f"{where} the sign holds in {_of(stop.same_sign, count)} repeats"
     told += f", in {stop.clear} of them with its whole interval"
     if stop.smallest is not None:
         told += f"; in {_of(stop.relevant, count)} the effect exceeds the smallest that matters"
         told += f", in {stop.negligible} it is below that either way"
     reach = f"{number(min(means))} to {quantity(max(means), unit)}"
-    return f"{told}. Effects run from {reach}.{_where_it_fails(r, stop)}"
+    return f"{told}. Effects run from {reach}.{_where_it_fails(r, stop)}{_beyond(stop)}"
+
+
+def _beyond(stop: Stop) -> str:
+    """How many of them are extrapolations."""
+    beyond = sum(r.is_beyond for r in stop.others)
+    if not beyond:
+        return ""
+    return (
+        f" In {_of(beyond, len(stop.others))} the delay of the loop is one at which nobody was "
+        "watched who steers that way: extrapolations."
+    )
 
 
 def _where_it_fails(r: Robustness, stop: Stop) -> str:
     """Under which strategies the sign is another."""
     failed = []
     for name in r.strategies:
-        means = [x.mean for x in stop.repeats if x.strategy == name]
+        means = [x.mean for x in stop.others if x.strategy == name]
         others = sum(not mean * stop.found > 0 for mean in means)
         if others:
             failed.append(f"{level_name(STRATEGY, name)} ({others} of {len(means)})")

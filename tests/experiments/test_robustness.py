@@ -14,18 +14,21 @@ EFFECTS = {
 }
 
 
-def read(effects, effect_s=12.0, rows=None):
+OWN = {"operator": {"strategy": "pursuit"}}
+
+
+def read(effects, effect_s=12.0, rows=None, scenario=OWN):
     runs = synthetic_study.columns(synthetic_study.drive_rows(8, 2, effect_s, missed=0.0))
     study = synthetic_study.manifest(8, 2)["study"] | synthetic_study.CLAIMS
     view = view_of(study, runs)
     table = synthetic_study.columns(synthetic_study.repeat_rows(effects) if rows is None else rows)
-    return view, robustness_of(study, table, view, finding_of(view))
+    return view, robustness_of(study, table, view, finding_of(view), scenario)
 
 
 def test_shares_count_the_repeats_with_known_signs():
     _, found = read(EFFECTS)
     (stop,) = found.stops
-    assert (stop.same_sign, stop.clear, stop.relevant, stop.negligible) == (3, 3, 2, 1)
+    assert (stop.same_sign, stop.clear, stop.relevant, stop.negligible) == (2, 2, 1, 1)
     assert (found.persons, found.trials, found.sets) == (4, 2, 1)
 
 
@@ -50,14 +53,39 @@ def test_a_repeat_without_a_pair_is_left_out():
     assert len(found.stops[0].repeats) == 2
 
 
+def test_the_studys_own_model_is_no_evidence_for_itself():
+    for own, counted in (("pursuit", 2), ("adaptive", 2), ("two_point", 3)):
+        _, found = read(EFFECTS, scenario={"operator": {"strategy": own}})
+        (stop,) = found.stops
+        assert stop.same_sign == counted
+        assert [r.strategy for r in stop.repeats if r.is_own] == [own] * (own != "two_point")
+
+
+def test_repeats_at_delays_at_which_nobody_was_watched_are_told_and_drawn_hollow():
+    rows = [
+        row | {"loop_delay_mean_s": 1.4, "delay_human_s": 0.2}
+        for row in synthetic_study.repeat_rows(EFFECTS)
+    ]
+    view, found = read(EFFECTS, rows=rows)
+    assert {(r.strategy, r.is_beyond) for r in found.stops[0].repeats} == {
+        ("pursuit", True),
+        ("adaptive", False),
+    }
+    told = sentences(found)[-1].replace("\N{NO-BREAK SPACE}", " ")
+    assert "In 1 of 3 (33 %) the delay of the loop is one at which nobody was watched" in told
+    with styled():
+        assert "Hollow: an extrapolation" in repeats(view, found).caption
+        assert "Hollow" not in repeats(*read(EFFECTS)).caption
+
+
 def test_the_sentences_give_shares_and_reach():
     _, found = read(EFFECTS)
     what, told = (s.replace("\N{NO-BREAK SPACE}", " ") for s in sentences(found))
     assert "(4 persons, 2 trials of each" in what
     assert told == (
-        "At one-way delay 1 s the sign holds in 3 of 4 (75 %) repeats, in 3 of them with its "
-        "whole interval; in 2 of 4 (50 %) the effect exceeds the smallest that matters, in 1 it "
-        "is below that either way. Effects run from −3.8 to 20.2 s. The sign is another "
+        "At one-way delay 1 s the sign holds in 2 of 3 (67 %) repeats, in 2 of them with its "
+        "whole interval; in 1 of 3 (33 %) the effect exceeds the smallest that matters, in 1 it "
+        "is below that either way. Effects run from −3.8 to 5.1 s. The sign is another "
         "under adaptive (1 of 2)."
     )
 
@@ -74,4 +102,4 @@ def test_a_study_without_repeats_has_none():
     runs = synthetic_study.columns(synthetic_study.drive_rows(4, 1))
     study = synthetic_study.manifest(4, 1)["study"]
     view = view_of(study, runs)
-    assert robustness_of(study, {}, view, finding_of(view)) is None
+    assert robustness_of(study, {}, view, finding_of(view), OWN) is None

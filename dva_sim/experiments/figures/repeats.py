@@ -44,9 +44,12 @@ def repeats(view: View, robustness: Robustness) -> Drawn | None:
     caption = (
         "Each row is the contrast under one model of the persons, with its own 95 % interval, "
         "sorted within a strategy; diamonds have the usual parameters, dots one of the other "
-        "sets. Line and blue band: the study's own result. Grey, differences declared too small "
-        "to matter. Repeats have fewer persons than the study, so their intervals are wider."
+        "sets. Line and blue band: the study's own result; black, its own model again, for "
+        "reference: it does not count. Grey, differences declared too small to matter. Repeats "
+        "have fewer persons than the study, so their intervals are wider."
     )
+    if any(repeat.is_beyond for stop in stops for repeat in stop.repeats):
+        caption += " Hollow: an extrapolation, at delays at which nobody was watched."
     title = f"The contrast in {measure_name(view.measure)} under other models of the persons"
     return finish(figure, "robustness", title, caption)
 
@@ -75,15 +78,16 @@ def _groups(ax: Axes, stop: Stop, strategies: tuple[str, ...]) -> None:
 
 
 def _row(ax: Axes, y: float, repeat: Repeat, colour: str) -> None:
+    colour = INK if repeat.is_own else colour
     ax.hlines(y, repeat.low, repeat.high, color=colour, lw=1, alpha=0.6)
     usual = repeat.parameters == 0
-    edge = INK if usual else SOFT
+    edge = colour if repeat.is_beyond else INK if usual else SOFT
     ax.plot(
         repeat.mean,
         y,
         "D" if usual else "o",
         ms=5 if usual else 3.5,
-        color=colour,
+        color="white" if repeat.is_beyond else colour,
         mec=edge,
-        mew=0.5,
+        mew=1.0 if repeat.is_beyond else 0.5,
     )
