@@ -79,6 +79,15 @@ class Motion:
         return vx, vy, target_vx, target_vy
 
 
+def summed_over(rate: float) -> float:
+    """The time from the first to the last frame of which a velocity is seen [s].
+
+    Args:
+        rate: Frames per second.
+    """
+    return max(1, math.floor(SUMMED * rate + 1e-6)) / rate
+
+
 class Goal(ABC):
     """What is to be done with a cursor, and what is measured of it.
 
@@ -159,7 +168,7 @@ class CursorTrial(Trial[Sighting]):
         self.goal = goal
         way = OneWay() if self.is_oracle else scenario.link.up
         self._up: Channel[Pair] = Channel(way, 0.0, streams, "up")
-        self._motion = Motion()
+        self._motion, self._summed = Motion(), summed_over(scenario.frames.rate_hz)
         self._next_reading, self.path = 0.0, 0.0
         self.moved_at: float | None = None
 
@@ -174,9 +183,9 @@ class CursorTrial(Trial[Sighting]):
         return Sighting(round(1000 * now), x, y, vx, vy, tx, ty, tvx, tvy, self.goal.tolerance)
 
     def decide(self, driver: Driver, seen: Sighting, now: float) -> None:
-        """See `Trial`; a velocity is that of the middle of the time over which it is summed."""
+        """See `Trial`."""
         delay = self.seat.delay
-        delay.see(now - 0.5 * SUMMED, seen.vx, seen.vy)
+        delay.see(now, seen.vx, seen.vy, self._summed)
         vx, vy = self._ask(driver, seen, now, delay.value)
         self.goal.notice(self.now, seen, delay.value)
         if self.goal.flat:

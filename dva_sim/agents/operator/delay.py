@@ -5,6 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
 
 STEP = 0.1  # resolution of the memory and of the guess while driving [s]
 LONGEST = 12.0  # nobody remembers what it did longer ago [s]; assumed
@@ -46,7 +49,7 @@ class DelayEstimate:
         self._last: float | None = None
         self._weights = 1.0 / scale[0], 1.0 / scale[1]
         self._lags = np.arange(1, round(LONGEST / step) + 1) * step
-        self._offset = self._filled = len(self._lags)
+        self._offset = self._filled = 2 * len(self._lags)
         self._asked = np.zeros((2, 4 * len(self._lags)))
         self._intent = (0.0, 0.0)
         self._misfit = FIRM * np.abs(self._lags - guess)
@@ -57,17 +60,26 @@ class DelayEstimate:
         self._remember(now)
         self._intent = one, other
 
-    def see(self, now: float, one: float, other: float) -> None:
-        """The picture shows the motion that was at `now` [s]; intents may be newer."""
+    def see(self, now: float, one: float, other: float, over: float = 0.0) -> None:
+        """The picture shows this motion at `now` [s].
+
+        A motion that was summed over a time is compared with what was asked for over as long.
+
+        Args:
+            now: [s]
+            one: Of the motion; see `intend`.
+            other: Likewise.
+            over: The time up to `now` over which the motion was summed [s].
+        """
         if now < self._next_look:
             return
         self._next_look = now + self._period
         self._remember(now)
-        newest = self._due(now)
-        past = slice(newest - len(self._lags), newest)
-        error = np.abs(self._asked[0, past] - one)
+        steps = min(max(1, round(over / self._step)), len(self._lags))
+        first, second = self._past(steps)
+        error = np.abs(first - one)
         error *= self._weights[0]
-        turn = np.abs(self._asked[1, past] - other)
+        turn = np.abs(second - other)
         turn *= self._weights[1]
         error += turn
         np.minimum(error, MOST, out=error)
@@ -83,9 +95,17 @@ class DelayEstimate:
         """Nothing is looked at for a while; that time stands for nothing seen."""
         self._last = None
 
+    def _past(self, steps: int) -> Floats:
+        """What was asked for, `(2, lags)`, the mean over some steps up to each; oldest first."""
+        past = self._asked[:, self._filled - len(self._lags) - steps + 1 : self._filled]
+        if steps == 1:
+            return past
+        share = np.full(steps, 1.0 / steps)
+        return np.stack([np.convolve(asked, share, "valid") for asked in past])
+
     def _remember(self, now: float) -> None:
         """Fill the memory with the standing intent up to `now`."""
-        due = self._due(now)
+        due = self._offset + int((now - self._start) / self._step + 1e-6)
         if due <= self._filled:
             return
         while due >= self._asked.shape[1]:
@@ -93,7 +113,3 @@ class DelayEstimate:
         self._asked[0, self._filled : due] = self._intent[0]
         self._asked[1, self._filled : due] = self._intent[1]
         self._filled = due
-
-    def _due(self, now: float) -> int:
-        """How much of the memory is filled at `now`."""
-        return self._offset + int((now - self._start) / self._step + 1e-6)
