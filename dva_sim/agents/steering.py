@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from itertools import islice, pairwise
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -103,24 +103,25 @@ class Route:
 
     def _project(self, x: float, y: float) -> tuple[float, float]:
         """Nearest place within reach of the last one: (way along the route, distance) [m]."""
-        nearest, along, at, first = math.inf, 0.0, self._at, self._segment
+        at, legs, nearest, found = self._at, self._legs, math.inf, (0.0, math.inf, 0.0)
         last_x, last_y = self._seen
         end = self._along + self._reach + BENT * math.hypot(x - last_x, y - last_y)
-        for i, (ax, ay, dx, dy, square) in enumerate(islice(self._legs, first, None), first):
-            if at[i] > end:
+        for i in range(self._segment, len(legs)):
+            begins = at[i]
+            if begins > end:
                 break
+            ax, ay, dx, dy, square = legs[i]
             share = ((x - ax) * dx + (y - ay) * dy) / square if square else 0.0
             share = 0.0 if share < 0.0 else 1.0 if share > 1.0 else share
-            way = share * math.sqrt(square)
-            if at[i] + way > end:
-                way = end - at[i]
-                share = way / math.sqrt(square)
-            distance = math.hypot(ax + share * dx - x, ay + share * dy - y)
-            if distance < nearest:
-                nearest, along = distance, at[i] + way
+            if at[i + 1] > end:
+                share = min(share, (end - begins) / (at[i + 1] - begins))
+            away_x, away_y = ax + share * dx - x, ay + share * dy - y
+            far = away_x * away_x + away_y * away_y
+            if far < nearest:
+                nearest, found = far, (begins + share * math.sqrt(square), away_x, away_y)
                 self._segment = i
-        self._seen, self._along = (x, y), along
-        return along, nearest
+        self._seen, self._along = (x, y), found[0]
+        return found[0], math.hypot(found[1], found[2])
 
     def point_at(self, along: float) -> tuple[float, float]:
         """The place a given way along the route [m]; beyond its end, the end."""
