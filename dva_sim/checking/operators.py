@@ -26,6 +26,7 @@ from dva_sim.agents.operator.strategies import (
 from dva_sim.agents.steering import Route
 from dva_sim.checking.promises import Case, Outcome, line, said
 from dva_sim.errors import ConfigError
+from dva_sim.plugins import FAILURES
 
 FRAME: Final = 0.1  # from one picture to the next [s]
 ROBOTS: Final = (Reach(0.5, math.pi / 6), Reach(0.8, 1.4, 0.56))  # one turns on the spot
@@ -115,7 +116,7 @@ class _Trial:
         for part in parts:
             try:
                 broken = list(part())
-            except Exception as error:
+            except FAILURES as error:
                 broken = [("raises", said(error))]
             yield from broken
             if broken:

@@ -16,6 +16,7 @@ from dva_sim.agents.operator.strategies import (
     known_strategies,
     load_strategy,
 )
+from dva_sim.checking import console
 from dva_sim.checking.operators import try_operator
 from dva_sim.errors import ConfigError
 
@@ -165,3 +166,16 @@ def test_a_strategy_is_tried_without_the_limits_that_it_is_held_within_when_it_r
     outcome = try_operator(load_strategy("mine.py:Mine", base=tmp_path))
     assert outcome.broken[0].startswith("wants a speed beyond reach: (9, 9)")
     assert issubclass(Pursuit, Strategy)
+
+
+def test_a_strategy_that_ends_the_program_is_told_in_a_line(tmp_path, capsys):
+    path = tmp_path / "leaving.py"
+    path.write_text(
+        "from dva_sim.agents.operator.strategies import Strategy\n"
+        "class Leaving(Strategy):\n"
+        "    def drive(self, route, view, stop_before): raise SystemExit(3)\n"
+    )
+    assert console.check(["operator", f"{path}:Leaving"]) == 1
+    lines = capsys.readouterr().out.splitlines()
+    assert "SystemExit: 3 (leaving.py:3)" in lines[0]
+    assert lines[-1] == "1 operator: 1 invalid"
