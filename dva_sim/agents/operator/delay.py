@@ -83,8 +83,10 @@ class DelayEstimate:
         turn *= self._weights[1]
         error += turn
         np.minimum(error, MOST, out=error)
-        passed = self._period if self._last is None else min(now - self._last, FADES_IN)
+        passed = 0.0 if self._last is None else min(now - self._last, FADES_IN)
         self._last = now
+        if passed < 2.0 * self._period:  # frames come a little sooner or later than one looks
+            passed = self._period
         error *= passed
         misfit = self._misfit
         misfit *= math.exp(-passed / FADES_IN)
