@@ -42,7 +42,13 @@ def test_a_study_gives_the_same_bytes_with_any_number_of_processes(tmp_path: Pat
         assert "report.html" in ran.stdout.replace("\n", "")
     one, two = bytes_of(tmp_path / "1"), bytes_of(tmp_path / "2")
     assert set(one) == {
-        *("runs.parquet", "events.parquet", "people.parquet", "tracks.parquet"),
+        *(
+            "runs.parquet",
+            "events.parquet",
+            "operators.parquet",
+            "people.parquet",
+            "tracks.parquet",
+        ),
         *("manifest.json", "report.html"),
     }
     assert one == two
