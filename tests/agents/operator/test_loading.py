@@ -139,6 +139,7 @@ def test_the_strategy_of_a_user_steers(tmp_path: Path) -> None:
         ("Intent(0.1, float('inf'))", "answers 0.1, inf"),
         ("None", "TypeError: cannot unpack non-iterable NoneType object"),
         ("1 / 0", "ZeroDivisionError: division by zero"),
+        ("exit(3)", "SystemExit: 3"),
         ("('fast', 'left')", "TypeError: must be real number, not str"),
     ],
 )

@@ -9,7 +9,7 @@ from typing import Any
 from dva_sim.agents.operator.strategies.base import Intent, PathView, PointView, Strategy, View
 from dva_sim.agents.operator.strategies.cursor import Velocity, slowed
 from dva_sim.agents.steering import Route
-from dva_sim.plugins import said
+from dva_sim.plugins import FAILURES, said
 
 
 class Guarded(Strategy):
@@ -43,7 +43,7 @@ class Guarded(Strategy):
         """What the user's counts, if it can tell."""
         try:
             return {str(name): float(value) for name, value in self.strategy.workload().items()}
-        except Exception as error:
+        except FAILURES as error:
             self._count(said(error))
             return {}
 
@@ -54,7 +54,7 @@ class Guarded(Strategy):
             if math.isfinite(one) and math.isfinite(other):
                 return float(one), float(other)
             problem = f"answers {one!r}, {other!r}"
-        except Exception as error:
+        except FAILURES as error:
             problem = said(error)
         self._count(problem)
         return None
