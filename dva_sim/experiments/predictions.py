@@ -3,7 +3,8 @@
 A direction holds when the 95 % interval lies on that side of zero, and fails when it lies on the
 other side or rules out every effect that matters. `same` holds when the interval lies within the
 smallest effect that matters, and fails when it lies wholly outside. A range holds when it
-contains the mean, and fails when the interval does not touch it. All else is open.
+contains the mean, and fails when the interval does not touch it. All else is open. Nothing is
+judged where tuning has chosen the value there was, so that both sides are the same runs.
 """
 
 from __future__ import annotations
@@ -12,13 +13,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from dva_sim.experiments.asking import Level, Prediction, Range
+import numpy as np
+
+from dva_sim.experiments.asking import TUNING, Level, Prediction, Range
 from dva_sim.experiments.effects import Setting, View
 from dva_sim.experiments.labels import level_name, measure_name, number, quantity, setting, unit_of
 from dva_sim.experiments.reading import interval_of
 from dva_sim.experiments.statistics import Interval
 
 Verdict = Literal["held", "did not hold", "open", "not judged"]
+_SAME_RUNS = "the same runs: tuning chose the value it had"
+_NAMES = ("cell", "config", TUNING)  # columns of a run that tell nothing of how it went
 _SIDES = {"above": "above zero", "below": "below zero", "same": "the same"}
 
 
@@ -88,11 +93,14 @@ def _judge(prediction: Prediction, view: View | None) -> Judged:
     names = f"{level_name(factor, first)} minus {level_name(factor, second)}"
     expected = f"{names} in {measure_name(view.measure)}, {setting(where)}: "
     expected += _SIDES[prediction.direction] + _range_words(prediction.expected, unit)
+    if factor == TUNING and _chose_what_was(view, (first, second), where):
+        return Judged(text, expected, _SAME_RUNS, "not judged")
     found = _measured(view, factor, (first, second), where)
     if found is None:
         return Judged(text, expected, "not run", "not judged")
     verdict = verdict_of(prediction.direction, prediction.expected, view.smallest_effect, found)
-    words = f"{quantity(found.mean, unit)} ({number(found.low)} to {quantity(found.high, unit)})"
+    low, high = max(found.low, -view.widest), min(found.high, view.widest)
+    words = f"{quantity(found.mean, unit)} ({number(low)} to {quantity(high, unit)})"
     return Judged(text, expected, words, verdict)
 
 
@@ -118,6 +126,13 @@ def _asked(prediction: Prediction, view: View) -> tuple[str, tuple[Level, Level]
     wanted.append((factor, contrast))
     ran = all(name in levels and set(some) <= set(levels[name]) for name, some in wanted)
     return (factor, contrast, where) if ran else None
+
+
+def _chose_what_was(view: View, contrast: tuple[Level, Level], where: Setting) -> bool:
+    """Whether tuned and untuned runs are the same in all that was measured of them."""
+    columns = [view.part.grid(name) for name in view.part.treated if name not in _NAMES]
+    pairs = [[view.part.where(c, where | {TUNING: level}) for level in contrast] for c in columns]
+    return all(np.array_equal(first, second, equal_nan=True) for first, second in pairs)
 
 
 def _measured(

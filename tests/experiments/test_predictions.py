@@ -97,3 +97,19 @@ def test_persons_who_are_all_alike_leave_no_doubt():
         "did not hold",
         "0\N{NO-BREAK SPACE}s (0 to 0\N{NO-BREAK SPACE}s)",
     )
+
+
+def test_where_tuning_chose_the_value_there_was_nothing_is_judged():
+    rows = synthetic_study.drive_rows(4, 1, missed=0.0)
+    twice = [row | {"tuning": level} for row in rows for level in ("untuned", "tuned")]
+    claim = {"text": "Helps.", "direction": "below", "factor": "tuning"}
+    study = synthetic_study.manifest(4, 1)["study"]
+    study["factors"] = study["factors"] | {"tuning": ["untuned", "tuned"]}
+    study["predictions"] = [claim | {"contrast": ["tuned", "untuned"]}]
+    study["answer"] = study["answer"] | {"within": {"profile": "default", "tuning": "tuned"}}
+    view = view_of(study, synthetic_study.columns(twice))
+    (found,) = judge_all(study, view)
+    assert (found.verdict, found.found) == (
+        "not judged",
+        "the same runs: tuning chose the value it had",
+    )
