@@ -53,6 +53,10 @@ _SUMMARIES: tuple[Summary, ...] = (
     ("command_rate_hz", "applied commands [Hz]", np.mean, number),
     ("stop_share", "in safe stop", np.mean, percent),
     ("contacts", "contacts per run", np.mean, number),
+    ("completed_share", "completed", np.mean, percent),
+    ("error_share", "errors", np.mean, percent),
+    ("throughput_bps", "throughput [bit/s]", np.mean, number),
+    ("delay_felt_s", "delay felt [s]", np.mean, number),
     ("violations", "violations", np.sum, number),
 )
 
@@ -62,11 +66,12 @@ def cell_table(
     measure: str,
     summaries: Sequence[Summary] = _SUMMARIES,
     support: Support | None = None,
+    possible: tuple[float, float] = (-np.inf, np.inf),
 ) -> CellTable:
     """Every cell of a part: size, confirmed share, the measure with its interval, and the rest."""
     settings = list(part.settings())
-    columns = [_counts(part), _confirmed(part), *_measure(part, measure)]
-    columns += [*_others(part, summaries), _beyond(support)]
+    columns = [_counts(part), _confirmed(part), *_measure(part, measure, possible)]
+    columns += [*_others(part, [s for s in summaries if s[0] != measure]), _beyond(support)]
     there = [c for c in columns if c is not None]
     names = [factor_name(f.name) for f in part.factors]
     rows = [
@@ -105,8 +110,11 @@ def _confirmed(part: Part) -> _Column | None:
     return "confirmed", [_text(np.mean, cell, percent) for cell in _cells(part, "confirmed")]
 
 
-def _measure(part: Part, measure: str) -> list[_Column]:
-    """Median and mean with its 95 % interval, in excess of the reference where there is one."""
+def _measure(part: Part, measure: str, possible: tuple[float, float]) -> list[_Column]:
+    """Median and mean with its 95 % interval, in excess of the reference where there is one.
+
+    An interval ends where no value is possible.
+    """
     if not part.has(measure):
         return []
     excess = part.has_reference(measure)
@@ -114,7 +122,12 @@ def _measure(part: Part, measure: str) -> list[_Column]:
     person = np.repeat(part.persons, len(part.trials))
     medians = [_text(np.median, present(cell), number) for cell in grid]
     intervals = [mean_interval(cell.ravel(), person) for cell in grid]
-    means = [f"{number(i.mean)} ({number(i.low)} to {number(i.high)})" for i in intervals]
+    widest = possible[1] - possible[0]
+    least, most = (-widest, widest) if excess else possible
+    means = [
+        f"{number(i.mean)} ({number(max(i.low, least))} to {number(min(i.high, most))})"
+        for i in intervals
+    ]
     name = "excess time" if excess and unit_of(measure) == "s" else measure_name(measure)
     unit = f" [{unit_of(measure)}]" if unit_of(measure) else ""
     return [(f"{name}, median{unit}", medians), (f"its mean (95 % interval){unit}", means)]

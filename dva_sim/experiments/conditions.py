@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from dva_sim.experiments.effects import Factor
-from dva_sim.experiments.labels import level_name
+from dva_sim.experiments.labels import factor_name, level_name
 
 _VARIED = "varied"
 _CONDITIONS = {
@@ -15,6 +15,7 @@ _CONDITIONS = {
     "attempts": "command.attempts",
     "watchdog of the robot": "robot.watchdog_s",
     "age limit of a command": "robot.max_age_s",
+    "messaging pattern": "pattern",
     "wanted command rate": "command.rate_hz",
     "one-way delay": "link.delay_s",
     "jitter (half-width)": "link.jitter_s",
@@ -52,15 +53,22 @@ _SAFE_ROUND_TRIPS = 4
 
 
 def conditions(
-    scenarios: Mapping[str, Mapping[str, Any]], factors: Sequence[Factor]
+    scenarios: Mapping[str, Mapping[str, Any]], factors: Sequence[Factor], also: Sequence[str] = ()
 ) -> list[tuple[str, list[str]]]:
-    """Each condition with its value in every part, and `varied` where it is a factor."""
+    """Each condition with its value in every part, and `varied` where it is a factor.
+
+    Args:
+        scenarios: Those of the parts.
+        factors: The keys that vary.
+        also: Further keys that matter here, such as those a study has changed.
+    """
     if not scenarios:
         return []
     varied = {factor.name for factor in factors}
     sites = [_site(s) for s in scenarios.values()]
     rows = [("site", sites)] if any(site != _NOWHERE for site in sites) else []
-    for name, key in _CONDITIONS.items():
+    stated = _CONDITIONS | {factor_name(k): k for k in also if k not in _CONDITIONS.values()}
+    for name, key in stated.items():
         values = [get(s, key) for s in scenarios.values()]
         if key in varied:
             rows.append((name, [_VARIED] * len(values)))
@@ -104,7 +112,9 @@ def _text(key: str, value: Any) -> str:
         return f"{value / 1e6:g} Mbit/s"
     if key.endswith("_bytes"):
         return f"{value / 1000:g} kB"
-    if isinstance(value, list):
+    if isinstance(value, Mapping):
+        return ", ".join(f"{k} {v}" for k, v in value.items()) or _NOWHERE
+    if isinstance(value, list | tuple):
         return ", ".join(_text(key, item) for item in value)
     if isinstance(value, str):
         return value.rpartition("/")[2]

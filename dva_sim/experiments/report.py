@@ -21,7 +21,7 @@ from dva_sim.experiments.dispatch import page as dispatch_page
 from dva_sim.experiments.dispatch.shifts import Shifts, is_dispatch
 from dva_sim.experiments.effects import Part, Table, View, as_floats
 from dva_sim.experiments.figures import Drawn, draw_all
-from dva_sim.experiments.labels import factor_name, level_name, listing, setting
+from dva_sim.experiments.labels import factor_name, is_in_file, level_name, listing, setting
 from dva_sim.experiments.predictions import judge_all
 from dva_sim.experiments.reading import factors_of, finding_of, keys_of, possible_values, view_of
 from dva_sim.experiments.results import Results
@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 
 _OPTIONAL = ("events", "tracks")
 _MOST_ERRORS = 3
+_FEWEST_PAIRS = 4  # of which a correlation says anything
 
 
 def write_report(folder: Path) -> Path:
@@ -106,7 +107,6 @@ def _page(results: Results, runs: Table, view: View | None, drawn: list[Drawn]) 
     factors = factors_of(study)
     scenarios = manifest.get("scenarios", {})
     shifts = _shifts(view, results)
-    stated = dispatch_page.conditions if shifts else conditions
     return _template().render(
         question=study.get("question", "A study without a question"),
         changes=[_as_words(change) for change in manifest.get("set", [])],
@@ -115,7 +115,11 @@ def _page(results: Results, runs: Table, view: View | None, drawn: list[Drawn]) 
         robustness=_words_of(_robustness(view, results)),
         warnings=_warnings(results, runs),
         parts=list(scenarios),
-        conditions=stated(scenarios, keys_of(study)),
+        conditions=(
+            dispatch_page.conditions(scenarios, keys_of(study))
+            if shifts
+            else conditions(scenarios, keys_of(study), _changed(study))
+        ),
         timeout_remark=timeout_remark(next(iter(scenarios.values()), {}), keys_of(study)),
         factors=[_levels(f.name, f.levels) for f in factors],
         treatments=_treatments(study),
@@ -126,6 +130,9 @@ def _page(results: Results, runs: Table, view: View | None, drawn: list[Drawn]) 
         persons=study.get("persons"),
         replications=study.get("replications"),
         correlation=_pair_correlation(view),
+        has_reference=any(part.get("reference") for part in study.get("parts", {}).values()),
+        may_miss="confirmed" in runs,
+        is_task=any(s.get("model") == "task" for s in scenarios.values()),
         method=dispatch_page.method(shifts, _pair_correlation(view)) if shifts else [],
         manifest=json.dumps(manifest, indent=2, sort_keys=True, ensure_ascii=False),
     )
@@ -163,7 +170,8 @@ def _tables(
 def _cells(part: Part, view: View, shifts: Shifts | None, results: Results) -> CellTable:
     if shifts is None:
         support = support_of_part(part, _scenario_of(results, part.name))
-        return cell_table(part, view.measure, support=support)
+        possible = possible_values(view.measure, _scenario_of(results, part.name))
+        return cell_table(part, view.measure, support=support, possible=possible)
     if part.name == view.part.name:
         return dispatch_page.cells(shifts)
     return cell_table(part, view.measure, dispatch_page.SUMMARIES)
@@ -199,7 +207,19 @@ def _warnings(results: Results, runs: Table) -> list[str]:
 
 
 def _levels(name: str, levels: tuple[Any, ...]) -> tuple[str, str]:
-    return factor_name(name), listing([level_name(name, level) for level in levels])
+    return factor_name(name), listing([_in_full(name, level) for level in levels])
+
+
+def _in_full(name: str, level: Any) -> str:
+    """A level with the file it is from, if it is a class in one."""
+    file = f" ({level.rpartition(':')[0]})" if is_in_file(level) else ""
+    return level_name(name, level) + file
+
+
+def _changed(study: Mapping[str, Any]) -> list[str]:
+    """Scenario keys that the study's parts set themselves."""
+    parts = study.get("parts", {}).values()
+    return list(dict.fromkeys(key for part in parts for key in part.get("changes") or {}))
 
 
 def _treatments(study: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -223,6 +243,8 @@ def _pair_correlation(view: View | None) -> float | None:
     grid = view.part.grid(view.measure)
     first, second = (view.curve(grid, view.panels[0], level)[-1] for level in view.contrast)
     both = np.isfinite(first) & np.isfinite(second)
+    if both.sum() < _FEWEST_PAIRS:
+        return None
     correlation = statistics.pair_correlation(first[both], second[both])
     return correlation if np.isfinite(correlation) else None
 

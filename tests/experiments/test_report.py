@@ -5,7 +5,8 @@ import pytest
 import synthetic_study
 
 from dva_sim.errors import ConfigError
-from dva_sim.experiments.report import write_report
+from dva_sim.experiments.conditions import conditions
+from dva_sim.experiments.report import _levels, write_report
 
 FIGURES = [
     "differences",
@@ -204,3 +205,12 @@ def test_what_a_treatment_changes_is_said_and_counts_as_varied(tmp_path):
     assert "near : nothing far : one-way delay 1 s" in text
     assert "one-way delay varied varied" in text
     assert "The time-out is above four round trips and the processing time" in text
+
+
+def test_conditions_name_what_a_study_changed_and_a_class_with_its_file():
+    scenario = {"pattern": "latest-wins", "operator": {"traits": {"crossover_rad_s": 1.2}}}
+    rows = dict(conditions({"drive": scenario}, [], also=["pattern", "operator.traits"]))
+    assert rows["messaging pattern"] == ["latest-wins"]
+    assert rows["operator traits"] == ["crossover_rad_s 1.2"]
+    _, levels = _levels("phone.filter", ("none", "/tmp/mine.py:Mine"))
+    assert levels == "none and Mine (/tmp/mine.py)"

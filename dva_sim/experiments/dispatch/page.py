@@ -258,13 +258,16 @@ def _rule(scenario: Mapping[str, Any], key: str, nothing: str) -> str:
 
 def method(shifts: Shifts, correlation: float | None) -> list[str]:
     """How the numbers were made, as a list of remarks."""
-    alike = f" The two sides of the contrast correlate with {correlation:.2f} at the last level."
+    alike = ""
+    if correlation is not None:
+        alike = (
+            f" The two sides of the contrast correlate with {correlation:.2f} at the last level."
+        )
     follow = f"{shifts.follow:g} s"
     return [
         "The shift is the cluster: all intervals are taken over independent shifts. A shift meets "
         "the same alarms, places, walking speeds and service times under every policy, and "
-        "differences are taken within it (common random numbers)."
-        + (alike if correlation is not None else ""),
+        f"differences are taken within it (common random numbers).{alike}",
         "The cohort are all alarms, true and false, first reported between the warm-up and one "
         f"follow-up before the horizon; each is followed for T = {follow}, so that nothing is cut "
         "off. Confirmed, cleared, escalated and expired compete: none is treated as a mere end of "
