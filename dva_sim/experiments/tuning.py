@@ -12,7 +12,7 @@ from dva_sim.config import validate
 from dva_sim.errors import ConfigError, DvaSimError
 from dva_sim.experiments.asking import Level, Levels, Tuning
 from dva_sim.experiments.cells import CellTable
-from dva_sim.experiments.design import basis_of_tuning
+from dva_sim.experiments.design import basis_of_tuning, refuse_unknown_measures
 from dva_sim.experiments.effects import Factor, Floats, Part
 from dva_sim.experiments.fingerprint import fingerprint
 from dva_sim.experiments.labels import (
@@ -80,10 +80,11 @@ def tune(
         limit_s: A run that takes longer, by the wall clock, has failed.
 
     Raises:
-        ConfigError: the study tunes nothing, or lacks the measure.
+        ConfigError: the study tunes nothing, or asks for a measure that there is none of.
         DvaSimError: runs failed, so that values would be judged by different persons.
     """
     rule, trials = _rule_of(study), tuning_study(study)
+    refuse_unknown_measures(study)
     run_study(trials, out, jobs=jobs, episode=episode, progress=progress, limit_s=limit_s)
     results = Results.load(out)
     if results.failures:
@@ -92,7 +93,7 @@ def tune(
     factors = [Factor(name, levels) for name, levels in trials.factors.items()]
     part = Part(results.table("runs"), rule.part, factors)
     if not part.has(rule.measure):
-        raise ConfigError(f"tuning.measure {rule.measure!r} is not a measure of these runs")
+        raise ConfigError(f"tuning.measure {rule.measure!r} has no value in any of these runs")
     seen = _seen(part, rule)
     return Tuned(
         study=study.file.stem,

@@ -150,7 +150,11 @@ def test_each_stage_of_the_delay_budget_is_what_it_is_made_of() -> None:
 def test_the_loop_delay_is_what_operators_come_to_see(
     delay: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The person's own guess, made from pictures and intents alone, checks the sum of stages."""
+    """The person's own guess, made from pictures and intents alone, checks the sum of stages.
+
+    It comes in tenths of a second, and the lag that fits a response best is a little less than
+    the mean delay of one that begins at once and levels off, as a hand's and a motor's.
+    """
     guesses: list[float] = []
     see = DelayEstimate.see
 
@@ -161,7 +165,7 @@ def test_the_loop_delay_is_what_operators_come_to_see(
     monkeypatch.setattr(DelayEstimate, "see", overheard)
     loop = metrics.run_row(run(link__delay_s=delay))["loop_delay_mean_s"]
     later = sorted(guesses[len(guesses) // 2 :])
-    assert later[len(later) // 2] == pytest.approx(loop, abs=0.15)
+    assert loop - 0.2 < later[len(later) // 2] < loop + 0.1
 
 
 def test_waiting_for_the_last_reply_is_told_as_the_patterns_own_delay() -> None:
