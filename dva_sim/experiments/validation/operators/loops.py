@@ -1,7 +1,8 @@
 """Delayed loops on their own: where they become unstable, and what a prediction makes of one.
 
-The loops are closed with the project's own laws and geometry and stepped in time; theory is only
-what they are compared with.
+The loops are closed by the strategies themselves and stepped in time; theory is only what they are
+compared with. Who steers is the person in the middle of the population, but for the limits that
+keep it from unstable loops: those are far away.
 """
 
 from __future__ import annotations
@@ -13,14 +14,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from dva_sim.agents.operator.person import Population, median_person
-from dva_sim.agents.operator.strategies.cursor import Sighting, towards
+from dva_sim.agents.camera import Observation
+from dva_sim.agents.operator.person import Person, Population, median_person
+from dva_sim.agents.operator.strategies.base import PointView, Reach, Strategy, View
+from dva_sim.agents.operator.strategies.cursor import Sighting
+from dva_sim.agents.operator.strategies.predictor import Predictor
+from dva_sim.agents.operator.strategies.pursuit import NEAREST_LOOK, Pursuit
 from dva_sim.agents.steering import Route
 
 STEPS = 200  # of time in a delay
-SMITH_STEPS = 2000  # the same under a Smith predictor
+SMITH_STEPS = 500  # the same under a Smith predictor
 DELAYS = 80  # a run lasts so many of them
 BISECTIONS = 14
+_FAR = 1e6  # a limit that is never reached
+LIMITLESS = Reach(speed=_FAR, turn_rate=_FAR)
 
 Loop = Callable[[float], Sequence[float]]
 """What a loop does with a parameter: the error at each step."""
@@ -53,43 +60,44 @@ def grows(errors: Sequence[float]) -> bool:
 
 
 def integrator(gain_delay: float) -> list[float]:
-    """A cursor brought to its target by the law of all strategies, seen a delay of 1 late.
+    """A cursor that a strategy brings to its target by the crossover law, seen a delay of 1 late.
 
     What is seen holds for a step, so half a step more would pass on average; the mean of two
     neighbouring frames takes that off.
     """
-    dt, person = 1.0 / STEPS, median_person(Population())
-    person = replace(person, pointing=gain_delay, margin=math.inf)
+    dt, strategy = 1.0 / STEPS, Strategy(_person(gain_delay), LIMITLESS)
     frames = deque([1.0] * (STEPS + 1), maxlen=STEPS + 1)
     place, places = 1.0, []
-    for _ in range(DELAYS * STEPS):
+    for step in range(DELAYS * STEPS):
         x = 0.5 * (frames[0] + frames[1])
-        seen = Sighting(0, x, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-        place += towards(seen, 1.0, person, math.inf)[0] * dt
+        place += strategy.point(PointView(step * dt, _cursor(x, 0.0), 1.0))[0] * dt
         frames.append(place)
         places.append(place)
     return places
 
 
 def pure_pursuit(speed_delay: float) -> list[float]:
-    """A robot that pursues a point a look-ahead of 1 m ahead on a straight line, seen 1 s late.
+    """A robot that `Pursuit` drives along a straight line, seen 1 s late.
+
+    The look-ahead is the nearest that there is.
 
     Args:
-        speed_delay: Speed x delay over look-ahead: as both are one, the speed [m/s].
+        speed_delay: Speed x delay over look-ahead.
 
     Returns:
         Distance from the line, signed, step by step [m].
     """
-    dt, speed = 1.0 / STEPS, speed_delay
+    dt, speed = 1.0 / STEPS, speed_delay * NEAREST_LOOK
+    pursuit = Pursuit(replace(_person(), caution=_FAR), Reach(speed, _FAR))
     route = Route(np.array([[0.0, 0.0], [2.0 * DELAYS, 0.0]]))
     x, y, heading = 1.0, 1e-3, 0.0
     frames, errors = deque([(x, y, heading)] * STEPS, maxlen=STEPS), []
-    for _ in range(DELAYS * STEPS):
-        ahead = route.ahead(*frames[0], 1.0)
-        turn = speed * 2.0 * math.sin(ahead.bearing) / ahead.distance
-        middle = heading + 0.5 * turn * dt
-        x, y = x + speed * math.cos(middle) * dt, y + speed * math.sin(middle) * dt
-        heading += turn * dt
+    for step in range(DELAYS * STEPS):
+        seen = Observation(0, *frames[0], 0.0, 0.0, ())
+        wanted = pursuit.drive(route, View(step * dt, seen, 1.0), 0.0)
+        middle = heading + 0.5 * wanted.turn_rate * dt
+        x, y = x + wanted.speed * math.cos(middle) * dt, y + wanted.speed * math.sin(middle) * dt
+        heading += wanted.turn_rate * dt
         frames.append((x, y, heading))
         errors.append(y)
     return errors
@@ -111,24 +119,33 @@ def linear_pursuit(speed_delay: float) -> list[float]:
 
 
 def smith_response(gain: float, delay: float, end: float) -> list[float]:
-    """Where an integrator under a Smith predictor is, step by step after a unit step is asked for.
+    """Where a cursor that `Predictor` steers is, step by step after a target appears 1 m away.
 
     The predictor adds to what is seen what was asked for since and cannot be seen yet, so the
     loop is closed on the present: y(t) = 1 - exp(-gain (t - delay)) from the delay on.
 
     Args:
-        gain: [1/s]
+        gain: Of the person [1/s].
         delay: Between a command and its effect [s]; a step is a part of it, see `SMITH_STEPS`.
         end: [s]
     """
     dt = delay / SMITH_STEPS
+    predictor = Predictor(_person(gain), LIMITLESS)
     on_the_way = deque([0.0] * SMITH_STEPS, maxlen=SMITH_STEPS)
-    place, coming, places = 0.0, 0.0, []
-    for _ in range(round(end / dt)):
-        command = gain * (1.0 - (place + coming))
-        arriving = on_the_way[0]
-        on_the_way.append(command)
-        place += arriving * dt
-        coming += (command - arriving) * dt
+    place, places = 0.0, []
+    for step in range(round(end / dt)):
+        velocity, _ = predictor.point(PointView(step * dt, _cursor(place, 1.0), delay))
+        place += on_the_way[0] * dt
+        on_the_way.append(velocity)
         places.append(place)
     return places
+
+
+def _person(gain: float = 1.0) -> Person:
+    """A person of that gain [1/s] in a loop that no margin keeps stable."""
+    return replace(median_person(Population()), pointing=gain, margin=_FAR, pace=1.0)
+
+
+def _cursor(x: float, target: float) -> Sighting:
+    """A cursor on a line, and a target that stands still [m]."""
+    return Sighting(0, x, 0.0, 0.0, 0.0, target, 0.0, 0.0, 0.0, 0.0)
