@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from dva_sim.agents.operator.strategies import try_strategy
 from dva_sim.experiments.validation.operators import output
 from dva_sim.experiments.validation.operators.exact import EXACT
 from dva_sim.experiments.validation.operators.experiments import EXPERIMENTS
@@ -27,6 +28,7 @@ from dva_sim.experiments.validation.operators.targets import lines_of, load_spli
 from dva_sim.experiments.validation.operators.trials import Cells, Found
 from dva_sim.experiments.validation.telling import WIDTH, console, progress_bar, say
 
+COLUMNS = (17, None, None, None, 19)  # characters; None: an equal share of the rest
 STYLES = {"passes": "green", "misses": "bold red", "shown only": "dim"}
 
 
@@ -43,10 +45,11 @@ def validate_operators(
     lines = lines_of(load_targets(), split)
     persons = QUICK_PERSONS if quick else PERSONS
     setting = Setting(strategy or split.strategy, seed, persons, quick, jobs)
+    try_strategy(setting.strategy)  # whether there is one, is known before anything is played
     found, played = _play(setting)
     verdicts = judge(lines, found)
     outcome = outcome_of(verdicts, split.rule)
-    _tell(verdicts)
+    _tell(verdicts, played)
     say(f"[bold]{output.headline(outcome)}[/bold]")
     for note in output.notes(verdicts):
         say(escape(note))
@@ -78,14 +81,26 @@ def _conditions(setting: Setting) -> dict[str, str]:
     }
 
 
-def _tell(verdicts: Sequence[Verdict]) -> None:
-    """The table, kind by kind."""
-    table = Table(box=None, pad_edge=False)
-    for head in output.HEADS:
-        table.add_column(head, no_wrap=head == "line")
-    for kind, title in output.TITLES.items():
-        table.add_row("", f"[bold]{title}[/bold]")
-        for verdict in (v for v in verdicts if v.line.kind == kind):
-            *cells, said = output.words(verdict)
-            table.add_row(*map(escape, cells), f"[{STYLES[verdict.word]}]{said}[/]")
-    Console(highlight=False, width=max(console.width, WIDTH)).print(table)
+def _tell(verdicts: Sequence[Verdict], played: Mapping[str, Cells]) -> None:
+    """The lines under their headings, and how they steered."""
+    wide = Console(highlight=False, width=max(console.width, WIDTH))
+    for title, own in output.grouped(verdicts):
+        wide.print(f"\n[bold]{title}[/bold]")
+        wide.print(_table(own))
+    wide.print("\n[bold]How they steered[/bold]")
+    heads = "experiment", "share of the time in which they moved and waited"
+    shares = Table(*heads, box=None, pad_edge=False)
+    for row in output.steered(played):
+        shares.add_row(*map(escape, row))
+    wide.print(shares)
+
+
+def _table(verdicts: Sequence[Verdict]) -> Table:
+    """Lines whose columns stand below each other from table to table."""
+    table = Table(box=None, pad_edge=False, expand=True)
+    for head, width in zip(output.HEADS, COLUMNS, strict=True):
+        table.add_column(head, width=width, ratio=None if width else 1)
+    for verdict in verdicts:
+        *cells, said = output.words(verdict)
+        table.add_row(*map(escape, cells), f"[{STYLES[verdict.word]}]{said}[/]")
+    return table

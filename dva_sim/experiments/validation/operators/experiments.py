@@ -27,18 +27,21 @@ FOLDER = "experiments/scenarios/tasks"
 
 LAGS_S = {"8.3": 0.0, "25": 1 / 60, "75": 4 / 60, "225": 13 / 60}  # by the lag's name [ms]
 SHORTEST_LAG = "8.3"  # half a frame
+PUBLISHED_LAGS = ("8.3", "25", "75")
 AT_BITS = 4.0
 GAINS = {25: 0.2435, 50: 0.487, 100: 0.974, 200: 1.948}  # pixels/s per degree: [m/s per rad]
 PUBLISHED_GAIN = 50
 SELECTIONS = {"first-entry": "first_entry", "dwell": "dwell"}
 LATENCY_S = 0.05  # of the machine in the steering experiment; assumed
 STEP_S = 1.0 / 60.0
+FEWEST_WAITS = 0.5  # in a trial on average; who waits less does not move and wait
 WAITS_S = (1.0, 1.5, 2.0, 2.5, 3.2)
 EXCAVATOR_S = 1.5
 FRAME_RATES = (5, 10, 20, 60)
 FRAME_DELAYS_S = (0.0, 0.1, 0.2, 0.3)
 _NOTHING = 1e-9  # times that differ by less are the same [s]
-_C = np.linspace(0.0, 2.0, 201)  # tried for the collapse
+_C = np.linspace(0.0, 6.0, 121)  # tried for the collapse
+TRIED = {"S15/c": (float(_C[0]), float(_C[-1]))}  # from where to where a value was looked for
 
 
 @dataclass(frozen=True)
@@ -64,10 +67,11 @@ class Experiment:
 
 
 def lag_values(cells: Cells) -> Values:
-    """Ratios of mean movement times, and what a millisecond of lag costs at 4 bits."""
+    """Ratios of mean movement times, what a millisecond of lag costs at 4 bits, the times [ms]."""
     times = {lag: mean(trials, "movement_time_s") for lag, trials in cells.items()}
     ratio = {lag: time / times[SHORTEST_LAG] for lag, time in times.items()}
-    return {"S7/25": ratio["25"], "S7/75": ratio["75"], "S8/slope": lag_slope(cells)}
+    values = {"S7/25": ratio["25"], "S7/75": ratio["75"], "S8/slope": lag_slope(cells)}
+    return values | {f"S7/time-{lag}": 1000.0 * times[lag] for lag in PUBLISHED_LAGS}
 
 
 def lag_slope(cells: Cells) -> float:
@@ -144,13 +148,17 @@ def latency_values(cells: Cells) -> Values:
 
 
 def wait_values(cells: Cells) -> Values:
-    """How straight completion times are in the delay, and their slope less the waits."""
+    """How straight completion times are in the delay, and their slope less the waits.
+
+    The slope of who does not wait says nothing of move-and-wait.
+    """
     delays = [float(name) for name in cells]
     times = [mean(trials, "movement_time_s") for trials in cells.values()]
     line = fit_line(delays, times)
     waits = float(np.mean([mean(trials, "waits") for trials in cells.values()]))
     straight = line.r2 if np.ptp(times) >= _NOTHING else math.nan  # nothing there to explain
-    return {"S13/linear": straight, "S13/slope": line.slope - waits}
+    beyond = line.slope - waits if waits >= FEWEST_WAITS else math.nan
+    return {"S13/linear": straight, "S13/slope": beyond}
 
 
 def excavator_values(cells: Cells) -> Values:
@@ -223,12 +231,14 @@ def _both_ways(delay: float) -> dict[str, Any]:
     return {"link.up.delay_s": 0.5 * delay, LATE: 0.5 * delay}
 
 
-_FEW = {"trials": 2, "practice": 1}
+_ONE = {"trials": 1, "practice": 1}  # of each of many conditions
+_TWO = {"trials": 2, "practice": 1}
+_FEW = {"trials": 3, "practice": 1}
 
 EXPERIMENTS: tuple[Experiment, ...] = (
-    Experiment("lag", "fitts-lag", {lag: {LATE: s} for lag, s in LAGS_S.items()}, lag_values, _FEW),
-    Experiment("tilt", "fitts-tilt", _tilt_cells(), tilt_values, _FEW),
-    Experiment("steering", "steering-law", {"tunnel": {}}, steering_values),
+    Experiment("lag", "fitts-lag", {lag: {LATE: s} for lag, s in LAGS_S.items()}, lag_values, _ONE),
+    Experiment("tilt", "fitts-tilt", _tilt_cells(), tilt_values, _TWO),
+    Experiment("steering", "steering-law", {"tunnel": {}}, steering_values, _TWO),
     Experiment(
         "latency",
         "steering-law",
@@ -238,7 +248,7 @@ EXPERIMENTS: tuple[Experiment, ...] = (
             "more": {LATE: LATENCY_S + STEP_S},
         },
         latency_values,
-        _FEW,
+        _ONE,
     ),
     Experiment(
         "waiting", "move-and-wait", {f"{s:g}": _both_ways(s) for s in WAITS_S}, wait_values, _FEW
@@ -248,8 +258,9 @@ EXPERIMENTS: tuple[Experiment, ...] = (
         "excavator",
         {"0": {LATE: 0.0}, str(EXCAVATOR_S): {LATE: EXCAVATOR_S}},
         excavator_values,
+        _ONE,
     ),
     Experiment("tracking", "tracking", {"tracking": {}}, tracking_values),
-    Experiment("frames", "frame-rate", _frame_cells(), frame_values, _FEW),
+    Experiment("frames", "frame-rate", _frame_cells(), frame_values, _ONE),
 )
 """Every experiment; which of them may be fitted to, the split file says."""

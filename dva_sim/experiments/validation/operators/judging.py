@@ -29,8 +29,10 @@ class Verdict:
 
     @property
     def inside(self) -> bool:
-        """Whether what is simulated lies in the band."""
-        return not math.isnan(self.found.value) and self.line.holds(self.found.value)
+        """Whether what is simulated lies in the band, for sure on the side that is asked for."""
+        found = self.found
+        held = not math.isnan(found.value) and self.line.holds(found.value)
+        return held and self.line.is_sure(found.low, found.high)
 
     @property
     def word(self) -> Word:
@@ -47,11 +49,13 @@ class Outcome:
     Attributes:
         exact: Exact lines that pass, and all of them.
         held_out: Held-out lines that pass, and all of them.
+        publications: Held-out publications that pass in all their lines, and all of them.
         rule: The shares that must pass.
     """
 
     exact: tuple[int, int]
     held_out: tuple[int, int]
+    publications: tuple[int, int]
     rule: RuleConfig
 
     @property
@@ -68,12 +72,21 @@ def judge(lines: Sequence[Line], found: Mapping[str, Found]) -> list[Verdict]:
 
 def outcome_of(verdicts: Sequence[Verdict], rule: RuleConfig) -> Outcome:
     """What the verdicts come to, by the rule of the split."""
-    return Outcome(_share(verdicts, "exact"), _share(verdicts, "held-out"), rule)
+    exact, held_out = _share(verdicts, "exact"), _share(verdicts, "held-out")
+    return Outcome(exact, held_out, _whole(verdicts), rule)
 
 
 def _share(verdicts: Sequence[Verdict], kind: Kind) -> tuple[int, int]:
     counted = [v for v in verdicts if v.line.kind == kind]
     return sum(v.word == "passes" for v in counted), len(counted)
+
+
+def _whole(verdicts: Sequence[Verdict]) -> tuple[int, int]:
+    """Held-out publications without a miss, and all."""
+    counted = [v for v in verdicts if v.line.kind == "held-out"]
+    missed = {v.line.publication for v in counted if v.word == "misses"}
+    every = {v.line.publication for v in counted}
+    return len(every) - len(missed), len(every)
 
 
 def _reaches(counts: tuple[int, int], share: float) -> bool:

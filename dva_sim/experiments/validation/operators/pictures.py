@@ -78,9 +78,10 @@ def _mark(axes: Axes, row: float, verdict: Verdict) -> None:
     )
     if abs(value) > _LIMIT:
         side = _LIMIT - 0.06 if value > 0 else 0.06 - _LIMIT
-        axes.plot([side], [row], ">" if value > 0 else "<", color=colour, ms=7)
+        marker = ">" if value > 0 else "<"
+        axes.plot([side], [row], marker, color=colour, ms=7, clip_on=False)
         return
     axes.plot([max(left, -_LIMIT), min(right, _LIMIT)], [row, row], color=colour, lw=1.4)
     if verdict.line.target is not None:
         axes.plot([(verdict.line.target - middle) / half], [row], "|", color=INK, ms=11, mew=1.4)
-    axes.plot([value], [row], "o", color=colour, ms=6)
+    axes.plot([value], [row], "o", color=colour, ms=6, clip_on=False, zorder=3)

@@ -31,9 +31,10 @@ def _loops() -> Drawn:
     axes[0].set_ylabel("error, first one = 1")
     _smith(axes[2])
     text = (
-        "Left and middle: loops of the project's own laws just below, at and above the critical "
-        "value that theory gives. Right: a Smith predictor (integrator, gain 4 /s, delay 0.5 s) "
-        "answers a step as if there were no delay, only later; the ring is the published value."
+        "Left and middle: loops that the strategies close themselves just below, at and above the "
+        "critical value that theory gives. Right: the strategy Predictor as a Smith predictor "
+        "(cursor, gain 4 /s, delay 0.5 s) answers a step as if there were no delay, only later; "
+        "the ring is the published value."
     )
     return finish(figure, "loops", "Where delayed loops become unstable", text)
 
@@ -47,9 +48,9 @@ def _around(axes: Axes, loop: loops.Loop, critical: float, title: str) -> None:
     axes.set_ylim(-4.2, 4.2)
     axes.set_title(title)
     axes.set_xlabel("time [delays]")
-    key = axes.legend(loc="lower left", ncols=3, fontsize=8, title="share of the critical value")
-    key.set_frame_on(True)
-    key.get_frame().set(alpha=0.9, linewidth=0)
+    below = (0.5, -0.22)  # where it hides no curve
+    title = "share of the critical value"
+    axes.legend(loc="upper center", bbox_to_anchor=below, ncols=3, fontsize=8, title=title)
 
 
 def _smith(axes: Axes) -> None:

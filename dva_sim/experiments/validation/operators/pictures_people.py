@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _SHADES = ("#56B4E9", "#0072B2", "#009E73", "#D55E00")  # from little to much
-_PUBLISHED_MS = {"8.3": 911, "25": 934, "75": 1059}
 
 ByLine = Mapping[str, Verdict]
 
@@ -68,17 +67,19 @@ def _lag(lines: ByLine, cells: Cells) -> Drawn:
         "condition and lines through them. Right: movement time against that at 8.3 ms; rings are "
         f"published, grey are the bands. A millisecond of lag costs {slope.found.value:.2f} ms at "
         f"4 bits; the band is {slope.line.low:g} to {slope.line.high:g}. Only such differences are "
-        f"compared: simulated persons need {first:.2f} s at 8.3 ms, published ones needed 0.91 s."
+        f"compared: simulated persons need {first:.2f} s at 8.3 ms, published ones needed "
+        f"{0.001 * (lines['S7/time-8.3'].line.target or 0.0):.2f} s."
     )
     return finish(figure, "lag", "Pointing under lag", text)
 
 
 def _ratios(axes: Axes, lines: ByLine, cells: Cells) -> None:
     """Movement times by lag, against the shortest lag."""
-    shortest = _PUBLISHED_MS[of.SHORTEST_LAG]
+    published = [lines[f"S7/time-{lag}"].line.target or 0.0 for lag in of.PUBLISHED_LAGS]
     first = person_means(cells[of.SHORTEST_LAG], TIME).mean()
-    for lag, published in _PUBLISHED_MS.items():
-        axes.plot([float(lag)], [published / shortest], "o", mfc="none", mec=ORANGE, ms=9, mew=1.5)
+    for lag, time in zip(of.PUBLISHED_LAGS, published, strict=True):
+        ratio = time / published[0]  # the shortest lag's
+        axes.plot([float(lag)], [ratio], "o", mfc="none", mec=ORANGE, ms=9, mew=1.5)
     for lag in ("25", "75"):
         bar(axes, float(lag), lines[f"S7/{lag}"].line, 7.0)
     lags = [float(lag) for lag in cells]
@@ -114,6 +115,8 @@ def _tilt(lines: ByLine, cells: Cells) -> Drawn:
     tilts.set_title("How far the hand tilts")
     for axes in (rates, times, tilts):
         axes.set_ylim(bottom=0)
+    for axes in (times, tilts):
+        axes.set_ylim(top=1.3 * axes.get_ylim()[1])  # room for the legend above the data
     text = (
         "Pointing by tilt with velocity control (MacKenzie & Teather 2012), which the operators "
         "were fitted to: shown, not counted. Rings are published, grey are bands."
@@ -129,7 +132,7 @@ def _by_gain(axes: Axes, cells: Cells, name: str, scale: float) -> None:
     axes.set_xscale("log", base=2)
     axes.set_xticks(list(of.GAINS), [str(gain) for gain in of.GAINS])
     axes.set_xlabel("gain [pixels/s per degree]")
-    axes.legend(fontsize=8)
+    axes.legend(fontsize=8, loc="upper left")
 
 
 def _steering(lines: ByLine, tunnel: Cells, latency: Cells) -> Drawn:

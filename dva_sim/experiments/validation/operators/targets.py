@@ -15,7 +15,7 @@ from dva_sim.errors import ConfigError
 FOLDER = "experiments/validation"
 TARGETS, SPLIT = "operators", "operators-split"
 
-Kind = Literal["exact", "fitted", "held-out", "remembered"]
+Kind = Literal["exact", "fitted", "held-out", "remembered", "beside"]
 Share = Annotated[float, Field(ge=0, le=1)]
 
 
@@ -28,6 +28,9 @@ class LineConfig(Config):
         target: As published, if a single number was.
         low: What passes begins here; left out, anywhere below `high`.
         high: What passes ends here.
+        above: The whole Monte Carlo interval has to lie above this, where the sign is what counts.
+        below: The same the other way round.
+        beside: Shown beside what is compared, never counted: it has a target and no band.
     """
 
     what: str
@@ -35,9 +38,17 @@ class LineConfig(Config):
     target: float | None = None
     low: float | None = None
     high: float | None = None
+    above: float | None = None
+    below: float | None = None
+    beside: bool = False
 
     @model_validator(mode="after")
     def _in_order(self) -> LineConfig:
+        limits = (self.low, self.high, self.above, self.below)
+        if self.beside:
+            if self.target is None or limits.count(None) < len(limits):
+                raise ValueError("a line beside the others has a target and no band")
+            return self
         if self.low is None and self.high is None:
             raise ValueError("a line needs low or high, or anything would pass")
         if self.low is not None and self.high is not None and self.low > self.high:
@@ -138,7 +149,15 @@ class SplitFile(Config):
         Raises:
             ConfigError: a check that is assigned twice.
         """
-        kinds: dict[str, Kind] = {}
+        return {check: kind for check, (kind, _) in self.places().items()}
+
+    def places(self) -> dict[str, tuple[Kind, str]]:
+        """The kind of each check, and the publication that it belongs to.
+
+        Raises:
+            ConfigError: a check that is assigned twice.
+        """
+        places: dict[str, tuple[Kind, str]] = {}
         groups: tuple[tuple[Kind, dict[str, tuple[str, ...]]], ...] = (
             ("exact", self.exact),
             ("fitted", self.fit),
@@ -146,11 +165,11 @@ class SplitFile(Config):
             ("remembered", self.memory),
         )
         for kind, publications in groups:
-            for check in (c for checks in publications.values() for c in checks):
-                if check in kinds:
+            for check, name in ((c, name) for name, own in publications.items() for c in own):
+                if check in places:
                     raise ConfigError(f"check {check!r} is assigned twice")
-                kinds[check] = kind
-        return kinds
+                places[check] = kind, name
+        return places
 
 
 @dataclass(frozen=True)
@@ -165,10 +184,13 @@ class Line:
         source: Where its numbers come from.
         tag: How sure they are.
         kind: Whether it counts.
+        publication: As the split groups checks.
         unit: Empty for a plain number.
         target: As published, if a single number was.
         low: What passes begins here; None: anywhere below `high`.
         high: What passes ends here; None: anywhere above `low`.
+        above: The whole interval lies above this; None: it need not.
+        below: The whole interval lies below this; None: it need not.
     """
 
     check: str
@@ -178,20 +200,33 @@ class Line:
     source: str
     tag: str
     kind: Kind
+    publication: str
     unit: str
     target: float | None
     low: float | None
     high: float | None
+    above: float | None = None
+    below: float | None = None
 
     @property
     def id(self) -> str:
         """`check/name`."""
         return f"{self.check}/{self.name}"
 
+    @property
+    def has_band(self) -> bool:
+        """Whether there is anything to judge it by."""
+        return self.low is not None or self.high is not None
+
     def holds(self, value: float) -> bool:
         """Whether a value lies in the band; nan never does."""
         above = self.low is None or value >= self.low
-        return above and (self.high is None or value <= self.high)
+        return self.has_band and above and (self.high is None or value <= self.high)
+
+    def is_sure(self, low: float, high: float) -> bool:
+        """Whether an interval lies on the side that is asked for, if one is."""
+        above = self.above is None or low > self.above
+        return above and (self.below is None or high < self.below)
 
 
 def load_targets(name: str = TARGETS) -> TargetFile:
@@ -225,8 +260,8 @@ def lines_of(targets: TargetFile, split: SplitFile) -> list[Line]:
     Raises:
         ConfigError: a check that is not assigned, or is not there; a tag M that would count.
     """
-    kinds = split.kinds()
-    _complete(targets.checks, kinds)
+    places = split.places()
+    _complete(targets.checks, split.kinds())
     return [
         Line(
             check=check,
@@ -235,11 +270,14 @@ def lines_of(targets: TargetFile, split: SplitFile) -> list[Line]:
             what=line.what,
             source=" ".join(config.source.split()),
             tag=config.tag,
-            kind=kinds[check],
+            kind="beside" if line.beside else places[check][0],
+            publication=places[check][1],
             unit=line.unit,
             target=line.target,
             low=line.low,
             high=line.high,
+            above=line.above,
+            below=line.below,
         )
         for check, config in targets.checks.items()
         for name, line in config.lines.items()

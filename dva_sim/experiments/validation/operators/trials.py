@@ -15,7 +15,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Values = dict[str, float]
 
-RESAMPLES = 400
+RESAMPLES = 300
 LEVEL = 0.95
 
 
