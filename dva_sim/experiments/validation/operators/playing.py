@@ -27,7 +27,7 @@ from dva_sim.experiments.validation.operators.trials import (
 from dva_sim.streams import Streams, derive_seed
 from dva_sim.tasks import TaskScenario, build, play
 
-PERSONS, QUICK_PERSONS = 24, 5
+PERSONS, QUICK_PERSONS = 24, 6
 _EXACT = "exact"
 
 Traits = Mapping[str, float]
