@@ -26,6 +26,14 @@ GROUPS: tuple[tuple[str, Kind, bool], ...] = (
     ("Fires, alarms and people on foot: standards and textbooks (exact)", "exact", True),
 )
 STEERED = "move_and_wait_share"
+BY = {
+    "lag": "lag [ms]",
+    "tilt": "gain, selection",
+    "waiting": "delay [s]",
+    "excavator": "delay [s]",
+    "frames": "frame rate [1/s], delay [s]",
+}
+"""What the names of the cells of an experiment mean, where they do not say it."""
 
 
 def write(
@@ -73,12 +81,15 @@ def grouped(verdicts: Sequence[Verdict]) -> Iterator[tuple[str, list[Verdict]]]:
 
 
 def steered(played: Mapping[str, Cells]) -> list[tuple[str, str]]:
-    """Of each experiment, in which share of the time the persons moved and waited."""
+    """Of each experiment and its cells, in which share of the time they moved and waited."""
     found = []
     for name, cells in played.items():
-        shares = [f"{100 * mean(trials, STEERED):.0f} %" for trials in cells.values()]
+        shares = [
+            f"{100 * mean(trials, STEERED):.0f}\N{NO-BREAK SPACE}%" for trials in cells.values()
+        ]
         each = ", ".join(f"{cell}: {s}" for cell, s in zip(cells, shares, strict=True))
-        found.append((name, f"{shares[0]} everywhere" if len(set(shares)) == 1 else each))
+        told = f"{name}, by {BY[name]}" if name in BY else name
+        found.append((told, f"{shares[0]} everywhere" if len(set(shares)) == 1 else each))
     return found
 
 

@@ -1,10 +1,12 @@
 """The files of targets and of the split: complete, consistent, and true to where they come from."""
 
+import csv
 import json
 from pathlib import Path
 
 import pytest
 
+from dva_sim import resources
 from dva_sim.config import validate
 from dva_sim.errors import ConfigError
 from dva_sim.experiments.validation.operators.exact import EXACT
@@ -17,6 +19,7 @@ from dva_sim.experiments.validation.operators.targets import (
     load_targets,
 )
 
+_COMPARISONS = ("first", "second")
 SHARED = Path(__file__).parents[5] / "shared/targets/operator.json"
 LINES = {line.id: line for line in lines_of(load_targets(), load_split())}
 
@@ -66,8 +69,10 @@ def test_the_embedded_targets_are_those_of_the_shared_file():
     for name, check in told.items():
         band = check.get("band")
         if isinstance(band, list):
-            own = [line for line in LINES.values() if line.check == name]
+            own = [line for line in LINES.values() if line.check == name and line.has_band]
             assert [(line.low, line.high) for line in own] == [tuple(band)], name
+    for lag, time in told["S7"]["target"].items():
+        assert LINES[f"S7/time-{lag}"].target == time
     for lag, (low, high) in told["S7"]["ratio_band"].items():
         assert (LINES[f"S7/{lag}"].low, LINES[f"S7/{lag}"].high) == (low, high)
     for line, share in (("S12/less", "-16.7"), ("S12/more", "16.7")):
@@ -91,7 +96,11 @@ def test_what_is_known_from_memory_cannot_be_held_out():
         lines_of(validate(TargetFile, targets("V,M", low=1)), split(held_out={"a": ("T",)}))
 
 
-@pytest.mark.parametrize("band", [{}, {"low": 2, "high": 1}])
+@pytest.mark.parametrize(
+    "band",
+    [{}, {"above": 1}, {"low": 2, "high": 1}, {"beside": True}]
+    + [{"beside": True, "target": 1, limit: 1} for limit in ("low", "above")],
+)
 def test_a_line_that_everything_or_nothing_passes_is_refused(band):
     with pytest.raises(ConfigError):
         validate(TargetFile, targets(**band))
@@ -100,6 +109,15 @@ def test_a_line_that_everything_or_nothing_passes_is_refused(band):
 def test_a_tag_without_a_meaning_is_refused():
     with pytest.raises(ConfigError, match="tag 'X' of T is unknown; known: V, M"):
         validate(TargetFile, targets("X", low=1))
+
+
+def test_the_first_two_comparisons_are_kept_line_by_line():
+    path = resources.find("operators", "experiments/validation").with_name("operators-history.csv")
+    rows = {r["line"]: r for r in csv.DictReader(path.read_text(encoding="utf-8").splitlines())}
+    assert rows.keys() == {line.id for line in LINES.values() if line.kind != "beside"}
+    held_out = [line for line in LINES.values() if line.kind == "held-out"]
+    passed = [sum(line.holds(float(rows[line.id][n])) for line in held_out) for n in _COMPARISONS]
+    assert passed == [7, 9]
 
 
 def test_people_were_watched_up_to_a_delay_of_one_and_a_half_seconds():

@@ -11,6 +11,7 @@ from dva_sim.experiments.validation.operators import output
 from dva_sim.experiments.validation.operators.judging import judge, outcome_of
 from dva_sim.experiments.validation.operators.targets import lines_of, load_split, load_targets
 from dva_sim.experiments.validation.operators.trials import (
+    Found,
     Trials,
     certain,
     collect,
@@ -20,6 +21,11 @@ from dva_sim.experiments.validation.operators.trials import (
 
 LINES = {line.id: line for line in lines_of(load_targets(), load_split())}
 RULE = load_split().rule
+
+
+def middle(line):
+    """A value that passes in a line with two ends."""
+    return certain(0.5 * (line.low + line.high))
 
 
 def verdict(line, value):
@@ -47,6 +53,28 @@ def test_a_target_changed_to_a_wrong_number_makes_the_verdict_a_miss():
     assert verdict(wrong, 600.0).word == "misses"
 
 
+@pytest.mark.parametrize(("line", "sign"), [("S12/less", -1), ("S12/more", 1), ("S7/25", 1)])
+def test_where_the_sign_counts_no_effect_misses_and_so_does_an_interval_that_holds_none(line, sign):
+    for value, other_end, word in ((0.0, 0.0, "misses"), (2, -1, "misses"), (2, 1, "passes")):
+        ends = sorted(1 + 0.01 * sign * share for share in (other_end, 3))
+        found = Found(1 + 0.01 * sign * value, *ends, 24)
+        assert judge([LINES[line]], {line: found})[0].word == word
+
+
+def test_a_line_beside_the_others_is_shown_without_a_band():
+    shown = verdict(LINES["S7/time-25"], 2000.0)
+    assert (shown.word, shown.inside) == ("shown only", False)
+    assert output.words(shown)[2:] == ["934 ms", "2000 ms", "shown only"]
+
+
+def test_a_publication_passes_as_a_whole_if_all_its_lines_do():
+    held_out = [line for line in LINES.values() if line.kind == "held-out"]
+    values = {line.id: middle(line) for line in held_out}
+    assert outcome_of(judge(held_out, values), RULE).publications == (5, 5)
+    values["S8/slope"] = values["S7/75"] = certain(0.0)  # both of one publication
+    assert outcome_of(judge(held_out, values), RULE).publications == (4, 5)
+
+
 @pytest.mark.parametrize("line", ["S9/dwell", "S14/crossover"])
 def test_what_was_fitted_to_or_remembered_is_shown_only_wherever_it_lies(line):
     assert verdict(LINES[line], 1.2).word == verdict(LINES[line], 99.0).word == "shown only"
@@ -62,7 +90,7 @@ def test_what_was_not_simulated_misses():
 @pytest.mark.parametrize(("misses", "passes"), [(0, True), (2, True), (3, False)])
 def test_eight_of_ten_held_out_lines_are_enough(misses, passes):
     held_out = [line for line in LINES.values() if line.kind == "held-out"]
-    values = {line.id: certain(line.low) for line in held_out}
+    values = {line.id: middle(line) for line in held_out}
     values |= {line.id: certain(-99.0) for line in held_out[:misses]}
     outcome = outcome_of(judge(held_out, values), RULE)
     assert outcome.held_out == (10 - misses, 10)
@@ -81,7 +109,8 @@ def test_the_headline_says_both_shares_and_what_is_asked_for():
     held_out = [line for line in LINES.values() if line.kind == "held-out"]
     outcome = outcome_of(judge(held_out, {line.id: certain(-9.0) for line in held_out}), RULE)
     assert output.headline(outcome) == (
-        "0 of 0 exact lines and 0 of 10 held-out lines (0 %) pass. "
+        "0 of 0 exact lines and 0 of 10 held-out lines (0 %) pass; "
+        "0 of 5 held-out publications pass in all their lines. "
         "Asked for are all exact ones and 80 % of the held-out ones: failed."
     )
 
@@ -90,7 +119,34 @@ def test_words_give_target_band_and_unit():
     assert output.published(LINES["S9/dwell"]) == "1.2 (0.95 to 1.45) bit/s"
     assert output.published(LINES["S16c/30"]) == "at least 120 min"
     assert output.published(LINES["S16c/300"]) == "at most 3 min"
+    assert output.published(LINES["S12/less"]) == "0.83 to 1, surely below 1"
     assert output.simulated(verdict(LINES["S16c/30"], math.inf)) == "never"
+
+
+def test_a_value_at_the_edge_of_what_was_tried_says_so():
+    line = LINES["S15/c"]
+    assert output.simulated(verdict(line, 6.0)) == "6, at the edge of what was tried"
+    assert output.simulated(verdict(line, 2.0)) == "2"
+
+
+def test_fires_and_people_on_foot_stand_under_a_heading_of_their_own():
+    verdicts = judge(list(LINES.values()), {})
+    exact = {title: own for title, own in output.grouped(verdicts) if "exact" in title}
+    assert [title.partition(":")[0] for title in exact] == [
+        "Operators and phones",
+        "Fires, alarms and people on foot",
+    ]
+    assert [len(own) for own in exact.values()] == [9, 19]
+
+
+def test_how_they_steered_is_told_cell_by_cell_where_it_differs():
+    lag = {name: trials(move_and_wait_share=(0, 0)) for name in ("8.3", "25")}
+    reach = {"0": lag["25"], "1.5": trials(move_and_wait_share=(0.5, 1.0))}
+    told = output.steered({"steering": lag, "excavator": reach})
+    assert [(name, shares.replace("\N{NO-BREAK SPACE}", " ")) for name, shares in told] == [
+        ("steering", "0 % everywhere"),
+        ("excavator, by delay [s]", "0: 0 %, 1.5: 75 %"),
+    ]
 
 
 def test_a_person_with_many_trials_counts_as_much_as_one_with_few():
@@ -157,8 +213,17 @@ def test_a_slope_of_three_seconds_a_second_agrees_with_three_waits():
 
 
 def test_times_that_no_delay_changes_lie_on_no_line():
-    cells = {str(d): trials(movement_time_s=(2, 2), waits=(0, 0)) for d in (1.0, 2.0, 3.0)}
-    assert math.isnan(of.wait_values(cells)["S13/linear"])
+    cells = {str(d): trials(movement_time_s=(2, 2), waits=(1, 1)) for d in (1.0, 2.0, 3.0)}
+    found = of.wait_values(cells)
+    assert math.isnan(found["S13/linear"])
+    assert found["S13/slope"] == pytest.approx(-1.0)
+
+
+def test_who_waits_less_than_every_other_trial_has_no_slope_that_agrees():
+    for waits, is_none in ((0, True), (1, False)):
+        times = {d: (2 + 0.5 * d,) * 2 for d in (1.0, 2.0, 3.0)}
+        cells = {str(d): trials(movement_time_s=t, waits=(0, waits)) for d, t in times.items()}
+        assert math.isnan(of.wait_values(cells)["S13/slope"]) == is_none
 
 
 def test_frame_rates_that_act_as_half_a_frame_of_delay_collapse_at_a_half():
@@ -175,7 +240,7 @@ def test_frame_rates_that_act_as_half_a_frame_of_delay_collapse_at_a_half():
 def test_every_line_that_is_not_exact_is_measured_by_one_experiment():
     """Names only: the experiments themselves are played elsewhere."""
     measured = {
-        "lag": {"S7/25", "S7/75", "S8/slope"},
+        "lag": {i for i in LINES if i.startswith(("S7/", "S8/"))},
         "tilt": {i for i in LINES if i.startswith(("S9/", "S10/"))},
         "steering": {"S11/mean", "S11/variance"},
         "latency": {"S12/less", "S12/more"},
