@@ -1,4 +1,4 @@
-"""The one fit of the operators: to the published experiment that the split calls `fit`, no other.
+"""The fit of the operators: to the published experiment that the split calls `fit`, no other.
 
     python experiments/validation/fit_operators.py --jobs 2
 
