@@ -42,7 +42,7 @@ def draw_people(verdicts: Sequence[Verdict], played: Mapping[str, Cells]) -> lis
         _lag(lines, played["lag"]),
         _tilt(lines, played["tilt"]),
         _steering(lines, played["steering"], played["latency"]),
-        _waiting(played["waiting"], lines["S17/increase"]),
+        _waiting(lines, played["waiting"]),
         _frames(lines, played["frames"]),
         _tracking(lines, played["tracking"]),
     ]
@@ -163,7 +163,7 @@ def _steering(lines: ByLine, tunnel: Cells, latency: Cells) -> Drawn:
     return finish(figure, "steering", "Steering through tunnels", text)
 
 
-def _waiting(cells: Cells, excavator: Verdict) -> Drawn:
+def _waiting(lines: ByLine, cells: Cells) -> Drawn:
     figure, [[times, waits, added]] = panels(1, 3, 2.9, width_ratios=[1.6, 1, 1])
     delays = np.array([float(name) for name in cells])
     means = [person_means(trials, TIME) for trials in cells.values()]
@@ -172,7 +172,8 @@ def _waiting(cells: Cells, excavator: Verdict) -> Drawn:
     ends = np.array([delays.min(), delays.max()])
     times.plot(ends, line.intercept + line.slope * ends, color=SOFT, lw=1.0, zorder=1)
     times.set_ylabel("completion time [s]")
-    times.set_title(f"Completion time: slope {line.slope:.2f}, R² {line.r2:.4f}")
+    r2 = lines["S13/linear"].found.value
+    times.set_title(f"Completion time: slope {round(line.slope, 2) + 0.0:.2f}, R² {_said(r2, 4)}")
     points(waits, delays.tolist(), [person_means(t, "waits") for t in cells.values()], BLUE)
     waits.axhspan(line.slope - 0.5, line.slope + 0.5, color=FAINT, alpha=0.55, lw=0)
     waits.set_ylabel("waits in a trial")
@@ -180,7 +181,7 @@ def _waiting(cells: Cells, excavator: Verdict) -> Drawn:
     for axes in (times, waits):
         axes.set_ylim(bottom=0)
         axes.set_xlabel("delay [s]")
-    _excavator(added, excavator)
+    _excavator(added, lines["S17/increase"])
     text = (
         "Left and middle: positioning over delays of 1 s and more (Ferrell 1965); if one moves, "
         "waits for what it did and moves again, each wait adds a delay, so the slope is the number "
@@ -217,12 +218,18 @@ def _frames(lines: ByLine, cells: Cells) -> Drawn:
     left.set_title("By frame rate")
     left.legend(fontsize=8, title="frames")
     right.set_xlabel(f"delay + {c:.2f} / frame rate [s]")
-    right.set_title(f"On one line: R² {lines['S15/collapse'].found.value:.3f}")
+    edge = ", factor at the edge of what was tried" if c in of.TRIED["S15/c"] else ""
+    right.set_title(f"On one line: R² {_said(lines['S15/collapse'].found.value, 3)}{edge}")
     text = (
         "Pointing at several frame rates and delays. If a frame rate acts as a delay of a share c "
         "of the time between frames, all lie on one curve. From memory in part, so not counted."
     )
     return finish(figure, "frames", "Frame rate as delay", text)
+
+
+def _said(value: float, digits: int) -> str:
+    """A number, if it is one."""
+    return "none" if np.isnan(value) else f"{value:.{digits}f}"
 
 
 def _tracking(lines: ByLine, cells: Cells) -> Drawn:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -52,7 +52,8 @@ def paired(
 ) -> None:
     """The same with the means given, and intervals from the persons."""
     halves = [half(p) for p in persons]
-    axes.errorbar(x, means, yerr=halves, fmt="o-", color=colour, ms=5, lw=1.2, elinewidth=1.4)
+    look: dict[str, Any] = {"fmt": "o-", "color": colour, "ms": 5, "lw": 1.2, "elinewidth": 1.4}
+    axes.errorbar(x, means, yerr=halves, clip_on=False, **look)
 
 
 def curve(
@@ -94,7 +95,7 @@ def value(axes: Axes, x: float, verdict: Verdict) -> None:
     """A simulated value with its interval, and in words."""
     found = verdict.found
     axes.plot([x, x], [found.low, found.high], color=BLUE, lw=1.4)
-    axes.plot([x], [found.value], "o", color=BLUE, ms=6)
+    axes.plot([x], [found.value], "o", color=BLUE, ms=6, clip_on=False, zorder=3)
     axes.annotate(
         f"{found.value:.2f}",
         (x, found.value),
