@@ -30,8 +30,11 @@ STAGES = (
     *("sampling", "pattern", "uplink", "processing", "motor"),
 )
 
-# How long ago, in time constants, a first-order lag got what it holds: equal shares of it.
-_REMEMBERED = -np.log1p(-(np.arange(16) + 0.5) / 16)
+_COUNT = 64
+_LEFT = np.linspace(1.0, 0.0, _COUNT + 1)
+# How long ago, in time constants, a first-order lag got what it holds: the mean of each of equal
+# shares of it, so that the mean of all is one (the integral of -log v is v - v log v).
+_REMEMBERED = -_COUNT * np.diff(_LEFT - _LEFT * np.log(np.maximum(_LEFT, 1e-300)))
 _REMEMBERED /= _REMEMBERED.mean()
 
 
