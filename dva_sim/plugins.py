@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import inspect
+import math
 import sys
 import traceback
 from collections.abc import Callable, Mapping
@@ -155,6 +156,33 @@ class Plugins(Generic[T]):
         if getattr(found, method) is getattr(base, method):
             raise ConfigError(f"{self.kind} {name!r} has no {self.needs}; should define it")
         return found
+
+
+class Guard:
+    """Asks a plug-in in a run; what it gets wrong is counted, and whoever asks goes on without.
+
+    Attributes:
+        failures: How often there was no answer that is one.
+        first_failure: What was wrong first, in a line.
+    """
+
+    failures: int
+    first_failure: str
+
+    def _answer(self, ask: Callable[..., Any], *given: Any) -> tuple[float, float] | None:
+        """Two finite numbers, or None."""
+        try:
+            one, other = ask(*given)
+            if math.isfinite(one) and math.isfinite(other):
+                return float(one), float(other)
+            self._count(f"answers {one!r}, {other!r}")
+        except FAILURES as error:
+            self._count(said(error))
+        return None
+
+    def _count(self, problem: str) -> None:
+        self.failures += 1
+        self.first_failure = self.first_failure or problem
 
 
 def said(error: BaseException) -> str:

@@ -24,9 +24,8 @@ from dva_sim.agents.operator.strategies import (
     View,
 )
 from dva_sim.agents.steering import Route
-from dva_sim.checking.promises import Case, Outcome, line, said
+from dva_sim.checking.promises import Case, Outcome, line, part_by_part
 from dva_sim.errors import ConfigError
-from dva_sim.plugins import FAILURES
 
 FRAME: Final = 0.1  # from one picture to the next [s]
 ROBOTS: Final = (Reach(0.5, math.pi / 6), Reach(0.8, 1.4, 0.56))  # one turns on the spot
@@ -110,17 +109,7 @@ class _Trial:
 
     def all(self) -> Iterator[Case]:
         """Every promise that is broken, with a case."""
-        parts: Sequence[Callable[[], Iterator[Case]]] = (
-            self._robots, self._cursors, self._alike, self._blind, self._ways
-        )  # fmt: skip
-        for part in parts:
-            try:
-                broken = list(part())
-            except FAILURES as error:
-                broken = [("raises", said(error))]
-            yield from broken
-            if broken:
-                return  # what comes next builds on this
+        return part_by_part((self._robots, self._cursors, self._alike, self._blind, self._ways))
 
     def new(self, person: Person, reach: Reach) -> Strategy:
         """The strategy itself.

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import traceback
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+
+from dva_sim.plugins import FAILURES
 
 Case = tuple[str, str]  # a promise in words, and what happened
 
@@ -24,6 +26,18 @@ class Outcome:
     warnings: tuple[str, ...]
     tries: int
     slowest: float
+
+
+def part_by_part(parts: Iterable[Callable[[], Iterable[Case]]]) -> Iterator[Case]:
+    """What the first part finds broken that finds anything: each builds on those before it."""
+    for part in parts:
+        try:
+            broken = list(part())
+        except FAILURES as error:
+            broken = [("raises", said(error))]
+        yield from broken
+        if broken:
+            return
 
 
 def line(promise: str, cases: Sequence[str]) -> str:

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
-from dva_sim.checking.promises import Case, Outcome, line, said
-from dva_sim.plugins import FAILURES
+from dva_sim.checking.promises import Case, Outcome, line, part_by_part
 from dva_sim.worlds.drives import LONGEST_TICK, Drive, DriveSpec, Guarded
 from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.hall import hall
@@ -86,17 +85,9 @@ class _Trial:
 
     def all(self) -> Iterator[Case]:
         """Every promise that is broken, with a case."""
-        parts: Sequence[Callable[[], Iterator[Case]]] = (
-            self._set_points, self._answers, self._drives, self._stops, self._obeys, self._walls
-        )  # fmt: skip
-        for part in parts:
-            try:
-                broken = list(part())
-            except FAILURES as error:
-                broken = [("raises", said(error))]
-            yield from broken
-            if broken:
-                return  # what comes next builds on this
+        return part_by_part(
+            (self._set_points, self._answers, self._drives, self._stops, self._obeys, self._walls)
+        )
 
     def _new(self) -> Drive:
         """The motors themselves."""

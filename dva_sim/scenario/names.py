@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -59,38 +60,40 @@ def check_strategy(strategy: str, options: Mapping[str, Any], error: Fail) -> No
     """Refuse a way of steering that cannot be loaded, or does not know its options."""
     from dva_sim.agents.operator.strategies import try_strategy
 
-    try:
+    with _told(error, lambda problem: _place(problem, "operator", "strategy", "options")):
         try_strategy(strategy, options)
-    except ConfigError as problem:
-        if problem.file is not None:
-            raise
-        raise error(problem.problem, _place(problem, "operator", "strategy", "options")) from None
 
 
 def check_policy(policy: str, options: Mapping[str, Any], error: Fail) -> None:
     """Refuse a policy that cannot be loaded, or does not know its options."""
     from dva_sim.core.dispatch import load_policy
 
-    try:
+    with _told(error, lambda problem: _place(problem, "dispatch", "policy", "options")):
         load_policy(policy, options)
-    except ConfigError as problem:
-        if problem.file is not None:
-            raise
-        raise error(problem.problem, _place(problem, "dispatch", "policy", "options")) from None
 
 
 def check_phone(profile: PhoneProfile, error: Fail) -> None:
     """Refuse a phone whose part, filter or mapping cannot be had, or does not know its options."""
     from dva_sim.agents.tilt import try_phone
 
-    try:
+    def place(problem: ConfigError) -> Path_:
+        stages = ("accelerometer", "mapping", "filter")
+        key = next((s for s in stages if problem.problem.startswith(s)), "filter")
+        return _place(problem, "phone", key, f"{key}_options")
+
+    with _told(error, place):
         try_phone(profile)
+
+
+@contextmanager
+def _told(error: Fail, place: Callable[[ConfigError], Path_]) -> Iterator[None]:
+    """Tell a mistake at its key of the scenario, unless it is in another file."""
+    try:
+        yield
     except ConfigError as problem:
         if problem.file is not None:
             raise
-        key = "mapping" if problem.problem.startswith("mapping") else "filter"
-        key = "accelerometer" if problem.problem.startswith("accelerometer") else key
-        raise error(problem.problem, _place(problem, "phone", key, f"{key}_options")) from None
+        raise error(problem.problem, place(problem)) from None
 
 
 def _place(problem: ConfigError, part: str, key: str, options: str) -> Path_:

@@ -92,9 +92,8 @@ class Mouse(Device):
         """See `Device`."""
         if reading is None:
             return 0.0, 0.0
-        (x, y), (old_x, old_y) = reading, self._told
-        self._told = reading
-        return self._gain * (x - old_x) / dt, self._gain * (y - old_y) / dt
+        last, self._told = self._told, reading
+        return _velocity(last, reading, self._gain, dt)
 
 
 class Joystick(Device):
@@ -209,9 +208,13 @@ class TiltPosition(Tilt):
         """See `Device`."""
         if reading is None:
             return 0.0, 0.0
-        (x, y), (old_x, old_y) = reading, self._told
-        self._told = reading
-        return self._gain * (x - old_x) / dt, self._gain * (y - old_y) / dt
+        last, self._told = self._told, reading
+        return _velocity(last, reading, self._gain, dt)
+
+
+def _velocity(last: Pair, place: Pair, gain: float, dt: float) -> Pair:
+    """Of a cursor that goes `gain` times the way from the last place to this one in `dt` [m/s]."""
+    return gain * (place[0] - last[0]) / dt, gain * (place[1] - last[1]) / dt
 
 
 KINDS: dict[str, Callable[[DeviceConfig, Person, Streams, float], Device]] = {

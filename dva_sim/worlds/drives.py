@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from dva_sim.errors import ConfigError
-from dva_sim.plugins import FAILURES, Plugins, said
+from dva_sim.plugins import Guard, Plugins
 
 LONGEST_TICK: Final = 0.04  # that profiles are made for [s]
 CREEP: Final = 0.01  # below this a car stands, and its steering turns nothing [m/s]
@@ -142,7 +142,7 @@ class ThreeWay(Drive):
         return along, ((now_speed + along * dt) * curvature - now_turn_rate) / dt
 
 
-class Guarded(Drive):
+class Guarded(Guard, Drive):
     """A drive of a user, kept within the limits of its robot whatever it answers.
 
     Both accelerations stay within their limits, and so do the speed and the turn rate that they
@@ -180,19 +180,6 @@ class Guarded(Drive):
         return _within(along, -spec.max_deceleration, spec.max_acceleration), _within(
             turn, -most, most
         )
-
-    def _answer(self, ask: Callable[..., Any], *given: float) -> tuple[float, float] | None:
-        """Two finite numbers, or None."""
-        try:
-            one, other = ask(*given)
-            if math.isfinite(one) and math.isfinite(other):
-                return float(one), float(other)
-            problem = f"answers {one!r}, {other!r}"
-        except FAILURES as error:
-            problem = said(error)
-        self.failures += 1
-        self.first_failure = self.first_failure or problem
-        return None
 
 
 def _within(value: float, least: float, most: float) -> float:

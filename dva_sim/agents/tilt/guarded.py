@@ -2,41 +2,17 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
-from typing import Any
-
 from dva_sim.agents.tilt.filters import Filter, Sample, check_filter, is_age
 from dva_sim.agents.tilt.mappings import Mapping, Pair, limited
-from dva_sim.plugins import FAILURES, said
+from dva_sim.plugins import FAILURES, Guard, said
 
 STAND: Pair = (0.0, 0.0)
 
 
-class _Guard:
-    """Counts what raises or answers no two finite numbers."""
-
-    failures: int
-    first_failure: str
-
-    def _answer(self, ask: Callable[..., Any], *given: Any) -> Pair | None:
-        """Two finite numbers, or None."""
-        try:
-            one, other = ask(*given)
-            if math.isfinite(one) and math.isfinite(other):
-                return float(one), float(other)
-            self._count(f"answers {one!r}, {other!r}")
-        except FAILURES as error:
-            self._count(said(error))
-        return None
-
-    def _count(self, problem: str) -> None:
-        self.failures += 1
-        self.first_failure = self.first_failure or problem
-
-
-class GuardedFilter(_Guard, Filter):
+class GuardedFilter(Guard, Filter):
     """A filter of a user; where it gives no answer, the reading is that of a phone at rest.
+
+    What it says after a sample that it did not take is no answer, either: it would be an old one.
 
     Args:
         filter_: The user's own.
@@ -50,17 +26,20 @@ class GuardedFilter(_Guard, Filter):
         check_filter(filter_)
         super().__init__(period)
         self._filter, self.batch = filter_, filter_.batch
+        self._took = True
 
     def add(self, sample: Sample) -> None:
         """See `Filter`."""
         try:
             self._filter.add(sample)
+            self._took = True
         except FAILURES as error:
+            self._took = False
             self._count(said(error))
 
     def value(self) -> Sample:
         """See `Filter`."""
-        return self._answer(self._filter.value) or STAND
+        return (self._answer(self._filter.value) if self._took else None) or STAND
 
     @property
     def age(self) -> float:
@@ -75,7 +54,7 @@ class GuardedFilter(_Guard, Filter):
         return 0.0
 
 
-class GuardedMapping(_Guard, Mapping):
+class GuardedMapping(Guard, Mapping):
     """A mapping of a user; where it gives no answer, the command is to stand."""
 
     def __init__(self, mapping: Mapping) -> None:

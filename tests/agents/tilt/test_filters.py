@@ -8,7 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dva_sim.agents.tilt.filters import BatchMedian, Filter, known_filters, load_filter
+from dva_sim.agents.tilt.filters import (
+    BatchMedian,
+    Filter,
+    MovingMedian,
+    known_filters,
+    load_filter,
+)
+from dva_sim.agents.tilt.guarded import GuardedFilter
 from dva_sim.errors import ConfigError
 
 PERIOD = 1 / 34
@@ -176,3 +183,25 @@ def test_a_filter_of_a_users_file_is_found(tmp_path: Path) -> None:
     filter_ = load_filter("mine.py:Half", {"share": 0.25}, tmp_path)(PERIOD)
     filter_.add((4.0, 8.0))
     assert filter_.value() == (1.0, 2.0)
+
+
+class Tiring(MovingMedian):
+    """Takes three samples, and no other one."""
+
+    taken = 0
+
+    def add(self, sample: tuple[float, float]) -> None:
+        self.taken += 1
+        if self.taken > 3:
+            raise RuntimeError("is tired")
+        super().add(sample)
+
+
+def test_a_users_filter_that_takes_no_more_samples_lets_the_phone_stand() -> None:
+    guarded = GuardedFilter(Tiring(0.03), 0.03)
+    for _ in range(3):
+        guarded.add((6.0, 12.0))
+    assert guarded.value() == (6.0, 12.0)
+    guarded.add((6.0, 12.0))
+    assert guarded.value() == (0.0, 0.0)
+    assert (guarded.failures, guarded.first_failure) == (1, "RuntimeError: is tired")

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Mapping
 
 from dva_sim.agents.operator.strategies.base import Intent, PathView, PointView, Strategy, View
 from dva_sim.agents.operator.strategies.cursor import Velocity, slowed
 from dva_sim.agents.steering import Route
-from dva_sim.plugins import FAILURES, said
+from dva_sim.plugins import FAILURES, Guard, said
 
 
-class Guarded(Strategy):
+class Guarded(Guard, Strategy):
     """A strategy of a user: what raises or answers no two finite numbers is counted, and stands.
 
     Attributes:
@@ -46,19 +44,3 @@ class Guarded(Strategy):
         except FAILURES as error:
             self._count(said(error))
             return {}
-
-    def _answer(self, ask: Callable[..., Any], *given: Any) -> tuple[float, float] | None:
-        """Two finite numbers, or None."""
-        try:
-            one, other = ask(*given)
-            if math.isfinite(one) and math.isfinite(other):
-                return float(one), float(other)
-            problem = f"answers {one!r}, {other!r}"
-        except FAILURES as error:
-            problem = said(error)
-        self._count(problem)
-        return None
-
-    def _count(self, problem: str) -> None:
-        self.failures += 1
-        self.first_failure = self.first_failure or problem
