@@ -101,6 +101,10 @@ class Route:
         distance = math.hypot(tx - x, ty - y)
         return Ahead(bearing, distance, self.length - along, offset)
 
+    def advance(self, x: float, y: float) -> None:
+        """Keep track of how far one has come who is here [m], as `ahead` does."""
+        self._project(x, y)
+
     def _project(self, x: float, y: float) -> tuple[float, float]:
         """Nearest place within reach of the last one: (way along the route, distance) [m]."""
         at, legs, nearest, found = self._at, self._legs, math.inf, (0.0, math.inf, 0.0)

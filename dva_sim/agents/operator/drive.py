@@ -54,9 +54,7 @@ class Drive(Work):
         super().__init__(seat, order, log, on_end)
         self._sender: CommandSender | None = None
         self._route: Route | None = None
-        self._lent: Route | None = (
-            None  # the same to the strategy, which may do with it as it likes
-        )
+        self._lent: Route | None = None  # the strategy's own copy, to do with as it likes
         self._intent = Intent(0.0, 0.0)
         self._seen_tick: int | None = None
         reach = seat.reach(self.robot)
@@ -238,7 +236,7 @@ class Drive(Work):
         if self._gets_nowhere(route.left):
             self.end("gave up", "the robot gets no nearer")
             return None
-        route.ahead(seen.x, seen.y, seen.heading, 0.0)  # a strategy need not follow it this way
+        route.advance(seen.x, seen.y)  # whether the strategy asks the way or not
         return self._lent
 
     def _take(self, points: NDArray[np.float64]) -> Route:
