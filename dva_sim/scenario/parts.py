@@ -107,7 +107,7 @@ class OperatorConfig(Config):
         population_seed: Draws the population; a study gives its own seed.
     """
 
-    strategy: str = "pursuit"
+    strategy: str = "adaptive"
     options: dict[str, Any] = Field(default_factory=dict)
     traits: dict[str, Positive] = Field(default_factory=dict)
     count: Annotated[int, Field(ge=0, le=50)] = 1

@@ -24,6 +24,7 @@ from dva_sim.recorder import DriveLog
 STILL = 0.02  # a robot that moves less stands [m/s, rad/s]
 ASKED_SPEED, ASKED_TURN = 0.05, 0.1  # from here on one expects to see it move [m/s, rad/s]
 STUCK_AFTER = 4.0  # standing for so long though asked to drive, a person plans anew [s]
+ASKED_FOR = 1.0  # asked for less in all, it was a touch that may well have no effect [s]
 LET_GO_FOR = 1.0  # one who sees no effect levels the phone for so long, and tilts again [s]
 NEARER = 0.5  # less is no progress [m]
 ATTEMPTS = 3  # in a row without any motion: the link is lost, as after three unanswered sends
@@ -60,7 +61,9 @@ class Drive(Work):
         reach = seat.reach(self.robot)
         self._strategy = seat.strategy(seat.person, reach)
         self._careful = Careful(seat.person, reach) if seat.setup.guarded else None
-        self._standing_since: float | None = None
+        self._asked_since: float | None = None  # to move, without any motion seen since
+        self._asked_for = self._stuck_look = 0.0
+        self._stuck_after = STUCK_AFTER + 2.0 * seat.delay.value
         self._let_go_until = 0.0
         self._without_effect = 0
         self._failures: Counter[str] = Counter()
@@ -218,7 +221,7 @@ class Drive(Work):
     def _way(self, seen: Observation) -> Route | None:
         """The way to the goal, for the strategy; planned anew when the robot does not get on."""
         if self._is_stuck(seen):
-            self._route = self._lent = self._standing_since = None
+            self._route = self._lent = self._asked_since = None
             self._let_go_until = self._clock.now + LET_GO_FOR
             self._device.recorder.counters["replans"] += 1
             self._without_effect += 1
@@ -254,17 +257,27 @@ class Drive(Work):
         return left > NEARER and now - self._nearer_at > self._seat.person.patience
 
     def _is_stuck(self, seen: Observation) -> bool:
-        """Whether the robot has stood for too long although it was asked to move."""
+        """Whether the robot has stood for too long although it was asked to move.
+
+        Who moves and waits asks for a while only: the time counts from the first asking, waits
+        included. How long is too long is of the delay when motion was last seen, since a guess
+        learns nothing from a picture that stands.
+        """
         now, intent = self._clock.now, self._intent
-        moves = abs(seen.speed) >= STILL or abs(seen.turn_rate) >= STILL
-        if moves:
+        passed, self._stuck_look = now - self._stuck_look, now
+        if abs(seen.speed) >= STILL or abs(seen.turn_rate) >= STILL:
             self._without_effect = 0
-        if moves or (intent.speed <= ASKED_SPEED and abs(intent.turn_rate) <= ASKED_TURN):
-            self._standing_since = None
+            self._stuck_after = STUCK_AFTER + 2.0 * self._seat.delay.value
+            self._asked_since = None
             return False
-        if self._standing_since is None:
-            self._standing_since = now
-        return now - self._standing_since > STUCK_AFTER + 2.0 * self._seat.delay.value
+        if intent.speed > ASKED_SPEED or abs(intent.turn_rate) > ASKED_TURN:
+            if self._asked_since is None:
+                self._asked_since, self._asked_for = now, 0.0
+            else:
+                self._asked_for += passed
+        if self._asked_since is None or self._asked_for < ASKED_FOR:
+            return False
+        return now - self._asked_since > self._stuck_after
 
     def _intend(self, intent: Intent, tick: int) -> None:
         now = self._clock.now

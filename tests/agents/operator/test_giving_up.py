@@ -30,6 +30,7 @@ class Mine(Strategy):
         return Intent(0.0 if abs(bearing) > 0.5 else 0.25, turn)
 """
 PATTERNS = (*ASKED, "pub-sub", "latest-wins")
+STRATEGIES = ("pursuit", "move_and_wait", "adaptive")
 
 
 def driving(pattern: str, **changes: object) -> PretendedDva:
@@ -38,7 +39,7 @@ def driving(pattern: str, **changes: object) -> PretendedDva:
     dva.order(1, EAST, robot=ROBOT)
     dva.run_until(lambda: "departed" in dva.progress(1))
     dva.run_for(5.0)
-    assert abs(dva.field.robots[ROBOT].body.speed) > 0.1
+    dva.run_until(lambda: abs(dva.field.robots[ROBOT].body.speed) > 0.1)
     return dva
 
 
@@ -63,10 +64,13 @@ def test_a_robot_that_says_nothing_any_more_is_lost_after_20_s_without_a_picture
     assert took == pytest.approx(20.5, abs=0.8)
 
 
+@pytest.mark.parametrize("strategy", STRATEGIES)
 @pytest.mark.parametrize("pattern", PATTERNS)
-def test_commands_that_do_not_arrive_are_a_lost_link_after_three_attempts(pattern: str) -> None:
+def test_commands_that_do_not_arrive_are_a_lost_link_after_three_attempts(
+    pattern: str, strategy: str
+) -> None:
     """The picture goes on; nobody moves any more, whatever is tried."""
-    dva = driving(pattern)
+    dva = driving(pattern, **{"operator.strategy": strategy})
     dva.field.robots[ROBOT].inbox._put = lambda *_: None  # type: ignore[method-assign]
     outcome, took = lost_after(dva)
     assert (outcome, ATTEMPTS) == ("lost link", 3)

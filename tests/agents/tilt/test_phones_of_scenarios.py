@@ -45,7 +45,7 @@ def test_a_wrong_stage_is_refused_before_the_run(changes: dict[str, Any], line: 
     [
         ("phone.mapping_options.x", "mapping 'absolute' has no option 'x'; known: gain, "),
         ("phone.filter_options.window", "filter 'median': option 'window' is 0; should be "),
-        ("operator.options.x", "operator 'pursuit' has no option 'x'; it has none"),
+        ("operator.options.x", "operator 'adaptive' has no option 'x'; known: closed"),
         ("dispatch.options.x", "policy 'min_eta' has no option 'x'; it has none"),
     ],
 )
