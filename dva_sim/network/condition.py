@@ -1,0 +1,220 @@
+"""A condition: everything that is set before an operator and a robot exchange commands.
+
+The same condition is measured on real sockets and predicted by the model; both give a row
+with the columns named here. A command is 400 bytes of application data, a reply 200.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, get_type_hints
+
+from dva_sim.errors import ConfigError
+
+COMMAND_BYTES = 400
+REPLY_BYTES = 200
+STALE_STEP_S = 0.005  # the command in force is looked at this often
+
+RESULTS = (
+    *("n_sent", "n_applied", "n_distinct", "send_hz", "applied_hz", "dup", "skip_frac"),
+    "first_seq",
+    *(f"age_{share}" for share in ("mean", "p50", "p95", "p99")),
+    *(f"rtt_{share}" for share in ("mean", "p50", "p95", "p99")),
+    *(f"stale_{share}" for share in ("mean", "p50", "p95", "p99")),
+    *("gap_p95", "gap_max", "timeouts", "alerts", "t_conn_ms", "t_hs_ms"),
+)
+"""What a run tells, the same for sockets and model; times in ms, None where not defined."""
+
+EMULATOR_RESULTS = (
+    *("emu_pkts_ab", "emu_lost_ab", "emu_tail_ab"),
+    *("emu_pkts_ba", "emu_lost_ba", "emu_tail_ba"),
+    *("emu_late_p50_ms", "emu_late_p99_ms", "emu_late_max_ms"),
+)
+"""What the emulated link tells about itself: a is the operator, b the robot."""
+
+_CHOICES = {
+    "pattern": ("req", "pub", "dealer"),
+    "conflate": ("none", "op", "rob", "both"),
+    "cc": ("cubic", "reno", "bbr"),
+}
+_SHORT = {"queue_pkts": "q", "burst_pkts": "burst"}
+_WORDS = {"": None, "auto": None, "inf": math.inf}
+
+
+@dataclass(frozen=True)
+class Condition:
+    """One cell of the comparison; times in ms because the tables are.
+
+    Attributes:
+        pattern: `req` REQ/REP, `pub` PUB/SUB, `dealer` DEALER/ROUTER.
+        hz: Wanted command rate. REQ sends the next command at the later of the end of the last
+            one and its issue + 1/hz; PUB and DEALER keep a fixed grid.
+        proc_ms: The robot's service time.
+        timeout_ms: REQ: after it the socket is closed and the same command goes over a new one.
+        attempts: REQ: so many times in all, then an alert and the next command.
+        conflate: Which end keeps only the last message.
+        hwm: High-water marks of both ends.
+        sndbuf: Send buffer of the operator [B]; None is the kernel's own choice.
+        rcvbuf: Receive buffer of the robot [B]; None is the kernel's own choice.
+        delay_ms: One-way delay.
+        jitter_frac: Half-width of a uniform law, as a share of the delay.
+        loss: Share of packets lost, each direction.
+        rate_kbit: Rate of each direction [kbit/s]; infinite is no limit.
+        queue_pkts: Packets that find room before the link, drop-tail.
+        reorder: Packets may overtake one another.
+        cc: Congestion control.
+        wait_hs: Commands start after the handshake instead of at once.
+        warm_s: Time from the first command to the statistics.
+        dur_s: Time that the statistics cover.
+        burst_pkts: Mean length of a run of lost packets (Gilbert-Elliott, everything lost in
+            the bad state); None is independent losses.
+    """
+
+    pattern: str
+    hz: float
+    proc_ms: float = 5.0
+    timeout_ms: float | None = None
+    attempts: int | None = None
+    conflate: str = "none"
+    hwm: int = 1000
+    sndbuf: int | None = None
+    rcvbuf: int | None = None
+    delay_ms: float = 0.0
+    jitter_frac: float = 0.0
+    loss: float = 0.0
+    rate_kbit: float = math.inf
+    queue_pkts: int = 100
+    reorder: bool = False
+    cc: str = "cubic"
+    wait_hs: bool = True
+    warm_s: float = 1.0
+    dur_s: float = 40.0
+    burst_pkts: float | None = None
+
+    def __post_init__(self) -> None:
+        for name, known in _CHOICES.items():
+            if getattr(self, name) not in known:
+                value = getattr(self, name)
+                raise ConfigError(f"{name} {value!r} is unknown; known: {', '.join(known)}")
+        given = [value is not None for value in (self.timeout_ms, self.attempts)]
+        if given != [self.pattern == "req"] * 2:
+            raise ConfigError("timeout_ms and attempts belong to pattern req, and only to it")
+        if self.conflate != "none" and self.pattern != "pub":
+            raise ConfigError(f"conflate {self.conflate!r} belongs to pattern pub, and only to it")
+        for name, problem in _out_of_range(self):
+            raise ConfigError(f"{name} {getattr(self, name):g} {problem}")
+
+    @property
+    def subscription_wait_s(self) -> float:
+        """How long a publisher waits on after its own handshake [s].
+
+        The subscriber's handshake ends half a round trip later, and its subscription needs
+        another half; with as much again as four small packets take on the link, and 5 ms.
+        """
+        if self.pattern != "pub" or not self.wait_hs:
+            return 0.0
+        round_trip = 2e-3 * self.delay_ms * (1.0 + self.jitter_frac)
+        return round_trip + 4 * 120 * 8 / (1e3 * self.rate_kbit) + 0.005
+
+    @property
+    def label(self) -> str:
+        """A name that a person can read; it leaves out what is as usual."""
+        rate = 0 if math.isinf(self.rate_kbit) else self.rate_kbit
+        text = f"{self.pattern}{self.hz:g}_d{self.delay_ms:g}_j{100 * self.jitter_frac:g}"
+        text += f"_l{100 * self.loss:g}_r{rate:g}_p{self.proc_ms:g}"
+        return text + "".join(f"_{part}" for part in _unusual(self))
+
+    @property
+    def hash(self) -> str:
+        """Eight digits that differ when anything that is set differs."""
+        text = ";".join(f"{name}={value}" for name, value in self.to_row().items())
+        return hashlib.sha256(text.encode()).hexdigest()[:8]
+
+    def to_row(self) -> dict[str, str]:
+        """The columns of the condition as a table holds them."""
+        return {name: _written(name, getattr(self, name)) for name in CONDITION}
+
+    @classmethod
+    def from_row(cls, row: Mapping[str, Any]) -> Condition:
+        """The condition of a row read from a table; other columns do not matter.
+
+        Raises:
+            ConfigError: a value is not as it should be.
+        """
+        return cls(**{name: _read(name, str(row[name])) for name in CONDITION if name in row})
+
+
+CONDITION = tuple(field.name for field in dataclasses.fields(Condition))
+"""The columns of a condition, in their order."""
+
+_KINDS = get_type_hints(Condition)
+
+
+def _out_of_range(condition: Condition) -> list[tuple[str, str]]:
+    """What no link or program can have."""
+    wrong = []
+    positive = ("hz", "hwm", "rate_kbit", "queue_pkts", "dur_s", "timeout_ms", "attempts")
+    for name in (*positive, "sndbuf", "rcvbuf"):
+        value = getattr(condition, name)
+        if value is not None and not value > 0:
+            wrong.append((name, "should be above 0"))
+    for name in ("proc_ms", "delay_ms", "warm_s"):
+        if not 0 <= getattr(condition, name) < math.inf:
+            wrong.append((name, "should be a finite number from 0 on"))
+    if not 0 <= condition.loss <= 0.9:
+        wrong.append(("loss", "should lie between 0 and 0.9"))
+    if not 0 <= condition.jitter_frac <= 1:
+        wrong.append(("jitter_frac", "should lie between 0 and 1"))
+    if condition.burst_pkts is not None and not condition.burst_pkts >= 1:
+        wrong.append(("burst_pkts", "should be at least 1"))
+    return wrong
+
+
+def _unusual(condition: Condition) -> list[str]:
+    parts = []
+    if condition.timeout_ms is not None:
+        parts.append(f"T{condition.timeout_ms:g}")
+    if condition.attempts not in (None, 3):
+        parts.append(f"x{condition.attempts}")
+    if condition.conflate != "none":
+        parts.append(f"conflate{condition.conflate}")
+    usual = {"hwm": 1000, "sndbuf": None, "rcvbuf": None, "queue_pkts": 100, "burst_pkts": None}
+    for name, value in usual.items():
+        if getattr(condition, name) != value:
+            parts.append(f"{_SHORT.get(name, name)}{getattr(condition, name):g}")
+    if condition.reorder:
+        parts.append("reorder")
+    if condition.cc != "cubic":
+        parts.append(condition.cc)
+    if not condition.wait_hs:
+        parts.append("nowait")
+    return parts
+
+
+def _written(name: str, value: Any) -> str:
+    if value is None:
+        return "auto" if name in ("sndbuf", "rcvbuf") else ""
+    if isinstance(value, bool):
+        return str(int(value))
+    return value if isinstance(value, str) else f"{value:.12g}"
+
+
+def _read(name: str, text: str) -> Any:
+    kind = _KINDS[name]
+    if kind is str:
+        return text
+    try:
+        number = _WORDS[text] if text in _WORDS else float(text)
+        if kind is bool:
+            return {0.0: False, 1.0: True}[number]  # type: ignore[index]
+        if number is None or kind in (float, float | None):
+            return number
+        if number != int(number):
+            raise ValueError
+        return int(number)
+    except (ValueError, KeyError, OverflowError):
+        raise ConfigError(f"{name} {text!r} is not a number that {name} can have") from None

@@ -1,0 +1,80 @@
+import csv
+import dataclasses
+import math
+from pathlib import Path
+
+import pytest
+
+from dva_sim.errors import ConfigError
+from dva_sim.network.condition import CONDITION, EMULATOR_RESULTS, RESULTS, Condition
+
+REFERENCE = Path(__file__).parents[2].parent / "shared" / "targets" / "network.csv"
+ASKING = Condition("req", 10, timeout_ms=2500, attempts=3, delay_ms=100, loss=0.05, rate_kbit=64)
+PUBLISHING = Condition("pub", 50, conflate="both", sndbuf=4096, hwm=1, queue_pkts=20)
+
+
+def test_a_condition_written_as_a_row_is_read_back_the_same() -> None:
+    for condition in (ASKING, PUBLISHING, dataclasses.replace(PUBLISHING, burst_pkts=3.5)):
+        assert Condition.from_row(condition.to_row()) == condition
+
+
+def test_what_is_not_set_is_empty_or_named_as_the_tables_do() -> None:
+    row = PUBLISHING.to_row()
+    assert row["timeout_ms"] == row["attempts"] == row["burst_pkts"] == ""
+    assert (row["rcvbuf"], row["rate_kbit"], row["reorder"]) == ("auto", "inf", "0")
+
+
+def test_the_way_a_number_is_written_does_not_change_the_condition() -> None:
+    row = ASKING.to_row() | {"hz": "10.0", "delay_ms": "1e2", "attempts": "3.0"}
+    assert Condition.from_row(row).hash == ASKING.hash
+
+
+def test_every_setting_changes_the_hash() -> None:
+    other = Condition("pub", 20, 6, None, None, "op", 2, 1, 1, 1, 0.1, 0.1, 1, 1, True, "reno")
+    other = dataclasses.replace(other, wait_hs=False, warm_s=2, dur_s=3, burst_pkts=2)
+    plain = Condition("pub", 10)
+    changed = [name for name in CONDITION if name not in ("pattern", "timeout_ms", "attempts")]
+    hashes = {dataclasses.replace(plain, **{name: getattr(other, name)}).hash for name in changed}
+    assert len(hashes | {plain.hash}) == len(changed) + 1
+
+
+def test_a_label_says_what_is_unusual_and_no_more() -> None:
+    assert ASKING.label == "req10_d100_j0_l5_r64_p5_T2500"
+    assert PUBLISHING.label == "pub50_d0_j0_l0_r0_p5_conflateboth_hwm1_sndbuf4096_q20"
+
+
+def test_only_a_publisher_waits_for_a_subscription_after_its_handshake() -> None:
+    slow = Condition("pub", 10, delay_ms=500, jitter_frac=0.2, rate_kbit=64)
+    assert slow.subscription_wait_s == pytest.approx(1.2 + 0.06 + 0.005)
+    assert dataclasses.replace(slow, wait_hs=False).subscription_wait_s == 0
+    assert ASKING.subscription_wait_s == 0
+
+
+@pytest.mark.parametrize(
+    ("changed", "told"),
+    [
+        ({"pattern": "push"}, "pattern 'push' is unknown; known: req, pub, dealer"),
+        ({"timeout_ms": 100}, "timeout_ms and attempts belong to pattern req, and only to it"),
+        ({"loss": 0.95}, "loss 0.95 should lie between 0 and 0.9"),
+        ({"hz": 0}, "hz 0 should be above 0"),
+        ({"proc_ms": math.inf}, "proc_ms inf should be a finite number from 0 on"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_one_line(changed: dict[str, object], told: str) -> None:
+    with pytest.raises(ConfigError) as refused:
+        dataclasses.replace(Condition("pub", 10), **changed)
+    assert refused.value.problem == told
+
+
+def test_a_word_where_a_number_belongs_is_refused() -> None:
+    with pytest.raises(ConfigError, match="hwm 'many' is not a number that hwm can have"):
+        Condition.from_row(PUBLISHING.to_row() | {"hwm": "many"})
+
+
+def test_the_first_set_of_measurements_has_the_columns_and_conditions_named_here() -> None:
+    if not REFERENCE.exists():
+        pytest.skip("the first set of measurements is not here")
+    with REFERENCE.open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert list(rows[0])[4:] == [*CONDITION[:-1], *RESULTS, *EMULATOR_RESULTS]
+    assert len({Condition.from_row(row).hash for row in rows}) == 385
