@@ -128,7 +128,7 @@ def _stale(
     warm_s: float,
     dur_s: float,
 ) -> Floats:
-    """Age of what is in force at each look; before the first application it counts from the start."""
+    """Age of what is in force at each look; from the start on before anything is."""
     looks = warm_s + STALE_STEP_S * np.arange(round(dur_s / STALE_STEP_S))
     origins = np.concatenate([[0.0], issued[numbers]])
     return np.asarray(looks - origins[np.searchsorted(applied, looks, side="right")])
