@@ -7,6 +7,7 @@ from typing import Protocol
 
 from dva_sim.network.link import (
     ConstantRate,
+    Direction,
     Link,
     LinkConfig,
     Serialiser,
@@ -35,14 +36,16 @@ class Reception(Protocol):
 class RadioLink(Link):
     """A link whose quality depends on where the robot is.
 
-    Packets keep their order when reception changes. While there is none every packet is lost,
-    and what rides on the link has to send again.
+    Packets keep their order when reception changes, unless the link may reorder them. While there
+    is none every packet is lost, and what rides on the link has to send again. The queue before
+    the air counts bytes; a packet that the air holds up arrives the mean delay after it, or later.
 
     Args:
         config: Delay, loss, queue of the link as such.
         serialiser: What gives its rate.
         streams: The run's luck.
         name: Name of this direction, for its luck.
+        direction: Which it is.
         reception: The quality where the robot is now; None: nothing is added.
     """
 
@@ -52,13 +55,19 @@ class RadioLink(Link):
         serialiser: Serialiser,
         streams: Streams,
         name: str,
+        direction: Direction,
         reception: Callable[[], Reception | None],
     ) -> None:
-        super().__init__(config, serialiser, streams, name)
+        super().__init__(config, serialiser, streams, name, direction)
+        way = config.toward(direction)
         self._reception = reception
-        self._luck = Weather(streams, f"{name}/radio")
-        self._air, self._rate = ConstantRate(config.rate_bps), config.rate_bps
+        self._luck = Weather(streams, f"{name}/radio", way.draws == "independent")
+        self._air, self._air_room = ConstantRate(way.rate_bps), way.queue_bytes
         self._newest = 0.0
+
+    def is_ideal(self) -> bool:
+        """See `Link`: the next place may have no reception."""
+        return False
 
     def carry(self, now: float, size: int) -> float | None:
         """See `Link`."""
@@ -75,6 +84,8 @@ class RadioLink(Link):
                 self.lost += 1
                 return None
             arrival = max(arrival, self._air.depart(now, size) + self.delay) + here.extra_delay_s
+        if self._may_overtake:
+            return arrival
         self._newest = max(self._newest, arrival)
         return self._newest
 
@@ -88,15 +99,14 @@ class RadioLink(Link):
 
     def _full(self, now: float, size: int, rate_bps: float) -> bool:
         """Whether the queue before the air is full; the air takes up the rate of the place."""
-        if rate_bps != self._rate:
-            self._rate = rate_bps
+        if rate_bps != self._air.rate_bps:
             self._air.change_rate(now, rate_bps)
-        return self._air.backlog_bytes(now) + size > self._room
+        return self._air.backlog_bytes(now) + size > self._air_room
 
 
 def make_link(
     config: LinkConfig,
-    direction: str,
+    direction: Direction,
     streams: Streams,
     name: str,
     reception: Callable[[], Reception | None] | None = None,
@@ -111,9 +121,9 @@ def make_link(
         reception: The quality of its radio hop now, if it has one.
 
     Raises:
-        ConfigError: the trace cannot be read.
+        ConfigError: a file that it names cannot be read.
     """
     serialiser, own_name = make_serialiser(config, direction, streams, name), f"{name}/{direction}"
     if reception is None:
-        return Link(config, serialiser, streams, own_name)
-    return RadioLink(config, serialiser, streams, own_name, reception)
+        return Link(config, serialiser, streams, own_name, direction)
+    return RadioLink(config, serialiser, streams, own_name, direction, reception)

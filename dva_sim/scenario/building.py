@@ -83,7 +83,7 @@ def _check_draughts(scenario: Scenario, error: Fail) -> None:
 def _check_timeout(scenario: Scenario, processing: float, error: Fail) -> None:
     """Below four round trips a retry never gets through: the socket opens anew each time."""
     timeout = scenario.command.timeout_s
-    needed = 8 * (scenario.link.delay_s + scenario.link.jitter_s) + processing
+    needed = 4 * scenario.link.slow_round_trip() + processing
     if scenario.robot.count and timeout <= needed:
         problem = (
             f"command.timeout_s {timeout:g} s should be above four round trips and the "

@@ -9,7 +9,7 @@ from dva_sim.agents.bystander import ALARMED, EVACUATING, SAFE, BystanderAgent
 from dva_sim.agents.guard import GuardAgent
 from dva_sim.agents.modes import Mode
 from dva_sim.clock import Clock
-from dva_sim.network.link import ConstantRate, Link, LinkConfig
+from dva_sim.network.link import ConstantRate, Direction, Link, LinkConfig, part_links
 from dva_sim.network.radio import Reception, make_link
 from dva_sim.network.virtual import VirtualNetwork
 from dva_sim.recorder import Recorder, TrackPoint
@@ -140,7 +140,7 @@ class Run:
             links[robot] = self._make_link(robot, "up"), self._make_link(robot, "down")
         return links
 
-    def _make_link(self, robot: str, direction: str) -> Link:
+    def _make_link(self, robot: str, direction: Direction) -> Link:
         stage = self.stage
         reception = partial(self._reception, robot) if stage.site.wifi else None
         name = f"{stage.labels[robot]}/link"
@@ -155,6 +155,14 @@ class Run:
         return None if here is None else here.quality
 
     def _link_between(self, source: str, destination: str) -> tuple[Link, Link]:
+        """The link from one to another and the one back, as far as they are not parted."""
+        links, partitions = self._unparted(source, destination), self.scenario.link.partitions
+        if not partitions:
+            return links
+        names = [self.stage.labels.get(node, node) for node in (source, destination)]
+        return part_links(links, *names, partitions)
+
+    def _unparted(self, source: str, destination: str) -> tuple[Link, Link]:
         """A robot's link is the only one that matters; everybody else is on the LAN."""
         if destination in self.links:
             return self.links[destination]

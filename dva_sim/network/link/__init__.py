@@ -1,0 +1,29 @@
+"""One direction of a link: delay, jitter, loss, rate, queue, recorded weather, outages."""
+
+from dva_sim.network.link.config import Direction, LinkConfig, Way
+from dva_sim.network.link.link import Link, make_serialiser
+from dva_sim.network.link.outages import Gap, Outage, Partition
+from dva_sim.network.link.partitions import PartedLink, part_links
+from dva_sim.network.link.rates import ConstantRate, PacketQueue, Serialiser, TraceRate
+from dva_sim.network.link.recordings import read_delay_log, read_trace
+from dva_sim.network.link.weather import Weather
+
+__all__ = [
+    "ConstantRate",
+    "Direction",
+    "Gap",
+    "Link",
+    "LinkConfig",
+    "Outage",
+    "PacketQueue",
+    "PartedLink",
+    "Partition",
+    "Serialiser",
+    "TraceRate",
+    "Way",
+    "Weather",
+    "make_serialiser",
+    "part_links",
+    "read_delay_log",
+    "read_trace",
+]

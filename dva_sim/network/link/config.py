@@ -1,0 +1,151 @@
+"""What a link is like, as configured."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, model_validator
+
+from dva_sim.config import Config
+from dva_sim.network.link.delays import Constant, DelayLaw
+from dva_sim.network.link.losses import Bursts
+from dva_sim.network.link.outages import Outage, Partition
+from dva_sim.network.link.recordings import read_delay_log
+from dva_sim.network.link.replay import moments_of
+
+Direction = Literal["up", "down"]
+Seconds = Annotated[float, Field(ge=0, le=30)]
+Loss = Annotated[float, Field(ge=0, le=0.9)]
+Rate = Annotated[float, Field(ge=1e3)]
+Room = Annotated[int, Field(ge=3_000)]
+Packets = Annotated[int, Field(ge=1)]
+Share = Annotated[float, Field(gt=0, le=1)]
+_SLOW_SDS = 2.0  # few packets are later than that; assumed
+
+
+class Way(Config):
+    """What is otherwise in one direction; each key as of the link, and as there if left out."""
+
+    delay_s: Seconds | None = None
+    jitter_s: Seconds | None = None
+    delay_law: DelayLaw | None = None
+    delay_log: str | None = None
+    delay_log_share: Share | None = None
+    reorder: bool | None = None
+    loss: Loss | None = None
+    bursts: Bursts | None = None
+    rate_bps: Rate | None = None
+    queue_bytes: Room | None = None
+    queue_packets: Packets | None = None
+
+
+class LinkConfig(Config):
+    """What lies between a robot and everybody else; `up` and `down` say what differs by direction.
+
+    Attributes:
+        delay_s: One-way propagation delay; the mean, where a law spreads it.
+        jitter_s: Half-width of a uniform law around the delay.
+        delay_law: Another law: `constant`, `normal`, `gamma`, `shifted_exponential` or
+            `empirical`, each with its own keys; with `correlation_s` it is correlated in time.
+        delay_log: File of delays over time, in two columns or as printed by `ping -D`; they
+            come on top of `delay_s`. Its lost probes are losses.
+        delay_log_share: Of each logged delay that one direction takes: half of a round trip.
+        reorder: Whether packets may overtake each other; if not, a later one waits.
+        loss: Probability that a packet is lost, each way.
+        bursts: How losses come in bursts; left out, each comes by itself.
+        rate_bps: Serialisation rate; without effect where a trace gives it.
+        queue_bytes: Room in the drop-tail queue before the link.
+        queue_packets: Room in packets that wait beside the one being sent, in place of bytes.
+        draws: Luck of packets sent in the same millisecond: `spread` evenly over what is
+            possible, or `independent`, as real packets are.
+        trace_up: Recorded packet opportunities towards the robot (Mahimahi form).
+        trace_down: The same from the robot.
+        outages: Times at which what would cross the link is lost.
+        partitions: Times at which some nodes do not hear others.
+        up: What is otherwise towards the robot.
+        down: What is otherwise from the robot.
+    """
+
+    delay_s: Seconds = 0.0
+    jitter_s: Seconds = 0.0
+    delay_law: DelayLaw | None = None
+    delay_log: str | None = None
+    delay_log_share: Share = 0.5
+    reorder: bool = False
+    loss: Loss = 0.0
+    bursts: Bursts | None = None
+    rate_bps: Rate = 20e6
+    queue_bytes: Room = 150_000
+    queue_packets: Packets | None = None
+    draws: Literal["spread", "independent"] = "spread"
+    trace_up: str | None = None
+    trace_down: str | None = None
+    outages: tuple[Outage, ...] = ()
+    partitions: tuple[Partition, ...] = ()
+    up: Way | None = None
+    down: Way | None = None
+
+    @model_validator(mode="after")
+    def _causal(self) -> LinkConfig:
+        for way in (self.toward("up"), self.toward("down")) if self.up or self.down else (self,):
+            way._check()
+        return self
+
+    def _check(self) -> None:
+        if self.jitter_s > self.delay_s:
+            raise ValueError(f"jitter_s {self.jitter_s:g} is above delay_s {self.delay_s:g}")
+        spread = {
+            "jitter_s": self.jitter_s > 0,
+            "delay_law": self.law is not None,
+            "delay_log": self.delay_log is not None,
+        }
+        given = [key for key, is_given in spread.items() if is_given]
+        if len(given) > 1:
+            raise ValueError(f"{given[0]} and {given[1]} exclude each other")
+        if self.law is not None:
+            self.law.check(self.delay_s)
+        if self.bursts is not None:
+            self.bursts.check(self.loss)
+
+    @property
+    def law(self) -> DelayLaw | None:
+        """The law that spreads the delay, if one does."""
+        return None if isinstance(self.delay_law, Constant) else self.delay_law
+
+    def toward(self, direction: Direction) -> LinkConfig:
+        """The same link with everything as it is in one direction."""
+        way = self.up if direction == "up" else self.down
+        changes: dict[str, Any] = {"up": None, "down": None}
+        for key in Way.model_fields if way else ():
+            value = getattr(way, key)
+            if value is not None:
+                changes[key] = value
+        changes["outages"] = tuple(o for o in self.outages if o.direction in (direction, "both"))
+        return self.model_copy(update=changes)
+
+    def moments(self) -> tuple[float, float]:
+        """Mean and standard deviation of the one-way delay [s], of a link of one direction.
+
+        Raises:
+            ConfigError: a file cannot be read.
+        """
+        if self.delay_log is not None:
+            mean, sd = moments_of(read_delay_log(self.delay_log))
+            return self.delay_s + self.delay_log_share * mean, self.delay_log_share * sd
+        if self.law is not None:
+            return self.law.moments(self.delay_s)
+        return self.delay_s, self.jitter_s / 3.0**0.5
+
+    def slow_round_trip(self) -> float:
+        """A round trip that few packets exceed [s], without queues and losses.
+
+        Raises:
+            ConfigError: a file cannot be read.
+        """
+        return sum(self.toward(direction)._slow() for direction in ("up", "down"))
+
+    def _slow(self) -> float:
+        if self.jitter_s:
+            return self.delay_s + self.jitter_s
+        mean, sd = self.moments()
+        return mean + _SLOW_SDS * sd

@@ -1,0 +1,243 @@
+"""Laws of the one-way delay: how far each packet's is from the link's `delay_s`.
+
+A law turns a uniform number into a deviation. Where that number comes from makes deviations
+independent from packet to packet, or correlated in time.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from collections.abc import Callable
+from statistics import fmean, pstdev
+from typing import Annotated, Any, Literal, Protocol
+
+from pydantic import BeforeValidator, Field, model_validator
+
+from dva_sim.config import Config
+from dva_sim.network.link.recordings import read_delays
+from dva_sim.network.link.weather import Luck, SlowWeather, Weather, normal_quantile
+from dva_sim.streams import Streams
+
+Quantile = Callable[[float], float]
+Seconds = Annotated[float, Field(ge=0, le=30)]
+PositiveSeconds = Annotated[float, Field(gt=0, le=30)]
+_SDS = 3.0  # a normal law keeps so many standard deviations above zero
+
+
+class Wobble(Protocol):
+    """Deviations from a link's `delay_s`, packet by packet."""
+
+    def deviation(self, now: float) -> float:
+        """Of a packet sent at `now` [s]."""
+
+
+class Jitter:
+    """A uniform law around the delay.
+
+    Args:
+        width: Half of it [s].
+        luck: Gives each packet its number.
+    """
+
+    def __init__(self, width: float, luck: Luck) -> None:
+        self._width, self._luck = width, luck
+
+    def deviation(self, now: float) -> float:
+        """See `Wobble`."""
+        return self._width * (2.0 * self._luck.draw(now) - 1.0)
+
+
+class ByQuantile:
+    """Any law.
+
+    Args:
+        quantile: The deviation [s] that is not exceeded with a given probability.
+        luck: Gives each packet its number.
+    """
+
+    def __init__(self, quantile: Quantile, luck: Luck) -> None:
+        self._quantile, self._luck = quantile, luck
+
+    def deviation(self, now: float) -> float:
+        """See `Wobble`."""
+        return self._quantile(self._luck.draw(now))
+
+
+class Constant(Config):
+    """All packets take `delay_s`: what is meant where no law is named."""
+
+    law: Literal["constant"]
+
+    def check(self, delay: float) -> None:
+        """Any delay will do."""
+
+    def moments(self, delay: float) -> tuple[float, float]:
+        """See `_Law`."""
+        return delay, 0.0
+
+    def play(self, delay: float, streams: Streams, name: str, independent: bool) -> None:
+        """See `_Law`: there is no deviation."""
+
+
+class _Law(Config):
+    """What all laws can do.
+
+    Attributes:
+        correlation_s: Time over which delays stay alike: the normal scores of two packets sent
+            `t` apart have correlation exp(-t / correlation_s), which for the normal law is
+            that of the delays. 0: packets are independent.
+    """
+
+    correlation_s: Annotated[float, Field(ge=0, le=1e5)] = 0.0
+
+    @abstractmethod
+    def check(self, delay: float) -> None:
+        """Refuse a `delay_s` [s] that the law cannot have.
+
+        Raises:
+            ValueError: saying what would be right.
+        """
+
+    @abstractmethod
+    def moments(self, delay: float) -> tuple[float, float]:
+        """Mean and standard deviation [s] of the one-way delay, `delay` being `delay_s`."""
+
+    @abstractmethod
+    def quantile(self, delay: float) -> Quantile:
+        """Deviations from `delay_s` [s] by probability."""
+
+    def play(self, delay: float, streams: Streams, name: str, independent: bool) -> Wobble:
+        """Deviations from `delay_s` [s], with luck of that name."""
+        luck: Luck = Weather(streams, name, independent)
+        if self.correlation_s:
+            luck = SlowWeather(streams, name, self.correlation_s)
+        return ByQuantile(self.quantile(delay), luck)
+
+
+class Normal(_Law):
+    """Symmetrical around `delay_s`; with a `correlation_s` an Ornstein-Uhlenbeck process."""
+
+    law: Literal["normal"]
+    sd_s: PositiveSeconds
+
+    def check(self, delay: float) -> None:
+        """See `_Law`: what would arrive before it is sent has to be negligible."""
+        if _SDS * self.sd_s > delay:
+            raise ValueError(
+                f"delay_law.sd_s {self.sd_s:g} of a normal law is above a third of delay_s "
+                f"{delay:g}; gamma has no such limit"
+            )
+
+    def moments(self, delay: float) -> tuple[float, float]:
+        """See `_Law`."""
+        return delay, self.sd_s
+
+    def quantile(self, delay: float) -> Quantile:
+        """See `_Law`."""
+        sd = self.sd_s
+        return lambda u: max(-delay, sd * normal_quantile(u))
+
+
+class Gamma(_Law):
+    """Mean `delay_s`, never below `least_s`: skewed, the more the larger its spread."""
+
+    law: Literal["gamma"]
+    sd_s: PositiveSeconds
+    least_s: Seconds = 0.0
+
+    def check(self, delay: float) -> None:
+        """See `_Law`."""
+        _above_least(self.least_s, delay)
+
+    def moments(self, delay: float) -> tuple[float, float]:
+        """See `_Law`."""
+        return delay, self.sd_s
+
+    def quantile(self, delay: float) -> Quantile:
+        """See `_Law`."""
+        from scipy.special import gammaincinv  # late: few runs need it, and it is slow to import
+
+        above = delay - self.least_s
+        shape, scale = (above / self.sd_s) ** 2, self.sd_s**2 / above
+        return lambda u: scale * float(gammaincinv(shape, u)) - above
+
+
+class ShiftedExponential(_Law):
+    """Mean `delay_s`, never below `least_s`; what is above it is exponential."""
+
+    law: Literal["shifted_exponential"]
+    least_s: Seconds
+
+    def check(self, delay: float) -> None:
+        """See `_Law`."""
+        _above_least(self.least_s, delay)
+
+    def moments(self, delay: float) -> tuple[float, float]:
+        """See `_Law`."""
+        return delay, delay - self.least_s
+
+    def quantile(self, delay: float) -> Quantile:
+        """See `_Law`."""
+        above = delay - self.least_s
+        return lambda u: -above * (1.0 + math.log(max(1.0 - u, 1e-16)))
+
+
+class Empirical(_Law):
+    """One of the given delays each time; `delay_s` comes on top of them.
+
+    Attributes:
+        delays_s: The delays; or else
+        file: names a file with one a line [ms].
+    """
+
+    law: Literal["empirical"]
+    delays_s: tuple[Seconds, ...] = ()
+    file: str | None = None
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Empirical:
+        if bool(self.delays_s) == (self.file is not None):
+            raise ValueError("an empirical law needs either delays_s or file")
+        return self
+
+    def check(self, delay: float) -> None:
+        """See `_Law`: any will do."""
+
+    def moments(self, delay: float) -> tuple[float, float]:
+        """See `_Law`.
+
+        Raises:
+            ConfigError: the file cannot be read.
+        """
+        delays = self._delays()
+        return delay + fmean(delays), pstdev(delays)
+
+    def quantile(self, delay: float) -> Quantile:
+        """See `_Law`.
+
+        Raises:
+            ConfigError: the file cannot be read.
+        """
+        delays = sorted(self._delays())
+        count = len(delays)
+        return lambda u: delays[min(count - 1, int(u * count))]
+
+    def _delays(self) -> tuple[float, ...]:
+        return self.delays_s if self.file is None else read_delays(self.file)
+
+
+def _above_least(least: float, delay: float) -> None:
+    if least >= delay:
+        raise ValueError(f"delay_law.least_s {least:g} should be below delay_s {delay:g}")
+
+
+def _name_is_law(value: Any) -> Any:
+    return {"law": value} if isinstance(value, str) else value
+
+
+_Any = Annotated[
+    Constant | Normal | Gamma | ShiftedExponential | Empirical, Field(discriminator="law")
+]
+DelayLaw = Annotated[_Any, BeforeValidator(_name_is_law, json_schema_input_type=str | _Any)]
+"""A law in a configuration file: a mapping with the key `law`, or the name alone."""

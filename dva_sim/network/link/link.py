@@ -1,0 +1,173 @@
+"""One direction of a link: drop-tail queue, serialisation, loss, delay.
+
+A packet's fate is known when it is sent, because the queue is first-in-first-out:
+no event is spent inside the link. Luck is a function of virtual time, so that two
+patterns that send at different moments still meet the same weather.
+"""
+
+from __future__ import annotations
+
+from dva_sim.network.link.config import Direction, LinkConfig
+from dva_sim.network.link.delays import Jitter, Wobble
+from dva_sim.network.link.losses import Chance, Fate, Gaps
+from dva_sim.network.link.rates import ConstantRate, PacketQueue, Serialiser, TraceRate
+from dva_sim.network.link.recordings import read_delay_log, read_trace
+from dva_sim.network.link.replay import Replay, period_of
+from dva_sim.network.link.weather import Weather
+from dva_sim.streams import Streams
+
+SMALLEST_PACKET = 40  # IPv4 and TCP headers alone [B]
+
+
+class Link:
+    """One direction of a link.
+
+    Args:
+        config: What the link is like.
+        serialiser: What gives the rate.
+        streams: The run's luck.
+        name: Name of this direction, for its luck; `x/up` and `x/down` are one link's.
+        direction: Which it is; `up` is towards the robot.
+
+    Attributes:
+        delay: Mean one-way delay without waiting [s].
+        rate_bps: Of the line [bit/s]; None where it varies.
+        room: Of the queue [B]; where packets are counted, what it holds of the smallest.
+    """
+
+    def __init__(
+        self,
+        config: LinkConfig,
+        serialiser: Serialiser,
+        streams: Streams,
+        name: str,
+        direction: Direction = "up",
+    ) -> None:
+        way = config.toward(direction)
+        replay = _make_replay(way, direction, streams, name)
+        self.name, self.rate_bps, self.room = name, serialiser.rate_bps, way.queue_bytes
+        self.delay, self._base = way.moments()[0], way.delay_s
+        if way.queue_packets is not None:
+            serialiser = PacketQueue(serialiser, way.queue_packets)
+            self.room = way.queue_packets * SMALLEST_PACKET
+        self._serialiser, self._offer = serialiser, serialiser.offer
+        self._fates = _make_fates(way, streams, name, replay)
+        self._wobble = replay or _make_wobble(way, streams, name)
+        self._may_overtake, self._last_arrival = way.reorder, 0.0
+        self._is_steady = not self._fates and self._wobble is None
+        self.offered = self.lost = self.dropped = self.bytes = 0
+
+    def is_ideal(self) -> bool:
+        """Whether it loses, spreads and reorders nothing by itself, and its rate is constant."""
+        return self._is_steady and self.rate_bps is not None
+
+    def carry(self, now: float, size: int) -> float | None:
+        """Send one packet.
+
+        Args:
+            now: When it is offered [s]; never before an earlier one.
+            size: Its size with all headers [B].
+
+        Returns:
+            When it arrives [s], or None if it is lost or the queue is full.
+        """
+        self.offered += 1
+        left_at = self._offer(now, size, self.room)
+        if left_at is None:
+            self.dropped += 1
+            return None
+        self.bytes += size
+        for fate in self._fates:
+            if fate.takes(now, left_at):
+                self.lost += 1
+                return None
+        arrival = left_at + self._base
+        if self._wobble is None:
+            return arrival
+        arrival += self._wobble.deviation(now)
+        if not self._may_overtake:
+            arrival = self._last_arrival = max(arrival, self._last_arrival)
+        return arrival
+
+    def carry_train(self, now: float, packets: int, size: int) -> float | None:
+        """Send packets back to back as one, where that makes no difference.
+
+        Args:
+            now: When they are offered [s].
+            packets: How many.
+            size: Of all together, with all headers [B].
+
+        Returns:
+            When the last of them arrives [s]; None, and nothing is sent, where each must
+            be looked at by itself: with loss, a law of the delay, a queue that counts packets,
+            or one that they do not fit into.
+        """
+        if not self._is_steady or isinstance(self._serialiser, PacketQueue):
+            return None
+        left_at = self._offer(now, size, self.room)
+        if left_at is None:
+            return None
+        self.offered += packets
+        self.bytes += size
+        return left_at + self._base
+
+    def backlog_bytes(self, now: float) -> float:
+        """Bytes that wait before the link at `now` [B]."""
+        return self._serialiser.backlog_bytes(now)
+
+
+def make_serialiser(
+    config: LinkConfig, direction: Direction, streams: Streams, name: str
+) -> Serialiser:
+    """What gives the rate of the `up` or `down` direction of a configured link.
+
+    Raises:
+        ConfigError: the trace cannot be read.
+    """
+    trace = config.trace_up if direction == "up" else config.trace_down
+    if trace is None:
+        return ConstantRate(config.toward(direction).rate_bps)
+    times = read_trace(trace)
+    offset = float(streams[f"{name}/trace-offset"].uniform(0.0, times[-1]))
+    return TraceRate(times, offset)
+
+
+def _make_fates(
+    way: LinkConfig, streams: Streams, name: str, replay: Replay | None
+) -> tuple[Fate, ...]:
+    """All that may take a packet of one direction."""
+    fates: list[Fate] = [replay] if replay else []
+    if way.loss:
+        luck = Weather(streams, f"{name}/loss", way.draws == "independent")
+        bursts = way.bursts and way.bursts.play(way.loss, streams, f"{name}/bursts", luck)
+        fates.append(bursts or Chance(way.loss, luck))
+    if way.outages:
+        fates.append(Gaps(way.outages))
+    return tuple(fates)
+
+
+def _make_wobble(way: LinkConfig, streams: Streams, name: str) -> Wobble | None:
+    """What spreads the delay of one direction by chance, if anything does."""
+    independent = way.draws == "independent"
+    if way.jitter_s:
+        return Jitter(way.jitter_s, Weather(streams, f"{name}/jitter", independent))
+    if way.law is not None:
+        return way.law.play(way.delay_s, streams, f"{name}/delay", independent)
+    return None
+
+
+def _make_replay(
+    way: LinkConfig, direction: Direction, streams: Streams, name: str
+) -> Replay | None:
+    """One direction's part of a delay log; both directions play the same moment of it.
+
+    Of a round trip that was lost, chance decides in which direction, so that it is lost once.
+    """
+    if way.delay_log is None:
+        return None
+    log = read_delay_log(way.delay_log)
+    luck = streams.fresh(f"{name.removesuffix(f'/{direction}')}/delay-log")
+    offset, coins = luck.random() * period_of(log), luck.random(len(log.times))
+    share = way.delay_log_share
+    here = coins < share if direction == "up" else coins >= 1.0 - share
+    return Replay(log, share, here, offset)

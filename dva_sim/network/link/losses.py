@@ -1,0 +1,158 @@
+"""What takes packets off a link by chance or by the clock."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Annotated, Protocol
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from dva_sim.config import Config
+from dva_sim.network.link.outages import Gap
+from dva_sim.network.link.weather import Luck, Spells
+from dva_sim.streams import Streams
+
+
+class Bursts(Config):
+    """Losses that come in bursts; `loss` of the link stays the share lost in the long run.
+
+    Attributes:
+        mean_s: How long a burst lasts on average. When it comes is a matter of virtual time,
+            so that all who send at that time meet it.
+        mean_packets: Instead, how many packets one lasts on average: each packet moves the
+            weather on, which then depends on how often one sends.
+        loss: Probability that a packet is lost in a burst; outside none is.
+
+    References:
+        Gilbert: Capacity of a burst-noise channel. Bell System Technical Journal 39 (1960).
+        Elliott: Estimates of error rates for codes on burst-noise channels. Bell System
+        Technical Journal 42 (1963).
+    """
+
+    mean_s: Annotated[float, Field(gt=0, le=1e5)] | None = None
+    mean_packets: Annotated[float, Field(ge=1, le=1e6)] | None = None
+    loss: Annotated[float, Field(gt=0, le=1)] = 1.0
+
+    @model_validator(mode="after")
+    def _one_measure(self) -> Bursts:
+        if (self.mean_s is None) == (self.mean_packets is None):
+            raise ValueError("bursts need either mean_s or mean_packets")
+        return self
+
+    def check(self, loss: float) -> None:
+        """Refuse a `loss` that such bursts cannot make.
+
+        Raises:
+            ValueError: saying what would be right.
+        """
+        if loss >= self.loss:
+            raise ValueError(f"loss {loss:g} should be below bursts.loss {self.loss:g}")
+        least = loss / (self.loss - loss)
+        if self.mean_packets is not None and self.mean_packets < least:
+            raise ValueError(
+                f"bursts.mean_packets {self.mean_packets:g} is too short for a loss of {loss:g}: "
+                f"at least {least:g}"
+            )
+
+    def play(self, loss: float, streams: Streams, name: str, luck: Luck) -> Fate:
+        """What takes a share `loss` of all packets, with luck of that name.
+
+        Args:
+            loss: In the long run.
+            streams: The run's luck.
+            name: Of these bursts.
+            luck: Decides packet by packet within a burst.
+        """
+        share = loss / self.loss  # of time, or of packets, that is in a burst
+        if self.mean_s is not None:
+            spells = Spells(streams, name, self.mean_s * (1.0 - share) / share, self.mean_s)
+            return TimedBursts(spells, self.loss, luck)
+        assert self.mean_packets is not None
+        return CountedBursts(streams.fresh(name), share, self.mean_packets, self.loss, luck)
+
+
+class Fate(Protocol):
+    """Something that may take a packet."""
+
+    def takes(self, now: float, left_at: float) -> bool:
+        """Whether it takes a packet that was sent at `now` [s] and has left the queue later."""
+
+
+class Chance:
+    """Every packet by itself.
+
+    Args:
+        loss: Probability.
+        luck: Gives each packet its number.
+    """
+
+    def __init__(self, loss: float, luck: Luck) -> None:
+        self._loss, self._luck = loss, luck
+
+    def takes(self, now: float, left_at: float) -> bool:
+        """See `Fate`."""
+        return self._luck.draw(now) < self._loss
+
+
+class TimedBursts:
+    """Packets sent in bad times.
+
+    Args:
+        spells: When times are bad.
+        loss: Probability then.
+        luck: Gives each packet its number.
+    """
+
+    def __init__(self, spells: Spells, loss: float, luck: Luck) -> None:
+        self._spells, self._loss, self._luck = spells, loss, luck
+
+    def takes(self, now: float, left_at: float) -> bool:
+        """See `Fate`."""
+        return self._spells.is_on(now) and self._luck.draw(now) < self._loss
+
+
+class CountedBursts:
+    """Runs of packets, whenever they come.
+
+    Args:
+        rng: Moves the weather on.
+        share: Of all packets that are in a burst.
+        length: Mean length of a burst, in packets.
+        loss: Probability in a burst.
+        luck: Gives each packet its number.
+    """
+
+    def __init__(
+        self, rng: np.random.Generator, share: float, length: float, loss: float, luck: Luck
+    ) -> None:
+        self._ends, self._begins = 1.0 / length, share / (1.0 - share) / length
+        self._loss, self._luck = loss, luck
+        self._steps = _uniform(rng)
+        self._is_on = next(self._steps) < share
+
+    def takes(self, now: float, left_at: float) -> bool:
+        """See `Fate`."""
+        if next(self._steps) < (self._ends if self._is_on else self._begins):
+            self._is_on = not self._is_on
+        return self._is_on and self._luck.draw(now) < self._loss
+
+
+class Gaps:
+    """What would cross the link when there is none.
+
+    Args:
+        gaps: When that is.
+    """
+
+    def __init__(self, gaps: Sequence[Gap]) -> None:
+        self._gaps = gaps
+
+    def takes(self, now: float, left_at: float) -> bool:
+        """See `Fate`."""
+        return any(gap.covers(left_at) for gap in self._gaps)
+
+
+def _uniform(rng: np.random.Generator) -> Iterator[float]:
+    while True:
+        yield from rng.random(1024).tolist()

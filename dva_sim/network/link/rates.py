@@ -1,0 +1,161 @@
+"""What gives a link its rate: a serial line, or a recorded one; and its queue."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections import deque
+
+import numpy as np
+from numpy.typing import NDArray
+
+OPPORTUNITY_BYTES = 1500  # what one line of a Mahimahi trace lets through
+
+
+class Serialiser(ABC):
+    """Turns queued bytes into departures, in order.
+
+    Attributes:
+        rate_bps: Its rate [bit/s]; None where it varies.
+    """
+
+    rate_bps: float | None
+
+    @abstractmethod
+    def backlog_bytes(self, now: float) -> float:
+        """Bytes still waiting or under way onto the link at `now` [B]."""
+
+    @abstractmethod
+    def depart(self, now: float, size: int) -> float:
+        """When the last byte of a packet of `size` bytes [B] offered at `now` has left [s]."""
+
+    def offer(self, now: float, size: int, room: int) -> float | None:
+        """The same where there is `room` for so many bytes [B]; None if the packet is too many."""
+        if self.backlog_bytes(now) + size > room:
+            return None
+        return self.depart(now, size)
+
+
+class ConstantRate(Serialiser):
+    """A serial line of fixed rate [bit/s]."""
+
+    def __init__(self, rate_bps: float) -> None:
+        self.rate_bps: float = rate_bps
+        self._seconds_per_byte = 8.0 / rate_bps
+        self._free_at = 0.0
+
+    def change_rate(self, now: float, rate_bps: float) -> None:
+        """Go on at another rate [bit/s] with the bytes that wait."""
+        waiting = self.backlog_bytes(now)
+        self.rate_bps, self._seconds_per_byte = rate_bps, 8.0 / rate_bps
+        self._free_at = now + waiting * self._seconds_per_byte
+
+    def backlog_bytes(self, now: float) -> float:
+        """See `Serialiser`."""
+        return max(0.0, self._free_at - now) / self._seconds_per_byte
+
+    def depart(self, now: float, size: int) -> float:
+        """See `Serialiser`."""
+        start = now if now > self._free_at else self._free_at
+        self._free_at = start + size * self._seconds_per_byte
+        return self._free_at
+
+    def offer(self, now: float, size: int, room: int) -> float | None:
+        """See `Serialiser`: both steps in one, because every packet comes here."""
+        start, seconds_per_byte = self._free_at, self._seconds_per_byte
+        if start > now:
+            if (start - now) / seconds_per_byte + size > room:
+                return None
+        elif size > room:
+            return None
+        else:
+            start = now
+        self._free_at = start = start + size * seconds_per_byte
+        return start
+
+
+class TraceRate(Serialiser):
+    """A recorded link: each line of the trace lets 1500 bytes through at that millisecond.
+
+    The trace repeats at its end. An opportunity that finds the queue empty is wasted, one
+    that is only half used serves the next packet in the same millisecond.
+
+    References:
+        Winstein, Sivaraman, Balakrishnan: Stochastic forecasts achieve high throughput and
+        low delay over cellular networks. NSDI 2013 (the form of the traces).
+    """
+
+    rate_bps = None
+
+    def __init__(self, times_s: NDArray[np.float64], offset_s: float) -> None:
+        self._times = times_s
+        self._period = float(times_s[-1])
+        self._offset = offset_s
+        self._index = self._first_at(0.0)
+        self._left = OPPORTUNITY_BYTES
+        self._queued: deque[tuple[float, int]] = deque()
+        self._backlog = 0
+
+    def _first_at(self, now: float) -> int:
+        """Running number of the first opportunity not before `now`."""
+        laps, inside = divmod(now + self._offset, self._period)
+        inside -= 1e-9
+        return int(laps) * len(self._times) + int(np.searchsorted(self._times, inside))
+
+    def _time_of(self, index: int) -> float:
+        laps, inside = divmod(index, len(self._times))
+        return laps * self._period + float(self._times[inside]) - self._offset
+
+    def backlog_bytes(self, now: float) -> float:
+        """See `Serialiser`."""
+        queued = self._queued
+        while queued and queued[0][0] <= now:
+            self._backlog -= queued.popleft()[1]
+        return float(self._backlog)
+
+    def depart(self, now: float, size: int) -> float:
+        """See `Serialiser`."""
+        first = self._first_at(now)
+        if first > self._index:
+            self._index, self._left = first, OPPORTUNITY_BYTES
+        rest = size
+        while rest > self._left:
+            rest -= self._left
+            self._index, self._left = self._index + 1, OPPORTUNITY_BYTES
+        self._left -= rest
+        left_at = max(now, self._time_of(self._index))
+        self._queued.append((left_at, size))
+        self._backlog += size
+        return left_at
+
+
+class PacketQueue(Serialiser):
+    """A line with room for so many packets that wait beside the one on its way onto the link.
+
+    Args:
+        line: What gives the rate.
+        packets: Room; bytes do not count.
+    """
+
+    def __init__(self, line: Serialiser, packets: int) -> None:
+        self._line, self._room = line, packets + 1
+        self._leaving: deque[float] = deque()
+        self.rate_bps = line.rate_bps
+
+    def backlog_bytes(self, now: float) -> float:
+        """See `Serialiser`."""
+        return self._line.backlog_bytes(now)
+
+    def depart(self, now: float, size: int) -> float:
+        """See `Serialiser`."""
+        left_at = self._line.depart(now, size)
+        self._leaving.append(left_at)
+        return left_at
+
+    def offer(self, now: float, size: int, room: int) -> float | None:
+        """See `Serialiser`: packets are counted instead of bytes."""
+        leaving = self._leaving
+        while leaving and leaving[0] <= now:
+            leaving.popleft()
+        if len(leaving) >= self._room:
+            return None
+        return self.depart(now, size)
