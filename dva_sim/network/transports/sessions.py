@@ -1,0 +1,166 @@
+"""Sessions between operator and robot, one for each transport."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from dva_sim.clock import Clock
+from dva_sim.network.link import Link
+from dva_sim.network.tcp import TcpOptions
+from dva_sim.network.transports.bottleneck import Bottleneck
+from dva_sim.network.transports.config import (
+    Btp,
+    Irtp,
+    Rtnp,
+    Tcp,
+    TransportConfig,
+    Trinomial,
+    Zeromq,
+)
+from dva_sim.network.transports.datagrams import IP_UDP, Assembly, Part, Sender, parts_of
+from dva_sim.network.transports.feedback import Echo
+from dva_sim.network.transports.laws import Aimd, Law, LeastRoundTrip, ThreeTerms
+from dva_sim.network.transports.messages import Ends, Message, Transport
+from dva_sim.network.transports.streams import TcpTransport
+from dva_sim.network.zmtp import ZmtpConnection, ZmtpOptions, framed
+
+NAME = "teleoperation"
+
+
+def ends_at(
+    bottleneck: Bottleneck,
+    config: TransportConfig,
+    on_command: Callable[[int], object],
+    on_picture: Callable[[int], object],
+) -> Ends:
+    """Where a session stands: its two links, with priority at the end hosts if it has that."""
+    first = isinstance(config, Rtnp)
+    up, down = bottleneck.link(NAME, "up", first), bottleneck.link(NAME, "down", first)
+    return Ends(up, down, on_command, on_picture)
+
+
+def open_session(clock: Clock, config: TransportConfig, ends: Ends) -> Transport:
+    """A session over a transport, as configured."""
+    if isinstance(config, Tcp):
+        return TcpTransport(clock, ends, TcpOptions(send_buffer=config.send_buffer_bytes))
+    if isinstance(config, Zeromq):
+        return ZeromqTransport(clock, ends, config)
+    if isinstance(config, Trinomial | Irtp | Btp):
+        return RateSession(clock, ends, config)
+    return PlainSession(clock, ends, config.header_bytes if isinstance(config, Rtnp) else 0)
+
+
+class PlainSession:
+    """Every datagram at once, none of them twice.
+
+    Args:
+        clock: Virtual time.
+        ends: What it stands between.
+        header: Besides IP and UDP [B].
+    """
+
+    def __init__(self, clock: Clock, ends: Ends, header: int) -> None:
+        self._clock, self._ends, self._header = clock, ends, header
+        self._at_robot, self._at_operator = Assembly(ends.on_command), Assembly(ends.on_picture)
+
+    def command(self, message: Message) -> None:
+        """See `Transport`."""
+        self._send(message, self._ends.up, self._at_robot.add)
+
+    def picture(self, message: Message) -> None:
+        """See `Transport`."""
+        self._send(message, self._ends.down, self._at_operator.add)
+
+    def _send(self, message: Message, link: Link, add: Callable[[Part], object]) -> None:
+        for part in parts_of(message, self._header):
+            arrival = link.carry(self._clock.now, part.size + self._header + IP_UDP)
+            if arrival is not None:
+                self._clock.call_at(arrival, add, part)
+
+
+class RateSession:
+    """Two directions, each with a law of rate of its own.
+
+    Args:
+        clock: Virtual time.
+        ends: What it stands between.
+        config: Trinomial, IRTP or BTP.
+    """
+
+    def __init__(self, clock: Clock, ends: Ends, config: Trinomial | Irtp | Btp) -> None:
+        header, repeats = config.header_bytes, isinstance(config, Irtp)
+        ways = ((ends.up, ends.on_command), (ends.down, ends.on_picture))
+        self._up, self._down = (
+            Sender(clock, link, header, law_of(config), told, repeats) for link, told in ways
+        )
+        if isinstance(config, Btp):
+            answer_each_other(self._up, self._down)
+        else:
+            answer_each(clock, self._up, ends.down, header)
+            answer_each(clock, self._down, ends.up, header)
+
+    def command(self, message: Message) -> None:
+        """See `Transport`."""
+        self._up.offer(message)
+
+    def picture(self, message: Message) -> None:
+        """See `Transport`."""
+        self._down.offer(message)
+
+
+class ZeromqTransport:
+    """Two publishers, each with one subscriber, on two connections that the operator opens.
+
+    Args:
+        clock: Virtual time.
+        ends: What it stands between.
+        config: What is kept, and where.
+    """
+
+    def __init__(self, clock: Clock, ends: Ends, config: Zeromq) -> None:
+        options = ZmtpOptions(
+            conflate=config.conflate, tcp=TcpOptions(send_buffer=config.send_buffer_bytes)
+        )
+        commands, pictures = (
+            ZmtpConnection(
+                clock, ends.up, ends.down, ends.on_command, ends.on_picture, options, options
+            )
+            for _ in range(2)
+        )
+        for connection in (commands, pictures):
+            connection.open(lambda: None)
+        self._operator, self._robot = commands.opener, pictures.peer
+
+    def command(self, message: Message) -> None:
+        """See `Transport`."""
+        self._operator.send(message.number, framed(message.size))
+
+    def picture(self, message: Message) -> None:
+        """See `Transport`."""
+        self._robot.send(message.number, framed(message.size))
+
+
+def law_of(config: Trinomial | Irtp | Btp) -> Law:
+    """The law of rate of a transport that has one."""
+    if isinstance(config, Trinomial):
+        return ThreeTerms(config.linear, config.square, config.decrease)
+    if isinstance(config, Irtp):
+        return Aimd(config.increase, config.decrease)
+    return LeastRoundTrip(config.tolerance_s, config.widen, config.narrow, config.longest_gap_s)
+
+
+def answer_each(clock: Clock, sender: Sender, back: Link, header: int) -> None:
+    """Let every datagram of a sender be acknowledged by one of its own on the way back."""
+
+    def answer(_: Sequence[Echo]) -> None:
+        arrival = back.carry(clock.now, header + IP_UDP)
+        if arrival is not None:
+            clock.call_at(arrival, sender.hear, sender.echoes())
+
+    sender.on_arrival = answer
+
+
+def answer_each_other(one: Sender, other: Sender) -> None:
+    """Let the acknowledgements of two directions ride on each other's datagrams."""
+    one.ride, other.ride = other.echoes, one.echoes
+    one.on_arrival, other.on_arrival = other.hear, one.hear
