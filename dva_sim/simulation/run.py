@@ -9,7 +9,14 @@ from dva_sim.agents.bystander import ALARMED, EVACUATING, SAFE, BystanderAgent
 from dva_sim.agents.guard import GuardAgent
 from dva_sim.agents.modes import Mode
 from dva_sim.clock import Clock
-from dva_sim.network.link import ConstantRate, Direction, Link, LinkConfig, part_links
+from dva_sim.network.link import (
+    ConstantRate,
+    Direction,
+    Link,
+    LinkConfig,
+    check_partitions,
+    part_links,
+)
 from dva_sim.network.radio import Reception, make_link
 from dva_sim.network.virtual import VirtualNetwork
 from dva_sim.recorder import Recorder, TrackPoint
@@ -17,6 +24,7 @@ from dva_sim.scenario import Scenario
 from dva_sim.simulation.control_room import add_dva, add_operator
 from dva_sim.simulation.field import Danger, Field, is_dangerous
 from dva_sim.simulation.names import id_of
+from dva_sim.simulation.offered import connector_of
 from dva_sim.simulation.recording import PersonLog, Recording, event_about
 from dva_sim.simulation.stage import Stage
 from dva_sim.simulation.watch import broken_event_rules, broken_rules
@@ -60,8 +68,11 @@ class Run:
 
     def __init__(self, scenario: Scenario, seed: int, keep_traffic: bool = False) -> None:
         self.scenario, self.clock, self.recorder = scenario, Clock(), Recorder(keep_traffic)
-        self.network = VirtualNetwork(self.clock, self._link_between, self.recorder.message_sent)
+        self.network = VirtualNetwork(
+            self.clock, self._link_between, self.recorder.message_sent, connector_of(scenario)
+        )
         self.stage = Stage(scenario, seed, self.network, self.recorder)
+        check_partitions(scenario.link.partitions, self.stage.labels.values())
         self.links = self._make_links()
         lan = Link(LAN, ConstantRate(LAN.rate_bps), self.stage.streams, "lan")
         self._lan = lan, lan
@@ -99,6 +110,7 @@ class Run:
             self.clock.now,
             people=self._people(),
             contained=self.field.contained,
+            depth=self.network.connector.deepest,
         )
 
     def _people(self) -> list[PersonLog]:
@@ -159,8 +171,10 @@ class Run:
         links, partitions = self._unparted(source, destination), self.scenario.link.partitions
         if not partitions:
             return links
-        names = [self.stage.labels.get(node, node) for node in (source, destination)]
-        return part_links(links, *names, partitions)
+        name_of = self.stage.labels.get
+        return part_links(
+            links, name_of(source, source), name_of(destination, destination), partitions
+        )
 
     def _unparted(self, source: str, destination: str) -> tuple[Link, Link]:
         """A robot's link is the only one that matters; everybody else is on the LAN."""

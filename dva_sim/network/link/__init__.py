@@ -3,7 +3,7 @@
 from dva_sim.network.link.config import Direction, LinkConfig, Way
 from dva_sim.network.link.link import Link, make_serialiser
 from dva_sim.network.link.outages import Gap, Outage, Partition
-from dva_sim.network.link.partitions import PartedLink, part_links
+from dva_sim.network.link.partitions import PartedLink, check_partitions, part_links
 from dva_sim.network.link.rates import ConstantRate, PacketQueue, Serialiser, TraceRate
 from dva_sim.network.link.recordings import read_delay_log, read_trace
 from dva_sim.network.link.weather import Weather
@@ -22,6 +22,7 @@ __all__ = [
     "TraceRate",
     "Way",
     "Weather",
+    "check_partitions",
     "make_serialiser",
     "part_links",
     "read_delay_log",

@@ -55,6 +55,7 @@ class Link:
         self._wobble = replay or _make_wobble(way, streams, name)
         self._may_overtake, self._last_arrival = way.reorder, 0.0
         self._is_steady = not self._fates and self._wobble is None
+        self._takes_trains = self._is_steady and way.queue_packets is None
         self.offered = self.lost = self.dropped = self.bytes = 0
 
     def is_ideal(self) -> bool:
@@ -102,7 +103,7 @@ class Link:
             be looked at by itself: with loss, a law of the delay, a queue that counts packets,
             or one that they do not fit into.
         """
-        if not self._is_steady or isinstance(self._serialiser, PacketQueue):
+        if not self._takes_trains:
             return None
         left_at = self._offer(now, size, self.room)
         if left_at is None:

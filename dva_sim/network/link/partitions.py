@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from fnmatch import fnmatchcase
 from typing import Any
 
+from dva_sim.errors import ConfigError
 from dva_sim.network.link.link import Link
 from dva_sim.network.link.outages import Gap, Partition
 
@@ -47,6 +49,19 @@ class PartedLink(Link):
     def backlog_bytes(self, now: float) -> float:
         """See `Link`."""
         return self._whole.backlog_bytes(now)
+
+
+def check_partitions(partitions: Sequence[Partition], names: Collection[str]) -> None:
+    """Refuse a partition that concerns nobody.
+
+    Raises:
+        ConfigError: no node has a name that it gives.
+    """
+    for partition in partitions:
+        for key, pattern in (("source", partition.source), ("destination", partition.destination)):
+            if not any(fnmatchcase(name, pattern) for name in names):
+                known = ", ".join(sorted(names))
+                raise ConfigError(f"{key} {pattern!r} of a partition is nobody; known: {known}")
 
 
 def part_links(
