@@ -1,0 +1,44 @@
+"""Where the process of a run begins: first the namespaces, then everything else.
+
+A user namespace is refused to a process with several threads, and numerical libraries start
+some when they are imported; so this module imports none before the namespaces are made.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+
+from dva_sim.emulator import kernel
+
+
+def main() -> None:
+    """Read a job from standard input, print its outcome."""
+    line = sys.stdin.readline()
+    told = json.loads(line)
+    os.environ["OPENBLAS_NUM_THREADS"] = os.environ["OMP_NUM_THREADS"] = "1"
+    parent = os.getppid()
+    way, problem = told["link"], ""
+    if way != "proxy":
+        try:
+            way = _become_owner(told["rootless"])
+        except OSError as error:
+            problem = error.strerror or str(error)
+    kernel.die_with_parent(parent)
+
+    from dva_sim.emulator.cell import Cell, Job, Outcome
+
+    outcome = Outcome(problem=problem) if problem else Cell(Job.from_json(line), way).play()
+    print(outcome.to_json(), flush=True)
+
+
+def _become_owner(rootless: bool) -> str:
+    if not rootless:
+        return kernel.become_owner()
+    kernel.become_root_of_a_user_namespace()
+    return "user namespace"
+
+
+if __name__ == "__main__":
+    main()
