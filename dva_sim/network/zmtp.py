@@ -1,0 +1,261 @@
+"""A ZeroMQ connection over TCP: greeting, framing, pipes, encoder and decoder.
+
+A message waits in the pipe until the encoder takes it into a batch, the batch until TCP's send
+buffer has room, and its bytes until TCP may send them: in order, all of it. At the other end
+the decoder stops when its program takes nothing more, TCP's receive buffer fills, its window
+closes, and in the end the sender's pipe is full. Only byte counts travel; which bytes end
+a message is noted here.
+
+References:
+    ZMTP 3.1, rfc.zeromq.org/spec/37: greeting, version negotiation, NULL mechanism, framing.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+from dva_sim.clock import Clock
+from dva_sim.network.link import Link
+from dva_sim.network.pipes import HIGH_WATER_MARK, Pipe
+from dva_sim.network.tcp import TcpConnection, TcpEndpoint, TcpOptions
+
+BATCH = 8192  # bytes that the encoder hands over, and the decoder reads, at once
+SIGNATURE, GREETING = 10, 64  # the beginning of a greeting, and all of it [B]
+READY = 43  # the READY command of a DEALER or ROUTER; the shortest has 27 [B]
+
+# How much of the other end's greeting must be heard before what is said next; at last nothing.
+_GREETING = (
+    (SIGNATURE, 1),  # the major version
+    (SIGNATURE + 1, GREETING - SIGNATURE - 1),
+    (GREETING, READY),
+    (GREETING + READY, 0),
+)
+
+Deliver = Callable[[Any], object]
+Then = Callable[[], object]
+
+
+def framed(size: int) -> int:
+    """Bytes on the wire of a frame of `size` bytes [B]."""
+    return size + 9 if size > 255 else size + 2
+
+
+def _nothing() -> None:
+    return None
+
+
+@dataclass(frozen=True, slots=True)
+class ZmtpOptions:
+    """What is set on the socket at one end.
+
+    Attributes:
+        mark: High-water mark of its send pipe, in messages.
+        conflate: Whether that pipe keeps only the newest message.
+        tcp: Of the connection below.
+    """
+
+    mark: int = HIGH_WATER_MARK
+    conflate: bool = False
+    tcp: TcpOptions = field(default_factory=TcpOptions)
+
+
+class ZmtpEnd:
+    """One end of a connection.
+
+    Args:
+        tcp: The end of the connection below.
+        link: Carries what is sent.
+        options: Of the socket.
+        deliver: Takes each message that arrives, whole and in order.
+
+    Attributes:
+        pipe: What waits for the encoder.
+        ready: Whether the handshake is over at this end.
+        closed: Whether nothing more is sent and delivered here.
+        on_ready: Called when the handshake is over.
+        on_end: Called when the other end has gone.
+    """
+
+    other: ZmtpEnd
+
+    def __init__(
+        self, tcp: TcpEndpoint, link: Link, options: ZmtpOptions, deliver: Deliver
+    ) -> None:
+        self._tcp, self._link, self._deliver = tcp, link, deliver
+        self.pipe: Pipe[tuple[Any, int]] = Pipe(options.mark, options.conflate)
+        self._batch = self._rest = self._position = self._heard = 0
+        self._arriving: deque[tuple[int, Any]] = deque()  # where each message ends, and what it is
+        self._greeting = iter(_GREETING)
+        self._next = next(self._greeting)
+        self._flushing = self._paused = self._over = False
+        self.ready = self.closed = False
+        self.on_ready: Then = _nothing
+        self.on_end: Then = _nothing
+        tcp.on_readable, tcp.on_writable, tcp.on_end = self._read, self._flush, self._end
+
+    # --- for the program -----------------------------------------------------------------
+
+    def send(self, payload: Any, size: int) -> bool:
+        """Put a message of `size` bytes on the wire [B] into the pipe; see `framed`.
+
+        Returns:
+            False if the high-water mark is reached, or the connection is no more.
+        """
+        if self.closed or not self.pipe.put((payload, size)):
+            return False
+        if self.ready and not self._batch:
+            self._flush()
+        return True
+
+    def pause(self) -> None:
+        """The program takes nothing more: the decoder stops, and keeps what it has read."""
+        self._paused = True
+
+    def resume(self) -> None:
+        """The program takes messages again."""
+        if self._paused:
+            self._paused = False
+            self._read()
+            if self._over and not self._paused:
+                self._end()
+
+    def backlog_bytes(self, now: float) -> float:
+        """Bytes that wait to be sent, here and before the link [B]."""
+        waiting = sum(size for _, size in self.pipe) + self._rest + self._batch
+        return waiting + self._tcp.unsent + self._link.backlog_bytes(now)
+
+    # --- the handshake -------------------------------------------------------------------
+
+    def begin(self) -> None:
+        """TCP is there: say the signature, the rest as the other end is heard."""
+        self._say(SIGNATURE)
+        self._read()
+
+    def _say(self, count: int) -> None:
+        self._position += count
+        self._batch += count
+        self._flush()
+
+    def _greet(self) -> None:
+        """Answer what has been heard of the other end's greeting so far."""
+        while not self.ready and self._heard >= self._next[0]:
+            if self._next[1]:
+                self._say(self._next[1])
+                self._next = next(self._greeting)
+            else:
+                self.ready = True
+                self.on_ready()
+                self._flush()
+
+    # --- encoder and decoder ---------------------------------------------------------------
+
+    def _flush(self) -> None:
+        """Hand batches to TCP as long as it takes them whole."""
+        if self._flushing:
+            return
+        self._flushing = True
+        while not self.closed:
+            if not self._batch:
+                self._fill()
+            if not self._batch:
+                break
+            self._batch -= self._tcp.write(self._batch)
+            if self._batch:
+                break  # TCP tells when it is writable again
+        self._flushing = False
+
+    def _fill(self) -> None:
+        """Take messages into a batch; a long one goes on in the next."""
+        while self.ready and self._batch < BATCH:
+            if not self._rest:
+                message = self.pipe.take()
+                if message is None:
+                    return
+                payload, self._rest = message
+                self._position += self._rest
+                self.other._arriving.append((self._position, payload))
+            part = min(self._rest, BATCH - self._batch)
+            self._rest -= part
+            self._batch += part
+
+    def _read(self) -> None:
+        """Deliver every whole message of a batch, then read the next batch."""
+        arriving = self._arriving
+        while not (self._paused or self.closed):
+            if arriving and arriving[0][0] <= self._heard:
+                self._deliver(arriving.popleft()[1])
+                continue
+            count = self._tcp.read(BATCH)
+            if not count:
+                return
+            self._heard += count
+            if not self.ready:
+                self._greet()
+
+    # --- the end ---------------------------------------------------------------------------
+
+    def close(self) -> None:
+        """Close the socket without lingering: what TCP has is still delivered, nothing else."""
+        if not self.closed:
+            self.closed = True
+            self._tcp.finish()
+
+    def _end(self) -> None:
+        """The other end has gone; it is noticed when all that came before is read."""
+        self._over = True
+        self._read()
+        if not (self.closed or self._paused):
+            self.closed = True
+            self.on_end()
+
+
+class ZmtpConnection:
+    """Two ends between two nodes, opened by a handshake.
+
+    The opener is ready after three round trips, the peer half a round trip later.
+
+    Args:
+        clock: The run's clock.
+        out: The link from the opener.
+        back: The link to the opener.
+        at_peer: Takes what the opener sends.
+        at_opener: Takes what the peer sends.
+        opener: Of the opener's socket.
+        peer: Of the peer's socket.
+    """
+
+    depth: Final = "segment"
+    keeps: Final = True
+
+    def __init__(
+        self,
+        clock: Clock,
+        out: Link,
+        back: Link,
+        at_peer: Deliver,
+        at_opener: Deliver,
+        opener: ZmtpOptions | None = None,
+        peer: ZmtpOptions | None = None,
+    ) -> None:
+        opener, peer = opener or ZmtpOptions(), peer or ZmtpOptions()
+        self._tcp = TcpConnection(clock, out, back, opener.tcp, peer.tcp)
+        self.opener = ZmtpEnd(self._tcp.opener, out, opener, at_opener)
+        self.peer = ZmtpEnd(self._tcp.peer, back, peer, at_peer)
+        self.opener.other, self.peer.other = self.peer, self.opener
+
+    def open(self, then: Then, accepted: Then = _nothing) -> None:
+        """Shake hands; `then()` when the opener is ready, `accepted()` when the peer is."""
+        self.opener.on_ready, self.peer.on_ready = then, accepted
+        self._tcp.open(self.opener.begin, self.peer.begin)
+
+    def close(self) -> None:
+        """The opener closes its socket; what TCP has of it still arrives at the peer."""
+        self.opener.close()
+
+    def drop(self) -> None:
+        """The connection breaks: what is under way is lost."""
+        self.opener.closed = self.peer.closed = True
+        self._tcp.close()
