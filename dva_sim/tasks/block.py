@@ -15,6 +15,7 @@ from dva_sim.tasks.cursor import CursorTrial, Goal
 from dva_sim.tasks.driving import DriveTrial
 from dva_sim.tasks.kinds import Pointing, Reach, Tracking, Tunnel
 from dva_sim.tasks.pointing import PointGoal, ReachGoal, TrackGoal
+from dva_sim.tasks.recorded import Recording
 from dva_sim.tasks.scenario import TaskScenario
 from dva_sim.tasks.trial import Seat, Trace
 from dva_sim.tasks.tunnel import TunnelGoal
@@ -24,7 +25,7 @@ PAUSE = 1.0  # between two trials, nothing is done [s]
 FINE = 0.01  # resolution at which the delay is learnt from a cursor [s]
 
 
-def play(scenario: TaskScenario, seed: int) -> list[Row]:
+def play(scenario: TaskScenario, seed: int, recording: Recording | None = None) -> list[Row]:
     """Do all trials; one row each, in order.
 
     The luck of a trial is its own: it depends on seed, person and number alone, so that two
@@ -33,8 +34,10 @@ def play(scenario: TaskScenario, seed: int) -> list[Row]:
     Args:
         scenario: The task, the person and what lies between.
         seed: Decides all luck but who the person is.
+        recording: Of a link that takes the place of the scenario's, for a vehicle; each trial
+            begins somewhere in it.
     """
-    return [row for row, _ in _play(scenario, seed, drawn=None)]
+    return [row for row, _ in _play(scenario, seed, drawn=None, recording=recording)]
 
 
 def trace_of(scenario: TaskScenario, seed: int, number: int = 0) -> tuple[Row, Trace]:
@@ -67,7 +70,9 @@ def seat_of(scenario: TaskScenario) -> Seat:
     return Seat(person, load_strategy(operator.strategy, operator.options), delay)
 
 
-def _play(scenario: TaskScenario, seed: int, drawn: int | None) -> Iterator[tuple[Row, Trace]]:
+def _play(
+    scenario: TaskScenario, seed: int, drawn: int | None, recording: Recording | None = None
+) -> Iterator[tuple[Row, Trace]]:
     seat, operator = seat_of(scenario), scenario.operator
     conditions = list(scenario.task.conditions())
     plan = [(conditions[0], -1)] * scenario.practice
@@ -76,6 +81,8 @@ def _play(scenario: TaskScenario, seed: int, drawn: int | None) -> Iterator[tupl
         kept = number - scenario.practice
         streams = Streams(derive_seed(seed, operator.population_seed, operator.person, number))
         trial = _trial(scenario, seat, condition, number, streams)
+        if recording is not None and isinstance(trial, DriveTrial):
+            trial.replay(recording, streams.fresh("recording").uniform(0.0, recording.length))
         trial.run(keep=kept == drawn)
         seat.delay.intend(seat.begun + trial.now, 0.0, 0.0)
         seat.delay.rest()

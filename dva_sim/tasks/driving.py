@@ -17,6 +17,7 @@ from dva_sim.tasks.channel import Channel, normals
 from dva_sim.tasks.devices import Joystick, Pair
 from dva_sim.tasks.kinds import Corner, Course, Slalom, Task
 from dva_sim.tasks.plants import Unicycle
+from dva_sim.tasks.recorded import RecordedChannel, Recording
 from dva_sim.tasks.scenario import OneWay, TaskScenario
 from dva_sim.tasks.trial import Seat, Trial
 
@@ -100,6 +101,12 @@ class DriveTrial(Trial[Observation]):
         self._errors = normals(streams.fresh("judgement"))
         self._next_reading, self.path = 0.0, 0.0
         self._squares, self._crossings, self._inside = 0.0, 0, True
+
+    def replay(self, recording: Recording, begin: float) -> None:
+        """Take the link from a recording, from `begin` [s] in it on; no link reaches the oracle."""
+        if not self.is_oracle:
+            self._up = RecordedChannel(recording.up, begin, 0.0)
+            self._frames = RecordedChannel(recording.down, begin, self._late)
 
     def sight(self) -> Observation:
         """See `Trial`."""

@@ -129,8 +129,8 @@ class Trial(ABC, Generic[S]):
         self._surprise = max(reaction - perception, 0.0)
         self._acts_from: float | None = None  # known once a frame is perceived
         self._newest: S | None = None
-        extra = scenario.frames.extra_s + perception
-        self._frames: Channel[S] = Channel(scenario.link.down, extra, streams, "down")
+        self._late = scenario.frames.extra_s + perception
+        self._frames: Channel[S] = Channel(scenario.link.down, self._late, streams, "down")
 
     @abstractmethod
     def sight(self) -> S:
