@@ -1,0 +1,196 @@
+"""How large the congestion window is: slow start, then Reno or CUBIC. Counted in segments.
+
+References:
+    RFC 5681 (slow start, Reno), RFC 9438 (CUBIC), RFC 2861 (after idle); Ha, Rhee: Taming
+    the elephants: new TCP slow start. Computer Networks 55(9), 2011 (HyStart, its delay
+    part; the thresholds are those of RFC 9406, section 4.3).
+"""
+
+from __future__ import annotations
+
+from math import inf
+
+from dva_sim.network.tcp.options import TcpOptions
+
+MIN_WINDOW = 2.0  # ssthresh is never below two segments (RFC 5681, equation 4)
+
+
+class Reno:
+    """Additive increase, halving: RFC 5681.
+
+    Attributes:
+        window: Congestion window [segments], not always whole.
+        threshold: Where slow start ends [segments].
+    """
+
+    BACKOFF = 0.5
+
+    __slots__ = ("_start", "threshold", "window")
+
+    def __init__(self, options: TcpOptions) -> None:
+        self._start = float(options.initial_window)
+        self.window, self.threshold = self._start, inf
+
+    def grow(self, segments: int, now: float, smoothed: float) -> None:
+        """`segments` more have been delivered at `now` [s], and the window was in use."""
+        if self.window < self.threshold:
+            before = self.window
+            self.window = min(self.window + segments, self.threshold)
+            segments -= int(self.window - before)
+        if segments > 0 and self.window >= self.threshold:
+            self._avoid(segments, now, smoothed)
+
+    def reduce(self, now: float) -> float:
+        """A loss: the new threshold [segments]; the window itself is brought down by others."""
+        self.threshold = max(self.window * self.BACKOFF, MIN_WINDOW)
+        return self.threshold
+
+    def rests(self, now: float) -> None:
+        """An acknowledgement while the window was not in use."""
+
+    def after_idle(self, idle: float, timeout: float) -> None:
+        """Nothing was sent for `idle` [s]: halve for each `timeout` [s] of it."""
+        floor = min(self._start, self.window)
+        self.threshold = max(self.threshold, 0.75 * self.window)
+        while idle > timeout and self.window > floor:
+            self.window = max(self.window / 2, floor)
+            idle -= timeout
+
+    def _avoid(self, segments: int, now: float, smoothed: float) -> None:
+        self.window += segments / self.window
+
+
+class Cubic(Reno):
+    """The window grows with the cube of the time since the last loss: RFC 9438."""
+
+    BACKOFF = 0.7
+    C = 0.4
+
+    __slots__ = ("_epoch", "_estimate", "_inflection", "_last", "_peak")
+
+    def __init__(self, options: TcpOptions) -> None:
+        super().__init__(options)
+        self._peak = self._inflection = self._estimate = 0.0
+        self._epoch = -1.0
+        self._last = 0.0
+
+    def reduce(self, now: float) -> float:
+        """See `Reno`; with fast convergence (RFC 9438, section 4.7)."""
+        self._epoch = -1.0
+        falling = self.window < self._peak
+        self._peak = self.window * (1 + self.BACKOFF) / 2 if falling else self.window
+        return super().reduce(now)
+
+    def rests(self, now: float) -> None:
+        """Time in which the window is not used does not count (RFC 9438, section 5.8)."""
+        if self._epoch >= 0:
+            self._epoch += now - self._last
+        self._last = now
+
+    def curve(self, elapsed: float) -> float:
+        """W_cubic, `elapsed` [s] after the epoch's start [segments]: RFC 9438, figure 1."""
+        return self.C * (elapsed - self._inflection) ** 3 + self._peak
+
+    def _avoid(self, segments: int, now: float, smoothed: float) -> None:
+        if self._epoch < 0:
+            self._begin(now)
+        self._last = now
+        elapsed = now - self._epoch
+        alpha = 3 * (1 - self.BACKOFF) / (1 + self.BACKOFF) if self._estimate < self._peak else 1.0
+        self._estimate += alpha * segments / self.window
+        if self.curve(elapsed) < self._estimate:
+            self.window = max(self.window, self._estimate)  # no slower than Reno
+            return
+        target = min(max(self.curve(elapsed + smoothed), self.window), 1.5 * self.window)
+        self.window += segments * (target - self.window) / self.window
+
+    def _begin(self, now: float) -> None:
+        """A new epoch: where the curve has its inflection (RFC 9438, figure 2)."""
+        self._epoch, self._estimate = now, self.window
+        if self.window >= self._peak:
+            self._peak, self._inflection = self.window, 0.0
+        else:
+            self._inflection = float(((self._peak - self.window) / self.C) ** (1 / 3))
+
+
+class HyStart:
+    """Ends slow start when the round trip grows, before the queue overflows.
+
+    Each round, the shortest of the first eight round trips is compared with the shortest
+    ever: an eighth more (at least 4 ms, at most 16 ms) means that a queue has built up.
+    """
+
+    SAMPLES, LOW_WINDOW, LEAST, MOST = 8, 16, 0.004, 0.016
+
+    __slots__ = ("_count", "_end", "_shortest")
+
+    def __init__(self) -> None:
+        self._end, self._count, self._shortest = 0, 0, inf
+
+    def ends(self, rtt: float, minimum: float, acknowledged: int, sent: int) -> bool:
+        """Whether slow start should end, after one more round trip [s] and the bytes so far."""
+        if acknowledged > self._end:
+            self._end, self._count, self._shortest = sent, 0, inf
+        self._count += 1
+        if self._count <= self.SAMPLES:
+            self._shortest = min(self._shortest, rtt)
+        if self._count < self.SAMPLES:
+            return False
+        return self._shortest > minimum + min(max(minimum / 8, self.LEAST), self.MOST)
+
+
+class Unlimited(Reno):
+    """No congestion window at all."""
+
+    __slots__ = ()
+
+    def __init__(self, options: TcpOptions) -> None:
+        super().__init__(options)
+        self.window = 1e9
+
+    def grow(self, segments: int, now: float, smoothed: float) -> None:
+        """Nothing to grow."""
+
+    def reduce(self, now: float) -> float:
+        """Nothing to reduce."""
+        return self.window
+
+
+def make_window(options: TcpOptions) -> Reno:
+    """The congestion window that the options ask for."""
+    if not options.congestion_window:
+        return Unlimited(options)
+    return Cubic(options) if options.congestion == "cubic" else Reno(options)
+
+
+class RateReduction:
+    """Proportional rate reduction: how many segments may leave during recovery.
+
+    The conservative bound, and one more when the acknowledgement moved the left edge.
+
+    References:
+        RFC 6937.
+    """
+
+    __slots__ = ("_at_start", "_delivered", "_threshold", "sent")
+
+    def __init__(self, threshold: float, in_flight: int) -> None:
+        self._threshold, self._at_start = threshold, max(1, in_flight)
+        self._delivered = self.sent = 0
+
+    def allows(self, delivered: int, in_flight: int, advanced: bool) -> int:
+        """Segments that may leave now.
+
+        Args:
+            delivered: Segments newly acknowledged, selectively or not.
+            in_flight: Segments on their way by the sender's estimate.
+            advanced: Whether the left edge moved and nothing more was found lost.
+        """
+        self._delivered += delivered
+        if in_flight > self._threshold:
+            share = -(-self._delivered * self._threshold // self._at_start)
+            allowed = share - self.sent
+        else:
+            allowed = max(self._delivered - self.sent, delivered) + advanced
+            allowed = min(self._threshold - in_flight, allowed)
+        return max(int(allowed), 0 if self.sent else 1)

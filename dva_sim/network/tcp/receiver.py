@@ -1,0 +1,187 @@
+"""The receiving half of an end: order, the receive window, and when to acknowledge.
+
+References:
+    RFC 9293 (windows), RFC 2018 and 2883 (selective and duplicate acknowledgement),
+    RFC 7323, section 4.3 (which time stamp is echoed), RFC 1122, section 4.2.3.2 (delayed
+    acknowledgement); Sarolahti, Kuznetsov: Congestion Control in Linux TCP. USENIX Annual
+    Technical Conference, FREENIX Track, 2002 (quick and adaptive acknowledgements);
+    ip-sysctl (tcp_pingpong_thresh = 1).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import inf
+
+from dva_sim.clock import Clock
+from dva_sim.network.tcp.memory import SMALLEST
+from dva_sim.network.tcp.options import TcpOptions
+from dva_sim.network.tcp.round_trip import RoundTrip
+from dva_sim.network.tcp.timer import Timer
+
+FIRST_WINDOW = 65_160  # 45 full segments [B]
+LARGEST_WINDOW = 3_145_728  # half of tcp_rmem's third value [B]
+QUICK = 16  # segments acknowledged at once at the start and after trouble
+LONGEST_DELAY = 0.2  # of an acknowledgement in a dialogue [s]
+BLOCKS = 3  # that fit beside time stamps
+
+
+class Receiver:
+    """Segments in, bytes in order out.
+
+    Args:
+        clock: The run's clock.
+        options: Of this end.
+        times: Round trip as this end's sender sees it.
+        acknowledge: Sends an acknowledgement without data.
+
+    Attributes:
+        next: First byte that is missing.
+        read_to: First byte not read by the program.
+        edge: First byte that does not fit, as the other end has been told.
+        acknowledged: First missing byte, as the other end has been told.
+        blocks: Bytes received beyond `next`, latest first.
+        duplicate: Something has arrived twice since the last acknowledgement.
+        stamp: Time stamp to echo [s].
+        pending: Segments with data since the last acknowledgement.
+        urgent: The next acknowledgement must not wait.
+        dialogue: Data goes back soon after data has come, so that acknowledgements wait
+            to ride on it.
+    """
+
+    def __init__(
+        self,
+        clock: Clock,
+        options: TcpOptions,
+        times: RoundTrip,
+        acknowledge: Callable[[], object],
+    ) -> None:
+        self._clock, self._options, self._times = clock, options, times
+        self._acknowledge = acknowledge
+        self.next = self.read_to = self.acknowledged = 0
+        self._automatic = options.receive_buffer is None
+        self._window = FIRST_WINDOW
+        if options.receive_buffer is not None:
+            self._window = max(2 * options.receive_buffer, SMALLEST) // 2
+        self.edge = self._window
+        self.blocks: list[tuple[int, int]] = []
+        self.duplicate = self.urgent = self.dialogue = False
+        self.stamp = 0.0
+        self.pending = 0
+        self._quick, self._last_data = 0, -inf
+        self._patience = options.delayed_ack
+        self._largest = 536  # segment seen [B]; RFC 9293's default to start with
+        self._timer = Timer(clock, self._waited, options.tick)
+
+    def take(self, start: int, end: int, now: float) -> bool:
+        """Bytes `start` to `end` arrive at `now` [s]; returns whether some are in order."""
+        if end <= self.next:
+            self.duplicate = True
+            self._hurry()
+            return False
+        if start > self.next:
+            self.urgent = True
+            if start < self.edge:
+                self._keep(start, end)
+            return False
+        self._note_rhythm(end - start, now)
+        self.duplicate = self.duplicate or start < self.next
+        self.next = end
+        self.pending += 1
+        if self.blocks:
+            self.urgent = True
+            self._absorb()
+        return True
+
+    def read(self, count: int) -> int:
+        """The program takes up to `count` bytes [B]; returns how many there were."""
+        taken = min(count, self.next - self.read_to)
+        self.read_to += taken
+        if self._automatic:
+            self._window = min(self._window + taken, LARGEST_WINDOW)
+        drained = self.pending and self.read_to == self.next
+        due = drained and (self.pending > 1 or not self.dialogue)
+        if due or self._reopened():
+            self._acknowledge()
+        return taken
+
+    def must_acknowledge(self) -> bool:
+        """Whether an acknowledgement leaves at once."""
+        if self.urgent:
+            return True
+        if not self.pending:
+            return False
+        quick = self._quick > 0 and not self.dialogue
+        return quick or self.next - self.acknowledged > self._largest or not self._patience
+
+    def wait(self, now: float) -> None:
+        """Let the acknowledgement wait for something to ride on."""
+        longest = LONGEST_DELAY if self.dialogue else 0.5
+        longest = min(longest, max(self._times.smoothed, self._options.delayed_ack))
+        at = now + min(self._patience, longest)
+        if at < self._timer.deadline:
+            self._timer.set(at)
+
+    def leaves(self, now: float, data: bool) -> None:
+        """A segment leaves, and the acknowledgement with it."""
+        if data and now - self._last_data < self._patience:
+            self.dialogue = True
+        if self.pending and self._quick:
+            self._quick -= 1
+        self.pending, self.urgent, self.duplicate = 0, False, False
+        self.acknowledged = self.next
+        self.edge = max(self.edge, self.read_to + self._window)
+        self._timer.stop()
+
+    def stop(self) -> None:
+        """Acknowledge nothing more."""
+        self._timer.stop()
+
+    def _waited(self) -> None:
+        """Nothing came to ride on."""
+        if self.dialogue:
+            self.dialogue, self._patience = False, self._options.delayed_ack
+        else:
+            self._patience = min(2 * self._patience, self._times.timeout)
+        if self.pending:
+            self._acknowledge()
+
+    def _reopened(self) -> bool:
+        """Whether the window has at least doubled, and by a segment (RFC 9293, 3.8.6.2.2)."""
+        before, after = self.edge - self.next, self.read_to + self._window - self.next
+        least = min(self._options.mss, self._window // 2)
+        return after >= 2 * before and after - before >= least
+
+    def _note_rhythm(self, size: int, now: float) -> None:
+        """How soon the next data may be expected."""
+        gap, base = now - self._last_data, self._options.delayed_ack
+        self._last_data = now
+        self._largest = max(self._largest, min(size, self._options.mss))
+        if gap > self._times.timeout:
+            self._quick = QUICK
+        elif gap <= base / 2:
+            self._patience = self._patience / 2 + base / 2
+        elif gap < self._patience:
+            self._patience = min(self._patience / 2 + gap, self._times.timeout)
+
+    def _hurry(self) -> None:
+        self.urgent, self.dialogue = True, False
+        self._quick, self._patience = QUICK, self._options.delayed_ack
+
+    def _keep(self, start: int, end: int) -> None:
+        """Put bytes that came too early first among the blocks, with those they touch."""
+        apart = []
+        for first, last in self.blocks:
+            if last < start or first > end:
+                apart.append((first, last))
+            else:
+                start, end = min(start, first), max(end, last)
+        self.blocks = [(start, end), *apart]
+
+    def _absorb(self) -> None:
+        """Take blocks that are in order now."""
+        for first, last in sorted(self.blocks):
+            if first > self.next:
+                break
+            self.next = max(self.next, last)
+        self.blocks = [block for block in self.blocks if block[1] > self.next]

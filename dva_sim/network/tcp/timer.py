@@ -1,0 +1,60 @@
+"""A timer that is moved far more often than it rings.
+
+Moving it later costs nothing: the event already scheduled looks, when it is due, whether
+the deadline has moved on. Only an earlier deadline needs a new event.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import ceil, inf
+
+from dva_sim.clock import Clock
+
+_SLACK_S = 1e-6  # the clock counts whole microseconds
+
+
+class Timer:
+    """One deadline at a time.
+
+    Args:
+        clock: The run's clock.
+        action: Called when the deadline has come.
+        tick: Deadlines are rounded up to multiples of this [s]; 0 = not rounded.
+
+    Attributes:
+        deadline: When it rings [s]; infinite if it is not set.
+    """
+
+    __slots__ = ("_action", "_clock", "_due", "_tick", "deadline")
+
+    def __init__(self, clock: Clock, action: Callable[[], object], tick: float = 0.0) -> None:
+        self._clock, self._action, self._tick = clock, action, tick
+        self.deadline = self._due = inf
+
+    def set(self, deadline: float) -> None:
+        """Ring at `deadline` [s] and not before, whatever was set earlier."""
+        if self._tick:
+            deadline = ceil(deadline / self._tick - 1e-6) * self._tick
+        self.deadline = deadline
+        if deadline < self._due:
+            self._schedule(deadline)
+
+    def stop(self) -> None:
+        """Do not ring."""
+        self.deadline = inf
+
+    def _schedule(self, due: float) -> None:
+        self._due = due
+        self._clock.call_at(due, self._look, due)
+
+    def _look(self, due: float) -> None:
+        if due != self._due:
+            return  # an earlier deadline came between
+        self._due = inf
+        if self.deadline > due + _SLACK_S:
+            if self.deadline < inf:
+                self._schedule(self.deadline)
+            return
+        self.deadline = inf
+        self._action()
