@@ -13,6 +13,7 @@ from dva_sim.emulator.running import refuse_for_proxy, run_job
 from dva_sim.emulator.wire import WireConfig
 from dva_sim.network.condition import EMULATOR_RESULTS, RESULTS, Condition
 from dva_sim.network.measures import RunLog, measure_log
+from dva_sim.streams import derive_seed
 
 Row = dict[str, str]
 _NOTES_PER_COMMAND = 8
@@ -26,7 +27,7 @@ def measure(condition: Condition, seed: int, link: str = PACKETS) -> Row:
 
     Args:
         condition: What is set.
-        seed: Of the link's luck.
+        seed: Of the link's luck, together with the condition: no two share theirs.
         link: `packets`, or `proxy` where namespaces are forbidden.
 
     Returns:
@@ -51,7 +52,7 @@ def job_of(condition: Condition, seed: int, link: str = PACKETS) -> Job:
     return Job(
         "commands",
         WireConfig.of(condition),
-        seed,
+        derive_seed(condition.hash, seed),
         bound_s=HANDSHAKE_LIMIT_S + condition.subscription_wait_s + played_s + 10.0,
         arguments=dataclasses.asdict(condition),
         congestion=condition.cc,
