@@ -239,7 +239,9 @@ def _is_tag(part: str | int, data: Any, loc: Sequence[str | int]) -> bool:
         inside = isinstance(data, Mapping) and step in data
         inside = inside or (isinstance(data, list) and isinstance(step, int) and step < len(data))
         if step == part:
-            return not inside and step != loc[-1] and isinstance(step, str)
+            # The last part is a missing key where there are keys.
+            is_key = step == loc[-1] and isinstance(data, Mapping)
+            return not inside and not is_key and isinstance(step, str)
         if inside:
             data = data[step]
     return False

@@ -16,6 +16,7 @@ import zmq
 
 from dva_sim.agents.device import Device
 from dva_sim.clock import Clock
+from dva_sim.network.connecting import Connector
 from dva_sim.network.keys import KeyRing
 from dva_sim.network.link import ConstantRate, Link, LinkConfig
 from dva_sim.network.patterns import (
@@ -82,12 +83,12 @@ class World:
 
 
 class VirtualWorld(World):
-    """Virtual time over good links."""
+    """Virtual time over good links; what carries the messages is chosen."""
 
-    def __init__(self) -> None:
+    def __init__(self, connector: Connector | None = None) -> None:
         self._links: dict[tuple[str, str], Link] = {}
         self.network: VirtualNetwork = VirtualNetwork(
-            Clock(), lambda a, b: (self._link(a, b), self._link(b, a))
+            Clock(), lambda a, b: (self._link(a, b), self._link(b, a)), connector=connector
         )
         self.leave, self.come_back = self.network.leave, self.network.come_back  # type: ignore[method-assign]
 

@@ -8,11 +8,12 @@ from typing import NamedTuple
 
 from dva_sim.clock import Clock
 from dva_sim.network.patterns import Answer, Request
+from dva_sim.network.pipes import Flow
 from dva_sim.protocol.codec import decode
 from dva_sim.protocol.errors import ProtocolError
 from dva_sim.protocol.messages import Emergency
 
-LIMIT = 1000  # ZeroMQ's default high-water mark: a full subscriber keeps the oldest
+LIMIT = 1000  # ZeroMQ's default high-water mark, in messages
 
 
 class Letter(NamedTuple):
@@ -36,21 +37,29 @@ class Inbox:
 
     Args:
         clock: The run's clock.
-        processing: Time that one message takes [s].
+        service: Gives the time that the next message takes [s].
         handle: Takes each letter when its processing is done.
         latest_wins: Keep only the newest waiting command, as a subscriber that drains its
             socket before it works does.
+        limit: How many messages of a class may wait.
+
+    Attributes:
+        flow: Where published commands come from, if it can be told to wait: then a full inbox
+            takes nothing more until half of it is done. What cannot wait is dropped.
     """
 
     def __init__(
         self,
         clock: Clock,
-        processing: float,
+        service: Callable[[], float],
         handle: Callable[[Letter], object],
         latest_wins: bool,
+        limit: int = LIMIT,
     ) -> None:
-        self._clock, self._processing, self._handle = clock, processing, handle
-        self._latest_wins = latest_wins
+        self._clock, self._service, self._handle = clock, service, handle
+        self._latest_wins, self._limit = latest_wins, limit
+        self.flow: Flow | None = None
+        self._paused = False
         self._emergencies: deque[Letter] = deque()
         self._control: deque[Letter] = deque()
         self._commands: deque[Letter] = deque()
@@ -76,6 +85,9 @@ class Inbox:
         if self._latest_wins:
             self.superseded += self.forget_published()
         self._put(self._commands, Letter(data, self._clock.now, None, None))
+        if self.flow is not None and len(self._commands) >= self._limit:
+            self._paused = True
+            self.flow.pause()
 
     def forget_published(self) -> int:
         """Drop the published commands that wait: how many those were."""
@@ -86,7 +98,7 @@ class Inbox:
         return before - len(self._commands)
 
     def _put(self, queue: deque[Letter], letter: Letter) -> None:
-        if len(queue) >= LIMIT:
+        if len(queue) >= self._limit:
             self.overflowed += 1
             return
         queue.append(letter)
@@ -100,11 +112,20 @@ class Inbox:
         while queue := self._emergencies or self._control or self._commands:
             self._busy = True
             letter = queue.popleft()
-            if self._processing > 0.0:
-                self._clock.call_after(self._processing, self._done, letter)
+            if self._paused:
+                self._take_more()
+            duration = self._service()
+            if duration > 0.0:
+                self._clock.call_after(duration, self._done, letter)
                 return
             self._handle(letter)
         self._busy = False
+
+    def _take_more(self) -> None:
+        """Let published commands come again once half of the inbox is done."""
+        if self.flow is not None and len(self._commands) <= self._limit // 2:
+            self._paused = False
+            self.flow.resume()
 
     def _done(self, letter: Letter) -> None:
         self._handle(letter)

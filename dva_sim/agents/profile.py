@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 from dva_sim import resources
 from dva_sim.agents.battery import BatteryProfile
 from dva_sim.agents.sensors import KINDS, SensorConfig
+from dva_sim.agents.service import Service
 from dva_sim.config import Config, Document, load_yaml, validate
 from dva_sim.worlds.drives import LONGEST_TICK, DriveSpec, load_drive
 
@@ -31,7 +32,7 @@ class RobotProfile(Config):
             middle at 0, 0; left out: a circle.
         drive: `differential`, `three_way`, or a class of your own as `mine.py:Mine`.
         options: Of that drive.
-        processing_s: What a message takes its computer; left out: 0.05.
+        processing_s: What a message takes its computer, a number or a law; left out: 0.05.
         battery: Left out: power never ends.
         sensors: What it carries; left out: one of each kind.
     """
@@ -48,7 +49,7 @@ class RobotProfile(Config):
     motor_time_constant_s: Positive = 0.15
     drive: str = "differential"
     options: dict[str, Any] = Field(default_factory=dict)
-    processing_s: Annotated[float, Field(ge=0, le=10)] = 0.05
+    processing_s: Service = 0.05
     battery: BatteryProfile | None = None
     sensors: Annotated[tuple[SensorConfig, ...], Field(max_length=16)] = ONE_OF_EACH
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from dva_sim.agents.camera import Frame, HazardSpot, Observation, View
 from dva_sim.agents.commands import topic_of
 from dva_sim.agents.device import STATUS, Device
-from dva_sim.agents.inbox import Inbox, Letter
+from dva_sim.agents.inbox import LIMIT, Inbox, Letter
 from dva_sim.agents.local_loops import GuardedDrive, MissionLoop, Surrounded
 from dva_sim.agents.modes import ENDS, Decision, Mode, RobotController, SetPoint
 from dva_sim.agents.sensing import SensorDesk, SensorPort
@@ -35,7 +35,7 @@ class RobotSetup:
 
     Attributes:
         pattern: How SetTeleOp reaches it.
-        processing: Time that one message takes its computer [s].
+        service: Gives the time that the next message takes its computer [s].
         frame_rate: Of the camera [1/s].
         frame_bytes: Size of a frame [B].
         view: What the camera sees.
@@ -44,10 +44,12 @@ class RobotSetup:
         guarded: Whether a collision guard slows whoever drives it (coordinated control).
         encode: From taking a frame to publishing it [s]; one frame at a time.
         charge: Share of the battery's charge that is left.
+        conflates: Whether its socket keeps only the newest published command.
+        limit: How many messages of a class may wait for its computer.
     """
 
     pattern: str
-    processing: float
+    service: Callable[[], float]
     frame_rate: float
     frame_bytes: int
     view: View
@@ -56,6 +58,8 @@ class RobotSetup:
     guarded: bool = False
     encode: float = 0.0
     charge: Callable[[], float] = lambda: 1.0
+    conflates: bool = False
+    limit: int = LIMIT
 
 
 class RobotAgent:
@@ -95,7 +99,11 @@ class RobotAgent:
         self.picture_age: float | None = None
         self.trace: Trace | None = None
         self.inbox = Inbox(
-            device.clock, setup.processing, self._handle, setup.pattern == "latest-wins"
+            device.clock,
+            setup.service,
+            self._handle,
+            setup.pattern == "latest-wins" or setup.conflates,
+            setup.limit,
         )
         self._sensing = SensorDesk(device, setup.sensors, controller.tick)
         controller.sensors = tuple(m.Sensor(n, port.unit) for n, port in setup.sensors.items())
@@ -226,11 +234,11 @@ class RobotAgent:
             self.device.tell(f"is now in mode {mode}", "mode")
         if self._commands is not None:
             self._commands.close()
-            self._commands = None
+            self._commands = self.inbox.flow = None
             self.inbox.forget_published()
         if mode is Mode.TELEOPERATION and self._setup.pattern in PUBLISHED:
             me = self.device.id_tag
-            self._commands = self.device.network.subscribe(
+            self._commands = self.inbox.flow = self.device.network.subscribe(
                 me, source, topic_of(me), self.inbox.published
             )
         if self.controller.mission is not None:

@@ -16,7 +16,7 @@ class Cadence:
 
     Attributes:
         period_s: Wanted time between two commands; the shortest, where it is not constant.
-        processing_s: Time a robot needs for one command.
+        processing_s: Time a robot needs for one command, on average.
     """
 
     period_s: float
@@ -40,6 +40,7 @@ def cadence(scenario: Mapping[str, Any], changes: Mapping[str, Level]) -> Cadenc
 
     A phone that looks only when its batch is full or its time is up wants no more than that.
     """
+    from dva_sim.agents.service import mean_of
     from dva_sim.scenario import build, phone_profile
 
     try:
@@ -50,4 +51,4 @@ def cadence(scenario: Mapping[str, Any], changes: Mapping[str, Level]) -> Cadenc
     period = 1.0 / resolved.command.rate_hz
     if phone.send == "on_change":
         period = min(phone.max_delay_s, 20 / phone.sample_rate_hz)
-    return Cadence(period, resolved.robot.processing_s or 0.0)
+    return Cadence(period, mean_of(resolved.robot.processing_s or 0.0))

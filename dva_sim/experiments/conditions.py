@@ -16,6 +16,11 @@ _CONDITIONS = {
     "watchdog of the robot": "robot.watchdog_s",
     "age limit of a command": "robot.max_age_s",
     "messaging pattern": "pattern",
+    "transport": "transport",
+    "high-water mark": "zeromq.high_water_mark",
+    "kept of what waits": "zeromq.conflate",
+    "send buffer": "zeromq.send_buffer_bytes",
+    "receive buffer": "zeromq.receive_buffer_bytes",
     "wanted command rate": "command.rate_hz",
     "one-way delay": "link.delay_s",
     "jitter (half-width)": "link.jitter_s",
@@ -90,6 +95,8 @@ def timeout_remark(scenario: Mapping[str, Any], factors: Sequence[Factor]) -> st
     timeout, processing = get(scenario, "command.timeout_s"), get(scenario, "robot.processing_s")
     varied = next((f.levels for f in factors if f.name == "link.delay_s"), ())
     delays = [float(d) for d in (get(scenario, "link.delay_s"), *varied) if d is not None]
+    if isinstance(processing, Mapping):
+        processing = processing["mean_s"]
     if timeout is None or processing is None or not delays:
         return ""
     needed = _SAFE_ROUND_TRIPS * 2 * max(delays) + processing
@@ -113,7 +120,7 @@ def _text(key: str, value: Any) -> str:
     if key.endswith("_bytes"):
         return f"{value / 1000:g} kB"
     if isinstance(value, Mapping):
-        return ", ".join(f"{k} {v}" for k, v in value.items()) or _NOWHERE
+        return ", ".join(f"{k} {v}" for k, v in value.items() if v is not None) or _NOWHERE
     if isinstance(value, list | tuple):
         return ", ".join(_text(key, item) for item in value)
     if isinstance(value, str):

@@ -9,6 +9,12 @@ Level = str | float | int | bool | None
 
 _FACTORS = {
     "pattern": "messaging pattern",
+    "transport": "transport",
+    "network_depth": "depth of the network model",
+    "zeromq.high_water_mark": "high-water mark",
+    "zeromq.conflate": "kept of what waits",
+    "zeromq.send_buffer_bytes": "send buffer",
+    "zeromq.receive_buffer_bytes": "receive buffer",
     "link.delay_s": "one-way delay",
     "link.jitter_s": "jitter",
     "link.loss": "packet loss",
@@ -43,6 +49,7 @@ _LEVELS = {
     "pipelined": "pipelined requests",
     "pub-sub": "plain PUB/SUB",
     "latest-wins": "latest-wins PUB/SUB",
+    "zeromq": "ZeroMQ over TCP",
     "direct": "direct control",
     "coordinated": "coordinated control",
     "supervisory": "supervisory control",

@@ -50,6 +50,7 @@ def run_row(recording: Recording) -> Row:
     row["plugin_failures"] = plugin_failures(recording)
     row["violations"] = sum(recording.recorder.violations.values())
     row["simulated_s"] = recording.duration
+    row["network_depth"] = recording.depth
     return row
 
 

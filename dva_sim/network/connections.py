@@ -152,15 +152,27 @@ class SocketSubscription:
         self._network, self._handler = network, handler
         self._socket = network.client(zmq.SUB, node, publisher)
         self._socket.subscribe(topic)
+        self._paused = False
         network.clock.watch(self._socket, self._hear)
 
     def close(self) -> None:
         """See `Subscription`."""
         self._network.close_client(self._socket)
 
+    def pause(self) -> None:
+        """See `Subscription`: what is not read waits in the socket."""
+        self._paused = True
+        self._network.clock.unwatch(self._socket)
+
+    def resume(self) -> None:
+        """See `Subscription`."""
+        if self._paused and not self._socket.closed:
+            self._paused = False
+            self._network.clock.watch(self._socket, self._hear)
+
     def _hear(self) -> None:
         for _ in range(DRAIN):
-            frames = next_of(self._socket)
+            frames = None if self._paused else next_of(self._socket)
             if frames is None:
                 return
             if len(frames) == 2:

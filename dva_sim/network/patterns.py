@@ -43,6 +43,12 @@ class Subscription(Protocol):
     def close(self) -> None:
         """Leave; nothing more is delivered."""
 
+    def pause(self) -> None:
+        """Take nothing more for now: what comes waits on the way, at last at the publisher."""
+
+    def resume(self) -> None:
+        """Take what has waited, and what comes."""
+
 
 class Wire(Protocol):
     """A connection to the service of a peer, made anew by closing it and opening another."""

@@ -11,7 +11,7 @@ References:
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Final
 
 from dva_sim.clock import Clock
 from dva_sim.network.link import Link
@@ -130,6 +130,37 @@ class Stream:
         return float(min(MAX_RTO, rto * 2.0 ** (tries - 1)))
 
 
+class StreamEnd:
+    """One end of a connection.
+
+    Args:
+        out: Carries what is sent.
+        link: What that goes over.
+
+    Attributes:
+        send: Sends a message of a size on the wire [B]; see `Stream`.
+    """
+
+    def __init__(self, out: Stream, link: Link) -> None:
+        self._out, self._link = out, link
+        self.send = out.send
+
+    @property
+    def closed(self) -> bool:
+        """Whether nothing is sent any more."""
+        return self._out.closed
+
+    def pause(self) -> None:
+        """Nothing waits here: what a program cannot take is for it to drop."""
+
+    def resume(self) -> None:
+        """See `pause`."""
+
+    def backlog_bytes(self, now: float) -> float:
+        """Bytes that wait before the link [B]."""
+        return self._link.backlog_bytes(now)
+
+
 class Connection:
     """Two streams between two nodes, opened by a handshake of three round trips.
 
@@ -145,34 +176,55 @@ class Connection:
 
     HANDSHAKE_ROUND_TRIPS = 3
     HANDSHAKE_BYTES = 64
+    depth: Final = "message"
+    keeps: Final = True
 
     def __init__(
         self, clock: Clock, out: Link, back: Link, at_peer: Deliver, at_opener: Deliver
     ) -> None:
         self._handlers = at_peer, at_opener
-        self._then: Callable[[], object] = lambda: None
+        self._then: Callable[[], object] = _nothing
+        self._accepted: Callable[[], object] | None = None
         self._hops_left = 2 * self.HANDSHAKE_ROUND_TRIPS
-        self.to_peer = Stream(clock, out, back, self._greets_back)
-        self.to_opener = Stream(clock, back, out, self._greets_on)
+        self._to_peer = Stream(clock, out, back, self._greets_back)
+        self._to_opener = Stream(clock, back, out, self._greets_on)
+        self.opener, self.peer = StreamEnd(self._to_peer, out), StreamEnd(self._to_opener, back)
 
-    def open(self, then: Callable[[], object]) -> None:
-        """Shake hands, then call `then()`."""
-        self._then = then
-        self.to_peer.send(None, self.HANDSHAKE_BYTES)
+    def open(
+        self, then: Callable[[], object], accepted: Callable[[], object] | None = None
+    ) -> None:
+        """Shake hands; `then()` when the opener is ready, `accepted()` when the peer is."""
+        self._then, self._accepted = then, accepted
+        self._to_peer.send(None, self.HANDSHAKE_BYTES)
 
     def close(self) -> None:
         """Drop everything under way in both directions."""
-        self.to_peer.close()
-        self.to_opener.close()
+        self._to_peer.close()
+        self._to_opener.close()
+
+    drop = close
 
     def _greets_back(self, _: object) -> None:
         self._hops_left -= 1
-        self.to_opener.send(None, self.HANDSHAKE_BYTES)
+        self._to_opener.send(None, self.HANDSHAKE_BYTES)
 
     def _greets_on(self, _: object) -> None:
         self._hops_left -= 1
         if self._hops_left:
-            self.to_peer.send(None, self.HANDSHAKE_BYTES)
-        else:
-            self.to_peer.deliver, self.to_opener.deliver = self._handlers
-            self._then()
+            self._to_peer.send(None, self.HANDSHAKE_BYTES)
+            return
+        self._to_peer.deliver, self._to_opener.deliver = self._handlers
+        if self._accepted is not None:
+            self._to_peer.deliver = self._is_accepted
+            self._to_peer.send(None, self.HANDSHAKE_BYTES)
+        self._then()
+
+    def _is_accepted(self, _: object) -> None:
+        """The last word of the opener's handshake has reached the peer."""
+        self._to_peer.deliver = self._handlers[0]
+        assert self._accepted is not None
+        self._accepted()
+
+
+def _nothing() -> None:
+    return None

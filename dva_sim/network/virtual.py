@@ -1,20 +1,20 @@
-"""The virtual network: the patterns in virtual time, over links with delay, loss and rate.
-
-Both patterns run on reliable streams, as ZeroMQ's run on TCP.
-"""
+"""The virtual network: the patterns in virtual time, over links with delay, loss and rate."""
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import defaultdict, deque
 from collections.abc import Callable
 from typing import Any
 
 from dva_sim.clock import Clock
+from dva_sim.network.connecting import AnyConnection, Connector
 from dva_sim.network.link import Link
 from dva_sim.network.patterns import OnReply, Request, Service
-from dva_sim.network.stream import Connection
+from dva_sim.network.zmtp import ZmtpConnection
 
-FRAMING = 9  # ZMTP header of a frame above 255 bytes [B]
+FRAMING = 9  # ZMTP header of a frame above 255 bytes; the few shorter messages count the same [B]
+RECONNECT = 0.1  # after a connection broke; ZeroMQ's default [s]
+SUBSCRIBE_AGAIN = 1.0  # where a subscription may get lost; assumed [s]
 
 Links = Callable[[str, str], tuple[Link, Link]]
 Traffic = Callable[[float, str, str, int], None]
@@ -27,15 +27,27 @@ class VirtualNetwork:
         clock: The run's clock.
         links: Gives the link from one node to another, and the one back.
         traffic: Told of each message sent: time [s], from, to, size [B].
+        connector: Makes the connections.
+
+    Attributes:
+        dropped: Publications that found the pipe of a subscriber full.
     """
 
-    def __init__(self, clock: Clock, links: Links, traffic: Traffic | None = None) -> None:
+    def __init__(
+        self,
+        clock: Clock,
+        links: Links,
+        traffic: Traffic | None = None,
+        connector: Connector | None = None,
+    ) -> None:
         self.clock = clock
         self.links = links
         self.traffic = traffic or (lambda *_: None)
+        self.connector = connector or Connector()
+        self.dropped = 0
         self._services: dict[str, Service] = {}
         self._gone: set[str] = set()
-        self._subscriptions: dict[str, list[VirtualSubscription]] = defaultdict(list)
+        self._clients: dict[str, dict[VirtualClient, None]] = defaultdict(dict)
         self._wanted: dict[tuple[str, str], list[VirtualSubscription]] = {}
 
     def introduce(self, node: str, address: str) -> None:
@@ -57,112 +69,174 @@ class VirtualNetwork:
         """See `Transport`."""
         total = size + FRAMING + len(topic) + 2
         for subscription in self._subscribers(node, topic):
-            if subscription.joined:
+            if not subscription.joined:
+                continue
+            if subscription.connection.peer.send(payload, total):
                 self.traffic(self.clock.now, node, subscription.node, total)
-                subscription.connection.to_opener.send(payload, total)
+            else:
+                self.dropped += 1
 
     def ready(self, node: str, topic: str, size: int) -> bool:
-        """See `Transport`: the link's queue shows what still waits."""
+        """See `Transport`: nothing else waits in the connection or before the link."""
         for subscription in self._subscribers(node, topic):
             if subscription.joined:
-                return subscription.downlink.backlog_bytes(self.clock.now) < size
+                return subscription.connection.peer.backlog_bytes(self.clock.now) < size
         return False
 
     def subscribe(
         self, node: str, publisher: str, topic: str, handler: Callable[[Any], object]
     ) -> VirtualSubscription:
         """See `Transport`."""
-        subscription = VirtualSubscription(self, node, publisher, topic, handler)
-        self._subscriptions[publisher].append(subscription)
-        self._wanted.clear()
-        if publisher not in self._gone:
-            subscription.open()
-        return subscription
+        return VirtualSubscription(self, node, publisher, topic, handler)
 
     def leave(self, node: str) -> None:
-        """A node crashes: it takes no requests, and its connections are gone."""
+        """A node crashes: it takes no requests, and the connections to it are gone."""
         self._gone.add(node)
-        for subscription in self._subscriptions[node]:
-            subscription.drop()
+        for client in self._clients[node]:
+            client.drop()
 
     def come_back(self, node: str) -> None:
-        """The node is there again; those who had subscribed to it connect anew."""
-        if node not in self._gone:
-            return  # a second connection would be opened over the first
-        self._gone.discard(node)
-        for subscription in self._subscriptions[node]:
-            subscription.open()
+        """The node is there again; those who want something of it connect anew, a little later."""
+        if node in self._gone:
+            self._gone.discard(node)
+            for client in self._clients[node]:
+                self.clock.call_after(RECONNECT, client.reopen)
 
-    def forget(self, subscription: VirtualSubscription) -> None:
-        """A subscription is closed."""
-        known = self._subscriptions[subscription.publisher]
-        if subscription in known:
-            known.remove(subscription)
-            self._wanted.clear()
+    def remember(self, client: VirtualClient) -> None:
+        """Somebody wants something of a node."""
+        self._clients[client.peer][client] = None
+        self._wanted.clear()
+
+    def forget(self, client: VirtualClient) -> None:
+        """Somebody wants nothing more of a node."""
+        self._clients[client.peer].pop(client, None)
+        self._wanted.clear()
+
+    def is_wanted(self, client: VirtualClient) -> bool:
+        """Whether somebody still wants something of a node, and that is there."""
+        return client.peer not in self._gone and client in self._clients[client.peer]
 
     def _subscribers(self, node: str, topic: str) -> list[VirtualSubscription]:
         """Who wants a topic, joined or not: found out anew when somebody has come or gone."""
         known = self._wanted.get((node, topic))
         if known is None:
-            known = [s for s in self._subscriptions[node] if topic.startswith(s.topic)]
+            known = [
+                client
+                for client in self._clients[node]
+                if isinstance(client, VirtualSubscription) and topic.startswith(client.topic)
+            ]
             self._wanted[node, topic] = known
         return known
 
 
-class VirtualWire:
-    """One connection to a service; requests wait until it is open."""
+class VirtualClient:
+    """Who connects to a peer, and connects anew when the connection broke.
+
+    Attributes:
+        connection: The present one.
+    """
+
+    def __init__(self, network: VirtualNetwork, node: str, peer: str) -> None:
+        self._network, self.node, self.peer = network, node, peer
+        self.connection = self._new_connection()
+        self._is_up = False
+        network.remember(self)
+        self._open()
+
+    def drop(self) -> None:
+        """The connection breaks; what was under way is lost."""
+        self.connection.drop()
+        self._is_up = False
+
+    def reopen(self) -> None:
+        """Connect anew, unless that has been done, or nobody wants it any more."""
+        if not self._is_up:
+            self.connection = self._new_connection()
+            self._open()
+
+    def close(self) -> None:
+        """See `Wire` and `Subscription`."""
+        self.connection.close()
+        self._network.forget(self)
+
+    def _open(self) -> None:
+        if self._network.is_wanted(self):
+            self._is_up = True
+            self.connection.open(self._opened)
+
+    def _opened(self) -> None:
+        raise NotImplementedError
+
+    def _new_connection(self) -> AnyConnection:
+        raise NotImplementedError
+
+
+class VirtualWire(VirtualClient):
+    """One connection to a service; requests wait until it is open and has room."""
 
     def __init__(self, network: VirtualNetwork, node: str, peer: str, on_reply: OnReply) -> None:
-        self._network, self._node, self._peer = network, node, peer
-        out, back = network.links(node, peer)
-        self._connection = Connection(
-            network.clock, out, back, self._at_peer, lambda payload: on_reply(*payload)
-        )
-        self._waiting: list[tuple[int, bytes]] | None = []
-        self._connection.open(self._opened)
+        self._waiting: deque[tuple[int, bytes]] = deque()
+        self._on_reply, self._is_open = on_reply, False
+        super().__init__(network, node, peer)
 
     def send(self, tag: int, data: bytes) -> None:
         """See `Wire`."""
-        if self._waiting is None:
-            self._transmit(tag, data)
-        else:
-            self._waiting.append((tag, data))
+        self._waiting.append((tag, data))
+        self._go_on()
 
-    def close(self) -> None:
-        """See `Wire`: a request that has arrived is executed, its reply is dropped."""
-        self._connection.close()
+    def drop(self) -> None:
+        """See `VirtualClient`; what has not left the pipe goes over the next connection."""
+        super().drop()
+        self._is_open = False
+        if isinstance(self.connection, ZmtpConnection):
+            kept = [payload for payload, _ in self.connection.opener.pipe]
+            self._waiting.extendleft(reversed(kept))
 
     def _opened(self) -> None:
-        waiting, self._waiting = self._waiting or [], None
-        for tag, data in waiting:
-            self._transmit(tag, data)
+        self._is_open = True
+        if isinstance(self.connection, ZmtpConnection):
+            self.connection.opener.pipe.on_room = self._go_on
+        self._go_on()
 
-    def _transmit(self, tag: int, data: bytes) -> None:
-        size = len(data) + FRAMING
-        self._network.traffic(self._network.clock.now, self._node, self._peer, size)
-        self._connection.to_peer.send((tag, data), size)
+    def _go_on(self) -> None:
+        """Send what waits, as far as there is room."""
+        while self._is_open and self._waiting:
+            tag, data = self._waiting[0]
+            size = len(data) + FRAMING
+            if not self.connection.opener.send((tag, data), size):
+                return
+            self._waiting.popleft()
+            self._network.traffic(self._network.clock.now, self.node, self.peer, size)
 
-    def _at_peer(self, payload: tuple[int, bytes]) -> None:
-        """A request has reached the peer: hand it to the service there."""
-        tag, data = payload
-        service = self._network.service(self._peer)
-        if service is not None:
-            service(Request(data, lambda reply: self._answer(tag, reply)))
+    def _new_connection(self) -> AnyConnection:
+        """A reply goes back over the connection that its request came by, or nowhere."""
+        network = self._network
 
-    def _answer(self, tag: int, reply: bytes) -> None:
-        if self._connection.to_opener.closed:
-            return
+        def at_peer(payload: tuple[int, bytes]) -> None:
+            tag, data = payload
+            service = network.service(self.peer)
+            if service is not None:
+                service(Request(data, lambda reply: self._answer(made, tag, reply)))
+
+        made = network.connector.connect(
+            network.clock,
+            network.links(self.node, self.peer),
+            at_peer,
+            lambda payload: self._on_reply(*payload),
+        )
+        return made
+
+    def _answer(self, connection: AnyConnection, tag: int, reply: bytes) -> None:
         size = len(reply) + FRAMING
-        self._network.traffic(self._network.clock.now, self._peer, self._node, size)
-        self._connection.to_opener.send((tag, reply), size)
+        if connection.peer.send((tag, reply), size):
+            self._network.traffic(self._network.clock.now, self.peer, self.node, size)
 
 
-class VirtualSubscription:
+class VirtualSubscription(VirtualClient):
     """A SUB socket: opens a connection to the publisher and says what it wants.
 
     Attributes:
         joined: Whether the publisher knows of it by now.
-        downlink: Carries what is published to it.
     """
 
     def __init__(
@@ -173,32 +247,37 @@ class VirtualSubscription:
         topic: str,
         handler: Callable[[Any], object],
     ) -> None:
-        self._network, self._handler = network, handler
-        self.node, self.publisher, self.topic = node, publisher, topic
-        self.connection = self._new_connection()
-        self.joined = False
+        self.topic, self._handler, self.joined = topic, handler, False
+        super().__init__(network, node, publisher)
 
-    def open(self) -> None:
-        """Shake hands, then subscribe."""
-        self.connection = self._new_connection()
-        self.connection.open(self._subscribe)
+    def pause(self) -> None:
+        """See `Subscription`."""
+        self.connection.opener.pause()
+
+    def resume(self) -> None:
+        """See `Subscription`."""
+        self.connection.opener.resume()
 
     def drop(self) -> None:
-        """The connection breaks; what was under way is lost."""
-        self.connection.close()
+        """See `VirtualClient`."""
+        super().drop()
         self.joined = False
 
-    def close(self) -> None:
-        """See `Subscription`."""
-        self.drop()
-        self._network.forget(self)
-
-    def _new_connection(self) -> Connection:
-        out, self.downlink = self._network.links(self.node, self.publisher)
-        return Connection(self._network.clock, out, self.downlink, self._joined, self._handler)
-
-    def _subscribe(self) -> None:
-        self.connection.to_peer.send(self.topic, len(self.topic) + 1)
+    def _opened(self) -> None:
+        """Subscribe; again and again where that may get lost."""
+        connection = self.connection
+        if connection.opener.send(self.topic, len(self.topic) + 1) and not connection.keeps:
+            self._network.clock.call_after(SUBSCRIBE_AGAIN, self._opened)
 
     def _joined(self, _: object) -> None:
         self.joined = True
+
+    def _new_connection(self) -> AnyConnection:
+        network = self._network
+        return network.connector.connect(
+            network.clock,
+            network.links(self.node, self.peer),
+            self._joined,
+            self._handler,
+            publishes=True,
+        )

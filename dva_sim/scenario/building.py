@@ -48,13 +48,9 @@ def _complete(scenario: Scenario, error: Fail) -> Scenario:
     check_phone(phone_profile(scenario, error), error)
     _check_draughts(scenario, error)
     processing = {profile.processing_s for profile in robot_profiles(scenario)}
-    longest = scenario.robot.processing_s
-    if longest is None:
-        longest = max(processing, default=0.0)
-        if len(processing) == 1:
-            robot = scenario.robot.model_copy(update={"processing_s": longest})
-            scenario = scenario.model_copy(update={"robot": robot})
-    _check_timeout(scenario, longest, error)
+    if scenario.robot.processing_s is None and len(processing) == 1:
+        robot = scenario.robot.model_copy(update={"processing_s": processing.pop()})
+        scenario = scenario.model_copy(update={"robot": robot})
     return scenario
 
 
@@ -78,15 +74,3 @@ def _check_draughts(scenario: Scenario, error: Fail) -> None:
                     problem = f"{end} of a draught ({x:g}, {y:g}) is not on the site, which is "
                     extent = f"from ({west:g}, {south:g}) to ({east:g}, {north:g})"
                     raise error(problem + extent, ("events", number, "hazard"))
-
-
-def _check_timeout(scenario: Scenario, processing: float, error: Fail) -> None:
-    """Below four round trips a retry never gets through: the socket opens anew each time."""
-    timeout = scenario.command.timeout_s
-    needed = 4 * scenario.link.slow_round_trip() + processing
-    if scenario.robot.count and timeout <= needed:
-        problem = (
-            f"command.timeout_s {timeout:g} s should be above four round trips and the "
-            f"processing time ({needed:g} s), or link.delay_s be shorter"
-        )
-        raise error(problem, ("command", "timeout_s"))

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from dva_sim.agents.sensors import SensorConfig
+from dva_sim.agents.service import Service
 from dva_sim.config import Config
 from dva_sim.errors import ConfigError
 from dva_sim.worlds.hazards import make_hazard
@@ -41,14 +42,15 @@ class RobotConfig(Config):
 
     Attributes:
         profile: One for all, or a list: the first robot has the first, and so on in turn.
-        processing_s: Time a message takes a robot's computer; left out: as its profile says.
+        processing_s: Time a message takes a robot's computer, a number or a law such as
+            `{law: gamma, mean_s: 0.2, cv: 0.5, first_s: 2}`; left out: as its profile says.
         sensors: What they carry; left out: as their profile says.
         charge: Share of the battery's capacity that they begin with.
     """
 
     profile: str | Annotated[tuple[str, ...], Field(min_length=1)] = "servrobot"
     count: Annotated[int, Field(ge=0, le=1000)] = 1
-    processing_s: Annotated[float, Field(ge=0, le=10)] | None = None
+    processing_s: Service | None = None
     sensors: Annotated[tuple[SensorConfig, ...], Field(max_length=16)] | None = None
     charge: Annotated[float, Field(gt=0, le=1)] = 1.0
     watchdog_s: Annotated[float, Field(gt=0, le=60)] = 3.0

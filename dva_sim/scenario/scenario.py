@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from dva_sim.config import Config
+from dva_sim.network.connecting import Depth, TransportKind, ZeromqConfig
 from dva_sim.network.link import LinkConfig
 from dva_sim.scenario.parts import (
     BystanderConfig,
@@ -30,6 +31,9 @@ class Scenario(Config):
         control: How operators use robots. `direct`: they close the loop over the link.
             `coordinated`: the robot also watches where it drives, and slows by itself.
             `supervisory`: they name the goal and judge the picture, the robot drives alone.
+        transport: What carries messages: ZeroMQ over TCP, or datagrams.
+        network_depth: How ZeroMQ over TCP is modelled: by whole messages, exact where nothing
+            is lost or piles up; by TCP segments; or as each link asks for.
     """
 
     model: Literal["full"] = "full"
@@ -43,6 +47,9 @@ class Scenario(Config):
     pattern: Literal["req-rep", "pipelined", "pub-sub", "latest-wins"] = "latest-wins"
     phone: PhoneConfig = PhoneConfig()
     command: CommandConfig = CommandConfig()
+    transport: TransportKind = "zeromq"
+    zeromq: ZeromqConfig = ZeromqConfig()
+    network_depth: Depth = "auto"
     link: LinkConfig = LinkConfig()
     camera: CameraConfig = CameraConfig()
     events: Annotated[tuple[EventConfig, ...], Field(min_length=1)] = (EventConfig(kind="fire"),)

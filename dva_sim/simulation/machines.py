@@ -11,6 +11,7 @@ from dva_sim.agents.modes import Limits, RobotController
 from dva_sim.agents.profile import RobotProfile
 from dva_sim.agents.robot import FRAME, RobotAgent, RobotSetup
 from dva_sim.agents.sensors import make_ports, sources_of
+from dva_sim.agents.service import service_times
 from dva_sim.clock import Clock
 from dva_sim.recorder import DriveLog
 from dva_sim.simulation.names import DVA
@@ -84,10 +85,11 @@ class Machines:
         camera, robot = scenario.camera, scenario.robot
         angle = math.radians(camera.field_of_view_deg)
         sources = sources_of(self._world, body, self._around, self._lidar, power.share)
+        processing = profile.processing_s if robot.processing_s is None else robot.processing_s
         configs = profile.sensors if robot.sensors is None else robot.sensors
         return RobotSetup(
             scenario.pattern,
-            profile.processing_s if robot.processing_s is None else robot.processing_s,
+            service_times(processing, stage.streams.fresh(f"{body.name}/processing")),
             camera.rate_hz,
             camera.frame_bytes,
             View(angle, camera.range_m, stage.planner.line_of_sight, self._smoke),
@@ -98,6 +100,8 @@ class Machines:
             guarded=scenario.control == "coordinated",
             encode=camera.encode_s,
             charge=power.share,
+            conflates=scenario.zeromq.conflates_receiver,
+            limit=scenario.zeromq.high_water_mark,
         )
 
     def _smoke(self, a: tuple[float, float], b: tuple[float, float]) -> float:

@@ -56,6 +56,8 @@ class Recording:
         duration: How long the run lasted [s].
         people: What became of the people on foot.
         contained: When incidents were dealt with [s], by their place in `incidents`.
+        depth: How the network was modelled: `message`, `segment` (where any connection was), or
+            `datagram`.
     """
 
     scenario: Scenario
@@ -71,6 +73,7 @@ class Recording:
     duration: float
     people: list[PersonLog] = field(default_factory=list)
     contained: dict[int, float] = field(default_factory=dict)
+    depth: str = "message"
 
     def event_of(self, number: int) -> Event | None:
         """The DVA's event about incident `number`, if it knows of it."""

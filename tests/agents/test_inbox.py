@@ -19,7 +19,7 @@ class Bench:
 
     def __init__(self, processing: float = 0.05) -> None:
         self.clock, self.done = Clock(), list[bytes]()
-        self.inbox = Inbox(self.clock, processing, self._handle, latest_wins=True)
+        self.inbox = Inbox(self.clock, lambda: processing, self._handle, latest_wins=True)
 
     def _handle(self, letter: Letter) -> None:
         self.done.append(letter.data)

@@ -7,7 +7,14 @@ from collections.abc import Iterator
 import pytest
 from transports import GUARD, NODES, SocketWorld, VirtualWorld, World
 
+from dva_sim.network.connecting import Connector
 from dva_sim.network.keys import KeyRing, create_keys
+
+VIRTUAL = {
+    "virtual messages": lambda: Connector(depth="message"),
+    "virtual segments": lambda: Connector(depth="segment"),
+    "virtual datagrams": lambda: Connector("datagrams"),
+}
 
 
 @pytest.fixture(scope="session")
@@ -17,7 +24,7 @@ def ring(tmp_path_factory: pytest.TempPathFactory) -> KeyRing:
     return KeyRing(folder)
 
 
-@pytest.fixture(params=["virtual", "sockets", "sockets with keys"])
+@pytest.fixture(params=[*VIRTUAL, "sockets", "sockets with keys"])
 def world(request: pytest.FixtureRequest) -> Iterator[World]:
     made = _world(request)
     yield made
@@ -32,7 +39,8 @@ def sockets(request: pytest.FixtureRequest) -> Iterator[SocketWorld]:
 
 
 def _world(request: pytest.FixtureRequest) -> World:
-    return VirtualWorld() if request.param == "virtual" else SocketWorld(_ring(request))
+    make = VIRTUAL.get(request.param)
+    return VirtualWorld(make()) if make else SocketWorld(_ring(request))
 
 
 def _ring(request: pytest.FixtureRequest) -> KeyRing | None:

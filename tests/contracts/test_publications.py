@@ -212,7 +212,7 @@ class SlowRobot:
 
     def __init__(self, world: World, latest_wins: bool) -> None:
         self.done: list[bytes] = []
-        self.inbox = Inbox(world.clock, 0.02, self._handle, latest_wins)
+        self.inbox = Inbox(world.clock, lambda: 0.02, self._handle, latest_wins)
         self.listener = Listener(world, "robot|", self.inbox.published)
         self.listener.await_a_mark()
         world.serve(ROBOT, self.inbox.request)

@@ -72,6 +72,11 @@ class TcpEndpoint:
         return int(in_order) - self._receiver.read_to
 
     @property
+    def unsent(self) -> int:
+        """Bytes written that were never put on the link [B]."""
+        return self.sender.total - self.sender.next
+
+    @property
     def window_edge(self) -> int:
         """First byte that this end has no room for, as first announced."""
         return self._receiver.edge

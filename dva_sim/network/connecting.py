@@ -1,0 +1,156 @@
+"""Which kind of connection joins two nodes: ZeroMQ at one of two depths, or datagrams."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from dva_sim.clock import Clock
+from dva_sim.config import Config
+from dva_sim.network.datagrams import DatagramConnection
+from dva_sim.network.link import Link
+from dva_sim.network.pipes import HIGH_WATER_MARK
+from dva_sim.network.stream import Connection
+from dva_sim.network.tcp import TcpOptions
+from dva_sim.network.zmtp import ZmtpConnection, ZmtpOptions
+
+TransportKind = Literal["zeromq", "datagrams"]
+Depth = Literal["auto", "message", "segment"]
+AnyConnection = Connection | ZmtpConnection | DatagramConnection
+Deliver = Callable[[Any], object]
+
+BUSY = 0.8  # share of a link's rate up to which nothing piles up before it; assumed
+
+_Buffer = Annotated[int, Field(ge=2_048, le=100_000_000)] | None
+
+
+class ZeromqConfig(Config):
+    """What is set on every ZeroMQ socket.
+
+    Attributes:
+        high_water_mark: Messages that a pipe holds, at both ends.
+        send_buffer_bytes: Of TCP (`ZMQ_SNDBUF`); left out: as large as the kernel finds fit.
+        receive_buffer_bytes: Of TCP (`ZMQ_RCVBUF`); left out: likewise.
+        conflate: Which end keeps only the newest of what is published and waits there
+            (`ZMQ_CONFLATE`).
+    """
+
+    high_water_mark: Annotated[int, Field(ge=1, le=1_000_000)] = HIGH_WATER_MARK
+    send_buffer_bytes: _Buffer = None
+    receive_buffer_bytes: _Buffer = None
+    conflate: Literal["none", "publisher", "subscriber", "both"] = "none"
+
+    @property
+    def conflates_sender(self) -> bool:
+        """Whether publishers keep only the newest message for each subscriber."""
+        return self.conflate in ("publisher", "both")
+
+    @property
+    def conflates_receiver(self) -> bool:
+        """Whether subscribers keep only the newest message."""
+        return self.conflate in ("subscriber", "both")
+
+    @property
+    def is_bounded(self) -> bool:
+        """Whether something may be full, or replaced, before it usually is."""
+        buffers = self.send_buffer_bytes, self.receive_buffer_bytes
+        set_by_hand = self.high_water_mark != HIGH_WATER_MARK or buffers != (None, None)
+        return set_by_hand or self.conflates_sender
+
+
+@dataclass(frozen=True)
+class Load:
+    """What one direction of a link is offered at most.
+
+    Attributes:
+        rate_bps: In the long run, with all headers [bit/s].
+        burst: At once [B].
+    """
+
+    rate_bps: float = 0.0
+    burst: int = 0
+
+
+class Connector:
+    """Makes the connections of a network.
+
+    With depth `auto` a connection is modelled message by message where that is exact, and
+    segment by segment where anything might be lost, come out of turn or pile up; see
+    `is_calm`.
+
+    Args:
+        transport: `zeromq` or `datagrams`.
+        depth: `message`, `segment`, or `auto`; datagrams have but one.
+        zeromq: Options of the sockets.
+        load: What a link is offered.
+
+    Attributes:
+        deepest: The depth of the connections so far: `message`, `segment` as soon as one needed
+            it, or `datagram`.
+    """
+
+    def __init__(
+        self,
+        transport: TransportKind = "zeromq",
+        depth: Depth = "auto",
+        zeromq: ZeromqConfig | None = None,
+        load: Load | None = None,
+    ) -> None:
+        self._transport, self._depth = transport, depth
+        self._zeromq, self._load = zeromq or ZeromqConfig(), load or Load()
+        self.deepest = "datagram" if transport == "datagrams" else "message"
+
+    def connect(
+        self,
+        clock: Clock,
+        links: tuple[Link, Link],
+        at_peer: Deliver,
+        at_opener: Deliver,
+        publishes: bool = False,
+    ) -> AnyConnection:
+        """A connection that is still to be opened.
+
+        Args:
+            clock: The run's clock.
+            links: From the opener, and to it.
+            at_peer: Takes what the opener sends.
+            at_opener: Takes what the peer sends.
+            publishes: Whether the peer publishes to the opener.
+        """
+        ends = clock, *links, at_peer, at_opener
+        depth = self.depth(*links)
+        if depth == "datagram":
+            return DatagramConnection(*ends)
+        if depth == "message":
+            return Connection(*ends)
+        self.deepest = depth
+        conflate = publishes and self._zeromq.conflates_sender
+        return ZmtpConnection(*ends, self._options(), self._options(conflate))
+
+    def depth(self, out: Link, back: Link) -> str:
+        """How a connection over two links is modelled."""
+        if self._transport == "datagrams":
+            return "datagram"
+        if self._depth != "auto":
+            return self._depth
+        calm = is_calm(out, self._load) and is_calm(back, self._load)
+        return "message" if calm and not self._zeromq.is_bounded else "segment"
+
+    def _options(self, conflate: bool = False) -> ZmtpOptions:
+        zeromq = self._zeromq
+        tcp = TcpOptions(zeromq.send_buffer_bytes, zeromq.receive_buffer_bytes)
+        return ZmtpOptions(zeromq.high_water_mark, conflate, tcp)
+
+
+def is_calm(link: Link, load: Load) -> bool:
+    """Whether messages over a link fare as their segments would under TCP.
+
+    Nothing may get lost, late by chance or out of turn by itself; the rate must be known and
+    not be used up by more than four fifths; and twice the largest burst must fit into the queue.
+    """
+    if not link.is_ideal() or link.rate_bps is None:
+        return False
+    return load.rate_bps <= BUSY * link.rate_bps and 2 * load.burst <= link.room

@@ -1,0 +1,74 @@
+"""How long a robot's computer takes: laws with their mean and spread, and a cold start."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dva_sim import scenario as scenarios
+from dva_sim.agents.service import ServiceLaw, mean_of, service_times
+from dva_sim.errors import ConfigError
+
+
+def draws(count: int = 40_000, **law: Any) -> np.ndarray:
+    times = service_times(ServiceLaw(**law), np.random.default_rng(1))
+    return np.array([times() for _ in range(count)])
+
+
+@pytest.mark.parametrize(
+    ("law", "cv"),
+    [
+        ({"law": "constant", "mean_s": 0.2}, 0.0),
+        ({"law": "exponential", "mean_s": 0.2}, 1.0),
+        ({"law": "lognormal", "mean_s": 0.2, "cv": 0.5}, 0.5),
+        ({"law": "gamma", "mean_s": 0.2, "cv": 2.0}, 2.0),
+    ],
+)
+def test_a_law_has_the_mean_and_the_spread_that_it_names(law: dict[str, Any], cv: float) -> None:
+    times = draws(**law)
+    assert times.min() >= 0.0
+    assert times.mean() == pytest.approx(0.2, rel=0.03)
+    assert times.std() == pytest.approx(0.2 * cv, rel=0.06)
+
+
+def test_a_cold_start_makes_the_first_message_take_longer_and_only_that() -> None:
+    times = draws(4, law="constant", mean_s=0.2, first_s=3.0)
+    assert times.tolist() == [3.0, 0.2, 0.2, 0.2]
+
+
+def test_a_number_is_always_the_same() -> None:
+    times = service_times(0.05, np.random.default_rng(1))
+    assert [times(), times()] == [0.05, 0.05]
+    assert mean_of(0.05) == 0.05
+
+
+@pytest.mark.parametrize(
+    ("wrong", "told"),
+    [
+        ({"law": "gamma", "mean_s": 1}, "the gamma law needs cv"),
+        ({"law": "exponential", "mean_s": 1, "cv": 1}, "the exponential law has no cv of its own"),
+        ({"law": "normal", "mean_s": 1}, "robot.processing_s.law: input should be 'constant', "),
+        ({"law": "constant", "mean_s": -1}, "robot.processing_s.mean_s: .* greater than 0"),
+        (
+            {"law": "constant", "mean_s": 1, "c": 1},
+            "unknown key 'robot.processing_s.c'; did you mean 'cv'",
+        ),
+        ("long", "robot.processing_s: input should be a valid number"),
+        (-1, "robot.processing_s: input should be greater than or equal to 0"),
+    ],
+)
+def test_a_law_that_cannot_be_is_refused(wrong: object, told: str) -> None:
+    with pytest.raises(ConfigError, match=told):
+        scenarios.build({}, {"robot.processing_s": wrong})
+
+
+def test_robots_draw_their_own_times_the_same_for_the_same_seed() -> None:
+    law = ServiceLaw(law="gamma", mean_s=0.2, cv=0.5)
+    first, again, other = (
+        list(itertools.islice(iter(service_times(law, np.random.default_rng(seed)), None), 5))
+        for seed in (1, 1, 2)
+    )
+    assert first == again != other
