@@ -232,12 +232,18 @@ def _above_least(least: float, delay: float) -> None:
         raise ValueError(f"delay_law.least_s {least:g} should be below delay_s {delay:g}")
 
 
-def _name_is_law(value: Any) -> Any:
+def _constant_by_name(value: Any) -> Any:
+    """The one law without keys of its own needs no mapping."""
+    if isinstance(value, str) and value != "constant":
+        raise ValueError("a law is a mapping, such as {law: gamma, sd_s: 0.02}, or constant")
     return {"law": value} if isinstance(value, str) else value
 
 
 _Any = Annotated[
     Constant | Normal | Gamma | ShiftedExponential | Empirical, Field(discriminator="law")
 ]
-DelayLaw = Annotated[_Any, BeforeValidator(_name_is_law, json_schema_input_type=str | _Any)]
-"""A law in a configuration file: a mapping with the key `law`, or the name alone."""
+_ByName = Literal["constant"]
+DelayLaw = Annotated[
+    _Any, BeforeValidator(_constant_by_name, json_schema_input_type=_ByName | _Any)
+]
+"""A law in a configuration file: a mapping with the key `law`, or the name `constant`."""

@@ -28,7 +28,7 @@ class Replay:
     def __init__(self, log: DelayLog, share: float, here: Flags, offset: float) -> None:
         times = log.times - log.times[0]
         self._period = period_of(log)
-        self._ends = (0.5 * (times[1:] + times[:-1])).tolist()
+        self._ends = (0.5 * (times + np.append(times[1:], self._period))).tolist()
         self._delays = _filled(share * log.delays).tolist()
         self._lost = (np.isnan(log.delays) & here).tolist()
         self._offset = offset
@@ -42,7 +42,8 @@ class Replay:
         return bool(self._lost[self._at(now)])
 
     def _at(self, now: float) -> int:
-        return bisect_right(self._ends, (now + self._offset) % self._period)
+        index = bisect_right(self._ends, (now + self._offset) % self._period)
+        return index if index < len(self._ends) else 0  # nearer to where the log begins anew
 
 
 def period_of(log: DelayLog) -> float:

@@ -1,0 +1,106 @@
+"""Queues in bytes and in packets, per direction; what a link says of itself."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from dva_sim.config import validate
+from dva_sim.errors import ConfigError
+from dva_sim.network.link import Link, LinkConfig
+from dva_sim.network.radio import make_link
+from dva_sim.streams import Streams
+
+
+def link(direction: Any = "up", **config: Any) -> Link:
+    return make_link(LinkConfig(**config), direction, Streams(1), "link")
+
+
+def test_a_queue_may_count_packets_that_wait_beside_the_one_under_way() -> None:
+    line = link(rate_bps=8e3, queue_packets=2)
+    assert [line.carry(0.0, 1000) for _ in range(4)] == [1.0, 2.0, 3.0, None]
+    assert line.carry(0.9, 10) is None
+    assert line.carry(1.0, 10) == pytest.approx(3.01)  # one has left
+    assert (line.offered, line.dropped, line.lost) == (6, 2, 0)
+    assert line.backlog_bytes(1.0) == pytest.approx(2010)
+
+
+def test_packets_count_whatever_their_size() -> None:
+    small, large = link(rate_bps=8e3, queue_packets=100), link(rate_bps=8e3, queue_packets=100)
+    for line, size in ((small, 40), (large, 9000)):
+        assert sum(line.carry(0.0, size) is not None for _ in range(150)) == 101
+
+
+def test_a_queue_of_packets_before_a_recorded_link(tmp_path: Any) -> None:
+    path = tmp_path / "slow.up"
+    path.write_text("1000\n2000\n")
+    line = link(trace_up=str(path), queue_packets=3)
+    assert [line.carry(0.0, 1500) is None for _ in range(6)] == [False] * 4 + [True] * 2
+
+
+def test_a_train_does_not_jump_a_queue_that_counts_packets() -> None:
+    line = link(queue_packets=5)
+    assert line.carry_train(0.0, 3, 3000) is None
+    assert line.offered == 0
+
+
+def test_each_direction_may_have_its_own_rate_and_queue() -> None:
+    config = {
+        "rate_bps": 8e6,
+        "queue_bytes": 5000,
+        "up": {"rate_bps": 8e3, "queue_packets": 1},
+        "down": {"queue_bytes": 3000},
+    }
+    up, down = link("up", **config), link("down", **config)
+    assert (up.rate_bps, down.rate_bps) == (8e3, 8e6)
+    assert [up.carry(0.0, 1000) for _ in range(3)] == [1.0, 2.0, None]
+    assert [down.carry(0.0, 1000) is None for _ in range(4)] == [False, False, False, True]
+
+
+def test_a_link_tells_its_rate_and_room(tmp_path: Any) -> None:
+    path = tmp_path / "a.up"
+    path.write_text("5\n")
+    plain, recorded = link(queue_bytes=9000), link(trace_up=str(path))
+    assert (plain.rate_bps, plain.room) == (20e6, 9000)
+    assert recorded.rate_bps is None
+    assert link(queue_packets=100).room == 4000  # as many bare TCP headers
+
+
+@pytest.mark.parametrize(
+    "config",
+    [
+        {"loss": 0.01},
+        {"delay_s": 0.1, "jitter_s": 0.01},
+        {"delay_s": 0.1, "delay_law": {"law": "gamma", "sd_s": 0.01}},
+        {"outages": [{"from_s": 1, "for_s": 1}]},
+        {"up": {"loss": 0.01}},
+    ],
+)
+def test_a_link_that_may_lose_or_spread_is_not_ideal(config: dict[str, Any]) -> None:
+    assert not link(**config).is_ideal()
+
+
+def test_a_link_is_ideal_whatever_its_delay_rate_and_queue() -> None:
+    assert link(delay_s=1.0, rate_bps=1e4, queue_packets=3).is_ideal()
+    assert link("down", up={"loss": 0.01}).is_ideal()
+    assert not make_link(LinkConfig(), "up", Streams(1), "x", lambda: None).is_ideal()
+
+
+def test_round_trips_that_few_exceed_are_known_of_both_directions(tmp_path: Any) -> None:
+    log = tmp_path / "a.log"
+    log.write_text("0 100\n1 300\n")
+    normal = {"law": "normal", "sd_s": 0.02}
+    for config, expected in (
+        ({"delay_s": 0.1, "jitter_s": 0.05}, 0.3),
+        ({"delay_s": 0.1, "delay_law": normal}, 0.28),
+        ({"delay_s": 0.1, "up": {"delay_s": 0.3}, "delay_law": normal}, 0.48),
+        ({"delay_log": str(log)}, 0.4),
+    ):
+        slow = validate(LinkConfig, config).slow_round_trip()
+        assert slow == pytest.approx(expected), config
+
+
+def test_what_no_queue_can_be_is_refused() -> None:
+    with pytest.raises(ConfigError, match="queue_packets: input should be greater than or equal"):
+        validate(LinkConfig, {"queue_packets": 0})
