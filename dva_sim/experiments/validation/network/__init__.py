@@ -1,0 +1,1 @@
+"""The network model beside real sockets: the same programs, predicted and measured."""
