@@ -55,7 +55,7 @@ class LinkConfig(Config):
         bursts: How losses come in bursts; left out, each comes by itself.
         rate_bps: Serialisation rate; without effect where a trace gives it.
         queue_bytes: Room in the drop-tail queue before the link.
-        queue_packets: Room in packets that wait beside the one being sent, in place of bytes.
+        queue_packets: Room in packets, the one being sent among them, in place of bytes.
         draws: Luck of packets sent in the same millisecond: `spread` evenly over what is
             possible, or `independent`, as real packets are.
         trace_up: Recorded packet opportunities towards the robot (Mahimahi form).

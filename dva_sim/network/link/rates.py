@@ -129,7 +129,7 @@ class TraceRate(Serialiser):
 
 
 class PacketQueue(Serialiser):
-    """A line with room for so many packets that wait beside the one on its way onto the link.
+    """A line with room for so many packets, the one on its way onto the link among them.
 
     Args:
         line: What gives the rate.
@@ -137,7 +137,7 @@ class PacketQueue(Serialiser):
     """
 
     def __init__(self, line: Serialiser, packets: int) -> None:
-        self._line, self._room = line, packets + 1
+        self._line, self._room = line, packets
         self._leaving: deque[float] = deque()
         self.rate_bps = line.rate_bps
 

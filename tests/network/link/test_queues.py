@@ -17,8 +17,8 @@ def link(direction: Any = "up", **config: Any) -> Link:
     return make_link(LinkConfig(**config), direction, Streams(1), "link")
 
 
-def test_a_queue_may_count_packets_that_wait_beside_the_one_under_way() -> None:
-    line = link(rate_bps=8e3, queue_packets=2)
+def test_a_queue_may_count_packets_with_the_one_under_way() -> None:
+    line = link(rate_bps=8e3, queue_packets=3)
     assert [line.carry(0.0, 1000) for _ in range(4)] == [1.0, 2.0, 3.0, None]
     assert line.carry(0.9, 10) is None
     assert line.carry(1.0, 10) == pytest.approx(3.01)  # one has left
@@ -29,13 +29,13 @@ def test_a_queue_may_count_packets_that_wait_beside_the_one_under_way() -> None:
 def test_packets_count_whatever_their_size() -> None:
     small, large = link(rate_bps=8e3, queue_packets=100), link(rate_bps=8e3, queue_packets=100)
     for line, size in ((small, 40), (large, 9000)):
-        assert sum(line.carry(0.0, size) is not None for _ in range(150)) == 101
+        assert sum(line.carry(0.0, size) is not None for _ in range(150)) == 100
 
 
 def test_a_queue_of_packets_before_a_recorded_link(tmp_path: Any) -> None:
     path = tmp_path / "slow.up"
     path.write_text("1000\n2000\n")
-    line = link(trace_up=str(path), queue_packets=3)
+    line = link(trace_up=str(path), queue_packets=4)
     assert [line.carry(0.0, 1500) is None for _ in range(6)] == [False] * 4 + [True] * 2
 
 
@@ -49,7 +49,7 @@ def test_each_direction_may_have_its_own_rate_and_queue() -> None:
     config = {
         "rate_bps": 8e6,
         "queue_bytes": 5000,
-        "up": {"rate_bps": 8e3, "queue_packets": 1},
+        "up": {"rate_bps": 8e3, "queue_packets": 2},
         "down": {"queue_bytes": 3000},
     }
     up, down = link("up", **config), link("down", **config)
