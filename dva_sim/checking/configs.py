@@ -23,6 +23,7 @@ from dva_sim.experiments.design import Cell
 from dva_sim.experiments.models import model_for, model_of
 from dva_sim.experiments.repeats import Bands
 from dva_sim.experiments.study import Study, load_study
+from dva_sim.experiments.transports import TransportScenario
 from dva_sim.experiments.tuned import Tuned
 from dva_sim.experiments.validation.dispatch.cases import CaseFile, load_cases
 from dva_sim.experiments.validation.operators.targets import SplitFile, TargetFile, load_split
@@ -82,7 +83,7 @@ def recognise(document: Document) -> Kind | None:
     """The kind that knows most of the keys; among equals, the one whose folder it lies in."""
     keys = document.data.keys() - {"description"}
     model = document.data.get("model")
-    others = {TimedScenario: "timed", TaskScenario: "task"}
+    others = {TimedScenario: "timed", TaskScenario: "task", TransportScenario: "transports"}
     kinds = [kind for kind in KINDS if others.get(kind.model, model) == model]
     shared = {kind.name: len(keys & kind.model.model_fields.keys()) for kind in kinds}
     likely = [kind for kind in kinds if shared[kind.name] == max(shared.values())]
@@ -229,6 +230,7 @@ KINDS: Final = (
     Kind("scenario", Scenario, "experiments/scenarios", _check_scenario),
     Kind("timed scenario", TimedScenario, "experiments/scenarios", _check_scenario),
     Kind("task", TaskScenario, "experiments/scenarios/tasks", _check_scenario),
+    Kind("transports", TransportScenario, "experiments/scenarios", _check_scenario),
     Kind("validation cases", CaseFile, "experiments/validation", _check_cases),
     Kind("targets", TargetFile, "experiments/validation", _check_model(TargetFile)),
     Kind("split", SplitFile, "experiments/validation", _check_split),

@@ -38,6 +38,7 @@ def _json_schema(kind: str) -> dict[str, Any]:
     from dva_sim.agents.tilt import AccelerometerPart, PhoneProfile
     from dva_sim.experiments.repeats import Bands
     from dva_sim.experiments.study import Study
+    from dva_sim.experiments.transports import TransportScenario
     from dva_sim.experiments.validation.dispatch.cases import CaseFile
     from dva_sim.scenario import Scenario
     from dva_sim.tasks import TaskScenario
@@ -46,7 +47,7 @@ def _json_schema(kind: str) -> dict[str, Any]:
 
     kinds: dict[str, Any] = {
         "study": Study,
-        "scenario": Scenario | TimedScenario | TaskScenario,
+        "scenario": Scenario | TimedScenario | TaskScenario | TransportScenario,
         "cases": CaseFile,
         "site": SiteFile,
         "agent": RobotProfile

@@ -29,6 +29,7 @@ from dva_sim.experiments import shifts
 from dva_sim.experiments import trials as tasks
 from dva_sim.experiments.models import model_of
 from dva_sim.experiments.pictures import Wanted
+from dva_sim.experiments.transports import TransportScenario, told
 from dva_sim.scenario import Scenario
 from dva_sim.simulation import Recording, simulate
 from dva_sim.tasks import TaskScenario
@@ -52,10 +53,13 @@ def episode(
     document = scenarios.load(name)
     changes = parse_changes(pairs)
     scenario = model_of(document).build(document, changes)
-    if isinstance(scenario, TimedScenario):
+    if isinstance(scenario, TimedScenario | TransportScenario):
         if pictures.any or side_by_side is not None:
-            raise ConfigError(f"{name} is a timed scenario: there is nothing to see or to send")
-        shifts.tell(scenario, seed, console)
+            raise ConfigError(f"{name} is a {scenario.model} scenario: there is nothing to see")
+        if isinstance(scenario, TransportScenario):
+            told.tell(scenario, seed, console)
+        else:
+            shifts.tell(scenario, seed, console)
         return
     if isinstance(scenario, TaskScenario):
         _task(name, scenario, seed, side_by_side, pictures)

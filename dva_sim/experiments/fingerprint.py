@@ -25,6 +25,7 @@ _CODE = (
     "streams.py",
     "experiments/episode.py",
     "experiments/metrics.py",
+    "experiments/transports",
     "experiments/workload.py",
 )
 _EDITED = ("agents", "protocol", "worlds")

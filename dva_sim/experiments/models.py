@@ -2,7 +2,8 @@
 
 `full`: bodies, cameras, persons with phones and every byte on the network. `timed`: travel and
 service times only, a thousand times faster; the DVA's core is the same in both. `task`: one
-person at a task of the literature, with the operators and hands of the full model.
+person at a task of the literature, with the operators and hands of the full model. `transports`:
+a session of teleoperation beside TCP flows on one congested link, and a drive over it.
 """
 
 from __future__ import annotations
@@ -12,13 +13,15 @@ from typing import Any, Protocol
 
 from dva_sim import scenario as scenarios
 from dva_sim.config import Document
+from dva_sim.experiments.transports import scenario as transports
+from dva_sim.experiments.transports.scenario import TransportScenario
 from dva_sim.scenario import Scenario
 from dva_sim.tasks import scenario as tasks
 from dva_sim.tasks.scenario import TaskScenario
 from dva_sim.timed import scenario as timed
 from dva_sim.timed.scenario import TimedScenario
 
-AnyScenario = Scenario | TimedScenario | TaskScenario
+AnyScenario = Scenario | TimedScenario | TaskScenario | TransportScenario
 Tables = dict[str, list[dict[str, Any]]]
 
 
@@ -187,4 +190,44 @@ class _Task:
         return {"runs": [run_row(trials)], "trials": trials}
 
 
-MODELS: dict[str, Model] = {"full": _Full(), "timed": _Timed(), "task": _Task()}
+class _Transports:
+    """A run is the network first, and then one drive of one person over it."""
+
+    def measures(self) -> tuple[str, ...]:
+        from dva_sim.experiments.transports.measures import MEASURES
+
+        return MEASURES
+
+    def build(self, source: Document, changes: Mapping[str, Any]) -> TransportScenario:
+        return transports.build(source, changes)
+
+    def set_by_study(self, seed: int) -> dict[str, Any]:
+        return {"operator.population_seed": seed}
+
+    def team(self, scenario: AnyScenario) -> int:
+        return 1
+
+    def played_by(self, scenario: AnyScenario, person: int) -> TransportScenario:
+        assert isinstance(scenario, TransportScenario)
+        operator = scenario.operator.model_copy(update={"person": person})
+        return scenario.model_copy(update={"operator": operator})
+
+    def rehearse(self, scenario: AnyScenario, seed: int) -> None:
+        from dva_sim.experiments.transports import rehearse
+
+        assert isinstance(scenario, TransportScenario)
+        rehearse(scenario)
+
+    def tables(self, scenario: AnyScenario, seed: int, with_tracks: bool) -> Tables:
+        from dva_sim.experiments.transports import simulate_transports
+
+        assert isinstance(scenario, TransportScenario)
+        return simulate_transports(scenario, seed)
+
+
+MODELS: dict[str, Model] = {
+    "full": _Full(),
+    "timed": _Timed(),
+    "task": _Task(),
+    "transports": _Transports(),
+}

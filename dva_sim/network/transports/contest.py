@@ -24,6 +24,7 @@ from dva_sim.network.transports.sessions import ends_at, open_session
 from dva_sim.network.transports.streams import Bulk
 from dva_sim.streams import Streams
 
+DRAIN_S = 5.0  # the last messages that count may still arrive; assumed
 Rate = Annotated[float, Field(gt=0, le=200)]
 Floats = NDArray[np.float64]
 
@@ -158,6 +159,7 @@ def play(config: ContestConfig, seed: int) -> Contest:
         name: [link.bytes - was for link, was in zip(some, before[name], strict=True)]
         for name, some in links.items()
     }
+    clock.run(until + DRAIN_S)
     return Contest(
         since=config.warm_up_s,
         until=until,
