@@ -58,7 +58,17 @@ class Stream:
         if self.closed or seq - self._next_delivered >= MAX_IN_FLIGHT:
             return False
         self._next_seq = seq + 1
-        self._transmit(seq, payload, size, 0)
+        clock = self._clock
+        now, packets = clock.now, -(-size // MSS)
+        arrival = self._forward.carry_train(now, packets, size + packets * HEADERS)
+        if arrival is None:
+            self._transmit(seq, payload, size, 0)
+            return True
+        self._measure(arrival - now + self._backward.delay)
+        if arrival < self._last_arrival:
+            arrival = self._last_arrival  # behind what had to be sent again
+        self._last_arrival = arrival
+        clock.call_at(arrival, self._arrive, seq, payload)
         return True
 
     def close(self) -> None:
@@ -70,10 +80,8 @@ class Stream:
         """Offer the message's packets to the link; those lost are offered again later."""
         if self.closed:
             return
-        now, packets, missing = self._clock.now, -(-size // MSS), 0
-        arrival = self._forward.carry_train(now, packets, size + packets * HEADERS)
-        if arrival is None:
-            arrival, missing = self._offer_each(now, size)
+        now = self._clock.now
+        arrival, missing = self._offer_each(now, size)
         if missing:
             self.retransmitted += 1
             wait = self._recovery_time(tries)
@@ -114,11 +122,12 @@ class Stream:
 
     def _measure(self, rtt: float) -> None:
         """RFC 6298, equations 2.2 and 2.3."""
-        if self._srtt is None:
+        srtt = self._srtt
+        if srtt is None:
             self._srtt, self._rttvar = rtt, rtt / 2
             return
-        self._rttvar += (abs(self._srtt - rtt) - self._rttvar) / 4
-        self._srtt += (rtt - self._srtt) / 8
+        self._rttvar += (abs(srtt - rtt) - self._rttvar) / 4
+        self._srtt = srtt + (rtt - srtt) / 8
 
     def _recovery_time(self, tries: int) -> float:
         """When a loss is mended: by the tail-loss probe first, then by the time-out, doubling."""

@@ -69,17 +69,17 @@ class VirtualNetwork:
         """See `Transport`."""
         total = size + FRAMING + len(topic) + 2
         for subscription in self._subscribers(node, topic):
-            if not subscription.joined:
-                continue
-            if subscription.connection.peer.send(payload, total):
-                self.traffic(self.clock.now, node, subscription.node, total)
-            else:
-                self.dropped += 1
+            send = subscription.send
+            if send is not None:
+                if send(payload, total):
+                    self.traffic(self.clock.now, node, subscription.node, total)
+                else:
+                    self.dropped += 1
 
     def ready(self, node: str, topic: str, size: int) -> bool:
         """See `Transport`: nothing else waits in the connection or before the link."""
         for subscription in self._subscribers(node, topic):
-            if subscription.joined:
+            if subscription.send is not None:
                 return subscription.connection.peer.backlog_bytes(self.clock.now) < size
         return False
 
@@ -236,7 +236,7 @@ class VirtualSubscription(VirtualClient):
     """A SUB socket: opens a connection to the publisher and says what it wants.
 
     Attributes:
-        joined: Whether the publisher knows of it by now.
+        send: Sends a publication of a size [B] to it; None until the publisher knows of it.
     """
 
     def __init__(
@@ -247,7 +247,8 @@ class VirtualSubscription(VirtualClient):
         topic: str,
         handler: Callable[[Any], object],
     ) -> None:
-        self.topic, self._handler, self.joined = topic, handler, False
+        self.topic, self._handler = topic, handler
+        self.send: Callable[[Any, int], bool] | None = None
         super().__init__(network, node, publisher)
 
     def pause(self) -> None:
@@ -261,7 +262,7 @@ class VirtualSubscription(VirtualClient):
     def drop(self) -> None:
         """See `VirtualClient`."""
         super().drop()
-        self.joined = False
+        self.send = None
 
     def _opened(self) -> None:
         """Subscribe; again and again where that may get lost."""
@@ -270,7 +271,7 @@ class VirtualSubscription(VirtualClient):
             self._network.clock.call_after(SUBSCRIBE_AGAIN, self._opened)
 
     def _joined(self, _: object) -> None:
-        self.joined = True
+        self.send = self.connection.peer.send
 
     def _new_connection(self) -> AnyConnection:
         network = self._network

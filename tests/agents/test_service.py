@@ -54,7 +54,7 @@ def test_a_number_is_always_the_same() -> None:
         ({"law": "constant", "mean_s": -1}, "robot.processing_s.mean_s: .* greater than 0"),
         (
             {"law": "constant", "mean_s": 1, "c": 1},
-            "unknown key 'robot.processing_s.c'; did you mean 'cv'",
+            "unknown key 'robot.processing_s.c'",
         ),
         ("long", "robot.processing_s: input should be a valid number"),
         (-1, "robot.processing_s: input should be greater than or equal to 0"),

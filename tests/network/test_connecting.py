@@ -1,0 +1,105 @@
+"""Which depth a connection gets: messages where that is exact, segments everywhere else."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from dva_sim import scenario as scenarios
+from dva_sim.errors import ConfigError
+from dva_sim.network.connecting import Connector, Load, ZeromqConfig, is_calm
+from dva_sim.network.link import ConstantRate, Link, LinkConfig
+from dva_sim.simulation import simulate
+from dva_sim.simulation.offered import load_of
+from dva_sim.streams import Streams
+
+LOAD = Load(rate_bps=1e6, burst=20_000)
+
+
+def link(**config: Any) -> Link:
+    settings = LinkConfig(**config)
+    return Link(settings, ConstantRate(settings.rate_bps), Streams(1), "l")
+
+
+def test_delay_alone_is_no_reason_for_segments() -> None:
+    assert is_calm(link(delay_s=0.5), LOAD)
+
+
+@pytest.mark.parametrize(
+    "config",
+    [
+        {"loss": 0.001},
+        {"delay_s": 0.1, "jitter_s": 0.01},
+        {"outages": [{"from_s": 10, "for_s": 1}]},
+        {"rate_bps": 1.2e6},
+        {"queue_bytes": 30_000},
+    ],
+    ids=["loss", "jitter", "an outage", "used up by more than four fifths", "a short queue"],
+)
+def test_what_may_lose_delay_by_chance_or_pile_up_takes_segments(config: dict[str, Any]) -> None:
+    assert not is_calm(link(**config), LOAD)
+    connector = Connector(load=LOAD)
+    assert connector.depth(link(), link()) == "message"
+    assert connector.depth(link(), link(**config)) == "segment"
+    assert connector.depth(link(**config), link()) == "segment"
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"high_water_mark": 10},
+        {"send_buffer_bytes": 4096},
+        {"receive_buffer_bytes": 4096},
+        {"conflate": "publisher"},
+    ],
+)
+def test_a_bound_that_is_set_takes_segments(options: dict[str, Any]) -> None:
+    connector = Connector(zeromq=ZeromqConfig(**options))
+    assert connector.depth(link(), link()) == "segment"
+
+
+def test_what_is_chosen_by_hand_is_taken() -> None:
+    for depth in ("message", "segment"):
+        connector = Connector(depth=depth)  # type: ignore[arg-type]
+        assert connector.depth(link(loss=0.1), link()) == depth
+        assert connector.depth(link(), link()) == depth
+    assert Connector("datagrams", "segment").depth(link(), link()) == "datagram"
+
+
+def test_the_usual_pictures_and_commands_use_a_twelfth_of_the_usual_link() -> None:
+    """10 pictures of 12,000 bytes and 30 messages a second, on 20 Mbit/s."""
+    load = load_of(scenarios.build({}))
+    assert load.rate_bps == 8 * (10 * (12_000 + 9 * 52) + 30 * 1000)
+    assert load.rate_bps / LinkConfig().rate_bps < 1 / 12
+    assert load.burst == 22_468
+
+
+@pytest.mark.parametrize(
+    ("changes", "depth"),
+    [
+        ({}, "message"),
+        ({"network_depth": "segment"}, "segment"),
+        ({"link.loss": 0.05}, "segment"),
+        ({"link.loss": 0.05, "network_depth": "message"}, "message"),
+        ({"transport": "datagrams"}, "datagram"),
+    ],
+)
+def test_a_run_says_what_it_used(changes: dict[str, Any], depth: str) -> None:
+    scenario = scenarios.build(scenarios.load("drive-to-event"), {"horizon_s": 8, **changes})
+    assert simulate(scenario, 1).depth == depth
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"zeromq.high_water_mark": 0}, "zeromq.high_water_mark"),
+        ({"zeromq.conflate": "robot"}, "'none', 'publisher', 'subscriber' or 'both'"),
+        ({"zeromq.sndbuf": 1}, "unknown key 'zeromq.sndbuf'"),
+        ({"transport": "udp"}, "'zeromq' or 'datagrams'"),
+        ({"network_depth": "packet"}, "'auto', 'message' or 'segment'"),
+    ],
+)
+def test_what_cannot_be_set_is_refused(changes: dict[str, Any], told: str) -> None:
+    with pytest.raises(ConfigError, match=told):
+        scenarios.build({}, changes)
