@@ -65,28 +65,37 @@ def measure_all(
         EmulatorError: the link cannot be set up, or fails again and again.
     """
     machine = _look_at_machine(link)
+    wanted = [(condition, seed) for seed in seeds for condition in conditions]
     with Table(path, (*_IDENTITY, *COLUMNS)) as table:
         table.sign(machine)
         known = {(row["cond_id"], row["seed"]) for row in table.rows}
-        wanted = [(condition, seed) for seed in seeds for condition in conditions]
         left = [(c, s) for c, s in wanted if (c.hash, str(s)) not in known]
-        failures: list[str] = []
-        in_a_row = 0
-        tell(Progress(len(wanted) - len(left), len(wanted), _time_of(left)))
-        for turn, (condition, seed) in enumerate(left, start=1):
-            cell, problem = f"{group}_{condition.label}_s{seed}", ""
-            try:
-                row = measure(condition, seed, link)
-                table.append(_identity(cell, group, seed, condition) | row)
-                in_a_row = 0
-            except EmulatorError as error:
-                problem = str(error)
-                failures.append(f"{cell}: {problem}")
-                in_a_row += 1
-                if in_a_row == _MOST_FAILURES:
-                    raise
-            done = len(wanted) - len(left) + turn - len(failures)
-            tell(Progress(done, len(wanted), _time_of(left[turn:]), cell, problem))
+        return _measure_left(left, len(wanted), table, tell, group, link)
+
+
+def _measure_left(
+    left: Sequence[tuple[Condition, int]],
+    total: int,
+    table: Table,
+    tell: Callable[[Progress], object],
+    group: str,
+    link: str,
+) -> list[str]:
+    """Measure what is not there yet; what failed, a line each."""
+    done, failures, in_a_row = total - len(left), [], 0
+    tell(Progress(done, total, _time_of(left)))
+    for turn, (condition, seed) in enumerate(left, start=1):
+        cell, problem = f"{group}_{condition.label}_s{seed}", ""
+        try:
+            row = measure(condition, seed, link)
+            table.append(_identity(cell, group, seed, condition) | row)
+            done, in_a_row = done + 1, 0
+        except EmulatorError as error:
+            problem, in_a_row = str(error), in_a_row + 1
+            failures.append(f"{cell}: {problem}")
+            if in_a_row == _MOST_FAILURES:
+                raise
+        tell(Progress(done, total, _time_of(left[turn:]), cell, problem))
     return failures
 
 

@@ -67,10 +67,10 @@ class Forwarder:
     def _take(self, tun: int) -> None:
         """Offer what waits in a device to its wire; what is not IPv4 is not forwarded."""
         wire, out = self._ways[tun]
-        with suppress(BlockingIOError):
+        with suppress(OSError):  # nothing waits, or the namespace has just ended
             for _ in range(_MOST_AT_ONCE):
                 packet = os.read(tun, _LARGEST)
-                if packet[0] >> 4 != _VERSION_4:
+                if not packet or packet[0] >> 4 != _VERSION_4:
                     continue
                 release = wire.offer(time.monotonic(), len(packet))
                 if release is not None:

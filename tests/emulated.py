@@ -1,0 +1,71 @@
+"""What tests of the emulated link need: whether there is one, and who lives because of it."""
+
+from __future__ import annotations
+
+import os
+import select
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from dva_sim.emulator.cell import Job
+from dva_sim.emulator.running import EmulatorError, run_job
+
+PATIENCE_S = 20.0
+
+
+@cache
+def missing(rootless: bool = False) -> str:
+    """Why there is no emulated link here; empty where there is one."""
+    try:
+        run_job(Job("nothing", rootless=rootless))
+    except EmulatorError as error:
+        return str(error)
+    return ""
+
+
+def need_link(rootless: bool = False) -> None:
+    """Skip the test where packets cannot be emulated, and say why."""
+    if missing(rootless):
+        pytest.skip(f"no emulated link here: {missing(rootless)}")
+
+
+def children(parent: int) -> list[int]:
+    """Processes that another one started and that live, oldest first."""
+    with suppress(FileNotFoundError):
+        text = Path(f"/proc/{parent}/task/{parent}/children").read_text()
+        return [int(word) for word in text.split()]
+    return []
+
+
+def wait_for_children(parent: int, count: int) -> list[int]:
+    """The processes that another one starts, as soon as there are so many."""
+    assert becomes(lambda: len(children(parent)) == count)
+    return children(parent)
+
+
+def networks(*processes: int) -> set[str]:
+    """The network namespaces of some processes."""
+    return {str(Path(f"/proc/{process}/ns/net").readlink()) for process in processes}
+
+
+def becomes(true: Callable[[], bool]) -> bool:
+    """Whether something becomes true before patience ends."""
+    limit = time.monotonic() + PATIENCE_S
+    while not true() and time.monotonic() < limit:
+        os.sched_yield()
+    return true()
+
+
+def all_end(handles: list[int]) -> bool:
+    """Whether the processes behind pidfds end before patience does; closes these."""
+    waiting = set(handles)
+    while waiting and (ended := select.select(list(waiting), [], [], PATIENCE_S)[0]):
+        waiting -= set(ended)
+    for handle in handles:
+        os.close(handle)
+    return not waiting
