@@ -27,6 +27,13 @@ _CONDITIONS = {
     "packet loss, each way": "link.loss",
     "link rate": "link.rate_bps",
     "queue before the link": "link.queue_bytes",
+    "law of the delay": "link.delay_law",
+    "recorded delays": "link.delay_log",
+    "packets may overtake": "link.reorder",
+    "bursts of losses": "link.bursts",
+    "queue before the link, in packets": "link.queue_packets",
+    "outages": "link.outages",
+    "partitions": "link.partitions",
     "recorded link, towards the robot": "link.trace_up",
     "recorded link, from the robot": "link.trace_down",
     "camera rate": "camera.rate_hz",
@@ -53,6 +60,7 @@ _CONDITIONS = {
     "dispatch policy": "dispatch.policy",
     "horizon of a run": "horizon_s",
 }
+_WAYS = {"otherwise towards the robot": "link.up", "otherwise from the robot": "link.down"}
 _NOWHERE = "–"
 _SAFE_ROUND_TRIPS = 4
 
@@ -72,9 +80,11 @@ def conditions(
     varied = {factor.name for factor in factors}
     sites = [_site(s) for s in scenarios.values()]
     rows = [("site", sites)] if any(site != _NOWHERE for site in sites) else []
-    stated = _CONDITIONS | {factor_name(k): k for k in also if k not in _CONDITIONS.values()}
+    of_robots = all(get(s, "model") != "task" for s in scenarios.values())
+    stated = _CONDITIONS | (_WAYS if of_robots else {})
+    stated |= {factor_name(k): k for k in also if k not in _CONDITIONS.values()}
     for name, key in stated.items():
-        values = [get(s, key) for s in scenarios.values()]
+        values = [_stated(get(s, key)) for s in scenarios.values()]
         if key in varied:
             rows.append((name, [_VARIED] * len(values)))
         elif any(v is not None for v in values):
@@ -105,6 +115,11 @@ def timeout_remark(scenario: Mapping[str, Any], factors: Sequence[Factor]) -> st
         f"The time-out {verdict} four round trips and the processing time at the largest delay "
         f"({level_name('command.timeout_s', needed)})."
     )
+
+
+def _stated(value: Any) -> Any:
+    """None for what goes without saying: that there is none of something."""
+    return None if value is False or value == [] else value
 
 
 def _site(scenario: Mapping[str, Any]) -> str:

@@ -1,0 +1,78 @@
+"""What a scenario says of its link, felt by who drives over it."""
+
+from __future__ import annotations
+
+import itertools
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from dva_sim import scenario as scenarios
+from dva_sim.config import load_yaml
+from dva_sim.errors import ConfigError
+from dva_sim.simulation import Recording, rehearse, simulate
+
+
+def run(**link: Any) -> Recording:
+    changes = {f"link.{key}": value for key, value in link.items()} | {"horizon_s": 120}
+    return simulate(scenarios.build(scenarios.load("drive-to-event"), changes), seed=1)
+
+
+def applied(recording: Recording) -> list[float]:
+    """When the robot followed a command of its operator [s]."""
+    return [a.time for drive in recording.recorder.drives for a in drive.applied]
+
+
+def longest_gap(times: list[float], since: float, until: float) -> float:
+    """Between two commands that were followed [s]."""
+    inside = [since, *(t for t in times if since <= t <= until), until]
+    return max(b - a for a, b in itertools.pairwise(inside))
+
+
+def test_during_an_outage_no_command_reaches_the_robot_and_afterwards_they_do() -> None:
+    free = applied(run())
+    assert longest_gap(free, 30.0, 40.0) < 1.0
+    out = applied(run(outages=[{"from_s": 32, "for_s": 4}]))
+    assert not [t for t in out if 32.5 < t < 36.0]
+    assert [t for t in out if t > 36.0]
+
+
+def test_a_partition_between_operator_and_robot_leaves_the_rest_of_the_network_alone() -> None:
+    gap = {"from_s": 32, "for_s": 4}
+    recording = run(partitions=[{"source": "operator-1", "destination": "robot-1", **gap}])
+    assert not [t for t in applied(recording) if 32.5 < t < 36.0]
+    up, down = recording.links[next(iter(recording.links))]
+    assert up.lost > 0
+    assert down.lost == 0
+
+
+def test_the_same_seed_gives_the_same_drive_over_bursts_and_slow_delays() -> None:
+    link = {
+        "delay_s": 0.05,
+        "delay_law": {"law": "gamma", "sd_s": 0.02, "correlation_s": 2.0},
+        "loss": 0.02,
+        "bursts": {"mean_s": 0.1},
+    }
+    assert applied(run(**link)) == applied(run(**link))
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("link:\n  delay_law: fast\n", r":2:3: link.delay_law: a law is a mapping, such as"),
+        ("link:\n  outages: [{from_s: 1}]\n", r":2:13: missing key 'link.outages.0.for_s'"),
+        ("link:\n  up: {dely_s: 1}\n", r":2:8: unknown key 'link.up.dely_s'; did you mean"),
+        ("link:\n  bursts: {mean_s: 1}\n  loss: 2\n", r":3:3: link.loss: input should be less"),
+        ("link:\n  delay_log: bad.log\n", r"bad\.log:2:1: should be a time \[s\], not 'x'"),
+        ("link:\n  partitions: [{source: a, from_s: 1, for_s: 1}]\n", "'a' of a partition is nob"),
+    ],
+)
+def test_a_mistake_is_told_with_its_place(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str, words: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "bad.log").write_text("1 2\nx 3\n")
+    (tmp_path / "s.yaml").write_text(text + "events: [{kind: fire, at_s: 5}]\n")
+    with pytest.raises(ConfigError, match=words):
+        rehearse(scenarios.build(load_yaml("s.yaml")), seed=1)
