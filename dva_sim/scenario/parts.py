@@ -123,6 +123,8 @@ class CommandConfig(Config):
     """How commands are sent, the same for every pattern.
 
     Attributes:
+        timeout_s: Of a command that is to be answered.
+        attempts: How often it is sent before the link counts as lost.
         window: How many requests may be unanswered at once under `pipelined`.
     """
 
@@ -130,6 +132,17 @@ class CommandConfig(Config):
     timeout_s: Annotated[float, Field(gt=0, le=120)] = 9.0
     attempts: Annotated[int, Field(ge=1, le=10)] = 3
     window: Annotated[int, Field(ge=2, le=1000)] = 8
+
+
+class RequestConfig(Config):
+    """All other requests: registration, permissions, orders, the start and end of a drive.
+
+    A time-out below four round trips is never met over a new connection, which needs three
+    before the request leaves: nothing would ever be answered.
+    """
+
+    timeout_s: Annotated[float, Field(gt=0, le=120)] = 9.0
+    attempts: Annotated[int, Field(ge=1, le=10)] = 3
 
 
 class CameraConfig(Config):

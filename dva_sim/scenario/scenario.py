@@ -17,6 +17,7 @@ from dva_sim.scenario.parts import (
     GuardConfig,
     OperatorConfig,
     PhoneConfig,
+    RequestConfig,
     RobotConfig,
     SiteConfig,
 )
@@ -47,6 +48,7 @@ class Scenario(Config):
     pattern: Literal["req-rep", "pipelined", "pub-sub", "latest-wins"] = "latest-wins"
     phone: PhoneConfig = PhoneConfig()
     command: CommandConfig = CommandConfig()
+    request: RequestConfig = RequestConfig()
     transport: TransportKind = "zeromq"
     zeromq: ZeromqConfig = ZeromqConfig()
     network_depth: Depth = "auto"

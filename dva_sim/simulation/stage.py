@@ -83,7 +83,7 @@ class Stage:
 
     def device(self, kind: str, number: int) -> Device:
         """A new device: its identity and ways to talk."""
-        command = self.scenario.command
+        request = self.scenario.request
         return Device(
             id_of(kind, number),
             label_of(kind, number),
@@ -93,8 +93,8 @@ class Stage:
             self.network,
             self.recorder,
             self.site.frame,
-            command.timeout_s,
-            command.attempts,
+            request.timeout_s,
+            request.attempts,
             self.labels,
             self.time_of_day,
         )

@@ -186,7 +186,7 @@ def test_three_parts_started_by_hand_work_together(programs: Programs, address: 
 
 
 def test_parts_may_start_before_the_dva(programs: Programs, address: str) -> None:
-    at = ("--dva", address, "--set", "command.timeout_s=1")
+    at = ("--dva", address, "--set", "request.timeout_s=1")
     operator = programs.start(*SCRIPTED, "--only", "operator", *at)
     world = programs.start(*SCRIPTED, "--only", "world", *at)
     world.wait_to_say("breaks out")  # both have found nobody so far
@@ -207,7 +207,7 @@ def test_devices_register_again_at_a_dva_that_was_killed_and_is_back(
     programs: Programs, address: str, tmp_path: Path
 ) -> None:
     """The world is the same all the time; only a DVA that knows the robot can permit to drive."""
-    at = ("--dva", address, "--set", "command.timeout_s=1")
+    at = ("--dva", address, "--set", "request.timeout_s=1")
     dva = programs.start(*SCRIPTED, "--only", "dva", *at)
     world = programs.start(*SCRIPTED, "--only", "world", *at, "--record", "traces")
     operator = programs.start(*SCRIPTED, "--only", "operator", *at)
