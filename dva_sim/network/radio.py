@@ -14,6 +14,7 @@ from dva_sim.network.link import (
     Weather,
     make_serialiser,
 )
+from dva_sim.network.link.delays import Wobble
 from dva_sim.streams import Streams
 
 
@@ -38,7 +39,7 @@ class RadioLink(Link):
 
     Packets keep their order when reception changes, unless the link may reorder them. While there
     is none every packet is lost, and what rides on the link has to send again. The queue before
-    the air counts bytes; a packet that the air holds up arrives the mean delay after it, or later.
+    the air counts bytes.
 
     Args:
         config: Delay, loss, queue of the link as such.
@@ -64,6 +65,8 @@ class RadioLink(Link):
         self._luck = Weather(streams, f"{name}/radio", way.draws == "independent")
         self._air, self._air_room = ConstantRate(way.rate_bps), way.queue_bytes
         self._newest = 0.0
+        self._noted = _Noted(self._wobble) if self._wobble and not way.jitter_s else None
+        self._wobble = self._noted or self._wobble
 
     def is_ideal(self) -> bool:
         """See `Link`: the next place may have no reception."""
@@ -83,7 +86,7 @@ class RadioLink(Link):
             if here.loss and self._luck.draw(now) < here.loss:
                 self.lost += 1
                 return None
-            arrival = max(arrival, self._air.depart(now, size) + self.delay) + here.extra_delay_s
+            arrival = max(arrival, self._air.depart(now, size) + self._lag()) + here.extra_delay_s
         if self._may_overtake:
             return arrival
         self._newest = max(self._newest, arrival)
@@ -97,11 +100,31 @@ class RadioLink(Link):
         """See `Link`."""
         return max(super().backlog_bytes(now), self._air.backlog_bytes(now))
 
+    def _lag(self) -> float:
+        """From leaving the air to arriving [s]: what the link's own law gave the last packet.
+
+        Uniform jitter is the exception, a packet that the air holds up takes its mean: what was
+        found out with it stays as it was.
+        """
+        return self.delay if self._noted is None else self._base + self._noted.last
+
     def _full(self, now: float, size: int, rate_bps: float) -> bool:
         """Whether the queue before the air is full; the air takes up the rate of the place."""
         if rate_bps != self._air.rate_bps:
             self._air.change_rate(now, rate_bps)
         return self._air.backlog_bytes(now) + size > self._air_room
+
+
+class _Noted:
+    """Deviations of a link's delay; the last one is remembered."""
+
+    def __init__(self, wobble: Wobble) -> None:
+        self._wobble, self.last = wobble, 0.0
+
+    def deviation(self, now: float) -> float:
+        """See `Wobble`."""
+        self.last = self._wobble.deviation(now)
+        return self.last
 
 
 def make_link(

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import numpy as np
 import pytest
 
 from dva_sim.clock import Clock
@@ -25,8 +26,8 @@ class Place:
     def __init__(self, quality: Quality | None = None) -> None:
         self.quality = quality
 
-    def link(self, **config: float) -> Link:
-        settings = LinkConfig(**config)  # type: ignore[arg-type]
+    def link(self, **config: Any) -> Link:
+        settings = LinkConfig(**config)
         return make_link(settings, "up", Streams(1), "radio", lambda: self.quality)
 
 
@@ -78,6 +79,23 @@ def test_packets_keep_their_order_when_reception_gets_better() -> None:
     assert first is not None
     assert second is not None
     assert second >= first > 1.0
+
+
+def test_packets_overtake_in_the_air_too_where_the_link_may_reorder_them() -> None:
+    law = {"law": "gamma", "sd_s": 0.05}
+    for reorder in (False, True):
+        link = Place(Quality()).link(delay_s=0.1, delay_law=law, reorder=reorder)
+        arrivals = [link.carry(n * 0.005, 100) for n in range(300)]
+        assert (arrivals == sorted(arrivals)) is not reorder
+
+
+def test_a_slow_air_leaves_the_law_of_the_delay_as_it_is() -> None:
+    law, n = {"law": "normal", "sd_s": 0.02}, 4000
+    link = Place(Quality(rate_bps=1e6)).link(delay_s=0.1, delay_law=law, reorder=True)
+    times = np.arange(n) / 100
+    delays = np.array([link.carry(t, 125) for t in times.tolist()], dtype=float) - times
+    assert delays.mean() == pytest.approx(0.101, abs=4 * 0.02 / n**0.5)
+    assert delays.std() == pytest.approx(0.02, abs=4 * 0.02 / (2 * n) ** 0.5)
 
 
 def test_what_was_sent_without_reception_arrives_when_there_is_some_again() -> None:
