@@ -5,6 +5,7 @@ import math
 import pytest
 
 from dva_sim.agents.profile import RobotProfile, load_robot
+from dva_sim.agents.service import ServiceLaw
 from dva_sim.config import validate
 from dva_sim.errors import ConfigError
 from dva_sim.worlds.drives import DriveSpec
@@ -18,7 +19,9 @@ def test_the_service_robot_is_what_the_physics_has_by_itself():
 def test_the_model_car_is_slow_to_answer_and_cannot_turn_on_the_spot():
     car = load_robot("pibot")
     spec = car.drive_spec()
-    assert car.processing_s == 1.0
+    service = car.processing_s
+    assert isinstance(service, ServiceLaw)
+    assert (service.mean_s, service.first_s) == (1.0, 3.0)
     assert spec.drive(spec).turning_radius == pytest.approx(0.26 / math.tan(math.radians(25)))
     assert spec.inner_radius == pytest.approx(0.10)
 
