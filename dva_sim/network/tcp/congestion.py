@@ -31,18 +31,25 @@ class Reno:
         self._start = float(options.initial_window)
         self.window, self.threshold = self._start, inf
 
-    def grow(self, segments: int, now: float, smoothed: float) -> None:
-        """`segments` more have been delivered at `now` [s], and the window was in use."""
+    def grow(self, segments: int, now: float, ahead: float) -> None:
+        """Segments have been delivered while the window was in use.
+
+        Args:
+            segments: How many.
+            now: When [s].
+            ahead: The shortest round trip [s].
+        """
         if self.window < self.threshold:
             before = self.window
             self.window = min(self.window + segments, self.threshold)
             segments -= int(self.window - before)
         if segments > 0 and self.window >= self.threshold:
-            self._avoid(segments, now, smoothed)
+            self._avoid(segments, now, ahead)
 
     def reduce(self, now: float) -> float:
         """A loss: the new threshold [segments]; the window itself is brought down by others."""
-        self.threshold = max(self.window * self.BACKOFF, MIN_WINDOW)
+        self.threshold = max(float(int(int(self.window) * self.BACKOFF)), MIN_WINDOW)
+        self.window = float(int(self.window))
         return self.threshold
 
     def rests(self, now: float) -> None:
@@ -56,29 +63,36 @@ class Reno:
             self.window = max(self.window / 2, floor)
             idle -= timeout
 
-    def _avoid(self, segments: int, now: float, smoothed: float) -> None:
+    def _avoid(self, segments: int, now: float, ahead: float) -> None:
         self.window += segments / self.window
 
 
 class Cubic(Reno):
-    """The window grows with the cube of the time since the last loss: RFC 9438."""
+    """The window grows with the cube of the time since the last loss: RFC 9438.
+
+    As in Linux everything is in whole segments: the distance to the curve's plateau is
+    rounded down, so a small window reaches the plateau soon and stays there for long; and
+    the curve is read the shortest round trip ahead, where the RFC takes the smoothed one.
+    """
 
     BACKOFF = 0.7
     C = 0.4
+    FRIENDLY = 3 * (1 - BACKOFF) / (1 + BACKOFF)
 
-    __slots__ = ("_epoch", "_estimate", "_inflection", "_last", "_peak")
+    __slots__ = ("_epoch", "_estimate", "_inflection", "_last", "_peak", "_plateau")
 
     def __init__(self, options: TcpOptions) -> None:
         super().__init__(options)
-        self._peak = self._inflection = self._estimate = 0.0
+        self._peak = self._plateau = self._inflection = self._estimate = 0.0
         self._epoch = -1.0
         self._last = 0.0
 
     def reduce(self, now: float) -> float:
         """See `Reno`; with fast convergence (RFC 9438, section 4.7)."""
         self._epoch = -1.0
-        falling = self.window < self._peak
-        self._peak = self.window * (1 + self.BACKOFF) / 2 if falling else self.window
+        whole = float(int(self.window))
+        falling = whole < self._peak
+        self._peak = float(int(whole * (1 + self.BACKOFF) / 2)) if falling else whole
         return super().reduce(now)
 
     def rests(self, now: float) -> None:
@@ -89,35 +103,31 @@ class Cubic(Reno):
 
     def curve(self, elapsed: float) -> float:
         """W_cubic, `elapsed` [s] after the epoch's start [segments]: RFC 9438, figure 1."""
-        return self.C * (elapsed - self._inflection) ** 3 + self._peak
+        return self._plateau + int(self.C * (elapsed - self._inflection) ** 3)
 
-    def _avoid(self, segments: int, now: float, smoothed: float) -> None:
+    def _avoid(self, segments: int, now: float, ahead: float) -> None:
         if self._epoch < 0:
             self._begin(now)
         self._last = now
-        elapsed = now - self._epoch
-        alpha = 3 * (1 - self.BACKOFF) / (1 + self.BACKOFF) if self._estimate < self._peak else 1.0
-        self._estimate += alpha * segments / self.window
-        if self.curve(elapsed) < self._estimate:
-            self.window = max(self.window, self._estimate)  # no slower than Reno
-            return
-        target = min(max(self.curve(elapsed + smoothed), self.window), 1.5 * self.window)
-        self.window += segments * (target - self.window) / self.window
+        self._estimate += self.FRIENDLY * segments / self.window
+        whole = int(self.window)
+        target = max(self.curve(now - self._epoch + ahead), int(self._estimate))
+        if target > whole:
+            self.window += segments * min(target / whole - 1.0, 0.5)
 
     def _begin(self, now: float) -> None:
         """A new epoch: where the curve has its inflection (RFC 9438, figure 2)."""
         self._epoch, self._estimate = now, self.window
-        if self.window >= self._peak:
-            self._peak, self._inflection = self.window, 0.0
-        else:
-            self._inflection = float(((self._peak - self.window) / self.C) ** (1 / 3))
+        self._plateau = max(self._peak, self.window)
+        self._inflection = float(((self._plateau - self.window) / self.C) ** (1 / 3))
 
 
 class HyStart:
     """Ends slow start when the round trip grows, before the queue overflows.
 
-    Each round, the shortest of the first eight round trips is compared with the shortest
-    ever: an eighth more (at least 4 ms, at most 16 ms) means that a queue has built up.
+    From a window of 16 segments on, the shortest of eight round trips of a round is
+    compared with the shortest ever: an eighth more (at least 4 ms, at most 16 ms) means
+    that a queue has built up.
     """
 
     SAMPLES, LOW_WINDOW, LEAST, MOST = 8, 16, 0.004, 0.016
@@ -125,16 +135,15 @@ class HyStart:
     __slots__ = ("_count", "_end", "_shortest")
 
     def __init__(self) -> None:
-        self._end, self._count, self._shortest = 0, 0, inf
+        self._end, self._count, self._shortest = -1, 0, inf
 
     def ends(self, rtt: float, minimum: float, acknowledged: int, sent: int) -> bool:
         """Whether slow start should end, after one more round trip [s] and the bytes so far."""
         if acknowledged > self._end:
             self._end, self._count, self._shortest = sent, 0, inf
-        self._count += 1
-        if self._count <= self.SAMPLES:
-            self._shortest = min(self._shortest, rtt)
+        self._shortest = min(self._shortest, rtt)
         if self._count < self.SAMPLES:
+            self._count += 1
             return False
         return self._shortest > minimum + min(max(minimum / 8, self.LEAST), self.MOST)
 
@@ -148,7 +157,7 @@ class Unlimited(Reno):
         super().__init__(options)
         self.window = 1e9
 
-    def grow(self, segments: int, now: float, smoothed: float) -> None:
+    def grow(self, segments: int, now: float, ahead: float) -> None:
         """Nothing to grow."""
 
     def reduce(self, now: float) -> float:

@@ -11,7 +11,7 @@ from __future__ import annotations
 PACKET_COST = 832  # beside the payload, of each packet that waits or is under way [B]
 SMALLEST = 4608  # the least that SO_SNDBUF gives, after doubling [B]
 LARGEST = 4_194_304  # tcp_wmem, third value [B]
-PER_SEGMENT = 4352  # what automatic tuning counts for a full segment [B]; x 2 x 10 = 87,040
+PER_SEGMENT = 2304  # what automatic tuning counts for a full segment; x 2 x 10 at first [B]
 WAITING_PACKET = 22 * 1448  # how far a packet that waits grows before another is begun [B]
 
 

@@ -177,12 +177,12 @@ class Sender:
         if first:
             self.times.sample(first, self.first, self.next)
             self.times.shortest(last)
-            if self._options.hystart and self.window.window < self.window.threshold:
+            if self.window.threshold > self.window.window >= HyStart.LOW_WINDOW:
                 self._look_for_queue(last)
 
     def _look_for_queue(self, round_trip: float) -> None:
-        grown = self._hystart.ends(round_trip, self.times.minimum, self.first, self.next)
-        if grown and self.window.window >= HyStart.LOW_WINDOW:
+        ends = self._hystart.ends(round_trip, self.times.minimum, self.first, self.next)
+        if ends and self._options.hystart:
             self.window.threshold = self.window.window
 
     def _judge_probe(
@@ -236,7 +236,7 @@ class Sender:
         elif advanced and self._state != RECOVERY:
             slow_start = self.window.window < self.window.threshold
             if self._window_used or (slow_start and self.window.window < 2 * self._most_out):
-                self.window.grow(delivered, now, self.times.smoothed)
+                self.window.grow(delivered, now, self.times.minimum)
             else:
                 self.window.rests(now)
 
