@@ -67,10 +67,10 @@ def report(folder: Annotated[Path, typer.Argument(help="A results folder.")]) ->
 
 @app.command()
 def validate(
-    what: Annotated[str, typer.Argument(help="dispatch or operators.")] = "dispatch",
+    what: Annotated[str, typer.Argument(help="dispatch, operators or network.")] = "dispatch",
     out: Annotated[Path | None, typer.Option("-o", "--out", help="Results folder.")] = None,
     cases: Annotated[
-        str | None, typer.Option(help="A file of cases, by name or path; dispatch only.")
+        str | None, typer.Option(help="A file of cases, by name or path; not for operators.")
     ] = None,
     strategy: Annotated[
         str | None, typer.Option(help="How operators drive, by name; operators only.")
@@ -78,11 +78,24 @@ def validate(
     quick: Annotated[bool, typer.Option("--quick", help="Fewer runs, wider errors.")] = False,
     jobs: Annotated[int | None, typer.Option(help="Processes; default: all cores.")] = None,
     seed: Annotated[int, typer.Option(help="Seed of all luck.")] = 1,
+    ablate: Annotated[
+        bool, typer.Option("--ablate", help="Leave mechanisms out one by one; network only.")
+    ] = False,
+    live: Annotated[
+        bool, typer.Option("--live", help="Measure real sockets now; network only.")
+    ] = False,
+    measure: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Measure the whole design, or go on with it; network only."
+        ),
+    ] = None,
 ) -> None:
-    """Play what the answer is known of, by theory or from people, and compare."""
+    """Play what the answer is known of, by theory, from people or from sockets, and compare."""
     from dva_sim.experiments.validation import console
 
-    raise typer.Exit(console.validate(what, out, cases, quick, jobs, seed, strategy))
+    sockets = console.Sockets(ablate, live, measure)
+    raise typer.Exit(console.validate(what, out, cases, quick, jobs, seed, strategy, sockets))
 
 
 @app.command()

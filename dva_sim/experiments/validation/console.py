@@ -3,13 +3,30 @@
 from __future__ import annotations
 
 import os
+from dataclasses import dataclass
 from pathlib import Path
 
 from dva_sim.errors import ConfigError
 from dva_sim.experiments.validation.telling import say
 
-WHAT = ("dispatch", "operators")
+
+WHAT = ("dispatch", "operators", "network")
 INTERRUPTED = 130  # exit code of a program ended by Ctrl-C
+
+
+@dataclass(frozen=True)
+class Sockets:
+    """What is done beside comparing the network model with the shipped measurements.
+
+    Attributes:
+        ablate: Leave mechanisms of the model out one by one.
+        live: Measure now, and compare with that alone.
+        measure: Measure the whole design into this table; nothing is compared.
+    """
+
+    ablate: bool = False
+    live: bool = False
+    measure: Path | None = None
 
 
 def validate(
@@ -20,37 +37,55 @@ def validate(
     jobs: int | None = None,
     seed: int = 1,
     strategy: str | None = None,
+    sockets: Sockets = Sockets(),
 ) -> int:
     """Play, print the comparison, write it if asked to; the exit code.
 
     Args:
-        what: `dispatch` or `operators`.
+        what: `dispatch`, `operators` or `network`.
         out: Where tables, figures and the page go.
-        cases: A file of cases, for dispatch.
+        cases: A file of cases, for dispatch and network.
         quick: Fewer runs.
         jobs: Processes; left out, one per core.
         seed: Of all luck.
         strategy: How the operators drive, for operators; left out, as the split file says.
+        sockets: What is measured and left out, for network.
 
     Raises:
         ConfigError: something else to validate, an option that belongs to the other, or a
             mistake in the files.
     """
+    _refuse_foreign(what, cases, strategy, sockets)
     workers = jobs or os.cpu_count() or 1
     try:
         if what == "dispatch":
-            if strategy is not None:
-                raise ConfigError("--strategy is for `validate operators`: dispatch has none")
             from dva_sim.experiments.validation.dispatch.console import validate_dispatch
 
             return validate_dispatch(cases, out, quick, workers, seed)
         if what == "operators":
-            if cases is not None:
-                raise ConfigError("--cases is for `validate dispatch`: operators have no cases")
             from dva_sim.experiments.validation.operators.console import validate_operators
 
             return validate_operators(strategy, out, quick, workers, seed)
+        from dva_sim.experiments.validation.network.comparing import Setting
+        from dva_sim.experiments.validation.network.console import validate_network
+
+        setting = Setting(seed, quick, workers, sockets.ablate)
+        return validate_network(cases, out, setting, sockets.measure, sockets.live)
     except KeyboardInterrupt:
         say("Stopped.")
         return INTERRUPTED
-    raise ConfigError(f"{what!r} cannot be validated; should be {' or '.join(WHAT)}")
+
+
+def _refuse_foreign(what: str, cases: str | None, strategy: str | None, sockets: Sockets) -> None:
+    """Refuse something else to validate, and options that belong to another."""
+    if what not in WHAT:
+        known = f"{', '.join(WHAT[:-1])} or {WHAT[-1]}"
+        raise ConfigError(f"{what!r} cannot be validated; should be {known}")
+    if strategy is not None and what != "operators":
+        raise ConfigError(f"--strategy is for `validate operators`: {what} has none")
+    if cases is not None and what == "operators":
+        raise ConfigError(
+            "--cases is for `validate dispatch` and `validate network`: operators have no cases"
+        )
+    if sockets != Sockets() and what != "network":
+        raise ConfigError("--ablate, --live and --measure are for `validate network`")

@@ -91,14 +91,18 @@ def bias_limit(measure: Measure) -> float:
     return MAX_TAIL_BIAS if tail_of_age else MAX_BIAS
 
 
-def pool(cells: Sequence[Cell], rng: np.random.Generator) -> Pooled:
-    """Judge all cells of pooled conditions together.
+def to_be_pooled(cells: Sequence[Cell]) -> list[Cell]:
+    """The cells that may be judged, say something, and differ from run to run."""
+    return [c for c in cells if not reason_against(c) and tells(c) and not is_steady(c)]
+
+
+def pool(judged: Sequence[Cell], rng: np.random.Generator) -> Pooled:
+    """Judge cells of pooled conditions together.
 
     Args:
-        cells: What is compared, of pooled conditions; those that must not be judged are left out.
+        judged: What is compared; see `to_be_pooled`.
         rng: Luck of the runs that take the sockets' place.
     """
-    judged = [c for c in cells if not reason_against(c) and tells(c) and not is_steady(c)]
     scored = tuple(score(cell) for cell in judged)
     null = null_scores(judged, rng)
     rms = np.sqrt((null**2).mean(axis=1)) if judged else np.zeros(1)

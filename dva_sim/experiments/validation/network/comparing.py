@@ -1,0 +1,204 @@
+"""The whole comparison: which runs of the model it takes, and what they come to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from dva_sim.experiments.validation.network.judging import MIN_INSIDE, Verdict, judge, share_inside
+from dva_sim.experiments.validation.network.kinds import KINDS, Group, Kind
+from dva_sim.experiments.validation.network.playing import Order, Progress, play_all
+from dva_sim.experiments.validation.network.pooling import (
+    Pooled,
+    is_steady,
+    pool,
+    tells,
+    to_be_pooled,
+)
+from dva_sim.experiments.validation.network.predict import WITHOUT, Depth, depth_for
+from dva_sim.experiments.validation.network.samples import Cell, Row, cells_of
+from dva_sim.streams import Streams
+
+RUNS, QUICK_RUNS = 200, 40  # of a condition under loss
+CONTROL_RUNS, QUICK_CONTROL_RUNS = 50, 20
+JITTER_RUNS = 20  # where nothing is lost, but delays are left to chance
+MODEL = "the model"
+CONTROLS: dict[str, Depth] = {
+    "message by message": "message",
+    "datagrams": "datagram",
+}
+"""Models that are too simple, and must be found out."""
+
+Rows = dict[Order, list[Row]]
+
+WANTED, WANTED_POOLED = 150, 40  # conditions that should be judged
+
+
+@dataclass(frozen=True)
+class Setting:
+    """How much is played.
+
+    Attributes:
+        seed: Of all luck.
+        quick: Few runs.
+        workers: Processes.
+        ablate: Whether mechanisms are left out one by one.
+    """
+
+    seed: int = 1
+    quick: bool = False
+    workers: int = 1
+    ablate: bool = False
+
+    def runs(self, group: Group) -> int:
+        """Of the model for a condition: one where nothing is left to chance."""
+        condition = group.condition
+        if condition.loss > 0:
+            return QUICK_RUNS if self.quick else RUNS
+        return JITTER_RUNS if condition.jitter_frac > 0 else 1
+
+    @property
+    def control_runs(self) -> int:
+        """Of each variant that is only looked at for pooled conditions."""
+        return QUICK_CONTROL_RUNS if self.quick else CONTROL_RUNS
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What was found.
+
+    Attributes:
+        groups: The conditions that were judged, with their measurements.
+        left_out: Those that were not played, and why.
+        verdicts: Bands and prediction intervals, cell by cell; of pooled conditions those
+            measures in which runs hardly differ.
+        pooled: Means over many runs under loss, by the model as it is.
+        rarely: Measures of pooled conditions that tell too little.
+        controls: The same by models that are too simple, by name.
+        ablated: The same with a mechanism left out, by its name.
+    """
+
+    groups: Sequence[Group]
+    left_out: Sequence[Group]
+    verdicts: Sequence[Verdict]
+    pooled: Pooled
+    rarely: Sequence[Cell]
+    controls: dict[str, Pooled] = field(default_factory=dict)
+    ablated: dict[str, Pooled] = field(default_factory=dict)
+
+    def of_kind(self, kind: Kind) -> list[Verdict]:
+        """The verdicts on conditions of a kind."""
+        return [v for v in self.verdicts if v.cell.group.kind == kind]
+
+    def passes_bands(self, kind: Kind) -> bool:
+        """Whether enough lies inside: everything, of single runs under loss nine of ten."""
+        inside, judged = share_inside(self.of_kind(kind))
+        return inside >= (MIN_INSIDE if kind == "single" else 1.0) * judged
+
+    @property
+    def fooled(self) -> list[str]:
+        """The models that are too simple and were not found out."""
+        return [name for name, pooled in self.controls.items() if pooled.passes]
+
+    @property
+    def passes(self) -> bool:
+        """Whether all bands hold and all that is too simple fails."""
+        bands = all(self.passes_bands(kind) for kind in KINDS)
+        return bands and self.pooled.passes and not self.fooled
+
+    @property
+    def missing(self) -> tuple[int, int]:
+        """How many conditions, and how many pooled ones, are wanted beyond those judged."""
+        judged = self.judged
+        pooled = sum(group.kind == "pooled" for group in judged)
+        return max(0, WANTED - len(judged)), max(0, WANTED_POOLED - pooled)
+
+    @property
+    def judged(self) -> list[Group]:
+        """The conditions of which at least one measure is judged."""
+        found = {v.cell.group.condition for v in self.verdicts if not v.why}
+        found |= {scored.cell.group.condition for scored in self.pooled.scored}
+        return [group for group in self.groups if group.condition in found]
+
+
+def compare(
+    groups: Sequence[Group], setting: Setting, progress: Progress = lambda done: None
+) -> Comparison:
+    """Play every condition that may be judged, and judge it.
+
+    Raises:
+        DvaSimError: a run failed.
+    """
+    played = [group for group in groups if not group.left_out]
+    orders = orders_of(played, setting)
+    rows = play_all(
+        [o for each in orders.values() for o in each], setting.seed, setting.workers, progress
+    )
+    cells = _cells(played, orders.pop(MODEL), rows)
+    own = [c for c in cells if c.group.kind == "pooled"]
+    scope = to_be_pooled(own)
+    found = {
+        name: _pooled(played, variant, rows, scope, setting.seed, name)
+        for name, variant in orders.items()
+    }
+    return Comparison(
+        groups=played,
+        left_out=[group for group in groups if group.left_out],
+        verdicts=[judge(c) for c in cells if c.group.kind != "pooled" or is_steady(c)],
+        pooled=pool(scope, Streams(setting.seed).fresh(f"null/{MODEL}")),
+        rarely=[c for c in own if not tells(c)],
+        controls={name: pooled for name, pooled in found.items() if name in CONTROLS},
+        ablated={name: pooled for name, pooled in found.items() if name in WITHOUT},
+    )
+
+
+def _pooled(
+    groups: Sequence[Group],
+    orders: Sequence[Order],
+    rows: Rows,
+    scope: Sequence[Cell],
+    seed: int,
+    name: str,
+) -> Pooled:
+    """A variant, by the same measures of the same conditions as the model."""
+    asked = {(cell.group.condition, cell.measure) for cell in scope}
+    cells = _cells(pooled_of(groups), orders, rows)
+    judged = [c for c in cells if (c.group.condition, c.measure) in asked and len(c.measured)]
+    return pool([c for c in judged if len(c.predicted) > 1], Streams(seed).fresh(f"null/{name}"))
+
+
+def orders_of(groups: Sequence[Group], setting: Setting) -> dict[str, list[Order]]:
+    """What to play: the model as it is, what is too simple, and with mechanisms left out."""
+    pooled, runs = pooled_of(groups), setting.control_runs
+    orders = {MODEL: [Order(g.condition, setting.runs(g)) for g in groups]}
+    for name, depth in CONTROLS.items():
+        orders[name] = [Order(g.condition, runs, depth) for g in pooled]
+    for name in WITHOUT if setting.ablate else ():
+        orders[name] = [Order(g.condition, runs, without=(name,)) for g in pooled]
+    return orders
+
+
+def pooled_of(groups: Sequence[Group]) -> list[Group]:
+    """The conditions that are pooled."""
+    return [group for group in groups if group.kind == "pooled"]
+
+
+def runs_in(groups: Sequence[Group], setting: Setting) -> int:
+    """How many runs a comparison takes."""
+    played = [group for group in groups if not group.left_out]
+    return sum(order.runs for own in orders_of(played, setting).values() for order in own)
+
+
+def depths_of(comparison: Comparison) -> dict[str, int]:
+    """How many conditions were played how deep."""
+    found: dict[str, int] = {}
+    for group in comparison.groups:
+        depth = depth_for(group.condition)
+        found[depth] = found.get(depth, 0) + 1
+    return found
+
+
+def _cells(groups: Sequence[Group], orders: Sequence[Order], rows: Rows) -> list[Cell]:
+    return [
+        c for group, own in zip(groups, orders, strict=True) for c in cells_of(group, rows[own])
+    ]

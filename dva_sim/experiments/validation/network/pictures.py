@@ -1,0 +1,201 @@
+"""Figures of the comparison: predicted against measured, z, and what each mechanism is worth."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dva_sim.experiments.figures.style import FAINT, INK, SOFT, Drawn, finish, panels, styled
+from dva_sim.experiments.validation.network.comparing import Comparison
+from dva_sim.experiments.validation.network.judging import BOUNDED_SHARE, SHARES, TIME_MS
+from dva_sim.experiments.validation.network.kinds import KINDS, Kind
+from dva_sim.experiments.validation.network.pooling import standard_error
+from dva_sim.experiments.validation.network.samples import BY_NAME, Cell, Floats
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_GOOD, _BAD, _PALE = "#0072B2", "#D55E00", "#9a9a9a"
+_PAIRS = (
+    ("applied_hz", None, "commands applied [1/s]"),
+    ("age_p50", "age_p95", "age when applied [ms]"),
+    ("stale_p50", "stale_p95", "age while in force [ms]"),
+    ("rtt_p50", "rtt_p95", "round trip [ms]"),
+)
+_ROWS: dict[Kind, str] = {
+    "lossless": "without loss",
+    "overload": "overload",
+    "single": "single, under loss",
+    "pooled": "pooled, under loss",
+}
+_LEAST_Z = 4.5  # drawn at least so far
+
+
+def draw_all(comparison: Comparison) -> list[Drawn]:
+    """Every figure there is something to draw for."""
+    with styled():
+        drawn = [_scatter(comparison)]
+        if comparison.pooled.scored:
+            drawn.append(_scores(comparison))
+        if comparison.controls:
+            drawn.append(_variants(comparison))
+    return drawn
+
+
+def _scatter(comparison: Comparison) -> Drawn:
+    """Predicted against measured, a row for each kind of condition."""
+    figure, axes = panels(len(KINDS), len(_PAIRS), 2.5)
+    outside = {id(v.cell) for v in comparison.verdicts if v.word == "outside"}
+    outside |= {id(scored.cell) for scored in comparison.pooled.significant}
+    shown = {id(v.cell) for v in comparison.verdicts if v.word == "shown only"}
+    cells = [v.cell for v in comparison.verdicts]
+    cells += [scored.cell for scored in comparison.pooled.scored]
+    for row, kind in zip(axes, KINDS, strict=True):
+        for ax, (median, tail, label) in zip(row, _PAIRS, strict=True):
+            own = [c for c in cells if c.group.kind == kind and c.model > 0 and c.real > 0]
+            for name, marker in ((median, "o"), (tail, "^")):
+                some = [c for c in own if c.measure.name == name]
+                _marks(ax, kind, some, marker, outside, shown)
+            _diagonal(ax, kind, label.endswith("[ms]"))
+            if row is axes[0]:
+                ax.set_title(label)
+            if row is axes[-1]:
+                ax.set_xlabel("measured")
+        row[0].set_ylabel(f"{_ROWS[kind]}\npredicted")
+    for marker, words in (("o", "median, or rate"), ("^", "95th percentile")):
+        axes[0][0].plot([], [], marker, color=_GOOD, ms=4, label=words)
+    for colour, words in ((_BAD, "outside its band, or significant"), (_PALE, "not judged")):
+        axes[0][0].plot([], [], "o", color=colour, ms=4, label=words)
+    figure.legend(*axes[0][0].get_legend_handles_labels(), loc="outside upper left", ncols=4)
+    text = (
+        "Each mark is one measure of one condition. The grey band is the one that is asked for "
+        f"without loss ({100 * SHARES['lossless']:.0f} % and {TIME_MS:g} ms; in overload "
+        f"{100 * SHARES['overload']:.0f} %, dashed {100 * BOUNDED_SHARE:.0f} % with bounded "
+        "buffers). Under loss the bars are the "
+        "model's own: of single runs the 95 % prediction interval, of pooled ones the 95 % "
+        "interval of the mean of as many runs as were measured."
+    )
+    return finish(figure, "scatter", "Predicted against measured", text)
+
+
+def _marks(
+    axes: Axes, kind: Kind, cells: Sequence[Cell], marker: str, outside: set[int], shown: set[int]
+) -> None:
+    for cell in cells:
+        colour = _BAD if id(cell) in outside else _PALE if id(cell) in shown else _GOOD
+        low, high = _bar(kind, cell)
+        if high > low:
+            axes.plot([cell.real] * 2, [low, high], color=colour, lw=0.6, alpha=0.5)
+        axes.plot(cell.real, cell.model, marker, color=colour, ms=3, mew=0, alpha=0.85)
+
+
+def _bar(kind: Kind, cell: Cell) -> tuple[float, float]:
+    """Where the model expects what was measured."""
+    least = 0.02 * cell.model  # a logarithmic axis has no zero
+    if kind == "single":
+        low, high = np.percentile(cell.predicted, (2.5, 97.5))
+        return max(float(low), least), float(high)
+    if kind == "pooled":
+        half = 1.96 * standard_error(cell)
+        return max(cell.model - half, least), cell.model + half
+    return cell.model, cell.model
+
+
+def _diagonal(axes: Axes, kind: Kind, is_time: bool) -> None:
+    """Where both agree, and the band around it."""
+    from matplotlib.ticker import LogLocator, NullLocator
+
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    low = min(axes.get_xlim()[0], axes.get_ylim()[0])
+    high = max(axes.get_xlim()[1], axes.get_ylim()[1])
+    x = np.geomspace(low, high, 60)
+    if kind in ("lossless", "overload"):
+        half = SHARES[kind] * x + (TIME_MS if is_time and kind == "lossless" else 0.0)
+        axes.fill_between(x, np.maximum(x - half, low), x + half, color=FAINT, alpha=0.8, lw=0)
+        if kind == "overload":
+            for side in (-1, 1):
+                axes.plot(x, x * (1 + side * BOUNDED_SHARE), color=SOFT, lw=0.5, ls="--")
+    axes.plot(x, x, color=SOFT, lw=0.6, zorder=0)
+    axes.set(xlim=(low, high), ylim=(low, high), aspect="equal")
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(LogLocator(numticks=5))
+        axis.set_major_formatter("{x:g}")
+        axis.set_minor_locator(NullLocator())
+
+
+def _scores(comparison: Comparison) -> Drawn:
+    """How z is distributed, and of each measure."""
+    pooled = comparison.pooled
+    figure, [[left, right]] = panels(1, 2, 3.2, width_ratios=(1, 1.3))
+    z = np.array([scored.z for scored in pooled.scored])
+    reach = max(_LEAST_Z, float(np.abs(z).max()) + 0.5)
+    edges = np.arange(-np.ceil(2 * reach) / 2, np.ceil(2 * reach) / 2 + 0.25, 0.5)
+    left.hist(z, edges.tolist(), color=_GOOD, alpha=0.8)
+    x = np.linspace(-4, 4, 200)
+    normal = 0.5 * len(z) * np.exp(-(x**2) / 2) / np.sqrt(2 * np.pi)
+    left.plot(x, normal, color=INK, lw=1.0, label="normal law")
+    low, high = pooled.expected
+    words = f"root mean square {pooled.rms:.2f}\nexpected {low:.2f} to {high:.2f}"
+    left.text(0.03, 0.96, words, transform=left.transAxes, va="top", fontsize=8)
+    left.set_xlabel("z: predicted minus measured, in standard errors")
+    left.set_ylabel("measures of conditions")
+    left.legend(loc="upper right", fontsize=8)
+    significant = {id(scored) for scored in pooled.significant}
+    names = [name for name in BY_NAME if any(s.cell.measure.name == name for s in pooled.scored)]
+    for place, name in enumerate(reversed(names)):
+        own = [s for s in pooled.scored if s.cell.measure.name == name]
+        spread = _spread(len(own))
+        for scored, offset in zip(sorted(own, key=lambda s: s.z), spread, strict=True):
+            colour = _BAD if id(scored) in significant else _GOOD
+            right.plot(scored.z, place + offset, "o", color=colour, ms=3, mew=0, alpha=0.85)
+    right.axvspan(-1.96, 1.96, color=FAINT, alpha=0.5, lw=0)
+    right.axvline(0, color=SOFT, lw=0.7)
+    right.set_yticks(range(len(names)), [BY_NAME[name].words for name in reversed(names)])
+    right.set_xlabel("z")
+    right.grid(visible=False)
+    text = (
+        "Means over at least six runs on sockets against the model's, under loss. If the model is "
+        "right, z follows the normal law about, and 95 of 100 lie in the grey band. Orange: "
+        "significant also when it is considered how many are looked at (Holm)."
+    )
+    return finish(figure, "scores", "Pooled runs under loss, in standard errors", text)
+
+
+def _spread(count: int) -> Floats:
+    """Small steps up and down, so that marks do not hide each other; the same each time."""
+    return np.asarray(0.28 * (np.arange(count) * 0.618034 % 1.0 * 2 - 1))
+
+
+def _variants(comparison: Comparison) -> Drawn:
+    """Root mean square of z with something left out."""
+    found = {"nothing left out": comparison.pooled, **comparison.controls}
+    found |= {f"without {name}": pooled for name, pooled in comparison.ablated.items()}
+    ordered = sorted(found.items(), key=lambda item: item[1].rms)
+    figure, [[axes]] = panels(1, 1, 0.9 + 0.27 * len(ordered))
+    low, high = comparison.pooled.expected
+    axes.axvspan(low, high, color=FAINT, lw=0)
+    for place, (_, pooled) in enumerate(ordered):
+        colour = _GOOD if pooled.passes else _BAD
+        axes.plot([pooled.rms], [place], "o", color=colour, ms=7)
+        axes.annotate(
+            f"{pooled.rms:.2f}",
+            (pooled.rms, place),
+            (8, 0),
+            textcoords="offset points",
+            va="center",
+        )
+    axes.set_xscale("log")
+    axes.set_xlim(min(0.5, 0.9 * low), 2.0 * max(pooled.rms for pooled in found.values()))
+    axes.xaxis.set_major_formatter("{x:g}")
+    axes.set_xlabel("root mean square of z over pooled runs under loss")
+    axes.set_yticks(range(len(ordered)), [name for name, _ in ordered])
+    axes.set_ylim(-0.6, len(ordered) - 0.4)
+    axes.grid(visible=False)
+    text = (
+        "Grey: where the root mean square lies in 95 of 100 comparisons if the model is right. "
+        "Blue passes all three criteria for pooled runs, orange fails at least one."
+    )
+    return finish(figure, "variants", "What each mechanism is worth", text)
