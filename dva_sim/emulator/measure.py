@@ -16,7 +16,7 @@ from dva_sim.network.measures import RunLog, measure_log
 from dva_sim.streams import derive_seed
 
 Row = dict[str, str]
-_NOTES_PER_COMMAND = 8
+_NOTES_PER_TURN = 8  # a command or an attempt
 _DECIMALS = 4
 COLUMNS = (*Condition("pub", 1).to_row(), *RESULTS, *EMULATOR_RESULTS, "realtime")
 """What a measurement tells: the condition, the results, the emulator, real-time priority."""
@@ -49,6 +49,7 @@ def measure(condition: Condition, seed: int, link: str = PACKETS) -> Row:
 def job_of(condition: Condition, seed: int, link: str = PACKETS) -> Job:
     """What the process of such a run is told."""
     played_s = condition.warm_s + condition.dur_s
+    patience_ms = condition.timeout_ms or math.inf
     return Job(
         "commands",
         WireConfig.of(condition),
@@ -57,7 +58,7 @@ def job_of(condition: Condition, seed: int, link: str = PACKETS) -> Job:
         arguments=dataclasses.asdict(condition),
         congestion=condition.cc,
         link=link,
-        room=1000 + int(_NOTES_PER_COMMAND * condition.hz * played_s),
+        room=1000 + int(_NOTES_PER_TURN * played_s * max(condition.hz, 1e3 / patience_ms)),
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 import tempfile
@@ -56,7 +57,7 @@ def start_job(job: Job, out: IO[bytes], err: IO[bytes]) -> subprocess.Popen[byte
         err: Gets complaints.
     """
     process = subprocess.Popen(
-        [sys.executable, "-m", "dva_sim.emulator.start"],
+        [sys.executable, "-m", "dva_sim.emulator.start", str(os.getpid())],
         stdin=subprocess.PIPE,
         stdout=out,
         stderr=err,

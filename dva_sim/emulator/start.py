@@ -14,18 +14,20 @@ from dva_sim.emulator import kernel
 
 
 def main() -> None:
-    """Read a job from standard input, print its outcome."""
+    """Read a job from standard input, print its outcome.
+
+    The one argument is the id of the process that waits for it: it may be gone by now.
+    """
     line = sys.stdin.readline()
     told = json.loads(line)
     os.environ["OPENBLAS_NUM_THREADS"] = os.environ["OMP_NUM_THREADS"] = "1"
-    parent = os.getppid()
     way, problem = told["link"], ""
     if way != "proxy":
         try:
             way = _become_owner(told["rootless"])
         except OSError as error:
             problem = error.strerror or str(error)
-    kernel.die_with_parent(parent)
+    kernel.die_with_parent(int(sys.argv[1]))
 
     from dva_sim.emulator.cell import Cell, Job, Outcome
 
