@@ -54,6 +54,7 @@ def run() -> Iterator[Run]:
         run.leave()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rootless", [False, True], ids=["root or not", "user namespace"])
 def test_real_packets_are_lost_as_told(rootless: bool) -> None:
     need_link(rootless)
@@ -64,6 +65,7 @@ def test_real_packets_are_lost_as_told(rootless: bool) -> None:
         assert [str(finding) for finding in find(crossing) if not finding.passed] == []
 
 
+@pytest.mark.slow
 def test_no_real_packet_is_early_or_faster_than_the_line() -> None:
     """It may be late on a busy machine: how late is what the link's own check asks."""
     need_link()
