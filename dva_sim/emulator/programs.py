@@ -104,7 +104,8 @@ class Operator:
         while due < self._end:
             _pause_until(due)
             issue = self._note(Kind.ISSUED, number)
-            self._exchange(number)
+            if not self._exchange(number):
+                return
             number += 1
             due = max(_now(), issue + self._period)
 
@@ -128,21 +129,22 @@ class Operator:
         dues = (self._start + step * self._period for step in steps)
         return [due for due in dues if due < self._end - 1e-9]
 
-    def _exchange(self, number: int) -> None:
-        """One command with all its attempts."""
+    def _exchange(self, number: int) -> bool:
+        """One command with all its attempts; False where the end came before its reply."""
         for _ in range(self._condition.attempts or 1):
             self.socket.send(_message(number, COMMAND_BYTES))
             late = _now() + 1e-3 * (self._condition.timeout_ms or 0.0)
             if self.socket.poll(_milliseconds(min(late, self._end) - _now())):
                 self._hear()
-                return
+                return True
             if late >= self._end:
-                return
+                return False
             self._note(Kind.TIMEOUT, number)
             self.socket.close(0)
             self.socket = _open(self._context, self._condition, operator=True)
             self.socket.connect(self._endpoint)
         self._note(Kind.ALERT, number)
+        return True
 
     def _listen_until(self, due: float) -> None:
         """Take replies until a command is due; polling counts whole milliseconds only."""
