@@ -122,15 +122,17 @@ def make_serialiser(
 ) -> Serialiser:
     """What gives the rate of the `up` or `down` direction of a configured link.
 
+    A run begins somewhere in a trace; two that were recorded together begin at the same moment.
+
     Raises:
         ConfigError: the trace cannot be read.
     """
     trace = config.trace_up if direction == "up" else config.trace_down
     if trace is None:
         return ConstantRate(config.toward(direction).rate_bps)
-    times = read_trace(trace)
-    offset = float(streams[f"{name}/trace-offset"].uniform(0.0, times[-1]))
-    return TraceRate(times, offset)
+    lasts = read_trace(config.trace_up or trace)[-1]
+    offset = float(streams.fresh(f"{name}/trace-offset").uniform(0.0, lasts))
+    return TraceRate(read_trace(trace), offset)
 
 
 def _make_fates(

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dva_sim import resources
 from dva_sim.errors import ConfigError
 
 Floats = NDArray[np.float64]
@@ -170,10 +171,16 @@ def _number(text: str, what: str, path: str, line: int) -> float:
     return value
 
 
+def _found(path: str) -> Path:
+    """A file by its path, or one that is shipped by its name."""
+    shipped = (root / "experiments/traces" / path for root in resources.roots())
+    return next((file for file in (Path(path), *shipped) if file.is_file()), Path(path))
+
+
 def _lines(path: str, what: str) -> Iterator[tuple[int, str]]:
     """Number and text of each line that is not empty."""
     try:
-        lines = Path(path).read_text(encoding="ascii").split("\n")
+        lines = _found(path).read_text(encoding="ascii").split("\n")
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else "is not text"
         raise ConfigError(f"{what} cannot be read: {reason}", path) from error
