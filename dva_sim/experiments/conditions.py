@@ -36,6 +36,14 @@ _CONDITIONS = {
     "partitions": "link.partitions",
     "recorded link, towards the robot": "link.trace_up",
     "recorded link, from the robot": "link.trace_down",
+    "rate of the shared link": "bottleneck.rate_bps",
+    "its queue": "bottleneck.queue_bytes",
+    "its one-way delay": "bottleneck.delay_s",
+    "commands per second": "commands.rate_hz",
+    "size of a command": "commands.bytes",
+    "pictures per second": "pictures.rate_hz",
+    "size of a picture": "pictures.bytes",
+    "way that is driven": "drive.task.kind",
     "camera rate": "camera.rate_hz",
     "size of a frame": "camera.frame_bytes",
     "field of view": "camera.field_of_view_deg",
@@ -130,9 +138,9 @@ def _site(scenario: Mapping[str, Any]) -> str:
 def _text(key: str, value: Any) -> str:
     if value is None:
         return "–"
-    if key == "link.rate_bps":
+    if key.endswith(".rate_bps"):
         return f"{value / 1e6:g} Mbit/s"
-    if key.endswith("_bytes"):
+    if key.endswith(("_bytes", ".bytes")):
         return f"{value / 1000:g} kB"
     if isinstance(value, Mapping):
         return ", ".join(f"{k} {v}" for k, v in value.items() if v is not None) or _NOWHERE

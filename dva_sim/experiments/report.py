@@ -27,6 +27,8 @@ from dva_sim.experiments.reading import factors_of, finding_of, keys_of, possibl
 from dva_sim.experiments.results import Results
 from dva_sim.experiments.robustness import Robustness, robustness_of, sentences
 from dva_sim.experiments.support import support_of_part
+from dva_sim.experiments.transports import figures as transport_figures
+from dva_sim.experiments.transports import page as transport_page
 from dva_sim.experiments.tuning import tuned_table, tuning_warning
 from dva_sim.experiments.variance import spread_table
 
@@ -74,6 +76,8 @@ def _draw(view: View, results: Results) -> list[Drawn]:
     tables = {name: results.table(name) for name in _OPTIONAL if results.has(name)}
     if shifts := _shifts(view, results):
         return dispatch_figures.draw_all(shifts)
+    if transport_figures.is_contest(view):
+        return transport_figures.draw_all(view)
     scenario = _scenario_of(results, view.part.name)
     return draw_all(view, tables, scenario, _robustness(view, results))
 
@@ -133,7 +137,7 @@ def _page(results: Results, runs: Table, view: View | None, drawn: list[Drawn]) 
         has_reference=any(part.get("reference") for part in study.get("parts", {}).values()),
         may_miss="confirmed" in runs,
         is_task=any(s.get("model") == "task" for s in scenarios.values()),
-        method=dispatch_page.method(shifts, _pair_correlation(view)) if shifts else [],
+        method=_method(view, shifts),
         manifest=json.dumps(manifest, indent=2, sort_keys=True, ensure_ascii=False),
     )
 
@@ -168,6 +172,8 @@ def _tables(
 
 
 def _cells(part: Part, view: View, shifts: Shifts | None, results: Results) -> CellTable:
+    if transport_figures.is_contest(view):
+        return cell_table(part, view.measure, transport_page.SUMMARIES)
     if shifts is None:
         support = support_of_part(part, _scenario_of(results, part.name))
         possible = possible_values(view.measure, _scenario_of(results, part.name))
@@ -204,6 +210,15 @@ def _warnings(results: Results, runs: Table) -> list[str]:
     if tuning := tuning_warning(results.manifest):
         found.append(tuning)
     return found
+
+
+def _method(view: View | None, shifts: Shifts | None) -> list[str]:
+    """Remarks where the usual ones do not fit."""
+    if shifts is not None:
+        return dispatch_page.method(shifts, _pair_correlation(view))
+    if transport_figures.is_contest(view):
+        return transport_page.method(_pair_correlation(view))
+    return []
 
 
 def _levels(name: str, levels: tuple[Any, ...]) -> tuple[str, str]:

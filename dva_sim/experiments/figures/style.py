@@ -37,7 +37,7 @@ _PATTERNS = {
     "pub-sub": "#0072B2",
     "latest-wins": "#009E73",
 }
-_OTHERS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#222222")
+_OTHERS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#222222", "#8a8a8a")
 
 _STYLE: dict[str, Any] = {
     "font.family": "DejaVu Sans",

@@ -40,7 +40,8 @@ def _lines(row: Row) -> Iterator[str]:
     yield (
         f"commands: {100 * row['delivered_share']:.1f} % delivered, "
         f"{row['command_rate_hz']:.1f} Hz applied, "
-        f"{_late(row['command_age_p50_s'], row['command_age_p95_s'])}"
+        f"{_ms(row['command_age_mean_s'])} old on average, "
+        f"95 % within {_ms(row['command_age_p95_s'])}"
     )
     if math.isfinite(row["crucial_delivered_share"]):
         yield (
@@ -52,17 +53,14 @@ def _lines(row: Row) -> Iterator[str]:
         f"{_ms(row['picture_age_mean_s'])} old on average, "
         f"95 % within {_ms(row['picture_age_p95_s'])}"
     )
-    yield f"round trip: {_late(row['round_trip_p50_s'], row['round_trip_p95_s'])}"
+    mean, late = _ms(row["round_trip_mean_s"]), _ms(row["round_trip_p95_s"])
+    yield f"round trip: {mean} on average, {late} at 95 %"
     done = "done" if row["completed"] else "not done"
     yield (
         f"drive: {done} in {row['movement_time_s']:.1f} s, "
         f"{row['path_error_rms_m']:.2f} m off the middle (rms), "
         f"{row['wall_crossings']} crossings"
     )
-
-
-def _late(median: float, late: float) -> str:
-    return f"{_ms(median)} in the median, {_ms(late)} at 95 %"
 
 
 def _ms(seconds: float) -> str:

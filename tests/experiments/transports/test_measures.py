@@ -88,7 +88,7 @@ def test_a_row_holds_shares_ages_and_rates():
     assert row["crucial_delivered_share"] == 0.5
     assert row["command_age_mean_s"] == pytest.approx(0.2)
     assert row["command_rate_hz"] == pytest.approx(0.2)
-    assert row["round_trip_p50_s"] == pytest.approx(0.6)
+    assert row["round_trip_mean_s"] == pytest.approx(0.6)
     assert row["session_down_bps"] == 200_000
     assert row["bulk_down_bps"] == 600_000
     assert row["bulk_use_down"] == 0.6

@@ -1,0 +1,57 @@
+"""What a report says in words and tables about a study of transports."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dva_sim.experiments.cells import Summary
+from dva_sim.experiments.labels import number, percent
+
+SUMMARIES: tuple[Summary, ...] = (
+    ("completed", "drives done", np.mean, percent),
+    ("wall_crossings", "crossings per drive", np.mean, number),
+    ("round_trip_mean_s", "round trip [s]", np.mean, number),
+    ("round_trip_p95_s", "its 95th percentile [s]", np.mean, number),
+    ("delivered_share", "commands delivered", np.mean, percent),
+    ("crucial_delivered_share", "crucial ones", np.mean, percent),
+    ("command_rate_hz", "applied [Hz]", np.mean, number),
+    ("command_age_mean_s", "age when applied [s]", np.mean, number),
+    ("age_in_force_mean_s", "age in force [s]", np.mean, number),
+    ("picture_rate_hz", "pictures shown [Hz]", np.mean, number),
+    ("picture_age_mean_s", "their age [s]", np.mean, number),
+    ("session_up_bps", "session up [bit/s]", np.mean, number),
+    ("session_down_bps", "session down [bit/s]", np.mean, number),
+    ("bulk_down_bps", "a TCP flow down [bit/s]", np.mean, number),
+    ("share_of_fair_down", "session, in equal shares", np.mean, number),
+    ("bulk_use_down", "line used by TCP, down", np.mean, percent),
+    ("jain_up", "Jain's index up", np.mean, number),
+    ("jain_down", "Jain's index down", np.mean, number),
+)
+
+
+def method(correlation: float | None) -> list[str]:
+    """How the numbers were made, as a list of remarks."""
+    alike = ""
+    if correlation is not None:
+        alike = (
+            f" The two sides of the contrast correlate with {correlation:.2f} at the last level."
+        )
+    return [
+        "The network is simulated first, packet by packet, and then somebody drives over the fates "
+        "of commands and pictures as they were: what is sent does not depend on what is driven. A "
+        "drive begins at a moment drawn for it and goes on from the beginning of the measured time "
+        "when it outlasts it.",
+        "The person is the cluster: intervals are taken over persons. A person's run meets the "
+        "same beginnings of all flows, the same noise of hand and judgement and the same place in "
+        f"the measured time under every transport; differences are taken within it.{alike}",
+        "Intervals of one level are Student's t; bands cover all levels of a line at once (max-t "
+        "over a bootstrap of persons). Both are Monte Carlo intervals, given the model.",
+        "Trinomial, RTNP, IRTP and BTP are in the manner of their papers: only abstracts could be "
+        "read, laws and numbers are not theirs. What is found here speaks for the laws as they "
+        "stand in the program, which says of each what is missing.",
+        "A command is applied if it arrives before any newer one; a picture is shown once all of "
+        "it is there. Messages that count may arrive up to five seconds after the last of them.",
+        "Not modelled: what processing at the hosts costs, encoding of pictures to fit the rate "
+        "(all have the same size), active queue management, and the radio itself. Operators are "
+        "control models; no human took part.",
+    ]
