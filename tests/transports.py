@@ -46,6 +46,13 @@ LIMIT = 60.0  # until what is waited for has happened, on a machine that is busy
 STEP = 0.005  # between two looks at a condition [s]
 DELAY = 0.001  # one way, in virtual time [s]
 
+VIRTUAL: dict[str, Callable[[], Connector]] = {
+    "virtual messages": lambda: Connector(depth="message"),
+    "virtual segments": lambda: Connector(depth="segment"),
+    "virtual datagrams": lambda: Connector("datagrams"),
+}
+"""What carries messages in virtual time."""
+
 
 class World:
     """Four nodes that can ask and tell each other."""

@@ -5,16 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
-from transports import GUARD, NODES, SocketWorld, VirtualWorld, World
+from transports import GUARD, NODES, VIRTUAL, SocketWorld, VirtualWorld, World
 
-from dva_sim.network.connecting import Connector
 from dva_sim.network.keys import KeyRing, create_keys
-
-VIRTUAL = {
-    "virtual messages": lambda: Connector(depth="message"),
-    "virtual segments": lambda: Connector(depth="segment"),
-    "virtual datagrams": lambda: Connector("datagrams"),
-}
 
 
 @pytest.fixture(scope="session")

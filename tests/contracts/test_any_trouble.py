@@ -13,6 +13,7 @@ from transports import (
     PHONE,
     ROBOT,
     TABLET,
+    VIRTUAL,
     Asker,
     Meddled,
     Meddler,
@@ -60,7 +61,8 @@ def ask_in_trouble(
         assert not asker.requester.busy
 
 
-@settings(deadline=None, max_examples=200)
+@pytest.mark.parametrize("kind", VIRTUAL)
+@settings(deadline=None, max_examples=100)
 @given(
     seed=st.integers(0, 2**32),
     plan=plans,
@@ -68,9 +70,9 @@ def ask_in_trouble(
     attempts=st.integers(1, 4),
 )
 def test_each_request_ends_once_in_virtual_time(
-    seed: int, plan: Plan, window: int, attempts: int
+    kind: str, seed: int, plan: Plan, window: int, attempts: int
 ) -> None:
-    ask_in_trouble(VirtualWorld(), seed, plan, window, attempts)
+    ask_in_trouble(VirtualWorld(VIRTUAL[kind]()), seed, plan, window, attempts)
 
 
 @pytest.mark.parametrize("window", [1, 3])
@@ -84,6 +86,7 @@ def test_each_request_ends_once_over_sockets(ring: KeyRing, window: int, keys: b
         world.close()
 
 
+@pytest.mark.parametrize("kind", VIRTUAL)
 @settings(deadline=None, max_examples=50)
 @given(
     seed=st.integers(0, 2**32),
@@ -93,9 +96,9 @@ def test_each_request_ends_once_over_sockets(ring: KeyRing, window: int, keys: b
     window=st.integers(1, 4),
 )
 def test_each_request_ends_once_while_nodes_come_and_go_in_virtual_time(
-    seed: int, absences: list[tuple[str, float, float]], window: int
+    kind: str, seed: int, absences: list[tuple[str, float, float]], window: int
 ) -> None:
-    world = VirtualWorld()
+    world = VirtualWorld(VIRTUAL[kind]())
     for node, at, duration in absences:
         world.clock.call_at(at, world.leave, node)
         world.clock.call_at(at + duration, world.come_back, node)
