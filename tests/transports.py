@@ -90,9 +90,10 @@ class World:
 
 
 class VirtualWorld(World):
-    """Virtual time over good links; what carries the messages is chosen."""
+    """Virtual time; what carries the messages is chosen, and how many packets the links lose."""
 
-    def __init__(self, connector: Connector | None = None) -> None:
+    def __init__(self, connector: Connector | None = None, loss: float = 0.0) -> None:
+        self._loss = loss
         self._links: dict[tuple[str, str], Link] = {}
         self.network: VirtualNetwork = VirtualNetwork(
             Clock(), lambda a, b: (self._link(a, b), self._link(b, a)), connector=connector
@@ -100,7 +101,7 @@ class VirtualWorld(World):
         self.leave, self.come_back = self.network.leave, self.network.come_back  # type: ignore[method-assign]
 
     def _link(self, a: str, b: str) -> Link:
-        config = LinkConfig(delay_s=DELAY)
+        config = LinkConfig(delay_s=DELAY, loss=self._loss, draws="independent")
         link = Link(config, ConstantRate(config.rate_bps), Streams(1), f"{a}>{b}")
         return self._links.setdefault((a, b), link)
 

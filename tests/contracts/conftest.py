@@ -17,7 +17,10 @@ def ring(tmp_path_factory: pytest.TempPathFactory) -> KeyRing:
     return KeyRing(folder)
 
 
-@pytest.fixture(params=[*VIRTUAL, "sockets", "sockets with keys"])
+LOSSY = "virtual segments with loss"  # what is promised, TCP keeps through losses
+
+
+@pytest.fixture(params=[*VIRTUAL, LOSSY, "sockets", "sockets with keys"])
 def world(request: pytest.FixtureRequest) -> Iterator[World]:
     made = _world(request)
     yield made
@@ -32,6 +35,8 @@ def sockets(request: pytest.FixtureRequest) -> Iterator[SocketWorld]:
 
 
 def _world(request: pytest.FixtureRequest) -> World:
+    if request.param == LOSSY:
+        return VirtualWorld(VIRTUAL["virtual segments"](), loss=0.05)
     make = VIRTUAL.get(request.param)
     return VirtualWorld(make()) if make else SocketWorld(_ring(request))
 
