@@ -71,25 +71,27 @@ class Cubic(Reno):
     """The window grows with the cube of the time since the last loss: RFC 9438.
 
     As in Linux everything is in whole segments: the distance to the curve's plateau is
-    rounded down, so a small window reaches the plateau soon and stays there for long; and
-    the curve is read the shortest round trip ahead, where the RFC takes the smoothed one.
+    rounded down, so a small window reaches the plateau soon and stays there for long, while
+    what is delivered meanwhile is saved up for the next step; and the curve is read the
+    shortest round trip ahead, where the RFC takes the smoothed one.
     """
 
     BACKOFF = 0.7
     C = 0.4
     FRIENDLY = 3 * (1 - BACKOFF) / (1 + BACKOFF)
 
-    __slots__ = ("_epoch", "_estimate", "_inflection", "_last", "_peak", "_plateau")
+    __slots__ = ("_epoch", "_estimate", "_inflection", "_last", "_peak", "_plateau", "_saved")
 
     def __init__(self, options: TcpOptions) -> None:
         super().__init__(options)
         self._peak = self._plateau = self._inflection = self._estimate = 0.0
         self._epoch = -1.0
         self._last = 0.0
+        self._saved = 0
 
     def reduce(self, now: float) -> float:
         """See `Reno`; with fast convergence (RFC 9438, section 4.7)."""
-        self._epoch = -1.0
+        self._epoch, self._saved = -1.0, 0
         whole = float(int(self.window))
         falling = whole < self._peak
         self._peak = float(int(whole * (1 + self.BACKOFF) / 2)) if falling else whole
@@ -110,10 +112,21 @@ class Cubic(Reno):
             self._begin(now)
         self._last = now
         self._estimate += self.FRIENDLY * segments / self.window
-        whole = int(self.window)
         target = max(self.curve(now - self._epoch + ahead), int(self._estimate))
-        if target > whole:
-            self.window += segments * min(target / whole - 1.0, 0.5)
+        price = self._price(target)
+        if self._saved >= price:
+            self._saved = 0
+            self.window += 1.0
+        self._saved += segments
+        steps = self._saved // price
+        self._saved -= steps * price
+        self.window += steps
+
+    def _price(self, target: float) -> int:
+        """Segments to be delivered for one more in the window: at least two, for long none."""
+        if target <= self.window:
+            return int(100 * self.window)
+        return max(2, int(self.window / (target - self.window)))
 
     def _begin(self, now: float) -> None:
         """A new epoch: where the curve has its inflection (RFC 9438, figure 2)."""
