@@ -71,6 +71,11 @@ class Scoreboard:
         """Segments on their way, by this account (RFC 6675, pipe)."""
         return len(self.queue) - self.sacked - self.lost + self.resent
 
+    def clear(self) -> None:
+        """Forget all of them."""
+        self.queue.clear()
+        self.sacked = self.lost = self.resent = 0
+
     def take(self, acknowledged: int, blocks: tuple[tuple[int, int], ...]) -> Gain:
         """Remove what is acknowledged in order, mark what is acknowledged selectively."""
         gain, queue, count = Gain(), self.queue, 0

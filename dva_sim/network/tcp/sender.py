@@ -1,9 +1,8 @@
-"""The sending half of an end: what may leave, when, and what is done about losses.
+"""The sending half of an end: what may leave, and when.
 
 References:
-    RFC 5681 and 6298 (windows and time-outs), RFC 8985 (RACK, tail-loss probe), RFC 6937
-    (rate reduction), RFC 3522 (needless recoveries told by time stamps), RFC 9293,
-    section 3.8.6.1 (probing a closed window).
+    RFC 9293 (sliding window), RFC 5681 and 7661 (a window that is not used does not grow),
+    RFC 6298 (round trips are never taken from what was sent twice).
 """
 
 from __future__ import annotations
@@ -12,18 +11,16 @@ from collections.abc import Callable
 from math import inf
 
 from dva_sim.clock import Clock
-from dva_sim.network.tcp.congestion import HyStart, RateReduction, make_window
-from dva_sim.network.tcp.losses import ByCount, ByTime
+from dva_sim.network.tcp.alarm import PROBE, REORDER, WINDOW, Alarm
+from dva_sim.network.tcp.congestion import HyStart, make_window
 from dva_sim.network.tcp.memory import SendBuffer
 from dva_sim.network.tcp.options import TcpOptions
+from dva_sim.network.tcp.recovery import OPEN, Recovery
 from dva_sim.network.tcp.round_trip import RoundTrip
 from dva_sim.network.tcp.scoreboard import Gain, Scoreboard, Sent
-from dva_sim.network.tcp.timer import Timer
-
-OPEN, RECOVERY, LOSS = "open", "recovery", "loss"
-TIMEOUT, PROBE, REORDER, WINDOW = "timeout", "probe", "reorder", "window"
 
 Emit = Callable[[int, int, float], object]
+Blocks = tuple[tuple[int, int], ...]
 
 
 class Sender:
@@ -46,6 +43,11 @@ class Sender:
         retransmitted: Repetitions.
         timeouts: Retransmission time-outs.
         tail_probes: Tail-loss probes.
+        buffer: What is written and not acknowledged, in bytes charged.
+        board: What is under way.
+        times: The round trip.
+        window: The congestion window.
+        recovery: What is done about losses.
     """
 
     def __init__(
@@ -59,16 +61,10 @@ class Sender:
         self.board = Scoreboard()
         self.times = RoundTrip(options)
         self.window = make_window(options)
-        self._losses = ByTime(self.times) if options.rack else ByCount(self.times)
+        self.recovery = Recovery(options, self.times, self.window, self.board)
         self._hystart = HyStart()
-        self._state, self._recover_to = OPEN, 0
-        self._before = self.window.window, self.window.threshold
-        self._first_repeat: float = inf
-        self._reduction = RateReduction(0.0, 0)
-        self._timer, self._kind = Timer(clock, self._ring, options.tick), TIMEOUT
-        self._timeout_at = self._doubt_until = 0.0
-        self._back_off = self._unanswered = 0
-        self._probe_end, self._probe_repeats = -1, False
+        self._alarm = Alarm(clock, options, self.times, self._ring)
+        self._unanswered = 0
         self._last_sent = 0.0
         self._window_used, self._most_out, self._use_round = False, 0, 0
 
@@ -102,9 +98,9 @@ class Sender:
 
     def stop(self) -> None:
         """Forget what is under way."""
-        self._timer.stop()
+        self._alarm.stop()
         self.total = self.next
-        self.board = Scoreboard()
+        self.board.clear()
 
     # Acknowledgements
 
@@ -113,7 +109,7 @@ class Sender:
         now: float,
         acknowledged: int,
         edge: int,
-        blocks: tuple[tuple[int, int], ...],
+        blocks: Blocks,
         duplicate: bool,
         echo: float,
     ) -> None:
@@ -129,46 +125,43 @@ class Sender:
         """
         self._unanswered = 0
         self.edge = max(self.edge, edge)
-        advanced = acknowledged > self.first
-        if self.board.queue and (advanced or blocks or duplicate or self._probe_end >= 0):
+        news = acknowledged > self.first or blocks or duplicate
+        if self.board.queue and (news or self.recovery.probe_end >= 0):
             self._digest(now, acknowledged, blocks, duplicate, echo)
         elif self.total > self.next:
-            self._back_off = 0 if self.edge > self.next else self._back_off
+            if self.edge > self.next:
+                self._alarm.back_off = 0
             self._push(now)
 
     def _digest(
-        self,
-        now: float,
-        acknowledged: int,
-        blocks: tuple[tuple[int, int], ...],
-        duplicate: bool,
-        echo: float,
+        self, now: float, acknowledged: int, blocks: Blocks, duplicate: bool, echo: float
     ) -> None:
-        gain, advanced = self.board.take(acknowledged, blocks), acknowledged > self.first
+        board, recovery = self.board, self.recovery
+        gain, advanced = board.take(acknowledged, blocks), acknowledged > self.first
         if advanced:
-            self.first, self._back_off = acknowledged, 0
+            self.first, self._alarm.back_off = acknowledged, 0
             self.buffer.release(gain.released)
         if gain.delivered:
             self._measure(gain, now, echo, advanced)
         if duplicate:
-            self._losses.needless(acknowledged, self.next)
-        if self._probe_end >= 0:
-            self._judge_probe(now, acknowledged, advanced, bool(blocks), duplicate)
-        if self._state != OPEN and advanced:
-            self._progress(now, acknowledged, echo)
-        lost = self.board.lost
-        self._doubt_until = 0.0
-        if self.board.sacked or gain.ambiguous or self._state != OPEN:
-            self._find_losses(now)
-        self._adapt(now, len(gain.delivered), advanced, self.board.lost > lost)
+            recovery.losses.needless(acknowledged, self.next)
+        if recovery.probe_end >= 0:
+            recovery.judge_probe(now, acknowledged, advanced or bool(blocks), duplicate)
+        if advanced:
+            recovery.progress(acknowledged, echo)
+        lost, self._alarm.doubt = board.lost, 0.0
+        if board.sacked or gain.ambiguous or recovery.state != OPEN:
+            self._alarm.doubt = recovery.find(now, self.next)
+        if not recovery.hold(len(gain.delivered), advanced and board.lost <= lost) and advanced:
+            self._grow(len(gain.delivered), now)
         self._transmit(now)
-        self._arm(now, advanced)
+        self._watch(now, advanced)
 
     def _measure(self, gain: Gain, now: float, echo: float, advanced: bool) -> None:
         """Round trip of the segment that waited longest; never of an ambiguous one (Karn)."""
         first = last = 0.0
         for sent in gain.delivered:
-            self._losses.delivered(sent, now, echo)
+            self.recovery.losses.delivered(sent, now, echo)
             if not sent.repeated and (sent.sacked or not gain.ambiguous):
                 last = now - sent.sent_at
                 first = first or last
@@ -185,60 +178,13 @@ class Sender:
         if ends and self._options.hystart:
             self.window.threshold = self.window.window
 
-    def _judge_probe(
-        self, now: float, acknowledged: int, advanced: bool, selective: bool, duplicate: bool
-    ) -> None:
-        """Did the probe mend a loss by itself? RFC 8985, section 7.4."""
-        if acknowledged < self._probe_end:
-            return
-        if self._probe_repeats and not duplicate and acknowledged > self._probe_end:
-            if self._state == OPEN and self._options.congestion_window:
-                self.window.window = min(self.window.window, self.window.reduce(now))
-        elif self._probe_repeats and not duplicate and (advanced or selective):
-            return  # either sending of it may have arrived
-        self._probe_end = -1
-
-    def _progress(self, now: float, acknowledged: int, echo: float) -> None:
-        """The left edge moved during a recovery: is it over, or was it needless?"""
-        over = acknowledged >= self._recover_to
-        needless = self._options.undo and echo < self._first_repeat
-        if needless and (over or self._state == LOSS or not self.board.resent):
-            window, threshold = self._before
-            self.window.window = max(self.window.window, window)
-            self.window.threshold = max(self.window.threshold, threshold)
-            self.board.forgive()
-            self._state = OPEN
-        elif over:
-            if self._state == RECOVERY and self._options.congestion_window:
-                self.window.window = self.window.threshold
-            self._losses.recovered()
-            self._state = OPEN
-
-    def _find_losses(self, now: float) -> None:
-        wait = self._losses.detect(self.board, now, self._state != OPEN)
-        self._doubt_until = now + wait if wait else 0.0
-        if self.board.lost and self._state == OPEN:
-            in_flight = len(self.board.queue)
-            self._begin(RECOVERY)
-            self._reduction = RateReduction(self.window.reduce(now), in_flight)
-
-    def _begin(self, state: str) -> None:
-        self._before = self.window.window, self.window.threshold
-        self._state, self._recover_to = state, self.next
-        self._first_repeat, self._probe_end = inf, -1
-
-    def _adapt(self, now: float, delivered: int, advanced: bool, worse: bool) -> None:
-        """Move the congestion window."""
-        if self._state == RECOVERY and self._options.congestion_window:
-            in_flight = self.board.in_flight
-            allowed = self._reduction.allows(delivered, in_flight, advanced and not worse)
-            self.window.window = float(in_flight + allowed)
-        elif advanced and self._state != RECOVERY:
-            slow_start = self.window.window < self.window.threshold
-            if self._window_used or (slow_start and self.window.window < 2 * self._most_out):
-                self.window.grow(delivered, now, self.times.minimum)
-            else:
-                self.window.rests(now)
+    def _grow(self, delivered: int, now: float) -> None:
+        """Open the congestion window, if it was used."""
+        slow_start = self.window.window < self.window.threshold
+        if self._window_used or (slow_start and self.window.window < 2 * self._most_out):
+            self.window.grow(delivered, now, self.times.minimum)
+        else:
+            self.window.rests(now)
 
     # Sending
 
@@ -247,11 +193,11 @@ class Sender:
         before = self.next
         self._transmit(now)
         if self.next > before or not self.board.queue:
-            self._arm(now, False)
+            self._watch(now, False)
 
     def _transmit(self, now: float) -> None:
         """Send what the windows allow: first what is lost, then what is new."""
-        if self._state != OPEN and self.board.lost:
+        if self.board.lost and self.recovery.state != OPEN:
             self._repeat_lost(now)
         if self.total == self.next:
             return
@@ -276,10 +222,7 @@ class Sender:
         start, self.next = self.next, end
         charge = self.buffer.depart(end - start, end == self.total)
         self.board.queue.append(Sent(start, end, now, charge))
-        self.segments += 1
-        self._reduction.sent += 1
-        self._last_sent = now
-        self._emit(start, end, now)
+        self._leave(start, end, now)
 
     def _repeat_lost(self, now: float) -> None:
         queue, index = self.board.queue, 0
@@ -295,110 +238,74 @@ class Sender:
         if self._options.collapse:
             self.buffer.release(self.board.merge(index, self._options.mss))
         self.board.repeat(sent, now)
-        self.segments += 1
+        self.recovery.repeated(now)
         self.retransmitted += 1
-        self._reduction.sent += 1
-        self._first_repeat = min(self._first_repeat, now)
-        self._last_sent = now
         if index == 0:
-            self._timeout_at = now + self._timeout()
-        self._emit(sent.start, sent.end, now)
+            self._alarm.delay_timeout(now)
+        self._leave(sent.start, sent.end, now)
+
+    def _leave(self, start: int, end: int, now: float) -> None:
+        self.segments += 1
+        self.recovery.sent()
+        self._last_sent = now
+        self._emit(start, end, now)
 
     # Timers
 
-    def _timeout(self) -> float:
-        return min(self.times.timeout * 2.0**self._back_off, self._options.max_rto)
-
-    def _arm(self, now: float, advanced: bool) -> None:
-        """Set the one timer to what comes first: a doubt resolved, a probe, a time-out."""
-        if not self.board.queue:
-            self._watch_window(now)
-            return
-        if advanced:
-            self._timeout_at = now + self._timeout()
-        elif self._kind != TIMEOUT or self._timer.deadline == inf:
-            self._timeout_at = self.board.queue[0].sent_at + self._timeout()
-        self._kind, at = TIMEOUT, self._timeout_at
-        if self._doubt_until and self._doubt_until < at:
-            self._kind, at = REORDER, self._doubt_until
-        elif self._may_probe():
-            self._kind, at = PROBE, min(at, now + self._probe_time())
-        self._timer.set(max(at, now))
+    def _watch(self, now: float, advanced: bool) -> None:
+        if self.board.queue:
+            self._alarm.watch(now, self.board, advanced, self._may_probe())
+        elif self.next < self.total:
+            self._alarm.watch_window(now)
+        else:
+            self._alarm.stop()
 
     def _may_probe(self) -> bool:
-        quiet = self._state == OPEN and not self.board.sacked and self._probe_end < 0
-        return quiet and self._options.tail_probe
-
-    def _probe_time(self) -> float:
-        """RFC 8985, section 7.2: a single segment may meet a delayed acknowledgement."""
-        if not self.times.smoothed:
-            return self._options.first_rto
-        alone = len(self.board.queue) == 1
-        return 2 * self.times.smoothed + (self._options.min_rto if alone else 0.0)
-
-    def _watch_window(self, now: float) -> None:
-        if self.next == self.total:
-            self._kind = TIMEOUT
-            self._timer.stop()
-        elif self._kind != WINDOW or self._timer.deadline == inf:
-            self._kind = WINDOW
-            self._timer.set(now + self._timeout())
+        quiet = self.recovery.state == OPEN and self.recovery.probe_end < 0
+        return quiet and not self.board.sacked and self._options.tail_probe
 
     def _ring(self) -> None:
-        now = self._clock.now
-        if self._kind == REORDER:
+        now, kind = self._clock.now, self._alarm.kind
+        if kind == REORDER:
             self._doubt_over(now)
-        elif self._kind == PROBE:
+        elif kind == PROBE:
             self._probe(now)
         elif self._unanswered >= self._options.retries:
             self._give_up()
         else:
             self._unanswered += 1
-            self._back_off += 1
-            if self._kind == WINDOW:
-                self._probe_window(now)
-            else:
-                self._time_out(now)
+            self._alarm.back_off += 1
+            self._probe_window(now) if kind == WINDOW else self._time_out(now)
 
     def _doubt_over(self, now: float) -> None:
-        lost = self.board.lost
-        self._find_losses(now)
-        self._adapt(now, 0, False, self.board.lost > lost)
+        self._alarm.doubt = self.recovery.find(now, self.next)
+        self.recovery.hold(0, False)
         self._transmit(now)
-        self._arm(now, False)
+        self._watch(now, False)
 
     def _probe(self, now: float) -> None:
         """Send something new, or the last segment again, to provoke an acknowledgement."""
         self.tail_probes += 1
         end = min(self.next + self._options.mss, self.total)
-        self._probe_repeats = not self.next < end <= self.edge
-        if self._probe_repeats:
-            self._repeat(len(self.board.queue) - 1, now)
-        else:
+        fresh = self.next < end <= self.edge
+        if fresh:
             self._send(end, now)
-        self._probe_end = self.next
-        self._kind, self._timeout_at = TIMEOUT, now + self._timeout()
-        self._timer.set(self._timeout_at)
+        else:
+            self._repeat(len(self.board.queue) - 1, now)
+        self.recovery.probed(self.next, not fresh)
+        self._alarm.restart(now)
 
     def _time_out(self, now: float) -> None:
-        """RFC 6298, rules 5.4 to 5.6; RFC 5681, equation 4."""
+        """RFC 6298, rules 5.4 to 5.6."""
         self.timeouts += 1
-        if self._state == OPEN or self.first >= self._recover_to:
-            self._begin(LOSS)
-            self.window.reduce(now)
-        self._state, self._recover_to = LOSS, self.next
-        self._losses.on_timeout(self.board, now)
-        if self._options.congestion_window:
-            self.window.window = float(self.board.in_flight + 1)
-        self._doubt_until = 0.0
+        self._alarm.doubt = 0.0
+        self.recovery.time_out(now, self.first, self.next)
         self._repeat(0, now)
-        self._kind, self._timeout_at = TIMEOUT, now + self._timeout()
-        self._timer.set(self._timeout_at)
+        self._alarm.restart(now)
 
     def _probe_window(self, now: float) -> None:
         if self.edge > self.next:
             self._send(min(self.edge, self.total), now)
-            self._arm(now, False)
         else:
             self._emit(-1, -1, now)
-            self._timer.set(now + self._timeout())
+        self._watch(now, False)
