@@ -97,7 +97,7 @@ class ThreeTerms:
         decrease: Share of the rate that a loss costs.
 
     References:
-        X. Liu, M. Q.-H. Meng, X. Ye, J. Gu: An UDP-based protocol for Internet robots. World
+        P. X. Liu, M. Meng, X. Ye, J. Gu: An UDP-based protocol for Internet robots. World
         Congress on Intelligent Control and Automation 2002, DOI 10.1109/WCICA.2002.1022068.
         P. X. Liu, M. Q.-H. Meng, S. X. Yang: Data communications for Internet robots. Autonomous
         Robots 15, 2003, DOI 10.1023/A:1026160302776.
@@ -106,7 +106,8 @@ class ThreeTerms:
         three only abstracts and lists of references could be read.)
         S. Jin, L. Guo, I. Matta, A. Bestavros: TCP-friendly SIMD congestion control and its
         convergence behavior. ICNP 2001. D. Bansal, H. Balakrishnan: Binomial congestion control
-        algorithms. INFOCOM 2001.
+        algorithms. INFOCOM 2001. M. Mathis, J. Semke, J. Mahdavi, T. Ott: The macroscopic behavior
+        of the TCP congestion avoidance algorithm. Computer Communication Review 27(3), 1997.
     """
 
     def __init__(self, linear: float, square: float, decrease: float) -> None:

@@ -21,6 +21,7 @@ SHORT = {
     "measure_s": 10,
     "drive.task.points_m": [[0, 0], [6, 0], [9, 3]],
     "drive.practice": 0,
+    "drive.horizon_s": 100,
 }
 BTP = {
     "kind": "btp",

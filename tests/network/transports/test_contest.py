@@ -82,9 +82,9 @@ def test_a_tcp_flow_alone_fills_the_line_and_its_queue():
 
 
 def test_tcp_flows_alone_share_the_line_alike():
-    of = contest("udp", bulk={"up": 3}, warm_up_s=20, measure_s=100, commands={"rate_hz": 1})
+    of = contest("udp", bulk={"up": 3}, warm_up_s=20, measure_s=60, commands={"rate_hz": 1})
     shares = np.array(of.bulk_bytes["up"]) / sum(of.bulk_bytes["up"])
-    assert shares == pytest.approx([1 / 3] * 3, abs=0.08)
+    assert shares == pytest.approx([1 / 3] * 3, abs=0.1)
 
 
 def test_udp_takes_what_it_wants_and_laws_of_rate_give_way():
