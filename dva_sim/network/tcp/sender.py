@@ -182,7 +182,8 @@ class Sender:
         """Open the congestion window, if it was used."""
         slow_start = self.window.window < self.window.threshold
         if self._window_used or (slow_start and self.window.window < 2 * self._most_out):
-            self.window.grow(delivered, now, self.times.minimum)
+            shortest = self.times.minimum
+            self.window.grow(delivered, now, shortest if shortest < inf else 0.0)
         else:
             self.window.rests(now)
 
