@@ -12,6 +12,7 @@ from dva_sim.network.tcp.round_trip import RoundTrip
 from dva_sim.network.tcp.scoreboard import Scoreboard, Sent
 
 DUPLICATES = 3
+_MICROSECOND = 1e-6  # the clock's step
 _PERSISTS = 16  # recoveries for which a widened window stays wide (RFC 8985, section 6.2)
 
 
@@ -52,8 +53,11 @@ class ByTime:
         elif sent.end < self._furthest and not sent.repeated:
             self._reordering = True
         taken = now - sent.sent_at
-        if sent.repeated and (echo < sent.sent_at or taken < self._times.minimum):
-            return  # an earlier sending of it has arrived
+        if sent.repeated:
+            # out of order, the time stamp that comes back is an older one and tells nothing
+            earlier = echo < sent.sent_at and not sent.sacked
+            if earlier or taken < self._times.minimum - _MICROSECOND:
+                return  # an earlier sending of it has arrived
         self.round_trip = taken
         if (sent.sent_at, sent.end) > (self._latest, self._latest_end):
             self._latest, self._latest_end = sent.sent_at, sent.end
@@ -94,7 +98,7 @@ class ByTime:
             if at > latest or (at == latest and sent.end >= latest_end):
                 continue
             left = at + patience - now
-            if left <= 1e-9:
+            if left <= _MICROSECOND:
                 board.mark_lost(sent)
             elif left > wait:
                 wait = left
@@ -104,7 +108,7 @@ class ByTime:
         """Mark the first segment and those whose time is over (RFC 8985, section 6.3)."""
         patience = self.round_trip + self.reordering_window(board, True)
         for index, sent in enumerate(board.queue):
-            if not sent.sacked and (index == 0 or sent.sent_at + patience <= now):
+            if not sent.sacked and (index == 0 or sent.sent_at + patience <= now + _MICROSECOND):
                 board.mark_lost(sent)
 
 

@@ -1,0 +1,100 @@
+"""When acknowledgements leave. One way takes 50 ms."""
+
+import pytest
+from scripted_tcp import Pair, options
+
+
+def acknowledged_at(pair, start):
+    """When the peer sent acknowledgements without data."""
+    return [at for at, size in pair.back.since(start) if size == 52]
+
+
+def answer(pair, size=200):
+    pair.peer.on_readable = lambda: (pair.read(), pair.peer.write(size))
+
+
+def test_a_one_way_stream_is_acknowledged_when_the_program_has_read():
+    pair = Pair()
+    pair.write_at([1.0 + 0.1 * number for number in range(30)])
+    pair.clock.run(6.0)
+    assert acknowledged_at(pair, 1.0) == pytest.approx([1.05 + 0.1 * n for n in range(30)])
+
+
+def test_in_a_dialogue_the_acknowledgement_rides_on_the_answer():
+    pair = Pair()
+    pair.peer.on_readable = lambda: (pair.read(), pair.clock.call_after(0.03, pair.peer.write, 200))
+    pair.write_at([1.0 + 0.1 * number for number in range(10)])
+    pair.clock.run(6.0)
+    # the first came before there was a dialogue
+    assert acknowledged_at(pair, 1.0) == [1.05]
+
+
+def test_in_a_dialogue_without_an_answer_it_waits_40_ms():
+    pair = Pair()
+    answer(pair)
+    pair.write_at([1.0, 1.1])
+    pair.at(1.12, setattr, pair.peer, "on_readable", pair.read)
+    pair.clock.run(2.0)
+    assert acknowledged_at(pair, 1.12) == pytest.approx([1.19])
+
+
+def test_after_a_wait_in_vain_the_dialogue_is_over():
+    pair = Pair()
+    answer(pair)
+    pair.write_at([1.0, 1.2, 1.5])
+    pair.at(1.12, setattr, pair.peer, "on_readable", pair.read)
+    pair.clock.run(2.0)
+    assert acknowledged_at(pair, 1.12) == pytest.approx([1.29, 1.55])
+
+
+def test_in_a_dialogue_a_second_segment_is_acknowledged_at_once():
+    pair = Pair()
+    answer(pair)
+    pair.write_at([1.0, 1.2, 1.21])
+    pair.at(1.12, setattr, pair.peer, "on_readable", pair.read)
+    pair.clock.run(2.0)
+    assert acknowledged_at(pair, 1.12) == pytest.approx([1.26])
+
+
+def test_an_answer_later_than_40_ms_makes_no_dialogue():
+    pair = Pair()
+    pair.peer.on_readable = lambda: (pair.read(), pair.clock.call_after(0.045, pair.peer.write, 9))
+    pair.write_at([1.0, 1.2, 1.4])
+    pair.clock.run(2.0)
+    assert acknowledged_at(pair, 1.0) == pytest.approx([1.05, 1.25, 1.45])
+
+
+def test_a_program_that_does_not_read_is_acknowledged_at_once_sixteen_times_then_later():
+    pair = Pair(reads=False)
+    pair.write_at([1.0 + 0.1 * number for number in range(18)])
+    pair.clock.run(6.0)
+    waits = [at - 1.05 - 0.1 * n for n, at in enumerate(acknowledged_at(pair, 1.0))]
+    assert waits == pytest.approx([0.0] * 16 + [0.04, 0.08])  # in vain once: twice as patient
+
+
+def test_two_full_segments_are_acknowledged_at_once_though_nobody_reads():
+    pair = Pair(reads=False)
+    pair.write_at([1.0 + 0.1 * number for number in range(16)])
+    pair.write_at([2.6], 2 * 1448)
+    pair.clock.run(6.0)
+    assert acknowledged_at(pair, 2.6) == pytest.approx([2.65])
+
+
+def test_without_delayed_acknowledgements_each_segment_has_its_own_at_once():
+    pair = Pair(peer=options(delayed_ack=0.0))
+    answer(pair)
+    pair.write_at([1.0, 1.1, 1.2])
+    pair.clock.run(2.0)
+    assert acknowledged_at(pair, 1.0) == pytest.approx([1.05, 1.1 + 0.05, 1.25])
+
+
+def test_what_comes_too_early_or_twice_or_fills_a_hole_is_acknowledged_at_once():
+    pair = Pair()
+    answer(pair)
+    pair.write_at([1.0])
+    pair.at(1.06, setattr, pair.peer, "on_readable", pair.read)
+    pair.at(1.15, pair.out.lose, 2)
+    pair.write_at([1.2, 1.21, 1.22])
+    pair.clock.run(3.0)
+    # too early at 1.27; the hole filled by the repetition of 1.335, a quarter round trip late
+    assert acknowledged_at(pair, 1.262) == pytest.approx([1.27, 1.385])

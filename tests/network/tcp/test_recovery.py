@@ -1,0 +1,145 @@
+"""What happens to lost segments. Round trip 100 ms, so the time-out is 300 ms."""
+
+import pytest
+from scripted_tcp import Pair, keep_writing, options
+
+
+def lost_at(times, lost, until=20.0, late=None, **changes):
+    """Write 400 B at each of `times`, lose the segments of these numbers."""
+    pair = Pair(opener=options(**changes))
+    before = len(pair.out.carried)
+    pair.out.lost = {before + number for number in lost}
+    pair.out.late = {before + number: by for number, by in (late or {}).items()}
+    pair.write_at(times)
+    pair.clock.run(until)
+    return pair
+
+
+def test_a_single_lost_segment_is_probed_when_its_timeout_would_have_come():
+    # probe time 2 x 0.1 + 0.2 s for a delayed acknowledgement, but no later than the time-out
+    pair = lost_at([1.0], {1})
+    assert pair.sent(1.0) == pytest.approx([1.0, 1.3])
+    assert (pair.opener.sender.tail_probes, pair.opener.sender.timeouts) == (1, 0)
+
+
+def test_without_the_probe_the_timeout_does_it_and_doubles():
+    pair = lost_at([1.0], {1, 2, 3}, tail_probe=False)
+    assert pair.sent(1.0) == pytest.approx([1.0, 1.3, 1.9, 3.1])
+    assert pair.opener.sender.timeouts == 3
+
+
+def test_after_a_lost_probe_the_timeout_starts_anew_and_doubles():
+    pair = lost_at([1.0], {1, 2, 3, 4})
+    assert pair.sent(1.0) == pytest.approx([1.0, 1.3, 1.6, 2.2, 3.4])
+
+
+def test_two_lost_at_the_tail_are_probed_after_two_round_trips_and_both_come_back():
+    # the probe repeats the second at 1.21; its acknowledgement at 1.31 tells of the first
+    pair = lost_at([1.0, 1.01], {1, 2})
+    assert pair.sent(1.0) == pytest.approx([1.0, 1.01, 1.21, 1.31])
+
+
+def test_a_probe_prefers_something_new():
+    pair = Pair(opener=options(initial_window=2))
+    pair.out.lose(1, 2)
+    pair.write_at([1.0, 1.0, 1.01])
+    pair.clock.run(1.25)
+    # the third write waits for the window of two; the probe at 1.2 sends it beyond the window
+    assert pair.sent(1.0) == pytest.approx([1.0, 1.0, 1.2])
+    assert pair.opener.sender.retransmitted == 0
+
+
+def test_a_silently_mended_loss_reduces_the_window():
+    pair = lost_at([1.0, 2.0, 3.0], {1})
+    assert pair.opener.sender.tail_probes == 1
+    assert pair.opener.congestion_window == 7.0
+
+
+def test_a_needless_probe_does_not_reduce_it():
+    pair = Pair()
+    pair.back.lose(1)  # only the acknowledgement was lost; the peer tells of the duplicate
+    pair.write_at([1.0, 2.0, 3.0])
+    pair.clock.run(5.0)
+    assert pair.opener.sender.tail_probes == 1
+    assert pair.opener.congestion_window == 10.0
+
+
+def test_a_loss_is_seen_a_quarter_of_the_round_trip_after_a_later_segment_was_due():
+    # the second is acknowledged at 1.11; the first was due at 1.1 and may be 25 ms late
+    assert lost_at([1.0, 1.01], {1}).sent(1.0) == pytest.approx([1.0, 1.01, 1.125])
+
+
+def test_the_loss_is_seen_at_once_when_the_later_segment_is_late_enough():
+    assert lost_at([1.0, 1.1], {1}).sent(1.0) == pytest.approx([1.0, 1.1, 1.2])
+
+
+def test_three_later_segments_end_the_patience():
+    pair = lost_at([1.0, 1.001, 1.002, 1.003], {1})
+    assert pair.sent(1.0)[-1] == pytest.approx(1.103)
+
+
+def test_without_rack_three_later_segments_are_needed():
+    three = lost_at([1.0, 1.01, 1.02, 1.03], {1}, rack=False)
+    two = lost_at([1.0, 1.01, 1.02], {1}, rack=False)
+    assert three.sent(1.0)[-1] == pytest.approx(1.13)
+    assert two.sent(1.0)[-1] == pytest.approx(1.3)  # nothing but the time-out
+
+
+def test_a_lost_repetition_is_found_by_what_was_sent_after_it():
+    # repeated at 1.2 and lost again; what left at 1.21 is acknowledged at 1.31
+    pair = lost_at([1.0, 1.1, 1.101, 1.102, 1.21], {1, 5})
+    assert pair.sent(1.0) == pytest.approx([1.0, 1.1, 1.101, 1.102, 1.2, 1.21, 1.31])
+    assert pair.opener.sender.timeouts == 0
+    assert sum(count for _, count in pair.arrivals) == 2000
+
+
+def test_a_segment_late_within_the_patience_is_not_repeated():
+    pair = lost_at([1.0, 1.01], set(), late={1: 0.02})
+    assert pair.opener.sender.retransmitted == 0
+
+
+def test_a_needless_recovery_is_taken_back_by_time_stamps():
+    late = {1: 0.08}
+    with_undo = lost_at([1.0, 1.01, 1.02], set(), late=late)
+    without = lost_at([1.0, 1.01, 1.02], set(), late=late, undo=False)
+    assert with_undo.opener.sender.retransmitted == without.opener.sender.retransmitted == 1
+    assert with_undo.opener.congestion_window == 10.0
+    assert without.opener.congestion_window < 10.0
+
+
+def test_once_reordering_was_seen_three_later_segments_do_not_end_the_patience():
+    pair = lost_at([1.0, 1.001, 2.0, 2.001, 2.002, 2.003], {3}, late={1: 0.01})
+    assert pair.sent(2.0)[-1] == pytest.approx(2.125)
+
+
+def test_small_neighbours_are_repeated_as_one_segment():
+    # after the time-out 3 x 400 B fit into one segment
+    together = lost_at([1.0, 1.001, 1.002], {1, 2, 3, 4}, tail_probe=False)
+    apart = lost_at([1.0, 1.001, 1.002], {1, 2, 3, 4}, tail_probe=False, collapse=False)
+    assert max(size for _, size in together.out.since(1.25)) == 1252
+    assert max(size for _, size in apart.out.since(1.25)) == 452
+    assert sum(count for _, count in together.arrivals) == 1200
+    assert sum(count for _, count in apart.arrivals) == 1200
+
+
+def test_a_timeout_leaves_a_window_of_one_segment():
+    pair = Pair(opener=options(tail_probe=False))
+    pair.out.lose(1)
+    pair.write_at([1.0])
+    pair.clock.run(1.35)
+    assert pair.opener.congestion_window == 1.0
+
+
+def test_slow_start_doubles_the_segments_of_a_round_trip():
+    pair = Pair(opener=options(hystart=False))
+    pair.at(1.0, keep_writing, pair.opener)
+    pair.clock.run(1.35)
+    sent = pair.sent(1.0)
+    assert [sent.count(at) for at in (1.0, 1.1, 1.2, 1.3)] == [10, 20, 40, 80]
+
+
+def test_without_a_congestion_window_all_that_is_written_leaves_at_once():
+    pair = Pair(opener=options(congestion_window=False, send_buffer=1_000_000))
+    pair.at(1.0, pair.opener.write, 60 * 1000)
+    pair.clock.run(1.01)
+    assert len(pair.sent(1.0)) == 42

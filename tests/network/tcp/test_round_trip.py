@@ -1,0 +1,56 @@
+import pytest
+
+from dva_sim.network.tcp.options import TcpOptions
+from dva_sim.network.tcp.round_trip import RoundTrip
+
+
+def after(*samples, **changes):
+    times = RoundTrip(TcpOptions(**changes))
+    for number, sample in enumerate(samples):
+        times.sample(sample, 2 * number, 2 * number + 1)
+    return times
+
+
+def test_before_a_sample_the_timeout_is_one_second():
+    assert after().timeout == 1.0
+
+
+@pytest.mark.parametrize(
+    ("rtt", "timeout"),
+    [(0.02, 0.22), (0.1, 0.3), (0.2, 0.6), (0.5, 1.5)],  # SRTT + max(200 ms, 4 R/2)
+)
+def test_the_first_sample_gives_half_of_itself_as_variance(rtt, timeout):
+    assert after(rtt).timeout == pytest.approx(timeout)
+
+
+def test_a_slower_second_sample_follows_the_rfc_by_hand():
+    # RTTVAR = 3/4 0.05 + 1/4 |0.1 - 0.5| = 0.1375; SRTT = 7/8 0.1 + 1/8 0.5 = 0.15
+    times = after(0.1, 0.5)
+    assert times.smoothed == pytest.approx(0.15)
+    assert times.timeout == pytest.approx(0.15 + 4 * 0.1375)
+
+
+def test_the_variance_falls_by_a_quarter_of_the_difference_once_per_round_trip():
+    # 0.1, then variation 0.075 in the round that ends, 0.05625 in the next
+    assert after(0.2, 0.2).timeout == pytest.approx(0.6)
+    assert after(0.2, 0.2, 0.2).timeout == pytest.approx(0.2 + 4 * (0.1 - 0.04375 / 4))
+
+
+def test_a_sudden_improvement_hardly_raises_the_variance():
+    # a difference of 0.7 s either way: (0.7 - 0.15) / 4 upwards, (0.7 - 0.5) / 32 downwards
+    assert after(0.3, 1.0).variance == pytest.approx(0.15 + 0.1375)
+    assert after(1.0, 0.3).variance == pytest.approx(0.5 + 0.00625)
+
+
+def test_without_variance_the_timeout_is_the_round_trip_and_200_ms():
+    assert after(0.5, 0.9, rtt_variance=False).timeout == pytest.approx(0.55 + 0.2)
+
+
+def test_an_opening_that_measured_nothing_leads_to_three_seconds():
+    times = after()
+    times.without_sample()
+    assert times.timeout == 3.0
+
+
+def test_the_timeout_is_never_beyond_the_longest():
+    assert after(100.0, max_rto=120.0).timeout == 120.0
