@@ -104,7 +104,7 @@ class Comparison:
     def passes(self) -> bool:
         """Whether all bands hold and all that is too simple fails."""
         bands = all(self.passes_bands(kind) for kind in KINDS)
-        return bands and self.pooled.passes and not self.fooled
+        return bands and (self.pooled.passes or not self.pooled.scored) and not self.fooled
 
     @property
     def missing(self) -> tuple[int, int]:
@@ -171,9 +171,9 @@ def orders_of(groups: Sequence[Group], setting: Setting) -> dict[str, list[Order
     """What to play: the model as it is, what is too simple, and with mechanisms left out."""
     pooled, runs = pooled_of(groups), setting.control_runs
     orders = {MODEL: [Order(g.condition, setting.runs(g)) for g in groups]}
-    for name, depth in CONTROLS.items():
+    for name, depth in CONTROLS.items() if pooled else ():
         orders[name] = [Order(g.condition, runs, depth) for g in pooled]
-    for name in WITHOUT if setting.ablate else ():
+    for name in WITHOUT if pooled and setting.ablate else ():
         orders[name] = [Order(g.condition, runs, without=(name,)) for g in pooled]
     return orders
 

@@ -98,12 +98,8 @@ def _tell(comparison: Comparison) -> None:
         if rows:
             wide.print(f"\n[bold]{output.TITLES[kind]}[/bold] (measured → predicted)")
             wide.print(_table(output.HEADS, rows))
-    wide.print("\n[bold]Not judged[/bold]")
-    for why, which in output.left_out(comparison):
-        say(escape(f"{why}: {which}"))
-    say("\n[bold]Largest deviations of pooled conditions[/bold]")
-    for text in output.worst(comparison, _WORST):
-        say(escape(text))
+    _list("Not judged", [f"{why}: {which}" for why, which in output.left_out(comparison)])
+    _list("Largest deviations of pooled conditions", output.worst(comparison, _WORST))
     wide.print("\n[bold]Criteria[/bold]")
     wide.print(_table(output.SUMMARY_HEADS, output.summary(comparison)))
     if comparison.ablated:
@@ -114,10 +110,18 @@ def _tell(comparison: Comparison) -> None:
         say(escape(note))
 
 
+def _list(title: str, lines: Sequence[str]) -> None:
+    """Lines under a heading, if there are any."""
+    if lines:
+        say(f"\n[bold]{title}[/bold]")
+    for line in lines:
+        say(escape(line))
+
+
 def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
     table = Table(box=None, pad_edge=False)
     for head in heads:
-        table.add_column(head, no_wrap=head != heads[-1])
+        table.add_column(escape(head), no_wrap=head != heads[-1])
     for *cells, last in rows:
         style = _STYLES.get(last.split(" ")[0] if last.startswith(("pass", "fail")) else last)
         if last.startswith("misses"):

@@ -15,6 +15,7 @@ from dva_sim.experiments.validation.network.pooling import Pooled, Scored, bias_
 from dva_sim.experiments.validation.network.predict import depth_for
 from dva_sim.experiments.validation.network.samples import BY_NAME, Cell
 from dva_sim.experiments.validation.writing import Row, render, write_all
+from dva_sim.network.condition import Condition
 
 NAME = "network"
 SUMMARY_HEADS = ("what", "found", "asked for", "verdict")
@@ -92,11 +93,12 @@ def notes(comparison: Comparison) -> list[str]:
             f"Wanted beyond these: {every} more conditions, {pooled} more pooled under loss. "
             "`dva-sim validate network --measure FILE` makes them."
         )
-    chance = 100 * comparison.pooled.false_alarms
-    found.append(
-        f"If the model were right, something would still be significant in {chance:.0f} % of "
-        "such comparisons."
-    )
+    if comparison.pooled.scored:
+        chance = 100 * comparison.pooled.false_alarms
+        found.append(
+            f"If the model were right, something would still be significant in {chance:.0f} % "
+            "of such comparisons."
+        )
     if comparison.rarely:
         found.append(
             f"{len(comparison.rarely)} measures of pooled conditions are left out: too rare, or "
@@ -114,7 +116,8 @@ def summary(comparison: Comparison) -> list[tuple[str, str, str, str]]:
             least = f"{100 * MIN_INSIDE:.0f} %" if kind == "single" else "all"
             share = f"{inside} of {judged} ({100 * inside / judged:.1f} %)"
             rows.append((TOLD[kind], share, least, _passes(comparison.passes_bands(kind))))
-    rows += _pooled_rows(comparison.pooled)
+    if comparison.pooled.scored:
+        rows += _pooled_rows(comparison.pooled)
     for name, pooled in comparison.controls.items():
         found = f"RMS z {pooled.rms:.1f}, {len(pooled.significant)} significant"
         verdict = "fooled us" if pooled.passes else "found out"
@@ -125,8 +128,9 @@ def summary(comparison: Comparison) -> list[tuple[str, str, str, str]]:
 def _pooled_rows(pooled: Pooled) -> list[tuple[str, str, str, str]]:
     low, high = pooled.expected
     count = len(pooled.scored)
-    worst = max(pooled.biases, key=lambda m: abs(pooled.biases[m]) / bias_limit(m), default=None)
-    rows = [
+    worst = max(pooled.biases, key=lambda m: abs(pooled.biases[m]) / bias_limit(m))
+    bias = f"{100 * pooled.biases[worst]:+.1f} % ({worst.words})"
+    return [
         (
             "pooled under loss, significant after Holm",
             f"{len(pooled.significant)} of {count}",
@@ -139,14 +143,13 @@ def _pooled_rows(pooled: Pooled) -> list[tuple[str, str, str, str]]:
             f"{low:.2f} to {high:.2f}",
             _passes(pooled.spread_is_right),
         ),
+        (
+            "pooled under loss, worst median bias",
+            bias,
+            f"below {100 * bias_limit(worst):.0f} %",
+            _passes(not pooled.biased),
+        ),
     ]
-    if worst is not None:
-        found = f"{100 * pooled.biases[worst]:+.1f} % ({worst.words})"
-        asked = f"below {100 * bias_limit(worst):.0f} %"
-        rows.append(
-            ("pooled under loss, worst median bias", found, asked, _passes(not pooled.biased))
-        )
-    return rows
 
 
 def ablation(comparison: Comparison) -> list[tuple[str, str, str, str]]:
@@ -172,7 +175,7 @@ def table(comparison: Comparison, kind: Kind) -> list[list[str]]:
     cells = _by_condition(comparison)
     misses = _misses(comparison)
     return [
-        _line(group, cells.get(group, {}), misses.get(group, []))
+        _line(group, cells[group.condition], misses.get(group.condition, []))
         for group in comparison.groups
         if group.kind == kind
     ]
@@ -196,10 +199,10 @@ def _both(cell: Cell | None, change: Any = lambda value: value) -> str:
     return f"{number(change(cell.real))} → {number(change(cell.model))}"
 
 
-def _by_condition(comparison: Comparison) -> dict[Group, dict[str, Cell]]:
-    found: dict[Group, dict[str, Cell]] = {}
+def _by_condition(comparison: Comparison) -> dict[Condition, dict[str, Cell]]:
+    found: dict[Condition, dict[str, Cell]] = {}
     for cell in _all_cells(comparison):
-        found.setdefault(cell.group, {})[cell.measure.name] = cell
+        found.setdefault(cell.group.condition, {})[cell.measure.name] = cell
     return found
 
 
@@ -208,11 +211,11 @@ def _all_cells(comparison: Comparison) -> list[Cell]:
     return [*(v.cell for v in comparison.verdicts), *pooled, *comparison.rarely]
 
 
-def _misses(comparison: Comparison) -> dict[Group, list[str]]:
+def _misses(comparison: Comparison) -> dict[Condition, list[str]]:
     """The measures of each condition that lie outside, or are significantly off."""
-    found: dict[Group, list[str]] = {}
+    found: dict[Condition, list[str]] = {}
     for cell in _outside(comparison):
-        found.setdefault(cell.group, []).append(cell.measure.name)
+        found.setdefault(cell.group.condition, []).append(cell.measure.name)
     return found
 
 

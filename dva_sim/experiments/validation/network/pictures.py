@@ -58,7 +58,10 @@ def _scatter(comparison: Comparison) -> Drawn:
             for name, marker in ((median, "o"), (tail, "^")):
                 some = [c for c in own if c.measure.name == name]
                 _marks(ax, kind, some, marker, outside, shown)
-            _diagonal(ax, kind, label.endswith("[ms]"))
+            if any(c.measure.name in (median, tail) for c in own):
+                _diagonal(ax, kind, label.endswith("[ms]"))
+            else:
+                ax.set(xticks=[], yticks=[])
             if row is axes[0]:
                 ax.set_title(label)
             if row is axes[-1]:

@@ -107,10 +107,14 @@ class Cell:
 
 
 def cells_of(group: Group, predicted: Sequence[Row]) -> list[Cell]:
-    """Every measure of a condition that is defined on either side."""
+    """Every measure of a condition that is defined on either side.
+
+    Time-outs and alerts are a requester's.
+    """
     real = [values_of(run.values) for run in group.runs]
     model = [values_of(row) for row in predicted]
-    cells = [Cell(group, m, _column(real, m), _column(model, m)) for m in MEASURES]
+    asked = MEASURES if group.condition.pattern == "req" else MEASURES[:-2]
+    cells = [Cell(group, m, _column(real, m), _column(model, m)) for m in asked]
     return [cell for cell in cells if len(cell.measured) or len(cell.predicted)]
 
 
