@@ -101,7 +101,7 @@ class VirtualWorld(World):
         self.leave, self.come_back = self.network.leave, self.network.come_back  # type: ignore[method-assign]
 
     def _link(self, a: str, b: str) -> Link:
-        config = LinkConfig(delay_s=DELAY, loss=self._loss, draws="independent")
+        config = LinkConfig(delay_s=DELAY, loss=self._loss)
         link = Link(config, ConstantRate(config.rate_bps), Streams(1), f"{a}>{b}")
         return self._links.setdefault((a, b), link)
 

@@ -62,7 +62,7 @@ class RadioLink(Link):
         super().__init__(config, serialiser, streams, name, direction)
         way = config.toward(direction)
         self._reception = reception
-        self._luck = Weather(streams, f"{name}/radio", way.draws == "independent")
+        self._luck = Weather(streams, f"{name}/radio")
         self._air, self._air_room = ConstantRate(way.rate_bps), way.queue_bytes
         self._newest = 0.0
         self._noted = _Noted(self._wobble) if self._wobble and not way.jitter_s else None

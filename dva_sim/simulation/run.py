@@ -24,7 +24,7 @@ from dva_sim.scenario import Scenario
 from dva_sim.simulation.control_room import add_dva, add_operator
 from dva_sim.simulation.field import Danger, Field, is_dangerous
 from dva_sim.simulation.names import id_of
-from dva_sim.simulation.offered import connector_of, link_of
+from dva_sim.simulation.offered import connector_of
 from dva_sim.simulation.recording import PersonLog, Recording, event_about
 from dva_sim.simulation.stage import Stage
 from dva_sim.simulation.watch import broken_event_rules, broken_rules
@@ -156,7 +156,7 @@ class Run:
         stage = self.stage
         reception = partial(self._reception, robot) if stage.site.wifi else None
         name = f"{stage.labels[robot]}/link"
-        return make_link(link_of(self.scenario), direction, stage.streams, name, reception)
+        return make_link(self.scenario.link, direction, stage.streams, name, reception)
 
     def _reception(self, robot: str) -> Reception | None:
         """The radio link's quality where a robot was at the last tick of the physics."""

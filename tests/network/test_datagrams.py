@@ -16,7 +16,7 @@ from dva_sim.streams import Streams
 
 
 def links(seed: int = 1, **config: Any) -> tuple[Link, Link]:
-    settings, streams = LinkConfig(draws="independent", **config), Streams(seed)
+    settings, streams = LinkConfig(**config), Streams(seed)
     up, down = (
         Link(settings, make_serialiser(settings, way, streams, "l"), streams, f"l/{way}", way)
         for way in ("up", "down")

@@ -22,7 +22,7 @@ DEPTHS = pytest.mark.parametrize("depth", ["message", "segment"])
 def network(
     depth: Depth, zeromq: dict[str, Any] | None = None, seed: int = 1, **config: Any
 ) -> VirtualNetwork:
-    settings, streams = LinkConfig(draws="independent", **config), Streams(seed)
+    settings, streams = LinkConfig(**config), Streams(seed)
     up, down = (
         Link(settings, make_serialiser(settings, way, streams, "l"), streams, f"l/{way}", way)
         for way in ("up", "down")

@@ -27,7 +27,7 @@ class Pair:
         **config: Any,
     ) -> None:
         self.clock = Clock()
-        settings, streams = LinkConfig(draws="independent", **config), Streams(seed)
+        settings, streams = LinkConfig(**config), Streams(seed)
         links = [
             Link(settings, make_serialiser(settings, way, streams, "l"), streams, f"l/{way}", way)
             for way in ("up", "down")

@@ -56,8 +56,6 @@ class LinkConfig(Config):
         rate_bps: Serialisation rate; without effect where a trace gives it.
         queue_bytes: Room in the drop-tail queue before the link.
         queue_packets: Room in packets, the one being sent among them, in place of bytes.
-        draws: Luck of packets sent in the same millisecond: `spread` evenly over what is
-            possible, or `independent`, as real packets are.
         trace_up: Recorded packet opportunities towards the robot (Mahimahi form).
         trace_down: The same from the robot.
         outages: Times at which what would cross the link is lost.
@@ -77,7 +75,7 @@ class LinkConfig(Config):
     rate_bps: Rate = 20e6
     queue_bytes: Room = 150_000
     queue_packets: Packets | None = None
-    draws: Literal["spread", "independent"] = "spread"
+    draws: Literal["independent"] = "independent"
     trace_up: str | None = None
     trace_down: str | None = None
     outages: tuple[Outage, ...] = ()

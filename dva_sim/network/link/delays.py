@@ -76,7 +76,7 @@ class Constant(Config):
         """See `_Law`."""
         return delay, 0.0
 
-    def play(self, delay: float, streams: Streams, name: str, independent: bool) -> None:
+    def play(self, delay: float, streams: Streams, name: str) -> None:
         """See `_Law`: there is no deviation."""
 
 
@@ -107,9 +107,9 @@ class _Law(Config):
     def quantile(self, delay: float) -> Quantile:
         """Deviations from `delay_s` [s] by probability."""
 
-    def play(self, delay: float, streams: Streams, name: str, independent: bool) -> Wobble:
+    def play(self, delay: float, streams: Streams, name: str) -> Wobble:
         """Deviations from `delay_s` [s], with luck of that name."""
-        luck: Luck = Weather(streams, name, independent)
+        luck: Luck = Weather(streams, name)
         if self.correlation_s:
             luck = SlowWeather(streams, name, self.correlation_s)
         return ByQuantile(self.quantile(delay), luck)

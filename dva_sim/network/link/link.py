@@ -141,7 +141,7 @@ def _make_fates(
     """All that may take a packet of one direction."""
     fates: list[Fate] = [replay] if replay else []
     if way.loss:
-        luck = Weather(streams, f"{name}/loss", way.draws == "independent")
+        luck = Weather(streams, f"{name}/loss")
         bursts = way.bursts and way.bursts.play(way.loss, streams, f"{name}/bursts", luck)
         fates.append(bursts or Chance(way.loss, luck))
     if way.outages:
@@ -151,11 +151,10 @@ def _make_fates(
 
 def _make_wobble(way: LinkConfig, streams: Streams, name: str) -> Wobble | None:
     """What spreads the delay of one direction by chance, if anything does."""
-    independent = way.draws == "independent"
     if way.jitter_s:
-        return Jitter(way.jitter_s, Weather(streams, f"{name}/jitter", independent))
+        return Jitter(way.jitter_s, Weather(streams, f"{name}/jitter"))
     if way.law is not None:
-        return way.law.play(way.delay_s, streams, f"{name}/delay", independent)
+        return way.law.play(way.delay_s, streams, f"{name}/delay")
     return None
 
 

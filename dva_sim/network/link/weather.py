@@ -18,8 +18,7 @@ from dva_sim.streams import Streams
 
 SLOT_S = 0.001
 _BLOCK = 8192  # slots drawn at once
-_GOLDEN = 0.6180339887498949
-_STEP, _MASK = int(_GOLDEN * 2.0**64) | 1, 2**64 - 1
+_STEP, _MASK = int(0.6180339887498949 * 2.0**64) | 1, 2**64 - 1  # the golden ratio of all bits
 _NORMAL = NormalDist()
 _EDGE = 1e-12  # quantiles of unbounded laws are asked for inside (edge, 1 - edge) only
 
@@ -34,18 +33,15 @@ class Luck(Protocol):
 class Weather:
     """Luck that is new in each millisecond, drawn in blocks when first looked at.
 
-    Packets of the same millisecond either share its number in steps of the golden ratio, which
-    keeps each packet's own law uniform and spreads them evenly (two losses close together are
-    then rarer than chance has them), or each gets a number of its own.
+    Packets of the same millisecond have numbers of their own, which follow from that one.
 
     Args:
         streams: The run's luck.
         name: Of this source.
-        independent: Whether packets of the same millisecond are independent.
     """
 
-    def __init__(self, streams: Streams, name: str, independent: bool = False) -> None:
-        self._streams, self._name, self._independent = streams, name, independent
+    def __init__(self, streams: Streams, name: str) -> None:
+        self._streams, self._name = streams, name
         self._blocks: dict[int, NDArray[np.float64]] = {}
         self._slot, self._count = -1, 0
 
@@ -60,9 +56,8 @@ class Weather:
             self._blocks.pop(number - 2, None)  # time only goes forward
             luck = self._streams.fresh(f"{self._name}/{number}")
             block = self._blocks[number] = luck.random(_BLOCK)
-        if self._count and self._independent:
-            return _scrambled(float(block[inside]), self._count)
-        return (float(block[inside]) + self._count * _GOLDEN) % 1.0
+        first = float(block[inside])
+        return _scrambled(first, self._count) if self._count else first
 
 
 def _scrambled(seed: float, count: int) -> float:

@@ -104,7 +104,7 @@ def test_without_correlation_neighbours_are_independent() -> None:
 def test_packets_of_one_millisecond_share_slow_weather_and_not_their_own_luck() -> None:
     line = link(delay_s=0.1, delay_law=NORMAL | {"correlation_s": 1.0})
     assert len({round(line.carry(0.5, 100) or 0, 6) for _ in range(5)}) == 1
-    line = link(delay_s=0.1, delay_law=NORMAL, reorder=True, draws="independent")
+    line = link(delay_s=0.1, delay_law=NORMAL, reorder=True)
     found = np.array([line.carry(0.5, 40) for _ in range(2000)]) - 0.6
     assert found.mean() == pytest.approx(0, abs=4 * 0.02 / 2000**0.5)
     assert found.std() == pytest.approx(0.02, abs=4 * 0.02 / 4000**0.5)

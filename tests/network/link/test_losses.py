@@ -58,7 +58,7 @@ def test_lengths_of_bursts_have_no_memory() -> None:
 def test_bursts_of_packets_lose_the_share_asked_for(inside: float, length: float) -> None:
     n, share = 200_000, 0.05
     bursts = {"mean_packets": length, "loss": inside}
-    lost = fates(n, 0.01, loss=share, bursts=bursts, draws="independent")
+    lost = fates(n, 0.01, loss=share, bursts=bursts)
     in_burst = share / inside
     keeps = 1 - 1 / length - in_burst / (1 - in_burst) / length  # correlation of neighbours
     error = (share * (1 - share) / n * (1 + max(0.0, keeps)) / (1 - max(0.0, keeps))) ** 0.5
@@ -93,18 +93,12 @@ def test_bursts_without_a_loss_are_none() -> None:
     assert link(loss=0, bursts={"mean_s": 1}).is_ideal()
 
 
-def test_independent_losses_of_one_millisecond_come_in_pairs_as_often_as_chance_has_them() -> None:
-    line, p, n = link(loss=0.1, draws="independent"), 0.1, 20_000
+def test_losses_of_one_millisecond_come_in_pairs_as_often_as_chance_has_them() -> None:
+    line, p, n = link(loss=0.1), 0.1, 20_000
     pairs = [[line.carry(t * 0.01, 100) is None for _ in range(2)] for t in range(n)]
     assert np.mean(pairs) == pytest.approx(p, abs=4 * (p * (1 - p) / (2 * n)) ** 0.5)
     both = np.mean([a and b for a, b in pairs])
     assert both == pytest.approx(p * p, abs=4 * (p * p / n) ** 0.5)
-
-
-def test_spread_losses_of_one_millisecond_are_never_neighbours_while_they_are_rare() -> None:
-    line = link(loss=0.1)
-    pairs = [[line.carry(t * 0.01, 100) is None for _ in range(2)] for t in range(2000)]
-    assert not any(a and b for a, b in pairs)
 
 
 @pytest.mark.parametrize(
