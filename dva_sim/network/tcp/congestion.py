@@ -138,9 +138,9 @@ class Cubic(Reno):
 class HyStart:
     """Ends slow start when the round trip grows, before the queue overflows.
 
-    From a window of 16 segments on, the shortest of eight round trips of a round is
-    compared with the shortest ever: an eighth more (at least 4 ms, at most 16 ms) means
-    that a queue has built up.
+    Rounds go from flight to flight. From a window of 16 segments on, the shortest of the
+    round trips of a round, if they are more than eight, is compared with the shortest ever:
+    an eighth more (at least 4 ms, at most 16 ms) means that a queue has built up.
     """
 
     SAMPLES, LOW_WINDOW, LEAST, MOST = 8, 16, 0.004, 0.016
@@ -150,14 +150,26 @@ class HyStart:
     def __init__(self) -> None:
         self._end, self._count, self._shortest = -1, 0, inf
 
-    def ends(self, rtt: float, minimum: float, acknowledged: int, sent: int) -> bool:
-        """Whether slow start should end, after one more round trip [s] and the bytes so far."""
+    def ends(self, window: float, rtt: float, minimum: float, acknowledged: int, sent: int) -> bool:
+        """Whether slow start should end.
+
+        Args:
+            window: Congestion window [segments].
+            rtt: One more round trip [s].
+            minimum: The shortest so far [s].
+            acknowledged: First byte not acknowledged.
+            sent: First byte not sent: the end of the next round.
+        """
+        verdict = False
+        if window >= self.LOW_WINDOW:
+            self._shortest = min(self._shortest, rtt)
+            verdict = self._count == self.SAMPLES and self._grown(minimum)
+            self._count = min(self._count + 1, self.SAMPLES)
         if acknowledged > self._end:
             self._end, self._count, self._shortest = sent, 0, inf
-        self._shortest = min(self._shortest, rtt)
-        if self._count < self.SAMPLES:
-            self._count += 1
-            return False
+        return verdict
+
+    def _grown(self, minimum: float) -> bool:
         return self._shortest > minimum + min(max(minimum / 8, self.LEAST), self.MOST)
 
 

@@ -163,7 +163,7 @@ class TcpEndpoint:
             self._offer()
         if receiver.pending:
             receiver.wait(now)
-        if sender.buffer.blocked and sender.buffer.reopens(sender.window.window):
+        if sender.buffer.blocked and sender.reopens():
             self.on_writable()
 
     def _offer(self) -> None:

@@ -1,9 +1,10 @@
 """The send buffer as the kernel charges it: a packet costs more than its bytes.
 
 References:
-    socket(7) (SO_SNDBUF is doubled), tcp(7) and ip-sysctl (tcp_wmem, whose default and
-    largest values are used). That a small packet costs its payload and 832 B, and that
-    a socket becomes writable again at two thirds, was measured.
+    socket(7) (SO_SNDBUF is doubled), tcp(7) and ip-sysctl (tcp_wmem, whose largest value
+    is used); RFC 1122, section 4.2.3.4 (no more than half of the largest window offered is
+    gathered). Measured on Linux 6.18: that a small packet costs its payload and 832 B, that
+    a socket becomes writable again at two thirds, and what a segment counts in tuning.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ PACKET_COST = 832  # beside the payload, of each packet that waits or is under w
 SMALLEST = 4608  # the least that SO_SNDBUF gives, after doubling [B]
 LARGEST = 4_194_304  # tcp_wmem, third value [B]
 PER_SEGMENT = 2304  # what automatic tuning counts for a full segment; x 2 x 10 at first [B]
-WAITING_PACKET = 22 * 1448  # how far a packet that waits grows before another is begun [B]
+WAITING_SEGMENTS = 45  # how far a packet that waits may grow: 64 KiB with its headers
 
 
 class SendBuffer:
@@ -24,6 +25,7 @@ class SendBuffer:
     Args:
         size: SO_SNDBUF as the program sets it [B], or None = automatic.
         initial_window: Of the congestion window [segments].
+        mss: Payload of a full segment [B].
 
     Attributes:
         limit: How much may be charged before no further packet is begun [B].
@@ -31,15 +33,34 @@ class SendBuffer:
         blocked: Whether a write was not taken whole since the last time there was room.
     """
 
-    __slots__ = ("_automatic", "_room", "_waiting_cost", "blocked", "limit", "used")
+    __slots__ = (
+        "_automatic",
+        "_largest_window",
+        "_mss",
+        "_packet",
+        "_room",
+        "_waiting_cost",
+        "blocked",
+        "limit",
+        "used",
+    )
 
-    def __init__(self, size: int | None, initial_window: int) -> None:
+    def __init__(self, size: int | None, initial_window: int, mss: int) -> None:
         self._automatic = size is None
+        self._mss = self._packet = mss
+        self._largest_window = 0
         self.limit = 2 * initial_window * PER_SEGMENT
         if size is not None:
             self.limit = max(2 * size, SMALLEST)
         self.used = self._room = self._waiting_cost = 0
         self.blocked = False
+
+    def offered(self, window: int) -> None:
+        """The other end has room for `window` bytes [B]: packets may wait that are half as long."""
+        if window > self._largest_window:
+            self._largest_window = window
+            segments = min(WAITING_SEGMENTS, window // 2 // self._mss)
+            self._packet = max(1, segments) * self._mss
 
     def take(self, count: int) -> int:
         """Charge up to `count` bytes [B]; returns how many found room."""
@@ -47,8 +68,8 @@ class SendBuffer:
         self._room -= taken
         self.used += taken
         while taken < count and self.used < self.limit:
-            part = min(count - taken, WAITING_PACKET)
-            self._room = WAITING_PACKET - part
+            part = min(count - taken, self._packet)
+            self._room = self._packet - part
             self._waiting_cost += PACKET_COST
             self.used += part + PACKET_COST
             taken += part
@@ -67,12 +88,19 @@ class SendBuffer:
         """Acknowledged: give back its charge [B]."""
         self.used -= charge
 
-    def reopens(self, window: float) -> bool:
-        """Whether there is room again; tunes the size to the congestion window [segments]."""
+    def reopens(self, window: float, in_flight: int) -> bool:
+        """Whether there is room again.
+
+        Tunes the size to the congestion window, but not while that is what holds data back.
+
+        Args:
+            window: Congestion window [segments].
+            in_flight: Segments under way.
+        """
         if not self.blocked:
             return False
-        if self._automatic:
-            self.limit = max(self.limit, min(LARGEST, int(2 * window) * PER_SEGMENT))
+        if self._automatic and in_flight < int(window):
+            self.limit = max(self.limit, min(LARGEST, 2 * int(window) * PER_SEGMENT))
         if 3 * self.used > 2 * self.limit:
             return False
         self.blocked = False

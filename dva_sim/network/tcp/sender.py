@@ -57,7 +57,7 @@ class Sender:
         self.total = self.next = self.first = self.edge = 0
         self.end_mark: float = inf
         self.segments = self.retransmitted = self.timeouts = self.tail_probes = 0
-        self.buffer = SendBuffer(options.send_buffer, options.initial_window)
+        self.buffer = SendBuffer(options.send_buffer, options.initial_window, options.mss)
         self.board = Scoreboard()
         self.times = RoundTrip(options)
         self.window = make_window(options)
@@ -71,6 +71,7 @@ class Sender:
     def established(self, round_trip: float | None, repeated: int, edge: int) -> None:
         """The opening is over: its round trip [s] if one was measured, its repetitions."""
         self.edge = edge
+        self.buffer.offered(edge)
         if round_trip is not None:
             self.times.sample(round_trip, 0, 0)
             self.times.shortest(round_trip)
@@ -89,6 +90,10 @@ class Sender:
             self.total += taken
             self._push(now)
         return taken
+
+    def reopens(self) -> bool:
+        """Whether a program that could not write all may write again."""
+        return self.buffer.reopens(self.window.window, self.board.in_flight)
 
     def finish(self) -> None:
         """Nothing more will be written; the end itself counts as a byte."""
@@ -124,7 +129,9 @@ class Sender:
             echo: Time stamp of the segment that caused it [s].
         """
         self._unanswered = 0
-        self.edge = max(self.edge, edge)
+        if edge > self.edge:
+            self.edge = edge
+            self.buffer.offered(edge - acknowledged)
         news = acknowledged > self.first or blocks or duplicate
         if self.board.queue and (news or self.recovery.probe_end >= 0):
             self._digest(now, acknowledged, blocks, duplicate, echo)
@@ -170,11 +177,12 @@ class Sender:
         if first:
             self.times.sample(first, self.first, self.next)
             self.times.shortest(last)
-            if self.window.threshold > self.window.window >= HyStart.LOW_WINDOW:
+            if self.window.window < self.window.threshold:
                 self._look_for_queue(last)
 
     def _look_for_queue(self, round_trip: float) -> None:
-        ends = self._hystart.ends(round_trip, self.times.minimum, self.first, self.next)
+        window, shortest = self.window.window, self.times.minimum
+        ends = self._hystart.ends(window, round_trip, shortest, self.first, self.next)
         if ends and self._options.hystart:
             self.window.threshold = self.window.window
 

@@ -105,14 +105,26 @@ def test_idle_time_halves_the_window_per_timeout_but_not_below_the_initial_one()
 @pytest.mark.parametrize(("shortest", "grown", "ends"), [(0.1, 0.111, False), (0.1, 0.113, True)])
 def test_hystart_ends_slow_start_when_eight_round_trips_are_an_eighth_longer(shortest, grown, ends):
     hystart = HyStart()
-    verdicts = [hystart.ends(grown, shortest, 5, 20) for _ in range(9)]
+    hystart.ends(10.0, grown, shortest, 0, 20)
+    verdicts = [hystart.ends(16.0, grown, shortest, 0, 20) for _ in range(9)]
     assert verdicts == [False] * 8 + [ends]
 
 
 def test_hystart_forgives_one_short_round_trip_among_the_long():
     hystart = HyStart()
+    hystart.ends(10.0, 0.3, 0.1, 0, 20)
     samples = [0.3] * 5 + [0.1] + [0.3] * 5
-    assert not any(hystart.ends(sample, 0.1, 5, 20) for sample in samples)
+    assert not any(hystart.ends(16.0, sample, 0.1, 0, 20) for sample in samples)
+
+
+def test_hystart_starts_anew_with_each_round_and_not_below_sixteen_segments():
+    hystart = HyStart()
+    for _ in range(7):
+        hystart.ends(16.0, 0.3, 0.1, 0, 20)
+    assert not hystart.ends(16.0, 0.3, 0.1, 21, 40)
+    assert not any(hystart.ends(16.0, 0.3, 0.1, 22, 40) for _ in range(8))
+    assert hystart.ends(16.0, 0.3, 0.1, 22, 40)
+    assert not any(HyStart().ends(15.0, 0.3, 0.1, 0, 20) for _ in range(20))
 
 
 def test_rate_reduction_sends_seven_for_ten_delivered_and_arrives_at_the_threshold():

@@ -42,7 +42,7 @@ def talk(seed, loss, spread, opener=EXACT, seconds=20.0):
         end.on_readable = lambda name=name: read(name)
         clock.every(0.05, lambda name=name: write(name))
     connection.open(lambda: None)
-    clock.run(seconds + 600.0)  # with three in ten lost, time-outs double far
+    clock.run(seconds + 3000.0)  # with three in ten lost, time-outs double far
     for name in ends:
         read(name)
     return written, log, connection
