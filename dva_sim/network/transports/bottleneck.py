@@ -51,7 +51,6 @@ class Bottleneck:
             loss=config.loss,
             rate_bps=config.rate_bps,
             queue_bytes=config.queue_bytes,
-            draws="independent",
         )
         self._lines = {way: Line(config.rate_bps) for way in WAYS}
 
