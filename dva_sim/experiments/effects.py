@@ -230,11 +230,16 @@ def _float(value: Any) -> float:
 
 
 def codes_of(table: Table, factor: Factor) -> NDArray[np.intp]:
-    """Which level of a factor each row has; -1 for none of them."""
+    """Which level of a factor each row has; -1 for none of them.
+
+    The level None is where nothing stands, which in a column of numbers is read as nan.
+    """
     values = np.asarray(table[factor.name])
     codes = np.full(len(values), -1, dtype=np.intp)
     for code, level in enumerate(factor.levels):
-        if isinstance(level, int | float):
+        if level is None:
+            codes[[v is None or v != v for v in values.tolist()]] = code
+        elif isinstance(level, int | float):
             codes[np.isclose(as_floats(values), float(level), rtol=1e-9, atol=1e-12)] = code
         else:
             codes[values.astype(str) == str(level)] = code

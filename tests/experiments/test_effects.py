@@ -3,7 +3,7 @@ import itertools
 import numpy as np
 import pytest
 
-from dva_sim.experiments.effects import Factor, Part, View, as_floats, person_means
+from dva_sim.experiments.effects import Factor, Part, View, as_floats, codes_of, person_means
 
 PATTERN = Factor("pattern", ("req-rep", "latest-wins"))
 DELAY = Factor("link.delay_s", (0, 0.5))
@@ -73,6 +73,16 @@ def test_factors_that_are_not_lines_or_along_x_become_panels_the_answers_first()
     part = Part(table(rows()), "drive", [PATTERN, DELAY])
     seen = View(part, "drive_time_s", None, DELAY, None, {"pattern": "latest-wins"})
     assert seen.panels == [{"pattern": "latest-wins"}, {"pattern": "req-rep"}]
+
+
+@pytest.mark.parametrize("column", [[np.nan, 8192.0, np.nan], [None, 8192, None]])
+def test_nothing_is_a_level_whether_it_is_read_as_nothing_or_as_no_number(column):
+    values = {"buffer": np.array(column, dtype=object)} | {
+        "numbers": np.array([np.nan if v is None else v for v in column])
+    }
+    for name in values:
+        assert codes_of(values, Factor(name, (None, 8192))).tolist() == [0, 1, 0]
+        assert codes_of(values, Factor(name, (4096, 8192))).tolist() == [-1, 1, -1]
 
 
 def test_true_is_one_and_what_is_not_a_number_is_missing():

@@ -5,6 +5,7 @@ from matplotlib.figure import Figure
 
 from dva_sim.experiments.cadence import Cadence
 from dva_sim.experiments.effects import Factor, Part, View
+from dva_sim.experiments.figures.commands import command_rate
 from dva_sim.experiments.figures.effect import _band, _fit_to
 from dva_sim.experiments.figures.ground import Ways
 from dva_sim.experiments.figures.story import Events, fates, outcomes, responses
@@ -16,6 +17,7 @@ from dva_sim.experiments.figures.style import (
     panel_name,
     panels,
     place_of,
+    styled,
 )
 
 DELAY = Factor("link.delay_s", (0.0, 0.05, 0.1, 0.25, 0.5, 1.0))
@@ -50,6 +52,16 @@ def test_a_boundary_outside_the_levels_has_no_place(delay):
 
 def test_a_pattern_keeps_its_colour_when_another_is_left_out():
     assert colours(PATTERN)["req-rep"] == colours(Factor("pattern", ("req-rep",)))["req-rep"]
+
+
+def test_a_panel_where_no_run_went_on_takes_nothing_from_the_others(view):
+    runs = {**view.part.treated, "is_reference": np.zeros(len(view.part.treated["part"]), bool)}
+    rate = np.where(runs["profile"] == "default", 8.0, np.nan)
+    part = Part(runs | {"command_rate_hz": rate}, "drive", view.part.factors)
+    both = View(part, "drive_time_s", PATTERN, DELAY, None, {})
+    assert [panel["profile"] for panel in both.shown] == ["default", "dissertation"]
+    with styled():
+        assert command_rate(both, lambda panel: None) is not None
 
 
 def test_names_of_lines_that_end_together_are_moved_apart_within_the_axes():

@@ -73,7 +73,8 @@ def command_rate(view: View, cadence_of: CadenceOf) -> Drawn | None:
             ends[level] = float(means[-1])
         _closed_form(ax, view, cadence_of(panel))
         every.append(ends)
-    axes[0].set_ylim(0, _ROOM * axes[0].dataLim.union([ax.dataLim for ax in axes]).y1)
+    tops = [ax.dataLim.y1 for ax in axes if np.isfinite(ax.dataLim.y1)]  # a panel may be empty
+    axes[0].set_ylim(0, _ROOM * max(tops, default=1.0))
     label_panels(axes, view, axis_label("command_rate_hz"))
     name_lines(axes, every, view.line, paint)
     caption = "Mean over runs. Commands that came too old or were overtaken are not counted."
