@@ -242,7 +242,8 @@ def check(
         list[str],
         typer.Argument(
             help="Messages, studies, scenarios, sites, plans, maps, agents; - reads a message. "
-            "Or policy, robot, operator, filter or mapping, and names of such or mine.py:Mine."
+            "Or policy, robot, operator, filter or mapping, and names of such or mine.py:Mine. "
+            "Or link: the emulated one."
         ),
     ],
     set_: Annotated[
@@ -251,7 +252,8 @@ def check(
     ] = None,
 ) -> None:
     """Tell of each file whether it is valid, and if not where and why; of a policy, a robot,
-    an operator, a filter or a mapping, whether it keeps its promises."""
+    an operator, a filter or a mapping, whether it keeps its promises; of the emulated link,
+    whether real packets cross it as it is told."""
     from dva_sim.checking import console
 
     raise typer.Exit(console.check(files, set_ or []))

@@ -17,6 +17,7 @@ from dva_sim.config import parse_changes
 from dva_sim.errors import ConfigError
 
 STDIN: Final = "-"
+LINK: Final = "link"
 VALID, INVALID, NOT_READ = 0, 1, 2  # exit codes; the highest of all files counts
 _SHOWN: Final = 50  # problems of one file
 
@@ -25,19 +26,31 @@ def check(names: Sequence[str], options: Sequence[str] = ()) -> int:
     """Tell of each file whether it is valid, and if not, why; the exit code.
 
     Args:
-        names: Paths of files; or a word of `TRIALS`, such as `policy`, and names of such. A file
-            of that name is `./policy`.
+        names: Paths of files; or a word of `TRIALS`, such as `policy`, and names of such; or
+            `link` alone, the emulated one. A file of that name is `./policy`.
         options: `key=value` pairs for what is tried.
 
     Raises:
         ConfigError: none is named, or options are given for files.
+        EmulatorError: there is no emulated link here.
     """
+    if names and names[0] == LINK:
+        return _check_link(names[1:], options)
     if names and names[0] in TRIALS:
         return _try_all(names[0], names[1:], parse_changes(options))
     if options:
         tried = ", ".join(trial.many for trial in TRIALS.values())
         raise ConfigError(f"--set is for {tried}: dva-sim check policy NAME --set key=value")
     return _sum_up("file", "files", [_check_one(name) for name in names])
+
+
+def _check_link(names: Sequence[str], options: Sequence[str]) -> int:
+    """Measure the emulated link; there is but one."""
+    from dva_sim.emulator import console  # late: nobody else needs it
+
+    if names or options:
+        raise ConfigError("check link: there is one link, without names and options")
+    return console.check()
 
 
 def _try_all(kind: str, names: Sequence[str], options: Mapping[str, Any]) -> int:

@@ -10,6 +10,9 @@ from pathlib import Path
 import pytest
 
 from dva_sim.checking import console
+from dva_sim.emulator import console as emulator
+from dva_sim.emulator.check import Finding
+from dva_sim.errors import ConfigError
 
 ROOT = Path(__file__).parents[2]
 SAMPLES = ROOT / "protocol" / "samples"
@@ -257,3 +260,24 @@ def test_the_printed_schema_can_be_written_to_a_file(here):
     wrong = call("schema", "sites")
     assert wrong.returncode == 2
     assert re.fullmatch(rb"dva-sim: no schema 'sites'; did you mean 'site'\?.*\n", wrong.stderr)
+
+
+def test_the_word_link_asks_for_the_emulated_link(check, monkeypatch):
+    monkeypatch.setattr(emulator, "why_no_packets", lambda: "")
+    for found, code in ((50.2, 0), (52.0, 1)):
+        finding = Finding("delay, median", "ms", 50.0, found, 1.0)
+        monkeypatch.setattr(emulator, "check_link", lambda finding=finding: [finding])
+        ended, lines = check("link")
+        assert ended == code
+        assert lines[0].endswith("MISSED" if code else "ok")
+
+
+def test_there_is_one_emulated_link_without_names_and_options():
+    for names, options in ((["link", "wifi"], []), (["link"], ["delay_s=1"])):
+        with pytest.raises(ConfigError, match="there is one link"):
+            console.check(names, options)
+
+
+def test_a_file_named_link_is_asked_for_by_its_path(check):
+    code, lines = check("./link")
+    assert (code, lines[-1]) == (2, "1 file: 1 not read")
