@@ -16,7 +16,6 @@ from dva_sim.agents.modes import Decision, RobotController
 from dva_sim.agents.operator.delay import DelayEstimate
 from dva_sim.experiments import metrics
 from dva_sim.experiments.budget import STAGES
-from dva_sim.network.link import Link
 from dva_sim.simulation import Recording, simulate
 
 NEAR = [{"kind": "fire", "room": "Main corridor", "at_s": 10, "reported": True}]
@@ -208,19 +207,8 @@ def test_a_robot_that_brakes_while_its_next_drive_is_ordered_breaks_no_rule() ->
 
 def cut_link_run(pattern: str = "latest-wins", until: float = 65.0, **more: Any) -> Recording:
     """The way up to the robot is dead from 20 s on, the pictures keep coming."""
-    carry, train = Link.carry, Link.carry_train
-
-    def is_cut(link: Link, now: float) -> bool:
-        return 20.0 < now < until and link.name.endswith("/up")
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Link, "carry", lambda s, now, n: None if is_cut(s, now) else carry(s, now, n))
-        patch.setattr(
-            Link,
-            "carry_train",
-            lambda s, now, k, n: None if is_cut(s, now) else train(s, now, k, n),
-        )
-        return run(pattern=pattern, **more)
+    outage = {"from_s": 20.0, "for_s": until - 20.0, "direction": "up"}
+    return run(pattern=pattern, link__outages=[outage], **more)
 
 
 @pytest.mark.parametrize("pattern", ["req-rep", "pub-sub", "latest-wins"])
@@ -236,7 +224,7 @@ def test_when_a_dead_link_comes_back_the_event_is_confirmed_under_any_pattern(
 
 
 def test_a_link_that_stays_dead_ends_the_drive_and_the_event_goes_to_a_guard() -> None:
-    recording = cut_link_run(until=1e9, events=NEAR, guard__count=1, horizon_s=600)
+    recording = cut_link_run(until=1e6, events=NEAR, guard__count=1, horizon_s=600)
     first = recording.recorder.drives[0]
     assert first.started is not None
     assert first.outcome == "lost link"
