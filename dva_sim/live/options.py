@@ -63,6 +63,13 @@ class Options:
         scenario = build(load(self.scenario), parse_changes(self.changes))
         if scenario.operator.strategy == "oracle":
             raise ConfigError("operator.strategy 'oracle' knows the truth: only in virtual time")
+        if scenario.transport != "zeromq":
+            raise ConfigError(f"transport {scenario.transport!r}: only in virtual time")
+        if scenario.zeromq.conflate != "none":
+            raise ConfigError(
+                f"zeromq.conflate {scenario.zeromq.conflate!r}: only in virtual time, since real "
+                "sockets would keep one part of a message and not the message"
+            )
         return scenario
 
 

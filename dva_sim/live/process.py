@@ -84,7 +84,7 @@ def run_part(
     def tell(line: str) -> None:
         recorder.tell(clock.now, name, line, "link")
 
-    network = SocketNetwork(clock, ring, tell)
+    network = SocketNetwork(clock, ring, tell, scenario.zeromq)
     try:
         joining = _joining(network, options, name)
         stage = Stage(scenario, options.seed, network, recorder, joining, _time_of_day(clock))

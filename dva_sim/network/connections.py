@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import zmq
 
+from dva_sim.network.connecting import ZeromqConfig
 from dva_sim.network.patterns import OnReply
 from dva_sim.network.security import Socket
 
@@ -21,6 +22,17 @@ NOBLOCK: Final = int(zmq.NOBLOCK)
 MORE: Final = int(zmq.NOBLOCK | zmq.SNDMORE)
 EVENTS: Final = int(zmq.EVENTS)
 POLLIN: Final = int(zmq.POLLIN)
+
+
+def options_of(zeromq: ZeromqConfig) -> dict[int, int]:
+    """Socket options by number; what the kernel is to choose is left out."""
+    options = {
+        zmq.SNDHWM: zeromq.high_water_mark,
+        zmq.RCVHWM: zeromq.high_water_mark,
+        zmq.SNDBUF: zeromq.send_buffer_bytes,
+        zmq.RCVBUF: zeromq.receive_buffer_bytes,
+    }
+    return {int(option): value for option, value in options.items() if value is not None}
 
 
 def has_more(socket: Socket) -> bool:

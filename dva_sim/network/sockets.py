@@ -15,6 +15,7 @@ from typing import Any, Final
 import zmq
 
 from dva_sim.errors import DvaSimError
+from dva_sim.network.connecting import ZeromqConfig
 from dva_sim.network.connections import (
     DRAIN,
     MORE,
@@ -25,6 +26,7 @@ from dva_sim.network.connections import (
     SocketSubscription,
     SocketWire,
     has_more,
+    options_of,
 )
 from dva_sim.network.keys import KeyRing
 from dva_sim.network.patterns import OnReply, Request, Service
@@ -62,6 +64,8 @@ class SocketNetwork:
         clock: Waits for the sockets.
         ring: Keys of the devices; None to run without.
         tell: Takes one line about each connection that could not be made.
+        zeromq: Set on every socket; `conflate` cannot be, since messages here have several
+            parts, of which ZeroMQ would keep the last alone.
 
     Attributes:
         counters: What was refused or could not be sent, by reason.
@@ -72,8 +76,10 @@ class SocketNetwork:
         clock: LiveClock,
         ring: KeyRing | None = None,
         tell: Callable[[str], object] = lambda _: None,
+        zeromq: ZeromqConfig | None = None,
     ) -> None:
         self.clock, self._tell = clock, tell
+        self._options = options_of(zeromq or ZeromqConfig())
         self._context: zmq.Context[Socket] = zmq.Context()
         # Each connection needs three; the system's own limit of open files comes first.
         self._context.set(zmq.MAX_SOCKETS, MOST_SOCKETS)
@@ -235,8 +241,15 @@ class SocketNetwork:
 
     # --- sockets -----------------------------------------------------------------------
 
-    def _listener(self, kind: int, node: str) -> Socket:
+    def _socket(self, kind: int) -> Socket:
+        """A socket with what is set on all: that counts for connections made afterwards."""
         socket = self._context.socket(kind)
+        for option, value in self._options.items():
+            socket.setsockopt(option, value)
+        return socket
+
+    def _listener(self, kind: int, node: str) -> Socket:
+        socket = self._socket(kind)
         socket.linger = LINGER
         socket.setsockopt(zmq.MAXMSGSIZE, LARGEST_TOPIC if kind == zmq.XPUB else LARGEST)
         try:
@@ -248,7 +261,7 @@ class SocketNetwork:
 
     def client(self, kind: int, node: str, peer: str) -> Socket:
         """A socket of `node`, connected to `peer` if there is a way to it."""
-        socket = self._context.socket(kind)
+        socket = self._socket(kind)
         socket.linger = 0
         socket.setsockopt(zmq.MAXMSGSIZE, LARGEST_PICTURE if kind == zmq.SUB else LARGEST)
         self._clients[socket] = node, peer
