@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from operator import itemgetter
+from typing import Any, NamedTuple
 
 from dva_sim.experiments.effects import Factor
 from dva_sim.experiments.labels import factor_name, level_name
@@ -108,21 +110,68 @@ def get(scenario: Mapping[str, Any], key: str) -> Any:
     return value
 
 
-def timeout_remark(scenario: Mapping[str, Any], factors: Sequence[Factor]) -> str:
-    """Whether the time-out leaves request/reply a fair chance at the largest delay."""
-    timeout, processing = get(scenario, "command.timeout_s"), get(scenario, "robot.processing_s")
-    varied = next((f.levels for f in factors if f.name == "link.delay_s"), ())
-    delays = [float(d) for d in (get(scenario, "link.delay_s"), *varied) if d is not None]
-    if isinstance(processing, Mapping):
-        processing = processing["mean_s"]
-    if timeout is None or processing is None or not delays:
+def timeout_remark(scenarios: Mapping[str, Mapping[str, Any]], study: Mapping[str, Any]) -> str:
+    """Whether a request that is sent again has time for its reply, condition by condition.
+
+    Args:
+        scenarios: Those of the parts.
+        study: Its factors and treatments say which conditions there are.
+    """
+    played = itertools.product(scenarios.values(), _changes(study))
+    known = list(filter(None, (_waiting(*pair) for pair in played)))
+    if not known:
         return ""
-    needed = _SAFE_ROUND_TRIPS * 2 * max(delays) + processing
-    verdict = "is above" if timeout > needed else "is not above"
-    return (
-        f"The time-out {verdict} four round trips and the processing time at the largest delay "
-        f"({level_name('command.timeout_s', needed)})."
+    what = "four round trips and the processing time"
+    short = sorted({(w.timeout, w.round_trip) for w in known if w.timeout <= w.needed})
+    if not short:
+        most = level_name("command.timeout_s", max(w.needed for w in known))
+        return f"The time-out is above {what} in every condition ({most} at most)."
+    where = "; ".join(
+        f"{level_name('command.timeout_s', timeout)} with round trips of "
+        + ", ".join(level_name("link.delay_s", trip) for _, trip in group)
+        for timeout, group in itertools.groupby(short, itemgetter(0))
     )
+    rest = "" if all(w.timeout <= w.needed for w in known) else " In all others it is above."
+    return (
+        f"The time-out is not above {what} in these conditions: {where}. There a request that is "
+        f"sent again, over a new connection, does not get its reply in time.{rest}"
+    )
+
+
+class _Waiting(NamedTuple):
+    """How long a request waits, and how long it would have to [s]."""
+
+    timeout: float
+    round_trip: float
+    needed: float
+
+
+def _waiting(scenario: Mapping[str, Any], changes: Mapping[str, Any]) -> _Waiting | None:
+    """Of one condition; None where there are no requests."""
+
+    def of(key: str) -> Any:
+        return changes[key] if key in changes else get(scenario, key)
+
+    timeout, processing, delay = (
+        of(key) for key in ("command.timeout_s", "robot.processing_s", "link.delay_s")
+    )
+    if timeout is None or processing is None or delay is None:
+        return None
+    ways = (of(f"link.{way}.delay_s") for way in ("up", "down"))
+    trip = float(sum(delay if way is None else way for way in ways))
+    mean = processing["mean_s"] if isinstance(processing, Mapping) else processing
+    return _Waiting(float(timeout), trip, _SAFE_ROUND_TRIPS * trip + float(mean))
+
+
+def _changes(study: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+    """What each combination of levels changes in a scenario."""
+    named = study.get("treatments", {})
+    factors = [
+        [named[name][str(level)] if name in named else {name: level} for level in levels]
+        for name, levels in study.get("factors", {}).items()
+    ]
+    for levels in itertools.product(*factors):
+        yield {key: value for level in levels for key, value in level.items()}
 
 
 def _stated(value: Any) -> Any:

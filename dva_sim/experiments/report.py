@@ -124,7 +124,7 @@ def _page(results: Results, runs: Table, view: View | None, drawn: list[Drawn]) 
             if shifts
             else conditions(scenarios, keys_of(study), _changed(study))
         ),
-        timeout_remark=timeout_remark(next(iter(scenarios.values()), {}), keys_of(study)),
+        timeout_remark=timeout_remark(scenarios, study),
         factors=[_levels(f.name, f.levels) for f in factors],
         treatments=_treatments(study),
         figures=drawn,
