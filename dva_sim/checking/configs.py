@@ -26,6 +26,7 @@ from dva_sim.experiments.study import Study, load_study
 from dva_sim.experiments.transports import TransportScenario
 from dva_sim.experiments.tuned import Tuned
 from dva_sim.experiments.validation.dispatch.cases import CaseFile, load_cases
+from dva_sim.experiments.validation.network.plan import PlanConfig, load_plan
 from dva_sim.experiments.validation.operators.targets import SplitFile, TargetFile, load_split
 from dva_sim.scenario import Scenario
 from dva_sim.tasks import TaskScenario
@@ -175,6 +176,11 @@ def _check_cases(document: Document) -> Iterator[ConfigError]:
     return iter(())
 
 
+def _check_plan(document: Document) -> Iterator[ConfigError]:
+    load_plan(str(document.file))
+    return iter(())
+
+
 def _check_split(document: Document) -> Iterator[ConfigError]:
     load_split(str(document.file))
     return iter(())
@@ -233,6 +239,7 @@ KINDS: Final = (
     Kind("transports", TransportScenario, "experiments/scenarios", _check_scenario),
     Kind("validation cases", CaseFile, "experiments/validation", _check_cases),
     Kind("targets", TargetFile, "experiments/validation", _check_model(TargetFile)),
+    Kind("measurements", PlanConfig, "experiments/validation", _check_plan),
     Kind("split", SplitFile, "experiments/validation", _check_split),
     Kind("site", SiteFile, "worlds", _check_site),
     Kind("ROS map", RosMap, "worlds", _check_map),

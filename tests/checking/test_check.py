@@ -55,6 +55,7 @@ def test_all_that_is_shipped_is_valid(check):
     agents = {"robot", "phone", "accelerometer", "guard", "bystanders", "operators"}
     agents |= {"bands of operators", "tuned values"}
     runs = {"study", "scenario", "timed scenario", "validation cases", "targets", "split", "task"}
+    runs |= {"transports", "measurements"}
     assert kinds == {"site", "plan", "message"} | runs | agents
 
 

@@ -12,6 +12,7 @@ from dva_sim.experiments.validation.network.pooling import (
     Pooled,
     is_steady,
     pool,
+    pool_variant,
     tells,
     to_be_pooled,
 )
@@ -136,35 +137,20 @@ def compare(
     )
     cells = _cells(played, orders.pop(MODEL), rows)
     own = [c for c in cells if c.group.kind == "pooled"]
-    scope = to_be_pooled(own)
+    pooled = pool(to_be_pooled(own), Streams(setting.seed).fresh("null"))
     found = {
-        name: _pooled(played, variant, rows, scope, setting.seed, name)
+        name: pool_variant(pooled, _cells(pooled_of(played), variant, rows))
         for name, variant in orders.items()
     }
     return Comparison(
         groups=played,
         left_out=[group for group in groups if group.left_out],
         verdicts=[judge(c) for c in cells if c.group.kind != "pooled" or is_steady(c)],
-        pooled=pool(scope, Streams(setting.seed).fresh(f"null/{MODEL}")),
+        pooled=pooled,
         rarely=[c for c in own if not tells(c)],
-        controls={name: pooled for name, pooled in found.items() if name in CONTROLS},
-        ablated={name: pooled for name, pooled in found.items() if name in WITHOUT},
+        controls={name: each for name, each in found.items() if name in CONTROLS},
+        ablated={name: each for name, each in found.items() if name in WITHOUT},
     )
-
-
-def _pooled(
-    groups: Sequence[Group],
-    orders: Sequence[Order],
-    rows: Rows,
-    scope: Sequence[Cell],
-    seed: int,
-    name: str,
-) -> Pooled:
-    """A variant, by the same measures of the same conditions as the model."""
-    asked = {(cell.group.condition, cell.measure) for cell in scope}
-    cells = _cells(pooled_of(groups), orders, rows)
-    judged = [c for c in cells if (c.group.condition, c.measure) in asked and len(c.measured)]
-    return pool([c for c in judged if len(c.predicted) > 1], Streams(seed).fresh(f"null/{name}"))
 
 
 def orders_of(groups: Sequence[Group], setting: Setting) -> dict[str, list[Order]]:

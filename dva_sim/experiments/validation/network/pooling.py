@@ -28,6 +28,7 @@ EXACT_S = 0.0005  # the laws without loss hold to this
 SIGNIFICANT = 0.05
 MAX_BIAS, MAX_TAIL_BIAS = 0.05, 0.10  # median over conditions; the latter of ages' tails
 MIN_EVENTS = 5  # fewer time-outs or alerts than this, expected in all runs, tell nothing
+MIN_CONDITIONS = 10  # fewer have no median to speak of
 MIN_SHARE = 0.9  # of the model's runs in which a measure must be defined
 DRAWS = 1000
 
@@ -59,7 +60,8 @@ class Pooled:
         rms: Root mean square of z.
         expected: The range in which 95 of 100 of them would lie if the model were right.
         false_alarms: How often something would be significant although the model were right.
-        biases: Median over conditions of model / real - 1, by measure.
+        biases: Median over conditions of model / real - 1, by measure; of measures that enough
+            conditions have.
     """
 
     scored: tuple[Scored, ...]
@@ -91,6 +93,25 @@ def bias_limit(measure: Measure) -> float:
     return MAX_TAIL_BIAS if tail_of_age else MAX_BIAS
 
 
+def pool_variant(own: Pooled, variants: Sequence[Cell]) -> Pooled:
+    """A variant of the model by the measures, and in the standard errors, of the model itself.
+
+    So it cannot gain or lose by how much its own runs differ.
+
+    Args:
+        own: What the model as it is comes to.
+        variants: Cells of the variant; those that the model is not judged by are left out.
+    """
+    known = {(c.group.condition, c.measure): c for c in variants if len(c.predicted)}
+    scored = []
+    for each in own.scored:
+        cell = known.get((each.cell.group.condition, each.cell.measure))
+        if cell is not None:
+            z = (cell.model - cell.real) / each.error
+            scored.append(Scored(cell, z, each.error, float(two_sided(np.array([z]))[0])))
+    return _judged(scored, own.expected, own.false_alarms)
+
+
 def to_be_pooled(cells: Sequence[Cell]) -> list[Cell]:
     """The cells that may be judged, say something, and differ from run to run."""
     return [c for c in cells if not reason_against(c) and tells(c) and not is_steady(c)]
@@ -103,18 +124,25 @@ def pool(judged: Sequence[Cell], rng: np.random.Generator) -> Pooled:
         judged: What is compared; see `to_be_pooled`.
         rng: Luck of the runs that take the sockets' place.
     """
-    scored = tuple(score(cell) for cell in judged)
+    scored = [score(cell) for cell in judged]
     null = null_scores(judged, rng)
     rms = np.sqrt((null**2).mean(axis=1)) if judged else np.zeros(1)
     low, high = np.percentile(rms, (2.5, 97.5))
     alarms = [bool(holm(two_sided(row)).any()) for row in null]
+    return _judged(scored, (float(low), float(high)), float(np.mean(alarms)))
+
+
+def _judged(scored: Sequence[Scored], expected: tuple[float, float], false_alarms: float) -> Pooled:
+    """What scores come to."""
+    found = holm([s.p for s in scored])
+    offs = {m: [s.cell.off for s in scored if s.cell.measure == m] for m in MEASURES}
     return Pooled(
-        scored,
-        tuple(s for s, found in zip(scored, holm([s.p for s in scored]), strict=True) if found),
+        tuple(scored),
+        tuple(s for s, is_significant in zip(scored, found, strict=True) if is_significant),
         float(np.sqrt(np.mean([s.z**2 for s in scored]))) if scored else 0.0,
-        (float(low), float(high)),
-        float(np.mean(alarms)) if alarms else 0.0,
-        {m: _bias([c for c in judged if c.measure == m]) for m in MEASURES if _any(judged, m)},
+        expected,
+        false_alarms,
+        {m: float(np.median(own)) for m, own in offs.items() if len(own) >= MIN_CONDITIONS},
     )
 
 
@@ -208,12 +236,3 @@ def holm(p: Sequence[float] | Floats) -> NDArray[np.bool_]:
     found = np.zeros(len(values), dtype=bool)
     found[order[:first]] = True
     return found
-
-
-def _any(cells: Sequence[Cell], measure: Measure) -> bool:
-    return any(cell.measure == measure for cell in cells)
-
-
-def _bias(cells: Sequence[Cell]) -> float:
-    offs = [cell.off for cell in cells if np.isfinite(cell.off)]
-    return float(np.median(offs)) if offs else 0.0

@@ -111,7 +111,6 @@ def make_links(condition: Condition, streams: Streams) -> tuple[Link, Link]:
         rate_bps=min(1000.0 * condition.rate_kbit, _UNLIMITED_BPS),
         queue_packets=condition.queue_pkts,
         reorder=condition.reorder,
-        draws="independent",
     )
     up = make_link(config, "up", streams, "link/up")
     return up, make_link(config, "down", streams, "link/down")
