@@ -61,6 +61,12 @@ class Alarm:
         self.delay_timeout(now)
         self._timer.set(self._timeout_at)
 
+    def fall_back(self, now: float, board: Scoreboard) -> None:
+        """Wait for the time-out of the first segment, counted from when it was sent last."""
+        self.kind = TIMEOUT
+        self._timeout_at = max(now, board.queue[0].sent_at + self.timeout())
+        self._timer.set(self._timeout_at)
+
     def delay_timeout(self, now: float) -> None:
         """The first segment has just been sent again: its time-out begins anew."""
         self._timeout_at = now + self.timeout()

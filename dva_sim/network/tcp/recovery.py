@@ -61,7 +61,7 @@ class Recovery:
         self.probe_end, self._probe_repeats = -1, False
 
     def repeated(self, now: float) -> None:
-        """A segment is sent again at `now` [s]."""
+        """A segment held to be lost is sent again at `now` [s]."""
         self._first_repeat = min(self._first_repeat, now)
 
     def sent(self) -> None:
@@ -142,8 +142,10 @@ class Recovery:
 
     def _begin(self, state: str, next_byte: int) -> None:
         self._before = self._window.window, self._window.threshold
-        self.state, self._until = state, next_byte
-        self._first_repeat, self.probe_end = inf, -1
+        self.state, self._until, self.probe_end = state, next_byte, -1
+        board = self._board
+        if not (board.resent or board.queue[0].repeated):
+            self._first_repeat = inf  # otherwise the one of the recovery before still counts
 
     def _mended(self, now: float) -> None:
         if self.state == OPEN and self._limited:

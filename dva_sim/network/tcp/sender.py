@@ -146,7 +146,7 @@ class Sender:
         board, recovery = self.board, self.recovery
         gain, advanced = board.take(acknowledged, blocks), acknowledged > self.first
         if advanced:
-            self.first, self._alarm.back_off = acknowledged, 0
+            self.first = acknowledged
             self.buffer.release(gain.released)
         if gain.delivered:
             self._measure(gain, now, echo, advanced)
@@ -175,6 +175,7 @@ class Sender:
         if not first and advanced:
             first = last = now - echo
         if first:
+            self._alarm.back_off = 0  # RFC 6298, section 5: not before there is a new sample
             self.times.sample(first, self.first, self.next)
             self.times.shortest(last)
             if self.window.window < self.window.threshold:
@@ -247,7 +248,8 @@ class Sender:
         if self._options.collapse:
             self.buffer.release(self.board.merge(index, self._options.mss))
         self.board.repeat(sent, now)
-        self.recovery.repeated(now)
+        if self.recovery.state != OPEN:
+            self.recovery.repeated(now)
         self.retransmitted += 1
         if index == 0:
             self._alarm.delay_timeout(now)
@@ -270,8 +272,8 @@ class Sender:
             self._alarm.stop()
 
     def _may_probe(self) -> bool:
-        quiet = self.recovery.state == OPEN and self.recovery.probe_end < 0
-        return quiet and not self.board.sacked and self._options.tail_probe
+        quiet = self.recovery.state == OPEN and not self.board.sacked
+        return quiet and self._options.tail_probe
 
     def _ring(self) -> None:
         now, kind = self._clock.now, self._alarm.kind
@@ -294,6 +296,9 @@ class Sender:
 
     def _probe(self, now: float) -> None:
         """Send something new, or the last segment again, to provoke an acknowledgement."""
+        if self.recovery.probe_end >= 0:
+            self._alarm.fall_back(now, self.board)  # one probe at a time
+            return
         self.tail_probes += 1
         end = min(self.next + self._options.mss, self.total)
         fresh = self.next < end <= self.edge
