@@ -75,7 +75,6 @@ class LinkConfig(Config):
     rate_bps: Rate = 20e6
     queue_bytes: Room = 150_000
     queue_packets: Packets | None = None
-    draws: Literal["independent"] = "independent"
     trace_up: str | None = None
     trace_down: str | None = None
     outages: tuple[Outage, ...] = ()
