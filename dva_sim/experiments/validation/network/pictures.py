@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,6 +16,8 @@ from dva_sim.experiments.validation.network.samples import BY_NAME, Cell, Floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
+    from matplotlib.figure import Figure
 
 _GOOD, _BAD, _PALE = "#0072B2", "#D55E00", "#9a9a9a"
 _PAIRS = (
@@ -30,13 +32,15 @@ _ROWS: dict[Kind, str] = {
     "single": "single, under loss",
     "pooled": "pooled, under loss",
 }
-_LEAST_Z = 4.5  # drawn at least so far
+_WIDE = 60.0  # a logarithmic axis from here on shows tens only
+_FARTHEST_Z = 6.5  # what is farther off stands at the edge
+_FARTHEST = 1.6  # the same of predicted over measured
 
 
 def draw_all(comparison: Comparison) -> list[Drawn]:
     """Every figure there is something to draw for."""
     with styled():
-        drawn = [_scatter(comparison)]
+        drawn = [_scatter(comparison), _ratios(comparison)]
         if comparison.pooled.scored:
             drawn.append(_scores(comparison))
         if comparison.controls:
@@ -47,31 +51,15 @@ def draw_all(comparison: Comparison) -> list[Drawn]:
 def _scatter(comparison: Comparison) -> Drawn:
     """Predicted against measured, a row for each kind of condition."""
     figure, axes = panels(len(KINDS), len(_PAIRS), 2.5)
-    outside = {id(v.cell) for v in comparison.verdicts if v.word == "outside"}
-    outside |= {id(scored.cell) for scored in comparison.pooled.significant}
-    shown = {id(v.cell) for v in comparison.verdicts if v.word == "shown only"}
-    cells = [v.cell for v in comparison.verdicts]
-    cells += [scored.cell for scored in comparison.pooled.scored]
-    for row, kind in zip(axes, KINDS, strict=True):
-        for ax, (median, tail, label) in zip(row, _PAIRS, strict=True):
-            own = [c for c in cells if c.group.kind == kind and c.model > 0 and c.real > 0]
-            for name, marker in ((median, "o"), (tail, "^")):
-                some = [c for c in own if c.measure.name == name]
-                _marks(ax, kind, some, marker, outside, shown)
-            if any(c.measure.name in (median, tail) for c in own):
-                _diagonal(ax, kind, label.endswith("[ms]"))
-            else:
-                ax.set(xticks=[], yticks=[])
-            if row is axes[0]:
-                ax.set_title(label)
-            if row is axes[-1]:
-                ax.set_xlabel("measured")
-        row[0].set_ylabel(f"{_ROWS[kind]}\npredicted")
-    for marker, words in (("o", "median, or rate"), ("^", "95th percentile")):
-        axes[0][0].plot([], [], marker, color=_GOOD, ms=4, label=words)
-    for colour, words in ((_BAD, "outside its band, or significant"), (_PALE, "not judged")):
-        axes[0][0].plot([], [], "o", color=colour, ms=4, label=words)
-    figure.legend(*axes[0][0].get_legend_handles_labels(), loc="outside upper left", ncols=4)
+    for panel in _panels(comparison, axes):
+        for cell, marker, colour in panel.marks:
+            low, high = _bar(panel.kind, cell)
+            if high > low:
+                panel.axes.plot([cell.real] * 2, [low, high], color=colour, lw=0.6, alpha=0.5)
+            panel.axes.plot(cell.real, cell.model, marker, color=colour, ms=3, mew=0, alpha=0.85)
+        if panel.marks:
+            _diagonal(panel.axes, panel.kind, panel.is_time)
+    _label(figure, axes, "predicted")
     text = (
         "Each mark is one measure of one condition. The grey band is the one that is asked for "
         f"without loss ({100 * SHARES['lossless']:.0f} % and {TIME_MS:g} ms; in overload "
@@ -83,15 +71,75 @@ def _scatter(comparison: Comparison) -> Drawn:
     return finish(figure, "scatter", "Predicted against measured", text)
 
 
-def _marks(
-    axes: Axes, kind: Kind, cells: Sequence[Cell], marker: str, outside: set[int], shown: set[int]
-) -> None:
-    for cell in cells:
-        colour = _BAD if id(cell) in outside else _PALE if id(cell) in shown else _GOOD
-        low, high = _bar(kind, cell)
-        if high > low:
-            axes.plot([cell.real] * 2, [low, high], color=colour, lw=0.6, alpha=0.5)
-        axes.plot(cell.real, cell.model, marker, color=colour, ms=3, mew=0, alpha=0.85)
+def _ratios(comparison: Comparison) -> Drawn:
+    """The same as predicted over measured: what is off can be seen."""
+    figure, axes = panels(len(KINDS), len(_PAIRS), 1.9)
+    for panel in _panels(comparison, axes):
+        ax = panel.axes
+        for cell, marker, colour in panel.marks:
+            ratio = cell.model / cell.real
+            clipped = min(max(ratio, 1 / _FARTHEST), _FARTHEST)
+            low, high = (value / cell.real for value in _bar(panel.kind, cell))
+            if high > low:
+                ax.plot([cell.real] * 2, [low, high], color=colour, lw=0.6, alpha=0.4)
+            ax.plot(cell.real, clipped, marker, color=colour, ms=3, mew=0, alpha=0.85)
+        if panel.marks:
+            _level(ax, panel.kind, panel.is_time)
+    _label(figure, axes, "predicted / measured")
+    text = (
+        f"What is more than {_FARTHEST:g} times off stands at the edge. Bands and bars are those "
+        "of the figure above."
+    )
+    return finish(figure, "ratios", "Predicted over measured", text)
+
+
+@dataclass(frozen=True)
+class _Panel:
+    """One kind of condition and one pair of measures; each mark with its shape and colour."""
+
+    axes: Axes
+    kind: Kind
+    is_time: bool
+    marks: list[tuple[Cell, str, str]]
+
+
+def _panels(comparison: Comparison, axes: list[list[Axes]]) -> list[_Panel]:
+    outside = {id(v.cell) for v in comparison.verdicts if v.word == "outside"}
+    outside |= {id(scored.cell) for scored in comparison.pooled.significant}
+    shown = {id(v.cell) for v in comparison.verdicts if v.word == "shown only"}
+    cells = [v.cell for v in comparison.verdicts]
+    cells += [scored.cell for scored in comparison.pooled.scored]
+    found = []
+    for row, kind in zip(axes, KINDS, strict=True):
+        for ax, (median, tail, label) in zip(row, _PAIRS, strict=True):
+            marks = []
+            for c in cells:
+                if c.group.kind != kind or c.measure.name not in (median, tail):
+                    continue
+                if c.model > 0 and c.real > 0:
+                    colour = _BAD if id(c) in outside else _PALE if id(c) in shown else _GOOD
+                    marks.append((c, "^" if c.measure.is_tail else "o", colour))
+            found.append(_Panel(ax, kind, label.endswith("[ms]"), marks))
+    return found
+
+
+def _label(figure: Figure, axes: list[list[Axes]], text: str) -> None:
+    """What is common to rows and columns, and the key."""
+    for row, kind in zip(axes, KINDS, strict=True):
+        row[0].set_ylabel(f"{_ROWS[kind]}\n{text}")
+        for ax in row:
+            if not ax.lines:
+                ax.set(xticks=[], yticks=[])
+    for ax, (_, _, label) in zip(axes[0], _PAIRS, strict=True):
+        ax.set_title(label)
+    for ax in axes[-1]:
+        ax.set_xlabel("measured")
+    corner = axes[0][0]
+    for marker, words in (("o", "median, or rate"), ("^", "95th percentile")):
+        corner.plot([], [], marker, color=_GOOD, ms=4, label=words)
+    for colour, words in ((_BAD, "outside its band, or significant"), (_PALE, "not judged")):
+        corner.plot([], [], "o", color=colour, ms=4, label=words)
+    figure.legend(*corner.get_legend_handles_labels(), loc="outside upper left", ncols=4)
 
 
 def _bar(kind: Kind, cell: Cell) -> tuple[float, float]:
@@ -108,8 +156,6 @@ def _bar(kind: Kind, cell: Cell) -> tuple[float, float]:
 
 def _diagonal(axes: Axes, kind: Kind, is_time: bool) -> None:
     """Where both agree, and the band around it."""
-    from matplotlib.ticker import LogLocator, NullLocator
-
     axes.set_xscale("log")
     axes.set_yscale("log")
     low = min(axes.get_xlim()[0], axes.get_ylim()[0])
@@ -124,19 +170,51 @@ def _diagonal(axes: Axes, kind: Kind, is_time: bool) -> None:
     axes.plot(x, x, color=SOFT, lw=0.6, zorder=0)
     axes.set(xlim=(low, high), ylim=(low, high), aspect="equal")
     for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_locator(LogLocator(numticks=5))
-        axis.set_major_formatter("{x:g}")
-        axis.set_minor_locator(NullLocator())
+        _log_ticks(axis, high / low)
+
+
+def _level(axes: Axes, kind: Kind, is_time: bool) -> None:
+    """The same for predicted over measured."""
+    from matplotlib.ticker import FixedLocator, NullLocator
+
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    low, high = axes.get_xlim()
+    x = np.geomspace(low, high, 60)
+    if kind in ("lossless", "overload"):
+        half = SHARES[kind] + (TIME_MS / x if is_time and kind == "lossless" else 0.0 * x)
+        least = np.maximum(1 - half, 0.1)
+        axes.fill_between(x, least, 1 + half, color=FAINT, alpha=0.8, lw=0)
+        if kind == "overload":
+            for side in (-1, 1):
+                axes.axhline(1 + side * BOUNDED_SHARE, color=SOFT, lw=0.5, ls="--")
+    axes.axhline(1, color=SOFT, lw=0.6, zorder=0)
+    axes.set(xlim=(low, high), ylim=(0.97 / _FARTHEST, 1.03 * _FARTHEST))
+    _log_ticks(axes.xaxis, high / low)
+    axes.yaxis.set_major_locator(FixedLocator([0.7, 0.8, 0.9, 1.0, 1.1, 1.25, 1.5]))
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.yaxis.set_minor_locator(NullLocator())
+
+
+def _log_ticks(axis: Axis, reach: float) -> None:
+    """Round places, as many as the reach wants."""
+    from matplotlib.ticker import LogLocator, NullLocator
+
+    subs = (1.0, 2.0, 5.0) if reach < _WIDE else (1.0,)
+    axis.set_major_locator(LogLocator(subs=subs, numticks=5))
+    axis.set_major_formatter("{x:g}")
+    axis.set_minor_locator(NullLocator())
 
 
 def _scores(comparison: Comparison) -> Drawn:
     """How z is distributed, and of each measure."""
     pooled = comparison.pooled
     figure, [[left, right]] = panels(1, 2, 3.2, width_ratios=(1, 1.3))
-    z = np.array([scored.z for scored in pooled.scored])
-    reach = max(_LEAST_Z, float(np.abs(z).max()) + 0.5)
-    edges = np.arange(-np.ceil(2 * reach) / 2, np.ceil(2 * reach) / 2 + 0.25, 0.5)
-    left.hist(z, edges.tolist(), color=_GOOD, alpha=0.8)
+    far = _FARTHEST_Z
+    z = np.clip([scored.z for scored in pooled.scored], -far, far)
+    edges = np.arange(-far - 0.5, far + 0.75, 0.5)
+    counts, *_ = left.hist(z, edges.tolist(), color=_GOOD, alpha=0.8)
+    left.set_ylim(0, 1.35 * float(np.max(counts)))  # room for the words
     x = np.linspace(-4, 4, 200)
     normal = 0.5 * len(z) * np.exp(-(x**2) / 2) / np.sqrt(2 * np.pi)
     left.plot(x, normal, color=INK, lw=1.0, label="normal law")
@@ -153,7 +231,10 @@ def _scores(comparison: Comparison) -> Drawn:
         spread = _spread(len(own))
         for scored, offset in zip(sorted(own, key=lambda s: s.z), spread, strict=True):
             colour = _BAD if id(scored) in significant else _GOOD
-            right.plot(scored.z, place + offset, "o", color=colour, ms=3, mew=0, alpha=0.85)
+            marker = "o" if abs(scored.z) < far else ">" if scored.z > 0 else "<"
+            at = min(max(scored.z, -far), far)
+            size = 3 if marker == "o" else 5
+            right.plot(at, place + offset, marker, color=colour, ms=size, mew=0, alpha=0.85)
     right.axvspan(-1.96, 1.96, color=FAINT, alpha=0.5, lw=0)
     right.axvline(0, color=SOFT, lw=0.7)
     right.set_yticks(range(len(names)), [BY_NAME[name].words for name in reversed(names)])
@@ -162,7 +243,8 @@ def _scores(comparison: Comparison) -> Drawn:
     text = (
         "Means over at least six runs on sockets against the model's, under loss. If the model is "
         "right, z follows the normal law about, and 95 of 100 lie in the grey band. Orange: "
-        "significant also when it is considered how many are looked at (Holm)."
+        "significant also when it is considered how many are looked at (Holm). "
+        f"Arrows and the outermost bars: farther than {far:g}."
     )
     return finish(figure, "scores", "Pooled runs under loss, in standard errors", text)
 
