@@ -54,7 +54,7 @@ def test_time_to_a_target_is_that_of_the_crossover_law_with_delay():
     scenario = build(
         pointing(
             task={"amplitude_m": 0.2, "width_m": widths},
-            operator={"traits": traits},
+            operator={"traits": traits, "strategy": "pursuit"},
             device={"kind": "joystick", "gain": 10.0, "rate_hz": 250},
             frames={"rate_hz": 250},
         )

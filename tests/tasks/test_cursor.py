@@ -69,7 +69,7 @@ def test_a_change_of_velocity_is_seen_as_a_whole_after_a_tenth_of_a_second():
 
 def test_more_frames_a_second_do_not_slow_who_has_no_noise():
     task = {"width_m": [0.01, 0.02, 0.04], "selection": "dwell", "dwell_s": 0.3}
-    who = {"traits": {"motor_noise": 1e-9}}
+    who = {"traits": {"motor_noise": 1e-9}, "strategy": "pursuit"}
     mouse = {"kind": "mouse", "rate_hz": 100}
     scenario = pointing(task=task, operator=who, device=mouse, trials=2, practice=10)
     few, *more = (

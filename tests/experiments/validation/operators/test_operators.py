@@ -34,9 +34,11 @@ def test_an_operator_on_whom_delay_has_no_effect_fails_whatever_else_it_does():
     assert not outcome_of(list(verdicts.values()), load_split().rule).passes
 
 
-def test_delay_costs_a_person_time():
-    _, found = played("adaptive", "lag")
-    assert found["S7/75"].value > found["S7/25"].value > 1.0
+def test_delay_costs_three_persons_time_also_in_the_worst_of_their_intervals():
+    _, found = played("adaptive", "lag", "excavator")
+    assert found["S7/75"].low > 1.0
+    assert found["S8/slope"].low > 1.0
+    assert found["S17/increase"].low > 0.1
 
 
 def test_the_same_seed_gives_the_same_numbers_and_another_one_other_persons():
