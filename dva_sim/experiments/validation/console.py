@@ -9,7 +9,6 @@ from pathlib import Path
 from dva_sim.errors import ConfigError
 from dva_sim.experiments.validation.telling import say
 
-
 WHAT = ("dispatch", "operators", "network")
 INTERRUPTED = 130  # exit code of a program ended by Ctrl-C
 
