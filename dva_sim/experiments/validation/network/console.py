@@ -25,7 +25,7 @@ from dva_sim.experiments.validation.network.measured import Run, SourceConfig, l
 from dva_sim.experiments.validation.network.plan import SHIPPED, load_plan
 from dva_sim.experiments.validation.telling import console, progress_bar, say
 
-WIDTH = 210  # of the table of conditions at least, also in a file
+WIDTH = 240  # of the table of conditions at least, also in a file
 _STYLES = {"passes": "green", "found out": "green", "fails": "bold red", "fooled us": "bold red"}
 _WORST = 12  # of the largest z that are named
 

@@ -18,6 +18,7 @@ from dva_sim.experiments.validation.writing import Row, render, write_all
 from dva_sim.network.condition import Condition
 
 NAME = "network"
+FEW_SINGLES = 20
 SUMMARY_HEADS = ("what", "found", "asked for", "verdict")
 ABLATION_HEADS = ("left out, or instead", "RMS z", "expected", "significant")
 HEADS = (
@@ -98,6 +99,12 @@ def notes(comparison: Comparison) -> list[str]:
         found.append(
             f"If the model were right, something would still be significant in {chance:.0f} % "
             "of such comparisons."
+        )
+    singles = sum(group.kind == "single" for group in comparison.judged)
+    if 0 < singles < FEW_SINGLES:
+        found.append(
+            f"Of single runs under loss there are only {singles}: the measures of a run go "
+            "together, so an unlucky one counts for many."
         )
     if comparison.rarely:
         found.append(
