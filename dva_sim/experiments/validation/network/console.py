@@ -23,6 +23,7 @@ from dva_sim.experiments.validation.network.kinds import KINDS, Group, grouped
 from dva_sim.experiments.validation.network.live import made_with, measure_design, measure_now
 from dva_sim.experiments.validation.network.measured import Run, SourceConfig, load_runs
 from dva_sim.experiments.validation.network.plan import SHIPPED, load_plan
+from dva_sim.experiments.validation.network.tables import HEADS, table
 from dva_sim.experiments.validation.telling import console, progress_bar, say
 
 WIDTH = 240  # of the table of conditions at least, also in a file
@@ -94,10 +95,10 @@ def _tell(comparison: Comparison) -> None:
     """The conditions, the criteria, and what they come to."""
     wide = Console(highlight=False, width=max(console.width, WIDTH))
     for kind in KINDS:
-        rows = output.table(comparison, kind)
+        rows = table(comparison, kind)
         if rows:
             wide.print(f"\n[bold]{output.TITLES[kind]}[/bold] (measured → predicted)")
-            wide.print(_table(output.HEADS, rows))
+            wide.print(_table(HEADS, rows))
     _list("Not judged", [f"{why}: {which}" for why, which in output.left_out(comparison)])
     _list("Largest deviations of pooled conditions", output.worst(comparison, _WORST))
     wide.print("\n[bold]Criteria[/bold]")

@@ -6,7 +6,7 @@ import pytest
 
 from dva_sim.errors import ConfigError
 from dva_sim.experiments.validation import console as commands
-from dva_sim.experiments.validation.network import comparing, console, output
+from dva_sim.experiments.validation.network import comparing, console, output, tables
 from dva_sim.experiments.validation.network.comparing import Setting, compare
 from dva_sim.experiments.validation.network.kinds import grouped
 from dva_sim.experiments.validation.network.measured import load_runs
@@ -66,8 +66,8 @@ def test_what_is_missing_is_counted(compared):
 
 
 def test_a_row_of_the_table_shows_measured_and_predicted(compared):
-    [row] = output.table(compared, "lossless")
-    told = dict(zip(output.HEADS, row, strict=True))
+    [row] = tables.table(compared, "lossless")
+    told = dict(zip(tables.HEADS, row, strict=True))
     assert told["depth"] == "message"
     assert told["age [ms]"].startswith("105.3 → 105 |")
     assert told["verdict"] == "passes"
