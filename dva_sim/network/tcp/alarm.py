@@ -71,15 +71,20 @@ class Alarm:
         """The first segment has just been sent again: its time-out begins anew."""
         self._timeout_at = now + self.timeout()
 
-    def watch(self, now: float, board: Scoreboard, advanced: bool, probing: bool) -> None:
+    def watch(
+        self, now: float, board: Scoreboard, advanced: bool, fresh: bool, probing: bool
+    ) -> None:
         """Set the alarm for segments under way.
 
         Args:
             now: [s].
             board: The segments, at least one.
             advanced: Something was acknowledged in order.
+            fresh: Something new was sent.
             probing: Whether a tail-loss probe may be sent.
         """
+        if not (advanced or self.doubt) and self._stands(fresh, probing):
+            return
         if advanced:
             self._timeout_at = now + self.timeout()
         elif self.kind != TIMEOUT or self._timer.deadline == inf:
@@ -87,9 +92,17 @@ class Alarm:
         self.kind, at = TIMEOUT, self._timeout_at
         if self.doubt and self.doubt < at:
             self.kind, at = REORDER, self.doubt
-        elif probing:
+        elif probing and (advanced or fresh):
             self.kind, at = PROBE, min(at, now + self._probe_time(len(board.queue)))
         self._timer.set(max(at, now))
+
+    def _stands(self, fresh: bool, probing: bool) -> bool:
+        """Whether what is set may stay: to set it again would round it differently."""
+        if self._timer.deadline == inf:
+            return False
+        if self.kind == PROBE:
+            return probing and not fresh
+        return self.kind == TIMEOUT and not (probing and fresh)
 
     def watch_window(self, now: float) -> None:
         """Wait until a closed window should be probed."""

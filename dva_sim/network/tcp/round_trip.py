@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import inf
+from math import ceil, inf
 
 from dva_sim.network.tcp.options import TcpOptions
 
@@ -22,7 +22,7 @@ class RoundTrip:
     Attributes:
         smoothed: SRTT [s]; 0 before the first sample.
         minimum: The shortest so far [s].
-        timeout: RTO without back-off [s].
+        timeout: RTO without back-off [s], in whole ticks.
     """
 
     __slots__ = (
@@ -61,7 +61,8 @@ class RoundTrip:
             self.variance = self._largest = max(self._variation, self._floor)
             self._round_end = sent
         spread = 4 * self.variance if self._options.rtt_variance else self._options.min_rto
-        self.timeout = min(self.smoothed + spread, self._options.max_rto)
+        timeout, tick = min(self.smoothed + spread, self._options.max_rto), self._options.tick
+        self.timeout = ceil(timeout / tick - 1e-6) * tick if tick else timeout
 
     def shortest(self, rtt: float) -> None:
         """Note a round trip that held no waiting for others [s]."""

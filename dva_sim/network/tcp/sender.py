@@ -161,8 +161,9 @@ class Sender:
             self._alarm.doubt = recovery.find(now, self.next)
         if not recovery.hold(len(gain.delivered), advanced and board.lost <= lost) and advanced:
             self._grow(len(gain.delivered), now)
+        before = self.next
         self._transmit(now)
-        self._watch(now, advanced)
+        self._watch(now, advanced, self.next > before)
 
     def _measure(self, gain: Gain, now: float, echo: float, advanced: bool) -> None:
         """Round trip of the segment that waited longest; never of an ambiguous one (Karn)."""
@@ -203,7 +204,7 @@ class Sender:
         before = self.next
         self._transmit(now)
         if self.next > before or not self.board.queue:
-            self._watch(now, False)
+            self._watch(now, False, self.next > before)
 
     def _transmit(self, now: float) -> None:
         """Send what the windows allow: first what is lost, then what is new."""
@@ -263,9 +264,9 @@ class Sender:
 
     # Timers
 
-    def _watch(self, now: float, advanced: bool) -> None:
+    def _watch(self, now: float, advanced: bool, fresh: bool) -> None:
         if self.board.queue:
-            self._alarm.watch(now, self.board, advanced, self._may_probe())
+            self._alarm.watch(now, self.board, advanced, fresh, self._may_probe())
         elif self.next < self.total:
             self._alarm.watch_window(now)
         else:
@@ -291,8 +292,9 @@ class Sender:
     def _doubt_over(self, now: float) -> None:
         self._alarm.doubt = self.recovery.find(now, self.next)
         self.recovery.hold(0, False)
+        before = self.next
         self._transmit(now)
-        self._watch(now, False)
+        self._watch(now, False, self.next > before)
 
     def _probe(self, now: float) -> None:
         """Send something new, or the last segment again, to provoke an acknowledgement."""
@@ -322,4 +324,4 @@ class Sender:
             self._send(min(self.edge, self.total), now)
         else:
             self._emit(-1, -1, now)
-        self._watch(now, False)
+        self._watch(now, False, bool(self.board.queue))

@@ -14,7 +14,7 @@ References:
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import inf
+from math import ceil, inf
 
 from dva_sim.clock import Clock
 
@@ -44,7 +44,8 @@ class Timer:
     def set(self, deadline: float) -> None:
         """Ring at `deadline` [s] and not before, whatever was set earlier."""
         if self._tick:
-            deadline = next_on_grid(deadline, deadline - self._clock.now, self._tick)
+            now = self._clock.now
+            deadline = next_on_grid(now, max(0.0, deadline - now), self._tick)
         self.deadline = deadline
         if deadline < self._due:
             self._schedule(deadline)
@@ -69,10 +70,14 @@ class Timer:
         self._action()
 
 
-def next_on_grid(deadline: float, wait: float, tick: float) -> float:
-    """When a timer rings that was set `wait` before its `deadline` [s], on a grid of `tick` [s]."""
-    ring = _INNERMOST * tick
-    while wait >= ring:
-        ring *= _COARSER
-        tick *= _COARSER
-    return (deadline // tick + 1.0) * tick
+def next_on_grid(now: float, wait: float, tick: float) -> float:
+    """When a timer rings that is set `now` [s] for `wait` [s], on a grid of `tick` [s].
+
+    The time is rounded down and the wait up to ticks; the ring is then the next one of the
+    wheel, never this one.
+    """
+    ticks, step = ceil(wait / tick - 1e-6), 1
+    due = int(now / tick + 1e-6) + ticks
+    while ticks >= _INNERMOST * step:
+        step *= _COARSER
+    return (due // step + 1) * step * tick

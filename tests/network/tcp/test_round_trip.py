@@ -4,8 +4,8 @@ from dva_sim.network.tcp.options import TcpOptions
 from dva_sim.network.tcp.round_trip import RoundTrip
 
 
-def after(*samples, **changes):
-    times = RoundTrip(TcpOptions(**changes))
+def after(*samples, tick=0.0, **changes):
+    times = RoundTrip(TcpOptions(tick=tick, **changes))
     for number, sample in enumerate(samples):
         times.sample(sample, 2 * number, 2 * number + 1)
     return times
@@ -54,3 +54,7 @@ def test_an_opening_that_measured_nothing_leads_to_three_seconds():
 
 def test_the_timeout_is_never_beyond_the_longest():
     assert after(100.0, max_rto=120.0).timeout == 120.0
+
+
+def test_the_timeout_is_in_whole_ticks_of_the_kernel():
+    assert after(0.0501, tick=0.004).timeout == pytest.approx(0.252)
