@@ -61,7 +61,7 @@ def replay(scenario: Scenario, seed: int, tape: Tape) -> Recording:
     class TapePhone:
         """Says what was said."""
 
-        hand_lag, keeps_alive, failures = 0.0, tape.keeps_alive, 0
+        hand_lag, keeps_alive, failures, first_failure = 0.0, tape.keeps_alive, 0, ""
 
         def __init__(self, *_: Any) -> None:
             self._looks, self._next_looks = deque(tape.looks), deque(tape.next_looks)

@@ -95,15 +95,13 @@ def test_operator_and_phone_are_less_than_half_of_an_episode(benchmark: Any, pro
     """The share is 1 - CPU time of the replay / CPU time of the episode, each the best of several.
 
     The replay is the same run with somebody who repeats the commands: the same messages at the
-    same moments, the same robot, links and DVA. Gone are perceiving, judging, looking for the
-    event, estimating the delay, deciding, planning, hand, accelerometer, filter and mapping.
+    same moments, the same robot, links and DVA, as tests/simulation sees to. Gone are perceiving,
+    judging, looking for the event, estimating the delay, deciding, planning, hand, accelerometer,
+    filter and mapping.
     """
     changes = {"pattern": "latest-wins", "phone.profile": profile}
     scenario = scenarios.build(scenarios.load("drive-to-event"), changes)
-    tape, full = taped(scenario, 1)
-    bare = replay(scenario, 1, tape)
-    assert bare.recorder.counters == full.recorder.counters
-    assert bare.recorder.tracks == full.recorder.tracks
+    tape, _ = taped(scenario, 1)
     runs = {
         "episode": lambda: simulate(scenario, 1).duration,
         "replay": lambda: replay(scenario, 1, tape).duration,
