@@ -35,6 +35,12 @@ DEPTHS: tuple[Depth, ...] = ("auto", "message", "segment", "datagram")
 
 _PATIENCE_S = 120.0  # for a handshake; then nothing is ever sent
 _UNLIMITED_BPS = 1e12
+LATE_S = 0.0001
+"""How late the emulated link lets a packet go, by its own account; half of them are later.
+
+It decides what comes first where delays and periods are round: acknowledgements do not return
+at the very moment of the next command.
+"""
 _SUBSCRIPTION = 1  # bytes of a subscription to everything
 _UNBOUNDED = 1 << 30  # a buffer that nothing here fills [B]
 
@@ -104,7 +110,7 @@ def make_links(condition: Condition, streams: Streams) -> tuple[Link, Link]:
     """The emulated link from the operator to the robot, and the one back."""
     bursts = condition.burst_pkts
     config = LinkConfig(
-        delay_s=condition.delay_ms / 1000.0,
+        delay_s=condition.delay_ms / 1000.0 + LATE_S,
         jitter_s=condition.delay_ms * condition.jitter_frac / 1000.0,
         loss=condition.loss,
         bursts=None if bursts is None else Bursts(mean_packets=bursts),

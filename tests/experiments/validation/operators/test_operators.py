@@ -68,7 +68,7 @@ def test_an_unknown_strategy_is_refused_before_anything_is_played(monkeypatch):
 @pytest.mark.parametrize(
     ("what", "options", "words"),
     [
-        ("robots", {}, "should be dispatch or operators"),
+        ("robots", {}, "should be dispatch, operators or network"),
         ("operators", {"cases": "mine.yaml"}, "--cases is for `validate dispatch`"),
         ("dispatch", {"strategy": "pursuit"}, "--strategy is for `validate operators`"),
     ],
