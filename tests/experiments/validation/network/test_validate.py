@@ -69,7 +69,7 @@ def test_a_row_of_the_table_shows_measured_and_predicted(compared):
     [row] = tables.table(compared, "lossless")
     told = dict(zip(tables.HEADS, row, strict=True))
     assert told["depth"] == "message"
-    assert told["age [ms]"].startswith("105.3 → 105 |")
+    assert told["age [ms]"].startswith("105.3 → 105.1 |")
     assert told["verdict"] == "passes"
 
 
