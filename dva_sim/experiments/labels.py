@@ -5,6 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
+from dva_sim.experiments.units import ending_of
+from dva_sim.experiments.units import unit_of as unit_of
+
 Level = str | float | int | bool | None
 
 _FACTORS = {
@@ -79,7 +82,8 @@ _MEASURES = {
     "error_share": "share of trials with an error",
     "effective_throughput_bps": "throughput with effective width",
     "delay_felt_s": "delay as the person takes it",
-    "id_slope": "time for one more of the index of difficulty",
+    "id_slope_s_per_bit": "time for one more bit of the index of difficulty",
+    "steering_slope_s": "time for one more width of a tunnel",
     "drive_time_s": "driving time to confirmation",
     "path_m": "path length",
     "command_age_p50_s": "median command age at application",
@@ -90,7 +94,7 @@ _MEASURES = {
     "loop_delay_mean_s": "observation-to-effect delay, as the sum of its stages",
     "loop_delay_measured_s": "observation-to-effect delay, measured",
     "contacts": "contacts with walls and others",
-    "contact_impulse_ns": "impulse of all contacts",
+    "contact_impulse_n_s": "impulse of all contacts",
     "person_contacts": "contacts with people",
     "jams": "jams",
     "evacuated_s": "time until the last one is out",
@@ -106,24 +110,24 @@ _MEASURES = {
     "exposure_s": "exposure of people per event",
     "exposure_look_s": "exposure of people in finding out, per event",
 }
-_UNITS = {"s": "s", "m": "m", "hz": "Hz", "mps": "m/s", "bps": "bit/s", "ns": "N s", "deg": "deg"}
-
-
-def unit_of(name: str) -> str:
-    """The unit a key ends in, as printed: `link.delay_s` gives `s`, `pattern` nothing."""
-    head, _, tail = name.rpartition("_")
-    return _UNITS.get(tail, "") if head else ""
 
 
 def plain_name(name: str) -> str:
     """A key without its unit and with spaces for the signs between its words."""
-    stem = name.rpartition("_")[0] if unit_of(name) else name
+    ending = ending_of(name)
+    stem = name.removesuffix(f"_{ending}") if ending else name
     return stem.replace(".", " ").replace("_", " ")
 
 
 def factor_name(factor: str) -> str:
     """`link.delay_s` is the one-way delay."""
     return _FACTORS.get(factor, plain_name(factor))
+
+
+def with_unit(factor: str) -> str:
+    """A factor's name with its unit in brackets, for the head of a column."""
+    unit = unit_of(factor)
+    return f"{factor_name(factor)} [{unit}]" if unit else factor_name(factor)
 
 
 def measure_name(measure: str) -> str:

@@ -19,7 +19,7 @@ NAN = math.nan
 
 MEASURES = (
     *("confirmed", "drive_time_s", "attempts"),
-    *("path_m", "contacts", "contact_impulse_ns", "person_contacts", "jams"),
+    *("path_m", "contacts", "contact_impulse_n_s", "person_contacts", "jams"),
     *("command_age_mean_s", *(f"command_age_p{q:02}_s" for q in QUANTILES), "age_in_force_mean_s"),
     *(f"delay_{stage}_s" for stage in STAGES),
     *("frame_age_mean_s", "loop_delay_mean_s", "loop_delay_measured_s"),
@@ -30,7 +30,7 @@ MEASURES = (
     *("utilisation", "attending_share", "queue_mean", "turns_per_min"),
     *("reversals_per_min", "command_changes_per_min", "steering_entropy", "waiting_share"),
     *("move_waits", "move_and_wait_share", "path_error_rms_m", "path_error_max_m"),
-    *("missed", "false_confirmations", "replans", "messages", "bytes", "refused"),
+    *("missed", "false_confirmations", "replans", "messages", "traffic_bytes", "refused"),
     *("plugin_failures", "violations", "simulated_s"),
 )
 """Numbers that a row of `run_row` may hold, and so what a study may ask for."""
@@ -45,7 +45,7 @@ def run_row(recording: Recording) -> Row:
     row |= _people_measures(recording) | workload.run_measures(recording)
     row["replans"] = recording.recorder.counters["replans"]
     row["messages"] = recording.recorder.counters["messages"]
-    row["bytes"] = recording.recorder.counters["bytes"]
+    row["traffic_bytes"] = recording.recorder.counters["bytes"]
     row["refused"] = recording.recorder.counters["refused"]
     row["plugin_failures"] = plugin_failures(recording)
     row["violations"] = sum(recording.recorder.violations.values())
@@ -133,7 +133,7 @@ def _body_measures(attempts: list[DriveLog], recording: Recording) -> Row:
     return {
         "path_m": sum(body.distance for body in bodies),
         "contacts": sum(body.contacts for body in bodies),
-        "contact_impulse_ns": sum(body.impulse for body in bodies),
+        "contact_impulse_n_s": sum(body.impulse for body in bodies),
         "person_contacts": sum(body.person_contacts for body in bodies),
         "jams": sum(body.jams for body in bodies),
     }

@@ -146,7 +146,7 @@ def _row(
         "wait_s": trial.waits.seconds,
         "move_and_wait_share": trial.move_and_wait_share,
         "delay_felt_s": trial.seat.delay.value,
-        "hand_most": trial.device.most,
+        **trial.device.farthest(),
         "plugin_failures": trial.failures + trial.device.failures,
     }
 

@@ -37,13 +37,11 @@ class Device(ABC):
     Attributes:
         top: The fastest cursor that it can ask for [m/s].
         period: Between two readings [s].
-        most: The farthest that the hand went: tilt [rad], deflection, or 0 for a mouse.
         failures: How often a filter of a user gave no answer that is one.
     """
 
     top: float
     period: float
-    most = 0.0
     failures = 0
 
     @abstractmethod
@@ -61,6 +59,10 @@ class Device(ABC):
     @abstractmethod
     def command(self, reading: Pair | None, dt: float) -> Pair:
         """At the machine: the velocity [m/s] for a step, given what has arrived, if anything."""
+
+    def farthest(self) -> dict[str, float]:
+        """How far the hand went from rest, as a column; nothing where there is no rest."""
+        return {}
 
 
 class Mouse(Device):
@@ -104,6 +106,7 @@ class Joystick(Device):
         self._keep = keep_of(person.hand_lag, dt)
         self._noise = noise_of(person, streams, dt)
         self._aim = self._hand = self._shown = self._told = (0.0, 0.0)
+        self._most = 0.0
 
     def aim(self, vx: float, vy: float) -> None:
         """See `Device`."""
@@ -115,7 +118,7 @@ class Joystick(Device):
         self._hand = x, y = ax + (x - ax) * keep, ay + (y - ay) * keep
         x, y = shaken(x, y, self._noise)
         self._shown = x, y = clamped(x, 1.0), clamped(y, 1.0)
-        self.most = max(self.most, abs(x), abs(y))
+        self._most = max(self._most, abs(x), abs(y))
 
     def reading(self) -> Pair:
         """See `Device`."""
@@ -126,6 +129,10 @@ class Joystick(Device):
         if reading is not None:
             self._told = self.top * reading[0], self.top * reading[1]
         return self._told
+
+    def farthest(self) -> dict[str, float]:
+        """See `Device`: the largest deflection, in shares of a full one."""
+        return {"deflection_max": self._most}
 
 
 class Tilt(Device):
@@ -149,6 +156,7 @@ class Tilt(Device):
         rest = [self._measured(0.0, 0.0) for _ in range(CALIBRATING)]
         self._rest = sum(r for r, _ in rest) / CALIBRATING, sum(p for _, p in rest) / CALIBRATING
         self._aim = self._told = (0.0, 0.0)
+        self._most = 0.0
 
     def move(self, dt: float) -> None:
         """The hand moves when the sensor looks; its steps are exact for any length."""
@@ -156,12 +164,16 @@ class Tilt(Device):
     def reading(self) -> Pair:
         """See `Device`: one more sample, filtered."""
         pitch, roll = self._hand.step(self._aim[1], self._aim[0], self.period)
-        self.most = max(self.most, abs(pitch), abs(roll))
+        self._most = max(self._most, abs(pitch), abs(roll))
         x, y = self._measured(pitch, roll)
         self._filter.add((x - self._rest[0], y - self._rest[1]))
         value = self._filter.value()
         self.failures = self._filter.failures
         return value
+
+    def farthest(self) -> dict[str, float]:
+        """See `Device`: the largest tilt about either axis [rad]."""
+        return {"tilt_max_rad": self._most}
 
     def _measured(self, pitch: float, roll: float) -> Pair:
         """Roll and pitch as the accelerometer tells them [rad]."""

@@ -29,10 +29,12 @@ MEANS = (
     "delay_felt_s",
 )
 """Columns of the trials whose mean is a column of the run, as far as the task has them."""
+FARTHEST = ("tilt_max_rad", "deflection_max")
 SHARES = {"completed": "completed_share", "error": "error_share"}
 MEASURES = (
-    *("trials", *(SHARES.get(name, name) for name in MEANS), "hand_most"),
-    *("throughput_bps", "effective_throughput_bps", "id_slope", "plugin_failures", "simulated_s"),
+    *("trials", *(SHARES.get(name, name) for name in MEANS), *FARTHEST),
+    *("throughput_bps", "effective_throughput_bps", "id_slope_s_per_bit", "steering_slope_s"),
+    *("plugin_failures", "simulated_s"),
 )
 """Numbers that a row of `run_row` may hold, and so what a study may ask for."""
 
@@ -42,8 +44,8 @@ def run_row(trials: Sequence[Mapping[str, Any]]) -> Row:
 
     `throughput_bps` is the mean over conditions of the nominal throughput, and
     `effective_throughput_bps` of that with effective width and amplitude, over the trials that
-    were done; `id_slope` is the time that one more of the index of difficulty takes (seconds per
-    bit, or per width of a tunnel), where there are several.
+    were done. `id_slope_s_per_bit` is the time that one more bit of the index of difficulty takes
+    in pointing, `steering_slope_s` that one more width of a tunnel takes, where there are several.
 
     Args:
         trials: Rows of `play`.
@@ -53,13 +55,15 @@ def run_row(trials: Sequence[Mapping[str, Any]]) -> Row:
         if name in trials[0]:
             row[SHARES.get(name, name)] = mean(trial[name] for trial in trials)
     row["plugin_failures"] = sum(trial["plugin_failures"] for trial in trials)
-    row["hand_most"] = max(float(trial["hand_most"]) for trial in trials)
+    for name in FARTHEST:
+        if name in trials[0]:
+            row[name] = max(float(trial[name]) for trial in trials)
     done = [trial for trial in trials if trial["completed"]]
     if "id_bits" in trials[0]:
         row |= _throughputs(done)
-    for key in ("id_bits", "steering_id"):
-        if key in trials[0]:
-            row["id_slope"] = _slope(done, key)
+        row["id_slope_s_per_bit"] = _slope(done, "id_bits")
+    if "steering_id" in trials[0]:
+        row["steering_slope_s"] = _slope(done, "steering_id")
     return row | {"simulated_s": sum(float(trial["trial_time_s"]) for trial in trials)}
 
 

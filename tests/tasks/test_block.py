@@ -214,7 +214,7 @@ def test_a_tilted_device_brings_the_ball_to_its_target(kind):
     changes = {"device.kind": kind, "device.gain": 0.5, "task.axes": 2}
     rows = play(build(pointing(trials=4), changes), 1)
     assert all(row["completed"] for row in rows)
-    assert all(0.0 < row["hand_most"] < math.radians(46) for row in rows)
+    assert all(0.0 < row["tilt_max_rad"] < math.radians(46) for row in rows)
 
 
 @pytest.mark.parametrize("shape", ["straight", "circular"])

@@ -176,7 +176,7 @@ def fates_in_time(shifts: Shifts) -> Drawn | None:
     for stop, row in enumerate(axes):
         for policy, ax in zip(chosen, row, strict=True):
             events = dict(shifts.events_of(policy, stop))
-            if len(events["event"]):
+            if len(events["event_id"]):
                 _stack(ax, measures.fates(events), times)
             ax.set_xlim(0, shifts.follow)
             ax.set_ylim(0, 1)

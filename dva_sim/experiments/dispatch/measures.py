@@ -51,7 +51,7 @@ MEASURES = (
     *("escalated_later_share", "confirmed_of_true_share", "contained_share", "containment_mean_s"),
     *("zone_ratio", "bound_mean_s", "beats_bound_share"),
     *("use_of_guards", "evenness_of_guards", "use_of_robots", "evenness_of_robots"),
-    *("use_of_operators", "load", "exposure_s", "exposure_look_s", "exposure_max_s"),
+    *("use_of_operators", "load", "exposure_s", "exposure_look_s", "exposure_max_s_per_h"),
     *("preempted", "relocated", "auctions", "overruled", "policy_failed", "messages"),
     *("violations", "simulated_s"),
 )
@@ -74,7 +74,7 @@ def tables(recording: TimedRecording, follow: float = FOLLOW_S) -> dict[str, lis
     events = cohort(recording, follow)
     return {
         "runs": [run_row(recording, events, follow)],
-        "events": [_row(events, place) for place in range(len(events["event"]))],
+        "events": [_row(events, place) for place in range(len(events["event_id"]))],
         "responders": [_responder_row(recording, unit) for unit in recording.units],
     }
 
@@ -115,7 +115,7 @@ def _columns(recording: TimedRecording, raw: Columns, bounds: Floats, follow: fl
     else:
         watched = np.minimum(recording.scenario.horizon_s - detected, follow)
     return {
-        "event": raw["number"] + 1,
+        "event_id": raw["number"] + 1,
         "stream": np.array(recording.streams)[raw["stream"]],
         "kind": np.array([s.kind for s in recording.scenario.demand])[raw["stream"]],
         "zone": np.array([*recording.zones, ""])[raw["zone"]],
@@ -192,7 +192,7 @@ def zone_ratio(events: Columns, follow: float) -> float:
 
 def run_row(recording: TimedRecording, events: Columns, follow: float) -> Row:
     """One row of all measures; see the head of this file."""
-    row: Row = {"follow_s": follow, "events": len(events["event"])}
+    row: Row = {"follow_s": follow, "events": len(events["event_id"])}
     row["true_share"] = _mean(events["is_true"])
     row |= _times(events, follow) | _fates(events, follow)
     if recording.scenario.dispatch.containment:
@@ -268,8 +268,8 @@ def _exposure(recording: TimedRecording) -> Row:
     """Time of people within danger radii, in all of the measured time.
 
     `exposure_s` is the sum per event, of which `exposure_look_s` comes from finding out (way,
-    look and leaving) and the rest from containing; `exposure_max_s` is that of the person most
-    exposed, per hour.
+    look and leaving) and the rest from containing; `exposure_max_s_per_h` is that of the person
+    most exposed, per hour.
     """
     events = max(1, int(recording.measured.sum()))
     guards = [unit.exposure for unit in recording.units if unit.kind == "guard"]
@@ -278,7 +278,7 @@ def _exposure(recording: TimedRecording) -> Row:
     return {
         "exposure_s": sum(whole) / events,
         "exposure_look_s": (sum(whole) - act) / events,
-        "exposure_max_s": max(whole, default=0.0) / recording.duration * 3600.0,
+        "exposure_max_s_per_h": max(whole, default=0.0) / recording.duration * 3600.0,
     }
 
 

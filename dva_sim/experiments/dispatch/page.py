@@ -29,7 +29,7 @@ SUMMARIES: tuple[Summary, ...] = (
     ("containment_mean_s", "time to containment [s]", np.mean, number),
     ("exposure_s", "exposure [s/event]", np.mean, number),
     ("exposure_look_s", "in finding out [s/event]", np.mean, number),
-    ("exposure_max_s", "most exposed person [s/h]", np.mean, number),
+    ("exposure_max_s_per_h", "most exposed person [s/h]", np.mean, number),
     ("robot_share", "by robot", np.mean, percent),
     ("use_of_guards", "guards busy", np.mean, percent),
     ("use_of_robots", "robots busy", np.mean, percent),

@@ -100,7 +100,7 @@ def tilt_values(cells: Cells) -> Values:
         np.mean([mean(cells[tilt_cell(g, s)], "movement_time_s") for s in SELECTIONS])
         for g in GAINS
     ]
-    tilts = [np.degrees(mean(trials, "hand_most")) for trials in cells.values()]
+    tilts = [np.degrees(mean(trials, "tilt_max_rad")) for trials in cells.values()]
     values["S10/best"] = float(list(GAINS)[int(np.argmin(times))])
     return values | {"S10/least-tilt": float(min(tilts)), "S10/most-tilt": float(max(tilts))}
 

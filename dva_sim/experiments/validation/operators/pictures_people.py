@@ -108,7 +108,7 @@ def _tilt(lines: ByLine, cells: Cells) -> Drawn:
     times.axvspan(best.low or 0.0, best.high or 0.0, color=FAINT, alpha=0.55, lw=0)
     tilts.axhspan(most.low or 0.0, most.high or 0.0, color=FAINT, alpha=0.55, lw=0)
     _by_gain(times, cells, TIME, 1.0)
-    _by_gain(tilts, cells, "hand_most", 180.0 / np.pi)
+    _by_gain(tilts, cells, "tilt_max_rad", 180.0 / np.pi)
     times.set_ylabel("movement time [s]")
     times.set_title("Which gain is best")
     tilts.set_ylabel("largest tilt [deg]")
