@@ -15,8 +15,11 @@ TUNING = "tuning"  # name of the factor whose levels are these:
 UNTUNED, TUNED = "untuned", "tuned"
 REPEATS = "robustness"  # name of the table of repeats, so of no part
 STRATEGY = "operator.strategy"
+ANSWER = "answer"  # the declared contrast, where a comparison is named
+POINT = "point"  # name of the factor that numbers the points of a design without levels
 
 Level = bool | int | float | str | None
+Direction = Literal["above", "below", "same"]
 
 
 def _distinct(levels: tuple[Level, ...]) -> tuple[Level, ...]:
@@ -72,26 +75,36 @@ class Part(Config):
         return value
 
 
-class Answer(Config):
-    """The contrast declared to answer the question, before anything is run.
+class Contrast(Config):
+    """Two levels of one factor, compared in one measure.
 
     Attributes:
         part: Part it is measured in.
         measure: Column of the table `runs`; in excess of the reference run where there is one.
         factor: Factor whose two levels are compared.
         contrast: The two levels: the first minus the second.
-        over: Factor along which the difference is followed.
+        over: Factor along which the difference is followed; without it, one difference.
         within: Levels of the other factors.
-        smallest_effect: Smallest difference that matters, in the measure's own unit.
-        smallest_effect_s: The same for a measure in seconds [s].
+        family: Tests of one family share their chance of a false alarm.
     """
 
     part: str
     measure: str
     factor: str
     contrast: tuple[Level, Level]
-    over: str
+    over: str | None = None
     within: dict[str, Level] = Field(default_factory=dict)
+    family: Annotated[str, Field(min_length=1)] = "main"
+
+
+class Answer(Contrast):
+    """The contrast declared to answer the question, before anything is run.
+
+    Attributes:
+        smallest_effect: Smallest difference that matters, in the measure's own unit.
+        smallest_effect_s: The same for a measure in seconds [s].
+    """
+
     smallest_effect: Annotated[float, Field(gt=0)] | None = None
     smallest_effect_s: Annotated[float, Field(gt=0)] | None = None
 
@@ -101,6 +114,67 @@ class Answer(Config):
         if self.measure.endswith("_s") and self.smallest_effect_s is not None:
             return self.smallest_effect_s
         return self.smallest_effect
+
+
+class Hypothesis(Config):
+    """A claim about one contrast at one place, to be tested; registered, it is confirmatory.
+
+    Attributes:
+        text: In words.
+        comparison: Which contrast: `answer`, or the name of a comparison.
+        direction: Of the first level minus the second: `above` zero, `below` it, or the `same`.
+        margin: By how much at least it is above or below; or within how much it is the same.
+            In the measure's unit.
+        at: Levels of other factors than the contrast's. By default those that the contrast is
+            `within`, and the last level of the factor it runs `over`.
+    """
+
+    text: str = ""
+    comparison: str = ANSWER
+    direction: Direction
+    margin: Annotated[float, Field(ge=0)] = 0.0
+    at: dict[str, Level] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _same_within_something(self) -> Hypothesis:
+        if self.direction == "same" and self.margin == 0:
+            raise ValueError("'same' needs a margin: nothing is the same to the last digit")
+        return self
+
+
+class Stop(Config):
+    """When enough persons were simulated: decided after whole batches of them, in seed order.
+
+    The study's `persons` are the first batch. After each, every half-width of the 95 % interval
+    is looked at: of the mean of a measure in each cell of a part, or of a contrast at each level
+    of the factor it runs over, for all of them at once.
+
+    Attributes:
+        half_width: Largest half-width that is good enough, in the measure's unit.
+        measure: Column of the table `runs`, in excess of the reference run where there is one.
+        part: Part it is measured in.
+        comparison: Instead of a measure: `answer`, or the name of a comparison.
+        batch_persons: How many persons each further batch has.
+        most_persons: After so many it ends in any case.
+
+    References:
+        Chow & Robbins, Annals of Mathematical Statistics 36 (1965), 457-462: why a fixed width
+        can be waited for, and that the interval holds in the limit only.
+    """
+
+    half_width: Annotated[float, Field(gt=0)]
+    measure: str | None = None
+    part: str | None = None
+    comparison: str | None = None
+    batch_persons: Count
+    most_persons: Count
+
+    @model_validator(mode="after")
+    def _looks_at_one_thing(self) -> Stop:
+        asked = (self.measure is not None, self.part is not None)
+        if asked != (self.comparison is None,) * 2:
+            raise ValueError("should name a comparison, or a measure and its part")
+        return self
 
 
 class Prediction(Config):
@@ -119,7 +193,7 @@ class Prediction(Config):
     """
 
     text: Annotated[str, Field(min_length=1)]
-    direction: Literal["above", "below", "same"] | None = None
+    direction: Direction | None = None
     factor: str | None = None
     contrast: tuple[Level, Level] | None = None
     at: dict[str, Level] = Field(default_factory=dict)

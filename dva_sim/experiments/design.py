@@ -1,4 +1,4 @@
-"""From a study to its runs: the full grid of cells, with luck shared between them."""
+"""From a study to its runs: the cells of its design, with luck shared between them."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from dva_sim import scenario as scenarios
-from dva_sim.config import Document
+from dva_sim.config import Document, Path_
 from dva_sim.errors import ConfigError
-from dva_sim.experiments.asking import REPEATS, TUNED, TUNING, Level, Part
+from dva_sim.experiments import designs
+from dva_sim.experiments.asking import POINT, REPEATS, TUNED, TUNING, Level, Part
 from dva_sim.experiments.models import AnyScenario, model_for, model_of
 from dva_sim.experiments.repeats import (
     PARAMETERS,
@@ -37,7 +38,7 @@ class Cell:
 
     Attributes:
         part: Name of the part.
-        index: Position in the grid of factors, or `REFERENCE`.
+        index: Position in the design, or `REFERENCE`.
         levels: Level of each factor; none for the reference.
         scenario: As it will be run, but for the person.
         config: Hash of that scenario.
@@ -57,7 +58,7 @@ class Job:
     Attributes:
         part: Name of the part.
         cell: Level of each factor; empty for a reference run.
-        index: Position of the cell in the grid, or `REFERENCE`.
+        index: Position of the cell in the design, or `REFERENCE`.
         person: Index of the simulated person, from 0.
         trial: Index of the trial, from 0.
         seed: The run's luck: the same for this person and trial in every cell.
@@ -91,7 +92,7 @@ class Job:
 
 
 def cells(study: Study) -> list[Cell]:
-    """All configurations, by part, the reference first, then the grid with the last factor fastest.
+    """All configurations, by part, the reference first, then those of the design in order.
 
     The repeats of the answer come last, as if they were a part of their own.
 
@@ -110,13 +111,23 @@ def refuse_unknown_measures(study: Study) -> None:
     Raises:
         ConfigError: it is none.
     """
-    for key, asked in (("answer", study.answer), ("tuning", study.tuning)):
-        if asked is None:
-            continue
-        known = model_of(_source(study, study.parts[asked.part])).measures()
-        if asked.measure not in known:
-            problem = f"measure {asked.measure!r} is unknown; known: {', '.join(known)}"
-            raise study.error(problem, (key, "measure"))
+    for path, part, measure in _asked_measures(study):
+        known = model_of(_source(study, study.parts[part])).measures()
+        if measure not in known:
+            problem = f"measure {measure!r} is unknown; known: {', '.join(known)}"
+            raise study.error(problem, path)
+
+
+def _asked_measures(study: Study) -> Iterator[tuple[Path_, str, str]]:
+    """Where a measure is asked for, of which part, and which."""
+    if study.answer is not None:
+        yield ("answer", "measure"), study.answer.part, study.answer.measure
+    for name, asked in study.comparisons.items():
+        yield ("comparisons", name, "measure"), asked.part, asked.measure
+    if study.tuning is not None:
+        yield ("tuning", "measure"), study.tuning.part, study.tuning.measure
+    if study.stop is not None and study.stop.part and study.stop.measure:
+        yield ("stop", "measure"), study.stop.part, study.stop.measure
 
 
 def base_scenario(study: Study, part: str) -> AnyScenario:
@@ -133,7 +144,8 @@ def basis_of_tuning(study: Study) -> Basis:
 
 def is_tuned(study: Study) -> bool:
     """Whether some cells have tuned values."""
-    return TUNED in study.factors.get(TUNING, ())
+    listed = (row.get(TUNING) for row in study.listed_rows)
+    return TUNED in (*study.factors.get(TUNING, ()), *listed)
 
 
 def jobs(study: Study, grid: Sequence[Cell] | None = None) -> list[Job]:
@@ -190,7 +202,7 @@ def _cells_of(study: Study, name: str) -> Iterator[Cell]:
     if part.reference is not None:
         yield _cell(name, REFERENCE, {}, _build(study, name, source, part.reference))
     change = _changer(study)
-    for index, levels in enumerate(_grid(study.factors)):
+    for index, levels in enumerate(designs.settings(study)):
         yield _cell(name, index, levels, _build(study, name, source, change(levels)))
 
 
@@ -223,10 +235,11 @@ def _changer(study: Study) -> Callable[[Mapping[str, Level]], dict[str, Any]]:
         for factor, level in levels.items():
             if factor in study.treatments:
                 changes |= study.treatments[factor][str(level)]
-            elif factor != TUNING:
+            elif factor == TUNING:
+                if level == TUNED and tuned is not None:
+                    changes[tuned.tuning.key] = tuned.value_for(levels)
+            elif factor != POINT:
                 changes[factor] = level
-            elif level == TUNED and tuned is not None:
-                changes[tuned.tuning.key] = tuned.value_for(levels)
         return changes
 
     return change
@@ -272,6 +285,9 @@ def _blamed(
         for place in places if named else ():
             if study.is_from_file((*place, key)):
                 return study.error(error.problem, (*place, key))
+        place_in_design = designs.place_of(study, key, value) if named else None
+        if place_in_design is not None and study.is_from_file(place_in_design):
+            return study.error(error.problem, place_in_design)
     return None
 
 
@@ -292,4 +308,4 @@ def _size(study: Study, name: str) -> tuple[int, int, str]:
     if name == REPEATS and study.robustness is not None and study.answer is not None:
         persons = min(study.robustness.persons, study.persons)
         return persons, study.robustness.replications, study.answer.part
-    return study.persons, study.parts[name].replications or study.replications, name
+    return study.most_persons, study.parts[name].replications or study.replications, name

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from dva_sim.config import Path_
 from dva_sim.experiments.asking import (
+    ANSWER,
+    POINT,
     REPEATS,
     STRATEGY,
     TUNED,
     TUNING,
     UNTUNED,
+    Contrast,
     Level,
     Prediction,
+    refuse_keys_of_the_design,
 )
+from dva_sim.experiments.designs import keys_of, place_of, rows_of
 
 if TYPE_CHECKING:
     from dva_sim.experiments.study import Study
@@ -23,20 +28,87 @@ Fault = tuple[str, Path_]
 """What is wrong, and the key at which that is said."""
 
 
+def of_design(study: Study) -> Iterator[Fault]:
+    """Rows that do not fit together, and factors that are there twice."""
+    design = study.design
+    for name in (POINT,) if POINT in study.factors else ():
+        yield f"{name!r} numbers the rows of a design; call the factor otherwise", ("factors", name)
+    if design is None:
+        return
+    yield from _faults_of_zip(study, design.zip or ())
+    yield from _faults_of_rows(study.listed_rows)
+    for key in keys_of(design, study.listed_rows):
+        if key in study.factors:
+            yield f"{key!r} is varied by the design already", ("factors", key)
+    for key in design.ranges:
+        if key in study.treatments or key == TUNING:
+            yield f"{key!r} has names for levels, so it has no range", ("design", "ranges", key)
+    if study.robustness is not None:
+        yield "robustness needs all levels with each other: a study without 'design'", (REPEATS,)
+
+
+def _faults_of_zip(study: Study, names: Sequence[str]) -> Iterator[Fault]:
+    for index, name in enumerate(names):
+        path = ("design", "zip", index)
+        if name not in study.factors:
+            known = ", ".join(study.factors)
+            yield f"{name!r} is not a factor; factors: {known}", path
+        elif name in names[:index]:
+            yield f"{name!r} stands twice", path
+        elif names[0] in study.factors:
+            wanted, count = len(study.factors[names[0]]), len(study.factors[name])
+            if count != wanted:
+                yield f"{name!r} should have {wanted} levels as {names[0]!r}, not {count}", path
+
+
+def _faults_of_rows(rows: Sequence[Mapping[str, Level]]) -> Iterator[Fault]:
+    first: dict[tuple[Level, ...], int] = {}
+    for index, row in enumerate(rows):
+        path = ("design", "rows", index)
+        if not row:
+            yield "row should name a level of each factor", path
+        if row.keys() != rows[0].keys():
+            odd = sorted(row.keys() ^ rows[0].keys())
+            yield f"row should name the same factors as the first, but for {', '.join(odd)}", path
+            return
+        same = first.setdefault(tuple(row[key] for key in rows[0]), index)
+        if same != index:
+            yield f"row {index + 1} is row {same + 1} again", path
+
+
 def of_factors(study: Study) -> Iterator[Fault]:
     """Names of treatments that do not exist, keys that two factors set, tuning without a rule."""
     setters: dict[str, str] = {}
-    for factor, levels in study.factors.items():
+    names = {**study.factors, **dict.fromkeys(keys_of(study.design, study.listed_rows), ())}
+    for factor in names:
+        levels = _levels_of(study, factor)
         named = study.treatments.get(factor)
         if named is not None:
             for level in (level for level in levels if level not in named):
                 known = ", ".join(named)
-                yield f"{level!r} is not a treatment; named: {known}", ("factors", factor)
+                yield f"{level!r} is not a treatment; named: {known}", _place(study, factor, level)
         keys = {key for changes in (named or {}).values() for key in changes} or {factor}
         for key in keys if factor != TUNING else ():
             if setters.setdefault(key, factor) != factor:
-                yield f"{key!r} is set by two factors", ("factors", factor)
+                yield f"{key!r} is set by two factors", _place(study, factor)
+    for key in study.changes:
+        if key in setters and key not in study.factors:
+            yield f"{key!r} is varied by the design; change 'design'", ("design",)
+    try:
+        refuse_keys_of_the_design(study.changes)
+    except ValueError as error:
+        yield str(error), ()
     yield from _faults_of_tuning(study)
+
+
+def _levels_of(study: Study, factor: str) -> Sequence[Level]:
+    """The levels of a factor, declared or in rows; none for a range."""
+    listed = [row[factor] for row in study.listed_rows if factor in row]
+    return study.factors.get(factor, tuple(listed))
+
+
+def _place(study: Study, factor: str, level: Level = None) -> Path_:
+    return place_of(study, factor, level) or ("factors", factor)
 
 
 def _faults_of_tuning(study: Study) -> Iterator[Fault]:
@@ -61,6 +133,10 @@ def of_claims(study: Study) -> Iterator[Fault]:
     """What was declared about factors and levels that the study does not have."""
     yield from of_answer(study)
     yield from of_robustness(study)
+    for name, comparison in study.comparisons.items():
+        yield from _faults_of_contrast(study, comparison, ("comparisons", name))
+    for name in study.hypotheses:
+        yield from _faults_of_hypothesis(study, name)
     if study.predictions and study.answer is None:
         if any(p.direction for p in study.predictions):
             yield "a prediction is judged against the answer; declare one", ("predictions",)
@@ -69,20 +145,87 @@ def of_claims(study: Study) -> Iterator[Fault]:
         yield from _faults_of_prediction(study, prediction, ("predictions", index))
 
 
+def kept_claims(study: Study) -> Study:
+    """The study without what was declared about parts, factors or levels that are gone.
+
+    Predictions stay: of each is told that it was not run.
+    """
+    lost: dict[str, object] = {}
+    if any(of_answer(study)):
+        lost["answer"] = None
+    if "answer" in lost or any(of_robustness(study)):
+        lost["robustness"] = None
+    lost["comparisons"] = {
+        name: comparison
+        for name, comparison in study.comparisons.items()
+        if not any(_faults_of_contrast(study, comparison, ()))
+    }
+    rest = study.model_copy(update=lost)
+    kept = {n: h for n, h in rest.hypotheses.items() if not any(_faults_of_hypothesis(rest, n))}
+    return rest.model_copy(update={"hypotheses": kept})
+
+
 def of_answer(study: Study) -> Iterator[Fault]:
     """Why the declared contrast cannot be computed."""
-    answer = study.answer
-    if answer is None:
-        return
-    if answer.part not in study.parts:
+    if study.answer is not None:
+        yield from _faults_of_contrast(study, study.answer, (ANSWER,))
+
+
+def _faults_of_contrast(study: Study, asked: Contrast, path: Path_) -> Iterator[Fault]:
+    if asked.part not in study.parts:
         known = ", ".join(study.parts)
-        yield f"answer.part {answer.part!r} is not a part; parts: {known}", ("answer", "part")
-    yield from _fault_of_level(study, ("answer", "factor"), answer.factor, answer.contrast)
-    yield from _fault_of_level(study, ("answer", "over"), answer.over, ())
-    for name, level in answer.within.items():
-        yield from _fault_of_level(study, ("answer", "within", name), name, (level,))
-    if answer.contrast[0] == answer.contrast[1]:
-        yield "contrast compares a level with itself", ("answer", "contrast")
+        name = ".".join(map(str, (*path, "part")))
+        yield f"{name} {asked.part!r} is not a part; parts: {known}", (*path, "part")
+    yield from _fault_of_level(study, (*path, "factor"), asked.factor, asked.contrast)
+    ranges = study.design.ranges if study.design is not None else {}
+    if asked.over is not None and asked.over not in ranges:
+        yield from _fault_of_level(study, (*path, "over"), asked.over, ())
+    for name, level in asked.within.items():
+        yield from _fault_of_level(study, (*path, "within", name), name, (level,))
+    if asked.contrast[0] == asked.contrast[1]:
+        yield "contrast compares a level with itself", (*path, "contrast")
+    if asked.over is None:
+        yield from _fault_of_place(study, asked, path)
+
+
+def _fault_of_place(study: Study, asked: Contrast, path: Path_) -> Iterator[Fault]:
+    """One difference is at one place: the levels of all factors have to be given."""
+    rows = rows_of(study)
+    for name, levels in study.factors.items():
+        is_free = len(levels) > 1 and not (rows and name in rows[0])
+        if is_free and name not in (asked.factor, *asked.within):
+            yield f"should run over {name!r} or be within a level of it", path
+
+
+def _faults_of_hypothesis(study: Study, name: str) -> Iterator[Fault]:
+    hypothesis, path = study.hypotheses[name], ("hypotheses", name)
+    asked = study.contrasts.get(hypothesis.comparison)
+    if asked is None:
+        known = ", ".join(study.contrasts) or "none"
+        problem = f"{hypothesis.comparison!r} is not a comparison; there are: {known}"
+        yield problem, (*path, "comparison")
+        return
+    for factor, level in hypothesis.at.items():
+        yield from _fault_of_level(study, (*path, "at", factor), factor, (level,))
+    if asked.factor in hypothesis.at:
+        yield f"{asked.factor!r} is what is compared", (*path, "at", asked.factor)
+
+
+def of_stop(study: Study) -> Iterator[Fault]:
+    """Why a stopping rule cannot be applied."""
+    stop = study.stop
+    if stop is None:
+        return
+    if stop.comparison is not None and stop.comparison not in study.contrasts:
+        known = ", ".join(study.contrasts) or "none"
+        problem = f"{stop.comparison!r} is not a comparison; there are: {known}"
+        yield problem, ("stop", "comparison")
+    if stop.part is not None and stop.part not in study.parts:
+        known = ", ".join(study.parts)
+        yield f"stop.part {stop.part!r} is not a part; parts: {known}", ("stop", "part")
+    if stop.most_persons < study.persons:
+        problem = f"most_persons should be at least the first batch, persons: {study.persons}"
+        yield problem, ("stop", "most_persons")
 
 
 def _faults_of_prediction(study: Study, prediction: Prediction, path: Path_) -> Iterator[Fault]:
@@ -107,6 +250,9 @@ def of_robustness(study: Study) -> Iterator[Fault]:
         yield "robustness repeats the answer's contrast; declare one", (REPEATS,)
         return
     over = study.answer.over
+    if over is None:
+        yield "robustness needs a factor that the answer runs over", (REPEATS,)
+        return
     yield from _fault_of_level(study, (REPEATS, "at"), over, robustness.at or ())
     if robustness.strategies and STRATEGY in study.factors:
         yield f"{STRATEGY!r} is a factor already", (REPEATS, "strategies")

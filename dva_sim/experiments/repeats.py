@@ -7,7 +7,7 @@ that nothing but the model differs.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Annotated
 
 import numpy as np
@@ -56,7 +56,7 @@ class Bands(Config):
 def factors_of_repeats(study: Study) -> dict[str, tuple[Level, ...]]:
     """What varies between and within repeats, in order; nothing where none are declared."""
     robustness, answer = study.robustness, study.answer
-    if robustness is None or answer is None:
+    if robustness is None or answer is None or answer.over is None:
         return {}
     strategies = {STRATEGY: robustness.strategies} if robustness.strategies else {}
     at = robustness.at or study.factors[answer.over][-1:]
@@ -103,11 +103,6 @@ def latin_hypercube(points: int, axes: int, rng: np.random.Generator) -> Floats:
     """
     slices = np.array([rng.permutation(points) for _ in range(axes)]).T.reshape(points, axes)
     return np.asarray((slices + rng.random((points, axes))) / points)
-
-
-def _traits(bands: Mapping[str, Range], place: Sequence[float]) -> Traits:
-    pairs = zip(bands.items(), place, strict=True)
-    return {name: _between(band, share) for (name, band), share in pairs}
 
 
 def _between(band: Range, share: float) -> float:

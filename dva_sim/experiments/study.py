@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import copy
 import dataclasses
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, PrivateAttr, field_validator
 
@@ -15,18 +14,27 @@ from dva_sim.config import Config, Document, Path_, load_yaml, parse_changes, va
 from dva_sim.errors import ConfigError
 from dva_sim.experiments import faults
 from dva_sim.experiments.asking import (
+    ANSWER,
     REPEATS,
     Answer,
     Changes,
+    Contrast,
     Count,
+    Hypothesis,
     Levels,
     Part,
     Prediction,
     Robustness,
     Seed,
+    Stop,
     Tuning,
     refuse_keys_of_the_design,
 )
+from dva_sim.experiments.designs import Design, Row, all_factors
+from dva_sim.experiments.designs_table import ROWS, read_table
+from dva_sim.experiments.overrides import Changed, change
+from dva_sim.experiments.status import Status
+from dva_sim.streams import derive_seed
 
 FOLDER = "experiments"
 
@@ -38,14 +46,21 @@ class Study(Config):
         question: In words.
         predictions: What was expected before anything was run.
         seed: Of the whole study; the population of persons is drawn from it too.
-        persons: Simulated persons, the clusters.
+        persons: Simulated persons: the blocks of the design and clusters of the statistics.
         replications: Paired trials per person.
         factors: Levels of each scenario key that is varied; the cells are their full grid.
+        design: Which levels are run together, if not every one with every other.
         treatments: Factors whose levels are names of several changes at once.
         parts: Scenarios by name, each run in every cell.
         answer: The declared contrast.
+        comparisons: Further contrasts by name.
+        hypotheses: Claims about contrasts, by name; `dva-sim register` fixes them.
         tuning: How the level `tuned` of the factor `tuning` comes by its value.
         robustness: The answer again under other models of the persons.
+        stop: When enough persons were simulated.
+        budget_s: Time by the clock [s] after which no further persons are begun.
+        record: Which episodes are kept as recordings.
+        full: Keys that are otherwise in the larger version, which `--full` runs.
     """
 
     question: str
@@ -54,15 +69,25 @@ class Study(Config):
     persons: Count = 24
     replications: Count = 5
     factors: dict[str, Levels] = Field(default_factory=dict)
+    design: Design | None = None
     treatments: dict[str, dict[str, Changes]] = Field(default_factory=dict)
     parts: Annotated[dict[str, Part], Field(min_length=1)]
     answer: Answer | None = None
+    comparisons: dict[str, Contrast] = Field(default_factory=dict)
+    hypotheses: dict[str, Hypothesis] = Field(default_factory=dict)
     tuning: Tuning | None = None
     robustness: Robustness | None = None
+    stop: Stop | None = None
+    budget_s: Annotated[float, Field(gt=0)] | None = None
+    record: Literal["all", "worst", "sample"] | None = None
+    full: Changes = Field(default_factory=dict)
 
     _document: Document = PrivateAttr(default_factory=lambda: Document({}, Path()))
+    _table: Document | None = PrivateAttr(default=None)
     _changes: Changes = PrivateAttr(default_factory=dict)
     _settings: tuple[str, ...] = PrivateAttr(default=())
+    _pilot: int | None = PrivateAttr(default=None)
+    _status: Status = PrivateAttr(default_factory=Status)
 
     @field_validator("factors")
     @classmethod
@@ -87,6 +112,34 @@ class Study(Config):
             raise ValueError(f"a part cannot be called {REPEATS!r}: the repeats are")
         return value
 
+    @field_validator("comparisons")
+    @classmethod
+    def _leaves_room_for_the_answer(cls, value: dict[str, Contrast]) -> dict[str, Contrast]:
+        if ANSWER in value:
+            raise ValueError(f"a comparison cannot be called {ANSWER!r}: the declared contrast is")
+        return value
+
+    @property
+    def contrasts(self) -> dict[str, Contrast]:
+        """All that is compared by name, the answer first."""
+        return {**({ANSWER: self.answer} if self.answer else {}), **self.comparisons}
+
+    @property
+    def most_persons(self) -> int:
+        """How many persons are simulated at most."""
+        return self.persons if self.stop is None else max(self.persons, self.stop.most_persons)
+
+    @property
+    def listed_rows(self) -> list[Row]:
+        """Levels that are run together, as listed in the study or in its CSV file."""
+        if self._table is not None:
+            return list(self._table.data[ROWS])
+        return list(self.design.rows or ()) if self.design is not None else []
+
+    def asked(self) -> dict[str, Any]:
+        """All keys that say what is run and how it is read, as JSON would hold them."""
+        return self.model_dump(mode="json", exclude={"record", "full"})
+
     @property
     def file(self) -> Path:
         """The study's file."""
@@ -99,7 +152,7 @@ class Study(Config):
 
     @property
     def changes(self) -> Mapping[str, Any]:
-        """Scenario keys changed in every part by `--set`."""
+        """Scenario keys changed in every part, by `--set` or by `full`."""
         return self._changes
 
     @property
@@ -107,89 +160,135 @@ class Study(Config):
         """The `key=value` pairs of `--set`; any makes the study exploratory."""
         return self._settings
 
+    @property
+    def pilot(self) -> int | None:
+        """How many persons a pilot of it has; None where it is none."""
+        return self._pilot
+
+    @property
+    def status(self) -> Status:
+        """What its results may be called."""
+        return self._status
+
     def error(self, problem: str, path: Path_) -> ConfigError:
-        """A mistake at a key of the study's file."""
+        """A mistake at a key of the study's file, or in the file of its rows."""
+        if self._table is not None and path[:2] == ("design", ROWS):
+            return self._table.error(problem, path[1:])
         return (
             self._document.error(problem, path) if self._document.places else ConfigError(problem)
         )
 
     def is_from_file(self, path: Path_) -> bool:
         """Whether the study's file, rather than `--set`, says what stands at `path`."""
+        if self._table is not None and path[:2] == ("design", ROWS):
+            return path[1:] in self._table.places
         return path in self._document.places
 
 
-def load_study(name: str | Path, settings: Iterable[str] = ()) -> Study:
-    """Read a study by name or path, and change it by `key=value` pairs.
+def load_study(
+    name: str | Path,
+    settings: Iterable[str] = (),
+    *,
+    full: bool = False,
+    pilot: int | None = None,
+) -> Study:
+    """Read a study by name or path.
 
-    A key of the study (`seed=2`, `replications=1`, `factors.pattern=[req-rep]`) changes the
-    study. Any other key is one of the scenario and holds in every part; if it is a factor,
-    its value or list of values takes the place of the factor's levels.
+    Args:
+        name: The study.
+        settings: `key=value` pairs. A key of the study (`seed=2`, `factors.pattern=[req-rep]`)
+            changes the study. Any other key is one of the scenario and holds in every part; if
+            it is a factor, its value or list of values takes the place of the factor's levels.
+        full: The larger version, by the study's key `full`.
+        pilot: Only so many persons, with luck that the study itself never meets.
 
     Raises:
-        ConfigError: not found, not valid, or a pair that makes no sense.
+        ConfigError: not found, not valid, or changes that make no sense.
     """
+    from dva_sim.experiments.registration import settled  # it knows cells, which studies make
+
     document = load_yaml(resources.find(str(name), FOLDER))
-    study = validate(Study, document.data, document.error)
-    for problem in (*faults.of_factors(study), *faults.of_claims(study)):
-        raise document.error(*problem)
-    study._document = document
-    return _with_settings(study, document, tuple(settings))
+    study, data = _version(document, full)
+    if settings := tuple(settings):
+        study = _with_settings(data, document, settings)
+    if pilot is not None:
+        study = _piloted(study, pilot)
+    return settled(study)
 
 
-def _with_settings(study: Study, document: Document, settings: Sequence[str]) -> Study:
-    if not settings:
-        return study
-    data, changes, touched = copy.deepcopy(document.data), {}, []
-    data.setdefault("factors", {})
-    for key, value in parse_changes(settings).items():
-        path = _study_path(key, data["factors"])
-        if path is None:
-            changes[key] = value
-        else:
-            _put(data, path, [value] if _is_level(path, value) else value)
-            touched.append(path)
-    _refuse_design(changes)
-    changed = validate(Study, data, lambda problem, _: ConfigError(f"--set: {problem}"))
-    for problem, _ in faults.of_factors(changed):
-        raise ConfigError(f"--set: {problem}")
-    if any(faults.of_answer(changed)):  # levels are gone: no mistake, but no contrast
-        changed = changed.model_copy(update={"answer": None, "robustness": None})
-    elif any(faults.of_robustness(changed)):
-        changed = changed.model_copy(update={"robustness": None})
-    kept = {
-        p: at for p, at in document.places.items() if not any(p[: len(t)] == t for t in touched)
-    }
-    changed._document = dataclasses.replace(document, places=kept)
-    changed._changes, changed._settings = changes, tuple(settings)
-    return changed
-
-
-def _study_path(key: str, factors: Mapping[str, Any]) -> tuple[str, ...] | None:
-    """Where a key stands in the study; None for a key of the scenario."""
-    head, _, rest = key.partition(".")
-    if key in factors:
-        return "factors", key
-    if head == "factors" and rest:
-        return "factors", rest
-    return tuple(key.split(".")) if head in Study.model_fields else None
-
-
-def _is_level(path: tuple[str, ...], value: Any) -> bool:
-    return path[0] == "factors" and len(path) == 2 and not isinstance(value, list)
-
-
-def _put(data: dict[str, Any], path: tuple[str, ...], value: Any) -> None:
-    for step in path[:-1]:
-        inner = data.get(step)
-        if not isinstance(inner, dict):
-            known = ", ".join(data)
-            raise ConfigError(f"--set: no {step!r} in the study to change; there: {known}")
-        data = inner
-    data[path[-1]] = value
-
-
-def _refuse_design(changes: Iterable[str]) -> None:
+def _version(document: Document, full: bool) -> tuple[Study, Changed]:
+    """The study as its file says, or its larger version; both are judged."""
+    written = Changed(document.data, {}, ())
+    study = _built(written, document)
+    if not study.full:
+        if full:
+            raise document.error("has no larger version: no key 'full'")
+        return study, written
     try:
-        refuse_keys_of_the_design(changes)
-    except ValueError as error:
-        raise ConfigError(f"--set: {error}") from None
+        data = change(written, study.full, Study.model_fields)
+        larger = _built(data, document)
+    except ConfigError as error:
+        raise _told_in_full(study, error) from None
+    return (larger, data) if full else (study, written)
+
+
+def _told_in_full(study: Study, error: ConfigError) -> ConfigError:
+    """A mistake of the larger version, at the key that it names."""
+    named = [key for key in study.full if key.rpartition(".")[2] in error.problem]
+    return study.error(f"in the larger version: {error.problem}", ("full", *named[:1]))
+
+
+def _with_settings(data: Changed, document: Document, settings: tuple[str, ...]) -> Study:
+    """The study changed by `--set`; claims about levels that are gone are gone, too."""
+    try:
+        changed = change(data, parse_changes(settings), Study.model_fields)
+        study = _built(changed, document, may_lose=True)
+    except ConfigError as error:
+        is_elsewhere = error.file not in (None, str(document.file))
+        told = error.problem if error.problem.startswith("--set") else f"--set: {error.problem}"
+        raise error if is_elsewhere else ConfigError(told) from None
+    study._settings = settings
+    return study
+
+
+def _piloted(study: Study, persons: int) -> Study:
+    """Some persons with luck of their own, so that nothing of the study itself is seen."""
+    if persons < 1:
+        raise ConfigError(f"a pilot should have at least 1 person, not {persons}")
+    seed = derive_seed(study.seed, "pilot")
+    pilot = study.model_copy(update={"persons": persons, "seed": seed, "stop": None})
+    pilot._pilot = persons
+    return pilot
+
+
+def _built(data: Changed, document: Document, may_lose: bool = False) -> Study:
+    """The study, if it makes sense.
+
+    Args:
+        data: Its keys.
+        document: Its file.
+        may_lose: Whether claims about what is not there are lost, instead of being mistakes.
+    """
+    study = validate(Study, data.data, document.error)
+    study._document = dataclasses.replace(
+        document, places={p: at for p, at in document.places.items() if data.holds(p)}
+    )
+    study._changes = data.changes
+    if study.design is not None and study.design.csv is not None:
+        path = resources.find(study.design.csv, FOLDER, suffix=".csv", base=study.folder)
+        study._table = read_table(path)
+    _tell_first(study, faults.of_design(study))
+    factors = all_factors(study.design, study.factors, study.listed_rows)
+    study = study.model_copy(update={"factors": factors})
+    _tell_first(study, faults.of_factors(study))
+    if may_lose:
+        study = faults.kept_claims(study)
+    else:
+        _tell_first(study, faults.of_claims(study))
+    _tell_first(study, faults.of_stop(study))
+    return study
+
+
+def _tell_first(study: Study, found: Iterable[faults.Fault]) -> None:
+    for problem, path in found:
+        raise study.error(problem, path)

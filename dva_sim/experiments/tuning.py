@@ -27,6 +27,7 @@ from dva_sim.experiments.pool import LIMIT_S, Episode
 from dva_sim.experiments.results import Results
 from dva_sim.experiments.runner import Progress, run_study
 from dva_sim.experiments.statistics import mean_interval
+from dva_sim.experiments.status import Status
 from dva_sim.experiments.study import Study
 from dva_sim.experiments.tuned import Basis, Chosen, Seen, Tuned, choose
 
@@ -44,7 +45,7 @@ def tuning_study(study: Study) -> Study:
     factors |= {name: study.factors[name] for name in rule.by}
     factors[rule.key] = rule.levels
     part = study.parts[rule.part]
-    return study.model_copy(
+    trials = study.model_copy(
         update={
             "question": f"Which {rule.key} for each {', '.join(rule.by)}?",
             "predictions": (),
@@ -52,12 +53,20 @@ def tuning_study(study: Study) -> Study:
             "persons": rule.persons,
             "replications": rule.replications,
             "factors": factors,
+            "design": None,
             "parts": {rule.part: part.model_copy(update={"reference": None, "replications": None})},
             "answer": None,
+            "comparisons": {},
+            "hypotheses": {},
             "tuning": None,
             "robustness": None,
+            "stop": None,
+            "budget_s": None,
+            "record": None,
         }
     )
+    trials._status, trials._table = Status(), None
+    return trials
 
 
 def tune(

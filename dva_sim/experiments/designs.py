@@ -1,0 +1,209 @@
+"""Designs: which levels meet each other, if not every one every other.
+
+A design makes rows, each with a level for some of the factors. All other factors cross them: every
+row meets every combination of their levels. Without a design there are no rows, and the cells are
+the full grid.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from pydantic import AfterValidator, BeforeValidator, Field, field_validator, model_validator
+
+from dva_sim.config import Config, Path_
+from dva_sim.experiments.asking import (
+    POINT,
+    Level,
+    Levels,
+    refuse_keys_of_the_design,
+)
+
+if TYPE_CHECKING:
+    from dva_sim.experiments.study import Study
+
+Row = dict[str, Level]
+
+_MOST_POINTS = 2**16
+_MOST_CELLS = 10_000  # of a grid that listed rows may leave empty in part
+
+
+class Span(Config):
+    """The values of a continuous factor, evenly spread on some scale.
+
+    Attributes:
+        low: Least value.
+        high: Greatest value.
+        scale: `linear`, `log` for even ratios, or `whole` for whole numbers.
+    """
+
+    low: float
+    high: float
+    scale: Literal["linear", "log", "whole"] = "linear"
+
+    @model_validator(mode="after")
+    def _ascends(self) -> Span:
+        if self.low >= self.high:
+            raise ValueError(f"range should ascend, not go from {self.low:g} to {self.high:g}")
+        if self.scale == "log" and self.low <= 0:
+            raise ValueError(f"range on a log scale should be above zero, not from {self.low:g}")
+        if self.scale == "whole" and not (self.low.is_integer() and self.high.is_integer()):
+            raise ValueError("range of whole numbers should begin and end with one")
+        return self
+
+
+def _spelled_out(value: Any) -> Any:
+    """`[low, high]` is short for a linear range."""
+    if isinstance(value, list | tuple) and len(value) == 2:
+        return {"low": value[0], "high": value[1]}
+    return value
+
+
+def _power_of_two(count: int) -> int:
+    if count & (count - 1):
+        below = 2 ** int(math.log2(count))
+        raise ValueError(f"should be a power of 2, such as {below} or {2 * below}")
+    return count
+
+
+Ranges = dict[
+    str,
+    Annotated[
+        Span, BeforeValidator(_spelled_out, json_schema_input_type=Span | tuple[float, float])
+    ],
+]
+Points = Annotated[int, Field(ge=2, le=_MOST_POINTS)]
+Dyadic = Annotated[Points, AfterValidator(_power_of_two)]
+
+
+class Design(Config):
+    """Which levels are run together; one key of the first six chooses how.
+
+    Attributes:
+        zip: Factors whose levels are taken together: the first of each, the second of each, ...
+        rows: Levels of some factors, row by row; these are not declared as factors again.
+        csv: File of such rows beside the study; its first line names the factors.
+        latin_hypercube: Number of points in the ranges, one in each equal slice of each range.
+        sobol: Number of points in the ranges by a scrambled Sobol' sequence; a power of 2.
+        saltelli: Number of base points, a power of 2, of the sample that Sobol' indices are
+            estimated from: it has two more points for each than there are ranges.
+        ranges: Continuous factors: `[low, high]`, or `{low, high, scale}`.
+    """
+
+    zip: Annotated[tuple[str, ...], Field(min_length=2)] | None = None
+    rows: Annotated[tuple[Row, ...], Field(min_length=1)] | None = None
+    csv: str | None = None
+    latin_hypercube: Points | None = None
+    sobol: Dyadic | None = None
+    saltelli: Dyadic | None = None
+    ranges: Ranges = Field(default_factory=dict)
+
+    @field_validator("rows")
+    @classmethod
+    def _change_the_scenario(cls, value: tuple[Row, ...] | None) -> tuple[Row, ...] | None:
+        for row in value or ():
+            refuse_keys_of_the_design(row)
+        return value
+
+    @field_validator("ranges")
+    @classmethod
+    def _vary_the_scenario(cls, value: Ranges) -> Ranges:
+        refuse_keys_of_the_design(value)
+        return value
+
+    @model_validator(mode="after")
+    def _is_of_one_kind(self) -> Design:
+        chosen = [kind for kind in KINDS if getattr(self, kind) is not None]
+        if len(chosen) != 1:
+            raise ValueError(f"should have one of {', '.join(KINDS)}")
+        if self.is_sampled != bool(self.ranges):
+            raise ValueError(
+                f"{chosen[0]} needs ranges" if self.is_sampled else f"{chosen[0]} has no ranges"
+            )
+        return self
+
+    @property
+    def is_sampled(self) -> bool:
+        """Whether its rows are points in ranges."""
+        return self.points > 0
+
+    @property
+    def points(self) -> int:
+        """How many points in ranges it has; 0 for one of listed levels."""
+        if self.saltelli is not None:
+            return self.saltelli * (len(self.ranges) + 2)
+        return self.latin_hypercube or self.sobol or 0
+
+
+KINDS = ("zip", "rows", "csv", "latin_hypercube", "sobol", "saltelli")
+
+
+def all_factors(
+    design: Design | None, declared: Mapping[str, Levels], rows: Sequence[Row]
+) -> dict[str, Levels]:
+    """Every factor with its levels: those that the design brings first, then those declared.
+
+    Listed levels come in the order met. Points in ranges have one factor, their number; so have
+    listed rows whose levels are so many that their grid would be nearly empty.
+    """
+    if design is None or design.zip is not None:
+        return dict(declared)
+    if design.is_sampled:
+        return {POINT: tuple(range(design.points)), **declared}
+    levels = {key: tuple(dict.fromkeys(row[key] for row in rows)) for key in rows[0]}
+    if math.prod(map(len, levels.values())) > _MOST_CELLS:
+        return {POINT: tuple(range(len(rows))), **declared}
+    return {**levels, **declared}
+
+
+def settings(study: Study) -> Iterator[Row]:
+    """The level of every factor in every cell, in the order of the cells: last factor fastest."""
+    for parts in itertools.product(*_axes(study)):
+        yield {key: level for part in parts for key, level in part.items()}
+
+
+def _axes(study: Study) -> Iterator[list[Row]]:
+    """What is crossed: the rows where the first of their factors stands, and each other factor."""
+    rows = rows_of(study)
+    together = set(rows[0]) if rows else set()
+    for factor, levels in study.factors.items():
+        if factor not in together:
+            yield [{factor: level} for level in levels]
+        elif rows:
+            yield rows
+            rows = []
+
+
+def rows_of(study: Study) -> list[Row]:
+    """The rows of the study's design; none where all factors are crossed."""
+    design = study.design
+    if design is None:
+        return []
+    if design.zip is not None:
+        columns = [study.factors[name] for name in design.zip]
+        return [dict(zip(design.zip, levels, strict=True)) for levels in zip(*columns, strict=True)]
+    if design.is_sampled:
+        from dva_sim.experiments.designs_sampled import sample
+
+        rows = sample(design, study.seed)
+    else:
+        rows = study.listed_rows
+    return [{POINT: i, **row} for i, row in enumerate(rows)] if POINT in study.factors else rows
+
+
+def keys_of(design: Design | None, rows: Sequence[Row]) -> list[str]:
+    """The factors that a design brings, beside those declared."""
+    return [*(rows[0] if rows else ()), *(design.ranges if design is not None else ())]
+
+
+def place_of(study: Study, key: str, value: Any) -> Path_ | None:
+    """Where the design gives a key that value; None if it does not."""
+    if study.design is not None and key in study.design.ranges:
+        return "design", "ranges", key
+    for index, row in enumerate(study.listed_rows):
+        if key in row and row[key] == value:
+            return "design", "rows", index, key
+    return None
