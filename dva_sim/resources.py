@@ -10,6 +10,7 @@ from dva_sim.errors import ConfigError
 
 _PACKAGE = Path(__file__).parent
 FOLDERS = ("protocol", "worlds", "agents", "experiments")
+REGISTRATION = ".registration.yaml"  # ending of a file that belongs to the study beside it
 
 
 def roots() -> list[Path]:
@@ -27,7 +28,8 @@ def available(folder: str, pattern: str = "*.yaml") -> dict[str, Path]:
     names: dict[str, Path] = {}
     for root in roots():
         for path in sorted((root / folder).glob(pattern)):
-            names.setdefault(path.stem, path)
+            if not path.name.endswith(REGISTRATION):
+                names.setdefault(path.stem, path)
     return names
 
 

@@ -166,8 +166,13 @@ def jobs(study: Study, grid: Sequence[Cell] | None = None) -> list[Job]:
 
 def stable_hash(data: Any) -> str:
     """64 bits that depend on the data alone, not on the machine or the order of keys."""
+    return digest(data)[:16]
+
+
+def digest(data: Any) -> str:
+    """All 256 bits of the same."""
     text = json.dumps(data, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
-    return hashlib.sha256(text.encode()).hexdigest()[:16]
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def inputs(cells: Iterable[Cell]) -> dict[str, str]:

@@ -167,10 +167,9 @@ def settings(study: Study) -> Iterator[Row]:
 
 def _axes(study: Study) -> Iterator[list[Row]]:
     """What is crossed: the rows where the first of their factors stands, and each other factor."""
-    rows = rows_of(study)
-    together = set(rows[0]) if rows else set()
+    rows, in_rows = rows_of(study), together(study)
     for factor, levels in study.factors.items():
-        if factor not in together:
+        if factor not in in_rows:
             yield [{factor: level} for level in levels]
         elif rows:
             yield rows
@@ -192,6 +191,15 @@ def rows_of(study: Study) -> list[Row]:
     else:
         rows = study.listed_rows
     return [{POINT: i, **row} for i, row in enumerate(rows)] if POINT in study.factors else rows
+
+
+def together(study: Study) -> set[str]:
+    """The factors whose levels stand in rows, and so do not cross each other."""
+    design = study.design
+    if design is not None and design.zip is not None:
+        return set(design.zip)
+    number = {POINT} & study.factors.keys()
+    return number | set(keys_of(design, study.listed_rows))
 
 
 def keys_of(design: Design | None, rows: Sequence[Row]) -> list[str]:

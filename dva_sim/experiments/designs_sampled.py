@@ -51,10 +51,10 @@ def _sobol(axes: int, points: int, rng: np.random.Generator) -> Floats:
 
 
 def saltelli(axes: int, base: int, rng: np.random.Generator) -> Floats:
-    """Two independent samples A and B, then for each axis A with that column of B.
+    """Pairs of independent points A and B, and for each axis A with that coordinate of B.
 
     Returns:
-        Points `((axes + 2) * base, axes)`: A, B, and A with column 0, 1, ... of B.
+        Points `(base * (axes + 2), axes)`, pair by pair: A, A with coordinate 0, 1, ... of B, B.
 
     References:
         Saltelli, Annoni, Azzini, Campolongo, Ratto & Tarantola, Computer Physics Communications
@@ -62,12 +62,11 @@ def saltelli(axes: int, base: int, rng: np.random.Generator) -> Floats:
     """
     both = _sobol(2 * axes, base, rng)
     first, second = both[:, :axes], both[:, axes:]
-    mixed = []
+    blocks = np.repeat(first[:, np.newaxis], axes + 2, axis=1)
     for axis in range(axes):
-        one = first.copy()
-        one[:, axis] = second[:, axis]
-        mixed.append(one)
-    return np.concatenate([first, second, *mixed])
+        blocks[:, axis + 1, axis] = second[:, axis]
+    blocks[:, -1] = second
+    return blocks.reshape(-1, axes)
 
 
 def _value(span: Span, share: float) -> float | int:

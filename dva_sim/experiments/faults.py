@@ -19,7 +19,7 @@ from dva_sim.experiments.asking import (
     Prediction,
     refuse_keys_of_the_design,
 )
-from dva_sim.experiments.designs import keys_of, place_of, rows_of
+from dva_sim.experiments.designs import keys_of, place_of, together
 
 if TYPE_CHECKING:
     from dva_sim.experiments.study import Study
@@ -190,10 +190,9 @@ def _faults_of_contrast(study: Study, asked: Contrast, path: Path_) -> Iterator[
 
 def _fault_of_place(study: Study, asked: Contrast, path: Path_) -> Iterator[Fault]:
     """One difference is at one place: the levels of all factors have to be given."""
-    rows = rows_of(study)
+    given = {asked.factor, *asked.within, *together(study)}
     for name, levels in study.factors.items():
-        is_free = len(levels) > 1 and not (rows and name in rows[0])
-        if is_free and name not in (asked.factor, *asked.within):
+        if len(levels) > 1 and name not in given:
             yield f"should run over {name!r} or be within a level of it", path
 
 

@@ -87,6 +87,7 @@ class Study(Config):
     _changes: Changes = PrivateAttr(default_factory=dict)
     _settings: tuple[str, ...] = PrivateAttr(default=())
     _pilot: int | None = PrivateAttr(default=None)
+    _is_full: bool = PrivateAttr(default=False)
     _status: Status = PrivateAttr(default_factory=Status)
 
     @field_validator("factors")
@@ -166,6 +167,11 @@ class Study(Config):
         return self._pilot
 
     @property
+    def is_full(self) -> bool:
+        """Whether it is the larger version."""
+        return self._is_full
+
+    @property
     def status(self) -> Status:
         """What its results may be called."""
         return self._status
@@ -211,6 +217,7 @@ def load_study(
     study, data = _version(document, full)
     if settings := tuple(settings):
         study = _with_settings(data, document, settings)
+    study._is_full = full
     if pilot is not None:
         study = _piloted(study, pilot)
     return settled(study)
