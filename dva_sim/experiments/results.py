@@ -4,18 +4,23 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
+from functools import cached_property
+from html import escape
 from pathlib import Path
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING, Any
 
 from dva_sim.errors import ConfigError
+from dva_sim.experiments.dictionary import Column, describe
+from dva_sim.experiments.frames import Frame, without_mask
+from dva_sim.experiments.journal import FILE as JOURNAL
+
+if TYPE_CHECKING:
+    from dva_sim.experiments.answer import Answer
+    from dva_sim.experiments.summary import Reading
 
 MANIFEST = "manifest.json"
+MACHINE = "machine.json"
 TABLES = "tables"
-
-Columns = dict[str, NDArray[Any]]
 
 
 @dataclass(frozen=True)
@@ -63,9 +68,30 @@ class Results:
         return dict(self.study["factors"])
 
     @property
-    def answer(self) -> dict[str, Any] | None:
-        """The declared contrast, if there is one."""
-        return self.study.get("answer")
+    def question(self) -> str:
+        """What was asked."""
+        return str(self.study.get("question", ""))
+
+    @cached_property
+    def reading(self) -> Reading:
+        """What the runs say, in words and tables."""
+        from dva_sim.experiments.summary import Reading
+
+        return Reading(self)
+
+    @property
+    def answer(self) -> Answer:
+        """The answer to the question in words, with its interval, and what must be known of it."""
+        return self.reading.answer
+
+    @property
+    def machine(self) -> dict[str, Any]:
+        """Times, costs and machine; nothing where they have not come along."""
+        try:
+            found = json.loads((self.folder / MACHINE).read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return {}
+        return found if isinstance(found, dict) else {}
 
     @property
     def failures(self) -> list[dict[str, Any]]:
@@ -81,7 +107,44 @@ class Results:
         """Whether the study wrote a table of that name."""
         return name in self.tables
 
-    def table(self, name: str, part: str | None = None) -> Columns:
+    @cached_property
+    def runs(self) -> Frame:
+        """The table of runs, one row each, repeats apart; empty if none was completed."""
+        return self.table("runs") if self.has("runs") else Frame()
+
+    def columns(self, table: str) -> list[Column]:
+        """What the columns of a table mean.
+
+        Raises:
+            ConfigError: no such table, or a damaged file.
+        """
+        scenarios = self.manifest.get("scenarios", {}).values()
+        models = dict.fromkeys(scenario.get("model", "full") for scenario in scenarios)
+        factors = [*self.factors, *((self.study.get("design") or {}).get("ranges") or {})]
+        return describe(table, list(self._read(table, "LIMIT 0")), list(models), factors)
+
+    def path_of(self, table: str) -> Path:
+        """The Parquet file of a table.
+
+        Raises:
+            ConfigError: no such table.
+        """
+        if not self.has(table):
+            there = ", ".join(self.tables) or "none"
+            raise ConfigError(f"{self.folder} has no table {table!r}; tables: {there}")
+        return self.folder / TABLES / f"{table}.parquet"
+
+    def report(self) -> Path:
+        """Make `report.html` and `figures/` in the folder.
+
+        Raises:
+            DvaSimError: the disk is full or refuses to be written.
+        """
+        from dva_sim.experiments.report import write_report
+
+        return write_report(self.folder)
+
+    def table(self, name: str, part: str | None = None) -> Frame:
         """The columns of a table, in the order of the rows (part, cell, person, trial).
 
         Missing values are nan in columns of numbers and None in all others; a column of
@@ -94,39 +157,36 @@ class Results:
         Raises:
             ConfigError: no such table, or a damaged file.
         """
+        return self._read(name, "" if part is None else "WHERE part = ?", part)
+
+    def _read(self, name: str, rows: str, part: str | None = None) -> Frame:
         import duckdb
 
-        if not self.has(name):
-            there = ", ".join(self.tables) or "none"
-            raise ConfigError(f"{self.folder} has no table {name!r}; tables: {there}")
-        query = "SELECT * FROM read_parquet(?)" + (" WHERE part = ?" if part is not None else "")
-        file = str(self.folder / TABLES / f"{name}.parquet")
+        file = str(self.path_of(name))
+        values = [file] if part is None else [file, part]
         try:
             with duckdb.connect(config={"threads": 1}) as connection:
-                values = [file] if part is None else [file, part]
+                query = f"SELECT * FROM read_parquet(?) {rows}"
                 columns = connection.execute(query, values).fetchnumpy()
         except duckdb.Error as error:
             raise ConfigError(f"cannot be read: {str(error).splitlines()[0]}", file) from None
-        return {key: _plain(column) for key, column in columns.items()}
+        return Frame({key: without_mask(column) for key, column in columns.items()})
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: question, answer, and how many runs stand behind it."""
+        notes = "".join(f"<p>{escape(note)}</p>" for note in self.answer.notes)
+        failed = f", {len(self.failures)} failed" if self.failures else ""
+        runs = f"<p>{self.runs.rows} runs{failed}, in {escape(str(self.folder))}</p>"
+        lead = f"<p><b>{escape(self.answer.lead)}</b></p>"
+        return f"<h3>{escape(self.question)}</h3>{lead}{notes}{runs}"
 
 
 def _not_results(folder: Path) -> str:
     if not folder.is_dir():
         return f"{folder} is not a folder; give the folder that 'dva-sim run' wrote"
+    if (folder / JOURNAL).exists():
+        return (
+            f"{folder} holds a study that is not finished; the command that began it goes on "
+            "from there, and with --dry-run it tells what is done"
+        )
     return f"{folder} holds no finished results: it has no {MANIFEST}; finish the study first"
-
-
-def _plain(column: NDArray[Any]) -> NDArray[Any]:
-    """A column without numpy's mask."""
-    if not isinstance(column, np.ma.MaskedArray):
-        return column
-    if column.dtype.kind == "f":
-        return np.ma.filled(column, np.nan)
-    missing = np.ma.getmaskarray(column)
-    if not missing.any():
-        return np.asarray(column.data)
-    if column.dtype.kind in "iu":
-        return np.where(missing, np.nan, column.data)
-    values = column.data.astype(object)
-    values[missing] = None
-    return np.asarray(values)

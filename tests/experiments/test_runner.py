@@ -68,7 +68,7 @@ def test_the_manifest_says_what_was_asked_and_changed(tmp_path):
     assert results.manifest["set"] == ["persons=2", "robot.processing_s=0.2"]
     assert results.manifest["scenarios"]["drive"]["robot"]["processing_s"] == 0.2
     assert results.factors == {"pattern": ["req-rep", "latest-wins"], "link.delay_s": [0, 0.25]}
-    assert results.answer["contrast"] == ["req-rep", "latest-wins"]
+    assert results.study["answer"]["contrast"] == ["req-rep", "latest-wins"]
     assert results.failures == []
 
 
@@ -99,7 +99,7 @@ def started(study: Path, out: Path) -> subprocess.Popen[str]:
         [sys.executable, "-m", "small_study", str(study), str(out), "2"],
         stdout=subprocess.PIPE,
         text=True,
-        env={**os.environ, "PYTHONPATH": str(TESTS)},
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(map(str, (TESTS.parent, TESTS)))},
         cwd=study.parent,
     )
 
