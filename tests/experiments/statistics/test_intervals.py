@@ -5,6 +5,7 @@ import pytest
 from scipy import stats
 
 from dva_sim.experiments import statistics
+from dva_sim.experiments.statistics.shares import _weighted_quantiles
 
 
 def test_a_persons_mean_leaves_out_missing_runs_and_missing_persons():
@@ -13,15 +14,28 @@ def test_a_persons_mean_leaves_out_missing_runs_and_missing_persons():
     assert means.tolist() == [5, 2]
 
 
-def test_the_interval_of_a_paired_difference_is_students_on_person_means():
+def test_the_interval_of_a_paired_difference_is_that_of_a_bootstrap_t_written_out():
     rng = np.random.default_rng(3)
     a, b = rng.gamma(2, 1, (24, 5)), rng.gamma(2, 1, (24, 5))
     person = np.repeat(np.arange(24), 5)
     found = statistics.paired_difference(a.ravel(), b.ravel(), person)
-    exact = stats.ttest_1samp((a - b).mean(axis=1), 0).confidence_interval(0.95)
-    assert (found.low, found.high) == pytest.approx(tuple(exact), rel=1e-12)
+    off = (a - b).mean(axis=1)
+    ratios = []
+    for _ in range(20_000):
+        drawn = rng.choice(off, 24)
+        ratios.append(abs(drawn.mean() - off.mean()) / stats.sem(drawn))
+    half = max(np.quantile(ratios, 0.95), stats.t.isf(0.025, 23)) * stats.sem(off)
     assert found.mean == pytest.approx((a - b).mean())
+    assert found.half_width == pytest.approx(half, rel=0.02)
+    assert (found.low + found.high) / 2 == pytest.approx(found.mean)
     assert found.n_persons == 24
+
+
+def test_with_fewer_than_six_persons_the_interval_is_students():
+    values = np.array([1.0, 4.0, 2.0, 7.0, 3.0])
+    found = statistics.mean_interval(values, np.arange(5))
+    exact = stats.ttest_1samp(values, 0).confidence_interval(0.95)
+    assert (found.low, found.high) == pytest.approx(tuple(exact), rel=1e-12)
 
 
 def test_trials_of_one_person_do_not_narrow_the_interval():
@@ -99,12 +113,12 @@ def test_levels_that_move_together_need_a_narrower_band_than_independent_ones():
     assert statistics.band(bound).critical < statistics.band(free).critical - 0.3
 
 
-def test_a_level_of_the_band_alone_is_students_interval():
-    values = np.random.default_rng(8).normal(size=(24, 3))
+def test_a_level_of_the_band_alone_is_the_interval_of_its_mean():
+    values = skewed(np.random.default_rng(8), 24, 3)
     band = statistics.band(values)
-    exact = stats.ttest_1samp(values, 0).confidence_interval(0.95)
-    assert np.allclose(band.pointwise_low, exact.low)
-    assert np.allclose(band.pointwise_high, exact.high)
+    alone = [statistics.mean_interval(column, np.arange(24)) for column in values.T]
+    assert np.allclose(band.pointwise_low, [interval.low for interval in alone])
+    assert np.allclose(band.pointwise_high, [interval.high for interval in alone])
 
 
 def test_the_same_differences_give_the_same_band():
@@ -148,7 +162,7 @@ def test_a_level_without_spread_has_a_band_without_width():
 def test_weighted_quantiles_are_those_of_repeated_values():
     ranked, weights = np.array([1.0, 2.0, 5.0, 9.0]), np.array([[2, 0, 3, 1], [1, 1, 1, 0]])
     for q in (0.05, 0.5, 0.9):
-        found = statistics._weighted_quantiles(ranked, weights.astype(float), q)
+        found = _weighted_quantiles(ranked, weights.astype(float), q)
         expected = [np.quantile(np.repeat(ranked, w), q) for w in weights]
         assert found == pytest.approx(expected)
 
