@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +35,24 @@ class TrackPoint(NamedTuple):
     y: float
     heading: float
     mode: str
+
+
+class Sent(NamedTuple):
+    """A message that went onto the network.
+
+    Attributes:
+        time: When [s].
+        source: Who sent it, by id.
+        destination: To whom.
+        size: With all framing [B].
+        payload: The XML as bytes, or the frame of a camera.
+    """
+
+    time: float
+    source: str
+    destination: str
+    size: int
+    payload: Any
 
 
 class Issued(NamedTuple):
@@ -111,6 +130,9 @@ class DriveLog:
         started: When the robot said that teleoperation had started [s].
         ended: When the drive was over [s].
         outcome: `confirmed`, `refuted`, `gave up`, `lost link` or `timeout`.
+        round_trips: From each command's request to its reply [s]; none of what is published.
+        samples: Of the accelerometer, in all batches that the phone's filter was read after.
+        values: How many such batches there were; none with a filter that takes no batches.
         applied: Commands in the order they took effect; those still under way when the
             drive ended, too.
         hand_lag: Time constant with which the hand follows what is wanted [s].
@@ -138,7 +160,9 @@ class DriveLog:
     hand_lag: float = 0.0
     timeouts: int = 0
     alerts: int = 0
-    round_trips: list[float] = field(default_factory=list)
+    round_trips: Sequence[float] = ()
+    samples: int = 0
+    values: int = 0
     applied: list[Applied] = field(default_factory=list)
     frames: list[Shown] = field(default_factory=list)
     intents: list[Followed] = field(default_factory=list)
@@ -170,7 +194,7 @@ class Recorder:
     """Collects; decides nothing.
 
     Args:
-        keep_traffic: Also keep each message sent, for pictures.
+        keep_traffic: Also keep each message sent, for pictures and recordings.
     """
 
     def __init__(self, keep_traffic: bool = False) -> None:
@@ -182,7 +206,7 @@ class Recorder:
         self.newest_drive: dict[str, DriveLog] = {}  # of each robot
         self.newest_command: dict[str, Applied] = {}  # of each robot, whoever's drive it is
         self.views: dict[str, list[TrackPoint]] = defaultdict(list)
-        self.traffic: list[tuple[float, str, str, int]] | None = [] if keep_traffic else None
+        self.traffic: list[Sent] | None = [] if keep_traffic else None
         self.exposure: dict[str, float] = defaultdict(float)
         self._issued: dict[tuple[str, int], Issued] = {}
 
@@ -195,12 +219,14 @@ class Recorder:
         if self.traffic is not None:
             self.views[robot].append(TrackPoint(time, x, y, heading, "seen"))
 
-    def message_sent(self, time: float, source: str, destination: str, size: int) -> None:
+    def message_sent(
+        self, time: float, source: str, destination: str, size: int, payload: Any
+    ) -> None:
         """Count a message, and keep it if pictures are wanted."""
         self.counters["messages"] += 1
         self.counters["bytes"] += size
         if self.traffic is not None:
-            self.traffic.append((time, source, destination, size))
+            self.traffic.append(Sent(time, source, destination, size, payload))
 
     def command_issued(self, source: str, message_id: int, issued: Issued) -> None:
         """A command leaves the phone."""

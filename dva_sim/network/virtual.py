@@ -17,7 +17,7 @@ RECONNECT = 0.1  # after a connection broke; ZeroMQ's default [s]
 SUBSCRIBE_AGAIN = 1.0  # where a subscription may get lost; assumed [s]
 
 Links = Callable[[str, str], tuple[Link, Link]]
-Traffic = Callable[[float, str, str, int], None]
+Traffic = Callable[[float, str, str, int, Any], None]
 
 
 class VirtualNetwork:
@@ -26,7 +26,7 @@ class VirtualNetwork:
     Args:
         clock: The run's clock.
         links: Gives the link from one node to another, and the one back.
-        traffic: Told of each message sent: time [s], from, to, size [B].
+        traffic: Told of each message sent: time [s], from, to, size [B], what.
         connector: Makes the connections.
 
     Attributes:
@@ -72,7 +72,7 @@ class VirtualNetwork:
             send = subscription.send
             if send is not None:
                 if send(payload, total):
-                    self.traffic(self.clock.now, node, subscription.node, total)
+                    self.traffic(self.clock.now, node, subscription.node, total, payload)
                 else:
                     self.dropped += 1
 
@@ -206,7 +206,7 @@ class VirtualWire(VirtualClient):
             if not self.connection.opener.send((tag, data), size):
                 return
             self._waiting.popleft()
-            self._network.traffic(self._network.clock.now, self.node, self.peer, size)
+            self._network.traffic(self._network.clock.now, self.node, self.peer, size, data)
 
     def _new_connection(self) -> AnyConnection:
         """A reply goes back over the connection that its request came by, or nowhere."""
@@ -229,7 +229,7 @@ class VirtualWire(VirtualClient):
     def _answer(self, connection: AnyConnection, tag: int, reply: bytes) -> None:
         size = len(reply) + FRAMING
         if connection.peer.send((tag, reply), size):
-            self._network.traffic(self._network.clock.now, self.peer, self.node, size)
+            self._network.traffic(self._network.clock.now, self.peer, self.node, size, reply)
 
 
 class VirtualSubscription(VirtualClient):

@@ -1,4 +1,4 @@
-"""What is left of a run when it is over."""
+"""What is left of a run when it is over: what can be shown of it, and all that is measured."""
 
 from __future__ import annotations
 
@@ -43,21 +43,18 @@ class PersonLog(NamedTuple):
     out: float = math.inf
 
 
-@dataclass
-class Recording:
-    """What happened in one run.
+@dataclass(kw_only=True)
+class Playback:
+    """What can be told and shown of a run, with or without what ran.
 
     Attributes:
+        recorder: What happened, as far as it is told or seen.
         incidents: The hazards as they were.
-        events: The events as the DVA knew them.
-        robots: The robots by id, as they ended.
         surroundings: What the hazards made of the air and the floor.
         labels: Names by id.
+        radii: Of the robots, seen from above, by id [m].
         duration: How long the run lasted [s].
-        people: What became of the people on foot.
         contained: When incidents were dealt with [s], by their place in `incidents`.
-        depth: How the network was modelled: `message`, `segment` (where any connection was), or
-            `datagram`.
     """
 
     scenario: Scenario
@@ -65,14 +62,33 @@ class Recording:
     site: Site
     recorder: Recorder
     incidents: list[Incident]
-    events: list[Event]
-    robots: dict[str, RobotAgent]
     surroundings: Surroundings
     labels: dict[str, str]
-    links: dict[str, tuple[Link, Link]]
+    radii: dict[str, float]
     duration: float
-    people: list[PersonLog] = field(default_factory=list)
     contained: dict[int, float] = field(default_factory=dict)
+
+    def robot_named(self, label: str) -> str | None:
+        """The id of a robot, if there is one of that name."""
+        return next((robot for robot in self.radii if self.labels[robot] == label), None)
+
+
+@dataclass(kw_only=True)
+class Recording(Playback):
+    """All that is left of one run, to be measured.
+
+    Attributes:
+        events: The events as the DVA knew them.
+        robots: The robots by id, as they ended.
+        people: What became of the people on foot.
+        depth: How the network was modelled: `message`, `segment` (where any connection was), or
+            `datagram`.
+    """
+
+    events: list[Event]
+    robots: dict[str, RobotAgent]
+    links: dict[str, tuple[Link, Link]]
+    people: list[PersonLog] = field(default_factory=list)
     depth: str = "message"
 
     def event_of(self, number: int) -> Event | None:

@@ -40,7 +40,8 @@ def simulate(scenario: Scenario, seed: int, keep_traffic: bool = False) -> Recor
     Args:
         scenario: What the run consists of.
         seed: Decides all luck but the persons'.
-        keep_traffic: Keep messages and the operators' views, for pictures.
+        keep_traffic: Keep messages, the operators' views and finer tracks, for pictures and
+            recordings.
 
     Raises:
         ConfigError: the site cannot hold the team or the events.
@@ -83,9 +84,9 @@ class Run:
             add_operator(self.stage, number, self.field.truth)
         self.field.schedule_incidents()
         self.dva.start()
-        self._period = FILM_PERIOD if keep_traffic else WATCH_PERIOD
         self._last_mission: dict[str, float] = {}
-        self.clock.every(self._period, self._watch)
+        self.clock.every(WATCH_PERIOD, self._watch)
+        self.clock.every(FILM_PERIOD if keep_traffic else WATCH_PERIOD, self._sample)
 
     def run(self) -> Recording:
         """Let time pass until all is settled or the horizon is reached."""
@@ -93,23 +94,24 @@ class Run:
         while now < horizon and not self._settled():
             now = min(now + 1.0, horizon)
             self.clock.run(now)
-        self.field.world.advance_to(self.clock.now)
         self._watch()
-        stage = self.stage
+        self._sample()
+        stage, field = self.stage, self.field
         return Recording(
-            self.scenario,
-            stage.seed,
-            stage.site,
-            self.recorder,
-            self.field.incidents,
-            list(self.dva.events.values()),
-            self.field.robots,
-            self.field.surroundings,
-            stage.labels,
-            self.links,
-            self.clock.now,
+            scenario=self.scenario,
+            seed=stage.seed,
+            site=stage.site,
+            recorder=self.recorder,
+            incidents=field.incidents,
+            surroundings=field.surroundings,
+            labels=stage.labels,
+            radii={name: robot.body.spec.radius for name, robot in field.robots.items()},
+            duration=self.clock.now,
+            contained=field.contained,
+            events=list(self.dva.events.values()),
+            robots=field.robots,
+            links=self.links,
             people=self._people(),
-            contained=self.field.contained,
             depth=self.network.connector.deepest,
         )
 
@@ -188,7 +190,7 @@ class Run:
     # --- watching ----------------------------------------------------------------------
 
     def _watch(self) -> None:
-        """Sample tracks and check the rules that must hold at every moment."""
+        """Check the rules that must hold at every moment."""
         now = self.clock.now
         self.field.world.advance_to(now)
         self._watch_robots(now)
@@ -204,10 +206,7 @@ class Run:
     def _watch_robots(self, now: float) -> None:
         recorder = self.recorder
         for robot in self.field.robots.values():
-            pose, label = robot.body.pose(), robot.device.label
-            recorder.tracks[label].append(
-                TrackPoint(now, pose.x, pose.y, pose.heading, robot.controller.mode.value)
-            )
+            label = robot.device.label
             if robot.controller.mode is Mode.MISSION:
                 self._last_mission[label] = now
             drive = self.field.newest_drive(robot.device.id_tag)
@@ -220,8 +219,24 @@ class Run:
     def _watch_person(
         self, name: str, who: GuardAgent | BystanderAgent, now: float, dangers: list[Danger]
     ) -> None:
+        if who.activity == SAFE:
+            return
         x, y = who.walking.place
-        if who.activity != SAFE:
-            self.recorder.tracks[name].append(TrackPoint(now, x, y, who.heading, who.activity))
-            if is_dangerous(who.exposure.conditions) or self.field.is_near(dangers, x, y):
-                self.recorder.exposure[name] += self._period
+        if is_dangerous(who.exposure.conditions) or self.field.is_near(dangers, x, y):
+            self.recorder.exposure[name] += WATCH_PERIOD
+
+    def _sample(self) -> None:
+        """Note where everybody is who is on the site."""
+        now, tracks = self.clock.now, self.recorder.tracks
+        self.field.world.advance_to(now)
+        for robot in self.field.robots.values():
+            pose, mode = robot.body.pose(), robot.controller.mode.value
+            tracks[robot.device.label].append(TrackPoint(now, pose.x, pose.y, pose.heading, mode))
+        people: list[tuple[str, GuardAgent | BystanderAgent]] = [
+            *((guard.device.label, guard) for guard in self.field.guards),
+            *((bystander.name, bystander) for bystander in self.field.bystanders),
+        ]
+        for name, who in people:
+            x, y = who.walking.place
+            if who.activity != SAFE:
+                tracks[name].append(TrackPoint(now, x, y, who.heading, who.activity))

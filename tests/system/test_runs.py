@@ -68,10 +68,15 @@ def test_adding_a_guard_changes_nobody_elses_luck() -> None:
     assert guarded.recorder.tracks["robot-1"] == alone.recorder.tracks["robot-1"]
 
 
-def test_keeping_traffic_for_pictures_changes_nothing() -> None:
-    scenario = scenarios.build(scenarios.load("drive-to-event"), {"link.delay_s": 0.1})
+@pytest.mark.parametrize(
+    ("name", "changes"),
+    [("drive-to-event", {"link.delay_s": 0.1}), ("evacuation", {"horizon_s": 90})],
+)
+def test_keeping_traffic_for_pictures_changes_nothing(name: str, changes: dict[str, float]) -> None:
+    scenario = scenarios.build(scenarios.load(name), changes)
     plain, filmed = simulate(scenario, 3), simulate(scenario, 3, keep_traffic=True)
     assert str(metrics.run_row(plain)) == str(metrics.run_row(filmed))
+    assert str(metrics.people_rows(plain)) == str(metrics.people_rows(filmed))
 
 
 @pytest.mark.parametrize("pattern", ["req-rep", "pipelined", "pub-sub", "latest-wins"])

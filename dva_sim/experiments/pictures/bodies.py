@@ -101,8 +101,7 @@ class _Ghost:
         from matplotlib.patches import Circle, Wedge
 
         recording = moments.recording
-        robot = next(r for r in recording.robots.values() if r.device.label == name)
-        self._views = recording.recorder.views.get(robot.device.id_tag, [])
+        self._views = recording.recorder.views.get(recording.robot_named(name) or "", [])
         self._times = [p.time for p in self._views]
         self._half = recording.scenario.camera.field_of_view_deg / 2
         radius = LARGER * moments.radius(name)

@@ -13,7 +13,7 @@ from dva_sim.experiments.pictures import style
 from dva_sim.experiments.pictures.moments import ROBOT, Moments
 from dva_sim.experiments.pictures.scene import Scene
 from dva_sim.experiments.pictures.traffic import Traffic
-from dva_sim.simulation import Recording
+from dva_sim.simulation import Playback
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -37,7 +37,7 @@ class Film:
         inset: Show what a robot's camera sees, too.
     """
 
-    def __init__(self, recordings: Sequence[Recording], inset: bool = False) -> None:
+    def __init__(self, recordings: Sequence[Playback], inset: bool = False) -> None:
         runs = [Moments(recording) for recording in recordings]
         self.duration = max(r.duration for r in recordings)
         self.speed = max(1.0, round(self.duration / LENGTH_S))
@@ -115,7 +115,7 @@ class _Eye:
 class _Story:
     """The newest lines of what is told."""
 
-    def __init__(self, ax: Axes, recording: Recording) -> None:
+    def __init__(self, ax: Axes, recording: Playback) -> None:
         self._timeline = [m for m in recording.recorder.timeline if m.kind != "link"]
         self._text = ax.text(
             0, 1, "", transform=ax.transAxes, ha="left", va="top", fontsize=style.FONT,
@@ -142,13 +142,13 @@ def new_figure(size: tuple[float, float], dpi: float = DPI) -> Figure:
     return figure
 
 
-def height_of_map(recording: Recording, across: float) -> float:
+def height_of_map(recording: Playback, across: float) -> float:
     """Height that a map of a width takes [in]."""
     xmin, ymin, xmax, ymax = recording.site.extent
     return float(min(TALLEST, across * (ymax - ymin + 2.2) / (xmax - xmin + 1.6) + 0.25))
 
 
-def title_of(recording: Recording) -> str:
+def title_of(recording: Playback) -> str:
     """What tells runs apart that stand side by side."""
     scenario = recording.scenario
     return f"{scenario.pattern}, {scenario.link.delay_s * 1000:.0f} ms each way"

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from dva_sim.agents.bystander import DOWN
 from dva_sim.errors import ConfigError
 from dva_sim.recorder import DriveLog, TrackPoint
-from dva_sim.simulation import Recording
+from dva_sim.simulation import Playback
 from dva_sim.simulation.incidents import Incident
 from dva_sim.worlds.camera_picture import Camera, Figure, Smoke, Spot
 from dva_sim.worlds.camera_picture.camera import Picture
@@ -17,6 +17,7 @@ from dva_sim.worlds.geo import Pose
 
 ROBOT, GUARD, BYSTANDER = "robot", "guard", "bystander"
 GONE = 1.0  # so long after the end of the track of somebody who left [s]
+PERSON = 0.25  # radius of somebody on foot, seen from above [m]
 FRESH = 3.0  # an older picture is not looked at any more [s]
 
 
@@ -46,7 +47,7 @@ class Moments:
         recording: The run.
     """
 
-    def __init__(self, recording: Recording) -> None:
+    def __init__(self, recording: Playback) -> None:
         self.recording = recording
         self.tracks = recording.recorder.tracks
         self._times = {name: [p.time for p in track] for name, track in self.tracks.items()}
@@ -96,9 +97,8 @@ class Moments:
 
     def radius(self, name: str) -> float:
         """Of somebody, seen from above [m]."""
-        robots = self.recording.robots.values()
-        found = [r.body.spec.radius for r in robots if r.device.label == name]
-        return float(found[0]) if found else 0.25
+        robot = self.recording.robot_named(name)
+        return PERSON if robot is None else self.recording.radii[robot]
 
     def glance(self, time: float) -> Glance | None:
         """The newest picture that an operator at the wheel looks at, if there is one."""

@@ -11,7 +11,7 @@ from dva_sim.errors import ConfigError
 from dva_sim.experiments.pictures.film import add_legend, height_of_map, new_figure, title_of
 from dva_sim.experiments.pictures.moments import Moments
 from dva_sim.experiments.pictures.scene import Scene
-from dva_sim.simulation import Recording
+from dva_sim.simulation import Playback
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -22,7 +22,7 @@ PANEL = 5.0  # a panel of a strip [in]
 LEGEND = 0.45  # height [in]
 
 
-def still(recordings: Sequence[Recording], time: float) -> Figure:
+def still(recordings: Sequence[Playback], time: float) -> Figure:
     """Runs side by side at one moment [s]."""
     runs = [Moments(recording) for recording in recordings]
     across = WIDE if len(runs) == 1 else 6.5
@@ -35,7 +35,7 @@ def still(recordings: Sequence[Recording], time: float) -> Figure:
     return _fixed(figure, scenes, runs, [time] * len(runs))
 
 
-def strip(recording: Recording, times: Sequence[float]) -> Figure:
+def strip(recording: Playback, times: Sequence[float]) -> Figure:
     """One run at several moments [s], from left to right and from top to bottom."""
     run = Moments(recording)
     height = height_of_map(recording, PANEL)
@@ -46,12 +46,12 @@ def strip(recording: Recording, times: Sequence[float]) -> Figure:
     return _fixed(figure, scenes, [run], times)
 
 
-def even_times(recording: Recording, panels: int) -> list[float]:
+def even_times(recording: Playback, panels: int) -> list[float]:
     """Moments spread evenly over a run, its end among them [s]."""
     return [recording.duration * (n + 1) / panels for n in range(panels)]
 
 
-def save_eye(recording: Recording, robot: str, time: float, path: Path) -> None:
+def save_eye(recording: Playback, robot: str, time: float, path: Path) -> None:
     """Write what a robot's camera sees at a moment [s], twice as large as it is sent.
 
     Raises:
@@ -62,7 +62,7 @@ def save_eye(recording: Recording, robot: str, time: float, path: Path) -> None:
     Image.fromarray(Moments(recording).eye(robot, time, 640, 480)).save(path)
 
 
-def check_times(recording: Recording, times: Sequence[float]) -> None:
+def check_times(recording: Playback, times: Sequence[float]) -> None:
     """Refuse moments that a run does not have.
 
     Raises:

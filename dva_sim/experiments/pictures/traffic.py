@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dva_sim.simulation import Recording
+from dva_sim.simulation import Playback
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -23,11 +23,11 @@ class Traffic:
         recording: A run made with `keep_traffic`.
     """
 
-    def __init__(self, ax: Axes, recording: Recording) -> None:
-        robots = set(recording.robots)
+    def __init__(self, ax: Axes, recording: Playback) -> None:
+        robots = set(recording.radii)
         traffic = recording.recorder.traffic or []
-        self._up = np.array([t for t, _, to, _ in traffic if to in robots])
-        self._down = np.array([t for t, source, _, _ in traffic if source in robots])
+        self._up = np.array([sent.time for sent in traffic if sent.destination in robots])
+        self._down = np.array([sent.time for sent in traffic if sent.source in robots])
         ax.set_xlim(-WINDOW_S, 0)
         ax.set_ylim(-1, 1)
         ax.set_yticks([0.5, -0.5], ["to robots", "from robots"], fontsize=7.5)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from dva_sim.errors import ConfigError
 from dva_sim.scenario import Scenario
-from dva_sim.simulation import Recording
+from dva_sim.simulation import Playback
 
 MOVING, STANDING, DRAWN = (".gif", ".mp4"), (".png", ".jpg"), (".png", ".pdf", ".svg")
 MOST_PANELS = 24
@@ -99,7 +99,7 @@ class Wanted:
                 lasts = f"which lasts at most {scenario.horizon_s:g} s"
                 raise ConfigError(f"--at {time:g} is not within the run, {lasts}")
 
-    def write(self, recordings: Sequence[Recording]) -> Iterator[str]:
+    def write(self, recordings: Sequence[Playback]) -> Iterator[str]:
         """Write everything, and say of each what it is and where.
 
         Args:
