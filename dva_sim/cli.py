@@ -14,6 +14,7 @@ app = typer.Typer(
     help="A test bench for surveillance teams of people and teleoperated robots.",
     no_args_is_help=True,
     add_completion=False,
+    rich_markup_mode=None,  # a third of the time that help takes
     pretty_exceptions_enable=False,
 )
 
@@ -33,16 +34,44 @@ def run(
     limit: Annotated[
         float, typer.Option(metavar="SECONDS", min=1, help="A run that takes longer has failed.")
     ] = 600,
+    full: Annotated[bool, typer.Option("--full", help="The study's larger version.")] = False,
+    pilot: Annotated[
+        int | None,
+        typer.Option(metavar="PERSONS", min=1, help="Only so many, with luck of their own."),
+    ] = None,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Only say what would run.")] = False,
 ) -> None:
     """Run a study, or go on with one that was interrupted, and write its report."""
     from dva_sim.experiments import console
 
     changes = [*(set_ or []), *([f"seed={seed}"] if seed is not None else [])]
+    version = console.Version(full, pilot)
     if dry_run:
-        console.plan(study, changes, out, jobs)
+        console.plan(study, changes, out, jobs, version)
         return
-    raise typer.Exit(console.run(study, changes, out, jobs, limit))
+    raise typer.Exit(console.run(study, changes, out, jobs, limit, version))
+
+
+@app.command()
+def new(name: Annotated[str, typer.Argument(help="Name or path of the new study.")]) -> None:
+    """Write a study to begin with: it runs as it stands, and says in comments what can be changed."""
+    from dva_sim.experiments import console
+
+    console.new(name)
+
+
+@app.command()
+def register(
+    study: Annotated[str, typer.Argument(help="A study by name or path.")],
+    full: Annotated[bool, typer.Option("--full", help="Its larger version.")] = False,
+    again: Annotated[
+        bool, typer.Option("--again", help="In place of an earlier registration; it will be told.")
+    ] = False,
+) -> None:
+    """Fix a study's hypotheses and size before it is run; the run then confirms or refutes them."""
+    from dva_sim.experiments import console
+
+    console.register(study, full, again)
 
 
 @app.command()
@@ -58,11 +87,15 @@ def tune(
 
 
 @app.command()
-def report(folder: Annotated[Path, typer.Argument(help="A results folder.")]) -> None:
-    """Make the report of a results folder again."""
+def report(
+    folder: Annotated[Path, typer.Argument(help="A results folder.")],
+    pdf: Annotated[bool, typer.Option("--pdf", help="As PDF too, for print.")] = False,
+) -> None:
+    """Make the report of a results folder again: a page, its figures, and the numbers in them."""
     from dva_sim.experiments.report import write_report
 
-    typer.echo(f"Report: {write_report(folder)}")
+    page = write_report(folder, pdf)
+    typer.echo(f"Report: {page}{' and report.pdf' if pdf else ''}")
 
 
 @app.command()

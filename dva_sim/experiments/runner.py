@@ -4,32 +4,24 @@ from __future__ import annotations
 
 import json
 import os
-import platform
 import time
-from collections import defaultdict
 from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from dva_sim import __version__
 from dva_sim.errors import ConfigError, DvaSimError
 from dva_sim.experiments import design, pool
-from dva_sim.experiments.design import Cell, Job, Key
-from dva_sim.experiments.fingerprint import fingerprint
+from dva_sim.experiments.design import Job, Key
 from dva_sim.experiments.journal import FILE, Journal
+from dva_sim.experiments.manifest import failures, machine, manifest_of, write_json
 from dva_sim.experiments.pool import Episode
-from dva_sim.experiments.repeats import parameter_sets
-from dva_sim.experiments.results import MANIFEST
+from dva_sim.experiments.results import MACHINE, MANIFEST
 from dva_sim.experiments.study import Study
-from dva_sim.experiments.tables import design_row, write_tables
+from dva_sim.experiments.tables import write_tables
 from dva_sim.experiments.tuned import load_tuned
-
-MACHINE = "machine.json"
-_PACKAGES = ("duckdb", "lxml", "numpy", "pymunk", "scipy", "shapely", "simpy")
 
 Progress = Callable[[int, int], object]
 
@@ -89,15 +81,16 @@ def run_study(
         raise ConfigError(f"number of processes should be at least 1, not {workers}")
     cells = design.cells(study)
     todo = design.jobs(study, cells)
-    manifest = _manifest(study, cells, todo)
+    manifest = manifest_of(study, cells, todo)
     started, clock = datetime.now(UTC), time.perf_counter()
     with _open(out, manifest) as journal:
         _run_rest(todo, journal, episode or _simulation(), workers, progress, limit_s)
         write_tables(out, todo, journal)
-        manifest["failures"] = _failures(todo, journal)
-        _write_json(out / MANIFEST, manifest)
-        session = {"started": started.isoformat(), "wall_s": time.perf_counter() - clock}
-        _write_json(out / MACHINE, _machine(todo, journal, workers) | session)
+        manifest["failures"] = failures(todo, journal)
+        write_json(out / MANIFEST, manifest)
+        session = {"cores": cores(), "jobs": workers, "started": started.isoformat()}
+        session["wall_s"] = time.perf_counter() - clock
+        write_json(out / MACHINE, machine(todo, journal) | session)
     return out
 
 
@@ -112,7 +105,7 @@ def dry_run(study: Study, out: str | Path, *, jobs: int | None = None) -> DryRun
     keys = {job.key for job in todo}
     costs: dict[Key, float] = {}
     if (Path(out) / FILE).exists():
-        with _open(Path(out), _manifest(study, cells, todo)) as journal:
+        with _open(Path(out), manifest_of(study, cells, todo)) as journal:
             costs = journal.costs()
     left = len(keys - costs.keys())
     mean = sum(costs.values()) / len(costs) if costs else None
@@ -178,77 +171,7 @@ def _open(out: Path, manifest: dict[str, Any]) -> Journal:
     return Journal(out, identity)
 
 
-def _manifest(study: Study, cells: Sequence[Cell], todo: Sequence[Job]) -> dict[str, Any]:
-    """What was asked and run: nothing in it depends on when, where or how fast."""
-    tuned = design.is_tuned(study)
-    content: dict[str, Any] = {
-        "question": study.question,
-        "study": study.model_dump(mode="json"),
-        "scenarios": {
-            part: design.base_scenario(study, part).model_dump(mode="json") for part in study.parts
-        },
-        "set": list(study.settings),
-        "changes": dict(study.changes),
-        "inputs": design.inputs(cells),
-        "cells": [_cell_row(cell) for cell in cells],
-        "parameter_sets": parameter_sets(study),
-        "tuned": load_tuned(study).model_dump(mode="json") if tuned else None,
-        "basis": design.basis_of_tuning(study).model_dump(mode="json") if tuned else None,
-        "runs": len({job.key for job in todo}),
-        "seeds": {
-            "study": study.seed,
-            "population": study.seed,
-            "rule": "a run's seed depends on the study's seed, the part, the person and the "
-            "trial, never on the cell: all cells share their luck, and repeats share it too",
-        },
-        "versions": {"dva-sim": __version__, "fingerprint": fingerprint()},
-    }
-    identity = design.stable_hash(content)
-    content["versions"]["python"] = platform.python_version()
-    content["versions"] |= {name: version(name) for name in _PACKAGES}
-    return content | {"hash": identity}
-
-
 def _remark(study: Study) -> str:
     if not design.is_tuned(study):
         return ""
     return load_tuned(study).remark(design.basis_of_tuning(study))
-
-
-def _cell_row(cell: Cell) -> dict[str, Any]:
-    levels = dict(cell.levels)
-    return {"part": cell.part, "cell": cell.index, "config": cell.config, "levels": levels}
-
-
-def _failures(todo: Sequence[Job], journal: Journal) -> list[dict[str, Any]]:
-    """Failed runs in the order of the design."""
-    failures = journal.failures()
-    return [design_row(j) | {"error": failures[j.key]} for j in todo if j.key in failures]
-
-
-def _machine(todo: Sequence[Job], journal: Journal, workers: int) -> dict[str, Any]:
-    """What is different on every machine and at every time."""
-    costs = journal.costs()
-    spent: dict[str, list[float]] = defaultdict(list)
-    for job in {job.key: job for job in todo}.values():
-        if job.key in costs:
-            spent[f"{job.part}/{job.index}"].append(costs[job.key])
-    return {
-        "platform": platform.platform(),
-        "cores": cores(),
-        "jobs": workers,
-        "cpu_s": sum(costs.values()),
-        "cpu_s_per_run": {cell: sum(c) / len(c) for cell, c in spent.items()},
-    }
-
-
-def _write_json(path: Path, data: dict[str, Any]) -> None:
-    """Whole or not at all, whatever happens meanwhile."""
-    part = path.with_name(f".{path.name}.{os.getpid()}")
-    text = json.dumps(data, indent=2, ensure_ascii=False) + "\n"
-    try:
-        part.write_text(text, encoding="utf-8", newline="\n")
-        part.replace(path)
-    except OSError as error:
-        part.unlink(missing_ok=True)
-        raise DvaSimError(f"{path} cannot be written: {error.strerror}") from None
