@@ -54,10 +54,10 @@ def run(
 
 @app.command()
 def new(name: Annotated[str, typer.Argument(help="Name or path of the new study.")]) -> None:
-    """Write a study to begin with: it runs as it stands, and says in comments what can be changed."""
-    from dva_sim.experiments import console
+    """Write a study to begin with: it runs as it stands, and comments say what can be changed."""
+    from dva_sim.experiments.starting import write_study
 
-    console.new(name)
+    typer.echo(write_study(name))
 
 
 @app.command()
@@ -69,9 +69,10 @@ def register(
     ] = False,
 ) -> None:
     """Fix a study's hypotheses and size before it is run; the run then confirms or refutes them."""
-    from dva_sim.experiments import console
+    from dva_sim.experiments.registration import register as write_down
+    from dva_sim.experiments.study import load_study
 
-    console.register(study, full, again)
+    typer.echo(write_down(load_study(study, full=full), again))
 
 
 @app.command()

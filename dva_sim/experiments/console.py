@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -176,7 +177,32 @@ def _fared(row: dict[str, Any], recording: Recording) -> str:
 # --- studies ---------------------------------------------------------------------------
 
 
-def run(name: str, pairs: list[str], out: Path | None, jobs: int | None, limit_s: float) -> int:
+@dataclass(frozen=True)
+class Version:
+    """Which version of a study is meant.
+
+    Attributes:
+        full: The larger one.
+        pilot: Only so many persons.
+    """
+
+    full: bool = False
+    pilot: int | None = None
+
+    def folder(self, name: str) -> Path:
+        """Where results go if nobody says: each version has its own folder."""
+        marks = ["-full"] * self.full + ["-pilot"] * (self.pilot is not None)
+        return Path("results") / "".join([Path(name).stem, *marks])
+
+
+def run(
+    name: str,
+    pairs: list[str],
+    out: Path | None,
+    jobs: int | None,
+    limit_s: float,
+    version: Version,
+) -> int:
     """Run a study with a progress bar, then write its report; the exit code."""
     from dva_sim.experiments.episode import rehearse_all
     from dva_sim.experiments.report import write_report
@@ -184,7 +210,8 @@ def run(name: str, pairs: list[str], out: Path | None, jobs: int | None, limit_s
     from dva_sim.experiments.runner import dry_run, run_study
     from dva_sim.experiments.study import load_study
 
-    study, folder = load_study(name, pairs), _folder(name, out)
+    study = load_study(name, pairs, full=version.full, pilot=version.pilot)
+    folder = out if out is not None else version.folder(name)
     say(f"[bold]{escape(study.question)}[/bold]")
     before = dry_run(study, folder, jobs=jobs)
     rehearse_all(study)
@@ -238,20 +265,17 @@ def tune(name: str, out: Path | None, jobs: int | None) -> int:
     return 0
 
 
-def plan(name: str, pairs: list[str], out: Path | None, jobs: int | None) -> None:
+def plan(name: str, pairs: list[str], out: Path | None, jobs: int | None, version: Version) -> None:
     """Say what `run` would do."""
     from dva_sim.experiments.episode import rehearse_all
     from dva_sim.experiments.runner import dry_run
     from dva_sim.experiments.study import load_study
 
-    study, folder = load_study(name, pairs), _folder(name, out)
+    study = load_study(name, pairs, full=version.full, pilot=version.pilot)
+    folder = out if out is not None else version.folder(name)
     plan = dry_run(study, folder, jobs=jobs)
     rehearse_all(study)
     _say_plan(plan, folder)
-
-
-def _folder(name: str, out: Path | None) -> Path:
-    return out if out is not None else Path("results") / Path(name).stem
 
 
 def _say_plan(plan: Any, folder: Path) -> None:

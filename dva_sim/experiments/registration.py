@@ -13,7 +13,7 @@ from typing import Any
 
 from dva_sim import __version__
 from dva_sim.config import Config, load_yaml, validate
-from dva_sim.errors import ConfigError
+from dva_sim.errors import ConfigError, DvaSimError
 from dva_sim.experiments import design
 from dva_sim.experiments.asking import POINT
 from dva_sim.experiments.fingerprint import fingerprint
@@ -74,8 +74,8 @@ def load_registration(path: Path) -> Registration | None:
     return validate(Registration, document.data, document.error)
 
 
-def register(study: Study, again: bool = False) -> Path:
-    """Write down what the confirmatory run of a study will be.
+def register(study: Study, again: bool = False) -> str:
+    """Write down what the confirmatory run of a study will be, and say so.
 
     Args:
         study: As its file says, in one of its versions.
@@ -97,8 +97,12 @@ def register(study: Study, again: bool = False) -> Path:
         plan=plan_of(study),
     )
     made = made.model_copy(update={"hash": made.proper_hash})
-    path.write_text(_as_text(made), encoding="utf-8", newline="\n")
-    return path
+    try:
+        path.write_text(_as_text(made), encoding="utf-8", newline="\n")
+    except OSError as error:
+        raise DvaSimError(f"{path} cannot be written: {error.strerror}") from None
+    names, size = ", ".join(study.hypotheses), f"{study.persons} persons x {study.replications}"
+    return f"Registered {names} on {size} trials, in {path}\nIts run, unchanged, confirms or refutes"
 
 
 def plan_of(study: Study) -> dict[str, Any]:
@@ -118,7 +122,7 @@ def plan_of(study: Study) -> dict[str, Any]:
         "inputs": sorted(files.values()),
     }
     plan: dict[str, Any] = json.loads(json.dumps(asked | resolved))
-    return plan
+    return {key: value for key, value in plan.items() if value not in (None, [], {})}
 
 
 def settled(study: Study) -> Study:
