@@ -16,6 +16,7 @@ from dva_sim.experiments.labels import (
     number,
     percent,
     unit_of,
+    with_unit,
 )
 from dva_sim.experiments.statistics import mean_interval
 from dva_sim.experiments.support import Support
@@ -45,7 +46,7 @@ class CellTable:
 # column of the runs, head, how the runs of a cell become one number, how it is printed
 _Summarise = Callable[[Floats], Any]
 Summary = tuple[str, str, _Summarise, Callable[[float], str]]
-_SUMMARIES: tuple[Summary, ...] = (
+SUMMARIES: tuple[Summary, ...] = (
     ("command_age_mean_s", "age of commands at application [s]", np.mean, number),
     ("age_in_force_mean_s", "age of the command in force [s]", np.mean, number),
     ("loop_delay_mean_s", "observation to effect, sum of stages [s]", np.mean, number),
@@ -64,13 +65,26 @@ _SUMMARIES: tuple[Summary, ...] = (
 def cell_table(
     part: Part,
     measure: str,
-    summaries: Sequence[Summary] = _SUMMARIES,
+    summaries: Sequence[Summary] = SUMMARIES,
     support: Support | None = None,
     possible: tuple[float, float] = (-np.inf, np.inf),
+    is_listed: bool = False,
+    points: Sequence[str] = (),
 ) -> CellTable:
-    """Every cell of a part: size, confirmed share, the measure with its interval, and the rest."""
+    """Every cell of a part: size, confirmed share, the measure with its interval, and the rest.
+
+    Args:
+        part: The runs.
+        measure: Column that is shown with its interval.
+        summaries: What else is shown.
+        support: Which cells are extrapolations.
+        possible: Least and greatest value of the measure.
+        is_listed: Whether the design names its cells, so that those without a run are none.
+        points: Continuous factors, whose values are shown for each cell.
+    """
     settings = list(part.settings())
-    columns = [_counts(part), _confirmed(part), *_measure(part, measure, possible)]
+    columns: list[_Column | None] = [_value(part, name) for name in points]
+    columns += [_counts(part), _confirmed(part), *_measure(part, measure, possible)]
     columns += [*_others(part, [s for s in summaries if s[0] != measure]), _beyond(support)]
     there = [c for c in columns if c is not None]
     names = [factor_name(f.name) for f in part.factors]
@@ -78,9 +92,13 @@ def cell_table(
         [*_cell_name(setting), *(values[i] for _, values in there)]
         for i, setting in enumerate(settings)
     ]
-    empty = sum(1 for values in _cells(part, "seed") if not len(values))
-    note = _what_is_covered(support)
-    return CellTable(part.name, [*names, *(h for h, _ in there)], len(names), rows, empty, note)
+    ran = [bool(there) for there in part.ran.ravel()]
+    if is_listed:
+        rows = [row for row, there in zip(rows, ran, strict=True) if there]
+    empty = 0 if is_listed else ran.count(False)
+    heads = [*names, *(head for head, _ in there)]
+    labels = len(names) + len(points)
+    return CellTable(part.name, heads, labels, rows, empty, _what_is_covered(support))
 
 
 _Column = tuple[str, list[str]]
@@ -98,6 +116,12 @@ def _by_cell(part: Part, grid: Floats) -> Floats:
 
 def _cell_name(setting: Setting) -> list[str]:
     return [level_name(factor, level) for factor, level in setting.items()]
+
+
+def _value(part: Part, name: str) -> _Column:
+    """A continuous factor's value in each cell."""
+    values = [float(cell[0]) if len(cell) else np.nan for cell in _cells(part, name)]
+    return with_unit(name), [number(value) for value in values]
 
 
 def _counts(part: Part) -> _Column:

@@ -10,7 +10,8 @@ import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,7 @@ from dva_sim.experiments.labels import Level
 Table = Mapping[str, NDArray[Any]]
 Floats = NDArray[np.float64]
 Setting = dict[str, Level]
+_Entry = TypeVar("_Entry", np.float64, np.bool_)
 
 MOST_PANELS = 4
 
@@ -69,6 +71,13 @@ class Part:
     def __len__(self) -> int:
         return int(self._known.sum())
 
+    @cached_property
+    def ran(self) -> NDArray[np.bool_]:
+        """Whether each cell `(levels of factor 1, ...)` has a run at all."""
+        ran = np.zeros([len(f.levels) for f in self.factors], dtype=bool)
+        ran[tuple(i[self._known] for i in self._index[: len(self.factors)])] = True
+        return ran
+
     def has(self, column: str) -> bool:
         """Whether at least one run gives a number for this column."""
         values = self.treated.get(column)
@@ -98,13 +107,13 @@ class Part:
         """Whether an excess can be taken at all."""
         return bool(np.isfinite(self.reference(column)).any())
 
-    def where(self, grid: Floats, setting: Mapping[str, Level]) -> Floats:
+    def where(self, grid: NDArray[_Entry], setting: Mapping[str, Level]) -> NDArray[_Entry]:
         """The part of a grid at some levels; the axes of the other factors stay."""
         index = tuple(
             f.levels.index(setting[f.name]) if f.name in setting else slice(None)
             for f in self.factors
         )
-        return grid[index]
+        return np.asarray(grid[index])
 
     def settings(self, but: Sequence[str] = ()) -> Iterator[Setting]:
         """Every combination of levels of the factors, except those named in `but`."""
@@ -152,10 +161,14 @@ class View:
 
     @property
     def panels(self) -> list[Setting]:
-        """Settings of all other factors, the last fastest; of each, the answer's level first."""
+        """Settings of all other factors, the last fastest; of each, the answer's level first.
+
+        Settings that the design leaves out are no panels.
+        """
         names = [f.name for f in (self.line, self.over) if f]
         every = list(self.part.settings(but=names))
-        return sorted(every, key=lambda panel: [self._is_aside(*item) for item in panel.items()])
+        order = sorted(every, key=lambda panel: [self._is_aside(*item) for item in panel.items()])
+        return [panel for panel in order if self.part.where(self.part.ran, panel).any()] or order
 
     @property
     def shown(self) -> list[Setting]:
@@ -170,10 +183,21 @@ class View:
         """The greatest difference between two values that the measure can take."""
         return self.possible[1] - self.possible[0]
 
+    def setting(self, panel: Setting, line: Level) -> Setting:
+        """The levels that a line of a panel stands for."""
+        return dict(panel) | ({self.line.name: line} if self.line else {})
+
+    def along_x(self) -> dict[str, Any]:
+        """The levels along x under their factor's name; nothing where there is no such factor."""
+        return {self.over.name: self.over.levels} if self.over else {}
+
+    def at_stop(self, stop: int) -> Setting:
+        """The level along x of one stop."""
+        return {self.over.name: self.over.levels[stop]} if self.over else {}
+
     def curve(self, grid: Floats, panel: Setting, line: Level) -> Floats:
         """Values along x as `(stops, persons, trials)`."""
-        setting = dict(panel) | ({self.line.name: line} if self.line else {})
-        values = self.part.where(grid, setting)
+        values = self.part.where(grid, self.setting(panel, line))
         return values if self.over else values[np.newaxis]
 
     @property
@@ -191,8 +215,8 @@ class View:
         return [int(stop) for stop in np.flatnonzero(marks)]
 
     def _marks(self, panel: Setting, line: Level) -> NDArray[np.bool_]:
-        setting = dict(panel) | ({self.line.name: line} if self.line else {})
-        return np.atleast_1d(self.part.where(np.asarray(self.outside, dtype=float), setting) > 0)
+        outside = np.asarray(self.outside, dtype=float)
+        return np.atleast_1d(self.part.where(outside, self.setting(panel, line)) > 0)
 
     def difference(self, panel: Setting, first: Level, second: Level) -> Floats:
         """First minus second, paired by person and trial, as person means `(persons, stops)`."""

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from dva_sim.experiments.answer import Finding, Missed
-from dva_sim.experiments.asking import TUNING
+from dva_sim.experiments.asking import POINT, TUNING
 from dva_sim.experiments.effects import (
     Factor,
     Floats,
@@ -20,10 +20,11 @@ from dva_sim.experiments.effects import (
     person_means,
     present,
 )
-from dva_sim.experiments.labels import Level, unit_of
+from dva_sim.experiments.labels import Level, brief, unit_of
 from dva_sim.experiments.statistics import Interval, band
 
 _NEVER_NEGATIVE = ("s", "m", "Hz", "bit/s", "N s")
+ROW = "row"  # name of the factor whose levels are the rows of a list
 _KEYS = {"part", "cell", "config", "is_reference", "person", "trial", "seed"}
 
 
@@ -32,11 +33,92 @@ def factors_of(study: Mapping[str, Any]) -> list[Factor]:
     return [Factor(name, tuple(levels)) for name, levels in study.get("factors", {}).items()]
 
 
+def layout_of(
+    study: Mapping[str, Any], runs: Table, are_points_trials: bool = True
+) -> tuple[Table, list[Factor]]:
+    """The runs with the factors by which they are laid out as a grid.
+
+    In the full grid these are the factors declared. Factors whose levels are taken together are
+    one, that of which the answer speaks or the first. Points in ranges are like trials: a person
+    meets them all, and what is compared is compared at each. Rows that leave most of their grid
+    empty are one factor, unless the answer needs the others.
+
+    Args:
+        study: As the manifest has it.
+        runs: The table of runs.
+        are_points_trials: Otherwise the point is a factor of its own.
+    """
+    factors, design = factors_of(study), study.get("design") or {}
+    if together := design.get("zip"):
+        kept = _spoken_of(study, together)
+        return runs, [f for f in factors if f.name not in together or f.name == kept]
+    if POINT in study.get("factors", {}) and POINT in runs and are_points_trials:
+        return _as_trials(runs), [f for f in factors if f.name != POINT]
+    if design and not study.get("answer") and _is_sparse(runs, factors):
+        return _as_rows(runs, factors)
+    return runs, factors
+
+
+def points_of(study: Mapping[str, Any], runs: Table) -> list[str]:
+    """Continuous factors: columns of numbers that tell where in its ranges each run lies."""
+    if POINT not in study.get("factors", {}) or POINT not in runs:
+        return []
+    design = list(runs)[: list(runs).index("is_reference")]
+    names = [n for n in design if n not in _KEYS and n not in study["factors"]]
+    return [n for n in names if np.isfinite(as_floats(runs[n])).any()]
+
+
+def _spoken_of(study: Mapping[str, Any], together: Sequence[str]) -> str:
+    """Which of the factors taken together stands for them."""
+    declared = study.get("answer") or {}
+    named = [declared.get("factor"), declared.get("over"), *(declared.get("within") or {})]
+    return next((name for name in named if name in together), together[0])
+
+
+def _as_trials(runs: Table) -> Table:
+    """Each point and trial as a trial of its own; a reference run is that of every point."""
+    aside = np.asarray(runs["is_reference"]).astype(bool)
+    points = np.unique(as_floats(runs[POINT])[~aside]).astype(int)
+    own, shared = np.flatnonzero(~aside), np.flatnonzero(aside)
+    rows = np.concatenate([own, np.tile(shared, len(points))])
+    point = np.concatenate([as_floats(runs[POINT])[own].astype(int), points.repeat(len(shared))])
+    trial = np.asarray(runs["trial"])[rows]
+    count = int(trial.max(initial=0)) + 1
+    return {key: np.asarray(v)[rows] for key, v in runs.items()} | {"trial": point * count + trial}
+
+
+def _is_sparse(runs: Table, factors: Sequence[Factor]) -> bool:
+    """Whether fewer than half of the cells of the grid were run."""
+    treated = ~np.asarray(runs["is_reference"]).astype(bool)
+    ran = len(np.unique(np.asarray(runs["cell"])[treated])) if "cell" in runs else 0
+    return 2 * ran < math.prod(len(f.levels) for f in factors)
+
+
+def _as_rows(runs: Table, factors: Sequence[Factor]) -> tuple[Table, list[Factor]]:
+    """The rows of a list as the levels of one factor, named by what they set."""
+    cells, first = np.unique(np.asarray(runs["cell"]), return_index=True)
+    names = {
+        int(cell): brief({f.name: _plain(runs[f.name][at]) for f in factors})
+        for cell, at in zip(cells, first, strict=True)
+        if cell >= 0
+    }
+    column = np.array([names.get(int(cell), "") for cell in runs["cell"]], dtype=object)
+    return dict(runs) | {ROW: column}, [Factor(ROW, tuple(names.values()))]
+
+
+def _plain(value: Any) -> Level:
+    """A level as it was declared: numpy's numbers as Python's."""
+    plain: Level = value.item() if isinstance(value, np.generic) else value
+    return plain
+
+
 def keys_of(study: Mapping[str, Any]) -> list[Factor]:
     """The scenario keys that vary, with their levels: treatments by what they change."""
     keys: dict[str, list[Level]] = {}
     for factor, levels in study.get("factors", {}).items():
         named = study.get("treatments", {}).get(factor)
+        if factor == POINT:
+            continue
         if factor == TUNING:
             keys[study["tuning"]["key"]] = list(study["tuning"]["levels"])
         elif named is None:
@@ -56,11 +138,15 @@ def view_of(study: Mapping[str, Any], runs: Table) -> View | None:
     declared = study.get("answer") or {}
     parts = list(dict.fromkeys(str(p) for p in runs["part"]))
     name = declared.get("part") if declared.get("part") in parts else next(iter(parts), None)
-    part = Part(runs, name, factors_of(study)) if name else None
+    table, factors = layout_of(study, runs)
+    part = Part(table, name, factors) if name else None
     if part is None or not len(part):
         return None
-    over = _factor(part, declared.get("over")) or _longest_numeric(part.factors)
-    line = _factor(part, declared.get("factor")) or _other(part.factors, over)
+    over = _factor(part, declared.get("over"))
+    line = _factor(part, declared.get("factor"))
+    if over is None and not (line and "over" in declared):
+        over = _longest_numeric([f for f in part.factors if f is not line])
+    line = line or _other(part.factors, over)
     within = {k: v for k, v in (declared.get("within") or {}).items() if _factor(part, k)}
     measure = declared.get("measure") or _first_measure(part)
     return View(

@@ -19,6 +19,7 @@ from dva_sim.experiments.figures.style import (
     place_of,
     styled,
 )
+from dva_sim.experiments.statistics import band
 
 DELAY = Factor("link.delay_s", (0.0, 0.05, 0.1, 0.25, 0.5, 1.0))
 PATTERN = Factor("pattern", ("req-rep", "pub-sub", "latest-wins"))
@@ -142,7 +143,7 @@ def test_four_settings_stand_two_by_two_with_the_answers_levels_first():
 def test_bands_end_where_nothing_is_possible_and_do_not_flatten_the_lines():
     few = np.array([[40.0, 60.0], [80.0, 90.0]])  # two persons, so bands of hundreds of seconds
     _, ((ax,),) = panels(1, 1, 3.0)
-    _band(ax, few, "black", 0.0, (0.0, 240.0))
+    _band(ax, band(few), "black", "o", 0.0, (0.0, 240.0))
     heights = ax.collections[0].get_paths()[0].vertices[:, 1]
     assert (heights.min(), heights.max()) == (0.0, 240.0)
     assert "they are cut" in _fit_to(ax, few.ravel())
@@ -152,7 +153,7 @@ def test_bands_end_where_nothing_is_possible_and_do_not_flatten_the_lines():
 def test_narrow_bands_are_shown_whole():
     _, ((ax,),) = panels(1, 1, 3.0)
     many = np.linspace([40.0, 45.0], [60.0, 65.0], 24)
-    _band(ax, many, "black", 0.0, (0.0, 240.0))
+    _band(ax, band(many), "black", "o", 0.0, (0.0, 240.0))
     before = ax.get_ylim()
     assert _fit_to(ax, many.ravel()) == ""
     assert ax.get_ylim() == before

@@ -6,16 +6,17 @@ import synthetic_study
 
 from dva_sim.errors import ConfigError
 from dva_sim.experiments.conditions import conditions
-from dva_sim.experiments.report import _levels, write_report
+from dva_sim.experiments.report import write_report
+from dva_sim.experiments.sections import _levels
 
 FIGURES = [
-    "differences",
-    "robustness",
-    "levels",
     "distributions",
+    "differences",
+    "levels",
+    "robustness",
+    "delay_budget",
     "command_age",
     "command_rate",
-    "delay_budget",
     "trajectories",
     "story_times",
     "story_outcomes",
@@ -119,7 +120,7 @@ def test_the_figures_come_in_order_and_as_files(report):
     page = report.read_text(encoding="utf-8")
     assert re.findall(r'<figure id="(\w+)"', page) == FIGURES
     files = {path.name for path in (report.parent / "figures").iterdir()}
-    assert files == {f"{name}.{ending}" for name in FIGURES for ending in ("svg", "png")}
+    assert files == {f"{name}.{ending}" for name in FIGURES for ending in ("svg", "png", "csv")}
 
 
 def test_the_report_made_again_has_the_same_bytes(report):
@@ -136,7 +137,8 @@ def test_every_cell_has_its_row(report):
 
 
 def test_a_study_that_went_as_declared_is_not_called_exploratory(report):
-    assert "exploratory" not in words(report)
+    assert "Exploratory" not in words(report)
+    assert "Declared: run as its file says" in words(report)
 
 
 def test_a_poor_study_is_reported_for_what_it_is(tmp_path):
@@ -149,8 +151,8 @@ def test_a_poor_study_is_reported_for_what_it_is(tmp_path):
         failures=[{"part": "drive", "error": "robot-1 left the world"}],
     )
     text = words(write_report(synthetic_study.write(tmp_path / "r", {"runs": runs}, facts)))
-    assert "exploratory" in text
-    assert "replications=1 , robot.count=1" in text
+    assert "Exploratory" in text
+    assert "Changed on the command line: replications=1, robot.count=1." in text
     assert "Too few persons to answer" in text
     assert "Runs that failed and are missing below: 1 (robot-1 left the world)" in text
     assert "Safety invariants were broken in 1 runs" in text
@@ -202,7 +204,7 @@ def test_what_a_treatment_changes_is_said_and_counts_as_varied(tmp_path):
     factors |= {"profile": synthetic_study.PROFILES}
     facts["study"] |= {"treatments": treatments, "factors": factors, "answer": None}
     text = words(write_report(synthetic_study.write(tmp_path / "r", {"runs": runs}, facts)))
-    assert "near : nothing far : one-way delay 1 s" in text
+    assert "near: nothing far: one-way delay 1 s" in text
     assert "one-way delay varied varied" in text
     assert "The time-out is above four round trips and the processing time" in text
 
@@ -212,5 +214,5 @@ def test_conditions_name_what_a_study_changed_and_a_class_with_its_file():
     rows = dict(conditions({"drive": scenario}, [], also=["pattern", "operator.traits"]))
     assert rows["messaging pattern"] == ["latest-wins"]
     assert rows["operator traits"] == ["crossover_rad_s 1.2"]
-    _, levels = _levels("phone.filter", ("none", "/tmp/mine.py:Mine"))
+    levels = _levels("phone.filter", ("none", "/tmp/mine.py:Mine"))
     assert levels == "none and Mine (/tmp/mine.py)"

@@ -20,42 +20,32 @@ from dva_sim.experiments.figures import (
 )
 from dva_sim.experiments.figures.style import Drawn, styled
 from dva_sim.experiments.labels import Level, factor_name, listing
-from dva_sim.experiments.robustness import Robustness
+from dva_sim.experiments.summary import Reading
 
 __all__ = ["Drawn", "draw_all"]
 
-_OF_ONE_PANEL = ("trajectories", "robustness")
+_OF_ONE_PANEL = ("heat_map", "trajectories", "robustness")
 
 
-def draw_all(
-    view: View,
-    tables: Mapping[str, Table],
-    scenario: Mapping[str, Any],
-    robustness: Robustness | None = None,
-) -> list[Drawn]:
-    """Every figure that the tables have the columns for, in the order of the report.
-
-    Args:
-        view: How to look at the part the answer is about.
-        tables: `events` and `tracks`, where the study has them.
-        scenario: The part's scenario before any factor changed it.
-        robustness: The contrast under other models of the persons.
-    """
-    cadence_of = _cadences(view, scenario)
+def draw_all(reading: Reading) -> list[Drawn]:
+    """Every figure that the tables have the columns for, in the order of the report."""
+    view = reading.view
+    if view is None:
+        return []
+    scenario, tracks = reading.scenario_of(view.part.name), reading.table("tracks")
+    cadence_of, robustness = _cadences(view, scenario), reading.robustness
     with styled():
         drawn = [
-            effect.differences(view, cadence_of),
-            repeats.repeats(view, robustness) if robustness else None,
-            effect.measure_levels(view),
             distribution.distributions(view),
+            effect.differences(view, cadence_of),
+            effect.measure_levels(view) if view.line or view.over else None,
+            repeats.repeats(view, robustness) if robustness else None,
+            budget.delay_budget(view),
             commands.command_age(view),
             commands.command_rate(view, cadence_of),
-            budget.delay_budget(view),
+            ground.trajectories(view, tracks, scenario) if tracks else None,
+            *_story(view, reading.table("events")),
         ]
-        if "tracks" in tables:
-            drawn.append(ground.trajectories(view, tables["tracks"], scenario))
-        if "events" in tables:
-            drawn.extend(_story(view, tables["events"]))
     note = _what_panels_are(view)
     there = [f for f in drawn if f is not None]
     return [replace(f, caption=f.caption + note * (f.name not in _OF_ONE_PANEL)) for f in there]
@@ -90,7 +80,7 @@ def _cadences(view: View, scenario: Mapping[str, Any]) -> effect.CadenceOf:
 
 
 def _story(view: View, table: Table) -> list[Drawn | None]:
-    part = story.story_part(table, view)
+    part = story.story_part(table, view) if table else None
     if part is None:
         return []
     events = story.Events(table, part, view)

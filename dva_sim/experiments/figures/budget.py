@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dva_sim.experiments.effects import Floats, Setting, View, nan_mean
+from dva_sim.experiments.figures.numbers import Numbers
 from dva_sim.experiments.figures.style import (
     INK,
     Drawn,
@@ -44,16 +45,20 @@ def delay_budget(view: View) -> Drawn | None:
     stages = [column for column in _STAGES if view.part.has(column)]
     if not stages:
         return None
-    shown = view.shown
+    shown, numbers = view.shown, Numbers()
     height = 2.7 if len(shown) < 3 else 2.2
     figure, axes = panels(len(shown), len(view.lines), height, sharex=True, sharey=True)
     for row, panel in zip(axes, shown, strict=True):
         for ax, level in zip(row, view.lines, strict=True):
-            _stack(ax, {stage: _means(view, stage, panel, level) for stage in stages})
-            _mark(ax, _means(view, _MEASURED, panel, level))
+            means = {stage: _means(view, stage, panel, level) for stage in stages}
+            measured = _means(view, _MEASURED, panel, level)
+            _stack(ax, means)
+            _mark(ax, measured)
+            told = view.along_x() | means | {_MEASURED: measured}
+            numbers.add(view.setting(panel, level), told)
             stops_axis(ax, view.over)
             if view.line and row is axes[0]:
-                ax.set_title(wrapped(level_name(view.line.name, level), 80 // len(view.lines)))
+                ax.set_title(wrapped(level_name(view.line.name, level), 70 // len(view.lines)))
     outer_labels(axes, shown, "Delay [s]")
     _key(figure, stages)
     caption = (
@@ -63,7 +68,7 @@ def delay_budget(view: View) -> Drawn | None:
         "whole, by the time of capture that travels with each command. From sampling to "
         "processing it is the age of the command in force."
     )
-    return finish(figure, "delay_budget", "Where the delay comes from", caption)
+    return finish(figure, "delay_budget", "Where the delay comes from", caption, numbers)
 
 
 def _means(view: View, column: str, panel: Setting, level: Level) -> Floats:

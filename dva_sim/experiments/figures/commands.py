@@ -10,6 +10,7 @@ import numpy as np
 from dva_sim.experiments.cadence import Cadence
 from dva_sim.experiments.effects import Floats, View, nan_mean
 from dva_sim.experiments.figures.effect import CadenceOf, mark_boundary
+from dva_sim.experiments.figures.numbers import Numbers
 from dva_sim.experiments.figures.style import (
     INK,
     Drawn,
@@ -21,6 +22,7 @@ from dva_sim.experiments.figures.style import (
     label_panels,
     legend,
     log_axis,
+    marks,
     name_lines,
     panel_grid,
     wrapped,
@@ -40,11 +42,13 @@ def command_age(view: View) -> Drawn | None:
         return None
     figure, axes = panel_grid(view, 3.0)
     paint = colours(view.line)
-    grids = [view.part.grid(column) for column in columns]
+    grids, numbers = [view.part.grid(column) for column in columns], Numbers()
     for ax, panel in zip(axes, view.shown, strict=True):
         for level, offset in dodge(view.lines):
             ages = [_cell_means(view.curve(grid, panel, level)) for grid in grids]
             _ranges(ax, [stop + offset for stop in range(len(view.stops))], ages, paint[level])
+            told = dict(zip(columns, ages, strict=True))
+            numbers.add(view.setting(panel, level), view.along_x() | told)
     log_axis(axes[0])
     label_panels(axes, view, axis_label("age_s", wrapped("Command age at application", 22)))
     legend(figure, view.line, paint)
@@ -53,7 +57,7 @@ def command_age(view: View) -> Drawn | None:
         "the middle half; thin, 5 to 95 %. Quantiles within runs, averaged over runs; "
         "logarithmic axis."
     )
-    return finish(figure, "command_age", "Age of commands when they take effect", caption)
+    return finish(figure, "command_age", "Age of commands when they take effect", caption, numbers)
 
 
 def command_rate(view: View, cadence_of: CadenceOf) -> Drawn | None:
@@ -61,7 +65,7 @@ def command_rate(view: View, cadence_of: CadenceOf) -> Drawn | None:
     if not view.part.has("command_rate_hz"):
         return None
     figure, axes = panel_grid(view, 3.0)
-    paint, every = colours(view.line), []
+    paint, mark, every, numbers = colours(view.line), marks(view.line), [], Numbers()
     grid = view.part.grid("command_rate_hz")
     for ax, panel in zip(axes, view.shown, strict=True):
         ends: Ends = {}
@@ -69,8 +73,10 @@ def command_rate(view: View, cadence_of: CadenceOf) -> Drawn | None:
             means = _cell_means(view.curve(grid, panel, level))
             size = 4 + 2.5 * (len(view.lines) - 1 - i)  # rings, where lines lie on each other
             ax.plot(means, color=paint[level], lw=1, alpha=0.5)
-            ax.plot(means, "o", ms=size, color=paint[level])
+            ax.plot(means, mark[level], ms=size, color=paint[level])
             ends[level] = float(means[-1])
+            told = view.along_x() | {"command_rate_hz": means}
+            numbers.add(view.setting(panel, level), told)
         _closed_form(ax, view, cadence_of(panel))
         every.append(ends)
     tops = [ax.dataLim.y1 for ax in axes if np.isfinite(ax.dataLim.y1)]  # a panel may be empty
@@ -84,7 +90,7 @@ def command_rate(view: View, cadence_of: CadenceOf) -> Drawn | None:
             "wanted period (where the app only sends what has changed, the shortest it allows), "
             "d the one-way delay and P the processing time."
         )
-    return finish(figure, "command_rate", "Commands applied per second", caption)
+    return finish(figure, "command_rate", "Commands applied per second", caption, numbers)
 
 
 def _cell_means(values: Floats) -> Floats:

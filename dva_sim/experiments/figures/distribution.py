@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dva_sim.experiments.effects import Floats, View, present
+from dva_sim.experiments.figures.numbers import Numbers
 from dva_sim.experiments.figures.style import (
     INK,
     SOFT,
@@ -40,7 +41,7 @@ def distributions(view: View) -> Drawn:
     shown = view.shown
     figure, axes = panels(len(shown), 1, 2.7 if len(shown) < 3 else 2.2, sharex=True, sharey=True)
     paint = colours(view.line)
-    raw, confirmed = view.part.grid(view.measure), _confirmed(view)
+    raw, confirmed, numbers = view.part.grid(view.measure), _confirmed(view), Numbers()
     for (ax,), panel in zip(axes, shown, strict=True):
         for level, offset in dodge(view.lines):
             values = view.curve(raw, panel, level).reshape(len(view.stops), -1)
@@ -48,6 +49,9 @@ def distributions(view: View) -> Drawn:
             width = min(0.3, 0.62 / len(view.lines))
             _dots(ax, offset, width, values, ok, paint[level])
             _boxes(ax, offset, width, values)
+            for stop, told in enumerate(values):
+                where = view.setting(panel, level) | view.at_stop(stop)
+                numbers.add(where, _columns(view, told, ok[stop]))
         _reference_line(ax, view)
         panel_title(ax, panel)
         stops_axis(ax, view.over)
@@ -58,11 +62,24 @@ def distributions(view: View) -> Drawn:
     _spread(axes[0][0], present(raw))
     legend(figure, view.line, paint)
     caption = (
-        "Each dot is one run, none left out; the bar is the median, the box the middle half."
+        "Each dot is one run, none left out; the bar is the median, the box the middle half. "
+        "At each place the columns stand in the order of the key."
         f"{_hollow_words(confirmed)}{hatch_words(view)}"
     )
     title = f"{capital(measure_name(view.measure))} of all {len(view.part):,} runs"
-    return finish(figure, "distributions", title, caption)
+    return finish(figure, "distributions", title, caption, numbers)
+
+
+def _columns(view: View, values: Floats, ok: NDArray[np.bool_]) -> dict[str, Any]:
+    """The runs of a cell that gave a value, with who drove and whether it was confirmed."""
+    persons, trials = view.part.persons, view.part.trials
+    there = np.isfinite(values)
+    told = {
+        "person": np.repeat(persons, len(trials))[there],
+        "trial": np.tile(trials, len(persons))[there],
+        view.measure: values[there],
+    }
+    return told | ({"confirmed": ok[there]} if view.part.has("confirmed") else {})
 
 
 def _hollow_words(confirmed: Floats) -> str:

@@ -17,6 +17,7 @@ from dva_sim.experiments.effects import (
     person_means,
     present,
 )
+from dva_sim.experiments.figures.numbers import Numbers, with_unit
 from dva_sim.experiments.figures.style import (
     FAINT,
     INK,
@@ -30,13 +31,14 @@ from dva_sim.experiments.figures.style import (
     hatch_stops,
     hatch_words,
     label_panels,
+    marks,
     name_lines,
     panel_grid,
     place_of,
     wrapped,
 )
 from dva_sim.experiments.labels import Level, factor_name, level_name, measure_name
-from dva_sim.experiments.statistics import band
+from dva_sim.experiments.statistics import Band, band
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -59,7 +61,9 @@ def differences(view: View, cadence_of: CadenceOf) -> Drawn | None:
     name = level_name(view.line.name, baseline)
     label = axis_label(view.measure, f"Difference against\n{name}")
     limit = view.widest
-    figure, axes, ends, cut = _curves(view, others, curve, label, (-limit, limit), home=0.0)
+    figure, axes, ends, cut, numbers = _curves(
+        view, others, curve, label, (-limit, limit), home=0.0
+    )
     for ax, panel in zip(axes, view.shown, strict=True):
         ax.axhline(0, color=INK, lw=0.8, zorder=1)
         mark_boundary(ax, view.over, cadence_of(panel), text=True)
@@ -71,7 +75,7 @@ def differences(view: View, cadence_of: CadenceOf) -> Drawn | None:
         "shaded, the 95 % band that covers all levels of a line at once; bars, the 95 % interval "
         f"of each level alone.{cut}{zoomed}{_boundary_words(view, cadence_of)}{hatch_words(view)}"
     )
-    return finish(figure, "differences", title, caption)
+    return finish(figure, "differences", title, caption, numbers)
 
 
 def measure_levels(view: View) -> Drawn:
@@ -84,7 +88,7 @@ def measure_levels(view: View) -> Drawn:
     what = capital(_what(view))
     label = axis_label(view.measure, wrapped(what))
     limits = (-view.widest, view.widest) if _in_excess(view) else view.possible
-    figure, axes, ends, cut = _curves(view, view.lines, curve, label, limits)
+    figure, axes, ends, cut, numbers = _curves(view, view.lines, curve, label, limits)
     name_lines(axes, ends, view.line, colours(view.line))
     excess = "Zero is the reference run of the same person and trial. " if _in_excess(view) else ""
     caption = (
@@ -93,7 +97,7 @@ def measure_levels(view: View) -> Drawn:
         f"than from themselves.{cut}{hatch_words(view)}"
     )
     title = f"{what} under each {factor_name(view.line.name)}" if view.line else what
-    return finish(figure, "levels", title, caption)
+    return finish(figure, "levels", title, caption, numbers)
 
 
 def mark_boundary(ax: Axes, over: Factor | None, cadence: Cadence | None, text: bool) -> None:
@@ -124,7 +128,7 @@ def _curves(
     ylabel: str,
     limits: tuple[float, float],
     home: float = math.nan,
-) -> tuple[Figure, list[Axes], list[Ends], str]:
+) -> tuple[Figure, list[Axes], list[Ends], str, Numbers]:
     """A panel for each setting, in it a line with its band for each level, and where it ends.
 
     Args:
@@ -136,20 +140,37 @@ def _curves(
         home: A value that must be seen, such as zero.
 
     Returns:
-        The figure, its axes, the end of each line, and what a caption must say of cut bands.
+        The figure, its axes, the end of each line, what a caption must say of cut bands, and the
+        numbers drawn.
     """
     figure, axes = panel_grid(view, 3.4)
-    paint, every, seen = colours(view.line), [], [np.array([home])]
+    paint, mark, every, seen = colours(view.line), marks(view.line), [], [np.array([home])]
+    numbers = Numbers()
     for ax, panel in zip(axes, view.shown, strict=True):
         ends: Ends = {}
         for i, level in enumerate(lines):
             shift = 0.12 * (i - (len(lines) - 1) / 2)  # bars of two lines stand side by side
-            seen.append(curve(panel, level).ravel())
-            ends[level] = _band(ax, curve(panel, level), paint[level], shift, limits)
+            matrix = curve(panel, level)
+            bands = band(matrix)
+            seen.append(matrix.ravel())
+            ends[level] = _band(ax, bands, paint[level], mark[level], shift, limits)
+            numbers.add(view.setting(panel, level), view.along_x() | _columns(view.measure, bands))
         hatch_stops(ax, view.stops_outside(panel))
         every.append(ends)
     label_panels(axes, view, ylabel)
-    return figure, axes, every, _fit_to(axes[0], present(np.concatenate(seen)))
+    return figure, axes, every, _fit_to(axes[0], present(np.concatenate(seen))), numbers
+
+
+def _columns(measure: str, bands: Band) -> dict[str, Floats]:
+    """A band as columns: mean, simultaneous and pointwise 95 % limits."""
+    edges = {
+        "mean": bands.mean,
+        "band_low": bands.low,
+        "band_high": bands.high,
+        "low": bands.pointwise_low,
+        "high": bands.pointwise_high,
+    }
+    return {with_unit(name, measure): values for name, values in edges.items()}
 
 
 def _fit_to(ax: Axes, values: Floats) -> str:
@@ -190,17 +211,16 @@ def _zoom_on_small(axes: list[Axes], smallest: float | None) -> str:
 
 
 def _band(
-    ax: Axes, matrix: Floats, colour: str, shift: float, limits: tuple[float, float]
+    ax: Axes, bands: Band, colour: str, mark: str, shift: float, limits: tuple[float, float]
 ) -> float:
-    """One line with its band and bars from `(persons, stops)`; gives the height of its end."""
-    bands = band(matrix)
-    x = np.arange(matrix.shape[1]) + shift
+    """One line with its band and bars; gives the height of its end."""
+    x = np.arange(len(bands.mean)) + shift
     low, high = np.clip([bands.low, bands.high], *limits)
     ax.fill_between(x, low, high, color=colour, alpha=0.16, lw=0)
     ax.vlines(
         x, *np.clip([bands.pointwise_low, bands.pointwise_high], *limits), color=colour, lw=1.2
     )
-    ax.plot(x, bands.mean, "-o", color=colour, ms=4)
+    ax.plot(x, bands.mean, "-", marker=mark, color=colour, ms=4.5)
     seen = present(bands.mean)
     return float(seen[-1]) if len(seen) else float("nan")
 

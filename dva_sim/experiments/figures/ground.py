@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from dva_sim.errors import DvaSimError
 from dva_sim.experiments.effects import Floats, Table, View, codes_of
+from dva_sim.experiments.figures.numbers import Numbers
 from dva_sim.experiments.figures.style import (
     INK,
     SOFT,
@@ -40,7 +41,7 @@ def trajectories(view: View, tracks: Table, scenario: Mapping[str, Any]) -> Draw
     low, high = _frame(ways.all_points)
     height = _row_height(high - low, columns=len(view.lines))
     figure, axes = panels(len(stops), len(view.lines), height, sharex=True, sharey=True)
-    paint = colours(view.line)
+    paint, numbers = colours(view.line), Numbers()
     for row, stop in zip(axes, stops, strict=True):
         for ax, level in zip(row, view.lines, strict=True):
             _ground(ax, site)
@@ -48,6 +49,8 @@ def trajectories(view: View, tracks: Table, scenario: Mapping[str, Any]) -> Draw
                 ax.plot(*way.T, color=SOFT, lw=1.3, ls=(0, (3, 2)), zorder=8)
             for way in ways.under(level, stop):
                 _way(ax, way, paint[level])
+                where = view.setting(view.panels[0], level) | _at(view, stop)
+                numbers.add(where, {"x_m": way[:, 0], "y_m": way[:, 1]})
             ax.set_title(_heading(view, level, stop), color=paint[level] if level else INK)
             ax.label_outer()
     axes[0][0].set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
@@ -58,7 +61,11 @@ def trajectories(view: View, tracks: Table, scenario: Mapping[str, Any]) -> Draw
         f"{'' if site else ' The files of the site were not found, so it is left out.'}"
     )
     within = f" ({setting(view.panels[0])})" if view.panels[0] else ""
-    return finish(figure, "trajectories", f"Ways taken{within}", caption)
+    return finish(figure, "trajectories", f"Ways taken{within}", caption, numbers)
+
+
+def _at(view: View, stop: Level) -> dict[str, Level]:
+    return {view.over.name: stop} if view.over else {}
 
 
 class Ways:

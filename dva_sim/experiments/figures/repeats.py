@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from dva_sim.experiments.asking import STRATEGY
 from dva_sim.experiments.effects import Factor, View
+from dva_sim.experiments.figures.numbers import Numbers, with_unit
 from dva_sim.experiments.figures.style import (
     FAINT,
     INK,
@@ -51,7 +52,20 @@ def repeats(view: View, robustness: Robustness) -> Drawn | None:
     if any(repeat.is_beyond for stop in stops for repeat in stop.repeats):
         caption += " Hollow: an extrapolation, at delays at which nobody was watched."
     title = f"The contrast in {measure_name(view.measure)} under other models of the persons"
-    return finish(figure, "robustness", title, caption)
+    return finish(figure, "robustness", title, caption, _numbers(view, robustness))
+
+
+def _numbers(view: View, robustness: Robustness) -> Numbers:
+    """Every repeat, as drawn."""
+    numbers = Numbers()
+    for stop in robustness.stops:
+        for repeat in stop.repeats:
+            edges = {"mean": repeat.mean, "low": repeat.low, "high": repeat.high}
+            told = {with_unit(name, view.measure): value for name, value in edges.items()}
+            who = {"strategy": repeat.strategy, "parameters": repeat.parameters}
+            flags = {"is_own": repeat.is_own, "is_extrapolated": repeat.is_beyond}
+            numbers.row({robustness.over: stop.level}, **who, **told, **flags)
+    return numbers
 
 
 def _own(ax: Axes, stop: Stop) -> None:

@@ -15,6 +15,7 @@ from dva_sim.experiments.effects import (
     as_floats,
     codes_of,
 )
+from dva_sim.experiments.figures.numbers import Numbers
 from dva_sim.experiments.figures.style import (
     Drawn,
     colours,
@@ -131,7 +132,7 @@ def story_part(table: Table, view: View) -> str | None:
 
 def responses(view: View, events: Events) -> Drawn | None:
     """Times of the events that were reached, guards and robots apart; of those who came."""
-    shown, met = view.shown, events.kinds_of_times()
+    shown, met, numbers = view.shown, events.kinds_of_times(), Numbers()
     if not met:
         return None
     figure, axes = panels(len(shown), len(met), 2.4, sharex=True, sharey=True)
@@ -142,6 +143,8 @@ def responses(view: View, events: Events) -> Drawn | None:
                 masks = [events.by(kind) & events.under(panel, level, v) for v in view.stops]
                 times = [events.times(column, mask) for mask in masks]
                 _quartiles(ax, offset, times, paint[level])
+                where = view.setting(panel, level) | {"responder_kind": kind, "time": column}
+                numbers.add(where, view.along_x() | _quantiles(times))
             stops_axis(ax, view.over)
             ax.set_title(title if row is axes[0] else "")
     axes[0][0].set_ylim(bottom=0)
@@ -151,27 +154,30 @@ def responses(view: View, events: Events) -> Drawn | None:
         "Dot, the median; bar, the middle half. Only events that were reached or confirmed have "
         f"such a time{_what_else_came(events)}."
     )
-    return finish(figure, "story_times", "Response, by who responded", caption)
+    return finish(figure, "story_times", "Response, by who responded", caption, numbers)
 
 
 def outcomes(view: View, events: Events) -> Drawn | None:
     """What became of every event, as shares that add up to one; None if all met one fate."""
     if events.one_fate() is not None:
         return None
-    shown = view.shown
+    shown, numbers = view.shown, Numbers()
     figure, axes = panels(len(shown), len(view.lines), 2.3, sharex=True, sharey=True)
     for row, panel in zip(axes, shown, strict=True):
         for ax, level in zip(row, view.lines, strict=True):
-            _stack(ax, [events.shares(events.under(panel, level, v)) for v in view.stops])
+            shares = [events.shares(events.under(panel, level, v)) for v in view.stops]
+            _stack(ax, shares)
+            told = {fate: [share[fate] for share in shares] for fate in _FATES}
+            numbers.add(view.setting(panel, level), view.along_x() | told)
             stops_axis(ax, view.over)
             if view.line and row is axes[0]:
-                ax.set_title(wrapped(level_name(view.line.name, level), 80 // len(view.lines)))
+                ax.set_title(wrapped(level_name(view.line.name, level), 70 // len(view.lines)))
     axes[0][0].yaxis.set_major_formatter(lambda y, _: f"{100 * y:.0f} %")
     axes[0][0].set_ylim(0, 1)
     outer_labels(axes, shown, "Share of events")
     _key(figure, events)
     caption = f"All {len(events):,} events, none left out: each has one of these outcomes."
-    return finish(figure, "story_outcomes", "What became of the events", caption)
+    return finish(figure, "story_outcomes", "What became of the events", caption, numbers)
 
 
 def _what_else_came(events: Events) -> str:
@@ -190,6 +196,14 @@ def _quartiles(ax: Axes, offset: float, times: list[Floats], colour: str) -> Non
     x = np.array(met) + offset
     ax.vlines(x, low, high, color=colour, lw=2.4, alpha=0.55)
     ax.plot(x, middle, "o", color=colour, ms=3.2)
+
+
+def _quantiles(times: list[Floats]) -> dict[str, Any]:
+    """How many events of each stop have a time, and its quartiles [s]."""
+    found = [np.quantile(t, [0.25, 0.5, 0.75]) if len(t) else np.full(3, np.nan) for t in times]
+    names = ("p25_s", "p50_s", "p75_s")
+    quartiles = {name: [float(q[i]) for q in found] for i, name in enumerate(names)}
+    return {"events": [len(t) for t in times]} | quartiles
 
 
 def _stack(ax: Axes, shares: list[dict[str, float]]) -> None:

@@ -6,12 +6,13 @@ import io
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from dva_sim.experiments.effects import Factor, Setting, View
+from dva_sim.experiments.figures.numbers import Numbers
 from dva_sim.experiments.labels import (
     Level,
     brief,
@@ -25,9 +26,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_TITLE = 90  # characters of a title that the width holds
+_TITLE = 78  # characters of a title that the width holds
 _ROW_LABEL = 28  # characters that the height of a row holds
-WIDTH = 9.6  # [in], the width of the report's column at 96 dots per inch
+WIDTH = 8.4  # [in]; on screen and on paper it is stretched or shrunk to the column
 INK, SOFT, FAINT = "#222222", "#6b6b6b", "#d9d9d9"
 
 # Okabe & Ito: told apart under every common colour blindness, and by lightness in print.
@@ -38,6 +39,9 @@ _PATTERNS = {
     "latest-wins": "#009E73",
 }
 _OTHERS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#222222", "#8a8a8a")
+# Beside the colours, which a print in grey does not show.
+_MARKS = "osD^vP*X"
+_MARK_OF = {"req-rep": "s", "pipelined": "D", "pub-sub": "o", "latest-wins": "^"}
 
 _STYLE: dict[str, Any] = {
     "font.family": "DejaVu Sans",
@@ -80,6 +84,8 @@ class Drawn:
         caption: How to read it.
         svg: The figure as vectors.
         png: The same as pixels.
+        csv: The numbers behind it; empty where none were written down.
+        figure: The figure itself, laid out, to be put on a page.
     """
 
     name: str
@@ -87,6 +93,8 @@ class Drawn:
     caption: str
     svg: bytes
     png: bytes
+    csv: bytes = b""
+    figure: Figure | None = field(default=None, compare=False, repr=False)
 
 
 @contextmanager
@@ -111,7 +119,9 @@ def panels(
     return figure, [list(row) for row in axes]
 
 
-def finish(figure: Figure, name: str, title: str, caption: str) -> Drawn:
+def finish(
+    figure: Figure, name: str, title: str, caption: str, numbers: Numbers | None = None
+) -> Drawn:
     """Render once to SVG and once to PNG, with nothing in them that changes from day to day."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.backends.backend_svg import FigureCanvasSVG
@@ -127,7 +137,8 @@ def finish(figure: Figure, name: str, title: str, caption: str) -> Drawn:
     FigureCanvasAgg(figure).print_png(png, metadata=metadata)  # type: ignore[no-untyped-call]
     metadata = {"Date": None, "Creator": None}
     FigureCanvasSVG(figure).print_svg(svg, metadata=metadata)  # type: ignore[no-untyped-call]
-    return Drawn(name, title, caption, svg.getvalue(), png.getvalue())
+    table = numbers.csv() if numbers else b""
+    return Drawn(name, title, caption, svg.getvalue(), png.getvalue(), table, figure)
 
 
 def colours(factor: Factor | None) -> Mapping[Level, str]:
@@ -137,6 +148,15 @@ def colours(factor: Factor | None) -> Mapping[Level, str]:
     if all(level in _PATTERNS for level in factor.levels):
         return {level: _PATTERNS[str(level)] for level in factor.levels}
     return {level: _OTHERS[i % len(_OTHERS)] for i, level in enumerate(factor.levels)}
+
+
+def marks(factor: Factor | None) -> Mapping[Level, str]:
+    """A mark for each level, as lasting as its colour."""
+    if factor is None:
+        return {None: _MARKS[0]}
+    if all(level in _MARK_OF for level in factor.levels):
+        return {level: _MARK_OF[str(level)] for level in factor.levels}
+    return {level: _MARKS[i % len(_MARKS)] for i, level in enumerate(factor.levels)}
 
 
 def axis_label(name: str, text: str | None = None) -> str:
@@ -309,6 +329,9 @@ def legend(figure: Figure, factor: Factor | None, paint: Mapping[Level, str]) ->
 
     if factor is None:
         return
-    handles = [Line2D([], [], color=paint[level], marker="o", ls="") for level in factor.levels]
+    mark = marks(factor)
+    handles = [
+        Line2D([], [], color=paint[level], marker=mark[level], ls="") for level in factor.levels
+    ]
     names = [level_name(factor.name, level) for level in factor.levels]
     figure.legend(handles, names, loc="outside upper left", ncols=len(names))

@@ -1,0 +1,209 @@
+"""Named comparisons and hypotheses as they came out: each contrast with interval, size and test.
+
+Levels of factors that a contrast does not name are averaged within each person. A hypothesis holds
+when its own test says so after Holm's adjustment within its family; it does not hold when the 95 %
+interval rules it out; all else is open.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+
+from dva_sim.experiments.asking import ANSWER, Contrast, Hypothesis
+from dva_sim.experiments.effects import Floats, Part, Setting, Table
+from dva_sim.experiments.reading import layout_of
+from dva_sim.experiments.statistics import (
+    LEVEL,
+    EffectSize,
+    Interval,
+    effect_size,
+    equivalence,
+    holm,
+    pair_correlation,
+    paired_difference,
+    permutation_test,
+)
+
+Verdict = Literal["held", "did not hold", "open", "not run"]
+_ALPHA = 1 - LEVEL
+
+
+class Pairs(NamedTuple):
+    """Both sides of a contrast, run by run `(n,)`, and whose run it was."""
+
+    first: Floats
+    second: Floats
+    person: Floats
+
+
+@dataclass(frozen=True)
+class Compared:
+    """One contrast at one place.
+
+    Attributes:
+        name: Of the comparison.
+        contrast: What was declared.
+        at: Levels at which it was taken.
+        difference: First minus second, with its own 95 % interval; None if not run.
+        size: The same in standard deviations.
+        correlation: Of the two sides, run by run.
+        p: Of the test that labels could be swapped.
+        adjusted: The same by Holm within the family.
+    """
+
+    name: str
+    contrast: Contrast
+    at: Setting
+    difference: Interval | None = None
+    size: EffectSize | None = None
+    correlation: float = math.nan
+    p: float = math.nan
+    adjusted: float = math.nan
+
+
+@dataclass(frozen=True)
+class Tested:
+    """A hypothesis beside what came out.
+
+    Attributes:
+        name: Of the hypothesis.
+        hypothesis: As declared.
+        contrast: What it is about.
+        at: Where.
+        difference: As measured, with its 95 % interval; None if not run.
+        p: Of its own test: one-sided, or of equivalence within the margin.
+        adjusted: The same by Holm within the family.
+        verdict: Whether it held.
+    """
+
+    name: str
+    hypothesis: Hypothesis
+    contrast: Contrast
+    at: Setting
+    difference: Interval | None = None
+    p: float = math.nan
+    adjusted: float = math.nan
+    verdict: Verdict = "not run"
+
+
+def compare_all(study: Mapping[str, Any], runs: Table) -> list[Compared]:
+    """Every named comparison at every level that it runs over, as the manifest has them."""
+    found = [
+        _compared(study, runs, name, contrast, at)
+        for name, contrast in _named(study).items()
+        if name != ANSWER
+        for at in _places(study, contrast)
+    ]
+    adjusted = holm([c.p for c in found], [c.contrast.family for c in found])
+    return [replace(c, adjusted=float(p)) for c, p in zip(found, adjusted, strict=True)]
+
+
+def judge_hypotheses(study: Mapping[str, Any], runs: Table) -> list[Tested]:
+    """Every hypothesis, judged."""
+    named = _named(study)
+    claims = {k: Hypothesis.model_validate(h) for k, h in (study.get("hypotheses") or {}).items()}
+    found = [
+        _tested(study, runs, name, claim, named[claim.comparison])
+        for name, claim in claims.items()
+        if claim.comparison in named
+    ]
+    adjusted = holm([t.p for t in found], [t.contrast.family for t in found])
+    judged = (replace(t, adjusted=float(p)) for t, p in zip(found, adjusted, strict=True))
+    return [replace(t, verdict=verdict_of(t)) for t in judged]
+
+
+def verdict_of(tested: Tested) -> Verdict:
+    """Whether a hypothesis held, by its adjusted test and by the interval."""
+    found, margin = tested.difference, tested.hypothesis.margin
+    if found is None:
+        return "not run"
+    if tested.adjusted <= _ALPHA:
+        return "held"
+    ruled_out = {
+        "above": found.high <= margin,
+        "below": found.low >= -margin,
+        "same": found.low > margin or found.high < -margin,
+    }
+    return "did not hold" if ruled_out[tested.hypothesis.direction] else "open"
+
+
+def pairs_of(
+    study: Mapping[str, Any], runs: Table, contrast: Contrast, at: Setting
+) -> Pairs | None:
+    """Both sides of a contrast at one place; None where it was not run."""
+    table, factors = layout_of(study, runs)
+    part = Part(table, contrast.part, factors)
+    known = {f.name: f.levels for f in part.factors}
+    wanted = dict(at) | {contrast.factor: contrast.contrast[0]}
+    there = all(name in known and level in known[name] for name, level in wanted.items())
+    if not there or contrast.contrast[1] not in known[contrast.factor]:
+        return None
+    in_excess = part.has_reference(contrast.measure)
+    grid = part.excess(contrast.measure) if in_excess else part.grid(contrast.measure)
+    sides = [part.where(grid, dict(at) | {contrast.factor: level}) for level in contrast.contrast]
+    person = np.broadcast_to(part.persons[:, np.newaxis], sides[0].shape)
+    return Pairs(sides[0].ravel(), sides[1].ravel(), person.ravel())
+
+
+def _named(study: Mapping[str, Any]) -> dict[str, Contrast]:
+    """The answer's contrast and the named ones."""
+    named: dict[str, Contrast] = {}
+    if study.get("answer"):
+        named[ANSWER] = Contrast.model_validate(study["answer"])
+    for name, declared in (study.get("comparisons") or {}).items():
+        named[name] = Contrast.model_validate(declared)
+    return named
+
+
+def _places(study: Mapping[str, Any], contrast: Contrast) -> Iterator[Setting]:
+    """Each level that a contrast runs over, or the one place it is taken at."""
+    if contrast.over is None:
+        yield dict(contrast.within)
+        return
+    for level in study.get("factors", {}).get(contrast.over, ()):
+        yield dict(contrast.within) | {contrast.over: level}
+
+
+def _compared(
+    study: Mapping[str, Any], runs: Table, name: str, contrast: Contrast, at: Setting
+) -> Compared:
+    pairs = pairs_of(study, runs, contrast, at)
+    found = paired_difference(*pairs) if pairs is not None else None
+    if pairs is None or found is None or not found.n_persons:
+        return Compared(name, contrast, at)
+    return Compared(
+        name,
+        contrast,
+        at,
+        found,
+        effect_size(*pairs),
+        pair_correlation(pairs.first, pairs.second),
+        permutation_test(*pairs).p,
+    )
+
+
+def _tested(
+    study: Mapping[str, Any], runs: Table, name: str, claim: Hypothesis, contrast: Contrast
+) -> Tested:
+    at = dict(contrast.within)
+    if contrast.over is not None:
+        at[contrast.over] = study["factors"][contrast.over][-1]
+    at |= claim.at
+    pairs = pairs_of(study, runs, contrast, at)
+    found = paired_difference(*pairs) if pairs is not None else None
+    if pairs is None or found is None or not found.n_persons:
+        return Tested(name, claim, contrast, at)
+    return Tested(name, claim, contrast, at, found, _p(claim, pairs))
+
+
+def _p(claim: Hypothesis, pairs: Pairs) -> float:
+    """Of the claim's own test."""
+    if claim.direction == "same":
+        return equivalence(*pairs, claim.margin).p
+    margin = claim.margin if claim.direction == "above" else -claim.margin
+    return permutation_test(*pairs, side=claim.direction, null=margin).p

@@ -1,0 +1,241 @@
+"""The sections of a report in their order: question and answer first, evidence, then method."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import chain
+from typing import Any
+
+from dva_sim.experiments.asking import POINT
+from dva_sim.experiments.blocks import (
+    Block,
+    Box,
+    Heading,
+    Items,
+    Printed,
+    Shown,
+    Verbatim,
+    Words,
+)
+from dva_sim.experiments.cells import CellTable
+from dva_sim.experiments.conditions import conditions, timeout_remark
+from dva_sim.experiments.contrasts import compare_all, judge_hypotheses
+from dva_sim.experiments.dispatch import page as dispatch_page
+from dva_sim.experiments.figures import Drawn
+from dva_sim.experiments.labels import (
+    factor_name,
+    is_in_file,
+    level_name,
+    listing,
+    number,
+    setting,
+    with_unit,
+)
+from dva_sim.experiments.method import remarks
+from dva_sim.experiments.predictions import Judged, judge_all
+from dva_sim.experiments.reading import factors_of, keys_of
+from dva_sim.experiments.robustness import sentences
+from dva_sim.experiments.status import Status
+from dva_sim.experiments.summary import Reading
+from dva_sim.experiments.tables_of_tests import comparison_table, hypothesis_table
+from dva_sim.experiments.tuning import tuned_table
+from dva_sim.experiments.variance import spread_table
+
+_KINDS = {
+    "confirmatory": "Confirmatory: run as registered beforehand",
+    "declared": "Declared: run as its file says, but nothing was registered beforehand",
+    "exploratory": "Exploratory: not to be taken for a test of what it found",
+}
+
+
+def blocks_of(reading: Reading, drawn: Sequence[Drawn]) -> list[Block]:
+    """The whole report below its title."""
+    return list(
+        chain(
+            _status(reading),
+            [Box((reading.answer.lead, *reading.answer.notes))],
+            _claims(reading),
+            _comparisons(reading),
+            _robustness(reading),
+            _what_varied(reading),
+            _figures(drawn),
+            _tables(reading),
+            _method(reading),
+            _manifest(reading),
+        )
+    )
+
+
+def status_of(manifest: Mapping[str, Any]) -> Status:
+    """What the result may be called; results that do not say are judged by what was set."""
+    if "status" in manifest:
+        return Status.model_validate(manifest["status"])
+    changes = [_as_words(change) for change in manifest.get("set", [])]
+    if not changes:
+        return Status(kind="declared")
+    return Status(kind="exploratory", why=(f"changed on the command line: {', '.join(changes)}",))
+
+
+def _status(reading: Reading) -> Iterator[Block]:
+    status = status_of(reading.manifest)
+    yield Words(_KINDS[status.kind], "label")
+    for why in status.why:
+        yield Words(f"{why[:1].upper()}{why[1:]}.", "note")
+    if status.registration:
+        told = ", ".join(f"{key} {value}" for key, value in status.registration.items())
+        yield Words(f"Registration: {told}.", "note")
+    for warning in reading.warnings:
+        yield Words(warning, "warning")
+
+
+def _claims(reading: Reading) -> Iterator[Block]:
+    hypotheses = judge_hypotheses(reading.study, reading.runs) if reading.runs else []
+    if hypotheses:
+        registered = status_of(reading.manifest).kind == "confirmatory"
+        kind = "Registered hypotheses" if registered else "Hypotheses, not registered"
+        yield Heading(f"{kind}, beside what came out")
+        yield Printed(hypothesis_table(hypotheses), is_words=True)
+    predictions = judge_all(reading.study, reading.view)
+    if predictions:
+        yield Heading("Predictions, written down before the run")
+        yield Printed(_prediction_table(predictions), is_words=True)
+
+
+def _prediction_table(predictions: Sequence[Judged]) -> CellTable:
+    heads = ["predicted", "of the contrast", "found (95 % interval)", "verdict"]
+    rows = [[p.text, p.expected, p.found, p.verdict] for p in predictions]
+    return CellTable("", heads, len(heads), rows)
+
+
+def _comparisons(reading: Reading) -> Iterator[Block]:
+    found = compare_all(reading.study, reading.runs) if reading.runs else []
+    if found:
+        yield Heading("Named comparisons")
+        yield Printed(comparison_table(found), is_words=True)
+
+
+def _robustness(reading: Reading) -> Iterator[Block]:
+    if reading.robustness is not None:
+        yield Heading("Under other models of the persons")
+        for sentence in sentences(reading.robustness):
+            yield Words(sentence)
+
+
+def _what_varied(reading: Reading) -> Iterator[Block]:
+    """Short, before the figures: their words must be known."""
+    factors = [f for f in factors_of(reading.study) if f.name != POINT]
+    design = reading.study.get("design") or {}
+    told = [f"{factor_name(f.name)} ({_levels(f.name, f.levels)})" for f in factors]
+    ranges = design.get("ranges") or {}
+    told += [
+        f"{with_unit(k)} from {number(r['low'])} to {number(r['high'])}" for k, r in ranges.items()
+    ]
+    if told:
+        yield Heading("What was compared")
+        yield Words(f"Varied, {_how(design, len(factors))}: {'; '.join(told)}.")
+    if treatments := _treatments(reading.study):
+        yield Items(tuple(f"{level}: {changes}" for level, changes in treatments))
+
+
+def _how(design: Mapping[str, Any], factors: int) -> str:
+    """Which levels met each other."""
+    if design.get("zip"):
+        return f"{listing([factor_name(n) for n in design['zip']])} taken together"
+    if design.get("rows") or design.get("csv"):
+        return "as listed row by row"
+    for kind, words in _SAMPLED.items():
+        if design.get(kind):
+            crossed = ", each with every combination of levels" if factors else ""
+            return f"at points {words}{crossed}"
+    return "in every combination" if factors > 1 else "alone"
+
+
+_SAMPLED = {
+    "latin_hypercube": "that fill the ranges as a Latin hypercube",
+    "sobol": "that fill the ranges as a Sobol' sequence",
+    "saltelli": "that fill the ranges as Saltelli's sample",
+}
+
+
+def _figures(drawn: Sequence[Drawn]) -> Iterator[Block]:
+    if drawn:
+        yield Heading("Figures")
+        yield from map(Shown, drawn)
+
+
+def _tables(reading: Reading) -> Iterator[Block]:
+    yield Heading("Every cell")
+    if not reading.cells:
+        yield Words("No run was completed.")
+    for table in reading.cells:
+        yield Heading(f"Part {table.part}", 3)
+        if table.empty:
+            yield Words(f"{table.empty} of {len(table.rows)} cells have no run.", "warning")
+        yield Printed(table)
+    if spread := spread_table(reading.view) if reading.view else None:
+        yield Heading("Between and within persons")
+        yield Words(
+            "Standard deviations of single runs, by the method of moments. What lies between "
+            "persons is not narrowed by more trials, only by more persons."
+        )
+        yield Printed(spread)
+    if tuned := tuned_table(reading.manifest):
+        yield Heading("Tuning")
+        whose, what = " and ".join(tuned.heads[: tuned.labels]), tuned.heads[tuned.labels]
+        yield Words(
+            f"Each {whose} has a {what} that suits it best, so for each the same number of values "
+            "was tried. Both tuned and untuned cells are above."
+        )
+        yield Printed(tuned)
+
+
+def _method(reading: Reading) -> Iterator[Block]:
+    yield Heading("Method")
+    scenarios, study = reading.scenarios, reading.study
+    if reading.shifts:
+        stated = dispatch_page.conditions(scenarios, keys_of(study))
+    else:
+        stated = conditions(scenarios, keys_of(study), _changed(study))
+    if stated:
+        yield Words("The same for all that is compared, unless varied:")
+        rows = [[name, *values] for name, values in stated]
+        yield Printed(CellTable("", ["condition", *scenarios], 1, rows))
+        if remark := timeout_remark(scenarios, study):
+            yield Words(remark)
+    yield Items(tuple(remarks(reading)))
+
+
+def _manifest(reading: Reading) -> Iterator[Block]:
+    text = json.dumps(reading.manifest, indent=2, sort_keys=True, ensure_ascii=False)
+    yield Verbatim("Manifest", text)
+
+
+def _levels(name: str, levels: Sequence[Any]) -> str:
+    return listing([_in_full(name, level) for level in levels])
+
+
+def _in_full(name: str, level: Any) -> str:
+    """A level with the file it is from, if it is a class in one."""
+    file = f" ({level.rpartition(':')[0]})" if is_in_file(level) else ""
+    return level_name(name, level) + file
+
+
+def _changed(study: Mapping[str, Any]) -> list[str]:
+    """Scenario keys that the study's parts set themselves."""
+    parts = study.get("parts", {}).values()
+    return list(dict.fromkeys(key for part in parts for key in part.get("changes") or {}))
+
+
+def _treatments(study: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """What each named level changes."""
+    return [
+        (level_name(factor, level), setting(changes) or "nothing")
+        for factor, named in study.get("treatments", {}).items()
+        for level, changes in named.items()
+    ]
+
+
+def _as_words(change: Any) -> str:
+    """One `--set`, however the manifest keeps it."""
+    return change if isinstance(change, str) else "=".join(str(word) for word in change)

@@ -1,0 +1,179 @@
+"""What a results folder says, in words and tables, without a picture or a page being made."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from dva_sim.experiments import statistics
+from dva_sim.experiments.answer import Answer, Finding, answer
+from dva_sim.experiments.asking import REPEATS
+from dva_sim.experiments.cells import SUMMARIES, CellTable, cell_table
+from dva_sim.experiments.dispatch import page as dispatch_page
+from dva_sim.experiments.dispatch.shifts import Shifts, is_dispatch
+from dva_sim.experiments.effects import Part, Table, View, as_floats
+from dva_sim.experiments.reading import (
+    finding_of,
+    layout_of,
+    points_of,
+    possible_values,
+    view_of,
+)
+from dva_sim.experiments.results import Results
+from dva_sim.experiments.robustness import Robustness, robustness_of
+from dva_sim.experiments.support import support_of_part
+from dva_sim.experiments.transports import figures as transport_figures
+from dva_sim.experiments.transports import page as transport_page
+from dva_sim.experiments.tuning import tuning_warning
+
+_MOST_ERRORS = 3
+_FEWEST_PAIRS = 4  # of which a correlation says anything
+
+
+class Reading:
+    """A results folder, read once: each part of it when it is first asked for.
+
+    Args:
+        results: The folder.
+    """
+
+    def __init__(self, results: Results) -> None:
+        self.results = results
+        self.manifest, self.study = results.manifest, results.study
+        self._tables: dict[str, Table] = {}
+
+    def table(self, name: str) -> Table:
+        """Columns of a table; nothing where the study has no such table."""
+        if name not in self._tables:
+            self._tables[name] = self.results.table(name) if self.results.has(name) else {}
+        return self._tables[name]
+
+    @property
+    def runs(self) -> Table:
+        """The table of runs."""
+        return self.table("runs")
+
+    @property
+    def scenarios(self) -> Mapping[str, Mapping[str, Any]]:
+        """Each part's scenario before any factor changed it."""
+        found: Mapping[str, Mapping[str, Any]] = self.manifest.get("scenarios", {})
+        return found
+
+    def scenario_of(self, part: str) -> Mapping[str, Any]:
+        """One part's scenario."""
+        return self.scenarios.get(part, {})
+
+    @cached_property
+    def view(self) -> View | None:
+        """How the study is looked at, with its extrapolations known; None without any run."""
+        view = view_of(self.study, self.runs) if self.runs else None
+        if view is None:
+            return None
+        scenario = self.scenario_of(view.part.name)
+        support = support_of_part(view.part, scenario)
+        possible = possible_values(view.measure, scenario)
+        return replace(view, outside=support.outside if support else None, possible=possible)
+
+    @cached_property
+    def finding(self) -> Finding | None:
+        """The declared contrast as measured."""
+        return finding_of(self.view) if self.view is not None else None
+
+    @cached_property
+    def shifts(self) -> Shifts | None:
+        """The runs as shifts, where a study compares policies of dispatch on them."""
+        if self.view is None or not is_dispatch(self.view):
+            return None
+        return Shifts(self.view, self.table("events") or None)
+
+    @property
+    def is_contest(self) -> bool:
+        """Whether transports compete on a congested link."""
+        return transport_figures.is_contest(self.view)
+
+    @cached_property
+    def robustness(self) -> Robustness | None:
+        """The answer under other models of the persons, where it was repeated."""
+        if self.view is None or self.finding is None or not self.table(REPEATS):
+            return None
+        scenario = self.scenario_of(self.view.part.name)
+        return robustness_of(self.study, self.table(REPEATS), self.view, self.finding, scenario)
+
+    @cached_property
+    def pair_correlation(self) -> float | None:
+        """How alike the two sides of the contrast are, run by run, at the last stop."""
+        view = self.view
+        if view is None or view.contrast is None:
+            return None
+        grid = view.part.grid(view.measure)
+        first, second = (view.curve(grid, view.panels[0], level)[-1] for level in view.contrast)
+        both = np.isfinite(first) & np.isfinite(second)
+        if both.sum() < _FEWEST_PAIRS:
+            return None
+        found = statistics.pair_correlation(first[both], second[both])
+        return found if np.isfinite(found) else None
+
+    # --- words and tables ------------------------------------------------------------------
+
+    @cached_property
+    def answer(self) -> Answer:
+        """What a reader should take home."""
+        if self.view is None:
+            return Answer("No run was completed, so there is nothing to answer with.")
+        if self.shifts is not None:
+            return dispatch_page.answer_of(self.finding, self.shifts)
+        if self.finding is not None:
+            return answer(self.finding)
+        return Answer(
+            "The contrast that would answer the question was not declared or not run; "
+            "the figures and the table show what was."
+        )
+
+    @cached_property
+    def cells(self) -> list[CellTable]:
+        """A table of cells for each part that has runs."""
+        if self.view is None:
+            return []
+        names = dict.fromkeys(str(name) for name in self.runs["part"])
+        table, factors = layout_of(self.study, self.runs, are_points_trials=False)
+        parts = [Part(table, name, factors) for name in names]
+        return [self._cells_of(part, self.view) for part in parts if len(part)]
+
+    def _cells_of(self, part: Part, view: View) -> CellTable:
+        if self.shifts is not None and part.name == view.part.name:
+            return dispatch_page.cells(self.shifts)
+        summaries = dispatch_page.SUMMARIES if self.shifts is not None else SUMMARIES
+        if self.is_contest:
+            summaries = transport_page.SUMMARIES
+        scenario = self.scenario_of(part.name)
+        return cell_table(
+            part,
+            view.measure,
+            summaries,
+            support=support_of_part(part, scenario) if summaries is SUMMARIES else None,
+            possible=possible_values(view.measure, scenario),
+            is_listed=bool(self.study.get("design")),
+            points=points_of(self.study, self.runs),
+        )
+
+    @property
+    def warnings(self) -> list[str]:
+        """What a reader must see before anything else."""
+        found = []
+        if failures := self.results.failures:
+            errors = dict.fromkeys(str(failure.get("error")) for failure in failures)
+            shown = "; ".join(list(errors)[:_MOST_ERRORS])
+            found.append(f"Runs that failed and are missing below: {len(failures)} ({shown}).")
+        runs = self.runs
+        broken = int((as_floats(runs["violations"]) > 0).sum()) if "violations" in runs else 0
+        if broken:
+            found.append(f"Safety invariants were broken in {broken} runs.")
+        if tuning := tuning_warning(self.manifest):
+            found.append(tuning)
+        if self.manifest.get("versions", {}).get("dirty"):
+            found.append("The program that made the runs had changes that were not committed.")
+        return found

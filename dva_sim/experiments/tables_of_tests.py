@@ -1,0 +1,119 @@
+"""Hypotheses and named comparisons as tables: what was claimed beside what came out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from dva_sim.experiments.cells import CellTable
+from dva_sim.experiments.contrasts import Compared, Tested, Verdict
+from dva_sim.experiments.effects import Setting
+from dva_sim.experiments.labels import level_name, measure_name, number, quantity, setting, unit_of
+from dva_sim.experiments.statistics import LEVEL, Interval
+
+# A mark beside the word: neither needs a colour.
+_VERDICTS: dict[Verdict, str] = {
+    "held": "✓ held",
+    "did not hold": "✗ did not hold",
+    "open": "? open",
+    "not run": "– not run",
+}
+_LEAST_P = 0.001
+
+
+def hypothesis_table(tested: Sequence[Tested]) -> CellTable:
+    """Each hypothesis: the claim, what was found, the adjusted test, the verdict."""
+    heads = ["hypothesis", "claim", "found (95 % interval)", "p by Holm", "verdict"]
+    rows = [
+        [
+            ": ".join(filter(None, (t.name, t.hypothesis.text))),
+            _claim(t),
+            _interval(t.difference, t.contrast.measure),
+            _p(t.adjusted),
+            _VERDICTS[t.verdict],
+        ]
+        for t in tested
+    ]
+    note = (
+        "A claim holds where its own test (permutation of persons beyond the margin; two one-sided "
+        "tests for sameness) stays below 5 % after Holm's adjustment within its family. It does "
+        "not hold where the 95 % interval rules it out. All else is open: absence of evidence."
+    )
+    return CellTable("", heads, len(heads), rows, note=note)
+
+
+def comparison_table(compared: Sequence[Compared]) -> CellTable:
+    """Each comparison at each level it runs over."""
+    heads = ["comparison", "difference in", "at", "first minus second (95 % interval)"]
+    heads += ["in standard deviations", "correlation of pairs", "p", "p by Holm", "apart?"]
+    rows = [
+        [
+            f"{c.name}: {_sides(c)}",
+            measure_name(c.contrast.measure),
+            _place(c.at),
+            _interval(c.difference, c.contrast.measure),
+            _bare(c.size.average) if c.size else "–",
+            number(c.correlation),
+            _p(c.p),
+            _p(c.adjusted),
+            _apart(c),
+        ]
+        for c in compared
+    ]
+    families = {c.contrast.family: 0 for c in compared}
+    for c in compared:
+        families[c.contrast.family] += 1
+    counted = "; ".join(f"{name}: {count}" for name, count in families.items())
+    note = (
+        "Each interval is of its row alone; p is of the permutation test (the labels of a person's "
+        "runs could as well be swapped), by Holm for all tests of its family together (tests in "
+        f"each family: {counted}). Standard deviations are those of persons under the "
+        "two levels, on average. Levels of factors that a comparison does not name are averaged."
+    )
+    return CellTable("", heads, len(heads), rows, note=note)
+
+
+def _sides(compared: Compared) -> str:
+    first, second = (level_name(compared.contrast.factor, x) for x in compared.contrast.contrast)
+    return f"{first} minus {second}"
+
+
+def _claim(tested: Tested) -> str:
+    """`A minus B in driving time, at delay 1 s: above 2 s`."""
+    first, second = (level_name(tested.contrast.factor, x) for x in tested.contrast.contrast)
+    claim, unit = tested.hypothesis, unit_of(tested.contrast.measure)
+    margin = quantity(claim.margin, unit) if claim.margin else "zero"
+    bound = {
+        "above": f"above {margin}",
+        "below": f"below {'−' if claim.margin else ''}{margin}",
+        "same": f"the same within {margin}",
+    }[claim.direction]
+    where = f", {setting(tested.at)}" if tested.at else ""
+    return f"{first} minus {second} in {measure_name(tested.contrast.measure)}{where}: {bound}"
+
+
+def _place(at: Setting) -> str:
+    return setting(at) or "everywhere"
+
+
+def _interval(found: Interval | None, measure: str) -> str:
+    if found is None:
+        return "not run"
+    unit = unit_of(measure)
+    return f"{quantity(found.mean, unit)} ({number(found.low)} to {quantity(found.high, unit)})"
+
+
+def _bare(found: Interval) -> str:
+    return f"{number(found.mean)} ({number(found.low)} to {number(found.high)})"
+
+
+def _p(value: float) -> str:
+    if not math.isfinite(value):
+        return "–"
+    return f"< {_LEAST_P:g}" if value < _LEAST_P else f"{value:.3f}"
+
+
+def _apart(compared: Compared) -> str:
+    if not math.isfinite(compared.adjusted):
+        return "–"
+    return "✓ yes" if compared.adjusted <= 1 - LEVEL else "? not shown"
