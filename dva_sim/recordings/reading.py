@@ -1,0 +1,275 @@
+"""An MCAP file of a run, read back: enough to tell its story and draw it, without simulating."""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from math import inf
+from pathlib import Path
+from typing import IO, Any
+
+import pydantic
+
+from dva_sim.errors import ConfigError
+from dva_sim.recorder import DriveLog, Moment, Recorder, Sent, Shown, TrackPoint
+from dva_sim.recordings import bodies, messages, sites, story
+from dva_sim.recordings.messages import XML
+from dva_sim.recordings.writing import ABOUT, FORMAT, RUN, SCENARIO, SITE, TABLES
+from dva_sim.scenario import Scenario
+from dva_sim.simulation import Playback
+from dva_sim.simulation.incidents import Incident
+from dva_sim.worlds.hazards import Surroundings
+from dva_sim.worlds.hazards.making import KINDS
+
+LARGEST = 2**31  # of one record [B]; what claims to be larger is damaged
+OTHER_FILE = "is not a recording of dva-sim"
+
+
+@dataclass(frozen=True)
+class Opened:
+    """A recording that has been read.
+
+    Attributes:
+        playback: What can be told and shown of the run.
+        about: What its file says of it, such as the version that made it.
+        tables: What was measured, rows by table, with None for what is missing; None if the
+            file does not say.
+        lasted: How long the run lasted [s]; longer than the playback if the file was cut short.
+    """
+
+    playback: Playback
+    about: dict[str, str]
+    tables: dict[str, list[dict[str, Any]]] | None
+    lasted: float
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether the file holds all of the run."""
+        return self.playback.duration >= self.lasted
+
+
+def read_recording(path: Path) -> Opened:
+    """Read a recording; of one that was cut short, all that is there.
+
+    Raises:
+        ConfigError: no such file, not a recording, a damaged one, or one of a later version.
+    """
+    raw = _Raw()
+    try:
+        with path.open("rb") as file:
+            raw.read(file)
+    except OSError as error:
+        raise ConfigError(f"cannot be read: {error.strerror}", path) from None
+    except _Damaged as error:
+        raise ConfigError(str(error), path) from None
+    try:
+        return _opened(raw)
+    except (KeyError, TypeError, ValueError, pydantic.ValidationError) as error:
+        problem = f"was made by dva-sim {raw.about.get('version', '?')} and cannot be read: "
+        raise ConfigError(problem + " ".join(str(error).split())[:200], path) from None
+
+
+class _Damaged(Exception):
+    """What is in the file is not what was written."""
+
+
+@dataclass
+class _Raw:
+    """What a file holds, sorted a little.
+
+    Attributes:
+        about: Its metadata.
+        files: What is attached, by name.
+        said: Content of the messages, with their time [s], by topic.
+        ends: Source and destination of the channels of XML, by topic.
+        time: Of the last message [s].
+        is_cut: Whether the end of the file is missing.
+    """
+
+    about: dict[str, str] = field(default_factory=dict)
+    files: dict[str, bytes] = field(default_factory=dict)
+    said: dict[str, list[tuple[float, Any]]] = field(default_factory=lambda: defaultdict(list))
+    ends: dict[str, dict[str, str]] = field(default_factory=dict)
+    time: float = 0.0
+    is_cut: bool = False
+
+    def read(self, file: IO[bytes]) -> None:
+        """Read records up to the end of the file, expected or not.
+
+        Raises:
+            _Damaged: something else than an early end.
+        """
+        from mcap.exceptions import EndOfFile, InvalidMagic, McapError
+        from mcap.records import Channel
+        from mcap.stream_reader import StreamReader
+        from zstandard import ZstdError
+
+        channels: dict[int, Channel] = {}
+        reader = StreamReader(file, validate_crcs=True, record_size_limit=LARGEST)
+        try:
+            for record in reader.records:
+                self._take(record, channels)
+        except EndOfFile:
+            self.is_cut = True
+        except InvalidMagic:
+            raise _Damaged(
+                f"{OTHER_FILE}: it does not begin and end as an MCAP file does"
+            ) from None
+        except (McapError, ZstdError, ValueError, KeyError, struct.error, MemoryError) as error:
+            raise _Damaged(f"is damaged: {' '.join(str(error).split())[:200]}") from None
+        if RUN not in self.files or ABOUT not in self.about:
+            cut = "it was cut short before anything of the run" if self.is_cut else OTHER_FILE
+            raise _Damaged(cut)
+
+    def _take(self, record: Any, channels: dict[int, Any]) -> None:
+        from mcap.records import Attachment, Channel, Metadata
+        from mcap.records import Message as Said
+
+        if isinstance(record, Said):
+            channel = channels[record.channel_id]
+            is_xml = channel.message_encoding == XML
+            self.time = record.log_time / messages.NS
+            content = record.data if is_xml else json.loads(record.data)
+            self.said[channel.topic].append((self.time, content))
+        elif isinstance(record, Channel):
+            channels[record.id] = record
+            if record.metadata:
+                self.ends[record.topic] = dict(record.metadata)
+        elif isinstance(record, Attachment):
+            self.files[record.name] = record.data
+        elif isinstance(record, Metadata) and record.name == ABOUT:
+            self.about = {**record.metadata, ABOUT: record.name}
+
+
+# --- from what was said to what can be shown -------------------------------------------
+
+
+def _opened(raw: _Raw) -> Opened:
+    run = json.loads(raw.files[RUN])
+    if run["format"] > FORMAT:
+        raise ValueError(f"its form {run['format']} is later than {FORMAT}")
+    scenario = Scenario.model_validate(json.loads(raw.files[SCENARIO]))
+    files = {n.removeprefix(SITE): d for n, d in raw.files.items() if n.startswith(SITE)}
+    site = sites.unpack(files, scenario, run["seed"])
+    incidents = [_incident(entry) for entry in run["incidents"]]
+    contained = {int(number): time for number, time in run["contained_s"].items()}
+    playback = Playback(
+        scenario=scenario,
+        seed=run["seed"],
+        site=site,
+        recorder=_recorder(raw, run),
+        incidents=incidents,
+        surroundings=_surroundings(site, incidents, contained),
+        labels=run["labels"],
+        radii=run["radii_m"],
+        duration=raw.time if raw.is_cut else run["duration_s"],
+        contained=contained,
+    )
+    about = {key: value for key, value in raw.about.items() if key != ABOUT}
+    tables = json.loads(raw.files[TABLES]) if TABLES in raw.files else None
+    return Opened(playback, about, tables, run["duration_s"])
+
+
+def _incident(entry: Mapping[str, Any]) -> Incident:
+    settings = dict(entry["hazard"])
+    settings["position"] = tuple(settings["position"])
+    detected = inf if entry["detected_s"] is None else entry["detected_s"]
+    hazard = KINDS[entry["kind"]](**settings)
+    return Incident(
+        entry["kind"], entry["room"], entry["start_s"], detected, None, hazard, entry["false_alarm"]
+    )
+
+
+def _surroundings(
+    site: Any, incidents: list[Incident], contained: dict[int, float]
+) -> Surroundings:
+    real = [number for number, incident in enumerate(incidents) if not incident.false_alarm]
+    surroundings = Surroundings(site, [incidents[number].hazard for number in real])
+    for number, time in contained.items():
+        surroundings.contain(real.index(number), time)
+    return surroundings
+
+
+def _recorder(raw: _Raw, run: Mapping[str, Any]) -> Recorder:
+    recorder = Recorder(keep_traffic=True)
+    recorder.timeline = [
+        Moment(time, log["name"], log["message"], log["kind"])
+        for time, log in raw.said[story.STORY]
+    ]
+    end = raw.time if raw.is_cut else inf
+    for topic in raw.said:
+        name, _, what = topic[1:].partition("/")
+        if what == bodies.POSE:
+            modes = raw.said.get(f"/{name}/{bodies.ACTIVITY}", [])
+            recorder.tracks[name] = _track(raw.said[topic], modes, run["sampled_s"], end)
+    robots = {run["labels"][robot]: robot for robot in run["radii_m"]}
+    for name, robot in robots.items():
+        seen = raw.said.get(f"/{name}/{bodies.SEEN}")
+        if seen:
+            recorder.views[robot] = [_point(time, content, "seen") for time, content in seen]
+    recorder.traffic = sorted(_traffic(raw, run), key=lambda sent: sent.time)
+    recorder.drives = _drives(raw, run)
+    return recorder
+
+
+def _point(time: float, content: Mapping[str, Any], mode: str) -> TrackPoint:
+    place, turn = content["pose"]["position"], content["pose"]["orientation"]
+    return TrackPoint(time, place["x"], place["y"], messages.heading_of(turn), mode)
+
+
+def _track(
+    said: list[tuple[float, Any]], modes: list[tuple[float, Any]], period: float, end: float
+) -> list[TrackPoint]:
+    """The samples of a track as they were taken, with those left out of somebody who stands."""
+    track: list[TrackPoint] = []
+    turns, mode = iter([*modes, (inf, {"activity": ""})]), ""
+    since, following = next(turns)
+    for time, content in said:
+        while since <= time:
+            mode, (since, following) = following["activity"], next(turns)
+        here = _point(time, content, mode)
+        track += _left_out(track[-1], here.time, period) if track else ()
+        track.append(here)
+    # Whoever was there shortly before the file was cut is there up to its end.
+    if end - track[-1].time <= bodies.ALIVE_S:
+        track += [*_left_out(track[-1], end, period), track[-1]._replace(time=end)]
+    return track
+
+
+def _left_out(before: TrackPoint, until: float, period: float) -> Iterator[TrackPoint]:
+    missing = max(0, round((until - before.time) / period) - 1)
+    return (before._replace(time=before.time + (n + 1) * period) for n in range(missing))
+
+
+def _traffic(raw: _Raw, run: Mapping[str, Any]) -> Iterator[Sent]:
+    ids = {name: device for device, name in story.names_of(run["labels"]).items()}
+    for topic, said in raw.said.items():
+        if topic in raw.ends:
+            ends = raw.ends[topic]["source"], raw.ends[topic]["destination"]
+            yield from (Sent(time, *ends, len(data), data) for time, data in said)
+        elif topic.endswith(f"/{story.CAMERA}"):
+            source = ids[topic.split("/")[1]]
+            for time, frame in said:
+                yield Sent(time, source, ids[frame["to"]], frame["size_bytes"], frame)
+
+
+def _drives(raw: _Raw, run: Mapping[str, Any]) -> list[DriveLog]:
+    drives = [
+        DriveLog(
+            entry["robot"],
+            entry["operator"],
+            entry["event"],
+            entry["ordered_s"],
+            entry["started_s"],
+            entry["ended_s"],
+            entry["outcome"],
+        )
+        for entry in run["drives"]
+    ]
+    for topic, said in raw.said.items():
+        for time, shown in said if topic.endswith(f"/{story.SCREEN}") else ():
+            drives[shown["drive"]].frames.append(Shown(shown["captured_s"], time, 0))
+    return drives

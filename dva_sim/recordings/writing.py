@@ -1,0 +1,242 @@
+"""A run as an MCAP file: the same run makes the same bytes, and a file is whole or not there."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO, Any
+
+from dva_sim import __version__, resources
+from dva_sim.errors import DvaSimError
+from dva_sim.recordings import bodies, fields, messages, scene, sites, story
+from dva_sim.recordings.messages import XML, Message
+from dva_sim.recordings.schemas import SCHEMAS
+from dva_sim.simulation import Playback
+from dva_sim.simulation.run import FILM_PERIOD
+
+FORMAT = 1  # of what is attached; a reader refuses a later one
+ABOUT = "dva-sim"  # name of the metadata
+RUN, SCENARIO, TABLES, SITE = "run.json", "scenario.json", "tables.json", "site/"
+CHUNK = 256 * 1024  # what a file that was cut short loses at most, unpacked [B]
+
+Tables = Mapping[str, Any]
+
+
+def write_recording(
+    playback: Playback,
+    path: Path,
+    *,
+    tables: Tables | None = None,
+    about: Mapping[str, str] | None = None,
+) -> None:
+    """Write a run as MCAP, in virtual time from zero.
+
+    Args:
+        playback: The run, simulated with `keep_traffic`.
+        path: Where; what was there is replaced once all is written.
+        tables: What was measured, rows by table; goes with it as JSON.
+        about: More to say of the run, such as its place in a study.
+
+    Raises:
+        DvaSimError: the file cannot be written.
+        ValueError: the run was made without `keep_traffic`.
+    """
+    if playback.recorder.traffic is None:
+        raise ValueError("a recording needs a run made with keep_traffic")
+    with whole_file(path) as file:
+        _write(playback, file, tables, dict(about or {}))
+
+
+@contextmanager
+def whole_file(path: Path) -> Iterator[IO[bytes]]:
+    """A file beside `path`, which takes its place if all goes well, and else is gone.
+
+    Raises:
+        DvaSimError: it cannot be written.
+    """
+    part = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        with part.open("wb") as file:
+            yield file
+            file.flush()
+            os.fsync(file.fileno())
+        part.replace(path)
+    except OSError as error:
+        raise DvaSimError(f"{path} cannot be written: {error.strerror or error}") from error
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def every_message(playback: Playback) -> Iterator[Message]:
+    """All messages of a recording, grouped by what they tell, not by time."""
+    yield from scene.ground(playback)
+    yield from bodies.activities(playback)
+    yield from scene.bodies(playback)
+    yield from scene.hazards(playback)
+    yield from scene.states(playback)
+    yield from fields.grids(playback)
+    yield from bodies.poses(playback)
+    yield from bodies.beliefs(playback)
+    yield from bodies.fixes(playback)
+    yield from story.told(playback)
+    yield from story.commanded(playback)
+    yield from story.said(playback)
+    yield from story.applied(playback)
+    yield from story.shown(playback)
+
+
+def _write(playback: Playback, file: IO[bytes], tables: Tables | None, about: Any) -> None:
+    from mcap.writer import Writer
+
+    writer = Writer(file, chunk_size=CHUNK, enable_data_crcs=True)
+    writer.start(profile="", library=f"dva-sim {__version__}")
+    writer.add_metadata(ABOUT, _about(playback) | about)
+    files = sites.pack(playback.site)
+    attached = {SCENARIO: _json(playback.scenario.model_dump(mode="json"))}
+    attached[RUN] = _json(facts(playback))
+    attached |= {} if tables is None else {TABLES: _json(_plain(tables))}
+    attached |= {SITE + name: data for name, data in files.items()}
+    # What stands here at the beginning is there even if the end of the file is not.
+    for name, data in attached.items():
+        writer.add_attachment(0, 0, name, _media_type(name), data)
+    _add_messages(writer, playback, files)
+    writer.finish()
+
+
+def _add_messages(writer: Any, playback: Playback, files: Mapping[str, bytes]) -> None:
+    channels = _Channels(writer, playback)
+    plan = next((data for name, data in files.items() if name.endswith(".geojson")), None)
+    every = [_packed(message) for message in every_message(playback)]
+    if plan is not None:
+        every.insert(
+            0, _packed(Message(0.0, "/plan", "foxglove.GeoJSON", {"geojson": plan.decode()}))
+        )
+    every.sort(key=lambda entry: entry[0])
+    for time, topic, schema, data in every:
+        channel = channels.of(topic, schema)
+        writer.add_message(channel, time, data, time, channels.count(channel))
+
+
+def _packed(message: Message) -> tuple[int, str, str, bytes]:
+    content = message.content if message.schema == XML else _json(message.content)
+    return messages.nanoseconds(message.time), message.topic, message.schema, content
+
+
+class _Channels:
+    """The channels of a file, opened when first used.
+
+    Args:
+        writer: Of the file.
+        playback: Tells who the ends of a channel of messages are.
+    """
+
+    def __init__(self, writer: Any, playback: Playback) -> None:
+        self._writer = writer
+        self._ids = {name: device for device, name in story.names_of(playback.labels).items()}
+        self._schemas: dict[str, int] = {}
+        self._channels: dict[str, int] = {}
+        self._counts: dict[int, int] = {}
+
+    def of(self, topic: str, schema: str) -> int:
+        """The channel of a topic."""
+        if topic not in self._channels:
+            encoding, metadata = ("json", {}) if schema != XML else (XML, self._ends(topic))
+            self._channels[topic] = self._writer.register_channel(
+                topic, encoding, self._schema(schema), metadata
+            )
+        return self._channels[topic]
+
+    def count(self, channel: int) -> int:
+        """How many messages a channel has had, this one included."""
+        self._counts[channel] = self._counts.get(channel, 0) + 1
+        return self._counts[channel]
+
+    def _ends(self, topic: str) -> dict[str, str]:
+        source, destination = topic.split("/")[-2:]
+        return {"source": self._ids[source], "destination": self._ids[destination]}
+
+    def _schema(self, name: str) -> int:
+        if name not in self._schemas:
+            if name == XML:
+                xsd = resources.find("dva", "protocol", ".xsd").read_bytes()
+                new = self._writer.register_schema("dva", "xsd", xsd)
+            else:
+                new = self._writer.register_schema(name, "jsonschema", _json(SCHEMAS[name]))
+            self._schemas[name] = new
+        return self._schemas[name]
+
+
+# --- what goes with it -----------------------------------------------------------------
+
+
+def facts(playback: Playback) -> dict[str, Any]:
+    """What a player has to know beside the messages."""
+    return {
+        "format": FORMAT,
+        "seed": playback.seed,
+        "duration_s": playback.duration,
+        "sampled_s": FILM_PERIOD,
+        "labels": playback.labels,
+        "radii_m": playback.radii,
+        "incidents": [_incident(incident) for incident in playback.incidents],
+        "contained_s": {str(number): time for number, time in playback.contained.items()},
+        "drives": [
+            {
+                "robot": drive.robot,
+                "operator": drive.operator,
+                "event": drive.event,
+                "ordered_s": drive.ordered,
+                "started_s": drive.started,
+                "ended_s": drive.ended,
+                "outcome": drive.outcome,
+            }
+            for drive in playback.recorder.drives
+        ],
+    }
+
+
+def _incident(incident: Any) -> dict[str, Any]:
+    return {
+        "kind": incident.kind,
+        "room": incident.room,
+        "start_s": incident.start,
+        "detected_s": messages.finite(incident.detected),
+        "false_alarm": incident.false_alarm,
+        "hazard": dataclasses.asdict(incident.hazard),
+    }
+
+
+def _about(playback: Playback) -> dict[str, str]:
+    return {
+        "version": __version__,
+        "format": str(FORMAT),
+        "seed": str(playback.seed),
+        "site": playback.site.name,
+        "duration_s": f"{playback.duration:g}",
+        "time": "virtual, from the start of the run",
+    }
+
+
+def _plain(value: Any) -> Any:
+    """Tables as JSON has them: what is missing or never came is null."""
+    if isinstance(value, Mapping):
+        return {key: _plain(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(each) for each in value]
+    if hasattr(value, "item"):
+        value = value.item()
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _json(data: Any) -> bytes:
+    return json.dumps(data, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
+
+
+def _media_type(name: str) -> str:
+    kinds = {".json": "application/json", ".geojson": "application/geo+json", ".png": "image/png"}
+    return kinds.get(Path(name).suffix, "application/yaml")
