@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from dva_sim.experiments.cells import CellTable
-from dva_sim.experiments.figures.style import Drawn
+
+if TYPE_CHECKING:
+    from dva_sim.experiments.figures.style import Drawn
 
 Kind = Literal["plain", "note", "warning", "label"]
 

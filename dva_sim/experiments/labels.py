@@ -144,6 +144,11 @@ def number(value: float) -> str:
     return text.replace("-", "\N{MINUS SIGN}") if float(text) else "0"
 
 
+def capital(text: str) -> str:
+    """A capital letter first; the others as they are."""
+    return text[:1].upper() + text[1:]
+
+
 def quantity(value: float, unit: str) -> str:
     """A number with its unit, apart by a space that does not break."""
     return f"{number(value)}\N{NO-BREAK SPACE}{unit}" if unit else number(value)

@@ -26,7 +26,6 @@ from dva_sim.experiments.reading import (
 from dva_sim.experiments.results import Results
 from dva_sim.experiments.robustness import Robustness, robustness_of
 from dva_sim.experiments.support import support_of_part
-from dva_sim.experiments.transports import figures as transport_figures
 from dva_sim.experiments.transports import page as transport_page
 from dva_sim.experiments.tuning import tuning_warning
 
@@ -93,7 +92,7 @@ class Reading:
     @property
     def is_contest(self) -> bool:
         """Whether transports compete on a congested link."""
-        return transport_figures.is_contest(self.view)
+        return transport_page.is_contest(self.view)
 
     @cached_property
     def robustness(self) -> Robustness | None:

@@ -13,7 +13,8 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from dva_sim.experiments.figures.style import FAINT, INK, SOFT, capital, panels, styled
+from dva_sim.experiments.figures.style import FAINT, INK, SOFT, panels, styled
+from dva_sim.experiments.labels import capital
 from dva_sim.tasks import TaskScenario, Trace, play, trace_of
 from dva_sim.tasks.summary import Row, run_row
 

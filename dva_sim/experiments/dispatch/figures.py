@@ -14,11 +14,11 @@ from dva_sim.experiments.figures.style import (
     INK,
     SOFT,
     Drawn,
-    capital,
     finish,
     panels,
     styled,
 )
+from dva_sim.experiments.labels import capital
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

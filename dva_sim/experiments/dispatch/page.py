@@ -13,8 +13,7 @@ from dva_sim.experiments.cells import CellTable, Summary, cell_table
 from dva_sim.experiments.dispatch.percentiles import pooled
 from dva_sim.experiments.dispatch.shifts import BEST, POLICY, Shifts
 from dva_sim.experiments.effects import Factor, Setting
-from dva_sim.experiments.figures.style import capital
-from dva_sim.experiments.labels import listing, number, percent
+from dva_sim.experiments.labels import capital, listing, number, percent
 
 SUMMARIES: tuple[Summary, ...] = (
     ("on_scene_share", "on scene by T", np.mean, percent),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from dva_sim.experiments.cadence import Cadence, cadence
 from dva_sim.experiments.effects import Setting, Table, View
@@ -20,7 +20,9 @@ from dva_sim.experiments.figures import (
 )
 from dva_sim.experiments.figures.style import Drawn, styled
 from dva_sim.experiments.labels import Level, factor_name, listing
-from dva_sim.experiments.summary import Reading
+
+if TYPE_CHECKING:
+    from dva_sim.experiments.summary import Reading
 
 __all__ = ["Drawn", "draw_all"]
 

@@ -14,7 +14,6 @@ from dva_sim.experiments.figures.style import (
     SOFT,
     Drawn,
     axis_label,
-    capital,
     colours,
     dodge,
     finish,
@@ -27,7 +26,7 @@ from dva_sim.experiments.figures.style import (
     stops_axis,
     wrapped,
 )
-from dva_sim.experiments.labels import measure_name
+from dva_sim.experiments.labels import capital, measure_name
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -25,7 +25,6 @@ from dva_sim.experiments.figures.style import (
     Drawn,
     Ends,
     axis_label,
-    capital,
     colours,
     finish,
     hatch_stops,
@@ -37,7 +36,7 @@ from dva_sim.experiments.figures.style import (
     place_of,
     wrapped,
 )
-from dva_sim.experiments.labels import Level, factor_name, level_name, measure_name
+from dva_sim.experiments.labels import Level, capital, factor_name, level_name, measure_name
 from dva_sim.experiments.statistics import Band, band
 
 if TYPE_CHECKING:

@@ -16,6 +16,7 @@ from dva_sim.experiments.figures.numbers import Numbers
 from dva_sim.experiments.labels import (
     Level,
     brief,
+    capital,
     factor_name,
     level_name,
     measure_name,
@@ -164,11 +165,6 @@ def axis_label(name: str, text: str | None = None) -> str:
     unit = unit_of(name)
     words = capital(text or measure_name(name))
     return f"{words} [{unit}]" if unit else words
-
-
-def capital(text: str) -> str:
-    """A capital letter first; the others as they are."""
-    return text[:1].upper() + text[1:]
 
 
 def wrapped(text: str, width: int = 38) -> str:

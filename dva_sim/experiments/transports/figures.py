@@ -57,11 +57,6 @@ FELT = (
 )
 
 
-def is_contest(view: View | None) -> bool:
-    """Whether a study compares sessions on a congested link."""
-    return view is not None and view.part.has("session_down_bps")
-
-
 def draw_all(view: View) -> list[Drawn]:
     """Every figure, in the order of the report."""
     with styled():

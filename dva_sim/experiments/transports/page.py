@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dva_sim.experiments.cells import Summary
+from dva_sim.experiments.effects import View
 from dva_sim.experiments.labels import number, percent
 
 SUMMARIES: tuple[Summary, ...] = (
@@ -27,6 +28,11 @@ SUMMARIES: tuple[Summary, ...] = (
     ("jain_up", "Jain's index up", np.mean, number),
     ("jain_down", "Jain's index down", np.mean, number),
 )
+
+
+def is_contest(view: View | None) -> bool:
+    """Whether a study compares sessions on a congested link."""
+    return view is not None and view.part.has("session_down_bps")
 
 
 def method(correlation: float | None) -> list[str]:
