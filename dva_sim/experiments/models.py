@@ -9,7 +9,7 @@ a session of teleoperation beside TCP flows on one congested link, and a drive o
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from dva_sim import scenario as scenarios
 from dva_sim.config import Document
@@ -20,6 +20,9 @@ from dva_sim.tasks import scenario as tasks
 from dva_sim.tasks.scenario import TaskScenario
 from dva_sim.timed import scenario as timed
 from dva_sim.timed.scenario import TimedScenario
+
+if TYPE_CHECKING:
+    from dva_sim.simulation import Recording
 
 AnyScenario = Scenario | TimedScenario | TaskScenario | TransportScenario
 Tables = dict[str, list[dict[str, Any]]]
@@ -75,6 +78,18 @@ def model_for(scenario: AnyScenario) -> Model:
     return MODELS[scenario.model]
 
 
+def tables_of(recording: Recording) -> Tables:
+    """What is measured of a run of the full model, but for its tracks."""
+    from dva_sim.experiments import metrics, workload
+
+    return {
+        "runs": [metrics.run_row(recording)],
+        "events": metrics.event_rows(recording),
+        "people": metrics.people_rows(recording),
+        "operators": workload.operator_rows(recording),
+    }
+
+
 class _Full:
     def measures(self) -> tuple[str, ...]:
         from dva_sim.experiments import metrics
@@ -103,20 +118,13 @@ class _Full:
         rehearse(scenario, seed)
 
     def tables(self, scenario: AnyScenario, seed: int, with_tracks: bool) -> Tables:
-        from dva_sim.experiments import metrics, workload
+        from dva_sim.experiments import metrics
         from dva_sim.simulation import simulate
 
         assert isinstance(scenario, Scenario)
         recording = simulate(scenario, seed)
-        tables: Tables = {
-            "runs": [metrics.run_row(recording)],
-            "events": metrics.event_rows(recording),
-            "people": metrics.people_rows(recording),
-            "operators": workload.operator_rows(recording),
-        }
-        if with_tracks:
-            tables["tracks"] = metrics.track_rows(recording)
-        return tables
+        tracks = {"tracks": metrics.track_rows(recording)} if with_tracks else {}
+        return tables_of(recording) | tracks
 
 
 class _Timed:

@@ -7,7 +7,7 @@ import struct
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from math import inf
+from math import inf, nan
 from pathlib import Path
 from typing import IO, Any
 
@@ -35,7 +35,7 @@ class Opened:
     Attributes:
         playback: What can be told and shown of the run.
         about: What its file says of it, such as the version that made it.
-        tables: What was measured, rows by table, with None for what is missing; None if the
+        tables: What was measured, rows by table, with nan for what is missing; None if the
             file does not say.
         lasted: How long the run lasted [s]; longer than the playback if the file was cut short.
     """
@@ -169,8 +169,15 @@ def _opened(raw: _Raw) -> Opened:
         contained=contained,
     )
     about = {key: value for key, value in raw.about.items() if key != ABOUT}
-    tables = json.loads(raw.files[TABLES]) if TABLES in raw.files else None
+    tables = _tables(raw.files[TABLES]) if TABLES in raw.files else None
     return Opened(playback, about, tables, run["duration_s"])
+
+
+def _tables(data: bytes) -> dict[str, list[dict[str, Any]]]:
+    return {
+        name: [{key: nan if v is None else v for key, v in row.items()} for row in rows]
+        for name, rows in json.loads(data).items()
+    }
 
 
 def _incident(entry: Mapping[str, Any]) -> Incident:

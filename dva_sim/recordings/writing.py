@@ -93,7 +93,7 @@ def every_message(playback: Playback) -> Iterator[Message]:
 def _write(playback: Playback, file: IO[bytes], tables: Tables | None, about: Any) -> None:
     from mcap.writer import Writer
 
-    writer = Writer(file, chunk_size=CHUNK, enable_data_crcs=True)
+    writer: Any = Writer(file, chunk_size=CHUNK, enable_data_crcs=True)
     writer.start(profile="", library=f"dva-sim {__version__}")
     writer.add_metadata(ABOUT, _about(playback) | about)
     files = sites.pack(playback.site)
