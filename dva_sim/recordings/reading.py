@@ -279,4 +279,7 @@ def _drives(raw: _Raw, run: Mapping[str, Any]) -> list[DriveLog]:
     for topic, said in raw.said.items():
         for time, shown in said if topic.endswith(f"/{story.SCREEN}") else ():
             drives[shown["drive"]].frames.append(Shown(shown["captured_s"], time, 0))
+        for time, made in said if topic.endswith(f"/{story.COMMANDS}") else ():
+            command = time, made["speed_m_s"], made["turn_rate_rad_s"]
+            drives[made["drive"]].commands.append(command)
     return drives

@@ -209,8 +209,9 @@ _OWN = (
     ),
     _object(
         "dva_sim.Command",
-        "The phone makes a command from the tilt",
+        "The phone makes a command from the tilt; `drive` counts the drives of the run from 0",
         timestamp=TIME,
+        drive=COUNT,
         robot=TEXT,
         speed_m_s=NUMBER,
         turn_rate_rad_s=NUMBER,

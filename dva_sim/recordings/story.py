@@ -11,7 +11,8 @@ from dva_sim.recordings import messages
 from dva_sim.recordings.messages import XML, Message
 from dva_sim.simulation import Playback
 
-STORY, SCREEN, CAMERA, MESSAGES = "/story", "screen", "camera", "/messages"
+STORY, MESSAGES = "/story", "/messages"
+SCREEN, COMMANDS, CAMERA = "screen", "commands", "camera"  # last parts of topics
 LEVELS = {"safety": 3, "mode": 1, "link": 1}  # of Foxglove's log; all else is for information
 
 
@@ -69,15 +70,17 @@ def shown(playback: Playback) -> Iterator[Message]:
 def commanded(playback: Playback) -> Iterator[Message]:
     """What the phones make of the tilt."""
     labels = playback.labels
-    for drive in playback.recorder.drives:
+    for number, drive in enumerate(playback.recorder.drives):
         for time, speed, turn_rate in drive.commands:
             content = {
                 "timestamp": messages.stamp(time),
+                "drive": number,
                 "robot": labels[drive.robot],
                 "speed_m_s": round(speed, 5),
                 "turn_rate_rad_s": round(turn_rate, 5),
             }
-            yield Message(time, f"/{labels[drive.operator]}/commands", "dva_sim.Command", content)
+            topic = f"/{labels[drive.operator]}/{COMMANDS}"
+            yield Message(time, topic, "dva_sim.Command", content)
 
 
 def applied(playback: Playback) -> Iterator[Message]:
