@@ -21,6 +21,7 @@ from dva_sim.errors import ConfigError
 from dva_sim.experiments import design
 from dva_sim.experiments.design import Cell
 from dva_sim.experiments.models import model_for, model_of
+from dva_sim.experiments.registration import Registration, departures, load_registration
 from dva_sim.experiments.repeats import Bands
 from dva_sim.experiments.study import Study, load_study
 from dva_sim.experiments.transports import TransportScenario
@@ -148,11 +149,24 @@ def _quoted(document: Document, problem: str) -> Path_:
 def _check_study(document: Document) -> Iterator[ConfigError]:
     """The study, its scenarios in every cell, and one run of each built as by the runner."""
     study = load_study(document.file)
-    for cell in design.cells(study):
+    versions = [study, *([load_study(document.file, full=True)] if study.full else [])]
+    cells = {cell.config: cell for version in versions for cell in design.cells(version)}
+    for cell in cells.values():
         try:
             model_for(cell.scenario).rehearse(cell.scenario, study.seed)
         except ConfigError as error:
             yield _blamed_in_cell(document, cell, error)
+
+
+def _check_registration(document: Document) -> Iterator[ConfigError]:
+    """The registration, and whether the study beside it is still what was registered."""
+    found = load_registration(document)
+    file = document.file.parent / f"{found.study}.yaml"
+    if not file.is_file():
+        yield document.error(f"{file.name}, the study it is of, is not beside it", ("study",))
+        return
+    for problem in departures(found, load_study(file, full=found.full)):
+        yield document.error(problem, ("plan",))
 
 
 def _blamed_in_cell(document: Document, cell: Cell, error: ConfigError) -> ConfigError:
@@ -252,5 +266,6 @@ KINDS: Final = (
     Kind("bystanders", BystanderProfile, "agents/people", _check_model(BystanderProfile)),
     Kind("operators", Population, "agents/people", _check_model(Population)),
     Kind("bands of operators", Bands, "agents/people", _check_model(Bands)),
+    Kind("registration", Registration, "experiments", _check_registration),
     Kind("tuned values", Tuned, "experiments/tuned", _check_model(Tuned)),
 )

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import difflib
 import json
+import re
 from typing import Any, Final
 
 from dva_sim.checking.forms import schema_file
 from dva_sim.errors import ConfigError
 
 KINDS: Final = ("message", "study", "scenario", "cases", "site", "agent")
+_KEYS: Final = "Attributes"  # the section of a model's description that tells its keys
+_KEY: Final = re.compile(r"^ {4}(?P<key>\w+): (?P<text>.*(?:\n {5,}.*)*)", re.MULTILINE)
 _DIALECT: Final = "https://json-schema.org/draft/2020-12/schema"
 
 
@@ -22,10 +25,24 @@ def schema_text(kind: str) -> str:
     if kind == "message":
         return schema_file().read_text(encoding="utf-8")
     if kind in KINDS:
-        return json.dumps({"$schema": _DIALECT} | _json_schema(kind), indent=2) + "\n"
+        schema = {"$schema": _DIALECT} | _json_schema(kind)
+        for model in (schema, *schema.get("$defs", {}).values()):
+            _describe_keys(model)
+        return json.dumps(schema, indent=2) + "\n"
     near = difflib.get_close_matches(kind, KINDS, n=1)
     hint = f"did you mean {near[0]!r}? " if near else ""
     raise ConfigError(f"no schema {kind!r}; {hint}there are: {', '.join(KINDS)}")
+
+
+def _describe_keys(model: dict[str, Any]) -> None:
+    """Give each key what its model's description says of it, so that editors can show it."""
+    text, _, rest = model.get("description", "").partition(f"\n\n{_KEYS}:\n")
+    if not rest:
+        return
+    model["description"] = text
+    for match in _KEY.finditer(rest.partition("\n\n")[0]):
+        if match["key"] in model.get("properties", {}):
+            model["properties"][match["key"]]["description"] = " ".join(match["text"].split())
 
 
 def _json_schema(kind: str) -> dict[str, Any]:

@@ -86,6 +86,8 @@ class Contrast(Config):
         over: Factor along which the difference is followed; without it, one difference.
         within: Levels of the other factors.
         family: Tests of one family share their chance of a false alarm.
+        smallest_effect: Smallest difference that matters, in the measure's own unit.
+        smallest_effect_s: The same for a measure in seconds [s].
     """
 
     part: str
@@ -95,16 +97,6 @@ class Contrast(Config):
     over: str | None = None
     within: dict[str, Level] = Field(default_factory=dict)
     family: Annotated[str, Field(min_length=1)] = "main"
-
-
-class Answer(Contrast):
-    """The contrast declared to answer the question, before anything is run.
-
-    Attributes:
-        smallest_effect: Smallest difference that matters, in the measure's own unit.
-        smallest_effect_s: The same for a measure in seconds [s].
-    """
-
     smallest_effect: Annotated[float, Field(gt=0)] | None = None
     smallest_effect_s: Annotated[float, Field(gt=0)] | None = None
 

@@ -79,8 +79,8 @@ def _faults_of_rows(rows: Sequence[Mapping[str, Level]]) -> Iterator[Fault]:
 def of_factors(study: Study) -> Iterator[Fault]:
     """Names of treatments that do not exist, keys that two factors set, tuning without a rule."""
     setters: dict[str, str] = {}
-    names = {**study.factors, **dict.fromkeys(keys_of(study.design, study.listed_rows), ())}
-    for factor in names:
+    listed = keys_of(study.design, study.listed_rows)
+    for factor in dict.fromkeys([*study.factors, *listed]):
         levels = _levels_of(study, factor)
         named = study.treatments.get(factor)
         if named is not None:
@@ -92,7 +92,7 @@ def of_factors(study: Study) -> Iterator[Fault]:
             if setters.setdefault(key, factor) != factor:
                 yield f"{key!r} is set by two factors", _place(study, factor)
     for key in study.changes:
-        if key in setters and key not in study.factors:
+        if setters.get(key) in listed:
             yield f"{key!r} is varied by the design; change 'design'", ("design",)
     try:
         refuse_keys_of_the_design(study.changes)
@@ -184,13 +184,13 @@ def _faults_of_contrast(study: Study, asked: Contrast, path: Path_) -> Iterator[
         yield from _fault_of_level(study, (*path, "within", name), name, (level,))
     if asked.contrast[0] == asked.contrast[1]:
         yield "contrast compares a level with itself", (*path, "contrast")
-    if asked.over is None:
+    if asked.over is None or path != (ANSWER,):
         yield from _fault_of_place(study, asked, path)
 
 
 def _fault_of_place(study: Study, asked: Contrast, path: Path_) -> Iterator[Fault]:
-    """One difference is at one place: the levels of all factors have to be given."""
-    given = {asked.factor, *asked.within, *together(study)}
+    """The levels of all other factors have to be given, or what is meant is open."""
+    given = {asked.factor, asked.over, *asked.within, *together(study)}
     for name, levels in study.factors.items():
         if len(levels) > 1 and name not in given:
             yield f"should run over {name!r} or be within a level of it", path

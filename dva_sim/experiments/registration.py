@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from dva_sim import __version__
-from dva_sim.config import Config, load_yaml, validate
+from dva_sim.config import Config, Document, load_yaml, validate
 from dva_sim.errors import ConfigError, DvaSimError
 from dva_sim.experiments import design
 from dva_sim.experiments.asking import POINT
@@ -57,21 +57,23 @@ class Registration(Config):
         return derive_seed("registration", self.hash)
 
 
-def file_of(study: Study) -> Path:
-    """Where the registration of a study lies."""
-    return study.folder / f"{study.file.stem}{REGISTRATION}"
-
-
-def load_registration(path: Path) -> Registration | None:
-    """A registration; None where there is none.
+def load_registration(document: Document) -> Registration:
+    """The registration that a file holds.
 
     Raises:
-        ConfigError: the file is not one.
+        ConfigError: it holds none.
     """
-    if not path.is_file():
-        return None
-    document = load_yaml(path)
     return validate(Registration, document.data, document.error)
+
+
+def registration_of(study: Study) -> Registration | None:
+    """The registration beside a study; None where there is none.
+
+    Raises:
+        ConfigError: the file there holds none.
+    """
+    path = study.folder / f"{study.file.stem}{REGISTRATION}"
+    return load_registration(load_yaml(path)) if path.is_file() else None
 
 
 def register(study: Study, again: bool = False) -> str:
@@ -85,8 +87,8 @@ def register(study: Study, again: bool = False) -> str:
         ConfigError: nothing to register, a size left open, or a registration that is there.
     """
     _refuse_what_is_open(study)
-    path = file_of(study)
-    found = load_registration(path)
+    path = study.folder / f"{study.file.stem}{REGISTRATION}"
+    found = registration_of(study)
     if found is not None and not again:
         raise ConfigError(f"{path} is there already; --again replaces it, and that will be told")
     made = Registration(
@@ -102,7 +104,7 @@ def register(study: Study, again: bool = False) -> str:
     except OSError as error:
         raise DvaSimError(f"{path} cannot be written: {error.strerror}") from None
     names, size = ", ".join(study.hypotheses), f"{study.persons} persons x {study.replications}"
-    return f"Registered {names} on {size} trials, in {path}\nIts run, unchanged, confirms or refutes"
+    return f"Registered {names} on {size} trials, in {path}\nRun unchanged, it confirms or refutes"
 
 
 def plan_of(study: Study) -> dict[str, Any]:
@@ -131,7 +133,7 @@ def settled(study: Study) -> Study:
     Raises:
         ConfigError: the registration cannot be read, or the study has a cell that is not valid.
     """
-    found = load_registration(file_of(study))
+    found = registration_of(study)
     why = [*_liberties(study), *(departures(found, study) if found is not None else ())]
     confirms = found is not None and not why
     if found is not None:

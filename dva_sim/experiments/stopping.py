@@ -76,7 +76,7 @@ def _of_measure(measure: str, rows: Iterable[Row]) -> Floats:
     for runs in cells.values():
         values = [value - aside.get(who, np.nan if aside else 0.0) for who, value in runs.items()]
         found = mean_interval(values, [person for person, _ in runs])
-        widths.append((found.high - found.low) / 2)
+        widths.append(found.half_width)
     return np.array(widths)
 
 

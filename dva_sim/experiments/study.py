@@ -16,7 +16,6 @@ from dva_sim.experiments import faults
 from dva_sim.experiments.asking import (
     ANSWER,
     REPEATS,
-    Answer,
     Changes,
     Contrast,
     Count,
@@ -72,7 +71,7 @@ class Study(Config):
     design: Design | None = None
     treatments: dict[str, dict[str, Changes]] = Field(default_factory=dict)
     parts: Annotated[dict[str, Part], Field(min_length=1)]
-    answer: Answer | None = None
+    answer: Contrast | None = None
     comparisons: dict[str, Contrast] = Field(default_factory=dict)
     hypotheses: dict[str, Hypothesis] = Field(default_factory=dict)
     tuning: Tuning | None = None
