@@ -24,6 +24,7 @@ from dva_sim.experiments.statistics import (
     effect_size,
     equivalence,
     holm,
+    one_sided_test,
     pair_correlation,
     paired_difference,
     permutation_test,
@@ -206,4 +207,4 @@ def _p(claim: Hypothesis, pairs: Pairs) -> float:
     if claim.direction == "same":
         return equivalence(*pairs, claim.margin).p
     margin = claim.margin if claim.direction == "above" else -claim.margin
-    return permutation_test(*pairs, side=claim.direction, null=margin).p
+    return one_sided_test(*pairs, margin, claim.direction)

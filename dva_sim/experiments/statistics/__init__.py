@@ -9,7 +9,7 @@ All intervals are Monte Carlo intervals: they hold given the model.
 from dva_sim.experiments.statistics.bands import Band, band
 from dva_sim.experiments.statistics.components import Components, components
 from dva_sim.experiments.statistics.effect_sizes import EffectSize, effect_size
-from dva_sim.experiments.statistics.equivalence import Equivalence, equivalence
+from dva_sim.experiments.statistics.equivalence import Equivalence, equivalence, one_sided_test
 from dva_sim.experiments.statistics.factorial import Effect, factorial_effects
 from dva_sim.experiments.statistics.families import holm
 from dva_sim.experiments.statistics.incidence import Incidence, cumulative_incidence
@@ -48,6 +48,7 @@ __all__ = [
     "holm",
     "mean_interval",
     "needed_persons",
+    "one_sided_test",
     "pair_correlation",
     "paired_difference",
     "permutation_test",

@@ -1,14 +1,16 @@
-"""Are two treatments the same for all that matters: two one-sided tests."""
+"""Does a difference lie beyond a bound, or within a margin: one-sided tests."""
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dva_sim.experiments.statistics.persons import Interval, person_means, students_t
+from dva_sim.experiments.statistics.means import paired_difference
+from dva_sim.experiments.statistics.persons import RESAMPLES, Interval, person_means
+from dva_sim.experiments.statistics.studentised import chance_above
 
 ALPHA = 0.05
 
@@ -21,7 +23,7 @@ class Equivalence:
         difference: Mean over persons of `a - b` with its interval of level `1 - 2 alpha`.
         margin: Largest difference that does not matter, either way.
         p: The larger of the two one-sided p-values; nan with fewer than two persons.
-        is_equivalent: Whether `p` is not above `alpha`: the interval lies within the margin.
+        is_equivalent: Whether `p` is below `alpha`: the interval lies within the margin.
     """
 
     difference: Interval
@@ -30,8 +32,44 @@ class Equivalence:
     is_equivalent: bool
 
 
+def one_sided_test(
+    a: ArrayLike,
+    b: ArrayLike,
+    person: ArrayLike,
+    bound: float,
+    side: Literal["above", "below"],
+    seed: int = 1,
+    resamples: int = RESAMPLES,
+) -> float:
+    """The p-value of the mean of `a - b` being above, or below, a bound.
+
+    By the same resampling as the interval of the difference, so that the two agree: p is
+    below 0.025 where the interval of 95 % lies beyond the bound.
+
+    Args:
+        a: One treatment `(n,)`, nan where missing.
+        b: The other `(n,)`, row by row the same person and trial.
+        person: Whose run it was `(n,)`.
+        bound: In the measure's unit.
+        side: On which side of it the difference is claimed to lie.
+        seed: Of the resampling.
+        resamples: How many times persons are drawn.
+
+    Returns:
+        Nan with fewer than two persons.
+    """
+    off = person_means(np.asarray(a, dtype=float) - np.asarray(b, dtype=float) - bound, person)[1]
+    return chance_above(off if side == "above" else -off, seed, resamples)
+
+
 def equivalence(
-    a: ArrayLike, b: ArrayLike, person: ArrayLike, margin: float, alpha: float = ALPHA
+    a: ArrayLike,
+    b: ArrayLike,
+    person: ArrayLike,
+    margin: float,
+    alpha: float = ALPHA,
+    seed: int = 1,
+    resamples: int = RESAMPLES,
 ) -> Equivalence:
     """Two one-sided tests that the mean of `a - b` lies between `-margin` and `margin`.
 
@@ -44,6 +82,8 @@ def equivalence(
         person: Whose run it was `(n,)`.
         margin: Above zero, in the measure's unit.
         alpha: Level of each of the tests.
+        seed: Of the resampling.
+        resamples: How many times persons are drawn.
 
     Raises:
         ValueError: the margin is not above zero.
@@ -53,21 +93,8 @@ def equivalence(
     """
     if not margin > 0:
         raise ValueError(f"the margin of an equivalence test must be above zero, not {margin}")
-    means = person_means(np.asarray(a, dtype=float) - np.asarray(b, dtype=float), person)[1]
-    n = len(means)
-    mean = float(means.mean()) if n else math.nan
-    error = float(means.std(ddof=1)) / math.sqrt(n) if n > 1 else math.nan
-    half = students_t(1 - 2 * alpha, n) * error
-    p = _p(margin - abs(mean), error, n)
-    return Equivalence(Interval(mean, mean - half, mean + half, n), margin, p, p <= alpha)
-
-
-def _p(room: float, error: float, n: int) -> float:
-    """One-sided p-value of the mean being so far inside the nearer edge of the margin."""
-    from scipy import special
-
-    if n < 2:
-        return math.nan
-    if error == 0:
-        return 0.0 if room > 0 else 1.0
-    return float(special.stdtr(n - 1, -room / error))
+    difference = paired_difference(a, b, person, 1 - 2 * alpha, seed, resamples)
+    above = one_sided_test(a, b, person, -margin, "above", seed, resamples)
+    below = one_sided_test(a, b, person, margin, "below", seed, resamples)
+    p = float(np.maximum(above, below))
+    return Equivalence(difference, margin, p, p < alpha)

@@ -40,7 +40,6 @@ def permutation_test(
     b: ArrayLike,
     person: ArrayLike,
     side: Side = "two-sided",
-    null: float = 0.0,
     seed: int = 1,
     permutations: int = PERMUTATIONS,
 ) -> PermutationTest:
@@ -50,14 +49,13 @@ def permutation_test(
     sign. All trials of a person flip together. With up to 14 persons every combination of signs
     is tried; else a random sample, with the outcome itself counted among it so that p is
     never zero and never too small. With fewer than 6 persons p cannot be below 0.05 two-sided.
+    Whether a difference is beyond some bound is for `one_sided_test`.
 
     Args:
         a: One treatment `(n,)`, nan where missing.
         b: The other `(n,)`, row by row the same person and trial.
         person: Whose run it was `(n,)`.
-        side: `above` asks whether `a - b` exceeds `null`, `below` whether it falls short of it.
-        null: The difference that is put to the test; other than zero, it is assumed that
-            persons' differences spread evenly around it.
+        side: `above` asks whether `a` exceeds `b`, `below` whether it falls short of it.
         seed: Of the random signs.
         permutations: How many of them.
 
@@ -65,14 +63,14 @@ def permutation_test(
         Fisher, The Design of Experiments (1935), section 21; Phipson & Smyth, Stat. Appl. Genet.
         Mol. Biol. 9 (2010) 39.
     """
-    off = person_means(np.asarray(a, dtype=float) - np.asarray(b, dtype=float) - null, person)[1]
+    off = person_means(np.asarray(a, dtype=float) - np.asarray(b, dtype=float), person)[1]
     if not len(off):
         return PermutationTest(math.nan, math.nan, 0, True)
     is_exact = len(off) <= _MOST_EXACT
     signs = _all_signs(len(off)) if is_exact else _random_signs(len(off), seed, permutations)
     chance = _as_extreme(signs @ off, float(off.sum()), side, float(abs(off).sum()))
     p = chance.mean() if is_exact else (chance.sum() + 1) / (len(chance) + 1)
-    return PermutationTest(float(off.mean()) + null, float(p), len(off), is_exact)
+    return PermutationTest(float(off.mean()), float(p), len(off), is_exact)
 
 
 def _as_extreme(sums: Floats, seen: float, side: Side, size: float) -> NDArray[np.bool_]:

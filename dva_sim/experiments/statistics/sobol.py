@@ -68,7 +68,7 @@ def sobol_indices(
     drawn = np.array([_indices(table, rows, columns) for rows, columns in chosen])
     low, high = np.nanquantile(drawn, [(1 - level) / 2, (1 + level) / 2], axis=0)
     first, total = (
-        [Interval(*map(float, ends), persons) for ends in zip(*part, strict=True)]
+        [Interval(float(x), float(lo), float(hi), persons) for x, lo, hi in zip(*part, strict=True)]
         for part in np.stack([whole, low, high], axis=1)
     )
     return tuple(SobolIndex(*each) for each in zip(levels, first, total, strict=True))

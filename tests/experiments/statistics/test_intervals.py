@@ -16,19 +16,22 @@ def test_a_persons_mean_leaves_out_missing_runs_and_missing_persons():
 
 def test_the_interval_of_a_paired_difference_is_that_of_a_bootstrap_t_written_out():
     rng = np.random.default_rng(3)
-    a, b = rng.gamma(2, 1, (24, 5)), rng.gamma(2, 1, (24, 5))
+    a, b = rng.gamma(0.4, 20, (24, 5)), rng.gamma(2, 1, (24, 5))
     person = np.repeat(np.arange(24), 5)
     found = statistics.paired_difference(a.ravel(), b.ravel(), person)
     off = (a - b).mean(axis=1)
     ratios = []
     for _ in range(20_000):
         drawn = rng.choice(off, 24)
-        ratios.append(abs(drawn.mean() - off.mean()) / stats.sem(drawn))
-    half = max(np.quantile(ratios, 0.95), stats.t.isf(0.025, 23)) * stats.sem(off)
+        ratios.append((drawn.mean() - off.mean()) / stats.sem(drawn))
+    students, either = stats.t.isf(0.025, 23), np.quantile(np.abs(ratios), 0.95)
+    down = max(students, either, np.quantile(ratios, 0.975))
+    up = max(students, either, -np.quantile(ratios, 0.025))
     assert found.mean == pytest.approx((a - b).mean())
-    assert found.half_width == pytest.approx(half, rel=0.02)
-    assert (found.low + found.high) / 2 == pytest.approx(found.mean)
+    assert (found.mean - found.low) / stats.sem(off) == pytest.approx(down, rel=0.03)
+    assert (found.high - found.mean) / stats.sem(off) == pytest.approx(up, rel=0.03)
     assert found.n_persons == 24
+    assert up > either > students
 
 
 def test_with_fewer_than_six_persons_the_interval_is_students():
