@@ -31,6 +31,10 @@ def run(
     set_: Sets = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the whole study.")] = None,
     jobs: Annotated[int | None, typer.Option(help="Processes; default: all cores.")] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(metavar="tcp://HOST:PORT", help="Use a dask.distributed cluster instead."),
+    ] = None,
     limit: Annotated[
         float, typer.Option(metavar="SECONDS", min=1, help="A run that takes longer has failed.")
     ] = 600,
@@ -42,14 +46,14 @@ def run(
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Only say what would run.")] = False,
 ) -> None:
     """Run a study, or go on with one that was interrupted, and write its report."""
-    from dva_sim.experiments import console
+    from dva_sim.experiments import running
 
     changes = [*(set_ or []), *([f"seed={seed}"] if seed is not None else [])]
-    version = console.Version(full, pilot)
+    version, workers = running.Version(full, pilot), running.Workers(jobs, scheduler, limit)
     if dry_run:
-        console.plan(study, changes, out, jobs, version)
+        running.plan(study, changes, out, workers, version)
         return
-    raise typer.Exit(console.run(study, changes, out, jobs, limit, version))
+    raise typer.Exit(running.run(study, changes, out, workers, version))
 
 
 @app.command()
@@ -82,9 +86,9 @@ def tune(
     jobs: Annotated[int | None, typer.Option(help="Processes; default: all cores.")] = None,
 ) -> None:
     """Choose what a study has tuned, on persons who take no part in it, and keep it beside it."""
-    from dva_sim.experiments import console
+    from dva_sim.experiments import running
 
-    raise typer.Exit(console.tune(study, out, jobs))
+    raise typer.Exit(running.tune(study, out, jobs))
 
 
 @app.command()
@@ -97,6 +101,72 @@ def report(
 
     page = write_report(folder, pdf)
     typer.echo(f"Report: {page}{' and report.pdf' if pdf else ''}")
+
+
+@app.command()
+def show(
+    folder: Annotated[Path, typer.Argument(help="A results folder.")],
+    table: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Show the rows of a table.")
+    ] = None,
+    rows: Annotated[int, typer.Option(min=1, help="How many of them.")] = 20,
+    columns: Annotated[
+        bool, typer.Option("--columns", help="Say what the columns mean, of one table or all.")
+    ] = False,
+) -> None:
+    """Show what a results folder holds: the answer, every cell, a table, or what columns mean."""
+    from dva_sim.experiments import showing_console
+
+    showing_console.show(folder, table, columns, rows)
+
+
+@app.command()
+def export(
+    folder: Annotated[Path, typer.Argument(help="A results folder.")],
+    out: Annotated[
+        Path, typer.Option("-o", "--out", help="X.csv or X.parquet for one table, or a folder.")
+    ],
+    table: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME", help="Only this one; may be given again."),
+    ] = None,
+    form: Annotated[
+        str | None, typer.Option("--format", metavar="csv|parquet", help="In a folder.")
+    ] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace what is there.")] = False,
+) -> None:
+    """Write tables of results for other programs, with what their columns mean."""
+    from dva_sim.experiments import showing_console
+
+    showing_console.export(folder, out, table or [], form, overwrite)
+
+
+@app.command()
+def compare(
+    first: Annotated[Path, typer.Argument(metavar="A", help="A results folder.")],
+    second: Annotated[Path, typer.Argument(metavar="B", help="What is compared with it.")],
+    measure: Annotated[
+        list[str] | None,
+        typer.Option(help="NAME or TABLE.NAME; default: the answer's. May be given again."),
+    ] = None,
+    by: Annotated[
+        list[str] | None,
+        typer.Option(metavar="FACTOR", help="Its levels in place of cells; may be given again."),
+    ] = None,
+    fail_if: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="CONDITION",
+            help="Exit with 1 if it holds: 'p95(drive_time_s) > 1.05x' (of A), "
+            "'mean(events.response_s) per cell > +0.5 s', 'share(confirmed) < 95 %'. "
+            "May be given again.",
+        ),
+    ] = None,
+) -> None:
+    """Compare two results folders, in pairs of runs wherever both had the same luck."""
+    from dva_sim.experiments import showing_console
+
+    raise typer.Exit(showing_console.compare(first, second, measure or [], by or [], fail_if or []))
 
 
 @app.command()
@@ -160,13 +230,49 @@ def episode(
         str | None,
         typer.Option(metavar="PATTERN,PATTERN", help="Show the same seed under two patterns."),
     ] = None,
+    record: Annotated[
+        Path | None, typer.Option(help="Keep the run as a file: .mcap, for replay and viewers.")
+    ] = None,
 ) -> None:
     """Run one scenario and tell its story."""
     from dva_sim.experiments import console
     from dva_sim.experiments.pictures import Wanted
 
     pictures = Wanted(video, still, strip, at, panels, camera, inset)
-    console.episode(scenario, seed, set_ or [], side_by_side, pictures)
+    console.episode(scenario, seed, set_ or [], side_by_side, pictures, record)
+
+
+@app.command()
+def replay(
+    file: Annotated[Path, typer.Argument(help="A recording: .mcap.")],
+    video: Annotated[Path | None, typer.Option(help="Write a film: .gif or .mp4.")] = None,
+    still: Annotated[
+        Path | None, typer.Option(help="Write one moment: .png, .pdf or .svg.")
+    ] = None,
+    strip: Annotated[
+        Path | None, typer.Option(help="Write several moments in one figure, likewise.")
+    ] = None,
+    at: Annotated[
+        str | None,
+        typer.Option(metavar="SECONDS", help="Moment of --still, or moments of --strip: 10,20,30."),
+    ] = None,
+    panels: Annotated[int, typer.Option(help="Moments in a strip.")] = 6,
+    camera: Annotated[
+        str | None,
+        typer.Option(metavar="ROBOT", help="--still shows what this robot's camera sees."),
+    ] = None,
+    inset: Annotated[
+        bool, typer.Option("--inset", help="Show in --video what a robot's camera sees.")
+    ] = False,
+    ros2: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="Write a ROS 2 bag; the folder is new.")
+    ] = None,
+) -> None:
+    """Tell and draw a recorded run from its file alone."""
+    from dva_sim.experiments import replaying
+    from dva_sim.experiments.pictures import Wanted
+
+    replaying.replay(file, Wanted(video, still, strip, at, panels, camera, inset), ros2)
 
 
 @app.command()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from html import escape
@@ -121,7 +122,15 @@ class Results:
         scenarios = self.manifest.get("scenarios", {}).values()
         models = dict.fromkeys(scenario.get("model", "full") for scenario in scenarios)
         factors = [*self.factors, *((self.study.get("design") or {}).get("ranges") or {})]
-        return describe(table, list(self._read(table, "LIMIT 0")), list(models), factors)
+        return describe(table, self.names(table), list(models), factors)
+
+    def names(self, table: str) -> list[str]:
+        """The columns of a table, without its rows being read.
+
+        Raises:
+            ConfigError: no such table, or a damaged file.
+        """
+        return list(self._read(table, "*", "LIMIT 0"))
 
     def path_of(self, table: str) -> Path:
         """The Parquet file of a table.
@@ -144,7 +153,9 @@ class Results:
 
         return write_report(self.folder)
 
-    def table(self, name: str, part: str | None = None) -> Frame:
+    def table(
+        self, name: str, part: str | None = None, columns: Sequence[str] | None = None
+    ) -> Frame:
         """The columns of a table, in the order of the rows (part, cell, person, trial).
 
         Missing values are nan in columns of numbers and None in all others; a column of
@@ -153,24 +164,26 @@ class Results:
         Args:
             name: `runs`, `events`, `tracks`, ...
             part: Only the rows of this part.
+            columns: Only these, which must be there.
 
         Raises:
             ConfigError: no such table, or a damaged file.
         """
-        return self._read(name, "" if part is None else "WHERE part = ?", part)
+        wanted = "*" if columns is None else ", ".join(map(_quoted, columns))
+        return self._read(name, wanted, "" if part is None else "WHERE part = ?", part)
 
-    def _read(self, name: str, rows: str, part: str | None = None) -> Frame:
+    def _read(self, name: str, columns: str, rows: str, part: str | None = None) -> Frame:
         import duckdb
 
         file = str(self.path_of(name))
         values = [file] if part is None else [file, part]
         try:
             with duckdb.connect(config={"threads": 1}) as connection:
-                query = f"SELECT * FROM read_parquet(?) {rows}"
-                columns = connection.execute(query, values).fetchnumpy()
+                query = f"SELECT {columns} FROM read_parquet(?) {rows}"
+                found = connection.execute(query, values).fetchnumpy()
         except duckdb.Error as error:
             raise ConfigError(f"cannot be read: {str(error).splitlines()[0]}", file) from None
-        return Frame({key: without_mask(column) for key, column in columns.items()})
+        return Frame({key: without_mask(column) for key, column in found.items()})
 
     def _repr_html_(self) -> str:
         """What a notebook shows: question, answer, and how many runs stand behind it."""
@@ -179,6 +192,10 @@ class Results:
         runs = f"<p>{self.runs.rows} runs{failed}, in {escape(str(self.folder))}</p>"
         lead = f"<p><b>{escape(self.answer.lead)}</b></p>"
         return f"<h3>{escape(self.question)}</h3>{lead}{notes}{runs}"
+
+
+def _quoted(name: str) -> str:
+    return '"' + name.replace('"', '""') + '"'
 
 
 def _not_results(folder: Path) -> str:

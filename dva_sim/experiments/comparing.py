@@ -1,0 +1,214 @@
+"""Two results folders side by side: what changed, cell by cell, and how sure that is.
+
+Where both ran the same person and trial on the same seed, runs are compared in pairs: what luck
+does to both cancels. Otherwise persons of the one are compared with persons of the other. A
+difference is always the second folder minus the first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from dva_sim.errors import ConfigError
+from dva_sim.experiments.comparing_cells import Levels, Matched, Pair, match
+from dva_sim.experiments.comparing_rows import Difference, Rows, as_numbers, difference
+from dva_sim.experiments.dictionary import DESIGN
+from dva_sim.experiments.frames import Frame
+from dva_sim.experiments.results import Results
+
+_ROW = ("part", "cell", "person", "trial", "seed")
+
+
+@dataclass(frozen=True)
+class Group:
+    """Cells that are looked at together, never of two parts.
+
+    Attributes:
+        part: Name of the part.
+        levels: What they have in common; nothing for all cells of the part.
+        pairs: The cells of both folders.
+    """
+
+    part: str
+    levels: Levels
+    pairs: tuple[Pair, ...]
+
+
+class Comparison:
+    """Two results folders, matched.
+
+    Args:
+        first: What is compared with.
+        second: What is compared.
+
+    Raises:
+        ConfigError: they have no cell in common.
+    """
+
+    def __init__(self, first: Results, second: Results) -> None:
+        self.sides = (first, second)
+        if not self.matched.pairs:
+            raise ConfigError(
+                f"{first.folder} and {second.folder} have no configuration in common: neither "
+                "levels of the same factors, nor a scenario"
+            )
+
+    @cached_property
+    def matched(self) -> Matched:
+        """Which cells are compared."""
+        return match(*self.sides)
+
+    @cached_property
+    def _columns(self) -> dict[str, list[str]]:
+        """What can be measured: the columns that both folders have, by table, the runs first."""
+        first, second = self.sides
+        tables = [t for t in ("runs", *first.tables) if first.has(t) and second.has(t)]
+        known = {*DESIGN, *first.factors, *second.factors}
+        return {
+            table: [n for n in first.names(table) if n in second.names(table) and n not in known]
+            for table in dict.fromkeys(tables)
+        }
+
+    def find(self, measure: str | None = None) -> tuple[str, str]:
+        """Table and column of a measure: `drive_time_s`, or `events.response_s`.
+
+        A name without a table is looked for in the runs first. Without a name it is the measure
+        of the declared answer.
+
+        Raises:
+            ConfigError: there is none, or it is not clear which is meant.
+        """
+        name = measure or (self.sides[0].study.get("answer") or {}).get("measure")
+        if not name:
+            raise ConfigError("the study declares no answer; name what to compare (--measure)")
+        table, _, column = str(name).rpartition(".")
+        where = [t for t, names in self._columns.items() if column in names and table in ("", t)]
+        if not where:
+            there = ", ".join(self._columns.get(table or "runs", ()))
+            raise ConfigError(f"measure {name!r} is not in both; {table or 'runs'}: {there}")
+        if len(where) > 1 and where[0] != "runs":
+            several = " or ".join(f"{table}.{column}" for table in where)
+            raise ConfigError(f"measure {name!r} is in several tables; name {several}")
+        return where[0], column
+
+    def groups(self, by: Sequence[str] | None = ()) -> Iterator[Group]:
+        """The cells in groups.
+
+        Args:
+            by: Factors whose levels tell the groups apart; none for every cell by itself,
+                None for all cells of a part together.
+
+        Raises:
+            ConfigError: a factor that the cells do not have in common.
+        """
+        known = dict.fromkeys(name for pair in self.matched.pairs for name, _ in pair.levels)
+        if unknown := [name for name in by or () if name not in known]:
+            there = ", ".join(known) or "none"
+            raise ConfigError(f"factor {unknown[0]!r} is not common to both; common: {there}")
+        groups: dict[tuple[str, Levels, int], list[Pair]] = {}
+        for pair in self.matched.pairs:
+            groups.setdefault(_group_of(pair, by), []).append(pair)
+        for (part, levels, _), pairs in groups.items():
+            yield Group(part, levels, tuple(pairs))
+
+    def rows(self, side: int, table: str, column: str, group: Group) -> Rows:
+        """The values of a column in some cells of the first (0) or second (1) folder.
+
+        The cells bear the numbers of the first folder, so that runs can be paired.
+        """
+        frame = self._frame(side, table, column)
+        own = [(pair.first, pair.second)[side] for pair in group.pairs]
+        number = dict(zip(own, (pair.first for pair in group.pairs), strict=True))
+        chosen = frame.where((frame["part"] == group.part) & np.isin(frame["cell"], own))
+        cells = np.array([number[cell] for cell in chosen["cell"].tolist()], dtype=np.int64)
+        return Rows(chosen[column], cells, *(chosen[name] for name in _ROW[2:]))
+
+    def _frame(self, side: int, table: str, column: str) -> Frame:
+        key = side, table, column
+        if key not in self._frames:
+            self._frames[key] = self.sides[side].table(table, columns=(*_ROW, column))
+        return self._frames[key]
+
+    @cached_property
+    def _frames(self) -> dict[tuple[int, str, str], Frame]:
+        return {}
+
+    def differences(
+        self, measure: str | None = None, by: Sequence[str] | None = ()
+    ) -> list[Difference]:
+        """A measure's difference in every group of cells that has a value; see `groups`.
+
+        Raises:
+            ConfigError: no such measure or factor, or one in words.
+        """
+        table, column = self.find(measure)
+        found = []
+        for group in self.groups(by):
+            rows = [as_numbers(self.rows(side, table, column, group), column) for side in (0, 1)]
+            if any(np.isfinite(side.values).any() for side in rows):
+                found.append(difference(group.part, group.levels, *rows))
+        return found
+
+    def changed(self) -> tuple[list[str], int]:
+        """Measures that are not the same in every pair of runs, and how many there are in all.
+
+        None where no run of both has the same luck.
+        """
+        names = self._columns.get("runs", [])
+        return [name for name in names if self._is_changed(name)], len(names)
+
+    def _is_changed(self, column: str) -> bool:
+        for group in self.groups(None):
+            a, b = (self.rows(side, "runs", column, group).by_run() for side in (0, 1))
+            both = a.keys() & b.keys()
+            if any(not _alike(a[key], b[key]) for key in both):
+                return True
+        return False
+
+    @cached_property
+    def paired(self) -> tuple[int, int]:
+        """Runs of the first folder that the second has with the same luck, and all of its runs."""
+        pairs = total = 0
+        for group in self.groups(None):
+            a, b = (self.rows(side, "runs", "seed", group).by_run() for side in (0, 1))
+            pairs, total = pairs + len(a.keys() & b.keys()), total + len(a)
+        return pairs, total
+
+    def _repr_html_(self) -> str:
+        return self.frame()._repr_html_()
+
+    def frame(self, measure: str | None = None, by: Sequence[str] | None = ()) -> Frame:
+        """The same as `differences`, as columns."""
+        table, column = self.find(measure)
+        rows = self.differences(f"{table}.{column}", by)
+        names = dict.fromkeys(name for row in rows for name, _ in row.levels)
+        levels = {n: np.array([dict(r.levels).get(n) for r in rows], dtype=object) for n in names}
+        numbers = {
+            "runs_first": [row.runs[0] for row in rows],
+            "runs_second": [row.runs[1] for row in rows],
+            f"median_first_{column}": [row.medians[0] for row in rows],
+            f"median_second_{column}": [row.medians[1] for row in rows],
+            f"difference_{column}": [row.interval.mean for row in rows],
+            f"difference_low_{column}": [row.interval.low for row in rows],
+            f"difference_high_{column}": [row.interval.high for row in rows],
+            "is_paired": [row.is_paired for row in rows],
+        }
+        part = np.array([row.part for row in rows], dtype=object)
+        return Frame({"part": part} | levels | {k: np.array(v) for k, v in numbers.items()})
+
+
+def _group_of(pair: Pair, by: Sequence[str] | None) -> tuple[str, Levels, int]:
+    if by is None:
+        return pair.part, (), 0
+    if not by:
+        return pair.part, pair.levels, pair.first
+    return pair.part, tuple((name, level) for name, level in pair.levels if name in by), 0
+
+
+def _alike(a: Any, b: Any) -> bool:
+    return bool(a == b or (a != a and b != b))  # nan is like nan

@@ -1,0 +1,118 @@
+"""Whether the conditions hold that a comparison should fail by."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from dva_sim.errors import ConfigError
+from dva_sim.experiments.comparing import Comparison, Group
+from dva_sim.experiments.comparing_cells import Levels
+from dva_sim.experiments.comparing_conditions import SIGNS, TESTS, Gate, percent_of
+from dva_sim.experiments.comparing_rows import Floats, Rows, as_numbers
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """A gate in one group of cells.
+
+    Attributes:
+        gate: The condition.
+        part: Name of the part.
+        levels: What the cells have in common.
+        first: The statistic in the first folder.
+        second: The same in the second.
+        bound: What the second is held against.
+        missing: Share of the rows without a value, in both.
+    """
+
+    gate: Gate
+    part: str
+    levels: Levels
+    first: float
+    second: float
+    bound: float
+    missing: tuple[float, float]
+
+    @property
+    def holds(self) -> bool:
+        """Whether the condition holds, so that the comparison fails."""
+        return bool(SIGNS[self.gate.sign](self.second, self.bound))
+
+
+def judge(gate: Gate, comparison: Comparison) -> list[Verdict]:
+    """Look at a condition wherever both folders have cells in common.
+
+    Raises:
+        ConfigError: no such measure or factor, or nothing to decide it by.
+    """
+    table, column = comparison.find(gate.measure)
+    by = None if gate.per is None else () if gate.per == "cell" else (gate.per,)
+    verdicts = list(_verdicts(gate, comparison, table, column, comparison.groups(by)))
+    if not verdicts:
+        raise ConfigError(f"--fail-if {gate.text!r}: no run of either has a value of {column}")
+    return verdicts
+
+
+def _verdicts(
+    gate: Gate, comparison: Comparison, table: str, column: str, groups: Iterator[Group]
+) -> Iterator[Verdict]:
+    for group in groups:
+        sides = [_tested(gate, comparison.rows(n, table, column, group), column) for n in (0, 1)]
+        if not any(len(_values(gate, side)) for side in sides):
+            continue
+        first, second = (_statistic(gate, side) for side in sides)
+        _refuse_undecided(gate, group, first, second)
+        shares = [
+            float(np.isnan(side.values).mean()) if len(side.values) else 1.0 for side in sides
+        ]
+        bound = gate.bound.for_(first)
+        yield Verdict(gate, group.part, group.levels, first, second, bound, (shares[0], shares[1]))
+
+
+def _tested(gate: Gate, rows: Rows, column: str) -> Rows:
+    """The rows with numbers for values: of a share, whether they pass its test."""
+    if gate.test is None:
+        return as_numbers(rows, column)
+    sign, than = gate.test
+    if isinstance(than, str):
+        passed = [
+            float("nan") if value is None else float(TESTS[sign](str(value), than))
+            for value in rows.values.tolist()
+        ]
+        return replace(rows, values=np.array(passed, dtype=float))
+    rows = as_numbers(rows, column)
+    there = np.where(np.isnan(rows.values), np.nan, TESTS[sign](rows.values, than))
+    return replace(rows, values=there)
+
+
+def _values(gate: Gate, rows: Rows) -> Floats:
+    if gate.statistic == "missing":
+        return np.isnan(rows.values).astype(float)
+    return rows.values[~np.isnan(rows.values)]
+
+
+def _statistic(gate: Gate, rows: Rows) -> float:
+    values, percent = _values(gate, rows), percent_of(gate.statistic)
+    if not len(values):
+        return math.nan
+    if percent is not None:
+        return float(np.percentile(values, percent))
+    if gate.statistic == "median":
+        return float(np.median(values))
+    ends = {"min": values.min(), "max": values.max()}
+    return float(ends.get(gate.statistic, values.mean()))
+
+
+def _refuse_undecided(gate: Gate, group: Group, first: float, second: float) -> None:
+    """A gate that cannot be decided must not pass for one that was."""
+    where = f"--fail-if {gate.text!r}: in part {group.part}"
+    needs_first = gate.bound.kind != "absolute"
+    for side, value in (("first", first), ("second", second)):
+        if math.isnan(value) and (side == "second" or needs_first):
+            raise ConfigError(f"{where} no run of the {side} folder has a value")
+    if gate.bound.kind == "times" and first < 0:
+        raise ConfigError(f"{where} the first folder has {first:g}; below zero, name a difference")

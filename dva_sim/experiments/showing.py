@@ -1,0 +1,151 @@
+"""What the terminal shows of a results folder: the answer, the cells, a table, or its columns."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from dva_sim.experiments.frames import plain
+from dva_sim.experiments.results import Results
+
+ROWS = 20
+_GAP = 2  # between columns
+
+
+def show(results: Results, console: Console) -> None:
+    """Question, status, answer, warnings, every cell, and where it comes from."""
+    console.print(f"[bold]{escape(results.question)}[/bold]", soft_wrap=True)
+    for line in _facts(results):
+        console.print(escape(line), soft_wrap=True)
+    console.print()
+    console.print(escape(results.answer.lead), soft_wrap=True)
+    for note in results.answer.notes:
+        console.print(escape(note), style="dim", soft_wrap=True)
+    for warning in results.reading.warnings:
+        console.print(f"[yellow]{escape(warning)}[/yellow]", soft_wrap=True)
+    for cells in results.reading.cells:
+        console.print(f"\n{escape(cells.part)}", style="bold")
+        print_table(cells.heads, cells.rows, console, cells.labels)
+        if cells.note:
+            console.print(escape(cells.note), style="dim", soft_wrap=True)
+    console.print(f"\n{_tables(results)}", soft_wrap=True)
+
+
+def show_table(results: Results, name: str, rows: int, console: Console) -> None:
+    """The first rows of a table.
+
+    Raises:
+        ConfigError: no such table.
+    """
+    frame = results.table(name)
+    shown = [[plain(values[row]) for values in frame.values()] for row in range(frame.rows)[:rows]]
+    print_table(list(frame), shown, console, len(results.factors))
+    if frame.rows > rows:
+        console.print(f"... and {frame.rows - rows} more rows", soft_wrap=True)
+
+
+def show_columns(results: Results, tables: Sequence[str], console: Console) -> None:
+    """What the columns of some tables mean, or of all.
+
+    Raises:
+        ConfigError: no such table.
+    """
+    for number, name in enumerate(tables or results.tables):
+        gap = "\n" if number else ""
+        console.print(f"{gap}[bold]{escape(name)}[/bold]")
+        told = Table(box=None, pad_edge=False, padding=(0, _GAP, 0, 0))
+        told.add_column("column", no_wrap=True)
+        told.add_column("unit", no_wrap=True)
+        told.add_column("meaning", overflow="fold")
+        for column in results.columns(name):
+            told.add_row(escape(column.name), column.unit, escape(column.meaning))
+        console.print(told)
+
+
+def program(results: Results) -> str:
+    """Which program made the results."""
+    versions = results.manifest.get("versions", {})
+    told = f"dva-sim {versions.get('dva-sim')}"
+    if commit := versions.get("commit"):
+        told += f", commit {commit[:12]}"
+    return told + (" with changes that are not committed" if versions.get("dirty") else "")
+
+
+def print_table(
+    heads: Sequence[str], rows: Sequence[Sequence[str]], console: Console, labels: int = 0
+) -> None:
+    """Columns side by side as far as there is room; the names of the others in a line.
+
+    Args:
+        heads: Of the columns.
+        rows: As text.
+        console: Where to; what is no terminal has room for all.
+        labels: How many leading columns name a row.
+    """
+    widths = [_width(head, [row[n] for row in rows]) for n, head in enumerate(heads)]
+    if not console.is_terminal:
+        console = Console(file=console.file, width=sum(widths), highlight=False)
+    fits = max(
+        labels, sum(sum(widths[: n + 1]) - _GAP <= console.width for n in range(len(heads))), 1
+    )
+    table = Table(box=None, pad_edge=False, padding=(0, _GAP, 0, 0))
+    for number, head in enumerate(heads[:fits]):
+        numbers = all(_is_number(row[number]) for row in rows)
+        width = widths[number] - _GAP
+        is_right = numbers and number >= labels
+        table.add_column(escape(head), justify="right" if is_right else "left", width=width)
+    for row in rows:
+        table.add_row(*(escape(value) for value in row[:fits]))
+    console.print(table)
+    if fits < len(heads):
+        console.print(escape(f"also: {', '.join(heads[fits:])}"), style="dim", soft_wrap=True)
+
+
+def _width(head: str, values: Sequence[str]) -> int:
+    return max(map(len, [*head.split(), *values]), default=0) + _GAP
+
+
+def _is_number(text: str) -> bool:
+    return not text or re.match(r"[-+\u2212\u2013]?(\d|$)", text) is not None
+
+
+def _facts(results: Results) -> Iterator[str]:
+    """Status, size, program and machine, each in a line."""
+    manifest, study = results.manifest, results.study
+    yield _status(manifest)
+    cells = len(manifest.get("cells", []))
+    size = f"{results.runs.rows} runs in {cells} configurations"
+    persons = f"{study.get('persons')} persons x {study.get('replications')} trials"
+    yield f"{size}, {len(results.failures)} failed; {persons}, seed {study.get('seed')}"
+    yield f"{program(results)}, study {manifest.get('hash')}"
+    if machine := results.machine:
+        yield _machine(machine)
+
+
+def _status(manifest: Mapping[str, Any]) -> str:
+    status = manifest.get("status") or {}
+    why = "; ".join(status.get("why", ()))
+    changed = ", ".join(map(str, manifest.get("set", ())))
+    told = f"{status.get('kind', 'declared')}{f': {why}' if why else ''}"
+    told = f"{told} (--set {changed})" if changed and changed not in why else told
+    return f"Status: {told}"
+
+
+def _machine(machine: Mapping[str, Any]) -> str:
+    parts = [
+        str(machine.get("started", ""))[:16].replace("T", " "),
+        str(machine.get("platform", "")),
+    ]
+    if "cpu_s" in machine:
+        parts.append(f"{machine['cpu_s']:.0f} s of CPU time")
+    return ", ".join(part for part in parts if part)
+
+
+def _tables(results: Results) -> str:
+    names = ", ".join(results.tables) or "none"
+    return f"Tables: {names} (--table NAME shows one, --columns what they mean)"

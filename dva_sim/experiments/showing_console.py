@@ -1,0 +1,50 @@
+"""What the command line does with results that are there: show, export, compare."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.console import Console
+
+from dva_sim.experiments import showing
+from dva_sim.experiments.results import Results
+
+console = Console(highlight=False)
+
+
+def show(folder: Path, table: str | None, columns: bool, rows: int) -> None:
+    """Show what is in a results folder: the answer, a table, or what columns mean."""
+    results = Results.load(folder)
+    if columns:
+        showing.show_columns(results, [] if table is None else [table], console)
+    elif table is not None:
+        showing.show_table(results, table, rows, console)
+    else:
+        showing.show(results, console)
+
+
+def export(
+    folder: Path, out: Path, tables: Sequence[str], form: str | None, overwrite: bool
+) -> None:
+    """Write tables as files."""
+    from dva_sim.experiments.exporting import export as write
+
+    for path in write(Results.load(folder), out, tables, form, overwrite):
+        console.print(str(path), soft_wrap=True, markup=False)
+
+
+def compare(
+    first: Path, second: Path, measures: Sequence[str], by: Sequence[str], fail_if: Sequence[str]
+) -> int:
+    """Compare two results folders; the exit code: 1 if a condition holds."""
+    from dva_sim.experiments.comparing import Comparison
+    from dva_sim.experiments.comparing_conditions import parse
+    from dva_sim.experiments.comparing_gates import judge
+    from dva_sim.experiments.comparing_told import tell, tell_verdicts
+
+    gates = [parse(text) for text in fail_if]
+    comparison = Comparison(Results.load(first), Results.load(second))
+    verdicts = [verdict for gate in gates for verdict in judge(gate, comparison)]
+    tell(comparison, measures, by, console)
+    return 1 if tell_verdicts(verdicts, console) else 0
