@@ -86,6 +86,7 @@ class CommandSender:
         if tick is None:
             return None
         command = self._phone.look(now)
+        self._drive.samples, self._drive.values = self._phone.samples, self._phone.values
         return None if command is None else Made(command, now, tick)
 
     def _offer(self, made: Made) -> None:
@@ -123,12 +124,12 @@ class RequestedCommands(CommandSender):
         """Give it its socket, and say what to do when the link is lost."""
         self._requester, self._on_alert = requester, on_alert
         requester.open()
+        self._drive.round_trips = requester.round_trips
         self._pending: Made | None = None
 
     def stop(self) -> None:
         """Send nothing more and close the socket."""
         super().stop()
-        self._drive.round_trips = list(self._requester.round_trips)
         self._drive.timeouts = self._requester.timeouts
         self._requester.close()
 

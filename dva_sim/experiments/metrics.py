@@ -16,6 +16,7 @@ from dva_sim.simulation import Recording
 
 Row = dict[str, Any]
 NAN = math.nan
+SETTLED = "confirmed", "contained", "refuted"  # outcomes of events that somebody has looked at
 
 MEASURES = (
     *("confirmed", "drive_time_s", "attempts"),
@@ -24,7 +25,9 @@ MEASURES = (
     *(f"delay_{stage}_s" for stage in STAGES),
     *("frame_age_mean_s", "loop_delay_mean_s", "loop_delay_measured_s"),
     *("command_rate_hz", "commands_sent", "commands_applied", "commands_stale"),
-    *("commands_superseded", "round_trip_p50_s", "queue_max", "timeouts", "alerts", "stop_share"),
+    *("commands_superseded", "round_trip_p50_s", "round_trip_p95_s", "round_trip_max_s"),
+    *("samples_per_value", "queue_max", "timeouts", "alerts", "stop_share"),
+    *("response_mean_s", "confirmation_mean_s", "settled_per_min"),
     *("events", "person_exposure_s", "dose_heat_max", "dose_toxic_max", "incapacitated"),
     *("evacuated_share", "evacuated_s"),
     *("utilisation", "attending_share", "queue_mean", "turns_per_min"),
@@ -42,7 +45,9 @@ def run_row(recording: Recording) -> Row:
     exposure = recording.recorder.exposure
     row["events"] = len(recording.events)
     row["person_exposure_s"] = float(sum(exposure.values()))
-    row |= _people_measures(recording) | workload.run_measures(recording)
+    row |= (
+        _event_measures(recording) | _people_measures(recording) | workload.run_measures(recording)
+    )
     row["replans"] = recording.recorder.counters["replans"]
     row["messages"] = recording.recorder.counters["messages"]
     row["traffic_bytes"] = recording.recorder.counters["bytes"]
@@ -52,6 +57,27 @@ def run_row(recording: Recording) -> Row:
     row["simulated_s"] = recording.duration
     row["network_depth"] = recording.depth
     return row
+
+
+def _event_measures(recording: Recording) -> Row:
+    """Of all events that the DVA knew; the whole horizon stands for what never came.
+
+    False alarms are responded to, and never confirmed: only response counts them.
+    """
+    rows = [row for row in event_rows(recording) if row["t_detected_s"] < math.inf]
+    real = [row for row in rows if row["is_true"]]
+    settled = sum(row["outcome"] in SETTLED for row in rows)
+    return {
+        "response_mean_s": _mean_or(recording.scenario.horizon_s, rows, "response_s"),
+        "confirmation_mean_s": _mean_or(recording.scenario.horizon_s, real, "confirmation_s"),
+        "settled_per_min": 60.0 * settled / recording.duration,
+    }
+
+
+def _mean_or(instead: float, rows: list[Row], column: str) -> float:
+    """Mean of a column, with something instead of what is missing; nan without rows."""
+    values = [instead if math.isnan(row[column]) else row[column] for row in rows]
+    return float(np.mean(values)) if values else NAN
 
 
 def plugin_failures(recording: Recording) -> int:
@@ -160,13 +186,29 @@ def _command_measures(attempts: list[DriveLog], recording: Recording) -> Row:
             "commands_stale": recording.recorder.counters["robot refused: stale"],
             "commands_superseded": sum(d.superseded for d in attempts)
             + sum(inbox.superseded for inbox in inboxes),
-            "round_trip_p50_s": float(np.median(trips)) if trips else NAN,
+            **_round_trips(trips),
+            "samples_per_value": _ratio(
+                sum(d.samples for d in attempts), sum(d.values for d in attempts)
+            ),
             "queue_max": max(inbox.longest for inbox in inboxes),
             "timeouts": sum(d.timeouts for d in attempts),
             "alerts": sum(d.alerts for d in attempts),
             "stop_share": 1.0 - float(in_force) / driving if driving else NAN,
         }
     )
+
+
+def _round_trips(trips: list[float]) -> Row:
+    """From a command's request to its reply."""
+    return {
+        "round_trip_p50_s": float(np.median(trips)) if trips else NAN,
+        "round_trip_p95_s": float(np.percentile(trips, 95)) if trips else NAN,
+        "round_trip_max_s": max(trips, default=NAN),
+    }
+
+
+def _ratio(amount: float, of: float) -> float:
+    return amount / of if of else NAN
 
 
 def _span(drive: DriveLog, recording: Recording) -> tuple[float, float]:
@@ -191,6 +233,7 @@ def _event_row(recording: Recording, number: int) -> Row:
         "event_id": number + 1,
         "kind": incident.kind,
         "room": incident.room,
+        "is_true": not incident.false_alarm,
         "responder_kind": "none",
         "responder": "",
         "outcome": "undetected",

@@ -46,6 +46,8 @@ class RobotConfig(Config):
             `{law: gamma, mean_s: 0.2, cv: 0.5, first_s: 2}`; left out: as its profile says.
         sensors: What they carry; left out: as their profile says.
         charge: Share of the battery's capacity that they begin with.
+        way_m: They begin at places from which the way to the first event is so long, rather than
+            at the site's bases.
     """
 
     profile: str | Annotated[tuple[str, ...], Field(min_length=1)] = "servrobot"
@@ -53,6 +55,7 @@ class RobotConfig(Config):
     processing_s: Service | None = None
     sensors: Annotated[tuple[SensorConfig, ...], Field(max_length=16)] | None = None
     charge: Annotated[float, Field(gt=0, le=1)] = 1.0
+    way_m: Positive | None = None
     watchdog_s: Annotated[float, Field(gt=0, le=60)] = 3.0
     max_age_s: Annotated[float, Field(gt=0, le=120)] = 6.0
 
@@ -66,10 +69,18 @@ class RobotConfig(Config):
 
 
 class GuardConfig(Config):
-    """The guards: how many, and from which profile they are drawn."""
+    """The guards: how many, and from which profile they are drawn.
+
+    Attributes:
+        mobilisation_s: Median from the order to the first step; left out: as the profile says.
+        way_m: They wait at places from which the way to the first event is so long, rather than
+            at the site's posts.
+    """
 
     profile: str = "guard"
     count: Annotated[int, Field(ge=0, le=200)] = 0
+    mobilisation_s: Positive | None = None
+    way_m: Positive | None = None
 
 
 class BystanderConfig(Config):

@@ -58,7 +58,12 @@ def phone_profile(scenario: Scenario, error: Fail | None = None) -> PhoneProfile
 
 def guard_profile(scenario: Scenario) -> GuardProfile:
     """How the scenario's guards are drawn."""
-    return _profile(GuardProfile, scenario.guard.profile, "agents/people")
+    profile = _profile(GuardProfile, scenario.guard.profile, "agents/people")
+    median = scenario.guard.mobilisation_s
+    if median is None:
+        return profile
+    trait = profile.mobilisation_s.model_copy(update={"median": median})
+    return profile.model_copy(update={"mobilisation_s": trait})
 
 
 def bystander_profile(scenario: Scenario) -> BystanderProfile:

@@ -18,6 +18,7 @@ from dva_sim.simulation.machines import Machines
 from dva_sim.simulation.names import DVA
 from dva_sim.simulation.people import People
 from dva_sim.simulation.stage import Stage
+from dva_sim.simulation.starts import Starts
 from dva_sim.worlds.hazards import Conditions, Surroundings
 from dva_sim.worlds.physics import World
 
@@ -67,14 +68,16 @@ class Field:
 
     def populate(self) -> None:
         """Put everybody in place and let them register."""
+        starts = Starts(self.stage, self.incidents[0].hazard.position)
         machines = Machines(
-            self.stage, self.world, self.surroundings, self._spots, self.newest_drive
+            *(self.stage, self.world, self.surroundings, self._spots, self.newest_drive, starts)
         )
         for number in range(1, self.stage.scenario.robot.count + 1):
             robot = machines.add(number)
             self.robots[robot.device.id_tag] = robot
         people = People(
-            self.stage, self.world, self.surroundings, self._spots, self._is_there, self._contain
+            *(self.stage, self.world, self.surroundings, self._spots),
+            *(self._is_there, self._contain, starts),
         )
         for number in range(1, self.stage.scenario.guard.count + 1):
             self.guards.append(people.add_guard(number))

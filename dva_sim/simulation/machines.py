@@ -15,7 +15,8 @@ from dva_sim.agents.service import service_times
 from dva_sim.clock import Clock
 from dva_sim.recorder import DriveLog
 from dva_sim.simulation.names import DVA
-from dva_sim.simulation.stage import Stage, place_of
+from dva_sim.simulation.stage import Stage
+from dva_sim.simulation.starts import Starts
 from dva_sim.worlds.bodies import GRIP
 from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.hazards import Surroundings
@@ -38,6 +39,7 @@ class Machines:
         around: The hazards.
         spots: What cameras may see of them, at a time [s].
         drive_of: The log of a robot's newest drive, if it had any.
+        starts: Where they begin.
     """
 
     def __init__(
@@ -47,9 +49,10 @@ class Machines:
         around: Surroundings,
         spots: Callable[[float], list[HazardSpot]],
         drive_of: Callable[[str], DriveLog | None],
+        starts: Starts,
     ) -> None:
         self._stage, self._world, self._around = stage, world, around
-        self._spots, self._drive_of = spots, drive_of
+        self._spots, self._drive_of, self._starts = spots, drive_of, starts
         self._lidar = Lidar(world)
         self._failures: dict[str, int] = {}
 
@@ -61,7 +64,7 @@ class Machines:
         """
         stage, config = self._stage, self._stage.scenario.robot
         profile = stage.robots[number - 1]
-        base = place_of(stage.site.robot_bases, number, "robot base", stage.site)
+        base = self._starts.of_robot(number)
         device = stage.device("robot", number)
         body = self._world.add_robot(device.label, profile.drive_spec(), base)
         controller = RobotController(

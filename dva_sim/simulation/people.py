@@ -15,7 +15,8 @@ from dva_sim.agents.people import Occupant, Walker
 from dva_sim.agents.walking import Walking
 from dva_sim.agents.workplaces import draw_places
 from dva_sim.scenario import bystander_profile, guard_profile
-from dva_sim.simulation.stage import Stage, place_of
+from dva_sim.simulation.stage import Stage
+from dva_sim.simulation.starts import Starts
 from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.hazards import Surroundings
 from dva_sim.worlds.physics import PersonBody, World
@@ -37,6 +38,7 @@ class People:
         spots: What can be seen of them, at a time [s].
         is_there: Whether something of a kind really is near a place [m].
         contain: Told of what kind is dealt with near a place [m].
+        starts: Where guards wait.
     """
 
     def __init__(
@@ -47,9 +49,10 @@ class People:
         spots: Callable[[float], list[HazardSpot]],
         is_there: Callable[[str, float, float], bool],
         contain: Callable[[str, float, float], object],
+        starts: Starts,
     ) -> None:
         self._stage, self._world, self._around, self._spots = stage, world, around, spots
-        self._is_there, self._contain = is_there, contain
+        self._is_there, self._contain, self._starts = is_there, contain, starts
         self._air: Air = around.at if around.has_any else clean_air
         self._refuges = refuges_of(stage.site)
         self._first_places: list[Point] = []
@@ -61,7 +64,7 @@ class People:
             ConfigError: the site has no post for it.
         """
         stage = self._stage
-        post = place_of(stage.site.guard_posts, number, "guard post", stage.site)
+        post = self._starts.of_guard(number)
         device = stage.device("guard", number)
         walker = Walker.draw(guard_profile(stage.scenario), stage.streams[f"{device.label}/walker"])
         body = self._world.add_person(device.label, post, radius=RADIUS)

@@ -24,6 +24,7 @@ from dva_sim.agents.tilt.trail import Trail
 
 SURELY: Final = -1.0  # the level that a person tilts to who wants to stand
 _TIE: Final = 1e-9  # moments nearer than this are the same [s]
+_TICK: Final = 1e-6  # who looks by a clock that rounds may come so much too soon [s]
 
 
 class Holder(Protocol):
@@ -87,6 +88,8 @@ class Phone:
         hand_lag: By how much the hand makes a command follow later what is asked, on average [s].
             The hand is moved from sample to sample, so that it is less than the time constant.
         shown: The command on the display: level, turn [deg/s].
+        samples: How many were in the batches of this drive.
+        values: How many batches there were.
 
     Raises:
         ConfigError: the part, the filter or the mapping cannot be had.
@@ -169,6 +172,7 @@ class Phone:
         self._filter = self._make_filter()
         self._trail.begin(now)
         self._wanted = self.shown = (0.0, 0.0)
+        self.samples = self.values = 0
         self._aim = 0.0, 0.0
         self._perceived = deque([self.shown], maxlen=self._late + 1)
         self._last_key: tuple[int, int] | None = None
@@ -200,7 +204,8 @@ class Phone:
         if self._batch is None or self._profile.ideal:
             return now + min(self._app.max_delay, BATCH * self._period)
         self._advance(now)
-        return min(self._due, self._sample_at + (self._batch - self._fresh - 1) * self._period)
+        complete = self._sample_at + (self._batch - self._fresh - 1) * self._period
+        return min(self._due, complete + _TICK)
 
     def look(self, now: float) -> TiltCommand | None:
         """The command to send at `now`, or None if there is nothing new to say."""
@@ -281,6 +286,7 @@ class Phone:
 
     def _take_value(self, at: float) -> None:
         """A batch is complete, or its time is over."""
+        self.samples, self.values = self.samples + self._fresh, self.values + 1
         reading = self._filter.value()
         self._stems_from = self._sampled_at - self._filter.age * self._period
         self._captured = self._trail.captured()

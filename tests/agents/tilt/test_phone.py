@@ -79,7 +79,16 @@ def test_a_batch_is_looked_at_after_20_samples_or_the_longest_delay() -> None:
         short = phone(filter=filter_, send="on_change", max_delay_s=0.5)
         long = phone(filter=filter_, send="on_change", max_delay_s=2.0)
         assert short.next_look(0.0, 10.0) == 0.5
-        assert long.next_look(0.0, 10.0) == pytest.approx(20 / 34)
+        assert long.next_look(0.0, 10.0) == pytest.approx(20 / 34, abs=2e-6)
+
+
+def test_a_batch_is_complete_when_its_app_looks_by_a_clock_in_whole_microseconds() -> None:
+    app = phone(filter="median20-copy", send="on_change", max_delay_s=2.0)
+    now = 0.0
+    for batch in range(1, 200):
+        now = round(app.next_look(now, 10.0), 6)
+        app.look(now)
+        assert app.values == batch
 
 
 def test_an_app_that_keeps_alive_resends_the_value_of_a_batch_until_the_next_is_complete() -> None:
