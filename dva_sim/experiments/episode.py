@@ -5,6 +5,7 @@ from __future__ import annotations
 from dva_sim.experiments import design
 from dva_sim.experiments.design import Job
 from dva_sim.experiments.models import Tables, model_for
+from dva_sim.experiments.recording import refuse_what_cannot_be_recorded
 from dva_sim.experiments.study import Study
 
 
@@ -18,7 +19,8 @@ def rehearse_all(study: Study) -> None:
     """Build one run of every configuration, so that a mistake is found before the first run.
 
     Raises:
-        ConfigError: what cannot be read or placed.
+        ConfigError: what cannot be read, placed or recorded.
     """
+    refuse_what_cannot_be_recorded(study)
     for cell in design.cells(study):
         model_for(cell.scenario).rehearse(cell.scenario, study.seed)
