@@ -266,7 +266,7 @@ def _build(study: Study, part: str, source: Document, changes: Mapping[str, Any]
     try:
         return model.build(source, _located({**fixed, **changes}, study.folder))
     except ConfigError as error:
-        every = {**study.parts[part].changes, **changes}
+        every = {**study.parts[part].changes, **study.changes, **changes}
         blamed = _blamed(study, part, error, every) if error.file is None else None
         raise (blamed or error) from None
 
@@ -282,17 +282,17 @@ def _located(changes: dict[str, Any], folder: Path) -> dict[str, Any]:
 def _blamed(
     study: Study, part: str, error: ConfigError, changes: Mapping[str, Any]
 ) -> ConfigError | None:
-    places: list[tuple[str, ...]] = [("factors",)]
-    places += [("parts", part, "reference"), ("parts", part, "changes")]
+    places: list[Path_] = [("factors",), ("parts", part, "reference"), ("parts", part, "changes")]
     places += [("treatments", f, level) for f, named in study.treatments.items() for level in named]
+    if study.is_full:
+        places.append(("full",))
     for key, value in changes.items():
         named = key in error.problem or (isinstance(value, str) and repr(value) in error.problem)
-        for place in places if named else ():
-            if study.is_from_file((*place, key)):
-                return study.error(error.problem, (*place, key))
-        place_in_design = designs.place_of(study, key, value) if named else None
-        if place_in_design is not None and study.is_from_file(place_in_design):
-            return study.error(error.problem, place_in_design)
+        in_design = designs.place_of(study, key, value)
+        every = [*((*place, key) for place in places), *([in_design] if in_design else [])]
+        for path in every if named else ():
+            if study.is_from_file(path):
+                return study.error(error.problem, path)
     return None
 
 

@@ -178,7 +178,8 @@ def _remarks(found: Registration) -> Iterator[str]:
     if found.made_with != now:
         yield f"the program is another than when it was registered ({found.made_with}; now {now})"
     if found.earlier:
-        yield f"it was registered {len(found.earlier)} times before, otherwise"
+        times = "once" if len(found.earlier) == 1 else f"{len(found.earlier)} times"
+        yield f"it had been registered {times} before, otherwise"
 
 
 def _refuse_what_is_open(study: Study) -> None:

@@ -240,7 +240,12 @@ def _version(document: Document, full: bool) -> tuple[Study, Changed]:
 
 def _told_in_full(study: Study, error: ConfigError) -> ConfigError:
     """A mistake of the larger version, at the key that it names."""
-    named = [key for key in study.full if key.rpartition(".")[2] in error.problem]
+    named = [
+        key
+        for key in study.full
+        if key.rpartition(".")[2] in error.problem
+        or any(repr(step) in error.problem for step in key.split("."))
+    ]
     return study.error(f"in the larger version: {error.problem}", ("full", *named[:1]))
 
 

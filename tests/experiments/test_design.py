@@ -1,6 +1,7 @@
+import hashlib
 from collections import defaultdict
 
-from small_study import RUNS, STUDY, study_in
+from small_study import REPEATED, RUNS, STUDY, study_in
 
 from dva_sim.experiments import design
 
@@ -82,3 +83,11 @@ def test_files_that_a_scenario_names_are_known_by_their_contents(tmp_path):
         trace.write_text(text)
         found.append(design.inputs(design.cells(study))[str(trace)])
     assert found[0] != found[1]
+
+
+def test_seeds_are_what_they_always_were(tmp_path):
+    """Results that were begun with an older program go on, and old answers can be run again."""
+    jobs = design.jobs(study_in(tmp_path, text=REPEATED))
+    assert [job.seed for job in jobs[:2]] == [1289764452063391784, 6791902960423926731]
+    seeds = [(job.part, job.index, *job.cell, job.person, job.trial, job.seed) for job in jobs]
+    assert hashlib.sha256(repr(seeds).encode()).hexdigest()[:16] == "d04fb4f22a6c0684"

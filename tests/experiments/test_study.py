@@ -177,3 +177,102 @@ def test_predictions_that_make_no_sense_are_refused(tmp_path, old, new, told):
     with pytest.raises(ConfigError) as caught:
         load_study(path)
     assert told in str(caught.value).replace(str(path), "study")
+
+
+COMPARED = (
+    STUDY
+    + """\
+comparisons:
+  far: {part: drive, measure: contacts, factor: pattern, contrast: [req-rep, latest-wins],
+    within: {link.delay_s: 0.25}, family: aside}
+hypotheses:
+  waiting-costs: {direction: above, margin: 1.5, at: {link.delay_s: 0.25}}
+  contacts-alike: {comparison: far, direction: same, margin: 0.5}
+"""
+)
+
+
+def test_comparisons_stand_beside_the_answer_and_hypotheses_name_one_of_them(tmp_path):
+    study = study_in(tmp_path, text=COMPARED)
+    assert list(study.contrasts) == ["answer", "far"]
+    assert (study.contrasts["far"].over, study.contrasts["far"].family) == (None, "aside")
+    assert study.hypotheses["waiting-costs"].comparison == "answer"
+    assert study.hypotheses["contacts-alike"].margin == 0.5
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("measure: contacts", "measure: contact", "study:23:22: measure 'contact' is unknown"),
+        ("  far: {part: drive", "  far: {part: drove", "study:23:9: comparisons.far.part 'drove'"),
+        ("within: {link.delay_s: 0.25}, ", "", "study:23:3: should run over 'link.delay_s' or"),
+        ("  far:", "  answer:", "study:22:1: comparisons: a comparison cannot be called 'answer'"),
+        ("comparison: far", "comparison: near", "study:27:20: 'near' is not a comparison; there"),
+        ("direction: same, margin: 0.5", "direction: same", "'same' needs a margin"),
+        ("at: {link.delay_s: 0.25}}", "at: {link.delay_s: 9}}", "study:26:55: 9 is not a level"),
+        ("at: {link.delay_s: 0.25}}", "at: {pattern: req-rep}}", "study:26:55: 'pattern' is what"),
+        ("margin: 1.5", "margin: -1.5", "study:26:37: hypotheses.waiting-costs.margin"),
+        ("margin: 1.5", "margins: 1.5", "unknown key 'hypotheses.waiting-costs.margins'; did you"),
+    ],
+)
+def test_claims_that_make_no_sense_are_refused_where_they_stand(tmp_path, old, new, told):
+    path = write_study(tmp_path, COMPARED.replace(old, new, 1))
+    with pytest.raises(ConfigError) as caught:
+        design.cells(load_study(path))
+    assert told in str(caught.value).replace(str(path), "study")
+
+
+def test_a_setting_takes_with_it_the_claims_about_what_is_gone(tmp_path):
+    study = study_in(tmp_path, "link.delay_s=[0, 0.5]", text=COMPARED)
+    assert list(study.contrasts) == ["answer"]
+    assert study.hypotheses == {}
+
+
+FULL = STUDY + "full: {persons: 6, link.delay_s: [0, 0.25, 0.5], robot.processing_s: 0.1}\n"
+
+
+def test_the_larger_version_has_its_own_keys_levels_and_scenario_keys(tmp_path):
+    path = write_study(tmp_path, FULL)
+    small, full = load_study(path), load_study(path, full=True)
+    assert (small.persons, small.factors["link.delay_s"], small.changes) == (3, (0, 0.25), {})
+    assert (full.persons, full.factors["link.delay_s"]) == (6, (0, 0.25, 0.5))
+    assert {cell.scenario.robot.processing_s for cell in design.cells(full)} == {0.1}
+    assert (small.status.kind, full.status.kind) == ("declared", "declared")
+
+
+def test_the_larger_version_holds_all_runs_of_the_smaller(tmp_path):
+    path = write_study(tmp_path, STUDY + "full: {persons: 6, replications: 3}\n")
+    small, full = ({j.key for j in design.jobs(load_study(path, full=f))} for f in (False, True))
+    assert small < full
+
+
+def test_a_larger_version_can_be_changed_by_settings_too(tmp_path):
+    full = load_study(write_study(tmp_path, FULL), ["persons=7"], full=True)
+    assert (full.persons, full.factors["link.delay_s"]) == (7, (0, 0.25, 0.5))
+
+
+@pytest.mark.parametrize(
+    ("full", "told"),
+    [
+        ("{persons: none}", "study:22:8: in the larger version: persons: input should be a valid"),
+        ("{person: 6}", "study:22:8: unknown key 'person'"),
+        ("{parts.drve.replications: 2}", "study:22:8: in the larger version: no 'drve' in the"),
+        ("{pattern: [pub-sub]}", "study:22:8: in the larger version: 'req-rep' is not a level"),
+    ],
+)
+def test_a_larger_version_that_makes_no_sense_is_refused_with_the_study(tmp_path, full, told):
+    path = write_study(tmp_path, STUDY + f"full: {full}\n")
+    with pytest.raises(ConfigError) as caught:
+        design.cells(load_study(path, full=True))
+    assert told in str(caught.value).replace(str(path), "study")
+
+
+def test_a_study_without_a_larger_version_says_so(tmp_path):
+    with pytest.raises(ConfigError, match=r"study\.yaml:1:1: has no larger version: no key 'full'"):
+        load_study(write_study(tmp_path), full=True)
+
+
+def test_what_is_recorded_and_the_larger_version_do_not_change_what_is_asked(tmp_path):
+    plain = study_in(tmp_path).asked()
+    assert study_in(tmp_path, text=STUDY + "record: worst\nfull: {persons: 9}\n").asked() == plain
+    assert study_in(tmp_path, text=STUDY + "budget_s: 60\n").asked() != plain
