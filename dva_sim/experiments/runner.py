@@ -1,48 +1,29 @@
-"""Run a study: what is not done yet, spread over processes, kept as it comes, then as tables."""
+"""Run a study: what is not done yet, wherever it is run, kept as it comes, then as tables."""
 
 from __future__ import annotations
 
 import json
-import os
+import shutil
 import time
-from collections.abc import Callable, Sequence
-from contextlib import closing
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, closing, contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 from dva_sim.errors import ConfigError, DvaSimError
-from dva_sim.experiments import design, pool
-from dva_sim.experiments.design import Job, Key
+from dva_sim.experiments import design, places, pool
+from dva_sim.experiments.design import Job
 from dva_sim.experiments.journal import FILE, Journal
 from dva_sim.experiments.manifest import failures, machine, manifest_of, write_json
+from dva_sim.experiments.places import Place
 from dva_sim.experiments.pool import Episode
 from dva_sim.experiments.results import MACHINE, MANIFEST
+from dva_sim.experiments.stopping import is_enough, rounds
 from dva_sim.experiments.study import Study
-from dva_sim.experiments.tables import write_tables
-from dva_sim.experiments.tuned import load_tuned
+from dva_sim.experiments.tables import design_row, write_tables
 
 Progress = Callable[[int, int], object]
-
-
-@dataclass(frozen=True)
-class DryRun:
-    """What running a study would mean.
-
-    Attributes:
-        runs: Different runs in all.
-        done: How many of them the results folder already holds.
-        cells: Configurations, with the reference runs' own.
-        estimate_s: Time for the rest [s], if runs done before tell their cost.
-        remark: What is doubtful about tuned values; empty if nothing is.
-    """
-
-    runs: int
-    done: int
-    cells: int
-    estimate_s: float | None
-    remark: str = ""
 
 
 def run_study(
@@ -50,20 +31,22 @@ def run_study(
     out: str | Path,
     *,
     jobs: int | None = None,
+    scheduler: str | None = None,
     episode: Episode | None = None,
     progress: Progress | None = None,
     limit_s: float = pool.LIMIT_S,
 ) -> Path:
     """Run what the results folder does not hold yet, then write its tables and manifest.
 
-    The tables and the manifest are the same bytes with any number of processes and after any
+    The tables and the manifest are the same bytes wherever the runs are made and after any
     interruption; times and costs are apart, in `machine.json`. Runs that fail are listed in
     the manifest (`Results.failures`) and tried again the next time.
 
     Args:
         study: From `load_study`.
         out: Results folder, made if need be.
-        jobs: Processes; by default one for each core.
+        jobs: Processes of this machine; by default one for each core.
+        scheduler: Address of a dask.distributed cluster to use instead.
         episode: Makes the tables of one run; by default a simulation.
         progress: Called with the number of runs done and of all runs, as they finish.
         limit_s: A run that takes longer, by the wall clock, has failed.
@@ -72,90 +55,35 @@ def run_study(
         The results folder.
 
     Raises:
-        ConfigError: the study is not valid, or the folder holds another one.
-        DvaSimError: the disk is full, or another program holds the journal.
-        KeyboardInterrupt: after tidying up; its message says how to go on.
+        ConfigError: the study is not valid, the folder holds another one, or there is no such
+            cluster.
+        DvaSimError: the disk is full, another program holds the journal, or the cluster is lost.
+        KeyboardInterrupt: after tidying up; its message says what has been done.
     """
-    out, workers = Path(out), cores() if jobs is None else jobs
-    if workers < 1:
-        raise ConfigError(f"number of processes should be at least 1, not {workers}")
+    out, started, clock = Path(out), datetime.now(UTC), time.perf_counter()
     cells = design.cells(study)
     todo = design.jobs(study, cells)
     manifest = manifest_of(study, cells, todo)
-    started, clock = datetime.now(UTC), time.perf_counter()
-    with _open(out, manifest) as journal:
-        _run_rest(todo, journal, episode or _simulation(), workers, progress, limit_s)
-        write_tables(out, todo, journal)
-        manifest["failures"] = failures(todo, journal)
-        write_json(out / MANIFEST, manifest)
-        session = {"cores": cores(), "jobs": workers, "started": started.isoformat()}
-        session["wall_s"] = time.perf_counter() - clock
-        write_json(out / MACHINE, machine(todo, journal) | session)
+    with ExitStack() as stack:
+        place = stack.enter_context(_place(jobs, scheduler))
+        journal = stack.enter_context(_opened(out, manifest["hash"]))
+        session = _Session(todo, journal, place, episode or _simulation(), progress, limit_s)
+        with session.told():
+            carried_out, stopped = _run_rounds(study, todo, session)
+            with journal.alone():
+                _tidy(out)
+                write_tables(out, carried_out, journal)
+                manifest["runs"] = len({job.key for job in carried_out})
+                manifest |= {"stopped": stopped, "failures": failures(carried_out, journal)}
+                write_json(out / MANIFEST, manifest)
+        facts = {"cores": places.cores(), "jobs": place.width, "started": started.isoformat()}
+        facts |= {"wall_s": time.perf_counter() - clock}
+        write_json(out / MACHINE, machine(carried_out, journal) | facts)
     return out
 
 
-def dry_run(study: Study, out: str | Path, *, jobs: int | None = None) -> DryRun:
-    """What `run_study` would do, without doing it.
-
-    Raises:
-        ConfigError: the study is not valid, or the folder holds another one.
-    """
-    cells = design.cells(study)
-    todo = design.jobs(study, cells)
-    keys = {job.key for job in todo}
-    costs: dict[Key, float] = {}
-    if (Path(out) / FILE).exists():
-        with _open(Path(out), manifest_of(study, cells, todo)) as journal:
-            costs = journal.costs()
-    left = len(keys - costs.keys())
-    mean = sum(costs.values()) / len(costs) if costs else None
-    estimate = None if mean is None else mean * left / (jobs or cores())
-    return DryRun(len(keys), len(keys) - left, len(cells), estimate, _remark(study))
-
-
-def cores() -> int:
-    """How many processes can run at the same time here."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
-
-
-def _run_rest(
-    todo: Sequence[Job],
-    journal: Journal,
-    episode: Episode,
-    workers: int,
-    progress: Progress | None,
-    limit_s: float,
-) -> None:
-    """Run what is not done; each batch is in the journal before it is counted."""
-    distinct = {job.key: job for job in todo}
-    done = journal.done()
-    rest = [job for key, job in distinct.items() if key not in done]
-    count, total = len(distinct) - len(rest), len(distinct)
-    tell = progress or (lambda *_: None)
-    tell(count, total)
-    try:
-        with closing(pool.run_all(rest, episode, min(workers, len(rest)), limit_s)) as batches:
-            for batch in batches:
-                journal.add(batch)
-                count += len(batch)
-                tell(count, total)
-    except KeyboardInterrupt:
-        raise KeyboardInterrupt(
-            f"interrupted after {count} of {total} runs; the same command goes on from there"
-        ) from None
-
-
-def _simulation() -> Episode:
-    from dva_sim.experiments.episode import run_job
-
-    return run_job
-
-
-def _open(out: Path, manifest: dict[str, Any]) -> Journal:
-    """The journal of the folder, which must be this study's or new."""
-    identity = manifest["hash"]
+def _opened(out: Path, identity: str) -> Journal:
+    """The journal of a results folder, which must be this study's or new."""
     try:
         out.mkdir(parents=True, exist_ok=True)
         if not (out / FILE).exists() and (out / MANIFEST).exists():
@@ -171,7 +99,123 @@ def _open(out: Path, manifest: dict[str, Any]) -> Journal:
     return Journal(out, identity)
 
 
-def _remark(study: Study) -> str:
-    if not design.is_tuned(study):
-        return ""
-    return load_tuned(study).remark(design.basis_of_tuning(study))
+class _Session:
+    """One go at a study: runs what is asked for and is not done, and counts."""
+
+    def __init__(
+        self,
+        todo: Sequence[Job],
+        journal: Journal,
+        place: Place,
+        episode: Episode,
+        progress: Progress | None,
+        limit_s: float,
+    ) -> None:
+        self.journal = journal
+        self._place, self._episode, self._limit_s = place, episode, limit_s
+        self._tell = progress or (lambda *_: None)
+        keys = {job.key for job in todo}
+        self._total, self._count = len(keys), len(keys & journal.done())
+        self._tell(self._count, self._total)
+
+    def left(self, batch: Sequence[Job]) -> list[Job]:
+        """What is not done yet, each run once."""
+        done = self.journal.done()
+        return [job for key, job in {job.key: job for job in batch}.items() if key not in done]
+
+    def run(self, rest: Sequence[Job]) -> None:
+        """Run some; what comes together is in the journal before it is counted."""
+        clock = time.perf_counter()
+        batches = pool.run_all(rest, self._episode, self._place, self._limit_s)
+        with closing(batches):
+            for batch in batches:
+                now = time.perf_counter()
+                self.journal.add(batch, now - clock)
+                clock, self._count = now, self._count + len(batch)
+                self._tell(self._count, self._total)
+
+    def end(self) -> None:
+        """No more will be run, even if not all have been."""
+        self._tell(self._count, self._count)
+
+    @contextmanager
+    def told(self) -> Iterator[None]:
+        """Say with a Ctrl-C how far it had come."""
+        try:
+            yield
+        except KeyboardInterrupt:
+            raise KeyboardInterrupt(
+                f"interrupted after {self._count} of {self._total} runs, which are kept; "
+                "the same command goes on from there"
+            ) from None
+
+
+def _run_rounds(
+    study: Study, todo: Sequence[Job], session: _Session
+) -> tuple[list[Job], dict[str, Any]]:
+    """Round after round until the study has enough; the jobs it then has, and what ended it.
+
+    Whether it is enough is judged by whole rounds alone, which are the same wherever and however
+    often the study was interrupted. A round that is done counts even if the budget is spent.
+    """
+    batches = rounds(study, todo)
+    chosen: list[Job] = []
+    why, number = None, 0
+    for number, batch in enumerate(batches, 1):
+        rest = session.left(batch)
+        if rest and chosen and _is_spent(study, session.journal):
+            why, number = "budget", number - 1
+            break
+        session.run(rest)
+        chosen.extend(batch)
+        if number < len(batches) and is_enough(study, _rows(todo, chosen, session.journal)):
+            why = "enough"
+            break
+    if why is not None:
+        session.end()
+    return _in_order(todo, chosen), {"rounds": number, "of": len(batches), "why": why}
+
+
+def _is_spent(study: Study, journal: Journal) -> bool:
+    return study.budget_s is not None and journal.wall_s >= study.budget_s
+
+
+def _in_order(todo: Sequence[Job], chosen: Sequence[Job]) -> list[Job]:
+    """The chosen ones in the order of the design."""
+    ids = {id(job) for job in chosen}
+    return [job for job in todo if id(job) in ids]
+
+
+def _rows(todo: Sequence[Job], chosen: Sequence[Job], journal: Journal) -> list[dict[str, Any]]:
+    """The table `runs` of the chosen jobs, but for repeats."""
+    own = [job for job in _in_order(todo, chosen) if not job.is_repeat]
+    tables = ((job, journal.tables(job.key) or {}) for job in own)
+    return [design_row(job) | row for job, found in tables for row in found.get("runs", ())]
+
+
+@contextmanager
+def _place(jobs: int | None, scheduler: str | None) -> Iterator[Place]:
+    if scheduler is None:
+        yield places.local(jobs)
+        return
+    if jobs is not None:
+        raise ConfigError("give the number of processes or a scheduler, not both")
+    from dva_sim.experiments.cluster import Cluster
+
+    with Cluster(scheduler) as cluster:
+        yield cluster
+
+
+def _simulation() -> Episode:
+    from dva_sim.experiments.episode import run_job
+
+    return run_job
+
+
+def _tidy(out: Path) -> None:
+    """Remove what a runner left behind that was killed while it wrote."""
+    for path in out.glob(".tables-*"):
+        shutil.rmtree(path, ignore_errors=True)
+    for name in (MANIFEST, MACHINE):
+        for path in out.glob(f".{name}.*"):
+            path.unlink(missing_ok=True)

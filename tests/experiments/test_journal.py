@@ -66,7 +66,8 @@ def test_a_full_disk_is_told_in_one_line_and_loses_nothing(tmp_path: Path):
         assert journal.done() == {("abc", 1)}
 
 
-def test_a_journal_held_by_another_program_is_told_in_one_line(tmp_path: Path):
+def test_a_journal_held_by_another_program_is_told_in_one_line(tmp_path: Path, monkeypatch):
+    monkeypatch.setattr("dva_sim.experiments.journal._PATIENCE_S", 0)
     with Journal(tmp_path, "me") as journal:
         journal._db.execute("PRAGMA busy_timeout = 0")
         other = sqlite3.connect(tmp_path / FILE, isolation_level=None)

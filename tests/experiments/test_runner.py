@@ -12,8 +12,9 @@ import pytest
 import small_study as kit
 
 from dva_sim.errors import ConfigError
+from dva_sim.experiments.planning import dry_run
 from dva_sim.experiments.results import Results
-from dva_sim.experiments.runner import dry_run, run_study
+from dva_sim.experiments.runner import run_study
 
 TESTS = Path(kit.__file__).parent
 PATIENCE_S = 60
@@ -140,7 +141,7 @@ def test_ctrl_c_keeps_what_is_done_and_says_how_to_go_on(tmp_path, plain):
     runner = started(study, out)
     said = stopped(runner, 3, signal.SIGINT)
     assert runner.returncode == 130
-    assert "of 42 runs; the same command goes on from there" in said
+    assert "of 42 runs, which are kept; the same command goes on from there" in said
     assert 3 <= dry_run(kit.study_in(tmp_path), out).done < kit.RUNS
     assert kit.files(run_study(kit.study_in(tmp_path), out, jobs=1, episode=kit.cheap)) == plain
 
@@ -174,11 +175,11 @@ def test_a_failed_run_is_tried_again_the_next_time(tmp_path, plain):
     assert kit.files(run_study(study, tmp_path / "out", jobs=1, episode=kit.cheap)) == plain
 
 
-def test_a_run_that_kills_its_process_twice_fails_and_the_others_go_on(tmp_path):
+def test_a_run_that_kills_its_process_again_and_again_fails_and_the_others_go_on(tmp_path):
     out = run_study(kit.study_in(tmp_path), tmp_path / "out", jobs=2, episode=kit.deadly)
     results = Results.load(out)
     (failure,) = results.failures
-    assert "killed the process it ran in, twice" in failure["error"]
+    assert "killed the process it ran in, again" in failure["error"]
     assert (failure["part"], failure["cell"], failure["person"]) == ("story", 2, 1)
     assert len(results.table("runs")["seed"]) == kit.RUNS - 1
 

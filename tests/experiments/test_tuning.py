@@ -5,8 +5,8 @@ import small_study as kit
 
 from dva_sim import resources
 from dva_sim.errors import ConfigError, DvaSimError
-from dva_sim.experiments import console, design
-from dva_sim.experiments.runner import dry_run
+from dva_sim.experiments import design, running
+from dva_sim.experiments.planning import dry_run
 from dva_sim.experiments.study import load_study
 from dva_sim.experiments.tuned import choose, file_of, load_tuned, save_tuned
 from dva_sim.experiments.tuning import tune, tuning_study
@@ -188,7 +188,7 @@ def test_the_command_tries_chooses_tells_and_keeps(tmp_path, capsys):
         text = text.replace(old, new)
     path = kit.write_study(tmp_path, text)
     (tmp_path / "one.yaml").write_text("description: no time to arrive\nhorizon_s: 1\n")
-    assert console.tune(str(path), tmp_path / "trials", 1) == 0
+    assert running.tune(str(path), tmp_path / "trials", 1) == 0
     said = capsys.readouterr().out
     assert "Which command.rate_hz for each pattern?" in said
     assert f"Kept in {tmp_path / 'tuned' / 'study.yaml'}" in said

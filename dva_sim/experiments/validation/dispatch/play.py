@@ -10,6 +10,7 @@ from typing import cast
 import numpy as np
 
 from dva_sim.errors import DvaSimError
+from dva_sim.experiments import places
 from dva_sim.experiments.design import Job
 from dva_sim.experiments.journal import Outcome, Tables
 from dva_sim.experiments.pool import run_all
@@ -120,7 +121,7 @@ def _perform(
     progress: Callable[[int], None],
 ) -> None:
     """Play some runs, and add how they ended."""
-    for batch in run_all(jobs, play, workers):
+    for batch in run_all(jobs, play, places.local(workers)):
         for outcome in batch:
             if outcome.error is not None:
                 raise DvaSimError(f"a run of case {outcome.key[0]!r} failed: {outcome.error}")

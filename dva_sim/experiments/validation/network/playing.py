@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any, cast
 
 from dva_sim.errors import DvaSimError
+from dva_sim.experiments import places
 from dva_sim.experiments.design import Job
 from dva_sim.experiments.journal import Tables
 from dva_sim.experiments.models import AnyScenario
@@ -66,7 +67,7 @@ def play_all(
     jobs.sort(key=lambda job: -_effort(job))
     rows: dict[tuple[str, int], list[Row]] = {}
     done = 0
-    for batch in run_all(jobs, perform, workers):
+    for batch in run_all(jobs, perform, places.local(workers)):
         for outcome in batch:
             if outcome.error is not None:
                 raise DvaSimError(f"{outcome.key[0]} could not be played: {outcome.error}")

@@ -10,6 +10,7 @@ from typing import Any, cast
 from dva_sim import resources
 from dva_sim.config import load_yaml
 from dva_sim.errors import DvaSimError
+from dva_sim.experiments import places
 from dva_sim.experiments.design import Job
 from dva_sim.experiments.journal import Tables
 from dva_sim.experiments.models import AnyScenario
@@ -144,7 +145,7 @@ def _played(
 ) -> dict[tuple[str, int], list[dict[str, Any]]]:
     """The rows of each job by its key."""
     rows: dict[tuple[str, int], list[dict[str, Any]]] = {}
-    for batch in run_all(jobs, perform, workers):
+    for batch in run_all(jobs, perform, places.local(workers)):
         for outcome in batch:
             if outcome.error is not None:
                 raise DvaSimError(f"{outcome.key[0]!r} could not be simulated: {outcome.error}")

@@ -1,0 +1,129 @@
+"""What running a study would mean: how many runs, what is done already, how long the rest takes."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from dva_sim.experiments import design, places, pool
+from dva_sim.experiments.design import Job, Key
+from dva_sim.experiments.journal import FILE, Journal
+from dva_sim.experiments.manifest import manifest_of
+from dva_sim.experiments.pool import Episode
+from dva_sim.experiments.stopping import rounds
+from dva_sim.experiments.study import Study
+from dva_sim.experiments.tuned import load_tuned
+
+PROBE_S = 5.0  # after so long no further run is tried
+_LONGEST_PROBE_S = 30.0  # a run that takes longer tells nothing
+
+
+@dataclass(frozen=True)
+class DryRun:
+    """What running a study would mean.
+
+    Attributes:
+        runs: Different runs in all.
+        done: How many of them the results folder already holds.
+        cells: Configurations, with the reference runs' own.
+        rounds: After how many batches it may stop; 1 if nothing can stop it early.
+        workers: Processes that the estimate is for.
+        estimate_s: Time for the rest [s], if any run tells its cost.
+        tried: Runs that were tried for the estimate and thrown away; 0 if it rests on runs kept.
+        remark: What is doubtful about tuned values; empty if nothing is.
+    """
+
+    runs: int
+    done: int
+    cells: int
+    rounds: int
+    workers: int
+    estimate_s: float | None
+    tried: int
+    remark: str
+
+
+def dry_run(
+    study: Study, out: str | Path, *, jobs: int | None = None, probe: Episode | None = None
+) -> DryRun:
+    """What `run_study` would do, without doing it.
+
+    Args:
+        study: From `load_study`.
+        out: Results folder.
+        jobs: Processes; by default one for each core.
+        probe: Makes the tables of one run. With it, a few runs are tried for the estimate if none
+            is done yet.
+
+    Raises:
+        ConfigError: the study is not valid, or the folder holds another one.
+    """
+    cells = design.cells(study)
+    todo = list({job.key: job for job in design.jobs(study, cells)}.values())
+    costs: dict[Key, float] = {}
+    if (Path(out) / FILE).exists():
+        identity = manifest_of(study, cells, todo)["hash"]
+        with Journal(Path(out), identity, must_exist=True) as journal:
+            costs = journal.costs()
+    left = [job for job in todo if job.key not in costs]
+    known = _by_config(costs)
+    tried = _tried(left, probe) if probe is not None and not known else {}
+    estimate = _estimate(left, known or tried)
+    workers = places.local(jobs).width
+    return DryRun(
+        len(todo),
+        len(todo) - len(left),
+        len(cells),
+        len(rounds(study, todo)),
+        workers,
+        None if estimate is None else estimate / min(workers, len(left) or 1),
+        len(tried),
+        _remark(study),
+    )
+
+
+def _by_config(costs: Mapping[Key, float]) -> dict[str, float]:
+    """What a run of each configuration costs on the average [s]."""
+    spent: dict[str, list[float]] = defaultdict(list)
+    for (config, _), cost in costs.items():
+        spent[config].append(cost)
+    return {config: sum(values) / len(values) for config, values in spent.items()}
+
+
+def _estimate(left: Sequence[Job], known: Mapping[str, float]) -> float | None:
+    """What the rest costs [s]; a configuration never run is taken for an average one."""
+    if not known and left:
+        return None
+    average = sum(known.values()) / max(1, len(known))
+    return sum(known.get(job.config, average) for job in left)
+
+
+def _tried(left: Sequence[Job], probe: Episode) -> dict[str, float]:
+    """What some configurations cost [s], from one run each, spread over the design."""
+    first = list({job.config: job for job in reversed(left)}.values())
+    end, costs = time.monotonic() + PROBE_S, {}
+    for index in [0, *_spread(len(first))] if first else ():  # the first time reads files too
+        outcome = pool.perform(first[index], probe, _LONGEST_PROBE_S)
+        if outcome.tables is not None:
+            costs[outcome.key[0]] = outcome.cost_s
+        if time.monotonic() > end or outcome.tables is None:
+            break
+    return costs
+
+
+def _spread(count: int) -> list[int]:
+    """All indices, so ordered that any beginning is spread over the whole range."""
+    step = next(
+        s for s in range(max(1, round(count * 0.618)), count + 2) if math.gcd(s, count) == 1
+    )
+    return [i * step % count for i in range(count)]
+
+
+def _remark(study: Study) -> str:
+    if not design.is_tuned(study):
+        return ""
+    return load_tuned(study).remark(design.basis_of_tuning(study))

@@ -1,0 +1,250 @@
+"""What the command line does with a study: say what will run, run it, show how far it is."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, Progress, TextColumn
+
+from dva_sim.experiments.console import console, say
+from dva_sim.experiments.planning import DryRun, dry_run
+from dva_sim.experiments.results import Results
+from dva_sim.experiments.study import Study, load_study
+
+INTERRUPTED = 130  # exit code of a program ended by Ctrl-C
+_LINE_S = 30.0  # between two lines of progress in a file
+_MINUTE_S, _HOUR_S = 60, 3600
+
+
+@dataclass(frozen=True)
+class Version:
+    """Which version of a study is meant.
+
+    Attributes:
+        full: The larger one.
+        pilot: Only so many persons.
+    """
+
+    full: bool = False
+    pilot: int | None = None
+
+    def folder(self, name: str) -> Path:
+        """Where results go if nobody says: each version has its own folder."""
+        marks = ["-full"] * self.full + ["-pilot"] * (self.pilot is not None)
+        return Path("results") / "".join([Path(name).stem, *marks])
+
+
+@dataclass(frozen=True)
+class Workers:
+    """Who runs a study.
+
+    Attributes:
+        jobs: Processes of this machine; by default one for each core.
+        scheduler: Address of a cluster to use instead.
+        limit_s: A run that takes longer has failed.
+    """
+
+    jobs: int | None = None
+    scheduler: str | None = None
+    limit_s: float = 600.0
+
+
+def run(name: str, pairs: list[str], out: Path | None, workers: Workers, version: Version) -> int:
+    """Run a study and show how far it is, then write its report; the exit code."""
+    from dva_sim.experiments.report import write_report
+    from dva_sim.experiments.runner import run_study
+
+    try:
+        study, folder = _loaded(name, pairs, out, version)
+        before = _planned(study, folder, workers, tries=False)
+        with _shown("running", before.runs) as show:
+            run_study(
+                study,
+                folder,
+                jobs=workers.jobs,
+                scheduler=workers.scheduler,
+                progress=show,
+                limit_s=workers.limit_s,
+            )
+        failures = _told_failures(Results.load(folder)) + _recorded(study, folder, workers)
+        with console.status("Writing the report ..."):
+            report = write_report(folder)
+    except KeyboardInterrupt as stopped:
+        return _stopped(stopped)
+    say(f"Report: {report}")
+    return 1 if failures else 0
+
+
+def tune(name: str, out: Path | None, jobs: int | None) -> int:
+    """Choose what a study has tuned, and write it beside the study; the exit code."""
+    from dva_sim.experiments.tuned import save_tuned
+    from dva_sim.experiments.tuning import tune as try_all
+    from dva_sim.experiments.tuning import tuning_study
+
+    study = load_study(name)
+    trials = tuning_study(study)
+    folder = out if out is not None else Path("results") / f"{Path(name).stem}-tuning"
+    say(f"[bold]{escape(trials.question)}[/bold]")
+    before = dry_run(trials, folder, jobs=jobs)
+    say(_plan(before, folder))
+    try:
+        with _shown("trying", before.runs) as show:
+            tuned = try_all(study, folder, jobs=jobs, progress=show)
+    except KeyboardInterrupt as stopped:
+        return _stopped(stopped)
+    for choice in tuned.chosen:
+        when = ", ".join(f"{name} {level}" for name, level in choice.when.items())
+        say(f"{when}: {tuned.tuning.key} {choice.value:g}")
+    say(f"Kept in {save_tuned(study, tuned)}")
+    return 0
+
+
+def plan(name: str, pairs: list[str], out: Path | None, workers: Workers, version: Version) -> None:
+    """Say what `run` would do."""
+    study, folder = _loaded(name, pairs, out, version)
+    _planned(study, folder, workers, tries=True)
+
+
+def _loaded(name: str, pairs: list[str], out: Path | None, version: Version) -> tuple[Study, Path]:
+    study = load_study(name, pairs, full=version.full, pilot=version.pilot)
+    say(f"[bold]{escape(study.question)}[/bold]")
+    return study, out if out is not None else version.folder(name)
+
+
+def _planned(study: Study, folder: Path, workers: Workers, tries: bool) -> DryRun:
+    """Say what will run, and find mistakes before the first run."""
+    from dva_sim.experiments.episode import rehearse_all, run_job
+
+    rehearse_all(study)
+    found = dry_run(study, folder, jobs=workers.jobs, probe=run_job if tries else None)
+    if found.remark:
+        say(f"[yellow]{escape(found.remark)}[/yellow]")
+    say(escape(_plan(found, folder)))
+    if tries:
+        say(_time(found))
+    return found
+
+
+def _plan(found: DryRun, folder: Path) -> str:
+    done = f", {found.done} of them done already" if found.done else ""
+    most = f"at most {found.runs}" if found.rounds > 1 else f"{found.runs}"
+    rounds = f" and up to {found.rounds} rounds" if found.rounds > 1 else ""
+    return f"{most} runs in {found.cells} configurations{rounds}{done}; into {folder}"
+
+
+def _time(found: DryRun) -> str:
+    """How long it will take, and how that is known."""
+    if found.runs == found.done:
+        return "nothing is left to run"
+    if found.estimate_s is None:
+        return "no estimate of the time: no run is done yet, and none that was tried ended in time"
+    runs = f"{found.tried} runs tried now" if found.tried else "the runs done already"
+    who = "1 process" if found.workers == 1 else f"{found.workers} processes"
+    return f"about {duration(found.estimate_s)} to go with {who}, judged by {runs}"
+
+
+def _told_failures(results: Results) -> int:
+    failures = results.failures
+    for f in failures[:5]:
+        where = f"{f['part']}, cell {f['cell']}, person {f['person']}, trial {f['trial']}"
+        say(f"[red]failed:[/red] {where}: {escape(str(f['error']).splitlines()[-1])}")
+    if failures:
+        say(f"[red]{len(failures)} runs failed[/red]; the same command tries them again")
+    return len(failures)
+
+
+def _recorded(study: Study, folder: Path, workers: Workers) -> int:
+    """Make the recordings that the study asks for; how many could not be made."""
+    if study.record is None:
+        return 0
+    from dva_sim.experiments.recording import record_study
+
+    with _shown("recording", 0) as show:
+        problems = record_study(
+            study, folder, jobs=workers.jobs, progress=show, limit_s=workers.limit_s
+        )
+    for problem in problems[:5]:
+        say(f"[red]not recorded:[/red] {escape(problem)}")
+    return len(problems)
+
+
+def _stopped(how: KeyboardInterrupt) -> int:
+    """Say what was done, and the command that goes on."""
+    say(f"Stopped: {how}" if str(how) else "Stopped.")
+    say(f"To go on: {escape(shlex.join(['dva-sim', *sys.argv[1:]]))}")
+    return INTERRUPTED
+
+
+# --- progress --------------------------------------------------------------------------
+
+
+@contextmanager
+def _shown(what: str, total: int) -> Iterator[Callable[[int, int], None]]:
+    """A bar on a terminal; elsewhere a line now and then."""
+    pace = Pace(time.monotonic)
+    if not console.is_terminal:
+        yield _Lines(console, pace).show
+        return
+    columns = (TextColumn(what), BarColumn(), TextColumn("{task.fields[pace]}"))
+    with Progress(*columns, console=console) as bar:
+        task = bar.add_task(what, total=total, pace="")
+
+        def show(done: int, total: int) -> None:
+            bar.update(task, completed=done, total=total, pace=pace.line(done, total))
+
+        yield show
+
+
+class _Lines:
+    """Progress in a file: the first line, the last, and one now and then."""
+
+    def __init__(self, where: Console, pace: Pace) -> None:
+        self._where, self._pace, self._last = where, pace, -_LINE_S
+
+    def show(self, done: int, total: int) -> None:
+        line = self._pace.line(done, total)
+        if done == total or time.monotonic() - self._last >= _LINE_S:
+            self._where.print(line, soft_wrap=True)
+            self._last = time.monotonic()
+
+
+class Pace:
+    """How fast runs are made, since the first look.
+
+    Args:
+        clock: Seconds of a clock that only goes forward.
+    """
+
+    def __init__(self, clock: Callable[[], float]) -> None:
+        self._clock = clock
+        self._first: tuple[int, float] | None = None
+
+    def line(self, done: int, total: int) -> str:
+        """So many runs are done: their rate, and the time left at this rate."""
+        now = self._clock()
+        self._first = self._first or (done, now)
+        made, took = done - self._first[0], now - self._first[1]
+        if not made or not took:
+            return f"{done}/{total} runs"
+        rate = made / took
+        left = "" if done == total else f", {duration((total - done) / rate)} left"
+        often = f"{rate:.1f} runs/s" if rate >= 1 else f"{rate * _MINUTE_S:.1f} runs/min"
+        return f"{done}/{total} runs, {often}{left}"
+
+
+def duration(seconds: float) -> str:
+    """In the units that people would say it in."""
+    if seconds < 90:
+        return f"{seconds:.0f} s"
+    if seconds < 90 * _MINUTE_S:
+        return f"{seconds / _MINUTE_S:.0f} min"
+    hours, rest = divmod(round(seconds / _MINUTE_S), _MINUTE_S)
+    return f"{hours} h {rest} min"
