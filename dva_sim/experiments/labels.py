@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 from dva_sim.experiments.units import ending_of
 from dva_sim.experiments.units import unit_of as unit_of
@@ -162,8 +163,13 @@ def percent(share: float) -> str:
     return f"{text.removesuffix('.0')}\N{NO-BREAK SPACE}%"
 
 
-def level_name(factor: str, level: Level, short: bool = False) -> str:
-    """One level with its unit: 0.05 of `link.delay_s` is `50 ms`; a class without its file."""
+def level_name(factor: str, level: Level | Mapping[str, Any], short: bool = False) -> str:
+    """One level with its unit: 0.05 of `link.delay_s` is `50 ms`; a class without its file.
+
+    What a treatment sets may be a law, or another group of keys: `law gamma, mean_s 50 ms`.
+    """
+    if isinstance(level, Mapping):
+        return ", ".join(f"{key} {level_name(key, value)}" for key, value in level.items())
     if isinstance(level, str):
         name = level.rpartition(":")[2] if is_in_file(level) else level
         return (_SHORT_LEVELS if short else _LEVELS).get(name, name)
