@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,6 +20,9 @@ from dva_sim.experiments.comparing_rows import Difference, Rows, as_numbers, dif
 from dva_sim.experiments.dictionary import DESIGN
 from dva_sim.experiments.frames import Frame
 from dva_sim.experiments.results import Results
+
+if TYPE_CHECKING:
+    from dva_sim.experiments.comparing_gates import Verdict
 
 _ROW = ("part", "cell", "person", "trial", "seed")
 
@@ -52,6 +55,7 @@ class Comparison:
 
     def __init__(self, first: Results, second: Results) -> None:
         self.sides = (first, second)
+        self._frames: dict[tuple[int, str, str], Frame] = {}
         if not self.matched.pairs:
             raise ConfigError(
                 f"{first.folder} and {second.folder} have no configuration in common: neither "
@@ -67,12 +71,13 @@ class Comparison:
     def _columns(self) -> dict[str, list[str]]:
         """What can be measured: the columns that both folders have, by table, the runs first."""
         first, second = self.sides
-        tables = [t for t in ("runs", *first.tables) if first.has(t) and second.has(t)]
+        tables = [name for name in first.tables if second.has(name)]
         known = {*DESIGN, *first.factors, *second.factors}
-        return {
-            table: [n for n in first.names(table) if n in second.names(table) and n not in known]
-            for table in dict.fromkeys(tables)
-        }
+        found = {}
+        for table in sorted(tables, key=lambda name: name != "runs"):
+            both = set(second.names(table)) - known
+            found[table] = [name for name in first.names(table) if name in both]
+        return found
 
     def find(self, measure: str | None = None) -> tuple[str, str]:
         """Table and column of a measure: `drive_time_s`, or `events.response_s`.
@@ -129,14 +134,12 @@ class Comparison:
         return Rows(chosen[column], cells, *(chosen[name] for name in _ROW[2:]))
 
     def _frame(self, side: int, table: str, column: str) -> Frame:
+        if table == "runs":
+            return self.sides[side].runs
         key = side, table, column
         if key not in self._frames:
             self._frames[key] = self.sides[side].table(table, columns=(*_ROW, column))
         return self._frames[key]
-
-    @cached_property
-    def _frames(self) -> dict[tuple[int, str, str], Frame]:
-        return {}
 
     def differences(
         self, measure: str | None = None, by: Sequence[str] | None = ()
@@ -153,6 +156,17 @@ class Comparison:
             if any(np.isfinite(side.values).any() for side in rows):
                 found.append(difference(group.part, group.levels, *rows))
         return found
+
+    def judge(self, condition: str) -> list[Verdict]:
+        """Look at a condition such as `p95(response_s) > 1.05x`, part by part.
+
+        Raises:
+            ConfigError: it is none, or nothing to decide it by.
+        """
+        from dva_sim.experiments.comparing_conditions import parse
+        from dva_sim.experiments.comparing_gates import judge
+
+        return judge(parse(condition), self)
 
     def changed(self) -> tuple[list[str], int]:
         """Measures that are not the same in every pair of runs, and how many there are in all.

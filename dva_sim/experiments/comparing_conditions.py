@@ -113,7 +113,7 @@ class _Reader:
         """
         if self.kind != kind or (among and self.word not in among):
             found = f"not {self.word!r}" if self.word else "and then it ends"
-            raise self.error(f"expected {called or ' or '.join(among)}, {found}")
+            raise self.error(f"expected {called or ' or '.join(map(repr, among))}, {found}")
         return self.next()
 
     def error(self, problem: str) -> ConfigError:

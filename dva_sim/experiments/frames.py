@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from html import escape
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
@@ -59,6 +60,21 @@ class Frame(dict[str, Array]):
 
     def _html_row(self, row: int) -> str:
         return "".join(f"<td>{escape(plain(values[row]))}</td>" for values in self.values())
+
+
+def frame_of(rows: Sequence[Mapping[str, Any]]) -> Frame:
+    """Rows as columns; what a row does not say is missing."""
+    names = dict.fromkeys(name for row in rows for name in row)
+    return Frame({name: _column([row.get(name) for row in rows]) for name in names})
+
+
+def _column(values: list[Any]) -> Array:
+    types = {type(value) for value in values}
+    if str in types or types == {type(None)}:
+        return np.array(values, dtype=object)
+    if type(None) in types:
+        return np.array([np.nan if value is None else value for value in values], dtype=float)
+    return np.array(values)
 
 
 def plain(value: Any) -> str:

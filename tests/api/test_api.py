@@ -1,0 +1,175 @@
+"""The Python API: the results of the command line, in scripts and notebooks, without a word."""
+
+import asyncio
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import dva_sim
+from dva_sim.api import _pairs
+from dva_sim.config import parse_changes
+from dva_sim.errors import ConfigError
+
+STUDY = """\
+question: Does a second of delay cost time?
+seed: 4
+persons: 2
+replications: 1
+factors:
+  link.delay_s: [0, 0.3]
+parts:
+  drive:
+    scenario: drive-to-event
+    changes: {horizon_s: 40}
+"""
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    path = tmp_path_factory.mktemp("study") / "late.yaml"
+    path.write_text(STUDY)
+    return path
+
+
+@pytest.fixture(scope="module")
+def results(study):
+    return dva_sim.run(study, study.parent / "api", set={"persons": 1}, jobs=1)
+
+
+def files(folder):
+    """All that must be the same bytes."""
+    folder = Path(folder)
+    paths = [*folder.glob("tables/*"), *folder.glob("figures/*")]
+    paths += [folder / "manifest.json", folder / "report.html"]
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in paths}
+
+
+def python(*words, folder):
+    """What a Python of its own says, without any mistake or warning."""
+    done = subprocess.run([sys.executable, *words], capture_output=True, text=True, cwd=folder)
+    assert (done.returncode, done.stderr) == (0, "")
+    return done.stdout
+
+
+def test_a_run_gives_the_bytes_of_the_same_command(study, results):
+    out = str(study.parent / "cli")
+    command = ["run", str(study), "--set", "persons=1", "-o", out, "--jobs", "2"]
+    python("-m", "dva_sim.cli", *command, folder=study.parent)
+    assert files(out) == files(results.folder)
+
+
+def test_the_runs_are_columns(results):
+    assert results.runs["link.delay_s"].tolist() == [0.0, 0.3]
+    assert results.runs["drive_time_s"].dtype == np.float64
+    assert results.failures == []
+
+
+def test_a_finished_study_is_only_opened_again(study, results):
+    told = []
+    again = dva_sim.run(
+        study,
+        results.folder,
+        set=["persons=1"],
+        progress=lambda done, total: told.append((done, total)),
+        report=False,
+    )
+    assert told[0] == (2, 2)
+    assert again.manifest == results.manifest
+
+
+def test_a_folder_can_be_loaded_and_compared_with_itself(results):
+    comparison = dva_sim.compare(results, dva_sim.load(results.folder))
+    assert comparison.paired == (2, 2)
+    assert comparison.changed()[0] == []
+    assert [verdict.holds for verdict in comparison.judge("mean(drive_time_s) > 1x")] == [False]
+
+
+def test_one_run_can_be_had_without_a_study():
+    once = dva_sim.episode("drive-to-event", seed=2, set={"horizon_s": 40, "link.delay_s": 0.1})
+    assert once.scenario.link.delay_s == 0.1
+    assert once.measures["simulated_s"] <= 40
+    assert set(once.tables) >= {"runs", "events", "tracks"}
+    assert once.tables["tracks"]["t_s"][0] == 0.0
+    assert "<td>drive_time_s</td>" in once._repr_html_()
+
+
+def test_an_episode_is_the_run_of_a_study_with_that_seed(results):
+    first = results.runs.where(results.runs["link.delay_s"] == 0.0)
+    fixed = {"horizon_s": 40, "link.delay_s": 0.0, "operator.population_seed": 4}
+    once = dva_sim.episode("drive-to-event", int(first["seed"][0]), set=fixed)
+    for name in ("drive_time_s", "path_m", "traffic_bytes"):
+        assert once.measures[name] == first[name][0]
+
+
+def test_a_script_needs_no_guard(study):
+    """Worker processes would run it again, and start the study within the study."""
+    script = study.parent / "script.py"
+    script.write_text(
+        "import dva_sim\n"
+        "results = dva_sim.run('late.yaml', 'unguarded', jobs=2, report=False)\n"
+        "print(results.runs.rows)\n"
+    )
+    assert python(str(script), folder=study.parent) == "4\n"
+
+
+def test_it_works_where_an_event_loop_runs(study, results):
+    """As in a notebook."""
+
+    async def cell():
+        return dva_sim.run(study, results.folder, set={"persons": 1}, report=False)
+
+    assert asyncio.run(cell()).runs.rows == 2
+
+
+def test_nothing_is_printed(study, capfd):
+    dva_sim.run(study, study.parent / "quiet", set={"persons": 1}, jobs=1, report=False)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_the_script_has_its_own_name_back_afterwards(results):
+    main = sys.modules["__main__"]
+    before = dict(vars(main))
+    with pytest.raises(ConfigError):
+        dva_sim.run("no-such-study")
+    assert dict(vars(main)) == before
+
+
+def test_importing_the_package_loads_nothing_heavy():
+    heavy = ["numpy", "pydantic", "duckdb", "scipy", "matplotlib", "rich", "dva_sim.api"]
+    code = f"import sys, dva_sim; print([name for name in {heavy} if name in sys.modules])"
+    assert python("-c", code, folder=".") == "[]\n"
+
+
+def test_what_is_there_is_told_and_nothing_else_is_found():
+    assert {"run", "load", "compare", "episode"} <= set(dir(dva_sim))
+    with pytest.raises(AttributeError, match="no attribute 'fly'"):
+        _ = dva_sim.fly
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "text"),
+    [
+        ("persons", 4, "persons=4"),
+        ("pattern", "req-rep", "pattern=req-rep"),
+        ("answer", None, "answer=null"),
+        ("link.delay_s", 0.1, "link.delay_s=0.1"),
+        ("label", "4", 'label="4"'),
+        ("factors.link.delay_s", (0, np.float64(0.5)), "factors.link.delay_s=[0, 0.5]"),
+        ("site.map", Path("plans/a.yaml"), "site.map=plans/a.yaml"),
+    ],
+)
+def test_settings_are_written_as_on_the_command_line(key, value, text):
+    assert _pairs({key: value}) == [text]
+    again = parse_changes([text])[key]
+    assert json.dumps(again) == json.dumps(
+        value, default=lambda x: x.item() if hasattr(x, "item") else str(x)
+    )
+
+
+def test_a_value_that_no_file_could_hold_is_refused():
+    with pytest.raises(ConfigError, match="persons cannot be"):
+        _pairs({"persons": object()})
