@@ -8,14 +8,15 @@ interval rules it out; all else is open.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from dva_sim.experiments.asking import ANSWER, Contrast, Hypothesis
+from dva_sim.experiments.asking import ANSWER, POINT, Contrast, Hypothesis
 from dva_sim.experiments.effects import Floats, Part, Setting, Table
+from dva_sim.experiments.labels import Level
 from dva_sim.experiments.reading import layout_of
 from dva_sim.experiments.statistics import (
     LEVEL,
@@ -163,11 +164,17 @@ def _named(study: Mapping[str, Any]) -> dict[str, Contrast]:
 
 def _places(study: Mapping[str, Any], contrast: Contrast) -> Iterator[Setting]:
     """Each level that a contrast runs over, or the one place it is taken at."""
-    if contrast.over is None:
+    stops = _stops(study, contrast)
+    if not stops:
         yield dict(contrast.within)
-        return
-    for level in study.get("factors", {}).get(contrast.over, ()):
-        yield dict(contrast.within) | {contrast.over: level}
+    for level in stops:
+        yield dict(contrast.within) | {str(contrast.over): level}
+
+
+def _stops(study: Mapping[str, Any], contrast: Contrast) -> Sequence[Level]:
+    """The levels that a contrast runs over; none over points in ranges, which are like trials."""
+    levels: Sequence[Level] = study.get("factors", {}).get(contrast.over, ())
+    return levels if contrast.over != POINT else ()
 
 
 def _compared(
@@ -192,8 +199,8 @@ def _tested(
     study: Mapping[str, Any], runs: Table, name: str, claim: Hypothesis, contrast: Contrast
 ) -> Tested:
     at = dict(contrast.within)
-    if contrast.over is not None:
-        at[contrast.over] = study["factors"][contrast.over][-1]
+    if stops := _stops(study, contrast):
+        at[str(contrast.over)] = stops[-1]
     at |= claim.at
     pairs = pairs_of(study, runs, contrast, at)
     found = paired_difference(*pairs) if pairs is not None else None
