@@ -5,13 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from dva_sim.errors import ConfigError
 from dva_sim.experiments.comparing import Comparison, Group
 from dva_sim.experiments.comparing_cells import Levels
-from dva_sim.experiments.comparing_conditions import SIGNS, TESTS, Gate, percent_of
+from dva_sim.experiments.comparing_conditions import (
+    SIGNS,
+    TESTS,
+    Gate,
+    Test,
+    percent_of,
+)
 from dva_sim.experiments.comparing_rows import Floats, Rows, as_numbers
 
 
@@ -75,18 +82,21 @@ def _verdicts(
 
 def _tested(gate: Gate, rows: Rows, column: str) -> Rows:
     """The rows with numbers for values: of a share, whether they pass its test."""
-    if gate.test is None:
+    if gate.test is None and gate.statistic != "missing":
         return as_numbers(rows, column)
-    sign, than = gate.test
-    if isinstance(than, str):
-        passed = [
-            float("nan") if value is None else float(TESTS[sign](str(value), than))
-            for value in rows.values.tolist()
-        ]
-        return replace(rows, values=np.array(passed, dtype=float))
-    rows = as_numbers(rows, column)
-    there = np.where(np.isnan(rows.values), np.nan, TESTS[sign](rows.values, than))
-    return replace(rows, values=there)
+    if gate.test is not None and not isinstance(gate.test.than, str):
+        rows = as_numbers(rows, column)
+    passed = [_passes(gate.test, value) for value in rows.values.tolist()]
+    return replace(rows, values=np.array(passed, dtype=float))
+
+
+def _passes(test: Test | None, value: Any) -> float:
+    """1 or 0, or nan for a value that is missing."""
+    if value is None or value != value:
+        return math.nan
+    if test is None:
+        return 1.0
+    return float(TESTS[test.sign](str(value) if isinstance(test.than, str) else value, test.than))
 
 
 def _values(gate: Gate, rows: Rows) -> Floats:

@@ -36,6 +36,9 @@ def tell(
     """
     for name, side in zip("AB", comparison.sides, strict=True):
         console.print(f"{name}: {escape(str(side.folder))}: {program(side)}", soft_wrap=True)
+        if side.failures:
+            failed = f"{len(side.failures)} runs of {name} failed and take no part"
+            console.print(failed, style="yellow", soft_wrap=True)
     for line in (*_cells(comparison), _luck(comparison)):
         console.print(escape(line), soft_wrap=True)
     wanted: Sequence[str | None] = measures or [None]

@@ -15,6 +15,7 @@ from dva_sim.experiments.results import Results
 
 ROWS = 20
 _GAP = 2  # between columns
+_ENDS = {"enough": "its interval is narrow enough", "budget": "its time is spent"}
 
 
 def show(results: Results, console: Console) -> None:
@@ -122,6 +123,9 @@ def _facts(results: Results) -> Iterator[str]:
     size = f"{results.runs.rows} runs in {cells} configurations"
     persons = f"{study.get('persons')} persons x {study.get('replications')} trials"
     yield f"{size}, {len(results.failures)} failed; {persons}, seed {study.get('seed')}"
+    if (stopped := manifest.get("stopped") or {}).get("why"):
+        why = _ENDS.get(stopped["why"], stopped["why"])
+        yield f"Ended after {stopped['rounds']} of {stopped['of']} rounds: {why}"
     yield f"{program(results)}, study {manifest.get('hash')}"
     if machine := results.machine:
         yield _machine(machine)

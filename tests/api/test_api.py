@@ -37,7 +37,7 @@ def study(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def results(study):
-    return dva_sim.run(study, study.parent / "api", set={"persons": 1}, jobs=1)
+    return dva_sim.run(study, study.parent / "api", set={"persons": 1}, jobs=1, report=False)
 
 
 def files(folder):
@@ -55,7 +55,9 @@ def python(*words, folder):
     return done.stdout
 
 
+@pytest.mark.slow  # two reports
 def test_a_run_gives_the_bytes_of_the_same_command(study, results):
+    results.report()
     out = str(study.parent / "cli")
     command = ["run", str(study), "--set", "persons=1", "-o", out, "--jobs", "2"]
     python("-m", "dva_sim.cli", *command, folder=study.parent)
@@ -105,6 +107,7 @@ def test_an_episode_is_the_run_of_a_study_with_that_seed(results):
         assert once.measures[name] == first[name][0]
 
 
+@pytest.mark.slow  # processes of its own
 def test_a_script_needs_no_guard(study):
     """Worker processes would run it again, and start the study within the study."""
     script = study.parent / "script.py"
