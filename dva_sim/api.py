@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from dva_sim import scenario as scenarios
 from dva_sim.config import parse_changes, parse_scalar
-from dva_sim.errors import ConfigError
+from dva_sim.errors import ConfigError, DvaSimError
 from dva_sim.experiments.comparing import Comparison
 from dva_sim.experiments.dictionary import describe
 from dva_sim.experiments.frames import Frame, frame_of, plain
@@ -65,10 +65,12 @@ def run(
         What came out; `failures` tells of runs that failed.
 
     Raises:
-        DvaSimError: a mistake in what was asked for, or a disk that is full.
+        DvaSimError: a mistake in what was asked for, a disk that is full, or runs that should be
+            kept as recordings and could not.
         KeyboardInterrupt: the finished runs are kept, and the same call goes on.
     """
     from dva_sim.experiments.episode import rehearse_all
+    from dva_sim.experiments.recording import record_study
     from dva_sim.experiments.runner import run_study
     from dva_sim.experiments.running import Version
     from dva_sim.experiments.study import load_study
@@ -80,9 +82,12 @@ def run(
     options: dict[str, Any] = {"jobs": jobs, "scheduler": scheduler}
     with _without_main():
         run_study(asked, folder, progress=progress, limit_s=limit_s, **options)
+        problems = record_study(asked, folder, jobs=jobs, limit_s=limit_s)
     results = load(folder)
     if report:
         results.report()
+    if problems:
+        raise DvaSimError(f"{folder}: {'; '.join(problems)}; the results are complete")
     return results
 
 
