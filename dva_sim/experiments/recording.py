@@ -18,6 +18,7 @@ from typing import Any
 from dva_sim.errors import DvaSimError
 from dva_sim.experiments import design, places, pool
 from dva_sim.experiments.design import Job
+from dva_sim.experiments.identity import stable_hash
 from dva_sim.experiments.models import Tables, tables_of
 from dva_sim.experiments.results import Results
 from dva_sim.experiments.study import Study
@@ -207,7 +208,7 @@ def _fingerprint(job: Job, row: Row) -> str:
 def _print_of(row: Row) -> str:
     """The same for a row as it was made and as a table holds it."""
     there = {name: v for name, v in row.items() if v is not None and v == v}
-    return design.stable_hash({n: v if isinstance(v, str) else float(v) for n, v in there.items()})
+    return stable_hash({n: v if isinstance(v, str) else float(v) for n, v in there.items()})
 
 
 def _about(job: Job) -> dict[str, str]:

@@ -17,7 +17,7 @@ from dva_sim.errors import ConfigError
 from dva_sim.recorder import DriveLog, Moment, Recorder, Sent, Shown, TrackPoint
 from dva_sim.recordings import bodies, messages, sites, story
 from dva_sim.recordings.messages import XML
-from dva_sim.recordings.writing import ABOUT, FORMAT, RUN, SCENARIO, SITE, TABLES
+from dva_sim.recordings.writing import ABOUT, DIGEST, FORMAT, RUN, SCENARIO, SITE, TABLES, digest
 from dva_sim.scenario import Scenario
 from dva_sim.simulation import Playback
 from dva_sim.simulation.incidents import Incident
@@ -25,7 +25,7 @@ from dva_sim.worlds.hazards import Surroundings
 from dva_sim.worlds.hazards.making import KINDS
 
 LARGEST = 2**31  # of one record [B]; what claims to be larger is damaged
-OTHER_FILE = "is not a recording of dva-sim"
+CUT = "is damaged, or was cut short before anything of the run"
 
 
 @dataclass(frozen=True)
@@ -68,8 +68,24 @@ def read_recording(path: Path) -> Opened:
     try:
         return _opened(raw)
     except (KeyError, TypeError, ValueError, pydantic.ValidationError) as error:
-        problem = f"was made by dva-sim {raw.about.get('version', '?')} and cannot be read: "
+        problem = f"was made by dva-sim {(raw.about or {}).get('version')} and cannot be read: "
         raise ConfigError(problem + " ".join(str(error).split())[:200], path) from None
+
+
+class _Exactly:
+    """A file that gives as many bytes as are asked for, or says that it ends early."""
+
+    def __init__(self, file: IO[bytes]) -> None:
+        self._file = file
+
+    def read(self, length: int) -> bytes:
+        """The next bytes."""
+        from mcap.exceptions import EndOfFile
+
+        data = self._file.read(length)
+        if len(data) < length:
+            raise EndOfFile
+        return data
 
 
 class _Damaged(Exception):
@@ -81,7 +97,7 @@ class _Raw:
     """What a file holds, sorted a little.
 
     Attributes:
-        about: Its metadata.
+        about: Its metadata, if they are ours.
         files: What is attached, by name.
         said: Content of the messages, with their time [s], by topic.
         ends: Source and destination of the channels of XML, by topic.
@@ -89,7 +105,7 @@ class _Raw:
         is_cut: Whether the end of the file is missing.
     """
 
-    about: dict[str, str] = field(default_factory=dict)
+    about: dict[str, str] | None = None
     files: dict[str, bytes] = field(default_factory=dict)
     said: dict[str, list[tuple[float, Any]]] = field(default_factory=lambda: defaultdict(list))
     ends: dict[str, dict[str, str]] = field(default_factory=dict)
@@ -108,21 +124,20 @@ class _Raw:
         from zstandard import ZstdError
 
         channels: dict[int, Channel] = {}
-        reader = StreamReader(file, validate_crcs=True, record_size_limit=LARGEST)
+        source: Any = _Exactly(file)
+        reader = StreamReader(source, validate_crcs=True, record_size_limit=LARGEST)
         try:
             for record in reader.records:
                 self._take(record, channels)
         except EndOfFile:
             self.is_cut = True
         except InvalidMagic:
-            raise _Damaged(
-                f"{OTHER_FILE}: it does not begin and end as an MCAP file does"
-            ) from None
+            where = "end" if self.files else "begin"
+            raise _Damaged(f"is not a recording: it does not {where} as MCAP does") from None
         except (McapError, ZstdError, ValueError, KeyError, struct.error, MemoryError) as error:
             raise _Damaged(f"is damaged: {' '.join(str(error).split())[:200]}") from None
-        if RUN not in self.files or ABOUT not in self.about:
-            cut = "it was cut short before anything of the run" if self.is_cut else OTHER_FILE
-            raise _Damaged(cut)
+        if self.about is None or digest(self.files) != self.about[DIGEST]:
+            raise _Damaged(CUT if self.is_cut else "is damaged: something is missing or changed")
 
     def _take(self, record: Any, channels: dict[int, Any]) -> None:
         from mcap.records import Attachment, Channel, Metadata
@@ -141,7 +156,7 @@ class _Raw:
         elif isinstance(record, Attachment):
             self.files[record.name] = record.data
         elif isinstance(record, Metadata) and record.name == ABOUT:
-            self.about = {**record.metadata, ABOUT: record.name}
+            self.about = dict(record.metadata)
 
 
 # --- from what was said to what can be shown -------------------------------------------
@@ -168,9 +183,8 @@ def _opened(raw: _Raw) -> Opened:
         duration=raw.time if raw.is_cut else run["duration_s"],
         contained=contained,
     )
-    about = {key: value for key, value in raw.about.items() if key != ABOUT}
     tables = _tables(raw.files[TABLES]) if TABLES in raw.files else None
-    return Opened(playback, about, tables, run["duration_s"])
+    return Opened(playback, raw.about or {}, tables, run["duration_s"])
 
 
 def _tables(data: bytes) -> dict[str, list[dict[str, Any]]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 import json
 import math
 import os
@@ -20,7 +21,7 @@ from dva_sim.simulation import Playback
 from dva_sim.simulation.run import FILM_PERIOD
 
 FORMAT = 1  # of what is attached; a reader refuses a later one
-ABOUT = "dva-sim"  # name of the metadata
+ABOUT, DIGEST = "dva-sim", "digest"  # name of the metadata, and of one entry of it
 RUN, SCENARIO, TABLES, SITE = "run.json", "scenario.json", "tables.json", "site/"
 CHUNK = 256 * 1024  # what a file that was cut short loses at most, unpacked [B]
 
@@ -95,13 +96,13 @@ def _write(playback: Playback, file: IO[bytes], tables: Tables | None, about: An
 
     writer: Any = Writer(file, chunk_size=CHUNK, enable_data_crcs=True)
     writer.start(profile="", library=f"dva-sim {__version__}")
-    writer.add_metadata(ABOUT, _about(playback) | about)
     files = sites.pack(playback.site)
     attached = {SCENARIO: _json(playback.scenario.model_dump(mode="json"))}
     attached[RUN] = _json(facts(playback))
     attached |= {} if tables is None else {TABLES: _json(_plain(tables))}
     attached |= {SITE + name: data for name, data in files.items()}
     # What stands here at the beginning is there even if the end of the file is not.
+    writer.add_metadata(ABOUT, _about(playback) | about | {DIGEST: digest(attached)})
     for name, data in attached.items():
         writer.add_attachment(0, 0, name, _media_type(name), data)
     _add_messages(writer, playback, files)
@@ -172,6 +173,14 @@ class _Channels:
 
 
 # --- what goes with it -----------------------------------------------------------------
+
+
+def digest(files: Mapping[str, bytes]) -> str:
+    """Of all that goes with the messages, by which damage is found."""
+    whole = hashlib.sha256()
+    for name, data in files.items():
+        whole.update(f"{name}:{len(data)}:".encode() + data)
+    return whole.hexdigest()
 
 
 def facts(playback: Playback) -> dict[str, Any]:

@@ -1,0 +1,17 @@
+"""Recordings of the short runs, written once."""
+
+from pathlib import Path
+
+import pytest
+from recordings.runs import drill, drive, evacuation
+
+from dva_sim.experiments.models import tables_of
+from dva_sim.recordings import write_recording
+
+
+@pytest.fixture(scope="session")
+def folder(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("recordings")
+    for run in (drive, drill, evacuation):
+        write_recording(run(), folder / f"{run.__name__}.mcap", tables=tables_of(run()))
+    return folder

@@ -1,0 +1,47 @@
+"""A recording as others read it: the TypeScript implementation of MCAP, where it is installed.
+
+`npm install @mcap/core fzstd` in a folder, and NODE_PATH at its `node_modules`.
+"""
+
+import json
+import shutil
+import subprocess
+
+import pytest
+from mcap.reader import make_reader
+
+READ = """
+const core = require("@mcap/core"), fzstd = require("fzstd"), fs = require("fs");
+const bytes = fs.readFileSync(process.argv[1]), counts = {}, attached = [];
+const readable = {
+  size: async () => BigInt(bytes.length),
+  read: async (at, n) => new Uint8Array(bytes.subarray(Number(at), Number(at + n))),
+};
+const zstd = (data, size) => fzstd.decompress(data, new Uint8Array(Number(size)));
+(async () => {
+  const handlers = { decompressHandlers: { zstd } };
+  const reader = await core.McapIndexedReader.Initialize({ readable, ...handlers });
+  for await (const message of reader.readMessages()) {
+    const topic = reader.channelsById.get(message.channelId).topic;
+    counts[topic] = (counts[topic] || 0) + 1;
+  }
+  for await (const each of reader.readAttachments()) attached.push(each.name);
+  console.log(JSON.stringify({ counts, attached }));
+})();
+"""
+
+
+def test_another_implementation_counts_the_same_messages(folder):
+    node = shutil.which("node")
+    known = node and subprocess.run(
+        [node, "-e", 'require("@mcap/core"); require("fzstd")'], capture_output=True, check=False
+    )
+    if not known or known.returncode:
+        pytest.skip("node with @mcap/core and fzstd is not installed")
+    command = [node, "-e", READ, str(folder / "drill.mcap")]
+    told = json.loads(subprocess.run(command, capture_output=True, check=True).stdout)
+    with (folder / "drill.mcap").open("rb") as file:
+        summary = make_reader(file).get_summary()
+        assert told["attached"] == [a.name for a in make_reader(file).iter_attachments()]
+    counts = summary.statistics.channel_message_counts
+    assert told["counts"] == {summary.channels[n].topic: count for n, count in counts.items()}
