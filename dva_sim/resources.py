@@ -33,6 +33,11 @@ def available(folder: str, pattern: str = "*.yaml") -> dict[str, Path]:
     return names
 
 
+def is_there(name: str, folder: str) -> bool:
+    """Whether there is a file of that name, without reading whole folders."""
+    return any((root / folder / f"{name}.yaml").is_file() for root in roots())
+
+
 def find(name: str, folder: str, suffix: str = ".yaml", base: Path | None = None) -> Path:
     """The file that `name` means: a path (also relative to `base`), or a name in `folder`.
 

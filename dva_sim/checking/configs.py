@@ -150,8 +150,8 @@ def _check_study(document: Document) -> Iterator[ConfigError]:
     """The study, its scenarios in every cell, and one run of each built as by the runner."""
     study = load_study(document.file)
     versions = [study, *([load_study(document.file, full=True)] if study.full else [])]
-    cells = {cell.config: cell for version in versions for cell in design.cells(version)}
-    for cell in cells.values():
+    cells = [design.to_rehearse(version, design.cells(version)) for version in versions]
+    for cell in {cell.config: cell for some in cells for cell in some}.values():
         try:
             model_for(cell.scenario).rehearse(cell.scenario, study.seed)
         except ConfigError as error:

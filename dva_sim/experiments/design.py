@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
 import itertools
-import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +13,7 @@ from dva_sim.config import Document, Path_
 from dva_sim.errors import ConfigError
 from dva_sim.experiments import designs
 from dva_sim.experiments.asking import POINT, REPEATS, TUNED, TUNING, Level, Part
+from dva_sim.experiments.identity import stable_hash
 from dva_sim.experiments.models import AnyScenario, model_for, model_of
 from dva_sim.experiments.repeats import (
     PARAMETERS,
@@ -164,41 +163,12 @@ def jobs(study: Study, grid: Sequence[Cell] | None = None) -> list[Job]:
     return [job for name, part_cells in parts for job in _jobs_of(study, name, part_cells)]
 
 
-def stable_hash(data: Any) -> str:
-    """64 bits that depend on the data alone, not on the machine or the order of keys."""
-    return digest(data)[:16]
-
-
-def digest(data: Any) -> str:
-    """All 256 bits of the same."""
-    text = json.dumps(data, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
-    return hashlib.sha256(text.encode()).hexdigest()
-
-
-def inputs(cells: Iterable[Cell]) -> dict[str, str]:
-    """Files that scenarios name by path (maps, traces), with the hash of their contents."""
-    dumps = (cell.scenario.model_dump(mode="json") for cell in cells)
-    names = sorted({text for dump in dumps for text in _texts(dump) if "." in text})
-    short = [name for name in names if "\n" not in name and len(name) < 1000]
-    paths = [(name, Path(_file_of(name))) for name in short]
-    return {
-        name: hashlib.sha256(path.read_bytes()).hexdigest()[:16]
-        for name, path in paths
-        if path.is_file()
-    }
-
-
-def _file_of(name: str) -> str:
-    """The file of a policy that is named as `file.py:Class`; other names are files as they are."""
-    return name.rpartition(":")[0] if ".py:" in name else name
-
-
-def _texts(data: Any) -> Iterator[str]:
-    if isinstance(data, str):
-        yield data
-    elif isinstance(data, Mapping | list):
-        for value in data.values() if isinstance(data, Mapping) else data:
-            yield from _texts(value)
+def to_rehearse(study: Study, every: Iterable[Cell]) -> list[Cell]:
+    """The cells in which a mistake would show: of points in ranges, the outermost of each."""
+    if POINT not in study.factors:
+        return list(every)
+    outermost = {row[POINT] for row in designs.outermost(study)}
+    return [c for c in every if not c.levels or dict(c.levels).get(POINT) in outermost]
 
 
 def _cells_of(study: Study, name: str) -> Iterator[Cell]:

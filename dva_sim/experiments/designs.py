@@ -10,6 +10,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from operator import itemgetter
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, field_validator, model_validator
@@ -191,6 +192,13 @@ def rows_of(study: Study) -> list[Row]:
     else:
         rows = study.listed_rows
     return [{POINT: i, **row} for i, row in enumerate(rows)] if POINT in study.factors else rows
+
+
+def outermost(study: Study) -> list[Row]:
+    """Of the points in ranges, those with the least or the greatest value of some factor."""
+    rows, ranges = rows_of(study), study.design.ranges if study.design is not None else {}
+    ends = [end(rows, key=itemgetter(key)) for key in ranges for end in (min, max)]
+    return ends or rows
 
 
 def together(study: Study) -> set[str]:

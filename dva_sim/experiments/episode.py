@@ -22,5 +22,5 @@ def rehearse_all(study: Study) -> None:
         ConfigError: what cannot be read, placed or recorded.
     """
     refuse_what_cannot_be_recorded(study)
-    for cell in design.cells(study):
+    for cell in design.to_rehearse(study, design.cells(study)):
         model_for(cell.scenario).rehearse(cell.scenario, study.seed)

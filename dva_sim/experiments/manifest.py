@@ -16,6 +16,7 @@ from dva_sim.errors import DvaSimError
 from dva_sim.experiments import design
 from dva_sim.experiments.design import Cell, Job
 from dva_sim.experiments.fingerprint import fingerprint
+from dva_sim.experiments.identity import inputs, stable_hash
 from dva_sim.experiments.journal import Journal
 from dva_sim.experiments.provenance import program_state
 from dva_sim.experiments.repeats import parameter_sets
@@ -41,7 +42,7 @@ def manifest_of(study: Study, cells: Sequence[Cell], todo: Sequence[Job]) -> dic
         },
         "set": list(study.settings),
         "changes": dict(study.changes),
-        "inputs": design.inputs(cells),
+        "inputs": inputs(cell.scenario for cell in cells),
         "cells": [_cell_row(cell) for cell in cells],
         "parameter_sets": parameter_sets(study),
         "tuned": load_tuned(study).model_dump(mode="json") if tuned else None,
@@ -55,7 +56,7 @@ def manifest_of(study: Study, cells: Sequence[Cell], todo: Sequence[Job]) -> dic
         },
         "versions": {"dva-sim": __version__, "fingerprint": fingerprint()},
     }
-    identity = design.stable_hash(content)
+    identity = stable_hash(content)
     content["versions"] = versions()
     return content | {"hash": identity}
 

@@ -17,6 +17,7 @@ from dva_sim.errors import ConfigError, DvaSimError
 from dva_sim.experiments import design
 from dva_sim.experiments.asking import POINT
 from dva_sim.experiments.fingerprint import fingerprint
+from dva_sim.experiments.identity import digest, inputs, stable_hash
 from dva_sim.experiments.status import Status
 from dva_sim.experiments.study import Study
 from dva_sim.resources import REGISTRATION
@@ -49,7 +50,7 @@ class Registration(Config):
     @property
     def proper_hash(self) -> str:
         """The hash of what it says."""
-        return design.digest(self.model_dump(mode="json", exclude={"hash"}))
+        return digest(self.model_dump(mode="json", exclude={"hash"}))
 
     @property
     def seed(self) -> int:
@@ -111,16 +112,19 @@ def plan_of(study: Study) -> dict[str, Any]:
     """All that fixes a confirmatory run, but for its seed, as JSON would hold it."""
     nobody = study.model_copy(update={"seed": _ANY_SEED})
     cells = design.cells(nobody)
-    files = {name: f"{Path(name).name} {content}" for name, content in design.inputs(cells).items()}
+    files = {
+        name: f"{Path(name).name} {content}"
+        for name, content in inputs(cell.scenario for cell in cells).items()
+    }
     asked = {key: value for key, value in nobody.asked().items() if key not in _OPEN}
     asked["factors"] = {f: levels for f, levels in asked["factors"].items() if f != POINT}
     if study.listed_rows:
-        asked["design"]["rows"] = design.stable_hash(study.listed_rows)
+        asked["design"]["rows"] = stable_hash(study.listed_rows)
     resolved = {
         "scenarios": {
             part: _hash_of(design.base_scenario(nobody, part), files) for part in study.parts
         },
-        "cells": design.stable_hash([_hash_of(cell.scenario, files) for cell in cells]),
+        "cells": stable_hash([_hash_of(cell.scenario, files) for cell in cells]),
         "inputs": sorted(files.values()),
     }
     plan: dict[str, Any] = json.loads(json.dumps(asked | resolved))
@@ -193,7 +197,7 @@ def _refuse_what_is_open(study: Study) -> None:
 
 def _hash_of(scenario: Config, files: Mapping[str, str]) -> str:
     """Files count by name and content, wherever they lie."""
-    return design.stable_hash(_portable(scenario.model_dump(mode="json"), files))
+    return stable_hash(_portable(scenario.model_dump(mode="json"), files))
 
 
 def _portable(data: Any, files: Mapping[str, str]) -> Any:

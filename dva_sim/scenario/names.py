@@ -39,18 +39,17 @@ def locate_files(data: dict[str, Any], folders: Sequence[Path]) -> None:
 
 def check_names(scenario: Scenario, error: Fail) -> None:
     """Refuse a profile, strategy or policy that does not exist, before anything runs."""
-    people, robots = resources.available("agents/people"), scenario.robot.profile
-    choices: dict[Path_, tuple[str | tuple[str, ...], Mapping[str, object]]] = {
-        ("phone", "profile"): (scenario.phone.profile, resources.available("agents/phones")),
-        ("robot", "profile"): (robots, resources.available("agents/robots")),
-        ("guard", "profile"): (scenario.guard.profile, people),
-        ("bystander", "profile"): (scenario.bystander.profile, people),
-        ("operator", "population"): (scenario.operator.population, people),
+    choices: dict[Path_, tuple[str | tuple[str, ...], str]] = {
+        ("phone", "profile"): (scenario.phone.profile, "agents/phones"),
+        ("robot", "profile"): (scenario.robot.profile, "agents/robots"),
+        ("guard", "profile"): (scenario.guard.profile, "agents/people"),
+        ("bystander", "profile"): (scenario.bystander.profile, "agents/people"),
+        ("operator", "population"): (scenario.operator.population, "agents/people"),
     }
-    for path, (given, known) in choices.items():
+    for path, (given, folder) in choices.items():
         for name in (given,) if isinstance(given, str) else given:
-            if name not in known and not Path(name).is_file():
-                key = ".".join(str(p) for p in path)
+            if not resources.is_there(name, folder) and not Path(name).is_file():
+                key, known = ".".join(str(p) for p in path), resources.available(folder)
                 raise error(f"{key} {name!r} is unknown; known: {', '.join(sorted(known))}", path)
     check_strategy(scenario.operator.strategy, scenario.operator.options, error)
     check_policy(scenario.dispatch.policy, scenario.dispatch.options, error)

@@ -4,6 +4,7 @@ from collections import defaultdict
 from small_study import REPEATED, RUNS, STUDY, study_in
 
 from dva_sim.experiments import design
+from dva_sim.experiments.identity import inputs
 
 
 def test_every_person_drives_every_trial_in_every_cell_and_once_in_the_reference(tmp_path):
@@ -74,14 +75,18 @@ def test_a_study_without_factors_has_one_cell(tmp_path):
     assert [(job.index, job.cell) for job in jobs] == [(0, ())] * 6
 
 
+def inputs_of(study):
+    return inputs(cell.scenario for cell in design.cells(study))
+
+
 def test_files_that_a_scenario_names_are_known_by_their_contents(tmp_path):
     trace = tmp_path / "cell.up"
     study = study_in(tmp_path, f"link.trace_up={trace}")
-    assert design.inputs(design.cells(study)) == {}
+    assert inputs_of(study) == {}
     found = []
     for text in ("1\n2\n", "1\n3\n"):
         trace.write_text(text)
-        found.append(design.inputs(design.cells(study))[str(trace)])
+        found.append(inputs_of(study)[str(trace)])
     assert found[0] != found[1]
 
 
