@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from dva_sim.experiments.statistics.persons import (
     LEVEL,
-    RESAMPLES,
     Floats,
     Interval,
-    draws,
     paired_means,
 )
-from dva_sim.experiments.statistics.resampling import bca
+from dva_sim.experiments.statistics.resampling import studentised_interval
 from dva_sim.experiments.statistics.shares import share_interval
+
+RESAMPLES = 1000  # each takes as many jackknife steps as there are persons
+
+_Scale = Callable[[Floats, Floats, Floats], Floats]
 
 
 @dataclass(frozen=True)
@@ -66,33 +70,34 @@ def effect_size(
     if n < 3:
         nothing = Interval(math.nan, math.nan, math.nan, n)
         return EffectSize(nothing, nothing, superiority)
-    whole = _weighted(first, second, np.ones((1, n)))
-    drawn = _weighted(first, second, draws(n, seed, resamples))
-    left_out = _weighted(first, second, 1 - np.eye(n))
     paired, average = (
-        Interval(float(whole[i, 0]), *bca(float(whole[i, 0]), drawn[i], left_out[i], level), n)
-        for i in range(2)
+        studentised_interval(partial(_size, first, second, scale), n, level, seed, resamples)
+        for scale in (_of_differences, _of_persons)
     )
     return EffectSize(paired, average, superiority)
 
 
-def _weighted(first: Floats, second: Floats, weights: Floats) -> Floats:
-    """`d_z` and `d_av` `(2, b)` of persons weighted `(b, n)`; nan without spread."""
-    total = weights.sum(axis=1)
-    mean = weights @ (first - second) / total
-    v = _variance(first, weights), _variance(second, weights)
-    own, average = np.sqrt(_variance(first - second, weights)), (np.sqrt(v[0]) + np.sqrt(v[1])) / 2
-    correction = _hedges(len(first))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        sizes = correction * mean / np.array([own, average])
-    return np.where(np.isfinite(sizes), sizes, np.nan)
+def _size(first: Floats, second: Floats, scale: _Scale, weights: Floats) -> Floats:
+    """Mean difference `(b,)` of persons weighted `(b, n)`, on a scale; nan without spread."""
+    mean = weights @ (first - second) / weights.sum(axis=1)
+    spread = scale(first, second, weights)
+    size = _hedges(len(first)) * mean / np.where(spread > 0, spread, 1)
+    return np.where(spread > 0, size, np.nan)
+
+
+def _of_differences(first: Floats, second: Floats, weights: Floats) -> Floats:
+    return np.sqrt(_variance(first - second, weights))
+
+
+def _of_persons(first: Floats, second: Floats, weights: Floats) -> Floats:
+    return (np.sqrt(_variance(first, weights)) + np.sqrt(_variance(second, weights))) / 2
 
 
 def _variance(values: Floats, weights: Floats) -> Floats:
     off, total = values - values.mean(), weights.sum(axis=1)
     mean = weights @ off / total
     square = weights @ off**2 / total - mean**2
-    return np.asarray(np.maximum(square, 0) * total / (total - 1))
+    return np.asarray(np.maximum(square, 0) * total / np.maximum(total - 1, 1))
 
 
 def _hedges(n: int) -> float:

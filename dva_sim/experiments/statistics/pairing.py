@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,13 +11,16 @@ from numpy.typing import ArrayLike
 
 from dva_sim.experiments.statistics.persons import (
     LEVEL,
-    RESAMPLES,
     Floats,
     Interval,
-    draws,
     paired_means,
 )
-from dva_sim.experiments.statistics.resampling import bca
+from dva_sim.experiments.statistics.resampling import studentised_interval
+
+Moments = tuple[Floats, Floats, Floats]
+
+RESAMPLES = 1000  # each takes as many jackknife steps as there are persons
+_ONE = 1 - 1e-12  # a perfect correlation, on Fisher's scale still finite
 
 _FEWEST = 3  # persons; of two, any are perfectly correlated
 
@@ -70,28 +74,58 @@ def variance_reduction(
         level: Confidence level.
         seed: Of the resampling.
         resamples: How many times persons are drawn.
+
+    References:
+        Fisher, Metron 1 (1921) 3-32 (the scale of correlations).
     """
     first, second = paired_means(a, b, person)
     n = len(first)
     if n < _FEWEST or np.ptp(first) == 0 or np.ptp(second) == 0:
         nothing = Interval(math.nan, math.nan, math.nan, n)
         return VarianceReduction(nothing, nothing)
-    whole = _weighted(first, second, np.ones((1, n)))
-    drawn = _weighted(first, second, draws(n, seed, resamples))
-    left_out = _weighted(first, second, 1 - np.eye(n))
-    correlation, ratio = (
-        Interval(float(whole[i, 0]), *bca(float(whole[i, 0]), drawn[i], left_out[i], level), n)
-        for i in range(2)
-    )
+    correlation = _on_fishers_scale(_correlation, first, second, level, seed, resamples)
+    shared = _on_fishers_scale(_shared, first, second, level, seed, resamples)
+    ratio = Interval(1 - shared.mean, 1 - shared.high, 1 - shared.low, n)
     return VarianceReduction(correlation, ratio)
 
 
-def _weighted(first: Floats, second: Floats, weights: Floats) -> Floats:
-    """Correlation and ratio of variances `(2, b)` of persons weighted `(b, n)`."""
+def _on_fishers_scale(
+    statistic: Callable[[Moments], Floats],
+    first: Floats,
+    second: Floats,
+    level: float,
+    seed: int,
+    resamples: int,
+) -> Interval:
+    """The interval of a correlation, made where it has no bounds and is spread evenly."""
+
+    def unbounded(weights: Floats) -> Floats:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.arctanh(np.clip(statistic(_moments(first, second, weights)), -_ONE, _ONE))
+
+    found = studentised_interval(unbounded, len(first), level, seed, resamples)
+    low, mean, high = np.tanh([found.low, found.mean, found.high]).tolist()
+    return Interval(mean, low, high, found.n_persons)
+
+
+def _correlation(moments: Moments) -> Floats:
+    first, second, joint = moments
+    return np.asarray(joint / np.sqrt(first * second))
+
+
+def _shared(moments: Moments) -> Floats:
+    """Share of the sum of variances that goes by pairing."""
+    first, second, joint = moments
+    return np.asarray(2 * joint / (first + second))
+
+
+def _moments(first: Floats, second: Floats, weights: Floats) -> Moments:
+    """Variances and covariance `(b,)` of persons weighted `(b, n)`."""
     one, two = first - first.mean(), second - second.mean()
     total = weights.sum(axis=1)
-    m1, m2 = weights @ one / total, weights @ two / total
-    v1, v2 = weights @ one**2 / total - m1**2, weights @ two**2 / total - m2**2
-    joint = weights @ (one * two) / total - m1 * m2
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.array([joint / np.sqrt(v1 * v2), 1 - 2 * joint / (v1 + v2)])
+    means = weights @ one / total, weights @ two / total
+    return (
+        np.maximum(weights @ one**2 / total - means[0] ** 2, 0),
+        np.maximum(weights @ two**2 / total - means[1] ** 2, 0),
+        weights @ (one * two) / total - means[0] * means[1],
+    )

@@ -8,7 +8,15 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dva_sim.experiments.statistics.persons import LEVEL, RESAMPLES, Floats, Interval, draws
+from dva_sim.experiments.statistics.persons import (
+    LEVEL,
+    RESAMPLES,
+    Floats,
+    Interval,
+    draws,
+    students_t,
+)
+from dva_sim.experiments.statistics.studentised import LEAST_ERROR, reach
 
 _EDGE = 1e-4  # nearest to 0 and 1 that a share of draws is taken for
 
@@ -24,7 +32,7 @@ def bootstrap_interval(
     """The cluster bootstrap: bias-corrected and accelerated, over persons.
 
     For statistics without an interval of their own here; means, shares and quantiles have
-    better ones. It is too narrow with few persons: a mean of 24 is covered in 93 %.
+    better ones.
 
     Args:
         values: One row per run, `(n,)` or `(n, columns)`; runs with a nan are left out.
@@ -50,7 +58,7 @@ def bootstrap_interval(
     counts = draws(len(own), seed, resamples).astype(int)
     drawn = np.array([statistic(_together(own, count)) for count in counts])
     left_out = [statistic(_together(own, count)) for count in 1 - np.eye(len(own), dtype=int)]
-    low, high = bca(estimate, drawn, np.array(left_out), level)
+    low, high = _bca(estimate, drawn, np.array(left_out), level)
     return Interval(estimate, low, high, len(own))
 
 
@@ -59,7 +67,7 @@ def _together(own: list[Floats], counts: NDArray[np.int_]) -> Floats:
     return np.concatenate([rows for rows, n in zip(own, counts, strict=True) for _ in range(n)])
 
 
-def bca(estimate: float, drawn: Floats, left_out: Floats, level: float) -> tuple[float, float]:
+def _bca(estimate: float, drawn: Floats, left_out: Floats, level: float) -> tuple[float, float]:
     """Ends of the bias-corrected and accelerated interval; nan draws are left out.
 
     Args:
@@ -78,6 +86,68 @@ def bca(estimate: float, drawn: Floats, left_out: Floats, level: float) -> tuple
     off = np.nanmean(left_out) - left_out[np.isfinite(left_out)]
     spread = float((off**2).sum()) ** 1.5
     lean = float((off**3).sum()) / (6 * spread) if spread > 0 else 0.0
-    z = bias + special.ndtri([(1 - level) / 2, (1 + level) / 2])
+    z = bias + special.ndtri(tails(level, len(left_out)))
     low, high = np.quantile(drawn, special.ndtr(bias + z / (1 - lean * z)))
     return float(low), float(high)
+
+
+def tails(level: float, persons: int) -> list[float]:
+    """Shares of draws beyond either end, wide enough for so few persons.
+
+    Persons drawn anew differ less than persons, by the factor that divides their variance by
+    one less than their number; and the spread itself is uncertain, as in Student's law.
+
+    References:
+        Hesterberg, The American Statistician 69 (2015) 371-386 (expanded percentiles).
+    """
+    from scipy import special
+
+    z = students_t(level, persons) * math.sqrt(persons / (persons - 1))
+    return [float(special.ndtr(-z)), float(special.ndtr(z))]
+
+
+def studentised_interval(
+    estimator: Callable[[Floats], Floats],
+    persons: int,
+    level: float,
+    seed: int,
+    resamples: int,
+) -> Interval:
+    """The bootstrap-t of a smooth statistic, with the jackknife for its standard error.
+
+    Args:
+        estimator: The statistic `(b,)` of persons weighted `(b, persons)`, on a scale without
+            bounds.
+        persons: How many there are, at least 3.
+        level: Confidence level.
+        seed: Of the resampling.
+        resamples: How many times persons are drawn.
+
+    References:
+        Efron & Tibshirani, An Introduction to the Bootstrap (1993), chapters 11 and 12.
+    """
+    everybody = np.ones((1, persons))
+    estimate, error = estimator(everybody)[0], _jackknife(estimator, everybody)[0]
+    if not error > 0:
+        same = 0.0 if error == 0 else math.nan
+        return Interval(float(estimate), float(estimate - same), float(estimate + same), persons)
+    weights = draws(persons, seed, resamples)
+    errors = np.maximum(_jackknife(estimator, weights), LEAST_ERROR * error)
+    ratio = (estimator(weights) - estimate) / errors
+    ratio = ratio[np.isfinite(ratio), np.newaxis]
+    (down,), (up,) = reach(ratio, np.array([persons]), level)
+    low, high = estimate - down * error, estimate + up * error
+    return Interval(float(estimate), float(low), float(high), persons)
+
+
+def _jackknife(estimator: Callable[[Floats], Floats], weights: Floats) -> Floats:
+    """Standard errors `(b,)` by leaving out each person of each draw `(b, n)` once."""
+    count = weights.shape[1]
+    fewer = np.maximum(weights[:, np.newaxis, :] - np.eye(count), 0)
+    left_out = estimator(fewer.reshape(-1, count)).reshape(len(weights), count)
+    there = (weights > 0) & np.isfinite(left_out)
+    left_out, weights = np.where(there, left_out, 0.0), np.where(there, weights, 0.0)
+    total = weights.sum(axis=1, keepdims=True)
+    centre = (weights * left_out).sum(axis=1, keepdims=True) / np.maximum(total, 1)
+    square = (weights * (left_out - centre) ** 2).sum(axis=1)
+    return np.asarray(np.where(total[:, 0] > 1, np.sqrt((count - 1) / count * square), np.nan))

@@ -15,6 +15,7 @@ from dva_sim.experiments.statistics.persons import (
     draws,
     students_t,
 )
+from dva_sim.experiments.statistics.resampling import tails
 
 
 def quantile_interval(
@@ -26,6 +27,10 @@ def quantile_interval(
     resamples: int = RESAMPLES,
 ) -> Interval:
     """A quantile of all runs, with the percentile interval of drawing persons anew.
+
+    The 95 % interval of a median over 24 persons with 5 trials covers in 95 %. High quantiles
+    are beyond so few persons: that of the 95th percentile covers in 93 % where persons hardly
+    differ, but in 76 % where the trials of each are much alike.
 
     Args:
         values: One value per run `(n,)`, nan where missing.
@@ -47,7 +52,7 @@ def quantile_interval(
         return Interval(estimate, math.nan, math.nan, 1)
     weights = draws(len(persons), seed, resamples)[:, owner]
     drawn = _weighted_quantiles(ranked, weights, q)
-    low, high = np.quantile(drawn, [(1 - level) / 2, (1 + level) / 2])
+    low, high = np.quantile(drawn, tails(level, len(persons)))
     return Interval(estimate, float(low), float(high), len(persons))
 
 

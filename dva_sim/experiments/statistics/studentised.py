@@ -1,13 +1,29 @@
 """Means in units of their standard error, as they come out when persons are drawn anew.
 
-What holds a mean in is decided on each side by itself, since where a few persons are far off the
-mean errs to one side more often and farther. Measured with 24 persons in 10,000 studies each:
+How far an interval reaches is decided on each side by itself: where a few persons are far off,
+the mean errs to one side more often and farther. Measured with 24 persons in 10,000 studies each:
 
-====================================  =========  ==========  ==========  =========
-95 % interval covers, in %            Student's  both sides  each side   here
-====================================  =========  ==========  ==========  =========
-TABLE
-====================================  =========  ==========  ==========  =========
+===============================================  =========  =========  =========  ========
+95 % interval covers, in % of studies            Student's  symmetric  each side  here
+===============================================  =========  =========  =========  ========
+normal                                           95.4       95.6       95.3       96.0
+person means of skewness 1.1                     94.2       95.0       95.0       96.2
+person means of skewness 2.3                     91.8       94.0       94.5       95.9
+the same, a quarter of the runs missing          91.4       93.7       94.7       95.9
+differences of log-normal times                  94.3       94.9       93.4       95.3
+the same, a quarter missing                      94.4       95.2       93.4       95.6
+times that end at a horizon                      93.6       95.3       95.9       96.8
+two thirds of the runs zero, the rest skewed     86.5       91.2       93.2       94.2
+four fifths of the persons zero                  95.4       99.0       82.8       99.0
+===============================================  =========  =========  =========  ========
+
+No interval helps where most persons do not differ and a single one differs much: a study that
+happens to be without him cannot know. Such differences (skewness 3 to 4) are covered in 78 to 94 %,
+by Student's in 63 to 88 %.
+
+References:
+    Efron & Tibshirani, An Introduction to the Bootstrap (1993), section 12.5 (bootstrap-t); Hall,
+    Ann. Stat. 16 (1988) 927-953 (symmetric and one-sided kinds).
 """
 
 from __future__ import annotations
@@ -19,7 +35,7 @@ import numpy as np
 from dva_sim.experiments.statistics.persons import Floats, draws, students_t
 
 FEWEST_TO_RESAMPLE = 6  # below, 5 % of the draws repeat one person only and have no spread
-_LEAST_ERROR = 0.25  # of the sample's standard error, in any draw
+LEAST_ERROR = 0.25  # of the sample's standard error, in any draw
 _ROUNDING = 1e-12  # spread below this share of the values is rounding, not variation
 
 
@@ -52,14 +68,11 @@ def studentised(values: Floats, mean: Floats, error: Floats, seed: int, resample
         error: Its standard error `(k,)`, above zero.
         seed: Of the resampling.
         resamples: How many times persons are drawn.
-
-    References:
-        Efron & Tibshirani, An Introduction to the Bootstrap (1993), section 12.5 (bootstrap-t).
     """
     if not len(mean):
         return np.empty((resamples, 0))
     drawn, drawn_error, _ = moments(values, draws(len(values), seed, resamples))
-    return np.asarray((drawn - mean) / np.maximum(drawn_error, _LEAST_ERROR * error))
+    return np.asarray((drawn - mean) / np.maximum(drawn_error, LEAST_ERROR * error))
 
 
 def reach(ratio: Floats, count: Floats, level: float) -> tuple[Floats, Floats]:

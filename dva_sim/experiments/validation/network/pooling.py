@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dva_sim.experiments.statistics import holm
 from dva_sim.experiments.validation.network.judging import reason_against
 from dva_sim.experiments.validation.network.samples import MEASURES, Cell, Measure
 from dva_sim.network.condition import Condition
@@ -128,13 +129,13 @@ def pool(judged: Sequence[Cell], rng: np.random.Generator) -> Pooled:
     null = null_scores(judged, rng)
     rms = np.sqrt((null**2).mean(axis=1)) if judged else np.zeros(1)
     low, high = np.percentile(rms, (2.5, 97.5))
-    alarms = [bool(holm(two_sided(row)).any()) for row in null]
+    alarms = [bool((holm(two_sided(row)) <= SIGNIFICANT).any()) for row in null]
     return _judged(scored, (float(low), float(high)), float(np.mean(alarms)))
 
 
 def _judged(scored: Sequence[Scored], expected: tuple[float, float], false_alarms: float) -> Pooled:
     """What scores come to."""
-    found = holm([s.p for s in scored])
+    found = holm([s.p for s in scored]) <= SIGNIFICANT
     offs = {m: [s.cell.off for s in scored if s.cell.measure == m] for m in MEASURES}
     return Pooled(
         tuple(scored),
@@ -219,20 +220,3 @@ def two_sided(z: Floats) -> Floats:
     from scipy.special import ndtr
 
     return np.asarray(2.0 * ndtr(-np.abs(z)))
-
-
-def holm(p: Sequence[float] | Floats) -> NDArray[np.bool_]:
-    """Which of several tests are significant together at 5 %.
-
-    References:
-        S. Holm, A simple sequentially rejective multiple test procedure, Scand. J. Stat. 6
-        (1979) 65-70.
-    """
-    values = np.asarray(p, dtype=float)
-    order = np.argsort(values, kind="stable")
-    limits = SIGNIFICANT / np.arange(len(values), 0, -1)
-    beyond = values[order] > limits
-    first = int(beyond.argmax()) if beyond.any() else len(values)
-    found = np.zeros(len(values), dtype=bool)
-    found[order[:first]] = True
-    return found

@@ -7,7 +7,6 @@ from dva_sim.experiments.validation.network import pooling
 from dva_sim.experiments.validation.network.kinds import Group
 from dva_sim.experiments.validation.network.measured import Run
 from dva_sim.experiments.validation.network.pooling import (
-    holm,
     is_steady,
     pool,
     score,
@@ -56,12 +55,6 @@ def test_a_model_that_is_a_little_off_everywhere_is_biased():
 
 def test_something_is_significant_in_about_one_of_twenty_right_comparisons():
     assert 0.01 < pool(cells(1.0, 3), RNG(0)).false_alarms < 0.15
-
-
-def test_holms_procedure_stops_at_the_first_that_is_not_significant():
-    """0.01 <= 0.05 / 4 and 0.015 <= 0.05 / 3, but 0.04 > 0.05 / 2."""
-    assert holm([0.04, 0.01, 0.015, 0.03]).tolist() == [False, True, True, False]
-    assert not holm([]).any()
 
 
 def test_where_runs_hardly_differ_means_are_not_pooled():
