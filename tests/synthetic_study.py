@@ -55,6 +55,7 @@ TUNED = {
     ],
 }
 Rows = list[dict[str, Any]]
+_CELLS = {cell: i for i, cell in enumerate(itertools.product(PATTERNS, DELAYS, PROFILES))}
 
 
 def manifest(persons: int, trials: int, **changes: Any) -> dict[str, Any]:
@@ -208,7 +209,7 @@ def write(folder: Path, tables: dict[str, Rows], facts: dict[str, Any]) -> Path:
 
 
 def _treatment(pattern: str, delay: float, profile: str) -> dict[str, Any]:
-    cell = f"{pattern}/{delay:g}/{profile}"
+    cell = _CELLS.get((pattern, delay, profile), -1)
     return {"cell": cell, "pattern": pattern, "link.delay_s": delay, "profile": profile}
 
 

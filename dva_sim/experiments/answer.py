@@ -67,6 +67,7 @@ class Finding:
         cluster: What the band rests on: persons, or shifts.
         widest: The greatest difference that is possible; a band of that size says nothing.
         all_confirmed: Whether no run of any cell was missed.
+        everywhere: Where a contrast holds that runs over nothing.
     """
 
     measure: str
@@ -87,6 +88,7 @@ class Finding:
     cluster: str = "person"
     widest: float = np.inf
     all_confirmed: bool = False
+    everywhere: str = "throughout"
 
     @property
     def unit(self) -> str:
@@ -283,7 +285,7 @@ def _is_ordered(f: Finding) -> bool:
 
 def _at(f: Finding, where: Sequence[int]) -> str:
     if not f.over:
-        return "throughout"
+        return f.everywhere
     if spoken := _spoken(f, where):
         return spoken
     names = listing([level_name(f.over, f.levels[i]) for i in where])
@@ -300,7 +302,7 @@ def _of(f: Finding) -> str:
 def _places(f: Finding, where: NDArray[np.intp]) -> str:
     """`from 250 ms on`, `up to 100 ms`, `at every delay`, or the levels one by one."""
     if not f.over:
-        return "throughout"
+        return f.everywhere
     names = [level_name(f.over, f.levels[int(i)]) for i in where]
     solid = len(where) > 1 and bool((np.diff(where) == 1).all()) and _is_ordered(f)
     if len(where) == len(f.levels) > 1:

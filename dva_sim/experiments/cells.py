@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from dva_sim.experiments.effects import Floats, Part, Setting, present
+from dva_sim.experiments.effects import Floats, Part, Setting, plain_level, present
 from dva_sim.experiments.labels import (
     factor_name,
     level_name,
@@ -80,7 +80,7 @@ def cell_table(
         support: Which cells are extrapolations.
         possible: Least and greatest value of the measure.
         is_listed: Whether the design names its cells, so that those without a run are none.
-        points: Continuous factors, whose values are shown for each cell.
+        points: Factors that are no axes, whose values are shown for each cell.
     """
     settings = list(part.settings())
     columns: list[_Column | None] = [_value(part, name) for name in points]
@@ -119,9 +119,9 @@ def _cell_name(setting: Setting) -> list[str]:
 
 
 def _value(part: Part, name: str) -> _Column:
-    """A continuous factor's value in each cell."""
-    values = [float(cell[0]) if len(cell) else np.nan for cell in _cells(part, name)]
-    return with_unit(name), [number(value) for value in values]
+    """What a factor that is no axis of the grid is set to in each cell."""
+    values = [plain_level(value) for value in part.first_of_cells(name)]
+    return with_unit(name), [f"{v:.3g}" if isinstance(v, float) else str(v) for v in values]
 
 
 def _counts(part: Part) -> _Column:

@@ -71,6 +71,16 @@ class Part:
     def __len__(self) -> int:
         return int(self._known.sum())
 
+    def first_of_cells(self, column: str) -> list[Any]:
+        """A column's value in the first run of each cell, in the order of `settings`."""
+        shape = [len(f.levels) for f in self.factors]
+        codes = tuple(i[self._known] for i in self._index[: len(shape)])
+        cells = np.ravel_multi_index(codes, shape) if shape else np.zeros(len(self), int)
+        known, first = np.unique(cells, return_index=True)
+        rows = dict(zip(known.tolist(), np.flatnonzero(self._known)[first].tolist(), strict=True))
+        values = self.treated[column]
+        return [values[rows[i]] if i in rows else None for i in range(math.prod(shape))]
+
     @cached_property
     def ran(self) -> NDArray[np.bool_]:
         """Whether each cell `(levels of factor 1, ...)` has a run at all."""
@@ -137,6 +147,7 @@ class View:
         outside: Whether each cell `(levels of factor 1, ...)` is an extrapolation, beyond the
             delays at which people were watched; None where nothing is known of that.
         possible: The least and the greatest value that the measure can take at all.
+        averages_points: Whether the trials are points in ranges, over which means are taken.
     """
 
     part: Part
@@ -148,6 +159,7 @@ class View:
     smallest_effect: float | None = None
     outside: NDArray[np.bool_] | None = None
     possible: tuple[float, float] = (-math.inf, math.inf)
+    averages_points: bool = False
 
     @property
     def lines(self) -> tuple[Level, ...]:
@@ -268,3 +280,9 @@ def codes_of(table: Table, factor: Factor) -> NDArray[np.intp]:
         else:
             codes[values.astype(str) == str(level)] = code
     return codes
+
+
+def plain_level(value: Any) -> Level:
+    """A level as it was declared: numpy's numbers as Python's."""
+    plain: Level = value.item() if isinstance(value, np.generic) else value
+    return plain

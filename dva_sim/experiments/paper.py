@@ -35,10 +35,11 @@ _KINDS: dict[Kind, Face] = {
     "warning": Face(9, "bold", colour="#8a3800"),
     "label": Face(9, "bold"),
 }
-_MONO = Face(6.5, family="DejaVu Sans Mono")
+_MONO = Face(5.5, family="DejaVu Sans Mono")
 _CELL, _HEAD = Face(7), Face(7, "bold", colour="#444444")
 _TIGHT, _TIGHT_HEAD = Face(6), Face(6, "bold", colour="#444444")
 _GAP = 9.0  # between columns [pt]
+_NAMES = 0.4  # of the width is what names of rows may take before they are broken
 _INDENT = 10.0  # of a list, and of the answer [pt]
 
 
@@ -122,13 +123,27 @@ def _figure(paper: Paper, block: Shown) -> None:
 
 
 def _verbatim(paper: Paper, block: Verbatim) -> None:
+    """Line by line, in two columns."""
     _heading(paper, Heading(block.title))
-    most = int(paper.width / width_of("m", _MONO))
-    for line in block.text.splitlines():
-        for start in range(0, max(1, len(line)), most):
-            paper.need(_MONO.leading)
-            paper.line(line[start : start + most], _MONO)
-            paper.y -= _MONO.leading
+    width = (paper.width - _GAP) / 2
+    most = int(width / width_of("m", _MONO))
+    lines = [
+        line[start : start + most]
+        for line in block.text.splitlines()
+        for start in range(0, max(1, len(line)), most)
+    ]
+    while lines:
+        rows = max(1, int(paper.room / _MONO.leading))
+        rows = min(rows, -(-len(lines) // 2))
+        top = paper.y
+        for column in range(2):
+            paper.y = top
+            for line in lines[column * rows : (column + 1) * rows]:
+                paper.line(line, _MONO, column * (width + _GAP))
+                paper.y -= _MONO.leading
+        paper.y = top - rows * _MONO.leading
+        lines = lines[2 * rows :]
+        paper.need(_MONO.leading)
 
 
 # --- tables ----------------------------------------------------------------------------------
@@ -141,10 +156,12 @@ def _table(paper: Paper, table: CellTable, is_words: bool) -> None:
     if not is_words and sum(widths) > paper.width:
         cell, head = _TIGHT, _TIGHT_HEAD
         widths = _widths(table, cell, head)
-    groups = [list(range(len(table.heads)))]
-    if is_words or sum(widths[: table.labels]) > paper.width / 2:
+    if is_words:
         widths = _squeezed(table, cell, head, widths, paper.width)
+        groups = [list(range(len(table.heads)))]
     else:
+        most = max(1.0, sum(widths[: table.labels]) / (_NAMES * paper.width))
+        widths = [w / most if i < table.labels else w for i, w in enumerate(widths)]
         groups = columns_that_fit(widths, table.labels, paper.width)
     for group in groups:
         _columns(paper, table, group, widths, (cell, head), is_words)

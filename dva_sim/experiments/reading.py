@@ -18,6 +18,7 @@ from dva_sim.experiments.effects import (
     View,
     as_floats,
     person_means,
+    plain_level,
     present,
 )
 from dva_sim.experiments.labels import Level, brief, unit_of
@@ -54,8 +55,8 @@ def layout_of(
         return runs, [f for f in factors if f.name not in together or f.name == kept]
     if POINT in study.get("factors", {}) and POINT in runs and are_points_trials:
         return _as_trials(runs), [f for f in factors if f.name != POINT]
-    if design and not study.get("answer") and _is_sparse(runs, factors):
-        return _as_rows(runs, factors)
+    if names := row_names(study, runs):
+        return with_rows(runs, names), [Factor(ROW, tuple(names.values()))]
     return runs, factors
 
 
@@ -94,22 +95,24 @@ def _is_sparse(runs: Table, factors: Sequence[Factor]) -> bool:
     return 2 * ran < math.prod(len(f.levels) for f in factors)
 
 
-def _as_rows(runs: Table, factors: Sequence[Factor]) -> tuple[Table, list[Factor]]:
-    """The rows of a list as the levels of one factor, named by what they set."""
+def row_names(study: Mapping[str, Any], runs: Table) -> dict[int, str]:
+    """What each cell of a list is called, by what it sets; nothing where factors are told apart."""
+    factors = factors_of(study)
+    listed = bool(study.get("design")) and not study.get("answer") and "cell" in runs
+    if not listed or POINT in study["factors"] or not _is_sparse(runs, factors):
+        return {}
     cells, first = np.unique(np.asarray(runs["cell"]), return_index=True)
-    names = {
-        int(cell): brief({f.name: _plain(runs[f.name][at]) for f in factors})
+    return {
+        int(cell): brief({f.name: plain_level(runs[f.name][at]) for f in factors})
         for cell, at in zip(cells, first, strict=True)
         if cell >= 0
     }
-    column = np.array([names.get(int(cell), "") for cell in runs["cell"]], dtype=object)
-    return dict(runs) | {ROW: column}, [Factor(ROW, tuple(names.values()))]
 
 
-def _plain(value: Any) -> Level:
-    """A level as it was declared: numpy's numbers as Python's."""
-    plain: Level = value.item() if isinstance(value, np.generic) else value
-    return plain
+def with_rows(table: Table, names: Mapping[int, str]) -> Table:
+    """A table with a column that says which row of the list each of its rows belongs to."""
+    column = np.array([names.get(int(cell), "") for cell in table["cell"]], dtype=object)
+    return dict(table) | {ROW: column}
 
 
 def keys_of(study: Mapping[str, Any]) -> list[Factor]:
@@ -156,6 +159,7 @@ def view_of(study: Mapping[str, Any], runs: Table) -> View | None:
         over=over,
         contrast=_contrast(declared, line),
         within=within,
+        averages_points=POINT in study.get("factors", {}),
         smallest_effect=declared.get(f"smallest_effect_{measure.rpartition('_')[2]}")
         or declared.get("smallest_effect"),
     )
@@ -185,6 +189,7 @@ def finding_of(view: View) -> Finding | None:
         horizon=_horizon(view),
         widest=view.widest,
         all_confirmed=_all_confirmed(view),
+        everywhere="on average over the ranges" if view.averages_points else "throughout",
     )
 
 

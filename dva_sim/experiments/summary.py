@@ -11,17 +11,20 @@ import numpy as np
 
 from dva_sim.experiments import statistics
 from dva_sim.experiments.answer import Answer, Finding, answer
-from dva_sim.experiments.asking import REPEATS
+from dva_sim.experiments.asking import POINT, REPEATS
 from dva_sim.experiments.cells import SUMMARIES, CellTable, cell_table
 from dva_sim.experiments.dispatch import page as dispatch_page
 from dva_sim.experiments.dispatch.shifts import Shifts, is_dispatch
 from dva_sim.experiments.effects import Part, Table, View, as_floats
+from dva_sim.experiments.episodes_kept import Episode, Tables, typical_and_worst
 from dva_sim.experiments.reading import (
     finding_of,
     layout_of,
     points_of,
     possible_values,
+    row_names,
     view_of,
+    with_rows,
 )
 from dva_sim.experiments.results import Results
 from dva_sim.experiments.robustness import Robustness, robustness_of
@@ -48,7 +51,9 @@ class Reading:
     def table(self, name: str) -> Table:
         """Columns of a table; nothing where the study has no such table."""
         if name not in self._tables:
-            self._tables[name] = self.results.table(name) if self.results.has(name) else {}
+            table: Table = self.results.table(name) if self.results.has(name) else {}
+            names = {} if name in ("runs", REPEATS) else row_names(self.study, self.runs)
+            self._tables[name] = with_rows(table, names) if table and names else table
         return self._tables[name]
 
     @property
@@ -101,6 +106,21 @@ class Reading:
             return None
         scenario = self.scenario_of(self.view.part.name)
         return robustness_of(self.study, self.table(REPEATS), self.view, self.finding, scenario)
+
+    @property
+    def points(self) -> list[str]:
+        """Continuous factors: columns that tell where in its ranges each run lies."""
+        return points_of(self.study, self.runs)
+
+    @property
+    def episodes(self) -> tuple[Episode, Episode] | None:
+        """A typical run and the worst, of those that were kept."""
+        if self.view is None:
+            return None
+        names = [n for n in self.study.get("factors", {}) if n != POINT and n in self.runs]
+        tables = Tables(self.runs, self.table("tracks"), [*names, *self.points])
+        part = self.view.part.name
+        return typical_and_worst(self.results.folder, part, self.view.measure, tables)
 
     @cached_property
     def pair_correlation(self) -> float | None:
@@ -156,8 +176,14 @@ class Reading:
             support=support_of_part(part, scenario) if summaries is SUMMARIES else None,
             possible=possible_values(view.measure, scenario),
             is_listed=bool(self.study.get("design")),
-            points=points_of(self.study, self.runs),
+            points=[*self.points, *self._taken_together(part)],
         )
+
+    def _taken_together(self, part: Part) -> list[str]:
+        """Factors of a zip that another one stands for."""
+        axes = [factor.name for factor in part.factors]
+        zipped = (self.study.get("design") or {}).get("zip") or ()
+        return [name for name in zipped if name not in axes]
 
     @property
     def warnings(self) -> list[str]:

@@ -93,7 +93,7 @@ def _claim(tested: Tested) -> str:
 
 
 def _place(at: Setting) -> str:
-    return setting(at) or "everywhere"
+    return setting(at) or "on average"
 
 
 def _interval(found: Interval | None, measure: str) -> str:

@@ -18,6 +18,7 @@ FOOT = 30.0  # from the lower edge to the page's number [pt]
 LEADING = 1.32  # line to line, in sizes of the font
 _INCH = 72.0  # [pt]
 _DATE = datetime(2000, 1, 1, tzinfo=UTC)
+_ROUNDING = 0.01  # [pt]
 _SOFT, _RULE = "#555555", "#bbbbbb"
 
 
@@ -173,7 +174,7 @@ def broken(text: str, face: Face, width: float) -> Iterator[str]:
     space, line, used = width_of(" ", face), "", 0.0
     for word in (piece for long in text.split() for piece in _cut(long, face, width)):
         size = width_of(word, face)
-        if line and used + space + size > width:
+        if line and used + space + size > width + _ROUNDING:
             yield line
             line, used = word, size
         else:
@@ -189,7 +190,7 @@ def shortened(text: str, face: Face, width: float) -> str:
 
 
 def _cut(word: str, face: Face, width: float) -> Iterator[str]:
-    while word and width_of(word, face) > width:
+    while word and width_of(word, face) > width + _ROUNDING:
         fits = next(
             (n for n in range(len(word) - 1, 1, -1) if width_of(word[:n], face) <= width), 1
         )

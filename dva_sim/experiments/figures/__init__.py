@@ -14,9 +14,14 @@ from dva_sim.experiments.figures import (
     commands,
     distribution,
     effect,
+    factorial,
     ground,
+    heat,
+    lapse,
     repeats,
+    scatter,
     story,
+    tradeoff,
 )
 from dva_sim.experiments.figures.style import Drawn, styled
 from dva_sim.experiments.labels import Level, factor_name, listing
@@ -26,7 +31,10 @@ if TYPE_CHECKING:
 
 __all__ = ["Drawn", "draw_all"]
 
-_OF_ONE_PANEL = ("heat_map", "trajectories", "robustness")
+_OF_PANELS = (
+    *("distributions", "differences", "levels", "delay_budget", "command_age", "command_rate"),
+    *("tradeoff", "story_times", "story_outcomes"),
+)
 
 
 def draw_all(reading: Reading) -> list[Drawn]:
@@ -41,16 +49,21 @@ def draw_all(reading: Reading) -> list[Drawn]:
             distribution.distributions(view),
             effect.differences(view, cadence_of),
             effect.measure_levels(view) if view.line or view.over else None,
+            heat.heat_map(view),
+            None if reading.study.get("design") else factorial.effects(view),
+            *scatter.scatters(reading),
             repeats.repeats(view, robustness) if robustness else None,
             budget.delay_budget(view),
             commands.command_age(view),
             commands.command_rate(view, cadence_of),
+            tradeoff.tradeoff(view),
             ground.trajectories(view, tracks, scenario) if tracks else None,
+            *_lapses(reading, view),
             *_story(view, reading.table("events")),
         ]
     note = _what_panels_are(view)
     there = [f for f in drawn if f is not None]
-    return [replace(f, caption=f.caption + note * (f.name not in _OF_ONE_PANEL)) for f in there]
+    return [replace(f, caption=f.caption + note * (f.name in _OF_PANELS)) for f in there]
 
 
 def _what_panels_are(view: View) -> str:
@@ -79,6 +92,18 @@ def _cadences(view: View, scenario: Mapping[str, Any]) -> effect.CadenceOf:
         return lookup(tuple(panel.items())) if along_delay and "req-rep" in view.lines else None
 
     return cadence_of
+
+
+def _lapses(reading: Reading, view: View) -> list[Drawn | None]:
+    """The typical and the worst run, where some were kept."""
+    episodes = reading.episodes
+    if episodes is None:
+        return []
+    scenario = reading.scenario_of(view.part.name)
+    return [
+        lapse.time_lapse(view, episode, scenario, which)
+        for episode, which in zip(episodes, ("typical", "worst"), strict=True)
+    ]
 
 
 def _story(view: View, table: Table) -> list[Drawn | None]:

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dva_sim.errors import DvaSimError
-from dva_sim.experiments.effects import Floats, Table, View, codes_of
+from dva_sim.experiments.asking import POINT
+from dva_sim.experiments.effects import Floats, Table, View, as_floats, codes_of
 from dva_sim.experiments.figures.numbers import Numbers
 from dva_sim.experiments.figures.style import (
     INK,
@@ -37,14 +38,14 @@ def trajectories(view: View, tracks: Table, scenario: Mapping[str, Any]) -> Draw
     if not ways:
         return None
     stops = list(dict.fromkeys((view.stops[0], view.stops[-1])))
-    site, aside = _site(scenario), ways.reference()
-    low, high = _frame(ways.all_points)
-    height = _row_height(high - low, columns=len(view.lines))
+    site, aside = site_of(scenario), ways.reference()
+    low, high = frame_of(ways.all_points)
+    height = row_height(high - low, columns=len(view.lines))
     figure, axes = panels(len(stops), len(view.lines), height, sharex=True, sharey=True)
     paint, numbers = colours(view.line), Numbers()
     for row, stop in zip(axes, stops, strict=True):
         for ax, level in zip(row, view.lines, strict=True):
-            _ground(ax, site)
+            draw_ground(ax, site)
             for way in aside:
                 ax.plot(*way.T, color=SOFT, lw=1.3, ls=(0, (3, 2)), zorder=8)
             for way in ways.under(level, stop):
@@ -54,7 +55,7 @@ def trajectories(view: View, tracks: Table, scenario: Mapping[str, Any]) -> Draw
             ax.set_title(_heading(view, level, stop), color=paint[level] if level else INK)
             ax.label_outer()
     axes[0][0].set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-    _scale_bar(axes[-1][0], low)
+    scale_bar(axes[-1][0], low)
     caption = (
         f"The same person and trial everywhere{'; dashed, the reference drive' if aside else ''}. "
         "Ring: where a way begins; dot: where it ends."
@@ -114,8 +115,11 @@ class Ways:
 def _first_trial(rows: Table) -> Table:
     if not len(rows["person"]):
         return rows
-    first = rows["person"] == rows["person"].min()
-    first = first & (rows["trial"] == rows["trial"][first].min())
+    first = np.ones(len(rows["person"]), dtype=bool)
+    for name in ("person", "trial", POINT):
+        if name in rows:
+            values = as_floats(rows[name])  # a reference run has no point: it is that of all
+            first &= (values == np.nanmin(values[first])) | np.isnan(values)
     return {key: values[first] for key, values in rows.items()}
 
 
@@ -123,7 +127,7 @@ def _points(rows: Table) -> Floats:
     return np.column_stack([rows["x_m"], rows["y_m"]]).astype(float)
 
 
-def _site(scenario: Mapping[str, Any]) -> Site | None:
+def site_of(scenario: Mapping[str, Any]) -> Site | None:
     """The site, or None where its files are not to be had; the ways are shown all the same."""
     from dva_sim.scenario import build, site_of
 
@@ -133,7 +137,8 @@ def _site(scenario: Mapping[str, Any]) -> Site | None:
         return None
 
 
-def _ground(ax: Axes, site: Site | None) -> None:
+def draw_ground(ax: Axes, site: Site | None) -> None:
+    """The plan of the site; axes in metres where its files are not to be had."""
     ax.set_aspect("equal")
     ax.grid(False)
     if site is None:
@@ -153,17 +158,18 @@ def _way(ax: Axes, way: Floats, colour: str) -> None:
     ax.plot(*way[-1], "o", ms=5, color=colour, zorder=10)
 
 
-def _frame(points: Floats) -> tuple[Floats, Floats]:
+def frame_of(points: Floats) -> tuple[Floats, Floats]:
     """Lower left and upper right corner of what is worth seeing [m]."""
     return points.min(axis=0) - _MARGIN, points.max(axis=0) + _MARGIN
 
 
-def _row_height(size: Floats, columns: int) -> float:
+def row_height(size: Floats, columns: int) -> float:
     """Height of a row of panels that are as wide as there is room for [in]."""
     return float(np.clip(WIDTH / columns * size[1] / size[0] + 0.3, 1.2, 5.0))
 
 
-def _scale_bar(ax: Axes, corner: Floats) -> None:
+def scale_bar(ax: Axes, corner: Floats) -> None:
+    """Five metres, in the lower left corner."""
     x, y = corner + 0.8
     ax.plot([x, x + _BAR], [y, y], color=INK, lw=2, solid_capstyle="butt", zorder=11)
     ax.annotate(

@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _TITLE = 78  # characters of a title that the width holds
+_CROWDED = 45  # characters of ticks that fit beside each other in the width
+_LEAST_TICK = 8  # characters of a tick's name in a line
 _ROW_LABEL = 28  # characters that the height of a row holds
 WIDTH = 8.4  # [in]; on screen and on paper it is stretched or shrunk to the column
 INK, SOFT, FAINT = "#222222", "#6b6b6b", "#d9d9d9"
@@ -60,6 +62,7 @@ _STYLE: dict[str, Any] = {
     "axes.axisbelow": True,
     "grid.color": FAINT,
     "grid.linewidth": 0.6,
+    "hatch.linewidth": 0.5,
     "xtick.color": SOFT,
     "ytick.color": SOFT,
     "xtick.labelcolor": INK,
@@ -178,9 +181,18 @@ def stops_axis(axes: Axes, over: Factor | None) -> None:
         axes.set_xticks([])
         return
     names, unit = _tick_names(over)
-    axes.set_xticks(range(len(names)), names)
+    narrow = max(_LEAST_TICK, _TITLE // len(names))
+    axes.set_xticks(range(len(names)), [wrapped(name, narrow) for name in names])
     axes.set_xlabel(f"{capital(factor_name(over.name))}{f' [{unit}]' if unit else ''}")
     axes.set_xlim(-0.5, len(names) - 0.5)
+
+
+def level_axis(axes: Axes, factor: Factor) -> None:
+    """A factor along y, level above level."""
+    names, unit = _tick_names(factor)
+    axes.set_yticks(range(len(names)), names)
+    axes.set_ylabel(f"{capital(factor_name(factor.name))}{f' [{unit}]' if unit else ''}")
+    axes.set_ylim(-0.5, len(names) - 0.5)
 
 
 def _tick_names(over: Factor) -> tuple[list[str], str]:
@@ -239,6 +251,7 @@ def label_panels(axes: Sequence[Axes], view: View, text: str) -> None:
     for index, (ax, panel) in enumerate(zip(axes, view.shown, strict=True)):
         panel_title(ax, panel, _TITLE // columns)
         stops_axis(ax, view.over)
+        _make_room(ax, columns)
         ax.set_ylabel(text if index % columns == 0 else "")
         if index < len(axes) - columns:
             ax.set_xlabel("")
@@ -259,8 +272,20 @@ def outer_labels(axes: list[list[Axes]], shown: Sequence[Setting], text: str) ->
     for row, panel in zip(axes, shown, strict=True):
         name = wrapped(panel_name(panel), _ROW_LABEL)
         row[0].set_ylabel(f"{name}\n{text}" if panel else text)
-        for ax in row if row is not axes[-1] else ():
-            ax.set_xlabel("")
+        for ax in row:
+            _make_room(ax, len(row))
+            if row is not axes[-1]:
+                ax.set_xlabel("")
+
+
+def _make_room(axes: Axes, columns: int) -> None:
+    """Where several stand abreast, names below them must not run into each other."""
+    axes.set_xlabel(wrapped(axes.get_xlabel(), _TITLE // columns))
+    names = [label.get_text() for label in axes.get_xticklabels()]
+    if columns * sum(map(len, names)) > _CROWDED:
+        narrow = max(_LEAST_TICK, _TITLE // (columns * len(names)))
+        words = [wrapped(name.replace("\n", " "), narrow) for name in names]
+        axes.set_xticks(axes.get_xticks(), words, fontsize=7)
 
 
 def dodge(lines: tuple[Level, ...]) -> list[tuple[Level, float]]:

@@ -1,0 +1,105 @@
+"""How soon somebody is there against how long people stand in danger: both are better small."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dva_sim.experiments.effects import Floats, Setting, View, person_means, present
+from dva_sim.experiments.figures.numbers import Numbers, with_unit
+from dva_sim.experiments.figures.style import (
+    Drawn,
+    axis_label,
+    colours,
+    finish,
+    legend,
+    marks,
+    panel_grid,
+    panel_title,
+)
+from dva_sim.experiments.labels import Level, factor_name, level_name, measure_name
+from dva_sim.experiments.statistics import Band, band
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+EXPOSURES = ("exposure_look_s", "exposure_s", "person_exposure_s")
+RESPONSES = ("response_mean_s", "response_s", "drive_time_s")
+
+
+def tradeoff(view: View) -> Drawn | None:
+    """Response over exposure, a line for each level of the compared factor through its stops."""
+    columns = _columns(view)
+    if columns is None:
+        return None
+    figure, axes = panel_grid(view, 3.6)
+    numbers = Numbers()
+    for ax, panel in zip(axes, view.shown, strict=True):
+        for level in view.lines:
+            bands = [_band(view, column, panel, level) for column in columns]
+            _line(ax, view, level, *bands)
+            told = {
+                with_unit(f"{word}_{edge}", column): getattr(found, name)
+                for word, column, found in zip(
+                    ("exposure", "response"), columns, bands, strict=True
+                )
+                for edge, name in _EDGES.items()
+            }
+            numbers.add(view.setting(panel, level), view.along_x() | told)
+        panel_title(ax, panel, 78 // len(axes))
+        ax.grid(True, axis="both")
+        ax.margins(0.12)
+    figure.supxlabel(axis_label(columns[0]), fontsize="medium")
+    figure.supylabel(axis_label(columns[1]), fontsize="medium")
+    legend(figure, view.line, colours(view.line))
+    title = f"The trade-off: {measure_name(columns[1])} against {measure_name(columns[0])}"
+    return finish(figure, "tradeoff", title, _caption(view), numbers)
+
+
+_EDGES = {"mean": "mean", "low": "pointwise_low", "high": "pointwise_high"}
+
+
+def _caption(view: View) -> str:
+    along = f", from one {factor_name(view.over.name)} to the next" if view.over else ""
+    return (
+        f"Down and to the left is better. Each mark is a cell, the mean over persons{along}; "
+        "crosses are 95 % intervals of each mean alone. Times in danger are summed over all people."
+    )
+
+
+def _columns(view: View) -> tuple[str, str] | None:
+    """The exposure that varies, and the response beside it."""
+    measured = [c for c in (view.measure, *EXPOSURES) if c in EXPOSURES and _varies(view, c)]
+    responses = [c for c in (view.measure, *RESPONSES) if c in RESPONSES and _varies(view, c)]
+    return (measured[0], responses[0]) if measured and responses else None
+
+
+def _varies(view: View, column: str) -> bool:
+    values = present(view.part.grid(column)) if view.part.has(column) else np.array([])
+    return len(values) > 1 and bool(np.ptp(values) > 0)
+
+
+def _band(view: View, column: str, panel: Setting, level: Level) -> Band:
+    means: Floats = person_means(view.curve(view.part.grid(column), panel, level))
+    return band(means)
+
+
+def _line(ax: Axes, view: View, level: Level, exposure: Band, response: Band) -> None:
+    """Through all stops, the first and the last of them named."""
+    paint, mark = colours(view.line)[level], marks(view.line)[level]
+    x, y = exposure.mean, response.mean
+    ax.hlines(y, exposure.pointwise_low, exposure.pointwise_high, color=paint, lw=0.8, alpha=0.7)
+    ax.vlines(x, response.pointwise_low, response.pointwise_high, color=paint, lw=0.8, alpha=0.7)
+    ax.plot(x, y, "-", marker=mark, color=paint, ms=5, lw=1.2)
+    if view.over is None or len(x) < 2:
+        return
+    for stop in (0, len(x) - 1):
+        ax.annotate(
+            level_name(view.over.name, view.over.levels[stop], short=True),
+            (float(x[stop]), float(y[stop])),
+            xytext=(5, 4),
+            textcoords="offset points",
+            fontsize=7.5,
+            color=paint,
+        )
