@@ -10,6 +10,7 @@ References:
 
 from __future__ import annotations
 
+import re
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -25,6 +26,7 @@ from dva_sim.experiments.manifest import versions
 P = ParamSpec("P")
 R = TypeVar("R")
 
+_ADDRESS = r"(tcp|tls|ucx|ws|wss)://.+:\d+"
 _CONNECT_S = 10.0
 _WORKERS_S = 60.0  # how long a cluster may be without any worker
 _ONE_AT_A_TIME = threading.Lock()  # in a worker with several threads
@@ -52,6 +54,8 @@ class Cluster:
 
     def __init__(self, address: str) -> None:
         self.address = address
+        if not re.fullmatch(_ADDRESS, address):
+            raise ConfigError(f"scheduler {address!r} should be like tcp://10.0.0.1:8786")
         try:
             from distributed import Client, KilledWorker
         except ImportError:
@@ -62,7 +66,7 @@ class Cluster:
         self.deaths: tuple[type[Exception], ...] = (KilledWorker,)
         try:
             self._client = Client(address, timeout=_CONNECT_S, set_as_default=False)
-        except (OSError, ValueError, ImportError) as error:
+        except (OSError, ImportError) as error:
             reason = str(error).splitlines()[0]
             raise ConfigError(f"no scheduler answers at {address}: {reason}") from None
         self._seen = time.monotonic()
@@ -119,7 +123,8 @@ class Cluster:
         elif now - self._seen > _WORKERS_S:
             raise DvaSimError(
                 f"the scheduler at {self.address} has had no workers for {_WORKERS_S:g} s: "
-                f"start some with 'dask worker {self.address} --nthreads 1'; {_GO_ON}"
+                f"start some with 'dask worker {self.address} --nthreads 1' (one that lacks this "
+                f"dva-sim leaves at once; its log says so); {_GO_ON}"
             )
 
     def _workers(self) -> dict[str, Any]:

@@ -23,8 +23,13 @@ _CODE = (
     "clock.py",
     "recorder.py",
     "streams.py",
+    "experiments/budget.py",
+    "experiments/dispatch/bounds.py",
+    "experiments/dispatch/measures.py",
+    "experiments/dispatch/outcomes.py",
     "experiments/episode.py",
     "experiments/metrics.py",
+    "experiments/models.py",
     "experiments/transports",
     "experiments/workload.py",
 )

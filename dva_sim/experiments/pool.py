@@ -160,7 +160,7 @@ def _alone(suspects: deque[Job], run: _Chunk, episode: Episode, place: Place) ->
 def _answers(under_way: _UnderWay, dead: deque[Job], place: Place) -> Batches:
     """What has come, after waiting for a while at most; the runs of dead workers apart."""
     done = wait(under_way, timeout=_LOOK_S, return_when=FIRST_COMPLETED).done
-    place.look_after(bool(done))
+    place.look_after(is_idle=not done)
     for future in done:
         chunk = under_way.pop(future)
         try:

@@ -1,0 +1,141 @@
+"""Runs on a dask cluster of this machine give the same bytes, and what goes wrong is told."""
+
+from __future__ import annotations
+
+import sqlite3
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import small_study as kit
+from dask_cluster import DaskCluster
+
+from dva_sim.errors import ConfigError, DvaSimError
+from dva_sim.experiments import cluster, pool
+from dva_sim.experiments.limit import RunTooLong, limited
+from dva_sim.experiments.runner import run_study
+
+
+@pytest.fixture
+def dask(tmp_path: Path) -> Iterator[DaskCluster]:
+    pytest.importorskip("distributed")
+    folder = tmp_path / "cluster"
+    folder.mkdir()
+    with DaskCluster(folder) as started:
+        yield started
+
+
+@pytest.mark.slow
+def test_a_worker_killed_half_way_loses_and_doubles_nothing(
+    tmp_path: Path, dask: DaskCluster, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    study = kit.study_in(tmp_path)
+    plain = kit.files(run_study(study, tmp_path / "plain", jobs=1, episode=kit.cheap))
+    for _ in range(2):
+        dask.add_worker()
+
+    def kill_one(done: int, total: int) -> None:
+        if done >= total // 2:
+            dask.workers[0].kill()
+
+    out = run_study(
+        study, tmp_path / "out", scheduler=dask.address, episode=kit.slower, progress=kill_one
+    )
+    assert dask.workers[0].wait() == -9
+    assert dask.workers[1].poll() is None
+    assert kit.files(out) == plain
+    with sqlite3.connect(out / "journal.sqlite") as journal:
+        (rows,) = journal.execute("SELECT count(*) FROM runs WHERE tables IS NOT NULL").fetchone()
+    journal.close()
+    assert rows == kit.RUNS
+
+
+@pytest.mark.slow
+def test_a_worker_with_another_profile_near_it_is_refused(
+    tmp_path: Path, dask: DaskCluster
+) -> None:
+    phones = tmp_path / "elsewhere" / "agents" / "phones"
+    phones.mkdir(parents=True)
+    (phones / "default.yaml").write_text("filter: none\n")
+    dask.add_worker(cwd=tmp_path / "elsewhere")
+    with pytest.raises(DvaSimError, match=r"worker tcp://.* has fingerprint \w+ \(here \w+\)"):
+        run_study(
+            kit.study_in(tmp_path), tmp_path / "out", scheduler=dask.address, episode=kit.cheap
+        )
+
+
+def test_programs_differ_in_what_a_run_depends_on_not_in_their_commit() -> None:
+    here = {"dva-sim": "1.0", "fingerprint": "abc", "commit": "123", "dirty": False, "numpy": "2.0"}
+    assert cluster.differences(here, here | {"commit": None, "dirty": None}) == ""
+    assert cluster.differences(here, here | {"numpy": "1.9"}) == "numpy 1.9 (here 2.0)"
+    older = {name: value for name, value in here.items() if name != "fingerprint"}
+    assert cluster.differences(here, older) == "fingerprint None (here abc)"
+
+
+@pytest.mark.parametrize("address", ["127.0.0.1", "127.0.0.1:8786", "foo://127.0.0.1:1", "tcp://:"])
+def test_an_address_that_is_none_is_refused(tmp_path: Path, address: str) -> None:
+    with pytest.raises(ConfigError, match="should be like tcp://"):
+        run_study(kit.study_in(tmp_path), tmp_path / "out", scheduler=address)
+
+
+def test_a_scheduler_that_does_not_answer_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("distributed")
+    monkeypatch.setattr(cluster, "_CONNECT_S", 0.01)
+    with pytest.raises(ConfigError, match=r"no scheduler answers at tcp://127\.0\.0\.1:9"):
+        run_study(kit.study_in(tmp_path), tmp_path / "out", scheduler="tcp://127.0.0.1:9")
+
+
+def test_what_to_install_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(ConfigError, match=r"pip install 'dva-sim\[cluster\]'"):
+        run_study(kit.study_in(tmp_path), tmp_path / "out", scheduler="tcp://127.0.0.1:9")
+
+
+def test_processes_and_a_scheduler_exclude_each_other(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="not both"):
+        run_study(kit.study_in(tmp_path), tmp_path / "out", jobs=2, scheduler="tcp://127.0.0.1:9")
+
+
+def test_a_run_in_a_thread_of_a_worker_has_its_limit_too() -> None:
+    from concurrent.futures import ThreadPoolExecutor
+
+    def stalls() -> None:
+        with limited(0.05, may_exit=False):
+            while True:
+                time.monotonic()
+
+    def is_quick() -> str:
+        with limited(60.0, may_exit=False):
+            return "done"
+
+    with ThreadPoolExecutor(1) as executor:
+        assert executor.submit(is_quick).result() == "done"
+        with pytest.raises(RunTooLong, match=r"took more than its 0\.05 s"):
+            executor.submit(stalls).result()
+        assert executor.submit(is_quick).result() == "done"
+
+
+def test_a_run_that_takes_the_limit_for_its_own_is_told_again(tmp_path: Path) -> None:
+    from concurrent.futures import ThreadPoolExecutor
+
+    def stubborn(job: object) -> kit.Tables:
+        for _ in range(2):
+            try:
+                while True:
+                    time.monotonic()
+            except BaseException:
+                continue
+        return {}
+
+    from dva_sim.experiments import design
+
+    job = design.jobs(kit.study_in(tmp_path))[0]
+    with ThreadPoolExecutor(1) as executor:
+        ended = executor.submit(pool.perform, job, stubborn, 0.05).result()
+    assert ended.error is None  # it has come back by itself, told twice
+    assert ended.tables == "{}"
