@@ -12,7 +12,7 @@ from dva_sim.errors import ConfigError
 
 ROOT = Path(__file__).parents[2]
 SHIPPED = {
-    "study": sorted(ROOT.glob("experiments/*.yaml")),
+    "study": sorted(set(ROOT.glob("experiments/*.yaml")) - set(ROOT.rglob("*.registration.yaml"))),
     "scenario": sorted(ROOT.glob("experiments/scenarios/*.yaml")),
     "cases": [ROOT / "experiments/validation/dispatch.yaml"],
     "site": sorted(ROOT.glob("worlds/*.yaml")),
@@ -145,6 +145,64 @@ def test_ranges_and_choices_are_in_the_schema():
     assert not scenario.accepts({"link": {"loss": 1}})
     assert not scenario.accepts({"robot": {"count": 0.5}})
     assert not validator("study").accepts({"question": "what?"})
+
+
+NEW_KEYS = """\
+question: what?
+parts: {it: {scenario: drive-to-event}}
+factors: {pattern: [req-rep, latest-wins]}
+design:
+  sobol: 8
+  ranges: {link.delay_s: [0, 1], link.loss: {low: 0.001, high: 0.1, scale: log}}
+comparisons:
+  far: {part: it, measure: contacts, factor: pattern, contrast: [req-rep, latest-wins]}
+hypotheses:
+  costs: {comparison: far, direction: above, margin: 0.5}
+stop: {half_width: 1, comparison: far, batch_persons: 2, most_persons: 9}
+budget_s: 60
+record: worst
+full: {persons: 40}
+"""
+
+
+def accepts_study(tmp_path, text):
+    path = tmp_path / "study.yaml"
+    path.write_text(text)
+    return validator("study").accepts(load_yaml(path).data)
+
+
+def test_what_a_study_may_say_of_designs_claims_and_stops_is_in_the_schema(tmp_path):
+    assert accepts_study(tmp_path, NEW_KEYS)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("sobol: 8", "sobol: eight"),
+        ("[0, 1]", "[0, 1, 2]"),
+        ("scale: log", "scale: square"),
+        ("direction: above", "direction: up"),
+        ("batch_persons: 2", "batch: 2"),
+        ("record: worst", "record: best"),
+        ("budget_s: 60", "budget_s: 0"),
+        ("measure: contacts, ", ""),
+    ],
+)
+def test_a_mistake_there_does_not_follow_the_schema(tmp_path, old, new):
+    assert old in NEW_KEYS
+    assert not accepts_study(tmp_path, NEW_KEYS.replace(old, new))
+
+
+def test_the_schema_tells_what_each_key_of_a_study_means():
+    schema = json.loads(schema_text("study"))
+    for name in ("Contrast", "Design", "Hypothesis", "Part", "Span", "Stop", "Tuning"):
+        model = schema["$defs"][name]
+        assert "Attributes" not in model["description"]
+        assert all(key.get("description") for key in model["properties"].values()), name
+    assert all(key.get("description") for key in schema["properties"].values())
+    assert schema["$defs"]["Span"]["properties"]["scale"]["description"] == (
+        "`linear`, `log` for even ratios, or `whole` for whole numbers."
+    )
 
 
 def test_every_kind_of_agent_is_named():

@@ -281,3 +281,25 @@ def test_every_model_takes_a_sampled_factor(tmp_path, scenario, key, low, high):
     cells = design.cells(study)
     assert len({cell.config for cell in cells}) == 3
     assert all(low <= dict(cell.levels)[key] <= high for cell in cells)
+
+
+def test_of_many_points_only_the_outermost_are_rehearsed(tmp_path):
+    study = study_in(tmp_path, text=ONLY_PATTERN + SAMPLED.format(kind="sobol"))
+    cells = [cell for cell in design.cells(study) if cell.part == "drive"]
+    chosen = [dict(cell.levels) for cell in design.to_rehearse(study, cells)]
+    every = [dict(cell.levels) for cell in cells]
+    assert chosen[0] == {}
+    assert len(chosen) <= 1 + 2 * 6 < len(every)
+    for key in ("link.delay_s", "link.loss"):
+        values = [cell[key] for cell in every if cell]
+        assert {min(values), max(values)} <= {cell[key] for cell in chosen if cell}
+
+
+def test_an_item_of_a_list_can_be_a_factor(tmp_path):
+    (tmp_path / "fire.yaml").write_text("events: [{kind: fire, at_s: 0}]\n")
+    study = study_in(
+        tmp_path,
+        text="question: When?\nparts: {it: {scenario: fire.yaml}}\n"
+        "factors: {events.0.at_s: [0, 5]}\n",
+    )
+    assert [cell.scenario.events[0].at_s for cell in design.cells(study)] == [0, 5]

@@ -276,3 +276,8 @@ def test_what_is_recorded_and_the_larger_version_do_not_change_what_is_asked(tmp
     plain = study_in(tmp_path).asked()
     assert study_in(tmp_path, text=STUDY + "record: worst\nfull: {persons: 9}\n").asked() == plain
     assert study_in(tmp_path, text=STUDY + "budget_s: 60\n").asked() != plain
+
+
+def test_the_main_study_fits_on_thirty_lines():
+    text = load_study("req-rep-vs-pub-sub").file.read_text()
+    assert len(text.splitlines()) <= 30

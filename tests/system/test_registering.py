@@ -1,0 +1,67 @@
+"""From a new study to a confirmed hypothesis, as users call it."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+STUDY = """\
+question: Does the nearest come sooner?
+persons: 3
+replications: 1
+factors:
+  dispatch.policy: [random, min_eta]
+parts:
+  shift: {scenario: small-shift, changes: {horizon_s: 1800}}
+answer:
+  part: shift
+  measure: response_mean_s
+  factor: dispatch.policy
+  contrast: [random, min_eta]
+hypotheses:
+  sooner: {direction: above}
+"""
+
+
+def call(*words: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "dva_sim.cli", *words]
+    return subprocess.run(command, capture_output=True, text=True, cwd=cwd, check=False)
+
+
+def status_of(folder: Path) -> dict[str, object]:
+    found: dict[str, object] = json.loads((folder / "manifest.json").read_text())["status"]
+    return found
+
+
+@pytest.mark.slow
+def test_a_study_is_registered_run_and_told_apart_from_what_was_only_tried(tmp_path: Path) -> None:
+    study = tmp_path / "mine.yaml"
+    study.write_text(STUDY)
+    done = call("register", "mine.yaml", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "Registered sooner on 3 persons x 1 trials, in mine.registration.yaml" in done.stdout
+    again = call("register", "mine.yaml", cwd=tmp_path)
+    assert (again.returncode, len(again.stderr.splitlines())) == (2, 1)
+
+    assert call("run", "mine.yaml", "--jobs", "1", cwd=tmp_path).returncode == 0
+    assert status_of(tmp_path / "results" / "mine")["kind"] == "confirmatory"
+
+    assert call("run", "mine.yaml", "--pilot", "2", "--jobs", "1", cwd=tmp_path).returncode == 0
+    pilot = status_of(tmp_path / "results" / "mine-pilot")
+    assert (pilot["kind"], pilot["why"][0]) == ("exploratory", "a pilot of 2 persons")  # type: ignore[index]
+
+    study.write_text(STUDY.replace("direction: above", "direction: below"))
+    refused = call("run", "mine.yaml", "--jobs", "1", cwd=tmp_path)
+    assert refused.returncode == 2
+    assert "holds another study" in refused.stderr
+    assert call("check", "mine.registration.yaml", cwd=tmp_path).returncode == 1
+
+
+def test_a_new_study_is_valid_at_once(tmp_path: Path) -> None:
+    assert "dva-sim run mine.yaml" in call("new", "mine", cwd=tmp_path).stdout
+    assert call("check", "mine.yaml", cwd=tmp_path).stdout.startswith("mine.yaml: study: valid")
+    assert call("new", "mine", cwd=tmp_path).returncode == 2
