@@ -136,7 +136,7 @@ class _Raw:
             raise _Damaged(f"is not a recording: it does not {where} as MCAP does") from None
         except (McapError, ZstdError, ValueError, KeyError, struct.error, MemoryError) as error:
             raise _Damaged(f"is damaged: {' '.join(str(error).split())[:200]}") from None
-        if self.about is None or digest(self.files) != self.about[DIGEST]:
+        if self.about is None or digest(self.files) != self.about.get(DIGEST):
             raise _Damaged(CUT if self.is_cut else "is damaged: something is missing or changed")
 
     def _take(self, record: Any, channels: dict[int, Any]) -> None:

@@ -1,6 +1,7 @@
 """Which runs of a study are kept, and that they are the same however they are made."""
 
 import math
+import resource
 from dataclasses import replace
 from pathlib import Path
 
@@ -184,3 +185,40 @@ def test_what_cannot_be_recorded_is_told_with_its_place(tmp_path):
     timed = load_study(tmp_path / "timed.yaml")
     with pytest.raises(ConfigError, match=r"timed\.yaml:5:1: record: all needs runs of the full"):
         refuse_what_cannot_be_recorded(timed)
+
+
+def test_a_full_disk_costs_recordings_and_not_the_study(kept):
+    """Once there is room again, the same call makes what is missing, to the same bytes."""
+    study, out = kept
+    before = recordings(out)
+    for name in before:
+        (out / "recordings" / name).unlink()
+    limit = resource.getrlimit(resource.RLIMIT_FSIZE)
+    smallest = min(len(data) for data in before.values())
+    resource.setrlimit(resource.RLIMIT_FSIZE, (smallest - 1, limit[1]))
+    try:
+        problems = record_study(study, out, jobs=1)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limit)
+    assert [problem.partition(": ")[0] for problem in problems] == ["DvaSimError"] * 3
+    assert all("cannot be written: File too large" in problem for problem in problems)
+    assert recordings(out) == {}
+    assert record_study(study, out, jobs=1) == []
+    assert recordings(out) == before
+
+
+def test_ctrl_c_says_how_far_it_is_and_the_next_call_goes_on(kept):
+    study, out = kept
+    before = recordings(out)
+    for name in before:
+        (out / "recordings" / name).unlink()
+
+    def stop(done, total):
+        if done == 1:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt, match="1 of 3 recordings are made"):
+        record_study(study, out, jobs=1, progress=stop)
+    assert len(recordings(out)) == 1
+    assert record_study(study, out, jobs=1) == []
+    assert recordings(out) == before
