@@ -16,7 +16,7 @@ import numpy as np
 
 from dva_sim.errors import ConfigError
 from dva_sim.experiments.comparing_cells import Levels, Matched, Pair, match
-from dva_sim.experiments.comparing_rows import Difference, Rows, as_numbers, difference
+from dva_sim.experiments.comparing_rows import Difference, Rows, Run, as_numbers, difference
 from dva_sim.experiments.dictionary import DESIGN
 from dva_sim.experiments.frames import Frame
 from dva_sim.experiments.results import Results
@@ -55,6 +55,7 @@ class Comparison:
 
     def __init__(self, first: Results, second: Results) -> None:
         self.sides = (first, second)
+        self._luck: dict[Group, frozenset[Run]] = {}
         self._frames: dict[tuple[int, str, str], Frame] = {}
         if not self.matched.pairs:
             raise ConfigError(
@@ -124,8 +125,20 @@ class Comparison:
     def rows(self, side: int, table: str, column: str, group: Group) -> Rows:
         """The values of a column in some cells of the first (0) or second (1) folder.
 
-        The cells bear the numbers of the first folder, so that runs can be paired.
+        Where both have runs with the same luck, only those are looked at. The cells bear the
+        numbers of the first folder, so that runs can be paired.
         """
+        rows, shared = self._rows(side, table, column, group), self._shared(group)
+        return rows.of(shared) if shared else rows
+
+    def _shared(self, group: Group) -> frozenset[Run]:
+        """The runs of some cells that both folders have."""
+        if group not in self._luck:
+            first, second = (self._rows(side, "runs", "seed", group).runs for side in (0, 1))
+            self._luck[group] = frozenset(first) & frozenset(second)
+        return self._luck[group]
+
+    def _rows(self, side: int, table: str, column: str, group: Group) -> Rows:
         frame = self._frame(side, table, column)
         own = [(pair.first, pair.second)[side] for pair in group.pairs]
         number = dict(zip(own, (pair.first for pair in group.pairs), strict=True))
@@ -178,20 +191,18 @@ class Comparison:
 
     def _is_changed(self, column: str) -> bool:
         for group in self.groups(None):
-            a, b = (self.rows(side, "runs", column, group).by_run() for side in (0, 1))
-            both = a.keys() & b.keys()
-            if any(not _alike(a[key], b[key]) for key in both):
-                return True
+            if self._shared(group):
+                a, b = (self.rows(side, "runs", column, group).by_run() for side in (0, 1))
+                if any(not _alike(a[run], b[run]) for run in a):
+                    return True
         return False
 
     @cached_property
     def paired(self) -> tuple[int, int]:
         """Runs of the first folder that the second has with the same luck, and all of its runs."""
-        pairs = total = 0
-        for group in self.groups(None):
-            a, b = (self.rows(side, "runs", "seed", group).by_run() for side in (0, 1))
-            pairs, total = pairs + len(a.keys() & b.keys()), total + len(a)
-        return pairs, total
+        groups = list(self.groups(None))
+        runs = sum(len(self._rows(0, "runs", "seed", group).runs) for group in groups)
+        return sum(len(self._shared(group)) for group in groups), runs
 
     def _repr_html_(self) -> str:
         return self.frame()._repr_html_()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Set
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -35,11 +36,21 @@ class Rows:
     trial: Array
     seed: Array
 
-    def by_run(self) -> dict[Run, Any]:
-        """The values by cell, person, trial and seed; of a run with several rows the last."""
+    @property
+    def runs(self) -> list[Run]:
+        """Cell, person, trial and seed of each row."""
         columns = (self.cell, self.person, self.trial, self.seed)
-        runs = zip(*(column.tolist() for column in columns), strict=True)
-        return dict(zip(runs, self.values.tolist(), strict=True))
+        return list(zip(*(column.tolist() for column in columns), strict=True))
+
+    def by_run(self) -> dict[Run, Any]:
+        """The values by run; of a run with several rows the last."""
+        return dict(zip(self.runs, self.values.tolist(), strict=True))
+
+    def of(self, runs: Set[Run]) -> Rows:
+        """The rows of some runs."""
+        chosen = np.array([run in runs for run in self.runs], dtype=bool)
+        columns = (self.values, self.cell, self.person, self.trial, self.seed)
+        return Rows(*(column[chosen] for column in columns))
 
     def means(self) -> Rows:
         """One row for each run that has a value: the mean of its rows."""

@@ -163,3 +163,17 @@ def test_a_difference_of_one_person_has_no_interval(made):
     assert row.interval.mean == pytest.approx(5.0)
     assert math.isnan(row.interval.low)
     assert not row.is_told_from_zero
+
+
+def test_where_luck_is_shared_in_part_only_those_runs_are_looked_at(made, before):
+    fewer = made("persons=2", episode=later)
+    comparison = Comparison(before, fewer)
+    assert comparison.paired == (24, 36)
+    row = comparison.differences("drive_time_s")[0]
+    assert row.runs == (4, 4)
+    assert row.interval.mean == pytest.approx(5 + (0 + 1) / 2)
+    runs = before.runs
+    times = runs["drive_time_s"][
+        (runs["cell"] >= 0) & (runs["person"] < 2) & (runs["part"] == "drive")
+    ]
+    assert comparison.judge("max(drive_time_s) > 1x")[0].first == times.max()
