@@ -109,6 +109,14 @@ def deadly_once(mark: Path, job: Job) -> Tables:
     return cheap(job)
 
 
+def stopped_once(mark: Path, job: Job) -> Tables:
+    """One run stops its process, the first time only, and nobody lets it go on."""
+    if job.part == "story" and job.index == 2 and job.person == 1 and not mark.exists():
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGSTOP)
+    return cheap(job)
+
+
 def stalls(job: Job) -> Tables:
     """One run never ends, and takes every exception for its own."""
     while job.part == "story" and job.index == 2 and job.person == 1:
