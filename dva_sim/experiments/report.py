@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from dva_sim.errors import DvaSimError
 from dva_sim.experiments.blocks import Block
 from dva_sim.experiments.dispatch import figures as dispatch_figures
 from dva_sim.experiments.figures import Drawn, draw_all
@@ -31,18 +32,26 @@ def write_report(folder: Path, pdf: bool = False) -> Path:
 
     Raises:
         ConfigError: the folder holds no results.
+        DvaSimError: the disk is full or refuses to be written.
     """
     reading = Reading(Results.load(folder))
     drawn = _draw(reading)
     blocks = blocks_of(reading, drawn)
-    _write_figures(folder / FIGURES, drawn)
     question = str(reading.study.get("question", "A study without a question"))
     page = folder / PAGE
-    page.write_text(_page(question, blocks), encoding="utf-8", newline="\n")
-    if pdf or (folder / PAPER).exists():
-        from dva_sim.experiments.paper import write_pdf
+    try:
+        _write_figures(folder / FIGURES, drawn)
+        page.write_text(_page(question, blocks), encoding="utf-8", newline="\n")
+        if pdf or (folder / PAPER).exists():
+            from dva_sim.experiments.paper import write_pdf
 
-        write_pdf(folder / PAPER, question, blocks)
+            write_pdf(folder / PAPER, question, blocks)
+    except OSError as error:
+        page.unlink(missing_ok=True)  # half a page would pass for a whole one
+        raise DvaSimError(
+            f"the report cannot be written in {folder}: {error.strerror}; "
+            f"mend that, then 'dva-sim report {folder}' makes it"
+        ) from None
     return page
 
 

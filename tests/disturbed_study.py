@@ -1,0 +1,228 @@
+"""A study that is killed at any moment, or runs out of disk, until it has come to its end.
+
+Run as `python -m disturbed_study kills FOLDER` or `... disk FOLDER` (in a mount namespace of its
+own); it prints what happened as JSON. Children are forked, so that a kill costs no start.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import shutil
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import small_study as kit
+
+from dva_sim.errors import DvaSimError
+from dva_sim.experiments import runner
+from dva_sim.experiments.design import Job
+from dva_sim.experiments.report import write_report
+from dva_sim.experiments.runner import run_study
+
+KILLS = 120
+PAIRS = 10
+SEED = 1
+STEP_KB = 96
+
+
+def run(out: Path, study: Any) -> None:
+    run_study(study, out, jobs=1, episode=reportable)
+
+
+def reportable(job: Job) -> kit.Tables:
+    """What a report is made of: ways of nobody cannot be drawn."""
+    return {"runs": kit.cheap(job)["runs"]}
+
+
+# --- kills -----------------------------------------------------------------------------
+
+
+def forked(work: Callable[[], None]) -> int:
+    """A child that does the work and ends; its process id."""
+    pid = os.fork()
+    if pid == 0:
+        try:
+            work()
+            os._exit(0)
+        except BaseException as error:
+            print(f"{type(error).__name__}: {error}", file=sys.stderr, flush=True)
+            os._exit(1)
+    return pid
+
+
+def ended(pid: int) -> bool:
+    """Whether a child came to its end; False if it was killed."""
+    _, status = os.waitpid(pid, 0)
+    assert os.WIFSIGNALED(status) or os.WEXITSTATUS(status) == 0, "a runner has failed"
+    return not os.WIFSIGNALED(status)
+
+
+class Dies:
+    """Kills its own process at the n-th call of any function, in Python or in C."""
+
+    def __init__(self, calls: int) -> None:
+        self.left = calls
+
+    def __call__(self, *_: object) -> None:
+        self.left -= 1
+        if self.left == 0:
+            os.kill(os.getpid(), signal.SIGKILL)
+
+
+def killed_at_a_call(out: Path, study: Any, calls: int) -> int:
+    def work() -> None:
+        sys.setprofile(Dies(calls))
+        run(out, study)
+
+    return forked(work)
+
+
+def killed_while_writing(out: Path, study: Any, calls: int) -> int:
+    """Counts from the moment when the tables begin to be written."""
+    write_tables = runner.write_tables
+
+    def watched(*arguments: Any) -> None:
+        sys.setprofile(Dies(calls))
+        write_tables(*arguments)
+
+    def work() -> None:
+        runner.write_tables = watched
+        run(out, study)
+
+    return forked(work)
+
+
+def killed_by_the_clock(out: Path, study: Any, after_s: float) -> int:
+    """From outside, wherever it is then: also within the database and the file system."""
+    pid = forked(lambda: run(out, study))
+    time.sleep(after_s)
+    os.kill(pid, signal.SIGKILL)
+    return pid
+
+
+def calls_of(work: Callable[[], object]) -> int:
+    count = Dies(0)
+    sys.setprofile(count)
+    work()
+    sys.setprofile(None)
+    return -count.left
+
+
+def rows_of(out: Path) -> Counter[tuple[str, int]]:
+    """How many rows the journal has for each run."""
+    if not (out / "journal.sqlite").exists():
+        return Counter()
+    journal = sqlite3.connect(out / "journal.sqlite")
+    tables = {name for (name,) in journal.execute("SELECT name FROM sqlite_master")}
+    found = journal.execute("SELECT config, seed FROM runs").fetchall() if "runs" in tables else []
+    journal.close()
+    return Counter(found)
+
+
+def kills(folder: Path) -> dict[str, Any]:
+    """Kill a runner again and again; each study that ends is compared, and another begun."""
+    study, luck, seen = kit.study_in(folder), random.Random(SEED), Counter[str]()
+    plain = folder / "plain"
+    run(plain, study)
+    whole, calls = kit.files(plain), calls_of(lambda: run(folder / "counted", study))
+    begun = time.monotonic()
+    run(folder / "timed", study)
+    took, number = time.monotonic() - begun, 0
+    while seen["killed"] < KILLS:
+        out = folder / f"killed-{number}"
+        kind = luck.choice(["call", "writing", "clock"])
+        if kind == "call":
+            pid = killed_at_a_call(out, study, luck.randrange(1, calls))
+        elif kind == "writing":
+            pid = killed_while_writing(out, study, luck.randrange(1, calls // 4))
+        else:
+            pid = killed_by_the_clock(out, study, luck.uniform(0, took))
+        was_killed = not ended(pid)
+        seen["killed"] += was_killed
+        seen[kind] += was_killed
+        seen["doubled"] += any(count > 1 for count in rows_of(out).values())
+        if not was_killed:
+            number += 1
+            seen["ended"] += 1
+            seen["equal"] += kit.files(out) == whole
+            seen["left behind"] += len([p for p in out.iterdir() if p.name.startswith(".")])
+    return dict(seen) | pairs(folder, study, whole, calls, luck)
+
+
+def pairs(folder: Path, study: Any, whole: Any, calls: int, luck: random.Random) -> dict[str, int]:
+    """Two runners on one folder, one of which is killed."""
+    seen = Counter[str]()
+    for number in range(PAIRS):
+        out = folder / f"pair-{number}"
+        killed = killed_at_a_call(out, study, luck.randrange(1, calls))
+        other = forked(lambda out=out: run(out, study))
+        seen["pairs"] += not ended(killed) and ended(other)
+        seen["pairs equal"] += kit.files(out) == whole
+        seen["pairs doubled"] += any(count > 1 for count in rows_of(out).values())
+    return dict(seen)
+
+
+# --- a full disk -----------------------------------------------------------------------
+
+
+def disk(folder: Path) -> dict[str, Any]:
+    """Give the disk a little more each time that it was full."""
+    study, told = kit.study_in(folder), []
+    plain = folder / "plain"
+    run(plain, study)
+    small = folder / "small"
+    small.mkdir()
+    size = STEP_KB
+    mount(small, size)
+    while True:
+        try:
+            run(small / "out", study)
+            break
+        except DvaSimError as error:
+            told.append(str(error))
+        size += STEP_KB
+        mount(small, size, "remount")
+    equal = kit.files(small / "out") == kit.files(plain)
+    (small / "ballast").write_bytes(bytes(shutil.disk_usage(small).free))
+    report = told_by(lambda: write_report(small / "out"))
+    (small / "ballast").unlink()
+    mount(small, 64 * 1024, "remount")
+    write_report(small / "out")
+    write_report(plain)
+    return {
+        "told": told,
+        "equal": equal,
+        "report": report,
+        "report equal": html(small / "out") == html(plain),
+        "left behind": [p.name for p in (small / "out").iterdir() if p.name.startswith(".")],
+    }
+
+
+def mount(where: Path, size_kb: int, *options: str) -> None:
+    words = ",".join([*options, f"size={size_kb}k"])
+    subprocess.run(["mount", "-t", "tmpfs", "-o", words, "tmpfs", where], check=True)
+
+
+def told_by(work: Callable[[], object]) -> str:
+    try:
+        work()
+    except DvaSimError as error:
+        return str(error)
+    return ""
+
+
+def html(folder: Path) -> bytes:
+    return (folder / "report.html").read_bytes()
+
+
+if __name__ == "__main__":
+    print(json.dumps({"kills": kills, "disk": disk}[sys.argv[1]](Path(sys.argv[2]))))

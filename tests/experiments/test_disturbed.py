@@ -1,0 +1,63 @@
+"""Kills at any moment, two runners at once and full disks: the end is that of a quiet run."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import disturbed_study as kit
+import pytest
+
+TESTS = Path(kit.__file__).parent
+NAMESPACE = ["unshare", "--map-root-user", "--mount"]
+
+
+def told(*words: str | Path) -> dict[str, Any]:
+    path = os.pathsep.join(map(str, (TESTS.parent, TESTS)))
+    environment = {**os.environ, "PYTHONPATH": path}
+    ran = subprocess.run(
+        list(map(str, words)), capture_output=True, text=True, env=environment, check=False
+    )
+    assert ran.returncode == 0, ran.stderr
+    return json.loads(ran.stdout)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
+def test_a_hundred_kills_at_any_moment_lose_and_double_nothing(tmp_path: Path) -> None:
+    found = told(sys.executable, "-m", "disturbed_study", "kills", tmp_path)
+    assert found["killed"] >= 100
+    assert min(found["call"], found["writing"], found["clock"]) >= 10
+    assert found["ended"] >= 5
+    assert found["equal"] == found["ended"]
+    assert (found["doubled"], found["left behind"]) == (0, 0)
+    assert found["pairs"] == found["pairs equal"] == kit.PAIRS
+    assert found["pairs doubled"] == 0
+
+
+def mounts_are_allowed(folder: Path) -> bool:
+    if shutil.which("unshare") is None:
+        return False
+    words = [*NAMESPACE, "mount", "-t", "tmpfs", "tmpfs", str(folder)]
+    return subprocess.run(words, capture_output=True, check=False).returncode == 0
+
+
+@pytest.mark.slow
+def test_a_full_disk_is_told_in_one_line_and_nothing_is_lost(tmp_path: Path) -> None:
+    if not mounts_are_allowed(tmp_path):
+        pytest.skip("this system lets nobody but root mount a small disk")
+    found = told(*NAMESPACE, sys.executable, "-m", "disturbed_study", "disk", tmp_path)
+    assert len(found["told"]) >= 3
+    assert all("\n" not in line for line in found["told"])
+    assert any("journal.sqlite: the disk is full" in line for line in found["told"])
+    assert any("tables cannot be written" in line for line in found["told"])
+    assert found["equal"]
+    assert found["report"]
+    assert "\n" not in found["report"]
+    assert found["report equal"]
+    assert found["left behind"] == []
