@@ -36,9 +36,9 @@ def _usual(reading: Reading) -> Iterator[str]:
     )
     yield (
         f"The person is the cluster: {block}s are averaged within a person first, and intervals "
-        "are taken over persons. Intervals of one level are bootstrap-t over persons, symmetric; "
-        "bands cover all levels of a line at once (max-t over a bootstrap of persons). Both are "
-        "Monte Carlo intervals, given the model."
+        "are taken over persons. Intervals of one level reach as far as Student's or the "
+        "bootstrap-t over persons does; bands cover all levels of a line at once (max-t over a "
+        "bootstrap of persons). Both are Monte Carlo intervals, given the model."
     )
     if POINT in study.get("factors", {}):
         yield (

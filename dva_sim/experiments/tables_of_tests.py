@@ -35,9 +35,10 @@ def hypothesis_table(tested: Sequence[Tested]) -> CellTable:
         for t in tested
     ]
     note = (
-        "A claim holds where its own test (permutation of persons beyond the margin; two one-sided "
-        "tests for sameness) stays below 5 % after Holm's adjustment within its family. It does "
-        "not hold where the 95 % interval rules it out. All else is open: absence of evidence."
+        "A claim holds where its own test (one-sided against the margin, bootstrap-t over persons; "
+        "two one-sided tests for sameness) stays below 5 % after Holm's adjustment within its "
+        "family. It does not hold where the 95 % interval rules it out. All else is open: absence "
+        "of evidence."
     )
     return CellTable("", heads, len(heads), rows, note=note)
 

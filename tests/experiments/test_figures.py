@@ -1,24 +1,32 @@
+import itertools
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import synthetic_study
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
 from dva_sim.experiments.cadence import Cadence
 from dva_sim.experiments.effects import Factor, Part, View
 from dva_sim.experiments.figures.commands import command_rate
 from dva_sim.experiments.figures.effect import _band, _fit_to
+from dva_sim.experiments.figures.factorial import effects
 from dva_sim.experiments.figures.ground import Ways
+from dva_sim.experiments.figures.heat import heat_map
 from dva_sim.experiments.figures.story import Events, fates, outcomes, responses
 from dva_sim.experiments.figures.style import (
     _apart,
     colours,
     log_axis,
+    marks,
     panel_grid,
     panel_name,
     panels,
     place_of,
     styled,
 )
+from dva_sim.experiments.figures.tradeoff import tradeoff
 from dva_sim.experiments.statistics import band
 
 DELAY = Factor("link.delay_s", (0.0, 0.05, 0.1, 0.25, 0.5, 1.0))
@@ -168,3 +176,85 @@ def test_nobody_who_never_came_has_a_panel_and_one_fate_needs_no_picture(view):
     assert outcomes(view, events) is None
     drawn = responses(view, events)
     assert f"all {len(events):,} were confirmed by a robot" in drawn.caption
+
+
+# Machado, Oliveira & Fernandes, IEEE Trans. Vis. Comput. Graph. 15 (2009) 1291: deuteranopia.
+DEUTERANOPIA = np.array(
+    [
+        [0.367322, 0.860646, -0.227968],
+        [0.280085, 0.672501, 0.047413],
+        [-0.011820, 0.042940, 0.968881],
+    ]
+)
+
+
+def seen_by_the_colour_blind(colour):
+    """A colour's linear red, green and blue as one without green cones sees it."""
+    rgb = np.array(to_rgb(colour))
+    linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
+    return DEUTERANOPIA @ linear
+
+
+@pytest.mark.parametrize("factor", [PATTERN, Factor("control", ("a", "b", "c", "d", "e", "f"))])
+def test_lines_differ_for_the_colour_blind_and_by_their_marks_in_a_print(factor):
+    seen = [seen_by_the_colour_blind(colour) for colour in colours(factor).values()]
+    apart = [np.linalg.norm(a - b) for a, b in itertools.combinations(seen, 2)]
+    assert min(apart) > 0.1
+    assert len(set(marks(factor).values())) == len(factor.levels)
+
+
+def two_factor_view(effect):
+    """Robot minus guard at 4 x 3 settings, for 8 persons of whom none differs from the others."""
+    rng = np.random.default_rng(1)
+    ratio, mobilisation = Factor("ratio", (0.5, 1.0, 2.0, 4.0)), Factor("wait_s", (0.0, 20.0, 40.0))
+    team = Factor("team", ("robot", "guard"))
+    rows = [
+        {"part": "d", "person": person, "trial": 0, "seed": person, "is_reference": False}
+        | {"team": who, "ratio": r, "wait_s": w}
+        | {"response_s": 60.0 + effect(r, w) * (who == "robot") + rng.normal(0, 0.5)}
+        for person in range(8)
+        for who in team.levels
+        for r in ratio.levels
+        for w in mobilisation.levels
+    ]
+    part = Part(synthetic_study.columns(rows), "d", [team, ratio, mobilisation])
+    return View(part, "response_s", team, ratio, ("robot", "guard"), {})
+
+
+def test_the_heat_map_draws_the_line_where_the_effect_turns_round():
+    with styled():
+        drawn = heat_map(two_factor_view(lambda ratio, wait: 10 * np.log2(ratio) - 0.5 * wait))
+    assert "Thick line: where the mean difference is zero" in drawn.caption
+    rows = drawn.csv.decode().splitlines()
+    assert rows[0] == "wait_s,ratio,mean_s,band_low_s,band_high_s"
+    assert len(rows) == 1 + 12
+
+
+def test_a_heat_map_without_a_change_of_sign_has_no_line():
+    with styled():
+        drawn = heat_map(two_factor_view(lambda ratio, wait: 30.0 + wait))
+    assert "zero nowhere" in drawn.caption
+
+
+def test_a_second_factor_of_two_levels_needs_no_heat_map(view):
+    assert heat_map(view) is None
+
+
+def test_main_effects_and_interactions_are_those_put_in():
+    with styled():
+        drawn = effects(two_factor_view(lambda ratio, wait: 2.0 * ratio + 0.1 * wait))
+    rows = [row.split(",") for row in drawn.csv.decode().splitlines()[1:]]
+    found = {(name, to): float(mean) for name, _, to, mean, *_ in rows}
+    assert found["team", "robot"] == pytest.approx(2.0 * 1.875 + 0.1 * 20, abs=0.3)
+    assert found["team x ratio", "robot x 4.0"] == pytest.approx(2.0 * 3.5, abs=0.5)
+    assert found["ratio x wait_s", "4.0 x 40.0"] == pytest.approx(0.0, abs=0.6)
+
+
+def test_the_tradeoff_needs_an_exposure_that_varies():
+    view = two_factor_view(lambda ratio, wait: 5.0)
+    assert tradeoff(view) is None
+    exposed = np.where(view.part.treated["team"] == "guard", 40.0, 2.0)
+    part = Part(view.part.treated | {"person_exposure_s": exposed}, "d", view.part.factors)
+    with styled():
+        drawn = tradeoff(replace(view, part=part))
+    assert drawn.title == "The trade-off: response time against time of people in danger"

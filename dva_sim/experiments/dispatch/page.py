@@ -276,8 +276,9 @@ def method(shifts: Shifts, correlation: float | None) -> list[str]:
         "an escalated event counts as never reached, though others may see to it.",
         f"The bound is the response to each event by {BOUND}. It is none for who is out already "
         "and near: how many events were reached sooner stands in the table.",
-        "Intervals of one entry are bootstrap-t over shifts, symmetric; bands hold all entries at "
-        "once (max-t over a bootstrap of shifts). All are Monte Carlo intervals, given the model.",
+        "Intervals of one entry reach as far as Student's or the bootstrap-t over shifts does; "
+        "bands hold all entries at once (max-t over a bootstrap of shifts). All are Monte Carlo "
+        "intervals, given the model.",
         "Use, exposure and evenness are of the whole measured time; what the desk counted "
         "(redirected, relocated, overruled) of the whole run.",
         "Not modelled: bodies, cameras, the network and driving (responders are travel and service "

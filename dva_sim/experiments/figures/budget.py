@@ -11,6 +11,7 @@ from dva_sim.experiments.figures.numbers import Numbers
 from dva_sim.experiments.figures.style import (
     INK,
     Drawn,
+    bars,
     finish,
     outer_labels,
     panels,
@@ -82,18 +83,10 @@ def _stack(ax: Axes, means: dict[str, Floats]) -> None:
     floor = np.zeros(len(next(iter(means.values()))))
     for stage, values in means.items():
         _, colour, hatch = _STAGES[stage]
-        heights = np.nan_to_num(values)
-        ax.bar(
-            range(len(values)),
-            heights,
-            0.72,
-            floor,
-            color=colour,
-            hatch=hatch,
-            edgecolor="white",
-            lw=0.5,
-        )
-        floor = floor + heights
+        top = floor + np.nan_to_num(values)
+        bars(ax, floor, top, colour, hatch)
+        floor = top
+    ax.set_ylim(bottom=0)
 
 
 def _mark(ax: Axes, measured: Floats) -> None:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dva_sim.experiments.effects import Factor, Floats, Setting, View
+from dva_sim.experiments.effects import MOST_PANELS, Factor, Floats, Setting, View
 from dva_sim.experiments.figures.numbers import Numbers, with_unit
 from dva_sim.experiments.figures.style import (
     INK,
@@ -15,10 +16,11 @@ from dva_sim.experiments.figures.style import (
     axis_label,
     finish,
     level_axis,
+    panel_title,
     panels,
     stops_axis,
 )
-from dva_sim.experiments.labels import level_name, measure_name, number, setting
+from dva_sim.experiments.labels import Level, level_name, measure_name, number
 from dva_sim.experiments.statistics import band
 
 if TYPE_CHECKING:
@@ -37,7 +39,7 @@ class Field:
 
     Attributes:
         second: The factor along y.
-        panel: Levels of all factors that are not shown.
+        panel: Levels of all factors that are not along an axis.
         mean: First minus second level of the contrast.
         low: Lower edge of the band that covers all pairs at once.
         high: Its upper edge.
@@ -52,25 +54,30 @@ class Field:
 
 def heat_map(view: View) -> Drawn | None:
     """The declared contrast over two factors; None where there is no second one worth it."""
-    field = _field(view)
-    if field is None or view.over is None or view.line is None or view.contrast is None:
+    fields = _fields(view)
+    if not fields or view.over is None or view.line is None or view.contrast is None:
         return None
-    rows = len(field.second.levels)
-    figure, ((ax,),) = panels(1, 1, max(2.6, 1.3 + 0.42 * rows))
-    first, second = (level_name(view.line.name, level) for level in view.contrast)
-    image = _colours(ax, field.mean)
-    has_zero = _contours(ax, field)
-    _write(ax, field, image)
-    stops_axis(ax, view.over)
-    level_axis(ax, field.second)
-    ax.grid(False)
-    bar = figure.colorbar(image, ax=ax, pad=0.02)
-    bar.set_label(axis_label(view.measure, f"{first}\nminus {second}"))
-    within = f" ({setting(field.panel)})" if field.panel else ""
-    title = f"{first} minus {second} in {measure_name(view.measure)}, over two factors{within}"
-    return finish(
-        figure, "heat_map", title, _caption(first, second, has_zero), _numbers(view, field)
-    )
+    second = fields[0].second
+    figure, grid = panels(len(fields), 1, max(2.4, 1.0 + 0.38 * len(second.levels)), sharex=True)
+    axes = [ax for (ax,) in grid]
+    first, other = (level_name(view.line.name, level) for level in view.contrast)
+    reach = max(float(np.nanmax(abs(field.mean))) for field in fields) or 1.0
+    has_zero = False
+    for ax, field in zip(axes, fields, strict=True):
+        image = _colours(ax, field.mean, reach)
+        has_zero |= _contours(ax, field)
+        _write(ax, field, image, reach)
+        level_axis(ax, second)
+        stops_axis(ax, view.over)
+        panel_title(ax, field.panel)
+        ax.grid(False)
+    for ax in axes[:-1]:
+        ax.set_xlabel("")
+    bar = figure.colorbar(image, ax=axes, pad=0.02)
+    bar.set_label(axis_label(view.measure, f"{first}\nminus {other}"))
+    title = f"{first} minus {other} in {measure_name(view.measure)}, over two factors"
+    numbers = _numbers(view, fields)
+    return finish(figure, "heat_map", title, _caption(first, other, has_zero), numbers)
 
 
 def _caption(first: str, second: str, has_zero: bool) -> str:
@@ -82,24 +89,28 @@ def _caption(first: str, second: str, has_zero: bool) -> str:
     )
     return (
         f"In each field the mean difference, paired by person and trial. {_ABOVE}: {first} lies "
-        f"above {second}, {_BELOW}: below, by the 95 % band that covers all fields at once; "
-        f"without a mark it cannot be told from zero. {line}"
+        f"above {second}, {_BELOW}: below, by the 95 % band that covers all fields of a panel at "
+        f"once; without a mark it cannot be told from zero. {line}"
     )
 
 
-def _field(view: View) -> Field | None:
+def _fields(view: View) -> list[Field]:
+    """One for each setting of the factors that are not shown, as many as there is room for."""
     second = _second(view)
-    if second is None or view.contrast is None or view.over is None:
-        return None
-    rest = {name: level for name, level in view.panels[0].items() if name != second.name}
-    first, other = view.contrast
-    columns = [
-        view.difference(rest | {second.name: level}, first, other) for level in second.levels
-    ]
+    if second is None or view.contrast is None:
+        return []
+    rest = [{k: v for k, v in panel.items() if k != second.name} for panel in view.panels]
+    settings = [panel for n, panel in enumerate(rest) if panel not in rest[:n]]
+    fields = [_field(view, second, view.contrast, panel) for panel in settings[:MOST_PANELS]]
+    return [field for field in fields if np.isfinite(field.mean).any()]
+
+
+def _field(view: View, second: Factor, contrast: tuple[Level, Level], panel: Setting) -> Field:
+    columns = [view.difference(panel | {second.name: x}, *contrast) for x in second.levels]
     values = np.stack(columns, axis=1)  # (persons, levels of the second, stops)
     found, shape = band(values.reshape(len(values), -1)), values.shape[1:]
     mean, low, high = (x.reshape(shape) for x in (found.mean, found.low, found.high))
-    return Field(second, rest, mean, low, high) if np.isfinite(mean).any() else None
+    return Field(second, panel, mean, low, high)
 
 
 def _second(view: View) -> Factor | None:
@@ -111,9 +122,8 @@ def _second(view: View) -> Factor | None:
     return max(worth, key=lambda f: (len(f.levels), f.is_numeric), default=None)
 
 
-def _colours(ax: Axes, mean: Floats) -> QuadMesh:
+def _colours(ax: Axes, mean: Floats, reach: float) -> QuadMesh:
     """Fields from purple, below zero, over white to orange: far apart for every eye."""
-    reach = float(np.nanmax(abs(mean))) or 1.0
     return ax.pcolormesh(
         *np.meshgrid(np.arange(mean.shape[1] + 1) - 0.5, np.arange(mean.shape[0] + 1) - 0.5),
         np.ma.masked_invalid(mean),
@@ -125,9 +135,8 @@ def _colours(ax: Axes, mean: Floats) -> QuadMesh:
     )
 
 
-def _write(ax: Axes, field: Field, image: QuadMesh) -> None:
+def _write(ax: Axes, field: Field, image: QuadMesh, reach: float) -> None:
     """Numbers and marks: no colour is needed to read them, nor is it in a print."""
-    reach = float(np.nanmax(abs(field.mean))) or 1.0
     for (y, x), mean in np.ndenumerate(field.mean):
         if not np.isfinite(mean):
             continue
@@ -170,10 +179,11 @@ def _contours(ax: Axes, field: Field) -> bool:
     return has_zero
 
 
-def _numbers(view: View, field: Field) -> Numbers:
+def _numbers(view: View, fields: Sequence[Field]) -> Numbers:
     numbers = Numbers()
-    for row, level in enumerate(field.second.levels):
+    for field in fields:
         edges = {"mean": field.mean, "band_low": field.low, "band_high": field.high}
-        told = {with_unit(name, view.measure): values[row] for name, values in edges.items()}
-        numbers.add(field.panel | {field.second.name: level}, view.along_x() | told)
+        for row, level in enumerate(field.second.levels):
+            told = {with_unit(name, view.measure): values[row] for name, values in edges.items()}
+            numbers.add(field.panel | {field.second.name: level}, view.along_x() | told)
     return numbers

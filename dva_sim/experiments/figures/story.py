@@ -18,6 +18,7 @@ from dva_sim.experiments.effects import (
 from dva_sim.experiments.figures.numbers import Numbers
 from dva_sim.experiments.figures.style import (
     Drawn,
+    bars,
     colours,
     dodge,
     finish,
@@ -208,11 +209,11 @@ def _quantiles(times: list[Floats]) -> dict[str, Any]:
 
 def _stack(ax: Axes, shares: list[dict[str, float]]) -> None:
     """A bar for each stop, its fates on top of each other."""
-    x, floor = range(len(shares)), np.zeros(len(shares))
+    floor = np.zeros(len(shares))
     for fate, colour in _FATES.items():
         heights = np.nan_to_num([share[fate] for share in shares])
         if heights.any():
-            ax.bar(x, heights, 0.72, floor, color=colour, edgecolor="white", lw=0.4)
+            bars(ax, floor, floor + heights, colour)
         floor = floor + heights
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dva_sim.experiments.effects import Factor, Setting, View
+from dva_sim.experiments.effects import Factor, Floats, Setting, View
 from dva_sim.experiments.figures.numbers import Numbers
 from dva_sim.experiments.labels import (
     Level,
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 _TITLE = 78  # characters of a title that the width holds
 _CROWDED = 45  # characters of ticks that fit beside each other in the width
+_HALF = 0.36  # of a bar's width, in stops
 _LEAST_TICK = 8  # characters of a tick's name in a line
 _ROW_LABEL = 28  # characters that the height of a row holds
 WIDTH = 8.4  # [in]; on screen and on paper it is stretched or shrunk to the column
@@ -173,6 +174,20 @@ def axis_label(name: str, text: str | None = None) -> str:
 def wrapped(text: str, width: int = 38) -> str:
     """Text in lines of at most `width` characters."""
     return "\n".join(textwrap.wrap(text, width))
+
+
+def bars(axes: Axes, floor: Floats, top: Floats, colour: str, hatch: str = "") -> None:
+    """A bar at each stop, from `floor` to `top` `(stops,)`: one artist for all of them."""
+    from matplotlib.collections import PolyCollection
+
+    left = np.arange(len(floor)) - _HALF
+    right = left + 2 * _HALF
+    x, y = np.stack([left, right, right, left]), np.stack([floor, floor, top, top])
+    corners = np.stack([x, y], axis=-1).swapaxes(0, 1)
+    look: dict[str, Any] = {"facecolor": colour, "hatch": hatch, "edgecolor": "white", "lw": 0.5}
+    axes.add_collection(PolyCollection(list(corners), **look))
+    axes.update_datalim([(-_HALF, 0.0), (len(floor) - 1 + _HALF, float(np.max(top, initial=0.0)))])
+    axes.autoscale_view()
 
 
 def stops_axis(axes: Axes, over: Factor | None) -> None:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 EXPOSURES = ("exposure_look_s", "exposure_s", "person_exposure_s")
-RESPONSES = ("response_mean_s", "response_s", "drive_time_s")
+RESPONSES = ("response_mean_s", "confirmation_mean_s", "response_s", "drive_time_s")
 
 
 def tradeoff(view: View) -> Drawn | None:

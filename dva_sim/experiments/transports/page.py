@@ -50,9 +50,9 @@ def method(correlation: float | None) -> list[str]:
         "The person is the cluster: intervals are taken over persons. A person's run meets the "
         "same beginnings of all flows, the same noise of hand and judgement and the same place in "
         f"the measured time under every transport; differences are taken within it.{alike}",
-        "Intervals of one level are bootstrap-t over persons, symmetric; bands cover all levels of "
-        "a line at once (max-t over a bootstrap of persons). Both are Monte Carlo intervals, given "
-        "the model.",
+        "Intervals of one level reach as far as Student's or the bootstrap-t over persons does; "
+        "bands cover all levels of a line at once (max-t over a bootstrap of persons). Both are "
+        "Monte Carlo intervals, given the model.",
         "Trinomial, RTNP, IRTP and BTP are in the manner of their papers: only abstracts could be "
         "read, laws and numbers are not theirs. What is found here speaks for the laws as they "
         "stand in the program, which says of each what is missing.",

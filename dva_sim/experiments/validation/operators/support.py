@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 from dva_sim.experiments.validation.operators.targets import SupportConfig, load_targets
 
 
+@cache
 def supports_of(strategy: str) -> tuple[SupportConfig, ...]:
     """What is known of a strategy, from short delays on; nothing if no published data speak of it.
 

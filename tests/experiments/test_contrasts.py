@@ -1,0 +1,84 @@
+import pytest
+import synthetic_study
+
+from dva_sim.experiments.contrasts import compare_all, judge_hypotheses
+from dva_sim.experiments.tables_of_tests import comparison_table, hypothesis_table
+
+PLAIN = {"part": "drive", "measure": "drive_time_s", "factor": "pattern"}
+COST = PLAIN | {"contrast": ["req-rep", "latest-wins"], "over": "link.delay_s"}
+SAME = PLAIN | {"contrast": ["pub-sub", "latest-wins"], "within": {"link.delay_s": 0.0}}
+
+
+@pytest.fixture(scope="module")
+def runs():
+    """Request/reply costs 40 s more at 1 s of delay, and 2.5 s at 250 ms."""
+    rows = synthetic_study.drive_rows(10, 2, effect_s=40.0, missed=0.0)
+    return synthetic_study.columns(rows)
+
+
+def study(**claims):
+    return synthetic_study.manifest(10, 2)["study"] | claims
+
+
+def test_a_comparison_is_made_at_each_level_it_runs_over(runs):
+    found = compare_all(study(comparisons={"cost": COST}), runs)
+    assert [c.at["link.delay_s"] for c in found] == [0.0, 0.05, 0.1, 0.25, 0.5, 1.0]
+    last = found[-1]
+    assert last.difference.mean == pytest.approx(40.0, abs=2.0)
+    assert last.p == pytest.approx(2 / 2**10)  # of 10 persons all went the same way
+    assert last.adjusted == pytest.approx(6 * last.p)  # the smallest of six
+    assert last.correlation > 0.9
+
+
+def test_the_table_of_comparisons_says_how_many_tests_there_are(runs):
+    found = compare_all(study(comparisons={"cost": COST, "same": SAME | {"family": "aside"}}), runs)
+    table = comparison_table(found)
+    assert len(table.rows) == 7
+    assert table.rows[5][-1] == "✓ yes"
+    assert "main: 6; aside: 1" in table.note
+
+
+def test_a_comparison_of_levels_that_were_not_run_is_said_not_to_have_been(runs):
+    (found,) = compare_all(study(comparisons={"x": SAME | {"contrast": ["pub-sub", "tcp"]}}), runs)
+    assert found.difference is None
+    assert comparison_table([found]).rows[0][3] == "not run"
+
+
+@pytest.mark.parametrize(
+    ("claim", "verdict"),
+    [
+        ({"direction": "above", "margin": 20.0}, "held"),
+        ({"direction": "above", "margin": 60.0}, "did not hold"),
+        ({"direction": "below"}, "did not hold"),
+        ({"direction": "same", "margin": 5.0}, "did not hold"),
+        ({"direction": "same", "margin": 5.0, "comparison": "same"}, "held"),
+        ({"direction": "above", "comparison": "same"}, "open"),
+    ],
+)
+def test_a_hypothesis_is_judged_by_its_margin(runs, claim, verdict):
+    declared = study(comparisons={"same": SAME}, hypotheses={"h": claim})
+    (tested,) = judge_hypotheses(declared, runs)
+    assert tested.verdict == verdict
+
+
+def test_the_table_of_hypotheses_sets_claims_beside_what_came_out(runs):
+    declared = study(
+        hypotheses={"h": {"text": "Waiting costs.", "direction": "above", "margin": 2}}
+    )
+    row = hypothesis_table(judge_hypotheses(declared, runs)).rows[0]
+    assert row[0] == "h: Waiting costs."
+    assert row[1].endswith(
+        "profile default, one-way delay 1\N{NO-BREAK SPACE}s: above 2.0\N{NO-BREAK SPACE}s"
+    )
+    assert row[4] == "✓ held"
+
+
+def test_levels_that_a_comparison_does_not_name_are_averaged(runs):
+    (found,) = compare_all(study(comparisons={"same": SAME}), runs)
+    here = (runs["part"] == "drive") & (runs["link.delay_s"] == 0.0) & ~runs["is_reference"]
+    both_profiles = {
+        pattern: runs["drive_time_s"][here & (runs["pattern"] == pattern)].mean()
+        for pattern in ("pub-sub", "latest-wins")
+    }
+    expected = both_profiles["pub-sub"] - both_profiles["latest-wins"]
+    assert found.difference.mean == pytest.approx(expected, abs=1e-9)

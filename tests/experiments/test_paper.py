@@ -1,0 +1,82 @@
+import re
+
+import pytest
+from matplotlib.figure import Figure
+
+from dva_sim.experiments.blocks import Box, Heading, Items, Printed, Shown, Verbatim, Words
+from dva_sim.experiments.cells import CellTable
+from dva_sim.experiments.figures.numbers import Numbers
+from dva_sim.experiments.figures.style import finish
+from dva_sim.experiments.paper import write_pdf
+from dva_sim.experiments.typeset import Face, broken, columns_that_fit, width_of
+
+FACE = Face(9)
+
+
+def drawn():
+    figure = Figure(figsize=(8.4, 3))
+    figure.subplots().plot([0, 1], [0, 1])
+    return finish(figure, "line", "A line", "It ascends.")
+
+
+def blocks():
+    rows = [[f"cell {n}", "1.0 (0.5 to 1.5)"] for n in range(80)]
+    return [
+        Words("Declared", "label"),
+        Box(("It costs 4.5 s.", "With an interval.")),
+        Heading("Figures"),
+        Shown(drawn()),
+        Items(("one", "two")),
+        Printed(CellTable("drive", ["cell", "mean"], 1, rows, note="All of them.")),
+        Verbatim("Manifest", '{\n  "seed": 1\n}'),
+    ]
+
+
+def test_a_report_on_paper_has_the_same_bytes_whenever_it_is_set(tmp_path):
+    for name in ("a.pdf", "b.pdf"):
+        write_pdf(tmp_path / name, "What does it cost?", blocks())
+    content = (tmp_path / "a.pdf").read_bytes()
+    assert content == (tmp_path / "b.pdf").read_bytes()
+    assert b"CreationDate (D:20000101000000Z)" in content
+
+
+def test_a_table_goes_on_over_pages_and_figures_stay_vectors(tmp_path):
+    write_pdf(tmp_path / "a.pdf", "What does it cost?", blocks())
+    content = (tmp_path / "a.pdf").read_bytes()
+    assert len(re.findall(rb"/Type /Page\b", content)) == 3
+    assert b"/Subtype /Image" not in content
+
+
+def test_text_is_broken_into_lines_that_fit_and_loses_no_word():
+    text = "the quick brown fox jumps over the lazy dog " * 5
+    lines = list(broken(text, FACE, 120.0))
+    assert max(width_of(line, FACE) for line in lines) <= 120.01
+    assert " ".join(lines).split() == text.split()
+
+
+def test_a_word_wider_than_the_line_is_cut():
+    lines = list(broken("x" * 100, FACE, 60.0))
+    assert len(lines) > 1
+    assert "".join(lines) == "x" * 100
+
+
+@pytest.mark.parametrize(
+    ("room", "groups"),
+    [(100.0, [[0, 1, 2, 3]]), (60.0, [[0, 1, 2], [0, 3]]), (10.0, [[0, 1], [0, 2], [0, 3]])],
+)
+def test_columns_that_do_not_fit_go_below_with_the_names_of_their_rows(room, groups):
+    assert columns_that_fit([20.0] * 4, labels=1, room=room) == groups
+
+
+def test_numbers_behind_a_figure_are_rows_with_levels_and_gaps():
+    numbers = Numbers()
+    numbers.add(
+        {"pattern": "req-rep"}, {"link.delay_s": [0.0, 0.5], "mean_s": [1.25, float("nan")]}
+    )
+    numbers.row({"pattern": None}, is_found=True)
+    assert numbers.csv().decode().splitlines() == [
+        "pattern,link.delay_s,mean_s,is_found",
+        "req-rep,0,1.25,",
+        "req-rep,0.5,,",
+        ",,,true",
+    ]
