@@ -63,26 +63,31 @@ def cumulative_incidence(
     what[moments > horizon] = ""
     names = [str(name) for name in np.unique(what) if name]
     persons, owner = np.unique(who, return_inverse=True)
-    weights = np.vstack([np.ones(len(owner)), np.arange(len(persons))[:, None] != owner])
-    shares = _aalen_johansen(np.minimum(moments, horizon), what, names, weights)
+    shares = _aalen_johansen(np.minimum(moments, horizon), what, names, owner)
     intervals = [_interval(share, len(persons), len(owner), level) for share in shares]
     return Incidence(horizon, dict(zip(names, intervals[:-1], strict=True)), intervals[-1])
 
 
 def _aalen_johansen(
-    times: Floats, what: NDArray[Any], names: Sequence[str], weights: Floats
+    times: Floats, what: NDArray[Any], names: Sequence[str], owner: NDArray[np.intp]
 ) -> Floats:
-    """Shares of each cause and of none `(causes + 1, b)` for runs weighted `(b, n)`."""
+    """Shares of each cause and of none `(causes + 1, 1 + persons)`: of all, and without each."""
     steps, place = np.unique(times, return_inverse=True)
-    at = place[:, np.newaxis] == np.arange(len(steps))
-    leaving = weights @ at
-    at_risk = np.cumsum(leaving[:, ::-1], axis=1)[:, ::-1]
-    struck = np.array([weights @ (at & (what == name)[:, np.newaxis]) for name in names])
-    hazards = struck / np.maximum(at_risk, 1)
-    hazards = hazards.reshape(len(names), *at_risk.shape)
-    alive = np.cumprod(1 - hazards.sum(axis=0), axis=1)
-    before = np.hstack([np.ones((len(alive), 1)), alive[:, :-1]])
-    return np.vstack([(hazards * before).sum(axis=2), alive[:, -1:].T if len(steps) else []])
+    shape = int(owner.max(initial=-1)) + 1, len(steps)
+
+    def leaving(why: NDArray[np.bool_]) -> Floats:
+        """How many leave at each step `(1 + persons, steps)`."""
+        at = owner[why] * shape[1] + place[why]
+        own = np.bincount(at, minlength=shape[0] * shape[1]).reshape(shape)
+        return np.vstack([own.sum(axis=0), own.sum(axis=0) - own]).astype(float)
+
+    gone = leaving(np.ones(len(times), dtype=bool))
+    at_risk = np.maximum(np.cumsum(gone[:, ::-1], axis=1)[:, ::-1], 1)
+    hazards = [leaving(what == name) / at_risk for name in names]
+    alive = np.cumprod(1 - np.sum(hazards, axis=0) * np.ones_like(gone), axis=1)
+    alive = np.hstack([np.ones((len(alive), 1)), alive])
+    shares = [(hazard * alive[:, :-1]).sum(axis=1) for hazard in hazards]
+    return np.array([*shares, alive[:, -1]])
 
 
 def _interval(share: Floats, persons: int, runs: int, level: float) -> Interval:

@@ -63,9 +63,11 @@ def sobol_indices(
     """
     table = _table(_blocks(levels, np.asarray(cell)), values, person, cell)
     blocks, persons = len(table), table.shape[2]
-    whole = _indices(table, np.ones(blocks), np.ones(persons))
+    there = np.isfinite(table).astype(float)
+    filled = np.where(there, table, 0.0)
+    whole = _indices(filled, there, np.ones(blocks), np.ones(persons))
     chosen = zip(draws(blocks, seed, resamples), draws(persons, seed + 1, resamples), strict=True)
-    drawn = np.array([_indices(table, rows, columns) for rows, columns in chosen])
+    drawn = np.array([_indices(filled, there, rows, columns) for rows, columns in chosen])
     low, high = np.nanquantile(drawn, [(1 - level) / 2, (1 + level) / 2], axis=0)
     first, total = (
         [Interval(float(x), float(lo), float(hi), persons) for x, lo, hi in zip(*part, strict=True)]
@@ -105,19 +107,19 @@ def _blocks(levels: Mapping[str, ArrayLike], cell: NDArray[Any]) -> NDArray[Any]
     return cells.reshape(-1, factors + 2)
 
 
-def _indices(table: Floats, rows: Floats, columns: Floats) -> Floats:
-    """First-order and total indices `(2, d)` of `(N, d + 2, persons)`, weighted."""
-    there = np.isfinite(table)
+def _indices(filled: Floats, there: Floats, rows: Floats, columns: Floats) -> Floats:
+    """First-order and total indices `(2, d)` of `(N, d + 2, persons)`, weighted.
+
+    A block of which a cell is of nobody drawn is left out.
+    """
     weight = there @ columns
     with np.errstate(divide="ignore", invalid="ignore"):
-        y = np.where(there, table, 0.0) @ columns / weight
-        rows = np.where(np.isfinite(y).all(axis=1), rows, 0.0)
-        y = np.where(np.isfinite(y), y, 0.0)
+        rows = np.where((weight > 0).all(axis=1), rows, 0.0)
+        y = np.where(weight > 0, filled @ columns / weight, 0.0)
         share = rows / rows.sum()
-        ends = y[:, [0, -1]]
-        centre = (share @ ends).mean()
-        variance = (share @ (ends - centre) ** 2).mean()
-        a, mixed, b = y[:, :1], y[:, 1:-1], y[:, -1:]
-        first = share @ ((b - centre) * (mixed - a)) / variance
+        centre = (share @ y[:, [0, -1]]).mean()
+        a, mixed, b = y[:, :1] - centre, y[:, 1:-1] - centre, y[:, -1:] - centre
+        variance = float(share @ (a**2 + b**2)[:, 0]) / 2
+        first = share @ (b * (mixed - a)) / variance
         total = share @ (a - mixed) ** 2 / (2 * variance)
     return np.array([first, total])

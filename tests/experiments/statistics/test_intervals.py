@@ -20,10 +20,8 @@ def test_the_interval_of_a_paired_difference_is_that_of_a_bootstrap_t_written_ou
     person = np.repeat(np.arange(24), 5)
     found = statistics.paired_difference(a.ravel(), b.ravel(), person)
     off = (a - b).mean(axis=1)
-    ratios = []
-    for _ in range(20_000):
-        drawn = rng.choice(off, 24)
-        ratios.append((drawn.mean() - off.mean()) / stats.sem(drawn))
+    drawn = rng.choice(off, (20_000, 24))
+    ratios = (drawn.mean(axis=1) - off.mean()) / stats.sem(drawn, axis=1)
     students, either = stats.t.isf(0.025, 23), np.quantile(np.abs(ratios), 0.95)
     down = max(students, either, np.quantile(ratios, 0.975))
     up = max(students, either, -np.quantile(ratios, 0.025))
@@ -68,22 +66,6 @@ def test_nobody_at_all_gives_nan_everywhere():
         found = make([np.nan], [0])
         assert math.isnan(found.mean)
         assert found.n_persons == 0
-
-
-def test_the_paired_interval_covers_a_skewed_truth_nineteen_times_in_twenty():
-    rng = np.random.default_rng(11)
-    studies, persons, trials = 2000, 24, 5
-    skill = rng.lognormal(0, 0.4, (studies, persons, 1))
-    slow = 30 * skill * rng.lognormal(0, 0.3, (studies, persons, trials))
-    fast = 24 * skill * rng.lognormal(0, 0.3, (studies, persons, trials))
-    truth = 6 * math.exp(0.4**2 / 2 + 0.3**2 / 2)
-    who = np.repeat(np.arange(persons), trials)
-    found = [
-        statistics.paired_difference(a.ravel(), b.ravel(), who)
-        for a, b in zip(slow, fast, strict=True)
-    ]
-    covered = np.mean([f.low <= truth <= f.high for f in found])
-    assert 0.93 <= covered <= 0.97
 
 
 def skewed(rng: np.random.Generator, persons: int, levels: int) -> np.ndarray:
@@ -195,19 +177,6 @@ def test_clustered_failures_widen_the_interval_of_a_share():
     wide, narrow = (statistics.share_interval(f, person) for f in (clustered, spread))
     assert wide.mean == narrow.mean == 0.25
     assert wide.high - wide.low > 1.5 * (narrow.high - narrow.low)
-
-
-def test_pairs_correlate_as_much_as_they_share():
-    rng = np.random.default_rng(15)
-    common, own = rng.normal(size=(2, 100_000)), rng.normal(size=(2, 100_000))
-    found = statistics.pair_correlation(3 * common[0] + own[0], 3 * common[0] + own[1])
-    assert found == pytest.approx(0.9, abs=0.01)
-    assert statistics.pair_correlation([1, 2, np.nan], [2, 4, 0]) == pytest.approx(1)
-
-
-def test_no_correlation_where_one_side_never_varies():
-    assert math.isnan(statistics.pair_correlation([1, 1, 1], [1, 2, 3]))
-    assert math.isnan(statistics.pair_correlation([1], [2]))
 
 
 def test_a_level_at_which_most_persons_do_not_differ_does_not_make_the_band_endless():

@@ -1,0 +1,58 @@
+import math
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from dva_sim.experiments.statistics import bootstrap_interval
+from dva_sim.experiments.statistics.resampling import tails
+
+
+def test_the_tails_are_as_wide_as_makes_a_normal_mean_students():
+    """The draws' spread is sqrt(23/24) of the standard error."""
+    z = stats.norm.ppf(tails(0.95, 24))
+    t = stats.t.isf(0.025, 23)
+    assert z * math.sqrt(23 / 24) == pytest.approx([-t, t])
+
+
+def test_of_many_persons_it_is_the_bca_interval_of_scipy():
+    values = np.random.default_rng(1).gamma(1, 1, 150)
+    theirs = stats.bootstrap((values,), np.mean, method="BCa", rng=2).confidence_interval
+    found = bootstrap_interval(values, range(150), np.mean)
+    assert (found.low, found.high) == pytest.approx((theirs.low, theirs.high), abs=0.025)
+    assert found.mean == values.mean()
+
+
+def test_persons_are_drawn_with_all_their_trials():
+    means = np.random.default_rng(3).normal(size=20)
+    alone = bootstrap_interval(means, range(20), np.mean)
+    again = bootstrap_interval(np.repeat(means, 10), np.repeat(range(20), 10), np.mean)
+    assert (again.low, again.high) == pytest.approx((alone.low, alone.high))
+    assert again.n_persons == 20
+
+
+def test_a_ratio_of_two_columns_is_covered_nineteen_times_in_twenty():
+    rng = np.random.default_rng(4)
+    held = []
+    for _ in range(150):
+        skill = rng.gamma(4, 1, (24, 1))
+        runs = np.stack([skill * rng.gamma(4, 0.5, (24, 5)), skill * rng.gamma(4, 0.25, (24, 5))])
+        rows = runs.reshape(2, -1).T
+        found = bootstrap_interval(
+            rows, np.repeat(range(24), 5), lambda x: x[:, 0].sum() / x[:, 1].sum(), resamples=300
+        )
+        held.append(found.low <= 2 <= found.high)
+    assert 0.90 <= np.mean(held) <= 0.985
+
+
+def test_a_run_with_a_missing_value_is_left_out():
+    rows = [[1, 2], [np.nan, 3], [3, 6], [4, 8]]
+    found = bootstrap_interval(rows, [0, 0, 1, 2], lambda x: x.sum())
+    assert found.mean == 24
+
+
+def test_nobody_and_one_person_have_no_interval():
+    assert math.isnan(bootstrap_interval([np.nan], [0], np.mean).mean)
+    found = bootstrap_interval([1, 3], [0, 0], np.mean)
+    assert found.mean == 2
+    assert math.isnan(found.low)
