@@ -24,6 +24,7 @@ from dva_sim.experiments.typeset import (
     broken,
     columns_that_fit,
     width_of,
+    words_of,
 )
 
 _TITLE = Face(16, "bold")
@@ -223,8 +224,8 @@ def _widths(table: CellTable, cell: Face, head: Face) -> list[float]:
     return [
         _GAP
         + max(
-            max((width_of(row[i], cell) for row in table.rows), default=0.0),
-            max((width_of(word, head) for word in text.split()), default=0.0),
+            max((width_of(" ".join(words_of(row[i])), cell) for row in table.rows), default=0.0),
+            _longest(text, head),
         )
         for i, text in enumerate(table.heads)
     ]
@@ -248,4 +249,4 @@ def _squeezed(
 
 
 def _longest(text: str, face: Face) -> float:
-    return max((width_of(word, face) for word in text.split()), default=0.0)
+    return max((width_of(word, face) for word in words_of(text)), default=0.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -172,7 +173,7 @@ def width_of(text: str, face: Face) -> float:
 def broken(text: str, face: Face, width: float) -> Iterator[str]:
     """A text in lines no wider than `width` [pt]; words that are wider are cut."""
     space, line, used = width_of(" ", face), "", 0.0
-    for word in (piece for long in text.split() for piece in _cut(long, face, width)):
+    for word in (piece for long in words_of(text) for piece in _cut(long, face, width)):
         size = width_of(word, face)
         if line and used + space + size > width + _ROUNDING:
             yield line
@@ -181,6 +182,11 @@ def broken(text: str, face: Face, width: float) -> Iterator[str]:
             line, used = f"{line} {word}" if line else word, used + (space if line else 0) + size
     if line:
         yield line
+
+
+def words_of(text: str) -> list[str]:
+    """What a line may be broken between; a space that does not break is no such place."""
+    return [word for word in re.split(r"[ \n\t]+", text) if word]
 
 
 def shortened(text: str, face: Face, width: float) -> str:

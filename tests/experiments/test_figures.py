@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 
 from dva_sim.experiments.cadence import Cadence
 from dva_sim.experiments.effects import Factor, Part, View
+from dva_sim.experiments.figures.budget import delay_budget
 from dva_sim.experiments.figures.commands import command_rate
 from dva_sim.experiments.figures.effect import _band, _fit_to
 from dva_sim.experiments.figures.factorial import effects
@@ -201,6 +202,21 @@ def test_lines_differ_for_the_colour_blind_and_by_their_marks_in_a_print(factor)
     apart = [np.linalg.norm(a - b) for a, b in itertools.combinations(seen, 2)]
     assert min(apart) > 0.1
     assert len(set(marks(factor).values())) == len(factor.levels)
+
+
+def test_bars_of_a_lower_panel_are_not_cut_by_the_first(view):
+    columns = ("delay_uplink_s", "delay_downlink_s")
+    runs = {**view.part.treated, "is_reference": np.zeros(len(view.part.treated["part"]), bool)}
+    longer = np.where(runs["profile"] == "dissertation", 3.0, 1.0)
+    part = Part(runs | {name: runs[name] * longer for name in columns}, "drive", view.part.factors)
+    with styled():
+        drawn = delay_budget(replace(view, part=part))
+    top = max(ax.get_ylim()[1] for ax in drawn.figure.axes)
+    rows = [row.split(",") for row in drawn.csv.decode().splitlines()]
+    stages = [i for i, name in enumerate(rows[0]) if name.startswith("delay_")]
+    highest = max(sum(float(row[i]) for i in stages) for row in rows[1:])
+    assert highest > 6.0
+    assert top > highest
 
 
 def two_factor_view(effect):

@@ -20,7 +20,7 @@ def drawn():
 
 
 def blocks():
-    rows = [[f"cell {n}", "1.0 (0.5 to 1.5)"] for n in range(80)]
+    rows = [[f"cell\n{n}", "1.0 (0.5 to 1.5)"] for n in range(80)]
     return [
         Words("Declared", "label"),
         Box(("It costs 4.5 s.", "With an interval.")),
@@ -52,6 +52,11 @@ def test_text_is_broken_into_lines_that_fit_and_loses_no_word():
     lines = list(broken(text, FACE, 120.0))
     assert max(width_of(line, FACE) for line in lines) <= 120.01
     assert " ".join(lines).split() == text.split()
+
+
+def test_a_number_stays_with_its_unit():
+    lines = list(broken("takes 91.3\N{NO-BREAK SPACE}s longer", FACE, width_of("takes 91.3", FACE)))
+    assert lines == ["takes", "91.3\N{NO-BREAK SPACE}s", "longer"]
 
 
 def test_a_word_wider_than_the_line_is_cut():

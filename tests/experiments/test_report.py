@@ -133,6 +133,67 @@ def test_the_report_made_again_has_the_same_bytes(report):
     assert [path.read_bytes() for path in files] == before
 
 
+def test_the_question_and_the_answer_come_before_the_evidence_and_that_before_the_method(report):
+    text = words(report)
+    places = [
+        text.index(word)
+        for word in (
+            "REQ/REP or PUB/SUB",
+            "Declared: run as its file says",
+            "REQ/REP takes",
+            "Predictions, written down",
+            "What was compared",
+            "Figures",
+            "Every cell",
+            "Method",
+            "Manifest",
+        )
+    ]
+    assert places == sorted(places)
+
+
+def test_figures_of_an_older_report_do_not_stay(tmp_path):
+    facts = synthetic_study.manifest(2, 1, failures=[{"error": "no site"}])
+    folder = synthetic_study.write(tmp_path / "r", {}, facts)
+    (folder / "figures").mkdir()
+    for name in ("old.svg", "old.csv", "mine.txt"):
+        (folder / "figures" / name).touch()
+    write_report(folder)
+    assert [path.name for path in (folder / "figures").iterdir()] == ["mine.txt"]
+
+
+def test_a_pdf_is_made_when_asked_for_and_kept_up_to_date(tmp_path):
+    facts = synthetic_study.manifest(2, 1, failures=[{"error": "no site"}])
+    folder = synthetic_study.write(tmp_path / "r", {}, facts)
+    write_report(folder)
+    assert not (folder / "report.pdf").exists()
+    write_report(folder, pdf=True)
+    made = (folder / "report.pdf").read_bytes()
+    (folder / "report.pdf").write_bytes(b"old")
+    write_report(folder)
+    assert (folder / "report.pdf").read_bytes() == made
+
+
+def test_a_registered_study_is_called_confirmatory_and_its_hypotheses_stand_beside_the_result(
+    tmp_path,
+):
+    status = {"kind": "confirmatory", "why": [], "registration": {"hash": "1234"}}
+    facts = synthetic_study.manifest(8, 1, status=status)
+    facts["study"] |= {
+        "factors": {"pattern": synthetic_study.PATTERNS, "link.delay_s": [1.0]},
+        "hypotheses": {"waits": {"text": "It waits.", "direction": "above", "margin": 2.0}},
+    }
+    facts["study"]["answer"] |= {"within": {}}
+    rows = synthetic_study.drive_rows(8, 1, effect_s=30.0, missed=0.0)
+    runs = [r for r in of_one_profile(rows) if r["link.delay_s"] == 1.0 or r["is_reference"]]
+    text = words(write_report(synthetic_study.write(tmp_path / "r", {"runs": runs}, facts)))
+    assert "Confirmatory: run as registered beforehand" in text
+    assert "Registration: hash 1234." in text
+    assert "Registered hypotheses, beside what came out" in text
+    assert "waits: It waits. REQ/REP minus latest-wins PUB/SUB" in text
+    assert "✓ held" in text
+
+
 def test_every_cell_has_its_row(report):
     rows = re.findall(r"<tr.*?</tr>", report.read_text(encoding="utf-8"))
     cells = [row for row in rows if row.count("<td") > 5]

@@ -9,6 +9,7 @@ import numpy as np
 from dva_sim.experiments.dispatch import measures
 from dva_sim.experiments.dispatch.percentiles import pooled
 from dva_sim.experiments.dispatch.shifts import BEST, FLOOR, Shifts
+from dva_sim.experiments.figures.numbers import Numbers, with_unit
 from dva_sim.experiments.figures.style import (
     FAINT,
     INK,
@@ -84,7 +85,7 @@ def trade(shifts: Shifts) -> Drawn | None:
         f"comes on top and costs about {_act(shifts):.0f} s per event whoever was sent. "
         f"{_bars_words(shifts)}"
     )
-    return finish(figure, "trade", title, caption)
+    return finish(figure, "trade", title, caption, _scatter_numbers(shifts, "exposure_look_s"))
 
 
 def stages(shifts: Shifts) -> Drawn | None:
@@ -99,7 +100,8 @@ def stages(shifts: Shifts) -> Drawn | None:
         "somebody is on scene, and of the true ones until a person has dealt with them. The same "
         f"guards do both. {_bars_words(shifts)}"
     )
-    return finish(figure, "stages", title, caption)
+    numbers = _scatter_numbers(shifts, "containment_mean_s")
+    return finish(figure, "stages", title, caption, numbers)
 
 
 def _scatter(shifts: Shifts, column: str, label: str) -> Figure:
@@ -130,6 +132,19 @@ def _scatter(shifts: Shifts, column: str, label: str) -> Figure:
     axes[len(axes) // 2].set_xlabel(label)
     _key(figure, axes[0])
     return figure
+
+
+def _scatter_numbers(shifts: Shifts, column: str) -> Numbers:
+    """Means, and half-widths of the difference against the baseline."""
+    numbers = Numbers()
+    told: dict[str, Any] = {}
+    for name in ("response_mean_s", column):
+        told[name] = shifts.means(name)
+        told[with_unit(f"{name.removesuffix('_s')}_half_width", name)] = _half_widths(shifts, name)
+    for stop, title in enumerate(shifts.titles):
+        at_stop: dict[str, Any] = {name: values[:, stop] for name, values in told.items()}
+        numbers.add({"at": title}, at_stop | {"dispatch.policy": shifts.policies})
+    return numbers
 
 
 def _bars_words(shifts: Shifts) -> str:
@@ -172,12 +187,15 @@ def fates_in_time(shifts: Shifts) -> Drawn | None:
         return None
     chosen = chosen_policies(shifts)
     figure, axes = panels(len(shifts.stops), len(chosen), 2.0, sharex=True, sharey=True)
-    times = np.linspace(0.0, shifts.follow, 301)
+    times, numbers = np.linspace(0.0, shifts.follow, 301), Numbers()
     for stop, row in enumerate(axes):
         for policy, ax in zip(chosen, row, strict=True):
             events = dict(shifts.events_of(policy, stop))
             if len(events["event_id"]):
-                _stack(ax, measures.fates(events), times)
+                shares = _shares(measures.fates(events), times)
+                _stack(ax, shares, times)
+                where = {"at": shifts.titles[stop], "dispatch.policy": policy}
+                numbers.add(where, {"t_s": times} | shares)
             ax.set_xlim(0, shifts.follow)
             ax.set_ylim(0, 1)
             ax.grid(False)
@@ -195,7 +213,7 @@ def fates_in_time(shifts: Shifts) -> Drawn | None:
         "shares add up to one, and no outcome is taken for mere lack of patience. All events of "
         f"the cohort, true and false; each is followed for {shifts.follow:g} s."
     )
-    return finish(figure, "fates", "What becomes of events, and when", caption)
+    return finish(figure, "fates", "What becomes of events, and when", caption, numbers)
 
 
 def chosen_policies(shifts: Shifts) -> list[str]:
@@ -206,9 +224,13 @@ def chosen_policies(shifts: Shifts) -> list[str]:
     return list(dict.fromkeys(p for p in wanted if p in shifts.policies))[:4]
 
 
-def _stack(ax: Axes, curve: Any, times: Any) -> None:
+def _shares(curve: Any, times: Any) -> dict[str, Any]:
+    """Cumulative incidence of each outcome at these times, and what is still open."""
     shares = {fate: curve.at(times, 1 + i) for i, fate in enumerate(measures.FATES)}
-    shares["open"] = 1.0 - sum(shares.values())
+    return shares | {"open": 1.0 - sum(shares.values())}
+
+
+def _stack(ax: Axes, shares: dict[str, Any], times: Any) -> None:
     bottom = np.zeros_like(times)
     for fate, colour in _FATES.items():
         top = bottom + shares[fate]
@@ -223,10 +245,16 @@ def way(shifts: Shifts) -> Drawn | None:
     """How far of the way from the floor to the best possible each policy gets."""
     if shifts.target is None or not shifts.travellers:
         return None
-    names = shifts.travellers
+    names, numbers = shifts.travellers, Numbers()
     figure, (axes,) = panels(1, len(shifts.stops), _height(len(names)), sharey=True)
     for stop, ax in enumerate(axes):
         found = shifts.progress(stop)
+        told: dict[str, Any] = {
+            "share": found.mean,
+            "share_low": found.low,
+            "share_high": found.high,
+        }
+        numbers.add({"at": shifts.titles[stop]}, told | {"dispatch.policy": names})
         for row, policy in enumerate(names):
             colour, mark = look(policy, shifts.policies)
             ax.hlines(row, 100 * found.low[row], 100 * found.high[row], color=colour, lw=1.6)
@@ -239,7 +267,7 @@ def way(shifts: Shifts) -> Drawn | None:
     title = (
         f"How much of what can be gained in response each policy gains: 0 is {FLOOR}, 100 {target}"
     )
-    return finish(figure, "way", title, _way_words(shifts))
+    return finish(figure, "way", title, _way_words(shifts), numbers)
 
 
 def _way_words(shifts: Shifts) -> str:
@@ -267,13 +295,20 @@ def percentiles(shifts: Shifts) -> Drawn | None:
     """Half, nine tenths and 95 % of all events had somebody on scene by ..."""
     if not shifts.events:
         return None
-    names = shifts.policies
+    names, numbers = shifts.policies, Numbers()
     figure, (axes,) = panels(1, len(shifts.stops), _height(len(names)), sharey=True)
     missing = False
     for stop, ax in enumerate(axes):
         for row, policy in enumerate(names):
             colour = look(policy, names)[0]
             value, low, high = pooled(shifts.events_of(policy, stop), _QUANTILES, shifts.follow)
+            where = {"at": shifts.titles[stop], "dispatch.policy": policy}
+            told: dict[str, Any] = {
+                "response_s": value,
+                "response_low_s": low,
+                "response_high_s": high,
+            }
+            numbers.add(where, told | {"quantile": _QUANTILES})
             inside = [np.minimum(x, shifts.follow) for x in (value, low, high)]
             ax.hlines([row] * 3, inside[1], inside[2], color=colour, lw=5, alpha=0.3)
             ax.plot(inside[0], [row] * 3, color=colour, lw=0.8)
@@ -296,7 +331,7 @@ def percentiles(shifts: Shifts) -> Drawn | None:
         f"late.{never} Broad bars: 95 % interval of each percentile alone, shifts drawn anew. "
         "The axes differ from panel to panel."
     )
-    return finish(figure, "percentiles", "Percentiles of the time to response", caption)
+    return finish(figure, "percentiles", "Percentiles of the time to response", caption, numbers)
 
 
 def burden(shifts: Shifts) -> Drawn | None:
@@ -308,8 +343,11 @@ def burden(shifts: Shifts) -> Drawn | None:
         "zone_ratio": "Worst zone's response\nover the best one's",
     }
     there = {c: text for c, text in columns.items() if shifts.view.part.has(c)}
-    names = shifts.policies
+    names, numbers = shifts.policies, Numbers()
     figure, (axes,) = panels(1, len(there), _height(len(names)), sharey=True)
+    for stop, title in enumerate(shifts.titles):
+        told: dict[str, Any] = {column: shifts.means(column)[:, stop] for column in there}
+        numbers.add({"at": title}, told | {"dispatch.policy": names})
     shades = np.linspace(0.35, 1.0, len(shifts.stops))
     for ax, (column, text) in zip(axes, there.items(), strict=True):
         means = shifts.means(column)
@@ -335,7 +373,7 @@ def burden(shifts: Shifts) -> Drawn | None:
         f"the best, of zones with at least {measures.FEWEST_IN_ZONE} events in the shift: chance "
         "alone lifts it above 1, under every policy."
     )
-    return finish(figure, "burden", title, caption)
+    return finish(figure, "burden", title, caption, numbers)
 
 
 def _height(rows: int) -> float:

@@ -60,6 +60,7 @@ def delay_budget(view: View) -> Drawn | None:
             stops_axis(ax, view.over)
             if view.line and row is axes[0]:
                 ax.set_title(wrapped(level_name(view.line.name, level), 70 // len(view.lines)))
+    axes[0][0].set_ylim(bottom=0)  # last: it ends the fitting of all axes to what is drawn
     outer_labels(axes, shown, "Delay [s]")
     _key(figure, stages)
     caption = (
@@ -86,7 +87,6 @@ def _stack(ax: Axes, means: dict[str, Floats]) -> None:
         top = floor + np.nan_to_num(values)
         bars(ax, floor, top, colour, hatch)
         floor = top
-    ax.set_ylim(bottom=0)
 
 
 def _mark(ax: Axes, measured: Floats) -> None:

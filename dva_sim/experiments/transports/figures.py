@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from dva_sim.experiments.effects import Floats, View, nan_mean, person_means
 from dva_sim.experiments.figures import effect
+from dva_sim.experiments.figures.numbers import Numbers
 from dva_sim.experiments.figures.style import (
     INK,
     Drawn,
@@ -99,7 +101,18 @@ def _drawn(
     for ax in axes[: len(there) - 2]:
         ax.set_xlabel("")
     _legend(figure, view)
-    return finish(figure, name, title, caption)
+    return finish(figure, name, title, caption, _numbers(view, there))
+
+
+def _numbers(view: View, shown: Sequence[Shown]) -> Numbers:
+    """Means over persons, in the units of the table of runs."""
+    numbers, panel = Numbers(), view.panels[0]
+    grids = {each.column: view.part.grid(each.column) for each in shown}
+    for level in view.lines:
+        curves = {name: view.curve(grid, panel, level) for name, grid in grids.items()}
+        means = {name: nan_mean(person_means(curve), axis=0) for name, curve in curves.items()}
+        numbers.add(view.setting(panel, level), view.along_x() | means)
+    return numbers
 
 
 def _panel(ax: Axes, view: View, shown: Shown) -> None:

@@ -78,6 +78,7 @@ def test_the_figures_of_dispatch_take_the_place_of_those_of_driving(report):
     page = report.read_text(encoding="utf-8")
     names = ["trade", "stages", "fates", "way", "percentiles", "burden"]
     assert re.findall(r'<figure id="(\w+)"', page) == names
+    assert {path.stem for path in (report.parent / "figures").glob("*.csv")} == set(names)
 
 
 def test_conditions_and_method_are_those_of_shifts(report):

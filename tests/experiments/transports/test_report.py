@@ -65,6 +65,7 @@ def test_the_report_finds_what_was_put_in(report):
 
 def test_its_figures_show_what_a_transport_brings_and_what_it_takes(report):
     drawn = {path.stem for path in (report.parent / "figures").glob("*.svg")}
+    assert {path.stem for path in (report.parent / "figures").glob("*.csv")} == drawn
     assert drawn == {"differences", "brought", "taken"}
 
 
