@@ -13,6 +13,7 @@ from pathlib import Path
 
 from dva_sim.experiments.design import Job
 from dva_sim.experiments.journal import Tables
+from dva_sim.experiments.results import Results
 from dva_sim.experiments.runner import run_study
 from dva_sim.experiments.study import Study, load_study
 
@@ -40,6 +41,8 @@ answer:
   smallest_effect_s: 2.0
 """
 RUNS = 6 + 4 * 6 + 4 * 3
+
+BUSY_S = 0.1
 
 REPEATED = (
     STUDY
@@ -84,6 +87,14 @@ def cheap(job: Job) -> Tables:
 def slower(job: Job) -> Tables:
     """The same at a cost that leaves time to be interrupted."""
     sum(math.sin(i) for i in range(200_000))
+    return cheap(job)
+
+
+def busy(job: Job) -> Tables:
+    """The same after a tenth of a second of CPU time."""
+    end = time.thread_time() + BUSY_S
+    while time.thread_time() < end:
+        math.sin(1.0)
     return cheap(job)
 
 
@@ -139,6 +150,11 @@ def files(folder: Path) -> dict[str, bytes]:
     """All that must be the same bytes."""
     names = [*sorted((folder / "tables").glob("*")), folder / "manifest.json"]
     return {path.name: path.read_bytes() for path in names}
+
+
+def rows(folder: Path) -> list[int]:
+    """Seeds of the runs in the table."""
+    return [int(seed) for seed in Results.load(folder).table("runs")["seed"]]
 
 
 def main() -> None:

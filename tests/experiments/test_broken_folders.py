@@ -58,6 +58,22 @@ def test_a_damaged_journal_is_told_with_what_to_do(tmp_path: Path, out: Path) ->
         run_study(kit.study_in(tmp_path), out, jobs=1, episode=kit.cheap)
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is always full")
+def test_a_disk_that_fills_up_at_the_manifest_is_told(
+    tmp_path: Path, out: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = kit.files(out)
+
+    def instead(folder: Path) -> None:
+        (folder / f".manifest.json.{os.getpid()}").symlink_to("/dev/full")
+
+    with monkeypatch.context() as patch:
+        patch.setattr("dva_sim.experiments.runner._tidy", instead)
+        with pytest.raises(DvaSimError, match=r"manifest\.json cannot be written: No space left"):
+            run_study(kit.study_in(tmp_path), out, jobs=1, episode=never)
+    assert kit.files(run_study(kit.study_in(tmp_path), out, jobs=1, episode=never)) == whole
+
+
 def test_what_a_killed_runner_left_behind_is_removed(tmp_path: Path, out: Path) -> None:
     (out / ".tables-abc").mkdir()
     (out / ".tables-abc" / "runs.duckdb").write_bytes(b"half")

@@ -89,7 +89,7 @@ def test_a_probe_spreads_over_the_design() -> None:
     for count in (1, 2, 3, 9, 100, 101):
         assert sorted(planning._spread(count)) == list(range(count))
     first = planning._spread(100)[:5]
-    assert min(abs(a - b) for a in first for b in first if a != b) >= 14
+    assert min(abs(a - b) for a in first for b in first if a != b) >= 10
 
 
 def test_what_is_stopped_names_the_command_that_goes_on(

@@ -1,0 +1,120 @@
+"""What the runner costs beside its runs, what it keeps in memory, and how soon help is there.
+
+CPU time where it can be, since other programs do not add to it; where only the wall clock tells,
+the load of the machine is said beside the figure.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+import small_study as kit
+
+from dva_sim.experiments import places
+from dva_sim.experiments.runner import run_study
+
+TESTS = Path(kit.__file__).parent
+ENVIRONMENT = {**os.environ, "PYTHONPATH": os.pathsep.join(map(str, (TESTS.parent, TESTS)))}
+MEMORY = """
+import json, re, sys
+from pathlib import Path
+import small_study as kit
+folder, jobs, total = Path(sys.argv[1]), int(sys.argv[2]), []
+def peak():
+    return int(re.search(r"VmHWM:\\s+(\\d+)", Path("/proc/self/status").read_text())[1]) / 1024
+study, before = kit.study_in(folder, "persons=230", "replications=8"), peak()
+seen = lambda done, runs: total.append(runs)
+kit.run_study(study, folder / "out", jobs=jobs, episode=kit.cheap, progress=seen)
+print(json.dumps([total[-1], before, peak()]))
+"""
+
+
+def load() -> str:
+    return f"load {os.getloadavg()[0]:.1f} on {places.cores()} cores"
+
+
+def test_the_runner_costs_little_beside_runs_of_a_tenth_of_a_second(
+    tmp_path: Path, benchmark: Any
+) -> None:
+    """Everything from the design to the manifest, in one process."""
+    study = kit.study_in(tmp_path, "persons=20")  # 280 runs
+    begun = time.process_time()
+    out = run_study(study, tmp_path / "out", jobs=1, episode=kit.busy)
+    whole = time.process_time() - begun
+    runs = len(kit.rows(out))
+    overhead = whole / (runs * kit.BUSY_S) - 1
+    benchmark.extra_info.update(overhead_percent=round(100 * overhead, 2), runs=runs)
+    print(f"\nrunner: {100 * overhead:.1f} % over {runs} runs of {kit.BUSY_S} s")
+    assert overhead < 0.05
+    benchmark(lambda: None)
+
+
+def test_handing_runs_to_processes_costs_the_parent_little(tmp_path: Path, benchmark: Any) -> None:
+    study = kit.study_in(tmp_path, "persons=20")
+    begun = time.process_time()
+    out = run_study(study, tmp_path / "out", jobs=2, episode=kit.busy)
+    own = time.process_time() - begun
+    share = own / (len(kit.rows(out)) * kit.BUSY_S)
+    benchmark.extra_info.update(parent_percent=round(100 * share, 2))
+    print(f"\nparent of two processes: {100 * share:.1f} % of the runs' own time")
+    assert share < 0.05
+    benchmark(lambda: None)
+
+
+def test_two_processes_are_nearly_twice_as_fast_as_one(tmp_path: Path, benchmark: Any) -> None:
+    """By the wall clock, so on idle cores only; on a busy machine the figure is only said."""
+    if places.cores() < 2:
+        pytest.skip("needs two cores")
+    study, took = kit.study_in(tmp_path, "persons=30"), {}
+    is_idle = os.getloadavg()[0] < 0.3
+    for jobs in (1, 2):
+        begun = time.perf_counter()
+        run_study(study, tmp_path / f"{jobs}", jobs=jobs, episode=kit.busy)
+        took[jobs] = time.perf_counter() - begun
+    ratio = took[1] / took[2]
+    benchmark.extra_info.update(two_over_one=round(ratio, 2), machine=load())
+    print(f"\ntwo processes: {ratio:.2f} times as fast as one ({load()})")
+    assert ratio > 1.7 or not is_idle
+    benchmark(lambda: None)
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_ten_thousand_short_runs_fit_in_little_memory(
+    tmp_path: Path, benchmark: Any, jobs: int
+) -> None:
+    if not Path("/proc/self/status").exists():
+        pytest.skip("this system does not tell the most memory a process has had")
+    words = [sys.executable, "-c", MEMORY, str(tmp_path), str(jobs)]
+    ran = subprocess.run(words, capture_output=True, text=True, env=ENVIRONMENT, check=True)
+    total, before, after = json.loads(ran.stdout)
+    benchmark.extra_info.update(parent_mb=round(after))
+    print(f"\n{total} runs, {jobs} processes: parent {after:.0f} MB, {before:.0f} MB before")
+    assert total > 10_000
+    assert after < 500
+    benchmark(lambda: None)
+
+
+def test_help_is_there_at_once(tmp_path: Path, benchmark: Any) -> None:
+    """The best of several, by the wall clock; CPU time beside it."""
+
+    def call() -> float:
+        words = [sys.executable, "-m", "dva_sim.cli", "--help"]
+        begun = time.perf_counter()
+        subprocess.run(words, capture_output=True, cwd=tmp_path, env=ENVIRONMENT, check=True)
+        return time.perf_counter() - begun
+
+    begun = os.times()
+    took = min(call() for _ in range(10))
+    ended = os.times()
+    cpu = ((ended[2] - begun[2]) + (ended[3] - begun[3])) / 10
+    benchmark.extra_info.update(wall_s=round(took, 3), cpu_s=round(cpu, 3), machine=load())
+    print(f"\nhelp: {took:.2f} s at best, {cpu:.2f} CPU s on the average ({load()})")
+    assert min(took, cpu) < 0.3
+    benchmark(lambda: None)
