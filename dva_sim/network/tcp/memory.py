@@ -30,7 +30,7 @@ class SendBuffer:
     Attributes:
         limit: How much may be charged before no further packet is begun [B].
         used: How much is charged [B].
-        blocked: Whether a write was not taken whole since the last time there was room.
+        blocked: Whether somebody waits for room, because a write was not taken whole, say.
     """
 
     __slots__ = (
@@ -61,6 +61,11 @@ class SendBuffer:
             self._largest_window = window
             segments = min(WAITING_SEGMENTS, window // 2 // self._mss)
             self._packet = max(1, segments) * self._mss
+
+    @property
+    def has_room(self) -> bool:
+        """Whether a third is free: what the kernel calls writable."""
+        return 3 * self.used <= 2 * self.limit
 
     def take(self, count: int) -> int:
         """Charge up to `count` bytes [B]; returns how many found room."""
@@ -101,7 +106,7 @@ class SendBuffer:
             return False
         if self._automatic and in_flight < int(window):
             self.limit = max(self.limit, min(LARGEST, 2 * int(window) * PER_SEGMENT))
-        if 3 * self.used > 2 * self.limit:
+        if not self.has_room:
             return False
         self.blocked = False
         return True
