@@ -130,7 +130,12 @@ def keys_of(study: Mapping[str, Any]) -> list[Factor]:
             for level in levels:
                 for key, value in named[level].items():
                     keys.setdefault(key, []).append(value)
-    return [Factor(key, tuple(dict.fromkeys(levels))) for key, levels in keys.items()]
+    return [Factor(key, _distinct(levels)) for key, levels in keys.items()]
+
+
+def _distinct(levels: Sequence[Any]) -> tuple[Any, ...]:
+    """Each level once; a treatment may set a whole block, such as a law."""
+    return tuple(level for i, level in enumerate(levels) if level not in levels[:i])
 
 
 def view_of(study: Mapping[str, Any], runs: Table) -> View | None:

@@ -86,11 +86,12 @@ class ZmtpEnd:
     ) -> None:
         self._tcp, self._link, self._deliver = tcp, link, deliver
         self.pipe: Pipe[tuple[Any, int]] = Pipe(options.mark, options.conflate)
+        self._asleep = True  # the sending thread has found the pipe empty, and is to be woken
         self._batch = self._rest = self._position = self._heard = 0
         self._arriving: deque[tuple[int, Any]] = deque()  # where each message ends, and what it is
         self._greeting = iter(_GREETING)
         self._next = next(self._greeting)
-        self._flushing = self._paused = self._over = False
+        self._paused = self._over = False
         self.ready = self.closed = False
         self.on_ready: Then = _nothing
         self.on_end: Then = _nothing
@@ -106,7 +107,7 @@ class ZmtpEnd:
         """
         if self.closed or not self.pipe.put((payload, size)):
             return False
-        if self.ready and not self._batch:
+        if self.ready and self._asleep:
             self._flush()
         return True
 
@@ -153,19 +154,22 @@ class ZmtpEnd:
     # --- encoder and decoder ---------------------------------------------------------------
 
     def _flush(self) -> None:
-        """Hand batches to TCP as long as it takes them whole."""
-        if self._flushing:
-            return
-        self._flushing = True
+        """Hand batches to TCP until it has no room, or there are none.
+
+        The sending thread is woken by a socket that is writable, of whose buffer a third is
+        free, and by the first message after it had found the pipe empty: that one is tried at
+        once, with whatever was held up before, and may find room although less is free.
+        """
+        self._asleep = False
         while not self.closed:
             if not self._batch:
                 self._fill()
             if not self._batch:
-                break
+                return
             self._batch -= self._tcp.write(self._batch)
-            if self._batch:
-                break  # TCP tells when it is writable again
-        self._flushing = False
+            if self._batch or not self._tcp.has_room:
+                self._tcp.await_room()
+                return
 
     def _fill(self) -> None:
         """Take messages into a batch; a long one goes on in the next."""
@@ -173,6 +177,7 @@ class ZmtpEnd:
             if not self._rest:
                 message = self.pipe.take()
                 if message is None:
+                    self._asleep = True
                     return
                 payload, self._rest = message
                 self._position += self._rest

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Final, Protocol
+from collections import deque
+from typing import Final, Generic, Protocol, TypeVar
 
 import pymunk
 from pymunk._chipmunk_cffi import lib
@@ -15,11 +16,46 @@ FRICTION, ELASTICITY = 0.3, 0.1  # of bumpers and walls; both multiply in a cont
 AT_REST = 1e-3  # slower than this, brakes hold [m/s, rad/s]
 WALL, ROBOT, PERSON = 1, 2, 3  # collision types
 
+T = TypeVar("T")
+
 # Straight to the functions behind pymunk's properties, for the hot loop: half the cost.
 get_velocity, get_position = lib.cpBodyGetVelocity, lib.cpBodyGetPosition
 get_spin, get_angle = lib.cpBodyGetAngularVelocity, lib.cpBodyGetAngle
 set_velocity, set_spin = lib.cpBodySetVelocity, lib.cpBodySetAngularVelocity
 set_force, set_torque = lib.cpBodySetForce, lib.cpBodySetTorque
+
+
+class Asked(Generic[T]):
+    """What is asked of a body: what holds now, and what will from later ticks on.
+
+    What was asked for first still has its tick, however soon something newer follows.
+
+    Args:
+        first: What holds at the beginning.
+
+    Attributes:
+        now: What holds.
+        coming: What will, and from which tick on.
+    """
+
+    __slots__ = ("coming", "now")
+
+    def __init__(self, first: T) -> None:
+        self.now = first
+        self.coming: deque[tuple[int, T]] = deque()
+
+    def put(self, start: int, what: T) -> None:
+        """From tick `start` on; starts never go back."""
+        if self.coming and self.coming[-1][0] == start:
+            self.coming.pop()
+        self.coming.append((start, what))
+
+    def at(self, tick: int) -> T:
+        """What holds in a tick; they are asked for in their order."""
+        coming = self.coming
+        while coming and coming[0][0] <= tick:
+            self.now = coming.popleft()[1]
+        return self.now
 
 
 class Timing(Protocol):

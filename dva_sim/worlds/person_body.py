@@ -11,6 +11,7 @@ from dva_sim.worlds.bodies import (
     AT_REST,
     PERSON,
     ROBOT,
+    Asked,
     Body,
     Timing,
     set_force,
@@ -43,7 +44,7 @@ class PersonBody(Body):
         shape.friction, shape.elasticity, shape.collision_type = 0.0, 0.0, self.kind
         super().__init__(world, name, body, shape)
         self.radius, self._mass, self._circle = radius, mass, shape
-        self._now = self._next = (0.0, 0.0, 0)
+        self._asked = Asked((0.0, 0.0))
 
     def walk(self, vx: float, vy: float) -> None:
         """Want to walk with this velocity [m/s] from the next tick on, until told otherwise.
@@ -53,7 +54,7 @@ class PersonBody(Body):
         """
         if not (math.isfinite(vx) and math.isfinite(vy)):
             raise ValueError(f"{self.name} cannot walk at {vx} m/s, {vy} m/s")
-        self._next = (vx, vy, self._world.next_tick())
+        self._asked.put(self._world.next_tick(), (vx, vy))
         self._world.wake(self)
 
     def take_up(self, radius: float) -> None:
@@ -63,13 +64,11 @@ class PersonBody(Body):
 
     def push(self, tick: int, dt: float) -> bool:
         """Apply the force of the legs for one tick; False if the person stands and shall stand."""
-        if self._next is not self._now and tick >= self._next[2]:
-            self._now = self._next
-        wx, wy, _ = self._now
+        wx, wy = self._asked.at(tick)
         vx, vy = self.velocity
         if wx == wy == 0.0 and abs(vx) + abs(vy) < AT_REST:
             set_velocity(self._raw, (0.0, 0.0))
-            return self._next is not self._now
+            return bool(self._asked.coming)
         ax, ay = (wx - vx) / RELAXATION, (wy - vy) / RELAXATION
         asked = math.hypot(ax, ay)
         share = self._mass * min(1.0, MOST_PUSH / asked) if asked > 0.0 else 0.0

@@ -14,6 +14,7 @@ from dva_sim.worlds.bodies import (
     GRIP,
     PERSON,
     ROBOT,
+    Asked,
     Body,
     G,
     Timing,
@@ -35,15 +36,14 @@ TRACK: Final = 0.5  # wheels stand that share of the radius off the middle; assu
 
 
 class SetPoint(NamedTuple):
-    """What the motors are asked for from tick `start` on and before tick `end`."""
+    """What the motors are asked for, before tick `end`."""
 
     speed: float
     turn_rate: float
-    start: int
     end: float
 
 
-STOP = SetPoint(0.0, 0.0, 0, math.inf)
+STOP = SetPoint(0.0, 0.0, math.inf)
 
 
 class Lock:
@@ -111,7 +111,7 @@ class RobotBody(Body):
         self.spec, self.radius, self._drive = spec, spec.radius, spec.drive(spec)
         self.distance, self.work, self._grip = 0.0, 0.0, GRIP
         self._powered = True
-        self._now, self._next = STOP, STOP
+        self._asked = Asked(STOP)
         self._people, self._jam = Contacts(), Jam()
         self._mass, self._moment = spec.mass, body.moment
         self._arm = TRACK * spec.radius
@@ -198,12 +198,12 @@ class RobotBody(Body):
         world, spec = self._world, self.spec
         start = world.next_tick()
         if not (math.isfinite(speed) and math.isfinite(turn_rate)) or math.isnan(until):
-            self._next = SetPoint(0.0, 0.0, start, math.inf)
+            self._asked.put(start, STOP)
         else:
             speed = min(max(speed, 0.0), spec.max_speed)
             turn_rate = min(max(turn_rate, -spec.max_turn_rate), spec.max_turn_rate)
             speed, turn_rate = self._drive.set_point(speed, turn_rate)
-            self._next = SetPoint(speed, turn_rate, start, world.tick_at(until))
+            self._asked.put(start, SetPoint(speed, turn_rate, world.tick_at(until)))
         world.wake(self)
 
     def push(self, tick: int, dt: float) -> bool:
@@ -215,9 +215,7 @@ class RobotBody(Body):
         have stopped it, as somebody pushes.
         """
         raw = self._raw
-        if self._next is not self._now and tick >= self._next.start:
-            self._now = self._next
-        wanted, wanted_spin, _, end = self._now
+        wanted, wanted_spin, end = self._asked.at(tick)
         if tick >= end or not self._powered:
             wanted = wanted_spin = 0.0
         velocity, spin = get_velocity(raw), get_spin(raw)
@@ -232,7 +230,7 @@ class RobotBody(Body):
                 set_spin(raw, 0.0)
                 if not self._lock.closed:
                     self._lock.close(self._grip)
-                return self._next is not self._now
+                return bool(self._asked.coming)
             if self._is_held(dt):
                 self.distance += abs(forward) * dt
                 return True

@@ -201,7 +201,7 @@ def test_after_a_publisher_is_back_a_subscriber_misses_the_interval_and_the_hand
 
 
 def test_what_waits_in_the_pipe_outlives_its_connection_and_what_had_left_it_does_not() -> None:
-    """5 requests a second pass; when the robot leaves, two batches of 20 are beyond the pipe."""
+    """5 requests a second pass; when the robot leaves, a batch of 20 is beyond the pipe."""
     net = network("segment", {"send_buffer_bytes": 4096}, delay_s=0.05, rate_bps=20_000)
     robot = Robot(net, 0.0)
     requester = Requester(net, "phone", "robot", timeout=60.0, attempts=1, window=100)
@@ -217,7 +217,7 @@ def test_what_waits_in_the_pipe_outlives_its_connection_and_what_had_left_it_doe
     before = [data for data, time in robot.done if time < 4.0]
     lost = 100 - len(done)
     assert 5 < len(before) < 12
-    assert 20 < lost < 50
+    assert 15 < lost < 30
     assert done == before + asked[len(before) + lost :]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Any
 
 import pytest
@@ -224,3 +225,18 @@ def test_nothing_is_delivered_after_a_connection_broke() -> None:
     pair.connection.drop()
     pair.run_for(30.0)
     assert pair.at_peer == pair.at_opener == []
+
+
+def test_a_small_buffer_is_filled_and_drained_in_the_rhythm_of_real_sockets() -> None:
+    """Fifty a second into 64 kbit/s. Seen on sockets: seven fill the buffer; then nothing is
+    written until four are left; of what comes then four or five in a row find room."""
+    conflated = ZmtpOptions(conflate=True, tcp=SMALL_BUFFER)
+    pair = Pair(conflated, delay_s=0.05, rate_bps=64_000)
+    pair.open()
+    for number in range(500):
+        pair.send(number)
+        pair.run_for(0.02)
+    settled = pair.at_peer[50:150]
+    breaks = [i for i in range(1, len(settled)) if settled[i] != settled[i - 1] + 1]
+    assert {b - a for a, b in itertools.pairwise(breaks)} == {4, 5}
+    assert {settled[i] - settled[i - 1] for i in breaks} <= {8, 9, 10, 11}

@@ -114,6 +114,19 @@ def test_a_set_point_changes_nothing_before_it_was_given(world):
     assert robot.speed < 0.49
 
 
+def test_set_points_that_come_faster_than_ticks_move_the_robot_like_a_single_one(world):
+    other = World(load_site("caparica"), DT)
+    once, often = in_corridor(world), in_corridor(other)
+    once.drive(0.5, 0.0, 3.0)
+    for time in np.arange(0.0, 3.0, 0.3 * DT):
+        other.advance_to(time)
+        often.drive(0.5, 0.0, 3.0)
+    for each in (world, other):
+        each.advance_to(5.0)
+    assert often.pose().x - 4.0 == pytest.approx(once.pose().x - 4.0, abs=1e-9)
+    assert once.pose().x > 5.0
+
+
 def test_how_often_somebody_looks_changes_nothing(world):
     other = World(load_site("caparica"), DT)
     seldom, often = in_corridor(world), in_corridor(other)

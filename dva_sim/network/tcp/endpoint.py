@@ -36,7 +36,7 @@ class TcpEndpoint:
     Attributes:
         on_readable: Called when bytes in order have arrived; `read` may be called inside.
         on_writable: Called when the send buffer has room again (a third of it is free)
-            after a `write` that could not take everything.
+            after a `write` that could not take everything, or `await_room`.
         on_end: Called once when the other end has finished, has reset the connection,
             or has not answered for so long that it is given up.
         sender: The sending half, with its counters.
@@ -96,6 +96,15 @@ class TcpEndpoint:
         if self.gone or self._finished or not self.established:
             return 0
         return self.sender.write(count)
+
+    @property
+    def has_room(self) -> bool:
+        """Whether a third of the send buffer is free; less may do for a `write`."""
+        return self.sender.buffer.has_room
+
+    def await_room(self) -> None:
+        """Ask for `on_writable`."""
+        self.sender.buffer.blocked = True
 
     def read(self, count: int) -> int:
         """Take up to `count` bytes in order [B]; returns how many. Opens the receive window."""

@@ -9,6 +9,8 @@ References:
 
 from __future__ import annotations
 
+from collections import deque
+
 PACKET_COST = 832  # beside the payload, of each packet that waits or is under way [B]
 SMALLEST = 4608  # the least that SO_SNDBUF gives, after doubling [B]
 LARGEST = 4_194_304  # tcp_wmem, third value [B]
@@ -19,8 +21,8 @@ WAITING_SEGMENTS = 45  # how far a packet that waits may grow: 64 KiB with its h
 class SendBuffer:
     """Bytes written and not yet acknowledged.
 
-    Bytes that cannot leave at once are gathered in one waiting packet, which is cheap;
-    each packet that leaves costs its own 832 B until it is acknowledged.
+    Bytes that cannot leave at once are gathered in waiting packets, which is cheap; each
+    packet costs 832 B until it is acknowledged, and so does each piece that is cut from one.
 
     Args:
         size: SO_SNDBUF as the program sets it [B], or None = automatic.
@@ -30,7 +32,7 @@ class SendBuffer:
     Attributes:
         limit: How much may be charged before no further packet is begun [B].
         used: How much is charged [B].
-        blocked: Whether a write was not taken whole since the last time there was room.
+        blocked: Whether somebody waits for room, because a write was not taken whole, say.
     """
 
     __slots__ = (
@@ -38,8 +40,7 @@ class SendBuffer:
         "_largest_window",
         "_mss",
         "_packet",
-        "_room",
-        "_waiting_cost",
+        "_waiting",
         "blocked",
         "limit",
         "used",
@@ -52,7 +53,8 @@ class SendBuffer:
         self.limit = 2 * initial_window * PER_SEGMENT
         if size is not None:
             self.limit = max(2 * size, SMALLEST)
-        self.used = self._room = self._waiting_cost = 0
+        self.used = 0
+        self._waiting: deque[int] = deque()  # payload of each packet that waits [B]
         self.blocked = False
 
     def offered(self, window: int) -> None:
@@ -62,27 +64,37 @@ class SendBuffer:
             segments = min(WAITING_SEGMENTS, window // 2 // self._mss)
             self._packet = max(1, segments) * self._mss
 
+    @property
+    def has_room(self) -> bool:
+        """Whether a third is free: what the kernel calls writable."""
+        return 3 * self.used <= 2 * self.limit
+
     def take(self, count: int) -> int:
         """Charge up to `count` bytes [B]; returns how many found room."""
-        taken = min(count, self._room)
-        self._room -= taken
-        self.used += taken
+        waiting, taken = self._waiting, 0
+        if waiting and waiting[-1] < self._packet:
+            taken = min(count, self._packet - waiting[-1])
+            waiting[-1] += taken
+            self.used += taken
         while taken < count and self.used < self.limit:
             part = min(count - taken, self._packet)
-            self._room = self._packet - part
-            self._waiting_cost += PACKET_COST
+            waiting.append(part)
             self.used += part + PACKET_COST
             taken += part
         self.blocked = self.blocked or taken < count
         return taken
 
-    def depart(self, size: int, last: bool) -> int:
-        """A segment of `size` bytes leaves, the `last` that waited: what it is charged [B]."""
-        if not last:
+    def depart(self, size: int) -> int:
+        """A segment of `size` bytes [B] leaves: what it is charged until it is acknowledged [B]."""
+        waiting, left, packets = self._waiting, size, 0
+        while waiting and left >= waiting[0]:
+            left -= waiting.popleft()
+            packets += 1
+        if left and waiting:  # cut off
+            waiting[0] -= left
             self.used += PACKET_COST
-            return size + PACKET_COST
-        cost, self._waiting_cost, self._room = self._waiting_cost, 0, 0
-        return size + cost
+            packets += 1
+        return size + packets * PACKET_COST
 
     def release(self, charge: int) -> None:
         """Acknowledged: give back its charge [B]."""
@@ -101,7 +113,7 @@ class SendBuffer:
             return False
         if self._automatic and in_flight < int(window):
             self.limit = max(self.limit, min(LARGEST, 2 * int(window) * PER_SEGMENT))
-        if 3 * self.used > 2 * self.limit:
+        if not self.has_room:
             return False
         self.blocked = False
         return True

@@ -231,7 +231,7 @@ class Sender:
 
     def _send(self, end: int, now: float) -> None:
         start, self.next = self.next, end
-        charge = self.buffer.depart(end - start, end == self.total)
+        charge = self.buffer.depart(end - start)
         self.board.queue.append(Sent(start, end, now, charge))
         self._leave(start, end, now)
 

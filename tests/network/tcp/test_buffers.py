@@ -92,3 +92,17 @@ def test_a_tuned_receive_window_grows_with_what_is_read():
     pair.clock.run(2.0)
     in_flight = pair.opener.sender.next - pair.opener.sender.first
     assert in_flight > 500_000
+
+
+def test_what_has_been_gathered_is_freed_packet_by_packet():
+    # four packets wait behind a closed window; when it opens for 4096 B, two leave whole and a
+    # piece of the third; once they are acknowledged two packets are left
+    pair = Pair(opener=options(send_buffer=4096), peer=options(receive_buffer=4096), reads=False)
+    pair.write_at([1.0 + number / 100 for number in range(60)], 409)
+    pair.clock.run(5.0)
+    sender = pair.opener.sender
+    assert sender.buffer.used == 5786 + 4 * 832
+    pair.at(6.0, pair.read)
+    pair.clock.run(8.0)
+    assert pair.peer.readable == 4096
+    assert sender.buffer.used == 5786 - 4096 + 2 * 832
