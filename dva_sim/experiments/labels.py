@@ -175,8 +175,6 @@ def level_name(factor: str, level: Level | Mapping[str, Any], short: bool = Fals
         return (_SHORT_LEVELS if short else _LEVELS).get(name, name)
     if level is None or isinstance(level, bool):
         return {None: "none", True: "yes", False: "no"}[level]
-    if isinstance(level, Mapping):  # a whole block, such as a law
-        return setting(level)
     if factor.endswith(".loss"):
         return percent(level)
     unit = unit_of(factor)
