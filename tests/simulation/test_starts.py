@@ -54,9 +54,7 @@ def test_a_longer_way_begins_elsewhere_with_the_same_event_and_the_same_person()
 
 
 def test_a_way_that_is_longer_than_any_on_the_site_is_refused_with_the_longest_there_is() -> None:
-    with pytest.raises(
-        ConfigError, match="no place 500 m from the event for guard-1"
-    ):
+    with pytest.raises(ConfigError, match="no place 500 m from the event for guard-1"):
         Run(drill(guard={"count": 1, "way_m": 500.0}, **GUARD_ALONE), 1)
 
 
