@@ -124,7 +124,8 @@ def _planned(study: Study, folder: Path, workers: Workers, tries: bool) -> DryRu
     from dva_sim.experiments.episode import rehearse_all, run_job
 
     rehearse_all(study)
-    found = dry_run(study, folder, jobs=workers.jobs, probe=run_job if tries else None)
+    jobs = workers.jobs if workers.scheduler is None else 1  # who knows how many are free there
+    found = dry_run(study, folder, jobs=jobs, probe=run_job if tries else None)
     if found.remark:
         say(f"[yellow]{escape(found.remark)}[/yellow]")
     say(escape(_plan(found, folder)))
