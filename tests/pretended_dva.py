@@ -23,6 +23,7 @@ from dva_sim.simulation.field import Field
 from dva_sim.simulation.machines import Machines
 from dva_sim.simulation.names import id_of
 from dva_sim.simulation.stage import Stage
+from dva_sim.simulation.starts import Starts
 from dva_sim.streams import Streams
 from dva_sim.worlds.geo import Pose
 
@@ -72,8 +73,9 @@ class PretendedDva:
         scenario = scenarios.build(scenarios.load("drive-to-event"), team | changes)
         self.stage = Stage(scenario, 1, self.network, Recorder())
         self.field = field = Field(self.stage)
+        starts = Starts(self.stage, field.incidents[0].hazard.position)
         machines = Machines(
-            self.stage, field.world, field.surroundings, field._spots, field.newest_drive
+            *(self.stage, field.world, field.surroundings, field._spots, field.newest_drive, starts)
         )
         for number in range(1, robots + 1):
             robot = machines.add(number)
