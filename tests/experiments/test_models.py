@@ -43,6 +43,7 @@ def numbers_of(name):
             "tasks/tracking",
             "tasks/course",
             "tasks/excavator",
+            "tasks/fitts-tilt",
         ),
     ],
 )

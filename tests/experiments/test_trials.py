@@ -44,7 +44,7 @@ def test_a_block_is_told_with_its_conditions_and_what_they_come_to():
 @pytest.mark.parametrize("wanted", [{"video": Path("x.gif")}, {"strip": Path("x.png")}])
 def test_a_task_has_no_film(wanted):
     with pytest.raises(ConfigError, match="is a task: only --still shows something"):
-        console.episode("tasks/corner", 1, [], None, Wanted(**wanted))
+        console.episode("tasks/corner", 1, [], None, Wanted(**wanted), None)
 
 
 def test_a_table_on_80_columns_cuts_no_head_tells_units_and_says_how_many_rows_are_left_out():
