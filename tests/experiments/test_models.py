@@ -13,6 +13,7 @@ SHORT = {
     "evacuation": {"horizon_s": 5},
     "small-shift": {"horizon_s": 3000, "dispatch.containment": True},
     "tasks/fitts-lag": {"trials": 1},
+    "tasks/fitts-tilt": {"trials": 1},
     "tasks/steering-law": {"trials": 1},
     "tasks/tracking": {
         "task.record_s": 30,
