@@ -28,7 +28,8 @@ from dva_sim.experiments.design import Job
 from dva_sim.experiments.report import write_report
 from dva_sim.experiments.runner import run_study
 
-KILLS = 120
+KILLS_EACH = 40
+KILLS_A_STUDY = 10
 PAIRS = 10
 SEED = 1
 STEP_KB = 96
@@ -120,58 +121,65 @@ def calls_of(work: Callable[[], object]) -> int:
     return -count.left
 
 
-def rows_of(out: Path) -> Counter[tuple[str, int]]:
-    """How many rows the journal has for each run."""
+def doubled(out: Path) -> bool:
+    """Whether the journal has more than one row for a run."""
     if not (out / "journal.sqlite").exists():
-        return Counter()
+        return False
     journal = sqlite3.connect(out / "journal.sqlite")
     tables = {name for (name,) in journal.execute("SELECT name FROM sqlite_master")}
     found = journal.execute("SELECT config, seed FROM runs").fetchall() if "runs" in tables else []
     journal.close()
-    return Counter(found)
+    return len(found) > len(set(found))
 
 
 def kills(folder: Path) -> dict[str, Any]:
-    """Kill a runner again and again; each study that ends is compared, and another begun."""
+    """Kill runners until each way to be killed has happened often enough.
+
+    A study that was killed some times may end in quiet and is compared; then another begins.
+    """
     study, luck, seen = kit.study_in(folder), random.Random(SEED), Counter[str]()
     plain = folder / "plain"
     run(plain, study)
     whole, calls = kit.files(plain), calls_of(lambda: run(folder / "counted", study))
     begun = time.process_time()
     run(folder / "timed", study)
-    took, number = time.process_time() - begun, 0
-    while seen["killed"] < KILLS:
-        out = folder / f"killed-{number}"
-        kind = luck.choice(["call", "writing", "clock"])
-        if kind == "call":
-            pid = killed_at_a_call(out, study, luck.randrange(1, calls))
-        elif kind == "writing":
-            pid = killed_while_writing(out, study, luck.randrange(1, calls // 10))
-        else:
-            pid = killed_by_the_clock(out, study, luck.uniform(0.001, took))
-        was_killed = not ended(pid)
-        seen["killed"] += was_killed
-        seen[kind] += was_killed
-        seen["doubled"] += any(count > 1 for count in rows_of(out).values())
-        if not was_killed:
-            number += 1
-            seen["ended"] += 1
-            seen["equal"] += kit.files(out) == whole
-            seen["left behind"] += len([p for p in out.iterdir() if p.name.startswith(".")])
+    took = time.process_time() - begun
+    ways: dict[str, Callable[[Path], int]] = {
+        "call": lambda out: killed_at_a_call(out, study, luck.randrange(1, calls)),
+        "writing": lambda out: killed_while_writing(out, study, luck.randrange(1, calls // 10)),
+        "clock": lambda out: killed_by_the_clock(out, study, luck.uniform(0.001, took)),
+    }
+    while wanted := [way for way in ways if seen[way] < KILLS_EACH]:
+        out = folder / f"killed-{seen['ended']}"
+        for _ in range(KILLS_A_STUDY):
+            way = luck.choice(wanted)
+            if ended(ways[way](out)):
+                break
+            seen[way] += 1
+            seen["doubled"] += doubled(out)
+        assert ended(forked(lambda out=out: run(out, study)))
+        seen["ended"] += 1
+        seen["equal"] += kit.files(out) == whole
+        seen["doubled"] += doubled(out)
+        seen["left behind"] += len([p for p in out.iterdir() if p.name.startswith(".")])
     return dict(seen) | pairs(folder, study, whole, calls, luck)
 
 
 def pairs(folder: Path, study: Any, whole: Any, calls: int, luck: random.Random) -> dict[str, int]:
-    """Two runners on one folder, one of which is killed."""
+    """Two runners on one folder, until one of the two was killed often enough.
+
+    Where the other left it too little to do, it ends before it dies.
+    """
     seen = Counter[str]()
-    for number in range(PAIRS):
-        out = folder / f"pair-{number}"
+    while seen["pairs killed"] < PAIRS:
+        out = folder / f"pair-{seen['pairs']}"
         killed = killed_at_a_call(out, study, luck.randrange(1, calls))
         other = forked(lambda out=out: run(out, study))
-        seen["pairs"] += ended(other)
-        seen["pairs killed"] += not ended(killed)  # the other may leave it too little to do
+        assert ended(other)
+        seen["pairs"] += 1
+        seen["pairs killed"] += not ended(killed)
         seen["pairs equal"] += kit.files(out) == whole
-        seen["pairs doubled"] += any(count > 1 for count in rows_of(out).values())
+        seen["pairs doubled"] += doubled(out)
     return dict(seen)
 
 

@@ -31,13 +31,11 @@ def told(*words: str | Path) -> dict[str, Any]:
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
 def test_a_hundred_kills_at_any_moment_lose_and_double_nothing(tmp_path: Path) -> None:
     found = told(sys.executable, "-m", "disturbed_study", "kills", tmp_path)
-    assert found["killed"] >= 100
-    assert min(found["call"], found["writing"], found["clock"]) >= 10
-    assert found["ended"] >= 5
-    assert found["equal"] == found["ended"]
+    assert min(found["call"], found["writing"], found["clock"]) >= kit.KILLS_EACH
+    assert found["equal"] == found["ended"] >= 100 // kit.KILLS_A_STUDY
     assert (found["doubled"], found["left behind"]) == (0, 0)
-    assert found["pairs"] == found["pairs equal"] == kit.PAIRS
-    assert found["pairs killed"] >= kit.PAIRS // 2
+    assert found["pairs killed"] == kit.PAIRS
+    assert found["pairs"] == found["pairs equal"]
     assert found["pairs doubled"] == 0
 
 
