@@ -205,7 +205,7 @@ class Phone:
             return now + min(self._app.max_delay, BATCH * self._period)
         self._advance(now)
         complete = self._sample_at + (self._batch - self._fresh - 1) * self._period
-        return min(self._due, complete + _TICK)
+        return min(math.ceil((self._due - _TIE / 2) / _TICK) * _TICK, complete + _TICK)
 
     def look(self, now: float) -> TiltCommand | None:
         """The command to send at `now`, or None if there is nothing new to say."""

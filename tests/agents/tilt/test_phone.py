@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -89,6 +90,16 @@ def test_a_batch_is_complete_when_its_app_looks_by_a_clock_in_whole_microseconds
         now = round(app.next_look(now, 10.0), 6)
         app.look(now)
         assert app.values == batch
+
+
+def test_time_goes_on_between_two_looks_where_batches_end_by_samples_and_by_time_in_turn() -> None:
+    app = noisy(filter="median20-copy", send="on_change", max_delay_s=0.6)
+    looks = [0.0]
+    for _ in range(1000):
+        looks.append(round(app.next_look(looks[-1], 10.0), 6))
+        app.look(looks[-1])
+    assert min(later - sooner for sooner, later in pairwise(looks)) >= 0.9e-6
+    assert app.samples < 20 * app.values  # some batches ended by time
 
 
 def test_an_app_that_keeps_alive_resends_the_value_of_a_batch_until_the_next_is_complete() -> None:
