@@ -37,7 +37,8 @@ class Registration(Config):
         earlier: Hashes of the registrations that this one replaces, the oldest first.
         plan: All that is fixed: the keys of the study, and hashes of its rows, its scenarios
             as resolved, and the files these name.
-        hash: Of all this.
+        hash: Of the plan and the earlier ones; a name or a program fixes nothing of the run, and
+            to change one must not buy another seed.
     """
 
     study: str
@@ -49,8 +50,8 @@ class Registration(Config):
 
     @property
     def proper_hash(self) -> str:
-        """The hash of what it says."""
-        return digest(self.model_dump(mode="json", exclude={"hash"}))
+        """The hash of what it fixes."""
+        return digest(self.model_dump(mode="json", include={"plan", "earlier"}))
 
     @property
     def seed(self) -> int:
@@ -166,7 +167,7 @@ def _liberties(study: Study) -> Iterator[str]:
 def departures(found: Registration, study: Study) -> Iterator[str]:
     """In what a study is not what was registered."""
     if found.hash != found.proper_hash:
-        yield "the registration was edited: its hash is not that of what it says"
+        yield "the registration was edited: its hash is not that of what it fixes"
     now = plan_of(study)
     keys = [key for key in {**found.plan, **now} if found.plan.get(key) != now.get(key)]
     for key in (key for key in keys if key in ("persons", "replications")):

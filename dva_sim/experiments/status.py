@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 from pydantic import Field
 
 from dva_sim.config import Config
+from dva_sim.experiments.limit import RunTooLong
 
 
 class Status(Config):
@@ -25,3 +27,41 @@ class Status(Config):
     why: tuple[str, ...] = ()
     reproducible: bool = True
     registration: dict[str, Any] | None = Field(default=None)
+
+
+def status_of(manifest: Mapping[str, Any]) -> Status:
+    """What the result may be called; results that do not say are judged by what was set.
+
+    A confirmation has all the runs that were registered. Runs that took too long are others on
+    another machine.
+    """
+    if "status" in manifest:
+        return _without(manifest.get("failures", []), Status.model_validate(manifest["status"]))
+    changes = [_as_words(change) for change in manifest.get("set", [])]
+    if not changes:
+        return Status(kind="declared")
+    return Status(kind="exploratory", why=(f"changed on the command line: {', '.join(changes)}",))
+
+
+def _without(failed: Sequence[Mapping[str, Any]], status: Status) -> Status:
+    """The status of results in which some runs are missing."""
+    if not failed:
+        return status
+    confirmed = status.kind == "confirmatory"
+    why = [f"{len(failed)} of the registered runs failed"] if confirmed else []
+    slow = sum(str(row["error"]).startswith(RunTooLong.__name__) for row in failed)
+    why += [f"{slow} of the runs met their limit of time; on another machine others may"] * bool(
+        slow
+    )
+    return status.model_copy(
+        update={
+            "kind": "exploratory" if confirmed else status.kind,
+            "why": (*why, *status.why),
+            "reproducible": status.reproducible and not slow,
+        }
+    )
+
+
+def _as_words(change: Any) -> str:
+    """One `--set`, however the manifest keeps it."""
+    return change if isinstance(change, str) else "=".join(str(word) for word in change)

@@ -11,6 +11,7 @@ from dva_sim.config import load_yaml
 from dva_sim.errors import ConfigError
 from dva_sim.experiments import design, registration
 from dva_sim.experiments.registration import load_registration, plan_of, register
+from dva_sim.experiments.status import status_of
 from dva_sim.experiments.study import load_study
 
 CLAIMED = (
@@ -153,7 +154,7 @@ def test_an_edited_registration_is_found(tmp_path):
     path.write_text(CLAIMED.replace("margin: 1.0", "margin: 0.0"))
     status = load_study(path).status
     assert status.kind == "exploratory"
-    assert status.why == ("the registration was edited: its hash is not that of what it says",)
+    assert status.why == ("the registration was edited: its hash is not that of what it fixes",)
 
 
 def test_a_registration_with_a_hash_of_ones_own_choice_is_found(tmp_path):
@@ -162,6 +163,30 @@ def test_a_registration_with_a_hash_of_ones_own_choice_is_found(tmp_path):
     found = load_registration(load_yaml(file)).hash
     file.write_text(file.read_text().replace(found, "0" * 64))
     assert load_study(path).status.kind == "exploratory"
+
+
+def test_a_name_of_ones_own_choice_buys_no_other_seed(tmp_path):
+    path = registered(tmp_path)
+    file = beside(path)
+    before = load_study(path).seed
+    file.write_text(file.read_text().replace('study: "study"', 'study: "lucky"'))
+    assert load_study(path).status.kind == "confirmatory"
+    assert load_study(path).seed == before
+
+
+def test_what_was_registered_is_not_confirmed_by_fewer_runs(tmp_path):
+    status = load_study(registered(tmp_path)).status.model_dump(mode="json")
+    broken = {"status": status, "failures": [{"error": "ValueError: no"}]}
+    found = status_of(broken)
+    assert (found.kind, found.reproducible) == ("exploratory", True)
+    assert found.why == ("1 of the registered runs failed",)
+    assert status_of(broken | {"failures": []}).kind == "confirmatory"
+
+
+def test_runs_that_took_too_long_are_others_on_another_machine():
+    found = status_of({"status": {}, "failures": [{"error": "RunTooLong: took more than its 1 s"}]})
+    assert (found.kind, found.reproducible) == ("declared", False)
+    assert found.why == ("1 of the runs met their limit of time; on another machine others may",)
 
 
 def test_another_program_is_told_and_changes_nothing_else(tmp_path, monkeypatch):
