@@ -23,6 +23,7 @@ from dva_sim.experiments.labels import (
 
 Floats = NDArray[np.float64]
 
+_LEAST = 0.01  # that is not printed as zero
 # What is not there at a level of zero.
 _ABSENT = {
     "link.delay_s": "delay",
@@ -176,6 +177,7 @@ def _undecided(f: Finding, where: NDArray[np.intp], bound: float) -> str:
 
 
 def _settled(f: Finding, where: NDArray[np.intp], bound: float, nowhere: bool) -> str:
+    bound = max(bound, _LEAST)
     verdict = f"effect above {quantity(bound, f.unit)} either way is ruled out"
     matters = f", and with it the {_declared(f)} declared to matter" if f.smallest_effect else ""
     if nowhere:
@@ -232,11 +234,17 @@ def _misses(f: Finding) -> list[str]:
         f"{level_name(f.factor, m.line)} {percent(m.share)} ({m.missed} of {m.runs})"
         for m in f.missed
     ]
+    return [f"Not confirmed {where}: {listing(shares)}. {_what_misses_count(f)}"]
+
+
+def _what_misses_count(f: Finding) -> str:
+    if f.measure != "drive_time_s":
+        return "Such a run counts with what was measured until it ended."
     horizon = f" ({quantity(f.horizon, 's')})" if f.horizon is not None else ""
-    return [
-        f"Not confirmed {where}: {listing(shares)}. Such a run counts with all the "
-        f"time it was given{horizon}, which says less than that the event was missed."
-    ]
+    return (
+        f"Such a run counts with all the time it was given{horizon}, which says less than that "
+        "the event was missed."
+    )
 
 
 def _what_is_measured(f: Finding) -> str:
@@ -297,6 +305,20 @@ def _at(f: Finding, where: Sequence[int]) -> str:
 
 def _of(f: Finding) -> str:
     return "of " if unit_of(f.over) or _is_ordered(f) else ""
+
+
+def telling_stop(finding: Finding) -> int | None:
+    """The stop of which the answer speaks first; the last with a band where nothing is told."""
+    for chosen in (finding.low > 0, finding.high < 0):
+        if len(where := np.flatnonzero(chosen)):
+            return _telling_level(finding, where)
+    there = np.flatnonzero(np.isfinite(finding.low))
+    return int(there[-1]) if len(there) else None
+
+
+def place_of(finding: Finding, stop: int) -> str:
+    """Where one stop of a finding lies: `with profile default, at a one-way delay of 1 s`."""
+    return f"{_condition(finding, inside=True)}{_at(finding, [stop])}"
 
 
 def _places(f: Finding, where: NDArray[np.intp]) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -84,7 +84,7 @@ def cell_table(
     """
     settings = list(part.settings())
     columns: list[_Column | None] = [_value(part, name) for name in points]
-    columns += [_counts(part), _confirmed(part), *_measure(part, measure, possible)]
+    columns += [_counts(part), *_endings(part), *_measure(part, measure, possible)]
     columns += [*_others(part, [s for s in summaries if s[0] != measure]), _beyond(support)]
     there = [c for c in columns if c is not None]
     names = [factor_name(f.name) for f in part.factors]
@@ -128,10 +128,28 @@ def _counts(part: Part) -> _Column:
     return "runs", [str(len(values)) for values in _cells(part, "seed")]
 
 
-def _confirmed(part: Part) -> _Column | None:
+_ENDINGS = {
+    "refuted": "refuted",
+    "lost link": "link lost",
+    "gave up": "given up",
+    "timeout": "nothing by the end",
+    "no drive": "no drive",
+}
+
+
+def _endings(part: Part) -> Iterator[_Column]:
+    """The share confirmed, and how the last drives of the others ended, as far as it occurs."""
     if not part.has("confirmed"):
-        return None
-    return "confirmed", [_text(np.mean, cell, percent) for cell in _cells(part, "confirmed")]
+        return
+    grid = part.grid("confirmed")
+    yield "confirmed", [_text(np.mean, present(cell), percent) for cell in _by_cell(part, grid)]
+    how = part.treated.get("outcome", np.array([]))
+    for outcome, head in _ENDINGS.items():
+        if np.any(how == outcome):
+            share = np.where(
+                np.isfinite(grid), part.laid_out((how == outcome).astype(float)), np.nan
+            )
+            yield head, [_text(np.mean, present(cell), percent) for cell in _by_cell(part, share)]
 
 
 def _measure(part: Part, measure: str, possible: tuple[float, float]) -> list[_Column]:

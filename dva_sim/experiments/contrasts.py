@@ -8,7 +8,7 @@ interval rules it out; all else is open.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal, NamedTuple
 
@@ -97,9 +97,9 @@ def compare_all(study: Mapping[str, Any], runs: Table) -> list[Compared]:
     """Every named comparison at every level that it runs over, as the manifest has them."""
     found = [
         _compared(study, runs, name, contrast, at)
-        for name, contrast in _named(study).items()
+        for name, contrast in contrasts_of(study).items()
         if name != ANSWER
-        for at in _places(study, contrast)
+        for at in places_of(study, contrast)
     ]
     adjusted = holm([c.p for c in found], [c.contrast.family for c in found])
     return [replace(c, adjusted=float(p)) for c, p in zip(found, adjusted, strict=True)]
@@ -107,12 +107,10 @@ def compare_all(study: Mapping[str, Any], runs: Table) -> list[Compared]:
 
 def judge_hypotheses(study: Mapping[str, Any], runs: Table) -> list[Tested]:
     """Every hypothesis, judged."""
-    named = _named(study)
-    claims = {k: Hypothesis.model_validate(h) for k, h in (study.get("hypotheses") or {}).items()}
+    named = contrasts_of(study)
     found = [
         _tested(study, runs, name, claim, named[claim.comparison])
-        for name, claim in claims.items()
-        if claim.comparison in named
+        for name, claim in claims_of(study).items()
     ]
     adjusted = holm([t.p for t in found], [t.contrast.family for t in found])
     judged = (replace(t, adjusted=float(p)) for t, p in zip(found, adjusted, strict=True))
@@ -152,7 +150,7 @@ def pairs_of(
     return Pairs(sides[0].ravel(), sides[1].ravel(), person.ravel())
 
 
-def _named(study: Mapping[str, Any]) -> dict[str, Contrast]:
+def contrasts_of(study: Mapping[str, Any]) -> dict[str, Contrast]:
     """The answer's contrast and the named ones."""
     named: dict[str, Contrast] = {}
     if study.get("answer"):
@@ -162,13 +160,20 @@ def _named(study: Mapping[str, Any]) -> dict[str, Contrast]:
     return named
 
 
-def _places(study: Mapping[str, Any], contrast: Contrast) -> Iterator[Setting]:
+def claims_of(study: Mapping[str, Any]) -> dict[str, Hypothesis]:
+    """The hypotheses, but for those about a contrast that is not declared."""
+    declared = (study.get("hypotheses") or {}).items()
+    claims = {name: Hypothesis.model_validate(claim) for name, claim in declared}
+    named = contrasts_of(study)
+    return {name: claim for name, claim in claims.items() if claim.comparison in named}
+
+
+def places_of(study: Mapping[str, Any], contrast: Contrast) -> list[Setting]:
     """Each level that a contrast runs over, or the one place it is taken at."""
     stops = _stops(study, contrast)
     if not stops:
-        yield dict(contrast.within)
-    for level in stops:
-        yield dict(contrast.within) | {str(contrast.over): level}
+        return [dict(contrast.within)]
+    return [dict(contrast.within) | {str(contrast.over): level} for level in stops]
 
 
 def _stops(study: Mapping[str, Any], contrast: Contrast) -> Sequence[Level]:
@@ -198,10 +203,7 @@ def _compared(
 def _tested(
     study: Mapping[str, Any], runs: Table, name: str, claim: Hypothesis, contrast: Contrast
 ) -> Tested:
-    at = dict(contrast.within)
-    if stops := _stops(study, contrast):
-        at[str(contrast.over)] = stops[-1]
-    at |= claim.at
+    at = places_of(study, contrast)[-1] | claim.at
     pairs = pairs_of(study, runs, contrast, at)
     found = paired_difference(*pairs) if pairs is not None else None
     if pairs is None or found is None or not found.n_persons:

@@ -95,12 +95,15 @@ class Part:
 
     def grid(self, column: str) -> Floats:
         """One column as `(levels of factor 1, ..., persons, trials)`; nan where no run is."""
+        none = np.full(len(self._known), np.nan)
+        return self.laid_out(as_floats(self.treated[column]) if column in self.treated else none)
+
+    def laid_out(self, values: Floats) -> Floats:
+        """One value for each row of `treated`, as the same grid."""
         shape = (*(len(f.levels) for f in self.factors), len(self.persons), len(self.trials))
-        values = np.full(shape, np.nan)
-        if column in self.treated:
-            index = tuple(i[self._known] for i in self._index)
-            values[index] = as_floats(self.treated[column])[self._known]
-        return values
+        grid = np.full(shape, np.nan)
+        grid[tuple(i[self._known] for i in self._index)] = values[self._known]
+        return grid
 
     def reference(self, column: str) -> Floats:
         """One column of the reference runs as `(persons, trials)`."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -13,8 +14,15 @@ from dva_sim.experiments.statistics import VarianceReduction, variance_reduction
 from dva_sim.experiments.summary import Reading
 from dva_sim.experiments.transports import page as transport_page
 
+_FEW = 6  # persons: with fewer nothing can be drawn anew
+
 
 def remarks(reading: Reading) -> list[str]:
+    """How large it was, how it was judged, and by which program."""
+    return [_size(reading), *_of_model(reading), *_tests(reading.study), _made_by(reading)]
+
+
+def _of_model(reading: Reading) -> list[str]:
     """Those of a dispatch or transport study, or the usual ones."""
     if reading.shifts is not None:
         return dispatch_page.method(reading.shifts, reading.pair_correlation)
@@ -23,22 +31,94 @@ def remarks(reading: Reading) -> list[str]:
     return list(_usual(reading))
 
 
+def _size(reading: Reading) -> str:
+    """Persons and trials as they were run, and what decided how many."""
+    cluster = reading.cluster
+    trials = "blocks of trials" if _is_task(reading) else "trials"
+    name = "Simulated persons" if cluster == "person" else "Independent shifts"
+    each = "" if cluster == "shift" else f"; {trials} of each: {_trials(reading)}"
+    return f"{name}: {reading.persons}{_why_so_many(reading)}{each}."
+
+
+def _trials(reading: Reading) -> str:
+    """How many each person made; part by part where they differ."""
+    usual = reading.study.get("replications")
+    parts = reading.study.get("parts", {}).items()
+    counts = {name: part.get("replications") or usual for name, part in parts}
+    if len(set(counts.values())) < 2:
+        return str(next(iter(counts.values()), usual))
+    return ", ".join(f"{count} in {name}" for name, count in counts.items())
+
+
+def _why_so_many(reading: Reading) -> str:
+    """What ended a study that could end early."""
+    stopped = reading.manifest.get("stopped") or {}
+    if reading.study.get("stop") is None and reading.study.get("budget_s") is None:
+        return ""
+    batches = f"after {stopped.get('rounds')} of {stopped.get('of')} batches"
+    why = stopped.get("why")
+    if why == "enough":
+        return (
+            f" (stopped {batches}: every interval asked for was narrow enough; intervals at which "
+            "one stops hold their 95 % in the long run, and a little less with few persons)"
+        )
+    if why == "budget":
+        return f" (stopped {batches}: the time by the clock was spent, so it cannot be made again)"
+    return f" (all {stopped.get('of')} batches, the most that was allowed)"
+
+
+def _is_task(reading: Reading) -> bool:
+    return any(s.get("model") == "task" for s in reading.scenarios.values())
+
+
+def _tests(study: Mapping[str, Any]) -> Iterator[str]:
+    """How claims were judged, where there are any."""
+    if study.get("hypotheses"):
+        yield (
+            "Hypotheses are judged by a one-sided test against their margin, at 5 % (bootstrap-t "
+            "over persons), those of sameness by two such tests, one at each end of the margin; p "
+            "is adjusted by Holm within each family of hypotheses."
+        )
+    if study.get("comparisons"):
+        yield (
+            "Comparisons are tested two-sided by permutation: a person's two sides are swapped, "
+            "all trials together (every way of swapping with up to 14 persons, else 10,000 drawn); "
+            "p is adjusted by Holm within each family of comparisons."
+        )
+
+
+def _made_by(reading: Reading) -> str:
+    """The program, and whether it can be had again."""
+    versions = reading.manifest.get("versions") or {}
+    program = f"Made with dva-sim {versions.get('dva-sim', 'of unknown version')}"
+    if fingerprint := versions.get("fingerprint"):
+        program += f", simulating code {fingerprint}"
+    commit = versions.get("commit")
+    if not commit:
+        return f"{program}; its commit is not known: it did not run from a checkout."
+    state = " with changes that are not committed" if versions.get("dirty") else ""
+    return f"{program}, commit {commit[:12]}{state}."
+
+
 def _usual(reading: Reading) -> Iterator[str]:
-    study = reading.study
-    is_task = any(s.get("model") == "task" for s in reading.scenarios.values())
+    study, is_task = reading.study, _is_task(reading)
     block = "block" if is_task else "trial"
     luck = "" if is_task else "start, event, "
     yield (
-        f"Simulated persons: {study.get('persons')}; {'blocks of trials' if is_task else 'trials'} "
-        f"of each: {study.get('replications')}. A {block} meets the same luck in every cell: "
-        f"{luck}noise of hand and sensor, weather of the link. Differences are taken within person "
-        f"and {block} (common random numbers){_alike(reading)}."
+        f"A {block} meets the same luck in every cell: {luck}noise of hand and sensor, weather of "
+        f"the link. Differences are taken within person and {block} (common random "
+        f"numbers){_alike(reading)}."
+    )
+    few = (
+        " With as few persons as here Student's stands alone, and Bonferroni's t for bands."
+        if reading.persons < _FEW
+        else ""
     )
     yield (
         f"The person is the cluster: {block}s are averaged within a person first, and intervals "
         "are taken over persons. Intervals of one level reach as far as Student's or the "
         "bootstrap-t over persons does; bands cover all levels of a line at once (max-t over a "
-        "bootstrap of persons). Both are Monte Carlo intervals, given the model."
+        f"bootstrap of persons).{few} Both are Monte Carlo intervals, given the model."
     )
     if POINT in study.get("factors", {}):
         yield (
@@ -51,7 +131,7 @@ def _usual(reading: Reading) -> Iterator[str]:
             "the same person and trial: an oracle that sees the true state without delay, on the "
             "same way."
         )
-    if "confirmed" in reading.runs:
+    if "confirmed" in reading.runs and reading.view and reading.view.measure == "drive_time_s":
         yield (
             "A run that was not confirmed counts with all the time it was given and is shown as "
             "such; it is not dropped."

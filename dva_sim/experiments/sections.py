@@ -22,6 +22,9 @@ from dva_sim.experiments.cells import CellTable
 from dva_sim.experiments.conditions import conditions, timeout_remark
 from dva_sim.experiments.contrasts import compare_all, judge_hypotheses
 from dva_sim.experiments.dispatch import page as dispatch_page
+from dva_sim.experiments.endings_told import in_a_line
+from dva_sim.experiments.endings_told import sentences as sentences_of_endings
+from dva_sim.experiments.endings_told import table as endings_table
 from dva_sim.experiments.figures import Drawn
 from dva_sim.experiments.labels import (
     factor_name,
@@ -33,10 +36,12 @@ from dva_sim.experiments.labels import (
     with_unit,
 )
 from dva_sim.experiments.method import remarks
+from dva_sim.experiments.needed_told import plan_table
 from dva_sim.experiments.predictions import Judged, judge_all
 from dva_sim.experiments.reading import factors_of, keys_of
+from dva_sim.experiments.registered import registration_table
 from dva_sim.experiments.robustness import sentences
-from dva_sim.experiments.status import Status
+from dva_sim.experiments.status import status_of
 from dva_sim.experiments.summary import Reading
 from dva_sim.experiments.tables_of_tests import comparison_table, hypothesis_table
 from dva_sim.experiments.tuning import tuned_table
@@ -57,6 +62,8 @@ def blocks_of(reading: Reading, drawn: Sequence[Drawn]) -> list[Block]:
             [Box((reading.answer.lead, *reading.answer.notes))],
             _claims(reading),
             _comparisons(reading),
+            _endings(reading),
+            _needed(reading),
             _robustness(reading),
             _what_varied(reading),
             _figures(drawn),
@@ -67,24 +74,11 @@ def blocks_of(reading: Reading, drawn: Sequence[Drawn]) -> list[Block]:
     )
 
 
-def status_of(manifest: Mapping[str, Any]) -> Status:
-    """What the result may be called; results that do not say are judged by what was set."""
-    if "status" in manifest:
-        return Status.model_validate(manifest["status"])
-    changes = [_as_words(change) for change in manifest.get("set", [])]
-    if not changes:
-        return Status(kind="declared")
-    return Status(kind="exploratory", why=(f"changed on the command line: {', '.join(changes)}",))
-
-
 def _status(reading: Reading) -> Iterator[Block]:
     status = status_of(reading.manifest)
     yield Words(_KINDS[status.kind], "label")
     for why in status.why:
         yield Words(f"{why[:1].upper()}{why[1:]}.", "note")
-    if status.registration:
-        told = ", ".join(f"{key} {value}" for key, value in status.registration.items())
-        yield Words(f"Registration: {told}.", "note")
     for warning in reading.warnings:
         yield Words(warning, "warning")
 
@@ -96,6 +90,11 @@ def _claims(reading: Reading) -> Iterator[Block]:
         kind = "Registered hypotheses" if registered else "Hypotheses, not registered"
         yield Heading(f"{kind}, beside what came out")
         yield Printed(hypothesis_table(hypotheses), is_words=True)
+    if status_of(reading.manifest).registration:
+        yield Heading("Registration")
+        yield Printed(
+            registration_table(reading.manifest, reading.runs, reading.persons), is_words=True
+        )
     predictions = judge_all(reading.study, reading.view)
     if predictions:
         yield Heading("Predictions, written down before the run")
@@ -113,6 +112,29 @@ def _comparisons(reading: Reading) -> Iterator[Block]:
     if found:
         yield Heading("Named comparisons")
         yield Printed(comparison_table(found), is_words=True)
+
+
+def _endings(reading: Reading) -> Iterator[Block]:
+    """How runs ended, where not all of them went right; else a line, if the answer has none."""
+    endings, view = reading.endings, reading.view
+    if endings is None or view is None:
+        return
+    if endings.is_right.all():
+        if reading.finding is None or not reading.finding.missed:
+            yield Words(in_a_line(endings))
+        return
+    yield Heading("How it ended")
+    for sentence in sentences_of_endings(endings, view, reading.finding):
+        yield Words(sentence)
+    found = endings_table(endings, view, reading.cluster)
+    if found.rows:
+        yield Printed(found)
+
+
+def _needed(reading: Reading) -> Iterator[Block]:
+    if reading.plans:
+        yield Heading("Persons that a study of this would need")
+        yield Printed(plan_table(reading.plans, reading.cluster), is_words=True)
 
 
 def _robustness(reading: Reading) -> Iterator[Block]:
@@ -234,8 +256,3 @@ def _treatments(study: Mapping[str, Any]) -> list[tuple[str, str]]:
         for factor, named in study.get("treatments", {}).items()
         for level, changes in named.items()
     ]
-
-
-def _as_words(change: Any) -> str:
-    """One `--set`, however the manifest keeps it."""
-    return change if isinstance(change, str) else "=".join(str(word) for word in change)

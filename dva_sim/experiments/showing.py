@@ -11,6 +11,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from dva_sim.experiments.frames import plain
+from dva_sim.experiments.needed_told import plan_lines
 from dva_sim.experiments.results import Results
 
 ROWS = 20
@@ -29,6 +30,8 @@ def show(results: Results, console: Console) -> None:
         console.print(escape(note), style="dim", soft_wrap=True)
     for warning in results.reading.warnings:
         console.print(f"[yellow]{escape(warning)}[/yellow]", soft_wrap=True)
+    for line in plan_lines(results.reading.plans, results.reading.cluster):
+        console.print(escape(line), soft_wrap=True)
     for cells in results.reading.cells:
         console.print(f"\n{escape(cells.part)}", style="bold")
         print_table(cells.heads, cells.rows, console, cells.labels)
@@ -74,6 +77,8 @@ def program(results: Results) -> str:
     told = f"dva-sim {versions.get('dva-sim')}"
     if commit := versions.get("commit"):
         told += f", commit {commit[:12]}"
+    else:
+        told += ", commit not known"
     return told + (" with changes that are not committed" if versions.get("dirty") else "")
 
 
@@ -121,7 +126,9 @@ def _facts(results: Results) -> Iterator[str]:
     yield _status(manifest)
     cells = len(manifest.get("cells", []))
     size = f"{results.runs.rows} runs in {cells} configurations"
-    persons = f"{study.get('persons')} persons x {study.get('replications')} trials"
+    persons = (
+        f"{results.reading.persons} {results.reading.cluster}s x {study.get('replications')} trials"
+    )
     yield f"{size}, {len(results.failures)} failed; {persons}, seed {study.get('seed')}"
     if (stopped := manifest.get("stopped") or {}).get("why"):
         why = _ENDS.get(stopped["why"], stopped["why"])

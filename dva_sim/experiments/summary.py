@@ -16,7 +16,10 @@ from dva_sim.experiments.cells import SUMMARIES, CellTable, cell_table
 from dva_sim.experiments.dispatch import page as dispatch_page
 from dva_sim.experiments.dispatch.shifts import Shifts, is_dispatch
 from dva_sim.experiments.effects import Part, Table, View, as_floats
+from dva_sim.experiments.endings import Endings, horizon_of
 from dva_sim.experiments.episodes_kept import Episode, Tables, typical_and_worst
+from dva_sim.experiments.needed import Plan, plans
+from dva_sim.experiments.needed_told import precision
 from dva_sim.experiments.reading import (
     finding_of,
     layout_of,
@@ -28,6 +31,7 @@ from dva_sim.experiments.reading import (
 )
 from dva_sim.experiments.results import Results
 from dva_sim.experiments.robustness import Robustness, robustness_of
+from dva_sim.experiments.status import status_of
 from dva_sim.experiments.support import support_of_part
 from dva_sim.experiments.transports import page as transport_page
 from dva_sim.experiments.tuning import tuning_warning
@@ -60,6 +64,11 @@ class Reading:
     def runs(self) -> Table:
         """The table of runs."""
         return self.table("runs")
+
+    @property
+    def persons(self) -> int:
+        """How many were simulated, which a stopping rule or a budget may have decided."""
+        return len(np.unique(self.runs["person"])) if self.runs else 0
 
     @property
     def scenarios(self) -> Mapping[str, Mapping[str, Any]]:
@@ -95,9 +104,24 @@ class Reading:
         return Shifts(self.view, self.table("events") or None)
 
     @property
+    def cluster(self) -> str:
+        """What is drawn anew for intervals: persons, or shifts."""
+        return "person" if self.shifts is None else "shift"
+
+    @property
     def is_contest(self) -> bool:
         """Whether transports compete on a congested link."""
         return transport_page.is_contest(self.view)
+
+    @cached_property
+    def endings(self) -> Endings | None:
+        """How the events of the answer's part ended; None where a study has none."""
+        events = self.table("events")
+        if self.view is None or "closing_s" not in events:
+            return None
+        horizon = horizon_of(self.view, self.scenario_of(self.view.part.name))
+        found = Endings(self.view, events, self.runs, horizon)
+        return found if len(found) and np.isfinite(horizon) else None
 
     @cached_property
     def robustness(self) -> Robustness | None:
@@ -144,13 +168,26 @@ class Reading:
         if self.view is None:
             return Answer("No run was completed, so there is nothing to answer with.")
         if self.shifts is not None:
-            return dispatch_page.answer_of(self.finding, self.shifts)
+            return self._with_precision(dispatch_page.answer_of(self.finding, self.shifts))
         if self.finding is not None:
-            return answer(self.finding)
+            return self._with_precision(answer(self.finding))
         return Answer(
             "The contrast that would answer the question was not declared or not run; "
             "the figures and the table show what was."
         )
+
+    def _with_precision(self, found: Answer) -> Answer:
+        if self.finding is None or self.view is None:
+            return found
+        told = precision(self.finding, self.view, self.cluster)
+        return replace(found, notes=[*found.notes, told]) if told else found
+
+    @cached_property
+    def plans(self) -> list[Plan]:
+        """What a study would need, counted from an exploratory one: others have been planned."""
+        if not self.runs or status_of(self.manifest).kind != "exploratory":
+            return []
+        return plans(self.study, self.runs)
 
     @cached_property
     def cells(self) -> list[CellTable]:

@@ -37,8 +37,8 @@ def hypothesis_table(tested: Sequence[Tested]) -> CellTable:
     note = (
         "A claim holds where its own test (one-sided against the margin, bootstrap-t over persons; "
         "two one-sided tests for sameness) stays below 5 % after Holm's adjustment within its "
-        "family. It does not hold where the 95 % interval rules it out. All else is open: absence "
-        "of evidence."
+        "family. It does not hold where the 95 % interval, which is of its row alone, rules it "
+        "out. All else is open: absence of evidence."
     )
     return CellTable("", heads, len(heads), rows, note=note)
 
@@ -67,11 +67,21 @@ def comparison_table(compared: Sequence[Compared]) -> CellTable:
     counted = "; ".join(f"{name}: {count}" for name, count in families.items())
     note = (
         "Each interval is of its row alone; p is of the permutation test (the labels of a person's "
-        "runs could as well be swapped), by Holm for all tests of its family together (tests in "
-        f"each family: {counted}). Standard deviations are those of persons under the "
+        "runs could as well be swapped), two-sided, by Holm for all tests of its family together "
+        f"(tests in each family: {counted}). Standard deviations are those of persons under the "
         "two levels, on average. Levels of factors that a comparison does not name are averaged."
+        f"{_too_few(compared)}"
     )
     return CellTable("", heads, len(heads), rows, note=note)
+
+
+def _too_few(compared: Sequence[Compared]) -> str:
+    """Whether even one test cannot come out, whatever the runs."""
+    persons = max((c.difference.n_persons for c in compared if c.difference), default=0)
+    least = 2.0 ** (1 - persons)
+    if not persons or least <= 1 - LEVEL:
+        return ""
+    return f" With {persons} persons p cannot be below {least:.2g}: this test needs six."
 
 
 def _sides(compared: Compared) -> str:
@@ -82,15 +92,27 @@ def _sides(compared: Compared) -> str:
 def _claim(tested: Tested) -> str:
     """`A minus B in driving time, at delay 1 s: above 2 s`."""
     first, second = (level_name(tested.contrast.factor, x) for x in tested.contrast.contrast)
+    where = f", {setting(tested.at)}" if tested.at else ""
+    measure = measure_name(tested.contrast.measure)
+    return f"{first} minus {second} in {measure}{where}: {bound_of(tested)}"
+
+
+def bound_of(tested: Tested) -> str:
+    """`above 2.0 s`, `below −2.0 s` or `the same within 2.0 s`."""
     claim, unit = tested.hypothesis, unit_of(tested.contrast.measure)
     margin = quantity(claim.margin, unit) if claim.margin else "zero"
-    bound = {
+    return {
         "above": f"above {margin}",
         "below": f"below {'−' if claim.margin else ''}{margin}",
         "same": f"the same within {margin}",
     }[claim.direction]
-    where = f", {setting(tested.at)}" if tested.at else ""
-    return f"{first} minus {second} in {measure_name(tested.contrast.measure)}{where}: {bound}"
+
+
+def verdict_with_interval(tested: Tested) -> str:
+    """`✓ held: 4.0 s (3.0 to 5.0 s)`."""
+    if tested.difference is None:
+        return _VERDICTS[tested.verdict]
+    return f"{_VERDICTS[tested.verdict]}: {_interval(tested.difference, tested.contrast.measure)}"
 
 
 def _place(at: Setting) -> str:

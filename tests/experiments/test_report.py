@@ -177,18 +177,20 @@ def test_a_pdf_is_made_when_asked_for_and_kept_up_to_date(tmp_path):
 def test_a_registered_study_is_called_confirmatory_and_its_hypotheses_stand_beside_the_result(
     tmp_path,
 ):
-    status = {"kind": "confirmatory", "why": [], "registration": {"hash": "1234"}}
-    facts = synthetic_study.manifest(8, 1, status=status)
+    facts = synthetic_study.manifest(8, 1)
     facts["study"] |= {
         "factors": {"pattern": synthetic_study.PATTERNS, "link.delay_s": [1.0]},
         "hypotheses": {"waits": {"text": "It waits.", "direction": "above", "margin": 2.0}},
     }
     facts["study"]["answer"] |= {"within": {}}
+    registration = {"made_with": "0.7.0 abc", "plan": dict(facts["study"]), "hash": "12345678" * 8}
+    facts["status"] = {"kind": "confirmatory", "why": [], "registration": registration}
     rows = synthetic_study.drive_rows(8, 1, effect_s=30.0, missed=0.0)
     runs = [r for r in of_one_profile(rows) if r["link.delay_s"] == 1.0 or r["is_reference"]]
     text = words(write_report(synthetic_study.write(tmp_path / "r", {"runs": runs}, facts)))
     assert "Confirmatory: run as registered beforehand" in text
-    assert "Registration: hash 1234." in text
+    assert "persons x trials 8 x 1 8 x 1 hypothesis waits above 2.0 s ✓ held: " in text
+    assert "hash 1234567812345678 earlier" in text
     assert "Registered hypotheses, beside what came out" in text
     assert "waits: It waits. REQ/REP minus latest-wins PUB/SUB" in text
     assert "✓ held" in text

@@ -1,0 +1,115 @@
+"""How it ended, as a report says it: the answer's contrast in words, and a table."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from dva_sim.experiments.answer import Finding, place_of
+from dva_sim.experiments.cells import CellTable
+from dva_sim.experiments.effects import View
+from dva_sim.experiments.endings import CLEARED, CONFIRMED, NOTHING, Ended, Endings
+from dva_sim.experiments.labels import (
+    Level,
+    capital,
+    factor_name,
+    level_name,
+    listing,
+    number,
+    percent,
+    quantity,
+    setting,
+)
+from dva_sim.experiments.statistics import Interval
+
+
+def sentences(endings: Endings, view: View, finding: Finding | None) -> list[str]:
+    """The contrast at the last stop at which not all went right; nothing without one."""
+    if finding is None:
+        return []
+    sides = (finding.first, finding.second)
+    stops = [stop for stop in view.stops if not _all_right(endings, sides, stop)]
+    if not stops:
+        return ["Where the answer looks every event was confirmed; elsewhere not all were."]
+    stop = stops[-1]
+    told = "; ".join(_side(view, endings.at(level, stop)) for level in sides)
+    where = place_of(finding, view.stops.index(stop))
+    when = f"by {quantity(endings.horizon, 's')} after the report"
+    return [f"{capital(where)}, {when}: {told}.{_apart(endings, finding, stop)}"]
+
+
+def in_a_line(endings: Endings) -> str:
+    """That all went right, in every cell."""
+    if CLEARED in endings.ways:
+        return "Every event was confirmed, and every false alarm cleared, in every cell."
+    return "Every event was confirmed, in every cell."
+
+
+def table(endings: Endings, view: View, cluster: str) -> CellTable:
+    """Share of each way, line by line at each stop at which not all went right."""
+    rows = [
+        [*_names(view, ended), str(ended.events), *map(_share, ended.shares.values())]
+        for stop in view.stops
+        if not _all_right(endings, view.lines, stop)
+        for ended in (endings.at(line, stop) for line in view.lines)
+        if ended.events
+    ]
+    factors = [factor_name(f.name) for f in (view.over, view.line) if f is not None]
+    last = f"nothing by {quantity(endings.horizon, 's')}"
+    heads = [*factors, "events", *(last if w == NOTHING else w for w in endings.ways)]
+    return CellTable(view.part.name, heads, len(factors), rows, note=_note(view, cluster))
+
+
+def _all_right(endings: Endings, lines: Sequence[Level], stop: Level) -> bool:
+    return all(bool(endings.is_right[endings.under(line, stop)].all()) for line in lines)
+
+
+def _names(view: View, ended: Ended) -> Iterator[str]:
+    for factor, level in ((view.over, ended.stop), (view.line, ended.line)):
+        if factor is not None:
+            yield level_name(factor.name, level)
+
+
+def _side(view: View, ended: Ended) -> str:
+    """`REQ/REP confirmed 83 % (60 to 94 %), link lost 17 % (6 to 40 %)`."""
+    name = level_name(view.line.name, ended.line) if view.line else "all"
+    told = [
+        f"{way} {_share(share)}"
+        for way, share in ended.shares.items()
+        if share.mean > 0 or way == CONFIRMED
+    ]
+    return f"{name}: {listing(told)}"
+
+
+def _apart(endings: Endings, finding: Finding, stop: Level) -> str:
+    """How far the shares confirmed lie apart, in percentage points."""
+    found = endings.difference(finding.first, finding.second, stop)
+    if not np.isfinite(found.low) or found.mean == 0:
+        return ""
+    first, second = (level_name(finding.factor, x) for x in (finding.first, finding.second))
+    sign = 1 if found.mean > 0 else -1
+    low, high = sorted(sign * max(-1.0, min(end, 1.0)) for end in (found.low, found.high))
+    ends = f" ({number(100 * low)} to {number(100 * high)})" if low < high else ""
+    return (
+        f" In the share confirmed {first} lies {number(100 * abs(found.mean))} percentage points "
+        f"{'above' if sign > 0 else 'below'} {second}{ends}."
+    )
+
+
+def _share(found: Interval) -> str:
+    """With its interval, where there are enough persons for one."""
+    if not np.isfinite(found.low):
+        return percent(found.mean)
+    low = percent(found.low).removesuffix("\N{NO-BREAK SPACE}%")
+    return f"{percent(found.mean)} ({low} to {percent(found.high)})"
+
+
+def _note(view: View, cluster: str) -> str:
+    where = f" with {setting(view.panels[0])}" if view.panels[0] else ""
+    return (
+        f"Shares of the events{where} that had ended in each way, with 95 % intervals. What comes "
+        "first rules out the others, so they compete, and a row adds up to 100 % (cumulative "
+        f"incidence, Aalen-Johansen). Each interval is of its share alone, with the {cluster} "
+        "as the cluster. Conditions in which all were confirmed are left out."
+    )

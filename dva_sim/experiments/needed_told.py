@@ -1,0 +1,133 @@
+"""How precise an answer is, and how many persons it takes, as a report says it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dva_sim.experiments.answer import Finding, place_of, telling_stop
+from dva_sim.experiments.cells import CellTable
+from dva_sim.experiments.effects import Floats, View
+from dva_sim.experiments.labels import level_name, quantity
+from dva_sim.experiments.needed import MOST_PERSONS, POWERS, Count, Plan
+from dva_sim.experiments.statistics import mean_interval, needed_persons
+
+
+def precision(finding: Finding, view: View, cluster: str) -> str:
+    """How wide the answer's interval is, and how many persons less would take; empty without one.
+
+    Args:
+        finding: The answer.
+        view: The runs it rests on.
+        cluster: What is drawn anew: persons, or shifts.
+    """
+    stop = telling_stop(finding)
+    if stop is None:
+        return ""
+    values, person = _differences(finding, view, stop)
+    found = mean_interval(values, person)
+    if not found.half_width > 0:
+        return ""
+    alone = " alone" if finding.over else ""
+    width = f"±{quantity(found.half_width, finding.unit)} with {found.n_persons} {cluster}s"
+    half = _count_of(needed(values, person, found.half_width / 2))
+    return (
+        f"The 95 % interval of the difference {place_of(finding, stop)}{alone} is {width}; half "
+        f"as wide would take about {half}.{_where_open(finding, view)} That is if more of them "
+        "spread as these do, with as many runs of each."
+    )
+
+
+def needed(values: Floats, person: NDArray[Any], half_width: float) -> float:
+    """Persons for an interval of a mean; infinite if there are more than a million."""
+    try:
+        return needed_persons(values, person, half_width)
+    except ValueError:
+        return math.inf
+
+
+def _where_open(finding: Finding, view: View) -> str:
+    """What it would take wherever an effect that matters is not ruled out yet."""
+    limit = finding.smallest_effect
+    if limit is None:
+        return ""
+    holds_zero = (finding.low <= 0) & (finding.high >= 0)
+    is_open = holds_zero & (np.maximum(-finding.low, finding.high) > limit)
+    stops = [int(stop) for stop in np.flatnonzero(is_open)]
+    if not stops:
+        return ""
+    most = max(needed(*_differences(finding, view, stop), limit) for stop in stops)
+    matters = level_name(finding.measure, limit)
+    return (
+        f" Where the question stays open, about {_count_of(most)} would narrow it to ±{matters}, "
+        "the smallest effect declared to matter."
+    )
+
+
+def _differences(finding: Finding, view: View, stop: int) -> tuple[Floats, NDArray[Any]]:
+    """First minus second, run by run, and whose they are."""
+    values, panel = view.values, view.panels[0]
+    first, second = (
+        view.curve(values, panel, side)[stop] for side in (finding.first, finding.second)
+    )
+    person = np.repeat(view.part.persons, len(view.part.trials))
+    return (first - second).ravel(), person
+
+
+def _count_of(persons: float) -> str:
+    return f"{persons:.0f}" if math.isfinite(persons) else "more than a million"
+
+
+def plan_table(found: Sequence[Plan], cluster: str) -> CellTable:
+    """A line for each plan."""
+    heads = ["to show", "true difference assumed", *(f"for {100 * p:.0f} % power" for p in POWERS)]
+    rows = [
+        [f"{p.name}: {p.what}", p.assumed, *(map(_told, p.counts) if p.counts else _NEVER)]
+        for p in found
+    ]
+    return CellTable("", heads, len(heads), rows, note=_assumes(found, cluster))
+
+
+def plan_lines(found: Sequence[Plan], cluster: str) -> list[str]:
+    """A line for each plan, and what they assume."""
+    lines = [
+        f"To show {p.name} ({p.what}), if the true difference is {p.assumed}: {_line(p, cluster)}."
+        for p in found
+    ]
+    return [*lines, _assumes(found, cluster)] if found else []
+
+
+_NEVER = ["not under this assumption"] * len(POWERS)
+
+
+def _line(plan: Plan, cluster: str) -> str:
+    if not plan.counts:
+        return "no number, for then it is not true"
+    needed = [
+        f"{_told(count)} {cluster}s for {100 * wanted:.0f} % power"
+        for count, wanted in zip(plan.counts, POWERS, strict=True)
+    ]
+    return ", ".join(needed)
+
+
+def _told(count: Count) -> str:
+    return f"{_persons(count.persons)} ({_persons(count.low)} to {_persons(count.high)})"
+
+
+def _persons(count: float) -> str:
+    return f"{count:.0f}" if math.isfinite(count) else f"more than {MOST_PERSONS:,}"
+
+
+def _assumes(found: Sequence[Plan], cluster: str) -> str:
+    counts = sorted({plan.known_from for plan in found})
+    known = str(counts[0]) if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
+    return (
+        f"Counted by the noncentral t, as many runs of each {cluster} as here, at 5 % divided by "
+        f"the tests of a family. How much {cluster}s spread is known from {known} of them only: in "
+        "brackets, what else would fit (95 %). What was found in a pilot tends to flatter: declare "
+        "the smallest difference that matters, and register before running."
+    )
