@@ -10,18 +10,21 @@ References:
 
 from __future__ import annotations
 
+import asyncio
+import logging
 import re
 import threading
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import CancelledError, Executor
-from contextlib import contextmanager
+from concurrent.futures import CancelledError, Executor, ThreadPoolExecutor
+from contextlib import ExitStack, contextmanager
 from functools import cache, partial
 from types import TracebackType
 from typing import Any, ParamSpec, TypeVar
 
 from dva_sim.errors import ConfigError, DvaSimError
 from dva_sim.experiments.manifest import versions
+from dva_sim.experiments.places import PlaceLost
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -31,7 +34,7 @@ _CONNECT_S = 10.0
 _WORKERS_S = 60.0  # how long a cluster may be without any worker
 _ONE_AT_A_TIME = threading.Lock()  # in a worker with several threads
 _STATE = ("commit", "dirty")  # tells nothing of what a run gives; the fingerprint does
-_GO_ON = "finished runs are kept; the same command goes on"
+_NOISY = ("distributed", "distributed.client", "tornado", "tornado.application", "asyncio")
 
 Versions = dict[str, Any]
 
@@ -64,11 +67,13 @@ class Cluster:
                 "pip install 'dva-sim[cluster]'"
             ) from None
         self.deaths: tuple[type[Exception], ...] = (KilledWorker,)
-        try:
+        self._open = ExitStack()
+        with self._open:
+            self._open.enter_context(_quiet())
+            _knock(address)
             self._client = Client(address, timeout=_CONNECT_S, set_as_default=False)
-        except (OSError, ImportError) as error:
-            reason = str(error).splitlines()[0]
-            raise ConfigError(f"no scheduler answers at {address}: {reason}") from None
+            self._open.callback(self._client.close)
+            self._open = self._open.pop_all()
         self._seen = time.monotonic()
 
     def __enter__(self) -> Cluster:
@@ -80,12 +85,12 @@ class Cluster:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self._client.close()
+        self._open.close()
 
     @property
     def width(self) -> int:
         """Workers there are now; a process counts as one, however many threads it has."""
-        return max(1, len(self._workers()))
+        return max(1, len(self._workers() or ()))
 
     @contextmanager
     def executor(self, width: int, task: Callable[..., Any]) -> Iterator[Executor]:
@@ -95,9 +100,9 @@ class Cluster:
             yield executor
         except (DvaSimError, KeyboardInterrupt, GeneratorExit):
             raise
-        except CancelledError:
-            raise DvaSimError(f"the scheduler at {self.address} is gone; {_GO_ON}") from None
         except Exception as error:
+            if isinstance(error, CancelledError) or not self._is_connected():
+                raise PlaceLost(f"the scheduler at {self.address} is gone") from None
             raise DvaSimError(
                 f"the cluster at {self.address} cannot run this program: {_line(error)}; its "
                 "scheduler and workers need the same dva-sim as here"
@@ -113,22 +118,81 @@ class Cluster:
         """See whether anybody is left to work.
 
         Raises:
-            DvaSimError: nobody is, and has not been for some time.
+            PlaceLost: nobody is, and has not been for some time.
         """
         now = time.monotonic()
-        if not is_idle or self._workers():
+        workers = self._workers() if is_idle else None
+        if workers or not is_idle:
             self._seen = now
-        elif self._client.status != "running":
-            raise DvaSimError(f"the scheduler at {self.address} is gone; {_GO_ON}")
+        elif not self._is_connected():
+            raise PlaceLost(f"the scheduler at {self.address} is gone")
         elif now - self._seen > _WORKERS_S:
-            raise DvaSimError(
-                f"the scheduler at {self.address} has had no workers for {_WORKERS_S:g} s: "
-                f"start some with 'dask worker {self.address} --nthreads 1' (one that lacks this "
-                f"dva-sim leaves at once; its log says so); {_GO_ON}"
-            )
+            raise PlaceLost(f"the scheduler at {self.address} {self._lacking(workers)}")
 
-    def _workers(self) -> dict[str, Any]:
-        return dict(self._client.scheduler_info(n_workers=-1)["workers"])
+    def _lacking(self, workers: dict[str, Any] | None) -> str:
+        if workers is None:
+            return f"has not answered for {_WORKERS_S:g} s"
+        return (
+            f"has had no workers for {_WORKERS_S:g} s: start some with 'dask worker "
+            f"{self.address} --nthreads 1' (one that lacks this dva-sim leaves at once; its log "
+            "says so)"
+        )
+
+    def _workers(self) -> dict[str, Any] | None:
+        """Those there are; None if the scheduler does not say."""
+        if not self._is_connected():
+            return None
+        ask = self._client.scheduler.identity
+        try:
+            return dict(
+                self._client.sync(ask, n_workers=-1, callback_timeout=_CONNECT_S)["workers"]
+            )
+        except OSError:  # a lost connection, or the time is over
+            return None
+
+    def _is_connected(self) -> bool:
+        """Whether there is a connection, or hope for one."""
+        return self._client.status in ("running", "connecting")
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep the library from logging what is told in one line when the block ends."""
+    loggers = [logging.getLogger(name) for name in _NOISY]
+    levels = [logger.level for logger in loggers]
+    for logger in loggers:
+        logger.setLevel(logging.CRITICAL + 1)
+    try:
+        yield
+    finally:
+        for logger, level in zip(loggers, levels, strict=True):
+            logger.setLevel(level)
+
+
+def _knock(address: str) -> None:
+    """See whether a scheduler is at home, whatever else may listen there.
+
+    Raises:
+        ConfigError: none is.
+    """
+    with ThreadPoolExecutor(1) as thread:  # a notebook has a loop of its own in this one
+        try:
+            kind = thread.submit(asyncio.run, _kind_at(address)).result()
+        except OSError as error:
+            reason = " ".join(str(error).split()) or f"nothing within {_CONNECT_S:g} s"
+        except Exception:  # whatever another program's answer may be taken for
+            reason = "what listens there is something else"
+        else:
+            reason = "" if kind == "Scheduler" else f"it is a {kind}"
+    if reason:
+        raise ConfigError(f"no scheduler answers at {address}: {reason}")
+
+
+async def _kind_at(address: str) -> str:
+    from distributed.core import rpc
+
+    async with asyncio.timeout(_CONNECT_S), rpc(address) as server:
+        return str((await server.identity())["type"])
 
 
 def _checked(task: Callable[P, R], wanted: Versions, *args: P.args, **kwargs: P.kwargs) -> R:

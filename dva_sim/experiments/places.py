@@ -16,11 +16,15 @@ from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from typing import Any, ParamSpec, Protocol, TypeVar
 
-from dva_sim.errors import ConfigError
+from dva_sim.errors import ConfigError, DvaSimError
 
 P = ParamSpec("P")
 R = TypeVar("R")
 _FAMILY = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
+
+
+class PlaceLost(DvaSimError):
+    """Nobody is left to run anything; what has been run is kept."""
 
 
 class Place(Protocol):
@@ -56,7 +60,7 @@ class Place(Protocol):
             is_idle: Whether nothing has come for some seconds.
 
         Raises:
-            DvaSimError: the place is lost.
+            PlaceLost: nobody is left.
         """
 
 

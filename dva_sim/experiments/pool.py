@@ -45,7 +45,8 @@ def run_all(
         limit_s: A run that takes longer by the wall clock has failed.
 
     Raises:
-        DvaSimError: the place is lost, or its workers have another program.
+        PlaceLost: nobody is left to run them.
+        DvaSimError: workers have another program.
     """
     plain = partial(perform_chunk, episode=episode, limit_s=limit_s, may_exit=not place.is_here)
     run = place.guarded(plain)

@@ -16,7 +16,7 @@ from dva_sim.experiments import design, places, pool
 from dva_sim.experiments.design import Job
 from dva_sim.experiments.journal import FILE, Journal
 from dva_sim.experiments.manifest import failures, machine, manifest_of, write_json
-from dva_sim.experiments.places import Place
+from dva_sim.experiments.places import Place, PlaceLost
 from dva_sim.experiments.pool import Episode
 from dva_sim.experiments.results import MACHINE, MANIFEST
 from dva_sim.experiments.stopping import is_enough, rounds
@@ -140,13 +140,18 @@ class _Session:
 
     @contextmanager
     def told(self) -> Iterator[None]:
-        """Say with a Ctrl-C how far it had come."""
+        """Say with a Ctrl-C, or when all workers are lost, how far it had come."""
+        go_on = "the same command goes on from there"
         try:
             yield
+        except PlaceLost as lost:
+            raise PlaceLost(
+                f"{lost}; {self._count} of {self._total} runs are kept; {go_on}, also with "
+                "another --scheduler or with --jobs"
+            ) from None
         except KeyboardInterrupt:
             raise KeyboardInterrupt(
-                f"interrupted after {self._count} of {self._total} runs, which are kept; "
-                "the same command goes on from there"
+                f"interrupted after {self._count} of {self._total} runs, which are kept; {go_on}"
             ) from None
 
 

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import signal
+import socket
 import sqlite3
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,6 +18,7 @@ from dask_cluster import DaskCluster
 from dva_sim.errors import ConfigError, DvaSimError
 from dva_sim.experiments import cluster, pool
 from dva_sim.experiments.limit import RunTooLong, limited
+from dva_sim.experiments.places import PlaceLost
 from dva_sim.experiments.runner import run_study
 
 
@@ -54,6 +58,55 @@ def test_a_worker_killed_half_way_loses_and_doubles_nothing(
 
 
 @pytest.mark.slow
+def test_a_scheduler_killed_half_way_ends_in_one_line_and_another_goes_on(
+    tmp_path: Path,
+    dask: DaskCluster,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    study = kit.study_in(tmp_path)
+    plain = kit.files(run_study(study, tmp_path / "plain", jobs=1, episode=kit.cheap))
+    dask.add_worker()
+    seen: list[int] = []
+
+    def kill_it(done: int, total: int) -> None:
+        seen.append(done)
+        if done >= total // 2:
+            dask.scheduler.kill()
+
+    out, address = tmp_path / "out", dask.address
+    monkeypatch.setattr(cluster, "_CONNECT_S", 1.0)
+    with pytest.raises(PlaceLost) as lost:
+        run_study(study, out, scheduler=address, episode=kit.slower, progress=kill_it)
+    told = f"the scheduler at {address} is gone; {seen[-1]} of {kit.RUNS} runs are kept; "
+    told += "the same command goes on from there, also with another --scheduler or with --jobs"
+    assert str(lost.value) == told
+    assert capfd.readouterr() == ("", "")  # the library's logs are not let through
+    begun: list[int] = []
+    run_study(study, out, jobs=1, episode=kit.cheap, progress=lambda done, _: begun.append(done))
+    assert begun[0] == seen[-1] > 0
+    assert kit.files(out) == plain
+
+
+@pytest.mark.slow
+def test_a_cluster_nobody_works_or_answers_in_is_told(
+    dask: DaskCluster, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with cluster.Cluster(dask.address) as place:
+        place.look_after(is_idle=True)
+        monkeypatch.setattr(cluster, "_WORKERS_S", 0.0)
+        with pytest.raises(PlaceLost, match=r"has had no workers for 0 s: start some with 'dask w"):
+            place.look_after(is_idle=True)
+        monkeypatch.setattr(cluster, "_CONNECT_S", 0.2)
+        dask.scheduler.send_signal(signal.SIGSTOP)
+        with pytest.raises(PlaceLost, match="has not answered for 0 s"):
+            place.look_after(is_idle=True)
+        place.look_after(is_idle=False)  # something has come meanwhile
+        dask.scheduler.send_signal(signal.SIGCONT)
+
+
+@pytest.mark.slow
 def test_a_worker_with_another_profile_near_it_is_refused(
     tmp_path: Path, dask: DaskCluster
 ) -> None:
@@ -81,13 +134,39 @@ def test_an_address_that_is_none_is_refused(tmp_path: Path, address: str) -> Non
         run_study(kit.study_in(tmp_path), tmp_path / "out", scheduler=address)
 
 
-def test_a_scheduler_that_does_not_answer_is_told(
+def test_a_scheduler_that_is_not_there_is_told(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip("distributed")
     monkeypatch.setattr(cluster, "_CONNECT_S", 0.01)
-    with pytest.raises(ConfigError, match=r"no scheduler answers at tcp://127\.0\.0\.1:9"):
+    with pytest.raises(ConfigError, match=r"no scheduler answers at tcp://127\.0\.0\.1:9: nothing"):
         run_study(kit.study_in(tmp_path), tmp_path / "out", scheduler="tcp://127.0.0.1:9")
+
+
+@pytest.mark.parametrize(
+    ("says", "told"),
+    [(b"HTTP/1.0 400 Bad request\r\n\r\n", "something else"), (b"", r"nothing within 0\.2 s")],
+)
+def test_another_program_is_not_taken_for_a_scheduler(
+    says: bytes, told: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("distributed")
+    monkeypatch.setattr(cluster, "_CONNECT_S", 30.0 if says else 0.2)
+    over = threading.Event()
+
+    def answer() -> None:
+        with server.accept()[0] as caller:
+            caller.sendall(says)
+            over.wait()
+
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
+        listener = threading.Thread(target=answer, daemon=True)
+        listener.start()
+        with pytest.raises(ConfigError, match=f"no scheduler answers at {address}: .*{told}"):
+            cluster.Cluster(address)
+        over.set()
+        listener.join()
 
 
 def test_what_to_install_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
