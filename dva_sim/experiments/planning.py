@@ -8,18 +8,22 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
-from dva_sim.experiments import design, places, pool
+from dva_sim.experiments import design, places
 from dva_sim.experiments.design import Job, Key
 from dva_sim.experiments.journal import FILE, Journal
+from dva_sim.experiments.limit import RunTooLong, limited
 from dva_sim.experiments.manifest import manifest_of
 from dva_sim.experiments.pool import Episode
 from dva_sim.experiments.stopping import rounds
 from dva_sim.experiments.study import Study
 from dva_sim.experiments.tuned import load_tuned
 
-PROBE_S = 5.0  # after so long no further run is tried
-_LONGEST_PROBE_S = 30.0  # a run that takes longer tells nothing
+PROBE_S = 5.0  # after so long no further run is tried,
+_FEW = 3  # unless there are fewer than that, since one may be far from the others
+MOST_S = 60.0  # for all of them: a run that is ended then costs that much at least
+_SHORT_S = 1.0  # the first run reads files too; if it is as short as this it is tried again
 
 
 @dataclass(frozen=True)
@@ -35,6 +39,8 @@ class DryRun:
         estimate_s: Time for the rest [s], if any run tells its cost.
         tried: Runs that were tried for the estimate and thrown away; 0 if it rests on runs kept.
         remark: What is doubtful about tuned values; empty if nothing is.
+        is_least: Whether it will take longer, since a run that was tried did not end in time.
+        failed: What went wrong with a run that was tried; empty if nothing did.
     """
 
     runs: int
@@ -45,6 +51,16 @@ class DryRun:
     estimate_s: float | None
     tried: int
     remark: str
+    is_least: bool = False
+    failed: str = ""
+
+
+class _Tried(NamedTuple):
+    """What some configurations cost [s], and what is told of it; see `DryRun`."""
+
+    costs: dict[str, float]
+    is_least: bool = False
+    failed: str = ""
 
 
 def dry_run(
@@ -71,8 +87,8 @@ def dry_run(
             costs = journal.costs()
     left = [job for job in todo if job.key not in costs]
     known = _by_config(costs)
-    tried = _tried(left, probe) if probe is not None and not known else {}
-    estimate = _estimate(left, known or tried)
+    tried = _tried(left, probe) if probe is not None and not known else _Tried({})
+    estimate = _estimate(left, known or tried.costs)
     workers = places.local(jobs).width
     return DryRun(
         len(todo),
@@ -81,8 +97,10 @@ def dry_run(
         len(rounds(study, todo)),
         workers,
         None if estimate is None else estimate / min(workers, len(left) or 1),
-        len(tried),
+        len(tried.costs),
         _remark(study),
+        tried.is_least,
+        tried.failed,
     )
 
 
@@ -102,17 +120,28 @@ def _estimate(left: Sequence[Job], known: Mapping[str, float]) -> float | None:
     return sum(known.get(job.config, average) for job in left)
 
 
-def _tried(left: Sequence[Job], probe: Episode) -> dict[str, float]:
-    """What some configurations cost [s], from one run each, spread over the design."""
+def _tried(left: Sequence[Job], probe: Episode) -> _Tried:
+    """Try one run each of some configurations, spread over the design."""
     first = list({job.config: job for job in reversed(left)}.values())
-    end, costs = time.monotonic() + PROBE_S, {}
-    for index in [0, *_spread(len(first))] if first else ():  # the first time reads files too
-        outcome = pool.perform(first[index], probe, _LONGEST_PROBE_S)
-        if outcome.tables is not None:
-            costs[outcome.key[0]] = outcome.cost_s
-        if time.monotonic() > end or outcome.tables is None:
+    begun, costs, failed = time.monotonic(), dict[str, float](), ""
+    for index in [0, *_spread(len(first))] if first else ():
+        job, gone = first[index], time.monotonic() - begun
+        if costs.get(job.config, 0.0) > _SHORT_S:
+            continue
+        if gone > PROBE_S and len(costs) >= _FEW:
             break
-    return costs
+        start = time.thread_time()
+        try:
+            with limited(max(MOST_S - gone, _SHORT_S), may_exit=False):
+                probe(job)
+        except RunTooLong:
+            costs[job.config] = time.thread_time() - start
+            return _Tried(costs, True, failed)
+        except Exception as error:
+            failed = failed or f"{type(error).__name__}: {' '.join(str(error).split())}"
+        else:
+            costs[job.config] = time.thread_time() - start
+    return _Tried(costs, False, failed)
 
 
 def _spread(count: int) -> list[int]:

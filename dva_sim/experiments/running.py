@@ -130,7 +130,7 @@ def _planned(study: Study, folder: Path, workers: Workers, tries: bool) -> DryRu
         say(f"[yellow]{escape(found.remark)}[/yellow]")
     say(escape(_plan(found, folder)))
     if tries:
-        say(_time(found))
+        say(escape(_time(found)))
     return found
 
 
@@ -145,11 +145,19 @@ def _time(found: DryRun) -> str:
     """How long it will take, and how that is known."""
     if found.runs == found.done:
         return "nothing is left to run"
+    failed = f"a run that was tried failed: {found.failed}" if found.failed else ""
     if found.estimate_s is None:
-        return "no estimate of the time: no run is done yet, and none that was tried ended in time"
-    runs = f"{found.tried} runs tried now" if found.tried else "the runs done already"
-    who = "1 process" if found.workers == 1 else f"{found.workers} processes"
-    return f"about {duration(found.estimate_s)} to go with {who}, judged by {runs}"
+        return f"no estimate of the time: {failed or 'no run is done yet, and none was tried'}"
+    runs = f"{_counted(found.tried, 'run')} tried now" if found.tried else "the runs done already"
+    about = "more than" if found.is_least else "about"
+    who = _counted(found.workers, "process", "processes")
+    told = f"{about} {duration(found.estimate_s)} to go with {who}, judged by {runs}"
+    told += "; the last was stopped before its end" if found.is_least else ""
+    return f"{told}; {failed}" if failed else told
+
+
+def _counted(number: int, one: str, many: str | None = None) -> str:
+    return f"{number} {one if number == 1 else many or f'{one}s'}"
 
 
 def _told_failures(results: Results) -> int:

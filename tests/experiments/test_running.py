@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -45,19 +46,38 @@ def test_a_dry_run_of_a_fresh_folder_tries_some_runs_and_keeps_none(tmp_path: Pa
     assert not (tmp_path / "out").exists()
 
 
-def test_a_probe_ends_when_its_time_is_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_probe_ends_when_its_time_is_up_but_not_after_one_or_two(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(planning, "PROBE_S", 0.0)
     plan = dry_run(kit.study_in(tmp_path), tmp_path / "out", probe=kit.cheap)
-    assert plan.tried == 1
+    assert plan.tried == 3
 
 
-def test_without_a_run_that_ends_there_is_no_estimate(tmp_path: Path) -> None:
+def test_a_run_that_does_not_end_in_time_costs_as_much_at_least(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def never(job: object) -> kit.Tables:
+        while True:
+            time.thread_time()
+
+    monkeypatch.setattr(planning, "MOST_S", 0.02)
+    monkeypatch.setattr(planning, "_SHORT_S", 0.02)
+    plan = dry_run(kit.study_in(tmp_path), tmp_path / "out", jobs=1, probe=never)
+    assert (plan.tried, plan.is_least) == (1, True)
+    assert plan.estimate_s is not None
+    assert plan.estimate_s > 0
+
+
+def test_a_run_that_fails_when_tried_is_told(tmp_path: Path) -> None:
     def falls(job: object) -> kit.Tables:
-        raise RuntimeError("fell")
+        raise RuntimeError("fell\ndeep")
 
     plan = dry_run(kit.study_in(tmp_path), tmp_path / "out", probe=falls)
     assert (plan.tried, plan.estimate_s) == (0, None)
-    assert "no estimate of the time" in running._time(plan)
+    assert running._time(plan) == (
+        "no estimate of the time: a run that was tried failed: RuntimeError: fell deep"
+    )
 
 
 @pytest.mark.parametrize(
@@ -71,6 +91,16 @@ def test_without_a_run_that_ends_there_is_no_estimate(tmp_path: Path) -> None:
         (
             DryRun(42, 7, 9, 1, 2, 30.0, 0, ""),
             "about 30 s to go with 2 processes, judged by the runs done already",
+        ),
+        (
+            DryRun(42, 0, 9, 1, 2, 7200.0, 1, "", is_least=True),
+            "more than 2 h 0 min to go with 2 processes, judged by 1 run tried now; the last "
+            "was stopped before its end",
+        ),
+        (
+            DryRun(42, 0, 9, 1, 2, 30.0, 4, "", failed="ValueError: no"),
+            "about 30 s to go with 2 processes, judged by 4 runs tried now; a run that was tried "
+            "failed: ValueError: no",
         ),
     ],
 )
