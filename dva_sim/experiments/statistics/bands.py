@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +11,7 @@ from dva_sim.experiments.statistics.persons import LEVEL, RESAMPLES, Floats, stu
 from dva_sim.experiments.statistics.studentised import (
     FEWEST_TO_RESAMPLE,
     moments,
+    place,
     reach,
     studentised,
 )
@@ -27,8 +27,8 @@ class Band:
         high: Its upper edge `(k,)`.
         pointwise_low: Lower end of each level's own interval `(k,)`.
         pointwise_high: Its upper end `(k,)`.
-        critical: Standard errors between the mean and the band's edge, if no level's own
-            interval ends farther out.
+        critical: Standard errors between each mean and the band's edge `(k,)`, if the level's
+            own interval does not end farther out; nan where there is no spread to measure by.
         n_persons: How many persons have at least one value.
     """
 
@@ -37,7 +37,7 @@ class Band:
     high: Floats
     pointwise_low: Floats
     pointwise_high: Floats
-    critical: float
+    critical: Floats
     n_persons: int
 
 
@@ -48,9 +48,8 @@ def band(
 
     Its width comes from the largest studentised deviation over the levels when persons are
     drawn anew: that respects how the levels depend on each other and how skewed they are.
-    Nowhere does it end inside a level's own interval. The 95 % band over 6 levels holds in 93 to
-    97 % of studies of 12 or 24 persons, normal, skewed or with a level four fifths zero.
-    With fewer than 6 persons Bonferroni's t stands in.
+    Nowhere does it end inside a level's own interval. A level with fewer than 6 persons gets
+    Bonferroni's t, and the others share what it leaves of the chance to err.
 
     Args:
         differences: One row per person `(n_persons, k)`, nan where a cell is missing.
@@ -68,19 +67,21 @@ def band(
     ratio = studentised(values[:, judged], mean[judged], error[judged], seed, resamples)
     down, up = np.where(count > 1, 0.0, np.nan), np.where(count > 1, 0.0, np.nan)
     down[judged], up[judged] = reach(ratio, count[judged], level)
-    critical = _critical(ratio, count[judged], level)
+    critical = np.full(len(mean), np.nan)
+    critical[judged] = _critical(ratio, count[judged], level)
+    reached = np.where(judged, critical, 0.0) * error
     lowest, highest = mean - down * error, mean + up * error
-    low = np.minimum(mean - critical * error, lowest)
-    high = np.maximum(mean + critical * error, highest)
+    low, high = np.minimum(mean - reached, lowest), np.maximum(mean + reached, highest)
     return Band(mean, low, high, lowest, highest, critical, len(values))
 
 
-def _critical(ratio: Floats, count: Floats, level: float) -> float:
-    """Standard errors that hold all levels at once; never less than the widest one alone."""
-    if not len(count):
-        return math.nan
-    fewest = int(count.min())
-    if fewest < FEWEST_TO_RESAMPLE:
-        return students_t(1 - (1 - level) / len(count), fewest)
-    largest = np.quantile(abs(ratio).max(axis=1), level, method="inverted_cdf")
-    return max(float(largest), students_t(level, fewest))
+def _critical(ratio: Floats, count: Floats, level: float) -> Floats:
+    """Standard errors `(k,)` that hold all levels at once; never less than the widest one alone."""
+    each = (1 - level) / max(len(count), 1)
+    critical = np.array([students_t(1 - each, int(n)) for n in count])
+    many = count >= FEWEST_TO_RESAMPLE
+    if many.any():
+        together = 1 - each * many.sum()
+        largest = np.sort(abs(ratio[:, many]).max(axis=1))[place(len(ratio), together)]
+        critical[many] = max(float(largest), students_t(together, int(count[many].min())))
+    return critical

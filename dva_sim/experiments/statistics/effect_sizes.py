@@ -3,25 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dva_sim.experiments.statistics.persons import (
-    LEVEL,
-    Floats,
-    Interval,
-    paired_means,
-)
-from dva_sim.experiments.statistics.resampling import studentised_interval
+from dva_sim.experiments.statistics.pairs import RESAMPLES, Pairs, studentised_intervals
+from dva_sim.experiments.statistics.persons import LEVEL, Floats, Interval, paired_means
 from dva_sim.experiments.statistics.shares import share_interval
-
-RESAMPLES = 1000  # each takes as many jackknife steps as there are persons
-
-_Scale = Callable[[Floats, Floats, Floats], Floats]
 
 
 @dataclass(frozen=True)
@@ -70,34 +59,29 @@ def effect_size(
     if n < 3:
         nothing = Interval(math.nan, math.nan, math.nan, n)
         return EffectSize(nothing, nothing, superiority)
-    paired, average = (
-        studentised_interval(partial(_size, first, second, scale), n, level, seed, resamples)
-        for scale in (_of_differences, _of_persons)
-    )
+    sizes = _beside_differences, _beside_persons
+    found = studentised_intervals(sizes, first, second, level, seed, resamples)
+    paired, average = (_times(each, _hedges(n)) for each in found)
     return EffectSize(paired, average, superiority)
 
 
-def _size(first: Floats, second: Floats, scale: _Scale, weights: Floats) -> Floats:
-    """Mean difference `(b,)` of persons weighted `(b, n)`, on a scale; nan without spread."""
-    mean = weights @ (first - second) / weights.sum(axis=1)
-    spread = scale(first, second, weights)
-    size = _hedges(len(first)) * mean / np.where(spread > 0, spread, 1)
-    return np.where(spread > 0, size, np.nan)
+def _beside_differences(pairs: Pairs) -> Floats:
+    return _size(pairs, np.sqrt(pairs.apart))
 
 
-def _of_differences(first: Floats, second: Floats, weights: Floats) -> Floats:
-    return np.sqrt(_variance(first - second, weights))
+def _beside_persons(pairs: Pairs) -> Floats:
+    return _size(pairs, (np.sqrt(pairs.first) + np.sqrt(pairs.second)) / 2)
 
 
-def _of_persons(first: Floats, second: Floats, weights: Floats) -> Floats:
-    return (np.sqrt(_variance(first, weights)) + np.sqrt(_variance(second, weights))) / 2
+def _size(pairs: Pairs, spread: Floats) -> Floats:
+    """Mean differences over a spread that is as if divided by one less; nan without any."""
+    there = spread > 0
+    size = pairs.difference / np.where(there, spread, 1)
+    return np.where(there, size * np.sqrt(np.maximum(pairs.count - 1, 0) / pairs.count), np.nan)
 
 
-def _variance(values: Floats, weights: Floats) -> Floats:
-    off, total = values - values.mean(), weights.sum(axis=1)
-    mean = weights @ off / total
-    square = weights @ off**2 / total - mean**2
-    return np.asarray(np.maximum(square, 0) * total / np.maximum(total - 1, 1))
+def _times(found: Interval, factor: float) -> Interval:
+    return Interval(found.mean * factor, found.low * factor, found.high * factor, found.n_persons)
 
 
 def _hedges(n: int) -> float:

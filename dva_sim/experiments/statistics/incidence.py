@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dva_sim.experiments.statistics.persons import LEVEL, Floats, Interval
-from dva_sim.experiments.statistics.shares import wilson_interval
+from dva_sim.experiments.statistics.shares import interval_of_share
 
 
 @dataclass(frozen=True)
@@ -42,8 +42,8 @@ def cumulative_incidence(
     and one minus Kaplan and Meier's estimate, which takes the others for chance, would be
     too large. If every run is followed to the horizon these are the plain shares.
 
-    The intervals are Wilson's, on as many runs as give the variance seen when each person in
-    turn is left out.
+    The intervals are those of shares, on as many runs as give the variance seen when each
+    person in turn is left out.
 
     Args:
         times: When it happened, or until when the run was followed `(n,)`; nan where missing.
@@ -87,7 +87,7 @@ def _aalen_johansen(
     alive = np.cumprod(1 - np.sum(hazards, axis=0) * np.ones_like(gone), axis=1)
     alive = np.hstack([np.ones((len(alive), 1)), alive])
     shares = [(hazard * alive[:, :-1]).sum(axis=1) for hazard in hazards]
-    return np.array([*shares, alive[:, -1]])
+    return np.array([*shares, alive[:, -1]]).round(12)  # all of them is 1, not a little less
 
 
 def _interval(share: Floats, persons: int, runs: int, level: float) -> Interval:
@@ -97,4 +97,4 @@ def _interval(share: Floats, persons: int, runs: int, level: float) -> Interval:
         return Interval(estimate, math.nan, math.nan, persons)
     left_out = share[1:]
     variance = (persons - 1) / persons * float(((left_out - left_out.mean()) ** 2).sum())
-    return wilson_interval(float(share[0]), variance, persons, runs, level)
+    return interval_of_share(float(share[0]), variance, persons, runs, level)

@@ -3,25 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dva_sim.experiments.statistics.persons import (
-    LEVEL,
-    Floats,
-    Interval,
-    paired_means,
+from dva_sim.experiments.statistics.pairs import (
+    RESAMPLES,
+    Pairs,
+    Statistic,
+    studentised_intervals,
 )
-from dva_sim.experiments.statistics.resampling import studentised_interval
+from dva_sim.experiments.statistics.persons import LEVEL, Floats, Interval, paired_means
 
-Moments = tuple[Floats, Floats, Floats]
-
-RESAMPLES = 1000  # each takes as many jackknife steps as there are persons
 _ONE = 1 - 1e-12  # a perfect correlation, on Fisher's scale still finite
-
 _FEWEST = 3  # persons; of two, any are perfectly correlated
 
 
@@ -83,49 +78,33 @@ def variance_reduction(
     if n < _FEWEST or np.ptp(first) == 0 or np.ptp(second) == 0:
         nothing = Interval(math.nan, math.nan, math.nan, n)
         return VarianceReduction(nothing, nothing)
-    correlation = _on_fishers_scale(_correlation, first, second, level, seed, resamples)
-    shared = _on_fishers_scale(_shared, first, second, level, seed, resamples)
+    scaled = _on_fishers_scale(_correlation), _on_fishers_scale(_shared)
+    found = studentised_intervals(scaled, first, second, level, seed, resamples)
+    correlation, shared = (_back(each) for each in found)
     ratio = Interval(1 - shared.mean, 1 - shared.high, 1 - shared.low, n)
     return VarianceReduction(correlation, ratio)
 
 
-def _on_fishers_scale(
-    statistic: Callable[[Moments], Floats],
-    first: Floats,
-    second: Floats,
-    level: float,
-    seed: int,
-    resamples: int,
-) -> Interval:
-    """The interval of a correlation, made where it has no bounds and is spread evenly."""
+def _on_fishers_scale(statistic: Statistic) -> Statistic:
+    """A correlation where it has no bounds and is spread evenly."""
 
-    def unbounded(weights: Floats) -> Floats:
+    def unbounded(pairs: Pairs) -> Floats:
         with np.errstate(divide="ignore", invalid="ignore"):
-            return np.arctanh(np.clip(statistic(_moments(first, second, weights)), -_ONE, _ONE))
+            return np.arctanh(np.clip(statistic(pairs), -_ONE, _ONE))
 
-    found = studentised_interval(unbounded, len(first), level, seed, resamples)
+    return unbounded
+
+
+def _back(found: Interval) -> Interval:
     low, mean, high = np.tanh([found.low, found.mean, found.high]).tolist()
     return Interval(mean, low, high, found.n_persons)
 
 
-def _correlation(moments: Moments) -> Floats:
-    first, second, joint = moments
-    return np.asarray(joint / np.sqrt(first * second))
+def _correlation(pairs: Pairs) -> Floats:
+    joint = (pairs.first + pairs.second - pairs.apart) / 2
+    return np.asarray(joint / np.sqrt(pairs.first * pairs.second))
 
 
-def _shared(moments: Moments) -> Floats:
+def _shared(pairs: Pairs) -> Floats:
     """Share of the sum of variances that goes by pairing."""
-    first, second, joint = moments
-    return np.asarray(2 * joint / (first + second))
-
-
-def _moments(first: Floats, second: Floats, weights: Floats) -> Moments:
-    """Variances and covariance `(b,)` of persons weighted `(b, n)`."""
-    one, two = first - first.mean(), second - second.mean()
-    total = weights.sum(axis=1)
-    means = weights @ one / total, weights @ two / total
-    return (
-        np.maximum(weights @ one**2 / total - means[0] ** 2, 0),
-        np.maximum(weights @ two**2 / total - means[1] ** 2, 0),
-        weights @ (one * two) / total - means[0] * means[1],
-    )
+    return np.asarray(1 - pairs.apart / (pairs.first + pairs.second))

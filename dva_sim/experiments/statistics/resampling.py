@@ -16,7 +16,6 @@ from dva_sim.experiments.statistics.persons import (
     draws,
     students_t,
 )
-from dva_sim.experiments.statistics.studentised import LEAST_ERROR, reach
 
 _EDGE = 1e-4  # nearest to 0 and 1 that a share of draws is taken for
 
@@ -104,50 +103,3 @@ def tails(level: float, persons: int) -> list[float]:
 
     z = students_t(level, persons) * math.sqrt(persons / (persons - 1))
     return [float(special.ndtr(-z)), float(special.ndtr(z))]
-
-
-def studentised_interval(
-    estimator: Callable[[Floats], Floats],
-    persons: int,
-    level: float,
-    seed: int,
-    resamples: int,
-) -> Interval:
-    """The bootstrap-t of a smooth statistic, with the jackknife for its standard error.
-
-    Args:
-        estimator: The statistic `(b,)` of persons weighted `(b, persons)`, on a scale without
-            bounds.
-        persons: How many there are, at least 3.
-        level: Confidence level.
-        seed: Of the resampling.
-        resamples: How many times persons are drawn.
-
-    References:
-        Efron & Tibshirani, An Introduction to the Bootstrap (1993), chapters 11 and 12.
-    """
-    everybody = np.ones((1, persons))
-    estimate, error = estimator(everybody)[0], _jackknife(estimator, everybody)[0]
-    if not error > 0:
-        same = 0.0 if error == 0 else math.nan
-        return Interval(float(estimate), float(estimate - same), float(estimate + same), persons)
-    weights = draws(persons, seed, resamples)
-    errors = np.maximum(_jackknife(estimator, weights), LEAST_ERROR * error)
-    ratio = (estimator(weights) - estimate) / errors
-    ratio = ratio[np.isfinite(ratio), np.newaxis]
-    (down,), (up,) = reach(ratio, np.array([persons]), level)
-    low, high = estimate - down * error, estimate + up * error
-    return Interval(float(estimate), float(low), float(high), persons)
-
-
-def _jackknife(estimator: Callable[[Floats], Floats], weights: Floats) -> Floats:
-    """Standard errors `(b,)` by leaving out each person of each draw `(b, n)` once."""
-    count = weights.shape[1]
-    fewer = np.maximum(weights[:, np.newaxis, :] - np.eye(count), 0)
-    left_out = estimator(fewer.reshape(-1, count)).reshape(len(weights), count)
-    there = (weights > 0) & np.isfinite(left_out)
-    left_out, weights = np.where(there, left_out, 0.0), np.where(there, weights, 0.0)
-    total = weights.sum(axis=1, keepdims=True)
-    centre = (weights * left_out).sum(axis=1, keepdims=True) / np.maximum(total, 1)
-    square = (weights * (left_out - centre) ** 2).sum(axis=1)
-    return np.asarray(np.where(total[:, 0] > 1, np.sqrt((count - 1) / count * square), np.nan))

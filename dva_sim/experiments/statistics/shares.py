@@ -1,73 +1,17 @@
-"""Quantiles of runs, and how often something happened."""
+"""How often something happened, and quantiles of runs: both by the runs they are worth."""
 
 from __future__ import annotations
 
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from dva_sim.experiments.statistics.persons import (
-    LEVEL,
-    RESAMPLES,
-    Floats,
-    Interval,
-    draws,
-    students_t,
-)
-from dva_sim.experiments.statistics.resampling import tails
-
-
-def quantile_interval(
-    values: ArrayLike,
-    person: ArrayLike,
-    q: float = 0.5,
-    level: float = LEVEL,
-    seed: int = 1,
-    resamples: int = RESAMPLES,
-) -> Interval:
-    """A quantile of all runs, with the percentile interval of drawing persons anew.
-
-    The 95 % interval of a median over 24 persons with 5 trials covers in 95 %. High quantiles
-    are beyond so few persons: that of the 95th percentile covers in 93 % where persons hardly
-    differ, but in 76 % where the trials of each are much alike.
-
-    Args:
-        values: One value per run `(n,)`, nan where missing.
-        person: Whose run it was `(n,)`.
-        q: Which quantile; 0.5 is the median.
-        level: Confidence level.
-        seed: Of the resampling.
-        resamples: How many times persons are drawn.
-    """
-    numbers, who = np.asarray(values, dtype=float), np.asarray(person)
-    there = np.isfinite(numbers)
-    persons, code = np.unique(who[there], return_inverse=True)
-    if not len(persons):
-        return Interval(math.nan, math.nan, math.nan, 0)
-    order = np.argsort(numbers[there], kind="stable")
-    ranked, owner = numbers[there][order], code[order]
-    estimate = float(np.quantile(ranked, q))
-    if len(persons) < 2:
-        return Interval(estimate, math.nan, math.nan, 1)
-    weights = draws(len(persons), seed, resamples)[:, owner]
-    drawn = _weighted_quantiles(ranked, weights, q)
-    low, high = np.quantile(drawn, tails(level, len(persons)))
-    return Interval(estimate, float(low), float(high), len(persons))
-
-
-def _weighted_quantiles(ranked: Floats, weights: Floats, q: float) -> Floats:
-    """Quantiles of ascending values, each repeated as often as its whole weight `(b, n)` says."""
-    upto = np.cumsum(weights, axis=1)
-    place = q * (upto[:, -1] - 1)
-    below = np.floor(place)
-    first = ranked[(upto > below[:, None]).argmax(axis=1)]
-    second = ranked[(upto > np.ceil(place)[:, None]).argmax(axis=1)]
-    return np.asarray(first + (place - below) * (second - first))
+from dva_sim.experiments.statistics.persons import LEVEL, Floats, Interval, students_t
 
 
 def share_interval(flags: ArrayLike, person: ArrayLike, level: float = LEVEL) -> Interval:
-    """How often something happened, with Wilson's interval on the effective number of runs.
+    """How often something happened, with Korn and Graubard's interval.
 
     Runs of one person are worth less than as many runs of different persons: the number of
     runs is divided by how much the variance between persons exceeds that of independent
@@ -79,47 +23,100 @@ def share_interval(flags: ArrayLike, person: ArrayLike, level: float = LEVEL) ->
         level: Confidence level.
 
     References:
-        Wilson, JASA 22 (1927) 209-212; Korn & Graubard, Survey Methodology 24 (1998) 193-201.
+        Korn & Graubard, Survey Methodology 24 (1998) 193-201.
     """
-    numbers, who = np.asarray(flags, dtype=float), np.asarray(person)
-    there = np.isfinite(numbers)
-    persons, code = np.unique(who[there], return_inverse=True)
-    if not len(persons):
+    numbers, code, persons = _present(flags, person)
+    if not persons:
         return Interval(math.nan, math.nan, math.nan, 0)
-    share = float(numbers[there].mean())
-    if len(persons) < 2:
-        return Interval(share, math.nan, math.nan, 1)
-    surplus = np.bincount(code, weights=numbers[there] - share)
-    n, runs = len(persons), int(there.sum())
-    between = n / (n - 1) * float((surplus**2).sum()) / runs**2
-    return wilson_interval(share, between, n, runs, level)
+    share = float(numbers.mean())
+    return interval_of_share(share, _variance(numbers, code), persons, len(numbers), level)
 
 
-def wilson_interval(
+def interval_of_share(
     share: float, variance: float, persons: int, runs: int, level: float = LEVEL
 ) -> Interval:
-    """Wilson's interval of a share on as many independent runs as would have its variance.
+    """Clopper and Pearson's interval on as many independent runs as would have this variance.
 
     Args:
         share: The estimate.
         variance: Of the estimate, from how persons differ.
-        persons: The least number of runs that it counts as.
+        persons: The least number of runs that it counts as; of one, the ends are nan.
         runs: The greatest.
         level: Confidence level.
     """
-    n = _effective_runs(share, variance, persons, runs)
-    low, high = _wilson(share, n, students_t(level, persons))
-    return Interval(share, low, high, persons)
+    n = _runs_worth(share, variance, persons, runs, level)
+    low, high = _clopper_pearson(np.array([share]), n, level)
+    return Interval(share, float(low[0]), float(high[0]), persons)
 
 
-def _effective_runs(share: float, variance: float, persons: int, runs: int) -> float:
-    """Independent runs worth as much as these; between the persons and the runs."""
+def quantile_interval(
+    values: ArrayLike, person: ArrayLike, q: float = 0.5, level: float = LEVEL
+) -> Interval:
+    """A quantile of all runs, between the values whose own shares are compatible with it.
+
+    Of a high quantile few persons may not tell how high it is: if all of them can lie below it
+    by luck, the upper end is infinite. With 24 persons and 5 trials the 95th percentile of runs
+    that hardly cluster has two ends, and mostly one where the trials of each are much alike.
+
+    Args:
+        values: One value per run `(n,)`, nan where missing.
+        person: Whose run it was `(n,)`.
+        q: Which quantile; 0.5 is the median.
+        level: Confidence level.
+
+    References:
+        Woodruff, JASA 47 (1952) 635-646.
+    """
+    numbers, code, persons = _present(values, person)
+    if not persons:
+        return Interval(math.nan, math.nan, math.nan, 0)
+    estimate = float(np.quantile(numbers, q))
+    if persons < 2:
+        return Interval(estimate, math.nan, math.nan, 1)
+    below, runs = (numbers <= estimate).astype(float), len(numbers)
+    n = _runs_worth(float(below.mean()), _variance(below, code), persons, runs, level)
+    low, high = _clopper_pearson(np.arange(runs + 1) / runs, n, level)
+    compatible = np.flatnonzero((low < q) & (q < high))
+    ends = np.concatenate([[-np.inf], np.sort(numbers), [np.inf]])
+    return Interval(estimate, float(ends[compatible[0]]), float(ends[compatible[-1] + 1]), persons)
+
+
+def _present(values: ArrayLike, person: ArrayLike) -> tuple[Floats, NDArray[np.intp], int]:
+    """Numbers that are there `(n,)`, whose each is `(n,)`, and how many persons have any."""
+    numbers, who = np.asarray(values, dtype=float), np.asarray(person)
+    there = np.isfinite(numbers)
+    persons, code = np.unique(who[there], return_inverse=True)
+    return numbers[there], code, len(persons)
+
+
+def _variance(flags: Floats, code: NDArray[np.intp]) -> float:
+    """Of the share of all runs, if persons were drawn anew; nan of one person."""
+    surplus = np.bincount(code, weights=flags - flags.mean())
+    persons = len(surplus)
+    if persons < 2:
+        return math.nan
+    return persons / (persons - 1) * float((surplus**2).sum()) / len(flags) ** 2
+
+
+def _runs_worth(share: float, variance: float, persons: int, runs: int, level: float) -> float:
+    """Independent runs worth as much as these, less for what the variance itself is unsure by."""
     if not 0 < share < 1:
-        return persons
-    return min(max(share * (1 - share) / variance, persons), runs) if variance > 0 else runs
+        n = float(persons)
+    else:
+        n = min(max(share * (1 - share) / variance, persons), runs) if variance > 0 else runs
+    return n * (students_t(level, runs) / students_t(level, persons)) ** 2
 
 
-def _wilson(share: float, n: float, t: float) -> tuple[float, float]:
-    centre = (share + t**2 / (2 * n)) / (1 + t**2 / n)
-    half = t / (1 + t**2 / n) * math.sqrt(share * (1 - share) / n + t**2 / (4 * n**2))
-    return max(0.0, centre - half), min(1.0, centre + half)
+def _clopper_pearson(share: Floats, n: float, level: float) -> tuple[Floats, Floats]:
+    """Ends `(k,)` of the interval of each share `(k,)` of `n` independent runs."""
+    from scipy import special
+
+    beyond, seen = (1 - level) / 2, share * n
+    with np.errstate(invalid="ignore"):
+        low = special.betaincinv(seen, n - seen + 1, beyond)
+        high = special.betaincinv(seen + 1, n - seen, 1 - beyond)
+    known = not math.isnan(n)
+    return (
+        np.where(known & (share <= 0), 0.0, low),
+        np.where(known & (share >= 1), 1.0, high),
+    )

@@ -61,7 +61,8 @@ def studentised(values: Floats, mean: Floats, error: Floats, seed: int, resample
 
     A draw that happens to repeat the same few persons has next to no spread of its own; it is
     given at least a quarter of the sample's. Without that a level at which most persons do not
-    differ at all would make intervals endless.
+    differ at all would make intervals endless. A draw with fewer than two persons of a level says
+    nothing of it and counts as no deviation.
 
     Args:
         values: One row per person `(n_persons, k)`, nan where missing.
@@ -73,7 +74,8 @@ def studentised(values: Floats, mean: Floats, error: Floats, seed: int, resample
     if not len(mean):
         return np.empty((resamples, 0))
     drawn, drawn_error, _ = moments(values, draws(len(values), seed, resamples))
-    return np.asarray((drawn - mean) / np.maximum(drawn_error, LEAST_ERROR * error))
+    ratio = (drawn - mean) / np.maximum(drawn_error, LEAST_ERROR * error)
+    return np.where(np.isnan(ratio), 0.0, ratio)
 
 
 def reach(ratio: Floats, count: Floats, level: float) -> tuple[Floats, Floats]:
@@ -89,12 +91,13 @@ def reach(ratio: Floats, count: Floats, level: float) -> tuple[Floats, Floats]:
     """
     least = np.array([students_t(level, int(n)) for n in count])
     few = count < FEWEST_TO_RESAMPLE
-    either = _quantile(abs(ratio), level)
-    down, up = (_quantile(side * ratio, (1 + level) / 2) for side in (1, -1))
-    least_or_either = np.where(few, least, np.maximum(least, either))
+    ranked, sizes = np.sort(ratio, axis=0), np.sort(abs(ratio), axis=0)
+    either = np.maximum(least, sizes[place(len(ratio), level)])
+    end = place(len(ratio), (1 + level) / 2)
+    down, up = ranked[end], -ranked[-1 - end]
     return (
-        np.where(few, least, np.maximum(least_or_either, down)),
-        np.where(few, least, np.maximum(least_or_either, up)),
+        np.where(few, least, np.maximum(either, down)),
+        np.where(few, least, np.maximum(either, up)),
     )
 
 
@@ -118,5 +121,6 @@ def chance_above(means: Floats, seed: int, resamples: int) -> float:
     return max(students, float(either), float(above))
 
 
-def _quantile(ratio: Floats, level: float) -> Floats:
-    return np.asarray(np.quantile(ratio, level, axis=0, method="inverted_cdf"))
+def place(n: int, level: float) -> int:
+    """Of `n` ascending values, the place of the first that such a share does not exceed."""
+    return max(math.ceil(n * level - _ROUNDING * n) - 1, 0)

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from scipy import stats
 
 from dva_sim.experiments.statistics import components
 
@@ -35,3 +36,11 @@ def test_persons_alike_have_no_variance_between_them_and_never_less():
 @pytest.mark.parametrize("values", [[[1, 2]], [[1], [2]], [[np.nan, np.nan], [1, 2]]])
 def test_too_few_to_split_is_nan(values):
     assert np.isnan(components(values).between)
+
+
+def test_the_mean_squares_are_those_of_scipys_analysis_of_variance():
+    values = np.random.default_rng(2).normal(0, 1, (12, 5)) + np.arange(12)[:, np.newaxis] / 6
+    found = components(values)
+    f = stats.f_oneway(*values).statistic
+    assert found.between / found.within == pytest.approx((f - 1) / 5)
+    assert found.within == pytest.approx(values.var(axis=1, ddof=1).mean())

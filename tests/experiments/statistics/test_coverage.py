@@ -3,13 +3,43 @@
 import numpy as np
 import pytest
 
-from dva_sim.experiments.statistics import band, mean_interval
+from dva_sim.experiments.statistics import (
+    band,
+    effect_size,
+    factorial_effects,
+    mean_interval,
+    quantile_interval,
+    share_interval,
+    variance_reduction,
+)
 from dva_sim.experiments.study import load_study
 
 STUDY = load_study("req-rep-vs-pub-sub")
 PERSONS, TRIALS = STUDY.persons, STUDY.replications
+WHO = np.repeat(np.arange(PERSONS), TRIALS)
 STUDIES = 10_000
 AT_ONCE = 250
+
+
+def clustered(law, icc, n, rng, persons=PERSONS):
+    """Runs of variance 1 around zero, this share of it between persons."""
+    return np.sqrt(icc) * law((n, persons, 1), rng) + np.sqrt(1 - icc) * law(
+        (n, persons, TRIALS), rng
+    )
+
+
+def normal(size, rng):
+    return rng.normal(size=size)
+
+
+def skewed(size, rng):
+    """Log-normal, of skewness 1.75."""
+    return (rng.lognormal(0, 0.5, size) - np.exp(0.125)) / np.sqrt(np.exp(0.5) - np.exp(0.25))
+
+
+def heavy(size, rng):
+    """Student's with 5 degrees of freedom: of kurtosis 9."""
+    return rng.standard_t(5, size) / np.sqrt(5 / 3)
 
 
 def gamma_persons(skewness, n, rng):
@@ -45,16 +75,19 @@ def person_means(values):
     return np.where(count > 0, total / np.maximum(count, 1), np.nan).T
 
 
+def holds(interval, true):
+    return interval.low <= true <= interval.high
+
+
 CASES = {
-    "even": lambda n, rng: rng.normal(size=(n, PERSONS, 1)) + rng.normal(size=(n, PERSONS, TRIALS)),
-    "skewness 1.1": lambda n, rng: gamma_persons(1.1, n, rng),
-    "skewness 2.3": lambda n, rng: gamma_persons(2.3, n, rng),
-    "skewness 2.3, the other way": lambda n, rng: -gamma_persons(2.3, n, rng),
+    "normal": lambda n, rng: clustered(normal, 0.3, n, rng),
+    "skewed, incomplete": lambda n, rng: with_gaps(clustered(skewed, 0.3, n, rng), rng),
+    "skewed, persons much alike": lambda n, rng: clustered(skewed, 0.0, n, rng),
     "skewness 2.3, incomplete": lambda n, rng: with_gaps(gamma_persons(2.3, n, rng), rng),
-    "paired times": paired_times,
+    "skewness 2.3, the other way": lambda n, rng: -gamma_persons(2.3, n, rng),
+    "heavy tails, trials much alike": lambda n, rng: clustered(heavy, 0.7, n, rng),
     "paired times, incomplete": lambda n, rng: with_gaps(paired_times(n, rng), rng),
     "mostly unhurt": mostly_unhurt,
-    "mostly unhurt, incomplete": lambda n, rng: with_gaps(mostly_unhurt(n, rng), rng),
 }
 
 
@@ -77,7 +110,107 @@ def test_what_holds_in_columns_of_a_band_is_the_interval_of_the_runs():
     rng = np.random.default_rng(3)
     values = paired_times(5, rng)
     found = band(person_means(values))
-    person = np.repeat(np.arange(PERSONS), TRIALS)
     for study, low, high in zip(values, found.pointwise_low, found.pointwise_high, strict=True):
-        interval = mean_interval(study.ravel(), person)
+        interval = mean_interval(study.ravel(), WHO)
         assert (interval.low, interval.high) == pytest.approx((low, high))
+
+
+def test_where_slow_runs_are_missing_more_often_no_interval_holds():
+    """Above the middle a third is missing, below it a twentieth: the mean is too low by 0.13."""
+    rng = np.random.default_rng(2014)
+    values = clustered(normal, 0.0, 500, rng)
+    gone = rng.random(values.shape) < np.where(values > 0, 0.35, 0.05)
+    found = band(person_means(np.where(gone, np.nan, values)), resamples=1000)
+    held = (found.pointwise_low <= 0) & (found.pointwise_high >= 0)
+    assert held.mean() < 0.85
+    assert found.mean.mean() == pytest.approx(-0.15, abs=0.02)
+
+
+def levels_of_one_line(persons, n, rng):
+    """Six levels of a skewed measure that share two thirds of their luck; one mostly zero."""
+    common, own = rng.normal(size=(n, persons, 1)), rng.normal(size=(n, persons, 6))
+    values = np.exp(0.5 * (0.8 * common + 0.6 * own)) - np.exp(0.125)
+    values[:, :, 0] *= rng.random((n, persons)) < 0.5
+    return values
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("persons", "studies"), [(24, 10_000), (12, 3000), (6, 3000)])
+def test_a_band_over_six_levels_holds_all_of_them_in_93_to_97_of_100_studies(persons, studies):
+    rng = np.random.default_rng(2015)
+    held = 0
+    for values in levels_of_one_line(persons, studies, rng):
+        found = band(values, resamples=1000)
+        held += bool(((found.low <= 0) & (found.high >= 0)).all())
+    assert 0.93 <= held / studies <= 0.97
+
+
+def skilled_pairs(persons, n, rng):
+    """Persons' log-normal times under two treatments."""
+    skill, noise = rng.lognormal(0, 0.4, (n, persons)), rng.lognormal(0, 0.3, (2, n, persons))
+    return 30 * skill * noise[0], 24 * skill * noise[1]
+
+
+def unitless(a, b):
+    size, pairing = effect_size(a, b, range(len(a)), resamples=500), None
+    pairing = variance_reduction(a, b, range(len(a)), resamples=500)
+    return size.paired, size.average, size.superiority, pairing.correlation, pairing.ratio
+
+
+def true_sizes(a, b):
+    d = a - b
+    return (
+        d.mean() / d.std(),
+        d.mean() / ((a.std() + b.std()) / 2),
+        (d > 0).mean(),
+        np.corrcoef(a, b)[0, 1],
+        d.var() / (a.var() + b.var()),
+    )
+
+
+@pytest.mark.slow
+def test_intervals_of_sizes_and_of_what_pairing_did_hold_in_93_to_98_of_100_skewed_studies():
+    rng = np.random.default_rng(2016)
+    truth = true_sizes(*skilled_pairs(2_000_000, 1, rng))
+    held = np.zeros(5)
+    for a, b in zip(*skilled_pairs(PERSONS, 4000, rng), strict=True):
+        held += [holds(x, true) for x, true in zip(unitless(a, b), truth, strict=True)]
+    assert np.all(held / 4000 >= 0.93)
+    assert np.all(held / 4000 <= 0.98)
+
+
+def happened(share, icc, n, rng):
+    """Yes or no by run; persons' own chances are of a beta law."""
+    strength = (1 - icc) / icc
+    chance = rng.beta(share * strength, (1 - share) * strength, (n, PERSONS, 1))
+    return (rng.random((n, PERSONS, TRIALS)) < chance).reshape(n, -1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("share", "icc"), [(0.5, 0.3), (0.2, 0.3), (0.2, 0.7)])
+def test_an_interval_of_a_share_holds_in_93_to_97_of_100_studies(share, icc):
+    flags = happened(share, icc, STUDIES, np.random.default_rng(2017))
+    held = np.mean([holds(share_interval(own, WHO), share) for own in flags])
+    assert 0.93 <= held <= 0.97
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("q", "icc", "true"), [(0.5, 0.3, 0.0), (0.95, 0.3, 1.6449), (0.95, 0.7, 1.6449)]
+)
+def test_an_interval_of_a_quantile_holds_in_93_to_97_of_100_studies(q, icc, true):
+    runs = clustered(normal, icc, STUDIES, np.random.default_rng(2018)).reshape(STUDIES, -1)
+    held = np.mean([holds(quantile_interval(own, WHO, q), true) for own in runs])
+    assert 0.93 <= held <= 0.975
+
+
+@pytest.mark.slow
+def test_nothing_is_found_in_a_factorial_without_effects_in_3_to_7_of_100_skewed_studies():
+    rng = np.random.default_rng(2019)
+    one, two = (np.repeat(x, PERSONS) for x in (list("aaabbb"), [0, 1, 2, 0, 1, 2]))
+    person = np.tile(np.arange(PERSONS), 6)
+    alarms = 0
+    for values in skewed((2000, 6 * PERSONS), rng):
+        found = factorial_effects({"x": one, "y": two}, values, person, resamples=1000)
+        alarms += any(effect.is_found for effect in found)
+    assert 0.03 <= alarms / 2000 <= 0.07

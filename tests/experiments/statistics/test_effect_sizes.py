@@ -5,6 +5,7 @@ import pytest
 from scipy import special, stats
 
 from dva_sim.experiments.statistics import effect_size
+from dva_sim.experiments.statistics.persons import draws
 
 
 def test_sizes_are_means_over_spreads_with_hedges_correction():
@@ -34,18 +35,27 @@ def test_the_interval_of_the_paired_size_is_near_that_of_the_noncentral_t():
     assert (found.low, found.high) == pytest.approx(tuple(exact), abs=0.06)
 
 
-def test_the_intervals_hold_in_most_of_many_skewed_studies():
-    rng = np.random.default_rng(2)
-    held = np.zeros(3)
-    skill, noise = rng.lognormal(0, 0.4, (200, 24)), rng.lognormal(0, 0.3, (2, 200, 24))
-    slow, fast = 30 * skill * noise[0], 24 * skill * noise[1]
-    truth = 0.464, 0.418, 0.702  # of 480,000 persons
-    for a, b in zip(slow, fast, strict=True):
-        found = effect_size(a, b, range(24), resamples=200)
-        sizes = found.paired, found.average, found.superiority
-        held += [x.low <= true <= x.high for x, true in zip(sizes, truth, strict=True)]
-    assert np.all(held / 200 >= 0.90)
-    assert np.all(held / 200 <= 0.99)
+def test_the_interval_of_the_average_size_is_a_bootstrap_t_written_out():
+    rng = np.random.default_rng(4)
+    a, b = rng.lognormal(0.3, 0.4, (2, 12))
+
+    def size(x, y):
+        return (x - y).mean() / (np.std(x, ddof=1) + np.std(y, ddof=1)) * 2
+
+    def with_error(rows):
+        left_out = [size(*np.delete(rows, i, axis=1)) for i in range(12)]
+        return size(*rows), math.sqrt(11 * np.var(left_out))
+
+    estimate, error = with_error(np.stack([a, b]))
+    counts = draws(12, 1, 200).astype(int)
+    drawn = [with_error(np.repeat(np.stack([a, b]), own, axis=1)) for own in counts]
+    ratios = np.sort([(size - estimate) / max(spread, error / 4) for size, spread in drawn])
+    least = max(stats.t.isf(0.025, 11), np.sort(abs(ratios))[189])
+    ends = -max(least, ratios[194]), max(least, -ratios[5])
+    found = effect_size(a, b, range(12), resamples=200).average
+    unit = found.mean / estimate * error
+    assert found.mean == pytest.approx((1 - 3 / (4 * 11 - 1)) * estimate, rel=1e-3)
+    assert (found.low, found.high) == pytest.approx([found.mean + unit * end for end in ends])
 
 
 def test_two_persons_have_a_superiority_but_no_size():

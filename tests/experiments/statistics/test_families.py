@@ -1,3 +1,5 @@
+import itertools
+
 import numpy as np
 import pytest
 
@@ -34,3 +36,19 @@ def test_the_chance_of_any_false_alarm_is_kept_whatever_else_is_true():
     p = np.column_stack([rng.random((3000, 3)), rng.random((3000, 2)) * 1e-6])
     alarms = np.mean([(holm(row)[:3] <= 0.05).any() for row in p])
     assert 0.035 <= alarms <= 0.065
+
+
+def test_it_is_the_closure_of_bonferronis_test_over_all_subsets():
+    """A test is as significant as the least significant of the subsets that it is in."""
+    p = np.random.default_rng(1).random(6) ** 3
+    subsets = [s for k in range(1, 7) for s in itertools.combinations(range(6), k)]
+    closure = [max(len(s) * min(p[list(s)]) for s in subsets if i in s) for i in range(6)]
+    assert holm(p) == pytest.approx(np.minimum(closure, 1))
+
+
+def test_true_hypotheses_of_a_family_are_rejected_in_one_study_of_twenty():
+    """Of five, three are true; the others are always found, so three share the 5 %: 4.9 %."""
+    rng = np.random.default_rng(2)
+    p = np.column_stack([rng.random((4000, 3)), np.full((4000, 2), 1e-6)])
+    alarms = np.mean([(holm(own)[:3] <= 0.05).any() for own in p])
+    assert alarms == pytest.approx(1 - (1 - 0.05 / 3) ** 3, abs=0.01)

@@ -60,6 +60,24 @@ def test_censored_runs_bias_nothing_and_the_intervals_hold():
     assert np.all(held / 200 >= 0.92)
 
 
+def test_its_interval_rests_on_leaving_out_each_person_in_turn():
+    rng = np.random.default_rng(4)
+    person, left = np.repeat(np.arange(8), 5), rng.exponential(60, 40)
+    times = np.minimum(rng.exponential(40, 40), left)
+    causes = np.where(times == left, "", rng.choice(["done", "lost"], 40))
+    found = cumulative_incidence(times, causes, 50, person).causes["done"]
+    alone = [
+        cumulative_incidence(times[person != i], causes[person != i], 50, person[person != i])
+        for i in range(8)
+    ]
+    variance = 7 * np.var([each.causes["done"].mean for each in alone])
+    worth = found.mean * (1 - found.mean) / variance
+    worth = min(max(worth, 8), 40) * (stats.t.isf(0.025, 39) / stats.t.isf(0.025, 7)) ** 2
+    seen = found.mean * worth
+    assert found.low == pytest.approx(stats.beta.ppf(0.025, seen, worth - seen + 1))
+    assert found.high == pytest.approx(stats.beta.ppf(0.975, seen + 1, worth - seen))
+
+
 def test_shares_add_up_to_one_and_an_event_at_the_horizon_counts():
     found = cumulative_incidence([5, 7, 5, 5.1], ["a", "", "b", "c"], 5, [0, 0, 1, 1])
     assert set(found.causes) == {"a", "b"}
