@@ -1,3 +1,6 @@
+import csv
+import io
+
 import numpy as np
 import pytest
 import synthetic_study
@@ -5,6 +8,7 @@ import synthetic_study
 from dva_sim.experiments.effects import Factor, Part, View
 from dva_sim.experiments.endings import NOTHING, Endings, horizon_of
 from dva_sim.experiments.endings_told import in_a_line, sentences, table
+from dva_sim.experiments.figures.incidence import endings_in_time
 from dva_sim.experiments.reading import finding_of
 
 LEVELS = ("short", "long")
@@ -143,3 +147,20 @@ def test_events_count_until_they_are_no_longer_followed_or_the_run_is_over():
     assert horizon_of(view, {"horizon_s": 240.0}) == 240.0
     view.part.treated["follow_s"] = np.full(len(view.part), 600.0)
     assert horizon_of(view, {"horizon_s": 7200.0}) == 600.0
+
+
+def test_the_figure_ends_at_the_shares_of_the_table():
+    found, view = three_of_four_lost()
+    drawn = endings_in_time(found, view)
+    assert drawn is not None
+    rows = list(csv.DictReader(io.StringIO(drawn.csv.decode())))
+    last = {row["command.timeout_s"]: row for row in rows if float(row["t_s"]) == HORIZON_S}
+    assert float(last["short"]["link lost"]) == pytest.approx(0.75)
+    assert float(last["long"]["confirmed"]) == pytest.approx(0.75)
+    first = next(row for row in rows if row["command.timeout_s"] == "long")
+    assert (float(first["confirmed"]), float(first[NOTHING])) == (0.0, 1.0)
+
+
+def test_where_all_were_confirmed_there_is_no_figure():
+    found, view = endings([confirmed(p, line) for p in range(3) for line in LEVELS])
+    assert endings_in_time(found, view) is None
