@@ -69,6 +69,7 @@ class Finding:
         widest: The greatest difference that is possible; a band of that size says nothing.
         all_confirmed: Whether no run of any cell was missed.
         everywhere: Where a contrast holds that runs over nothing.
+        failed: Runs that are missing because they failed.
     """
 
     measure: str
@@ -90,6 +91,7 @@ class Finding:
     widest: float = np.inf
     all_confirmed: bool = False
     everywhere: str = "throughout"
+    failed: int = 0
 
     @property
     def unit(self) -> str:
@@ -225,11 +227,12 @@ def _misses(f: Finding) -> list[str]:
     """Misses are a result of their own: the mean alone would hide them behind the horizon."""
     if not f.missed:
         return []
+    every = f"Every event{' of the runs that did not fail' if f.failed else ''} was confirmed"
     if f.all_confirmed:
-        return ["Every event was confirmed, in every cell."]
+        return [f"{every}, in every cell."]
     where = _at(f, [len(f.levels) - 1])
     if not any(m.missed for m in f.missed):
-        return [f"Every event was confirmed {where}, under each {factor_name(f.factor)}."]
+        return [f"{every} {where}, under each {factor_name(f.factor)}."]
     shares = [
         f"{level_name(f.factor, m.line)} {percent(m.share)} ({m.missed} of {m.runs})"
         for m in f.missed

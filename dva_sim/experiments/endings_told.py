@@ -39,11 +39,11 @@ def sentences(endings: Endings, view: View, finding: Finding | None) -> list[str
     return [f"{capital(where)}, {when}: {told}.{_apart(endings, finding, stop)}"]
 
 
-def in_a_line(endings: Endings) -> str:
-    """That all went right, in every cell."""
-    if CLEARED in endings.ways:
-        return "Every event was confirmed, and every false alarm cleared, in every cell."
-    return "Every event was confirmed, in every cell."
+def in_a_line(endings: Endings, failed: int = 0) -> str:
+    """That all went right, in every cell; of failed runs nobody knows."""
+    every = f"Every event{' of the runs that did not fail' if failed else ''} was confirmed"
+    cleared = ", and every false alarm cleared" if CLEARED in endings.ways else ""
+    return f"{every}{cleared}, in every cell."
 
 
 def table(endings: Endings, view: View, cluster: str) -> CellTable:

@@ -121,7 +121,7 @@ def _endings(reading: Reading) -> Iterator[Block]:
         return
     if endings.is_right.all():
         if reading.finding is None or not reading.finding.missed:
-            yield Words(in_a_line(endings))
+            yield Words(in_a_line(endings, len(reading.results.failures)))
         return
     yield Heading("How it ended")
     for sentence in sentences_of_endings(endings, view, reading.finding):

@@ -13,6 +13,7 @@ from rich.table import Table
 from dva_sim.experiments.frames import plain
 from dva_sim.experiments.needed_told import plan_lines
 from dva_sim.experiments.results import Results
+from dva_sim.experiments.status import status_of
 
 ROWS = 20
 _GAP = 2  # between columns
@@ -139,12 +140,9 @@ def _facts(results: Results) -> Iterator[str]:
 
 
 def _status(manifest: Mapping[str, Any]) -> str:
-    status = manifest.get("status") or {}
-    why = "; ".join(status.get("why", ()))
-    changed = ", ".join(map(str, manifest.get("set", ())))
-    told = f"{status.get('kind', 'declared')}{f': {why}' if why else ''}"
-    told = f"{told} (--set {changed})" if changed and changed not in why else told
-    return f"Status: {told}"
+    status = status_of(manifest)
+    why = "; ".join(status.why)
+    return f"Status: {status.kind}{f': {why}' if why else ''}"
 
 
 def _machine(machine: Mapping[str, Any]) -> str:

@@ -94,7 +94,8 @@ class Reading:
     @cached_property
     def finding(self) -> Finding | None:
         """The declared contrast as measured."""
-        return finding_of(self.view) if self.view is not None else None
+        found = finding_of(self.view) if self.view is not None else None
+        return replace(found, failed=len(self.results.failures)) if found is not None else None
 
     @cached_property
     def shifts(self) -> Shifts | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,29 +12,17 @@ from numpy.typing import NDArray
 from dva_sim.experiments.dispatch.outcomes import CUT, incidence
 from dva_sim.experiments.effects import Floats, Setting, View
 from dva_sim.experiments.endings import NOTHING, Endings
+from dva_sim.experiments.figures.keys import box, key
 from dva_sim.experiments.figures.numbers import Numbers
+from dva_sim.experiments.figures.palette import FATES, PAPER
 from dva_sim.experiments.figures.style import Drawn, finish, panels, wrapped
 from dva_sim.experiments.labels import Level, brief, capital, level_name
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 _MOST_STOPS, _MOST_LINES, _POINTS = 4, 3, 241
 _TITLE = 70  # characters that the width holds
-# Colour and hatching, so that a print in grey tells them apart too.
-_LOOKS = {
-    "confirmed": ("#0b559f", ""),
-    "cleared": ("#75b4d8", ""),
-    "refuted": ("#CC79A7", "...."),
-    "false alarm confirmed": ("#7a3b69", "xxxx"),
-    "link lost": ("#E69F00", "////"),
-    "given up": ("#8c4a00", "\\\\\\\\"),
-    "escalated": ("#f0c75e", "||||"),
-    "expired": ("#D55E00", "----"),
-    "never reported": ("#3b3b3b", ""),
-    NOTHING: ("#e3e3e3", ""),
-}
 
 
 def endings_in_time(endings: Endings, view: View) -> Drawn | None:
@@ -62,10 +50,10 @@ def endings_in_time(endings: Endings, view: View) -> Drawn | None:
         ax.set_title(wrapped(capital(brief(_stop(view, stop))), _TITLE // len(stops)))
     for ax in axes[-1]:
         ax.set_xlabel("Since the report [s]")
-    _key(figure, endings)
-    where = f" with {brief(view.panels[0])}" if view.panels[0] else ""
+    key(figure, [box(FATES[way]) for way in endings.ways], [_named(w) for w in endings.ways])
+    place = f" with {brief(view.panels[0])}" if view.panels[0] else ""
     caption = (
-        f"Share of the events{where} that had ended in each way by each moment: the ways rule each "
+        f"Share of the events{place} that had ended in each way by each moment: the ways rule each "
         "other out, so they are stacked (cumulative incidence, Aalen-Johansen). Shares at the "
         "right edge stand in the table, with intervals. Shown are places at which not all were "
         "confirmed."
@@ -101,22 +89,11 @@ def _shares(endings: Endings, mask: NDArray[np.bool_], times: Floats) -> dict[st
 def _stack(ax: Axes, shares: dict[str, Floats], times: Floats) -> None:
     floor = np.zeros_like(times)
     for way, share in shares.items():
-        colour, hatch = _LOOKS[way]
-        top = floor + share
-        look = {"facecolor": colour, "hatch": hatch, "edgecolor": "white", "lw": 0.6}
-        ax.fill_between(times, floor, top, step="post", **look)  # type: ignore[arg-type]
+        fill, top = FATES[way], floor + share
+        look: dict[str, Any] = {"facecolor": fill.colour, "hatch": fill.hatch, "edgecolor": PAPER}
+        ax.fill_between(times, floor, top, step="post", lw=0.6, **look)
         floor = top
 
 
 def _named(way: str) -> str:
     return "nothing yet" if way == NOTHING else way
-
-
-def _key(figure: Figure, endings: Endings) -> None:
-    from matplotlib.patches import Patch
-
-    handles = [
-        Patch(facecolor=_LOOKS[way][0], hatch=_LOOKS[way][1], edgecolor="white", label=_named(way))
-        for way in endings.ways
-    ]
-    figure.legend(handles=handles, loc="outside upper left", ncols=len(handles))
