@@ -91,12 +91,13 @@ class _Reader:
 
     def __init__(self, text: str) -> None:
         self.text, self._at = text, 0
-        self.kind, self.word = "", ""
+        self.kind, self.word, self._begin = "", "", 0
         self.next()
 
     def next(self) -> str:
         """Go on; the word left behind."""
         left, rest = self.word, self.text[self._at :]
+        self._begin = self._at + len(rest) - len(rest.lstrip())
         found = _WORD.match(rest)
         if found is None and rest.strip():
             raise self.error(f"{rest.strip()[0]!r} has no meaning here")
@@ -117,9 +118,10 @@ class _Reader:
         return self.next()
 
     def error(self, problem: str) -> ConfigError:
-        """A mistake in the condition."""
+        """A mistake in the condition, at the word it has come to."""
         return ConfigError(
-            f"--fail-if {self.text!r}: {problem}; conditions look like p95(response_s) > 1.05x, "
+            f"--fail-if {self.text!r}, column {self._begin + 1}: {problem}; "
+            "conditions look like p95(response_s) > 1.05x, "
             "mean(drive_time_s) per cell > +0.5 s, or share(confirmed) < 95 %"
         )
 
@@ -131,10 +133,7 @@ def parse(text: str) -> Gate:
         ConfigError: it is none, told with what was expected.
     """
     words = _Reader(text)
-    statistic = words.take("name", called="a statistic")
-    if statistic not in _STATISTICS and percent_of(statistic) is None:
-        known = f"{', '.join(_STATISTICS)}, p1 to p99"
-        raise words.error(f"statistic {statistic!r} is unknown; known: {known}")
+    statistic = _statistic(words)
     words.take("sign", ("(",))
     measure = words.take("name", called="a measure")
     test = _test(words, measure) if statistic == "share" and words.kind == "sign" else None
@@ -155,6 +154,14 @@ def percent_of(statistic: str) -> float | None:
     """Which percentile a statistic is: 95 for `p95`; None if it is none."""
     found = re.fullmatch(r"p(\d\d?(?:\.\d+)?)", statistic)
     return float(found[1]) if found and float(found[1]) else None
+
+
+def _statistic(words: _Reader) -> str:
+    name = words.word
+    if words.kind == "name" and name not in _STATISTICS and percent_of(name) is None:
+        known = f"{', '.join(_STATISTICS)}, p1 to p99"
+        raise words.error(f"statistic {name!r} is unknown; known: {known}")
+    return words.take("name", called="a statistic")
 
 
 def _test(words: _Reader, measure: str) -> Test | None:

@@ -56,11 +56,14 @@ def judge(gate: Gate, comparison: Comparison) -> list[Verdict]:
     Raises:
         ConfigError: no such measure or factor, or nothing to decide it by.
     """
-    table, column = comparison.find(gate.measure)
-    by = None if gate.per is None else () if gate.per == "cell" else (gate.per,)
-    verdicts = list(_verdicts(gate, comparison, table, column, comparison.groups(by)))
-    if not verdicts:
-        raise ConfigError(f"--fail-if {gate.text!r}: no run of either has a value of {column}")
+    try:
+        table, column = comparison.find(gate.measure)
+        by = None if gate.per is None else () if gate.per == "cell" else (gate.per,)
+        verdicts = list(_verdicts(gate, comparison, table, column, comparison.groups(by)))
+        if not verdicts:
+            raise ConfigError(f"no run of either has a value of {column}")
+    except ConfigError as error:
+        raise ConfigError(f"--fail-if {gate.text!r}: {error}") from None
     return verdicts
 
 
@@ -119,7 +122,7 @@ def _statistic(gate: Gate, rows: Rows) -> float:
 
 def _refuse_undecided(gate: Gate, group: Group, first: float, second: float) -> None:
     """A gate that cannot be decided must not pass for one that was."""
-    where = f"--fail-if {gate.text!r}: in part {group.part}"
+    where = f"in part {group.part}"
     needs_first = gate.bound.kind != "absolute"
     for side, value in (("first", first), ("second", second)):
         if math.isnan(value) and (side == "second" or needs_first):

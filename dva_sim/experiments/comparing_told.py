@@ -13,6 +13,7 @@ from dva_sim.experiments.comparing_cells import Levels
 from dva_sim.experiments.comparing_gates import Verdict
 from dva_sim.experiments.comparing_rows import Difference
 from dva_sim.experiments.labels import brief, factor_name, level_name, number
+from dva_sim.experiments.results import Results
 from dva_sim.experiments.showing import print_table, program
 from dva_sim.experiments.units import unit_of
 
@@ -35,11 +36,11 @@ def tell(
         ConfigError: no such measure or factor.
     """
     for name, side in zip("AB", comparison.sides, strict=True):
-        console.print(f"{name}: {escape(str(side.folder))}: {program(side)}", soft_wrap=True)
+        console.print(escape(f"{name}: {side.folder}: {program(side)}{_set(side)}"), soft_wrap=True)
         if side.failures:
             failed = f"{len(side.failures)} runs of {name} failed and take no part"
             console.print(failed, style="yellow", soft_wrap=True)
-    for line in (*_cells(comparison), _luck(comparison)):
+    for line in (*_questions(comparison), *_cells(comparison), _luck(comparison)):
         console.print(escape(line), soft_wrap=True)
     wanted: Sequence[str | None] = measures or [None]
     for measure in wanted:
@@ -72,9 +73,24 @@ def _verdict(verdict: Verdict) -> str:
     return f"{where}: {values}; without a value: A {100 * here:.3g} %, B {100 * there:.3g} %"
 
 
+def _set(side: Results) -> str:
+    changed = ", ".join(map(str, side.manifest.get("set", ())))
+    return f", --set {changed}" if changed else ""
+
+
+def _questions(comparison: Comparison) -> list[str]:
+    """What two studies ask, if it is not the same."""
+    asked = [side.question for side in comparison.sides]
+    if asked[0] == asked[1]:
+        return []
+    return ["Two different studies:", *(f"  {n}: {q}" for n, q in zip("AB", asked, strict=True))]
+
+
 def _cells(comparison: Comparison) -> list[str]:
     matched = comparison.matched
-    lines = [f"{len(matched.pairs)} cells are in both"]
+    others = sum(not pair.is_same for pair in matched.pairs)
+    more = f", {others} of them with another configuration in each" if others else ""
+    lines = [f"{len(matched.pairs)} cells are in both{more}"]
     for name, rest in (("A", matched.only_first), ("B", matched.only_second)):
         if rest:
             some = "; ".join(f"{part} {brief(dict(levels))}" for part, levels in rest[:_SHOWN])

@@ -78,6 +78,21 @@ def test_a_share_can_be_of_a_word(word):
 
 
 @pytest.mark.parametrize(
+    ("text", "column"),
+    [
+        ("average(response_s) > 3", 1),
+        ("p95(response_s > 1.05x", 16),
+        ("p95(response_s) > 3 m", 21),
+        ("  max(jams) ; 1", 13),
+        ("p95(response_s)  ", 18),
+    ],
+)
+def test_a_mistake_is_told_with_its_place(text, column):
+    with pytest.raises(ConfigError, match=f", column {column}: "):
+        parse(text)
+
+
+@pytest.mark.parametrize(
     ("text", "problem"),
     [
         ("", "expected a statistic, and then it ends"),

@@ -2,6 +2,7 @@
 
 import io
 import json
+import shutil
 import sys
 
 import pytest
@@ -147,6 +148,22 @@ def test_the_same_results_are_told_to_be_identical(folders, command):
     assert "All 5 measures are the same in every pair of runs" in out
 
 
+def test_another_question_other_settings_and_other_configurations_are_told(
+    folders, tmp_path, command
+):
+    other = shutil.copytree(folders["cheap"], tmp_path / "other")
+    manifest = json.loads((other / "manifest.json").read_text())
+    manifest["study"]["question"] = "Which is safer?"
+    manifest["set"] = ["link.loss=0.1"]
+    for cell in manifest["cells"][:3]:
+        cell["config"] = "0"
+    (other / "manifest.json").write_text(json.dumps(manifest))
+    _, out, _ = command("compare", folders["cheap"], other)
+    assert "Two different studies:\n  A: Which is quicker?\n  B: Which is safer?\n" in out
+    assert "8 cells are in both, 2 of them with another configuration in each" in out
+    assert ", --set link.loss=0.1\n" in out
+
+
 @pytest.mark.parametrize(
     ("conditions", "code", "said"),
     [
@@ -174,6 +191,10 @@ def test_runs_that_failed_are_told(folders, command):
         (["show", "{cheap}", "--table", "flights"], "no table 'flights'; tables: runs, tracks"),
         (["compare", "{cheap}", "nowhere"], "nowhere is not a folder"),
         (["compare", "{cheap}", "{later}", "--fail-if", "p95(drive_time_s"], "expected ')'"),
+        (
+            ["compare", "{cheap}", "{later}", "--fail-if", "p95(speed) > 3"],
+            "3': measure 'speed' is",
+        ),
         (["compare", "{cheap}", "{later}", "--measure", "speed"], "measure 'speed' is not in both"),
     ],
 )
