@@ -17,6 +17,7 @@ from dva_sim.experiments.blocks import (
     Words,
 )
 from dva_sim.experiments.cells import CellTable
+from dva_sim.experiments.figures.palette import SOFT, WARNING
 from dva_sim.experiments.typeset import (
     SMALL,
     Face,
@@ -33,12 +34,12 @@ _PLAIN, _LEAD = Face(9), Face(10.5, "bold")
 _KINDS: dict[Kind, Face] = {
     "plain": _PLAIN,
     "note": SMALL,
-    "warning": Face(9, "bold", colour="#8a3800"),
+    "warning": Face(9, "bold", colour=WARNING),
     "label": Face(9, "bold"),
 }
 _MONO = Face(5.5, family="DejaVu Sans Mono")
-_CELL, _HEAD = Face(7), Face(7, "bold", colour="#444444")
-_TIGHT, _TIGHT_HEAD = Face(6), Face(6, "bold", colour="#444444")
+_CELL, _HEAD = Face(7), Face(7, "bold", colour=SOFT)
+_TIGHT, _TIGHT_HEAD = Face(6), Face(6, "bold", colour=SOFT)
 _GAP = 9.0  # between columns [pt]
 _NAMES = 0.4  # of the width is what names of rows may take before they are broken
 _INDENT = 10.0  # of a list, and of the answer [pt]

@@ -10,6 +10,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from dva_sim.experiments.figures.palette import FAINT, INK, SOFT
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
@@ -20,7 +22,6 @@ LEADING = 1.32  # line to line, in sizes of the font
 _INCH = 72.0  # [pt]
 _DATE = datetime(2000, 1, 1, tzinfo=UTC)
 _ROUNDING = 0.01  # [pt]
-_SOFT, _RULE = "#555555", "#bbbbbb"
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,7 @@ class Face:
     size: float = 9.0
     weight: str = "normal"
     family: str = "DejaVu Sans"
-    colour: str = "#1a1a1a"
+    colour: str = INK
 
     @property
     def leading(self) -> float:
@@ -45,7 +46,7 @@ class Face:
         return LEADING * self.size
 
 
-SMALL = Face(7.5, colour=_SOFT)
+SMALL = Face(7.5, colour=SOFT)
 
 
 class Paper:
@@ -112,7 +113,7 @@ class Paper:
         from matplotlib.transforms import IdentityTransform
 
         context = self._renderer.new_gc()
-        context.set_foreground(_RULE)
+        context.set_foreground(FAINT)
         context.set_linewidth(0.5)
         ends = [(MARGIN + x, self.y), (MARGIN + x + (width or self.width - x), self.y)]
         self._renderer.draw_path(context, Outline(ends), IdentityTransform())

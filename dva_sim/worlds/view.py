@@ -44,7 +44,12 @@ ARC_POINTS = 9
 
 
 def draw_site(
-    ax: Axes, site: Site, labels: bool = True, coverage: bool = False, views: bool = False
+    ax: Axes,
+    site: Site,
+    labels: bool = True,
+    coverage: bool = False,
+    views: bool = False,
+    scale: bool = True,
 ) -> None:
     """Draw a site into `ax`, in metres, without axes.
 
@@ -56,6 +61,7 @@ def draw_site(
         labels: Names, zones and equipment too, not only ground, walls, doors and exits.
         coverage: Where the radio link is not good, as a faint layer.
         views: What fixed cameras see, as a faint layer.
+        scale: A bar below the site that tells lengths.
     """
     _set_limits(ax, site)
     if site.rooms:
@@ -75,7 +81,8 @@ def draw_site(
         draw_equipment(ax, site)
         write_names(ax, site)
         draw_north(ax, site)
-    draw_scale_bar(ax, site)
+    if scale:
+        draw_scale_bar(ax, site)
 
 
 def limits(site: Site) -> tuple[tuple[float, float], tuple[float, float]]:

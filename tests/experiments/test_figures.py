@@ -1,26 +1,25 @@
-import itertools
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import synthetic_study
-from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
 from dva_sim.experiments.cadence import Cadence
 from dva_sim.experiments.effects import Factor, Part, View
 from dva_sim.experiments.figures.budget import delay_budget
 from dva_sim.experiments.figures.commands import command_rate
-from dva_sim.experiments.figures.effect import _band, _fit_to
+from dva_sim.experiments.figures.effect import _band, _fit_to, differences
 from dva_sim.experiments.figures.factorial import effects
 from dva_sim.experiments.figures.ground import Ways
 from dva_sim.experiments.figures.heat import heat_map
+from dva_sim.experiments.figures.keys import apart, columns_of
+from dva_sim.experiments.figures.palette import ONE
+from dva_sim.experiments.figures.scatter import trend
 from dva_sim.experiments.figures.story import Events, fates, outcomes, responses
 from dva_sim.experiments.figures.style import (
-    _apart,
-    colours,
+    is_to_scale,
     log_axis,
-    marks,
     panel_grid,
     panel_name,
     panels,
@@ -60,10 +59,6 @@ def test_a_boundary_outside_the_levels_has_no_place(delay):
     assert place_of(DELAY, delay) is None
 
 
-def test_a_pattern_keeps_its_colour_when_another_is_left_out():
-    assert colours(PATTERN)["req-rep"] == colours(Factor("pattern", ("req-rep",)))["req-rep"]
-
-
 def test_a_panel_where_no_run_went_on_takes_nothing_from_the_others(view):
     runs = {**view.part.treated, "is_reference": np.zeros(len(view.part.treated["part"]), bool)}
     rate = np.where(runs["profile"] == "default", 8.0, np.nan)
@@ -75,7 +70,7 @@ def test_a_panel_where_no_run_went_on_takes_nothing_from_the_others(view):
 
 
 def test_names_of_lines_that_end_together_are_moved_apart_within_the_axes():
-    placed = _apart([0.95, 0.96, 0.97], gap=0.1)
+    placed = apart([0.95, 0.96, 0.97], gap=0.1)
     assert np.diff(placed).min() == pytest.approx(0.1)
     assert max(placed) == pytest.approx(1.0)
 
@@ -87,7 +82,7 @@ def test_every_event_has_a_fate_even_one_nobody_foresaw():
         "confirmed by a robot",
         "confirmed by a guard",
         "expired",
-        "open at the end",
+        "open",
         "other",
     ]
 
@@ -152,7 +147,7 @@ def test_four_settings_stand_two_by_two_with_the_answers_levels_first():
 def test_bands_end_where_nothing_is_possible_and_do_not_flatten_the_lines():
     few = np.array([[40.0, 60.0], [80.0, 90.0]])  # two persons, so bands of hundreds of seconds
     _, ((ax,),) = panels(1, 1, 3.0)
-    _band(ax, band(few), "black", "o", 0.0, (0.0, 240.0))
+    _band(ax, band(few), ONE, 0.0, (0.0, 240.0))
     heights = ax.collections[0].get_paths()[0].vertices[:, 1]
     assert (heights.min(), heights.max()) == (0.0, 240.0)
     assert "they are cut" in _fit_to(ax, few.ravel())
@@ -162,7 +157,7 @@ def test_bands_end_where_nothing_is_possible_and_do_not_flatten_the_lines():
 def test_narrow_bands_are_shown_whole():
     _, ((ax,),) = panels(1, 1, 3.0)
     many = np.linspace([40.0, 45.0], [60.0, 65.0], 24)
-    _band(ax, band(many), "black", "o", 0.0, (0.0, 240.0))
+    _band(ax, band(many), ONE, 0.0, (0.0, 240.0))
     before = ax.get_ylim()
     assert _fit_to(ax, many.ravel()) == ""
     assert ax.get_ylim() == before
@@ -179,31 +174,6 @@ def test_nobody_who_never_came_has_a_panel_and_one_fate_needs_no_picture(view):
     assert f"all {len(events):,} were confirmed by a robot" in drawn.caption
 
 
-# Machado, Oliveira & Fernandes, IEEE Trans. Vis. Comput. Graph. 15 (2009) 1291: deuteranopia.
-DEUTERANOPIA = np.array(
-    [
-        [0.367322, 0.860646, -0.227968],
-        [0.280085, 0.672501, 0.047413],
-        [-0.011820, 0.042940, 0.968881],
-    ]
-)
-
-
-def seen_by_the_colour_blind(colour):
-    """A colour's linear red, green and blue as one without green cones sees it."""
-    rgb = np.array(to_rgb(colour))
-    linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
-    return DEUTERANOPIA @ linear
-
-
-@pytest.mark.parametrize("factor", [PATTERN, Factor("control", ("a", "b", "c", "d", "e", "f"))])
-def test_lines_differ_for_the_colour_blind_and_by_their_marks_in_a_print(factor):
-    seen = [seen_by_the_colour_blind(colour) for colour in colours(factor).values()]
-    apart = [np.linalg.norm(a - b) for a, b in itertools.combinations(seen, 2)]
-    assert min(apart) > 0.1
-    assert len(set(marks(factor).values())) == len(factor.levels)
-
-
 def test_bars_of_a_lower_panel_are_not_cut_by_the_first(view):
     columns = ("delay_uplink_s", "delay_downlink_s")
     runs = {**view.part.treated, "is_reference": np.zeros(len(view.part.treated["part"]), bool)}
@@ -211,12 +181,12 @@ def test_bars_of_a_lower_panel_are_not_cut_by_the_first(view):
     part = Part(runs | {name: runs[name] * longer for name in columns}, "drive", view.part.factors)
     with styled():
         drawn = delay_budget(replace(view, part=part))
-    top = max(ax.get_ylim()[1] for ax in drawn.figure.axes)
+    longest = max(ax.get_xlim()[1] for ax in drawn.figure.axes)
     rows = [row.split(",") for row in drawn.csv.decode().splitlines()]
     stages = [i for i, name in enumerate(rows[0]) if name.startswith("delay_")]
     highest = max(sum(float(row[i]) for i in stages) for row in rows[1:])
     assert highest > 6.0
-    assert top > highest
+    assert longest > highest
 
 
 def two_factor_view(effect):
@@ -274,3 +244,75 @@ def test_the_tradeoff_needs_an_exposure_that_varies():
     with styled():
         drawn = tradeoff(replace(view, part=part))
     assert drawn.title == "The trade-off: response time against time of people in danger"
+
+
+def of_links(view, count):
+    """The same runs, with links that have names where delays were."""
+    names = ("ideal", "far", "wifi", "lossy", "narrow", "cellular-at-the-edge")[:count]
+    runs = {**view.part.treated, "is_reference": np.zeros(len(view.part.treated["part"]), bool)}
+    link = np.array([names[DELAY.levels.index(d)] for d in runs["link.delay_s"].tolist()])
+    factors = [PATTERN, Factor("link", names), PROFILE]
+    part = Part(runs | {"link": link}, "drive", factors)
+    contrast = ("req-rep", "latest-wins")
+    return View(part, "drive_time_s", PATTERN, factors[1], contrast, {"profile": "default"})
+
+
+def test_lines_lead_from_number_to_number_and_never_from_word_to_word(view):
+    def joined(view):
+        with styled():
+            figure = differences(view, lambda panel: None).figure
+        return [line for line in figure.axes[0].lines if len(line.get_xdata()) == 6 and solid(line)]
+
+    def solid(line):
+        return line.get_linestyle() == "-"
+
+    assert len(joined(replace(view, contrast=("req-rep", "latest-wins")))) == 2
+    assert joined(of_links(view, 6)) == []
+
+
+def overlapping(figure, texts):
+    """Pairs of texts that are drawn over each other."""
+    figure.draw_without_rendering()
+    boxes = [t.get_window_extent() for t in texts if t.get_text() and t.get_visible()]
+    return [
+        (a, b)
+        for i, a in enumerate(boxes)
+        for b in boxes[:i]
+        if a.x0 < b.x1 and b.x0 < a.x1 and a.y0 < b.y1 and b.y0 < a.y1
+    ]
+
+
+def test_names_of_six_links_stand_clear_of_each_other_beside_the_delay_budget(view):
+    with styled():
+        figure = delay_budget(of_links(view, 6)).figure
+    axes = [ax for ax in figure.axes if ax.get_visible()]
+    names = list(axes[0].get_yticklabels())
+    assert [text.get_text() for text in names][::5] == ["ideal", "cellular-at-the-edge"]
+    assert overlapping(figure, [*names, *(ax.title for ax in axes)]) == []
+
+
+@pytest.mark.parametrize(
+    ("lengths", "columns"),
+    [([8, 13, 19], 3), ([8, 13, 19, 6, 19, 9, 11], 5), ([120, 3], 1), ([], 1)],
+)
+def test_a_key_has_as_many_columns_as_fit_the_width(lengths, columns):
+    assert columns_of(lengths) == columns
+
+
+def test_an_axis_says_when_its_levels_are_not_as_far_apart_as_their_places():
+    assert is_to_scale(Factor("robot.count", (1, 2, 3)))
+    assert is_to_scale(Factor("link", ("near", "far")))
+    assert not is_to_scale(DELAY)
+
+
+def test_the_trend_of_points_is_made_of_means_with_the_scatter_of_their_points():
+    x = np.arange(32.0)
+    middle, mean, half = trend(x, np.where(x % 2, 3.0, 1.0) + (x > 15))
+    assert middle[:2] == pytest.approx([1.5, 5.5])
+    assert mean == pytest.approx([2, 2, 2, 2, 3, 3, 3, 3])
+    # Two at 1 and two at 3: a standard deviation of 1.1547, over 2, times Student's 3.1824.
+    assert half == pytest.approx(np.full(8, 1.8374), abs=1e-4)
+
+
+def test_seven_points_are_too_few_for_a_trend():
+    assert trend(np.arange(7.0), np.arange(7.0))[0].size == 0

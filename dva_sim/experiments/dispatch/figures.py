@@ -9,45 +9,18 @@ import numpy as np
 from dva_sim.experiments.dispatch import measures
 from dva_sim.experiments.dispatch.percentiles import pooled
 from dva_sim.experiments.dispatch.shifts import BEST, FLOOR, Shifts
+from dva_sim.experiments.effects import Factor
+from dva_sim.experiments.figures.keys import box, key
 from dva_sim.experiments.figures.numbers import Numbers, with_unit
-from dva_sim.experiments.figures.style import (
-    FAINT,
-    INK,
-    SOFT,
-    Drawn,
-    finish,
-    panels,
-    styled,
-)
-from dva_sim.experiments.labels import capital
+from dva_sim.experiments.figures.palette import FAINT, FATES, INK, PAPER, SOFT, Look, looks
+from dva_sim.experiments.figures.style import Drawn, finish, panels, styled
+from dva_sim.experiments.labels import Level, capital
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# Okabe & Ito's colours and three more; the mark helps where two are near.
-LOOKS: dict[str, tuple[str, str]] = {
-    "random": ("#8a8a8a", "X"),
-    "nearest_idle": ("#222222", "s"),
-    "min_eta": ("#0072B2", "o"),
-    "priority_eta": ("#56B4E9", "^"),
-    "batch_optimal": ("#009E73", "D"),
-    "auction": ("#E69F00", "v"),
-    "preemptive": ("#CC79A7", "P"),
-    "hazard_team": ("#D55E00", "*"),
-    "operator_aware": ("#6a3d9a", "h"),
-    "coverage": ("#8c4a00", ">"),
-    "preference": ("#b8a000", "<"),
-    "oracle": ("#000000", "d"),
-}
-_OTHERS = (("#3b7a57", "p"), ("#a05195", "8"), ("#4d6fa8", "H"))
-_FATES = {
-    "confirmed": "#0b559f",
-    "refuted": "#75b4d8",
-    "open": "#f0f0f0",
-    "expired": "#8c4a00",
-    "escalated": "#E69F00",
-}
+_FATES = ("confirmed", "refuted", "open", "expired", "escalated")  # as they are stacked
 _NAMES = {"refuted": "cleared as a false alarm", "open": "still open"}
 _QUANTILES = (0.5, 0.9, 0.95)
 
@@ -60,12 +33,9 @@ def draw_all(shifts: Shifts) -> list[Drawn]:
     return [figure for figure in drawn if figure is not None]
 
 
-def look(policy: str, policies: tuple[str, ...]) -> tuple[str, str]:
-    """Colour and mark of a policy, the same in every report."""
-    if policy in LOOKS:
-        return LOOKS[policy]
-    strangers = [p for p in policies if p not in LOOKS]
-    return _OTHERS[strangers.index(policy) % len(_OTHERS)]
+def _looks(shifts: Shifts) -> dict[Level, Look]:
+    """Of each policy, the same in every figure."""
+    return looks(Factor("dispatch.policy", shifts.policies))
 
 
 # --- the trade -----------------------------------------------------------------------------
@@ -108,10 +78,11 @@ def _scatter(shifts: Shifts, column: str, label: str) -> Figure:
     """Response over another measure, both better where smaller."""
     across, response = shifts.means(column), shifts.means("response_mean_s")
     figure, (axes,) = panels(1, len(shifts.stops), 4.0)
+    look = _looks(shifts)
     halves = [_half_widths(shifts, c) for c in (column, "response_mean_s")]
     for stop, ax in enumerate(axes):
         for number, policy in enumerate(shifts.policies):
-            colour, mark = look(policy, shifts.policies)
+            colour, mark = look[policy]
             ax.errorbar(
                 across[number, stop],
                 response[number, stop],
@@ -204,10 +175,7 @@ def fates_in_time(shifts: Shifts) -> Drawn | None:
         row[0].set_ylabel(f"{capital(shifts.titles[stop])}\nshare of events")
     for ax in axes[-1]:
         ax.set_xlabel("Time since the report [s]")
-    from matplotlib.patches import Patch
-
-    handles = [Patch(color=colour, label=_NAMES.get(f, f)) for f, colour in _FATES.items()]
-    figure.legend(handles=handles, loc="outside upper left", ncols=len(handles))
+    key(figure, [box(FATES[fate]) for fate in _FATES], [_NAMES.get(f, f) for f in _FATES])
     caption = (
         "Cumulative incidence of each outcome (Aalen-Johansen), stacked: at every moment the "
         "shares add up to one, and no outcome is taken for mere lack of patience. All events of "
@@ -232,9 +200,10 @@ def _shares(curve: Any, times: Any) -> dict[str, Any]:
 
 def _stack(ax: Axes, shares: dict[str, Any], times: Any) -> None:
     bottom = np.zeros_like(times)
-    for fate, colour in _FATES.items():
+    for fate in _FATES:
+        colour, hatch = FATES[fate]
         top = bottom + shares[fate]
-        ax.fill_between(times, bottom, top, color=colour, lw=0)
+        ax.fill_between(times, bottom, top, facecolor=colour, hatch=hatch, edgecolor=PAPER, lw=0)
         bottom = top
 
 
@@ -245,7 +214,7 @@ def way(shifts: Shifts) -> Drawn | None:
     """How far of the way from the floor to the best possible each policy gets."""
     if shifts.target is None or not shifts.travellers:
         return None
-    names, numbers = shifts.travellers, Numbers()
+    names, numbers, look = shifts.travellers, Numbers(), _looks(shifts)
     figure, (axes,) = panels(1, len(shifts.stops), _height(len(names)), sharey=True)
     for stop, ax in enumerate(axes):
         found = shifts.progress(stop)
@@ -256,7 +225,7 @@ def way(shifts: Shifts) -> Drawn | None:
         }
         numbers.add({"at": shifts.titles[stop]}, told | {"dispatch.policy": names})
         for row, policy in enumerate(names):
-            colour, mark = look(policy, shifts.policies)
+            colour, mark = look[policy]
             ax.hlines(row, 100 * found.low[row], 100 * found.high[row], color=colour, lw=1.6)
             ax.plot(100 * found.mean[row], row, marker=mark, color=colour, ms=7)
         ax.axvline(100, color=INK, lw=0.8)
@@ -295,12 +264,12 @@ def percentiles(shifts: Shifts) -> Drawn | None:
     """Half, nine tenths and 95 % of all events had somebody on scene by ..."""
     if not shifts.events:
         return None
-    names, numbers = shifts.policies, Numbers()
+    names, numbers, look = shifts.policies, Numbers(), _looks(shifts)
     figure, (axes,) = panels(1, len(shifts.stops), _height(len(names)), sharey=True)
     missing = False
     for stop, ax in enumerate(axes):
         for row, policy in enumerate(names):
-            colour = look(policy, names)[0]
+            colour = look[policy].colour
             value, low, high = pooled(shifts.events_of(policy, stop), _QUANTILES, shifts.follow)
             where = {"at": shifts.titles[stop], "dispatch.policy": policy}
             told: dict[str, Any] = {
@@ -316,7 +285,7 @@ def percentiles(shifts: Shifts) -> Drawn | None:
                 inside[0], np.isfinite(value), (True, False, False), strict=True
             ):
                 mark = "o" if reached else ">"
-                ax.plot(x, row, mark, ms=6, mfc=colour if fill else "white", mec=colour)
+                ax.plot(x, row, mark, ms=6, mfc=colour if fill else PAPER, mec=colour)
             missing |= not np.isfinite(high).all()
         _policy_axis(ax, names, capital(shifts.titles[stop]))
         ax.set_xlim(0, None)
@@ -343,7 +312,7 @@ def burden(shifts: Shifts) -> Drawn | None:
         "zone_ratio": "Worst zone's response\nover the best one's",
     }
     there = {c: text for c, text in columns.items() if shifts.view.part.has(c)}
-    names, numbers = shifts.policies, Numbers()
+    names, numbers, look = shifts.policies, Numbers(), _looks(shifts)
     figure, (axes,) = panels(1, len(there), _height(len(names)), sharey=True)
     for stop, title in enumerate(shifts.titles):
         told: dict[str, Any] = {column: shifts.means(column)[:, stop] for column in there}
@@ -358,9 +327,9 @@ def burden(shifts: Shifts) -> Drawn | None:
                     row,
                     "o",
                     ms=4 + 2 * stop,
-                    color=look(policy, names)[0],
+                    color=look[policy].colour,
                     alpha=float(shades[stop]),
-                    mec="white",
+                    mec=PAPER,
                 )
         _policy_axis(ax, names, text)
         if column.startswith("use"):
@@ -390,4 +359,4 @@ def _policy_axis(ax: Axes, names: tuple[str, ...], title: str) -> None:
 
 def _key(figure: Any, ax: Axes) -> None:
     handles, names = ax.get_legend_handles_labels()
-    figure.legend(handles, names, loc="outside upper left", ncols=min(5, len(names)))
+    key(figure, handles, names)

@@ -10,20 +10,17 @@ import numpy as np
 from dva_sim.experiments.cadence import Cadence
 from dva_sim.experiments.effects import Floats, View, nan_mean
 from dva_sim.experiments.figures.effect import CadenceOf, mark_boundary
+from dva_sim.experiments.figures.keys import Ends, legend, name_lines
 from dva_sim.experiments.figures.numbers import Numbers
+from dva_sim.experiments.figures.palette import INK, Look, looks
 from dva_sim.experiments.figures.style import (
-    INK,
     Drawn,
-    Ends,
     axis_label,
-    colours,
     dodge,
     finish,
+    has_lines,
     label_panels,
-    legend,
     log_axis,
-    marks,
-    name_lines,
     panel_grid,
     wrapped,
 )
@@ -41,19 +38,19 @@ def command_age(view: View) -> Drawn | None:
     if not all(view.part.has(column) for column in columns):
         return None
     figure, axes = panel_grid(view, 3.0)
-    paint = colours(view.line)
+    look = looks(view.line)
     grids, numbers = [view.part.grid(column) for column in columns], Numbers()
     for ax, panel in zip(axes, view.shown, strict=True):
         for level, offset in dodge(view.lines):
             ages = [_cell_means(view.curve(grid, panel, level)) for grid in grids]
-            _ranges(ax, [stop + offset for stop in range(len(view.stops))], ages, paint[level])
+            _ranges(ax, [stop + offset for stop in range(len(view.stops))], ages, look[level])
             told = dict(zip(columns, ages, strict=True))
             numbers.add(view.setting(panel, level), view.along_x() | told)
     log_axis(axes[0])
     label_panels(axes, view, axis_label("age_s", wrapped("Command age at application", 22)))
-    legend(figure, view.line, paint)
+    legend(figure, view.line)
     caption = (
-        "From the moment a command is issued to its effect at the motors: dot, the median; thick, "
+        "From the moment a command is issued to its effect at the motors: mark, the median; thick, "
         "the middle half; thin, 5 to 95 %. Quantiles within runs, averaged over runs; "
         "logarithmic axis."
     )
@@ -65,15 +62,17 @@ def command_rate(view: View, cadence_of: CadenceOf) -> Drawn | None:
     if not view.part.has("command_rate_hz"):
         return None
     figure, axes = panel_grid(view, 3.0)
-    paint, mark, every, numbers = colours(view.line), marks(view.line), [], Numbers()
+    look, every, numbers = looks(view.line), [], Numbers()
     grid = view.part.grid("command_rate_hz")
     for ax, panel in zip(axes, view.shown, strict=True):
         ends: Ends = {}
-        for i, level in enumerate(view.lines):
+        for i, (level, place) in enumerate(dodge(view.lines)):
             means = _cell_means(view.curve(grid, panel, level))
-            size = 4 + 2.5 * (len(view.lines) - 1 - i)  # rings, where lines lie on each other
-            ax.plot(means, color=paint[level], lw=1, alpha=0.5)
-            ax.plot(means, mark[level], ms=size, color=paint[level])
+            if has_lines(view):  # larger marks below, where lines lie on each other
+                _line(ax, means, look[level], 4 + 2.5 * (len(view.lines) - 1 - i))
+            else:
+                x = np.arange(len(means)) + place
+                ax.plot(x, means, look[level].mark, ms=5, color=look[level].colour)
             ends[level] = float(means[-1])
             told = view.along_x() | {"command_rate_hz": means}
             numbers.add(view.setting(panel, level), told)
@@ -82,7 +81,10 @@ def command_rate(view: View, cadence_of: CadenceOf) -> Drawn | None:
     tops = [ax.dataLim.y1 for ax in axes if np.isfinite(ax.dataLim.y1)]  # a panel may be empty
     axes[0].set_ylim(0, _ROOM * max(tops, default=1.0))
     label_panels(axes, view, axis_label("command_rate_hz"))
-    name_lines(axes, every, view.line, paint)
+    if has_lines(view):
+        name_lines(axes, every, view.line)
+    else:
+        legend(figure, view.line)
     caption = "Mean over runs. Commands that came too old or were overtaken are not counted."
     if any(cadence_of(panel) for panel in view.shown):
         caption += (
@@ -98,11 +100,16 @@ def _cell_means(values: Floats) -> Floats:
     return nan_mean(values.reshape(len(values), -1), axis=1)
 
 
-def _ranges(ax: Axes, x: Sequence[float], ages: list[Floats], colour: str) -> None:
+def _line(ax: Axes, means: Floats, look: Look, size: float) -> None:
+    ax.plot(means, color=look.colour, lw=1, alpha=0.5)
+    ax.plot(means, look.mark, ms=size, color=look.colour)
+
+
+def _ranges(ax: Axes, x: Sequence[float], ages: list[Floats], look: Look) -> None:
     low, quarter, middle, three_quarters, high = ages
-    ax.vlines(x, low, high, color=colour, lw=1)
-    ax.vlines(x, quarter, three_quarters, color=colour, lw=4, alpha=0.55)
-    ax.plot(x, middle, "o", color=colour, ms=4)
+    ax.vlines(x, low, high, color=look.colour, lw=1)
+    ax.vlines(x, quarter, three_quarters, color=look.colour, lw=4, alpha=0.55)
+    ax.plot(x, middle, look.mark, color=look.colour, ms=4.5)
 
 
 def _closed_form(ax: Axes, view: View, cadence: Cadence | None) -> None:

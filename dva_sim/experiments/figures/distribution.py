@@ -8,18 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dva_sim.experiments.effects import Floats, View, present
+from dva_sim.experiments.figures.keys import legend
 from dva_sim.experiments.figures.numbers import Numbers
+from dva_sim.experiments.figures.palette import INK, PAPER, SOFT, Look, looks
 from dva_sim.experiments.figures.style import (
-    INK,
-    SOFT,
     Drawn,
     axis_label,
-    colours,
     dodge,
     finish,
     hatch_stops,
     hatch_words,
-    legend,
     log_axis,
     panel_title,
     panels,
@@ -39,14 +37,14 @@ def distributions(view: View) -> Drawn:
     """Every run as a dot, with median and middle half."""
     shown = view.shown
     figure, axes = panels(len(shown), 1, 2.7 if len(shown) < 3 else 2.2, sharex=True, sharey=True)
-    paint = colours(view.line)
+    look = looks(view.line)
     raw, confirmed, numbers = view.part.grid(view.measure), _confirmed(view), Numbers()
     for (ax,), panel in zip(axes, shown, strict=True):
         for level, offset in dodge(view.lines):
             values = view.curve(raw, panel, level).reshape(len(view.stops), -1)
             ok = view.curve(confirmed, panel, level).reshape(values.shape) != 0
             width = min(0.3, 0.62 / len(view.lines))
-            _dots(ax, offset, width, values, ok, paint[level])
+            _dots(ax, offset, width, values, ok, look[level])
             _boxes(ax, offset, width, values)
             for stop, told in enumerate(values):
                 where = view.setting(panel, level) | view.at_stop(stop)
@@ -59,9 +57,9 @@ def distributions(view: View) -> Drawn:
             ax.set_xlabel("")
         ax.set_ylabel(axis_label(view.measure, wrapped(measure_name(view.measure), 24)))
     _spread(axes[0][0], present(raw))
-    legend(figure, view.line, paint)
+    legend(figure, view.line)
     caption = (
-        "Each dot is one run, none left out; the bar is the median, the box the middle half. "
+        "Each mark is one run, none left out; the bar is the median, the box the middle half. "
         "At each place the columns stand in the order of the key."
         f"{_hollow_words(confirmed)}{hatch_words(view)}"
     )
@@ -84,11 +82,11 @@ def _columns(view: View, values: Floats, ok: NDArray[np.bool_]) -> dict[str, Any
 def _hollow_words(confirmed: Floats) -> str:
     if not (confirmed == 0).any():
         return ""
-    return " Hollow dots were not confirmed and count with all the time they were given."
+    return " Hollow ones were not confirmed and count with all the time they were given."
 
 
 def _dots(
-    ax: Axes, offset: float, width: float, values: Floats, ok: NDArray[np.bool_], colour: str
+    ax: Axes, offset: float, width: float, values: Floats, ok: NDArray[np.bool_], look: Look
 ) -> None:
     """Every run `(stops, runs)` as a dot, side by side with the others of its stop."""
     stops, runs = values.shape
@@ -98,11 +96,12 @@ def _dots(
     dots: dict[str, Any] = {
         "s": 5 if runs > _CROWD else 14,
         "lw": 0.5,
+        "marker": look.mark,
         "rasterized": True,
         "zorder": 2,
     }
-    ax.scatter(x[good], values[good], color=colour, alpha=0.35, **dots)
-    ax.scatter(x[missed], values[missed], facecolor="white", edgecolor=colour, **dots)
+    ax.scatter(x[good], values[good], color=look.colour, alpha=0.35, **dots)
+    ax.scatter(x[missed], values[missed], facecolor=PAPER, edgecolor=look.colour, **dots)
 
 
 def _boxes(ax: Axes, offset: float, width: float, values: Floats) -> None:

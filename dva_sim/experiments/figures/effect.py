@@ -17,21 +17,18 @@ from dva_sim.experiments.effects import (
     person_means,
     present,
 )
+from dva_sim.experiments.figures.keys import Ends, legend, name_lines
 from dva_sim.experiments.figures.numbers import Numbers, with_unit
+from dva_sim.experiments.figures.palette import FAINT, INK, PAPER, SOFT, Look, looks
 from dva_sim.experiments.figures.style import (
-    FAINT,
-    INK,
-    SOFT,
     Drawn,
-    Ends,
     axis_label,
-    colours,
+    dodge,
     finish,
+    has_lines,
     hatch_stops,
     hatch_words,
     label_panels,
-    marks,
-    name_lines,
     panel_grid,
     place_of,
     wrapped,
@@ -43,6 +40,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+_WIDER = 1.2  # of a logarithmic axis, lest marks lie on its edges
+_STEP = 0.12  # between the bars of two lines, in stops
 _ROOM = 0.15  # share of what persons span that is left free beyond them, where bands are cut
 CadenceOf = Callable[[Setting], Cadence | None]
 
@@ -67,12 +66,12 @@ def differences(view: View, cadence_of: CadenceOf) -> Drawn | None:
         ax.axhline(0, color=INK, lw=0.8, zorder=1)
         mark_boundary(ax, view.over, cadence_of(panel), text=True)
     zoomed = _zoom_on_small(axes, view.smallest_effect)
-    name_lines(axes, ends, view.line, colours(view.line))
+    _name(view, others, figure, axes, ends)
     title = f"What the other levels cost against {name}: difference in {_what(view)}"
     caption = (
         f"Above zero, {name} has the lower value. Means of differences paired by person and trial; "
-        "shaded, the 95 % band that covers all levels of a line at once; bars, the 95 % interval "
-        f"of each level alone.{cut}{zoomed}{_boundary_words(view, cadence_of)}{hatch_words(view)}"
+        f"{_intervals_words(view)}.{cut}{zoomed}{_boundary_words(view, cadence_of)}"
+        f"{hatch_words(view)}"
     )
     return finish(figure, "differences", title, caption, numbers)
 
@@ -88,10 +87,10 @@ def measure_levels(view: View) -> Drawn:
     label = axis_label(view.measure, wrapped(what))
     limits = (-view.widest, view.widest) if _in_excess(view) else view.possible
     figure, axes, ends, cut, numbers = _curves(view, view.lines, curve, label, limits)
-    name_lines(axes, ends, view.line, colours(view.line))
+    _name(view, view.lines, figure, axes, ends)
     excess = "Zero is the reference run of the same person and trial. " if _in_excess(view) else ""
     caption = (
-        f"Mean over persons; shaded, its simultaneous 95 % band. {excess}Bands of two lines may "
+        f"Mean over persons; {_intervals_words(view)}. {excess}Intervals of two levels may "
         "overlap although their paired difference is clear: persons differ more from each other "
         f"than from themselves.{cut}{hatch_words(view)}"
     )
@@ -143,16 +142,15 @@ def _curves(
         numbers drawn.
     """
     figure, axes = panel_grid(view, 3.4)
-    paint, mark, every, seen = colours(view.line), marks(view.line), [], [np.array([home])]
-    numbers = Numbers()
+    look, every, seen, numbers = looks(view.line), [], [np.array([home])], Numbers()
+    draw = _band if has_lines(view) else _points
     for ax, panel in zip(axes, view.shown, strict=True):
         ends: Ends = {}
-        for i, level in enumerate(lines):
-            shift = 0.12 * (i - (len(lines) - 1) / 2)  # bars of two lines stand side by side
+        for level, shift in _side_by_side(view, lines):
             matrix = curve(panel, level)
             bands = band(matrix)
             seen.append(matrix.ravel())
-            ends[level] = _band(ax, bands, paint[level], mark[level], shift, limits)
+            ends[level] = draw(ax, bands, look[level], shift, limits)
             numbers.add(view.setting(panel, level), view.along_x() | _columns(view.measure, bands))
         hatch_stops(ax, view.stops_outside(panel))
         every.append(ends)
@@ -198,6 +196,7 @@ def _zoom_on_small(axes: list[Axes], smallest: float | None) -> str:
     bottom, top = axes[0].get_ylim()
     if max(-bottom, top) < 10 * smallest:
         return words
+    bottom, top = (_WIDER * end if abs(end) > smallest else end for end in (bottom, top))
     digits = (1, 2, 5) if max(-bottom, top) < 100 * smallest else (1,)
     steps = [k * 10.0**n for n in range(-3, 7) for k in digits if smallest <= k * 10.0**n]
     axes[0].set_yscale("symlog", linthresh=2 * smallest)
@@ -209,17 +208,54 @@ def _zoom_on_small(axes: list[Axes], smallest: float | None) -> str:
     return f"{words} The axis is linear near zero and logarithmic beyond."
 
 
-def _band(
-    ax: Axes, bands: Band, colour: str, mark: str, shift: float, limits: tuple[float, float]
-) -> float:
-    """One line with its band and bars; gives the height of its end."""
+def _side_by_side(view: View, lines: tuple[Level, ...]) -> list[tuple[Level, float]]:
+    """Each level's place beside its stop; close together where a line goes on to the next."""
+    if not has_lines(view):
+        return dodge(lines)
+    return [(level, _STEP * (i - (len(lines) - 1) / 2)) for i, level in enumerate(lines)]
+
+
+def _intervals_words(view: View) -> str:
+    if has_lines(view):
+        return (
+            "shaded, the 95 % band that covers all levels of a line at once; bars, the 95 % "
+            "interval of each level alone"
+        )
+    return (
+        "thin bars, the 95 % intervals that hold for all places of a mark at once; thick bars, "
+        "the 95 % interval of each alone"
+    )
+
+
+def _name(
+    view: View, lines: tuple[Level, ...], figure: Figure, axes: list[Axes], ends: list[Ends]
+) -> None:
+    """Lines are named at their ends, marks in a key."""
+    if has_lines(view):
+        name_lines(axes, ends, view.line)
+    elif view.line is not None:
+        legend(figure, view.line, lines)
+
+
+def _points(ax: Axes, bands: Band, look: Look, shift: float, limits: tuple[float, float]) -> float:
+    """A mark with two bars at each stop: the wide interval thin, the narrow one thick."""
     x = np.arange(len(bands.mean)) + shift
+    ax.vlines(x, *np.clip([bands.low, bands.high], *limits), color=look.colour, lw=1)
+    narrow = np.clip([bands.pointwise_low, bands.pointwise_high], *limits)
+    ax.vlines(x, *narrow, color=look.colour, lw=2.6)
+    ax.plot(x, bands.mean, look.mark, color=look.colour, ms=6, mec=PAPER, mew=0.6, zorder=3)
+    return math.nan  # no line, so no end
+
+
+def _band(ax: Axes, bands: Band, look: Look, shift: float, limits: tuple[float, float]) -> float:
+    """One line with its band and bars; gives the height of its end."""
+    x, colour = np.arange(len(bands.mean)) + shift, look.colour
     low, high = np.clip([bands.low, bands.high], *limits)
     ax.fill_between(x, low, high, color=colour, alpha=0.16, lw=0)
     ax.vlines(
         x, *np.clip([bands.pointwise_low, bands.pointwise_high], *limits), color=colour, lw=1.2
     )
-    ax.plot(x, bands.mean, "-", marker=mark, color=colour, ms=4.5)
+    ax.plot(x, bands.mean, "-", marker=look.mark, color=colour, ms=4.5)
     seen = present(bands.mean)
     return float(seen[-1]) if len(seen) else float("nan")
 

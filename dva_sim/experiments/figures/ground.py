@@ -12,15 +12,8 @@ from dva_sim.errors import DvaSimError
 from dva_sim.experiments.asking import POINT
 from dva_sim.experiments.effects import Floats, Table, View, as_floats, codes_of
 from dva_sim.experiments.figures.numbers import Numbers
-from dva_sim.experiments.figures.style import (
-    INK,
-    SOFT,
-    WIDTH,
-    Drawn,
-    colours,
-    finish,
-    panels,
-)
+from dva_sim.experiments.figures.palette import INK, PAPER, SOFT, colours
+from dva_sim.experiments.figures.style import WIDTH, Drawn, finish, panels, wrapped
 from dva_sim.experiments.labels import Level, factor_name, level_name, setting
 
 if TYPE_CHECKING:
@@ -28,6 +21,8 @@ if TYPE_CHECKING:
 
     from dva_sim.worlds.site import Site
 
+_ABREAST, _MOST = 4, 7  # panels, if they are broad or high
+_TITLE = 76  # characters of titles that stand abreast
 _MARGIN = 2.5  # [m] around everything driven
 _BAR = 5.0  # [m]
 
@@ -40,11 +35,15 @@ def trajectories(view: View, tracks: Table, scenario: Mapping[str, Any]) -> Draw
     stops = list(dict.fromkeys((view.stops[0], view.stops[-1])))
     site, aside = site_of(scenario), ways.reference()
     low, high = frame_of(ways.all_points)
-    height = row_height(high - low, columns=len(view.lines))
-    figure, axes = panels(len(stops), len(view.lines), height, sharex=True, sharey=True)
+    size, count = high - low, len(view.lines)
+    abreast = min(count, _MOST if size[1] > size[0] else _ABREAST)
+    deep = -(-count // abreast)
+    height = row_height(size, columns=abreast)
+    figure, axes = panels(deep * len(stops), abreast, height, sharex=True, sharey=True)
     paint, numbers = colours(view.line), Numbers()
-    for row, stop in zip(axes, stops, strict=True):
-        for ax, level in zip(row, view.lines, strict=True):
+    for index, stop in enumerate(stops):
+        block = [ax for row in axes[index * deep : (index + 1) * deep] for ax in row]
+        for ax, level in zip(block, view.lines, strict=False):
             draw_ground(ax, site)
             for way in aside:
                 ax.plot(*way.T, color=SOFT, lw=1.3, ls=(0, (3, 2)), zorder=8)
@@ -52,8 +51,10 @@ def trajectories(view: View, tracks: Table, scenario: Mapping[str, Any]) -> Draw
                 _way(ax, way, paint[level])
                 where = view.setting(view.panels[0], level) | _at(view, stop)
                 numbers.add(where, {"x_m": way[:, 0], "y_m": way[:, 1]})
-            ax.set_title(_heading(view, level, stop), color=paint[level] if level else INK)
+            ax.set_title(wrapped(_heading(view, level, stop), _TITLE // abreast), fontsize=8.5)
             ax.label_outer()
+        for ax in block[count:]:
+            ax.set_visible(False)
     axes[0][0].set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     scale_bar(axes[-1][0], low)
     caption = (
@@ -147,14 +148,12 @@ def draw_ground(ax: Axes, site: Site | None) -> None:
         return
     from dva_sim.worlds.view import draw_site
 
-    draw_site(ax, site, labels=False)
-    for text in ax.texts:
-        text.set_clip_on(True)  # what lies outside the frame must not claim room
+    draw_site(ax, site, labels=False, scale=False)
 
 
 def _way(ax: Axes, way: Floats, colour: str) -> None:
     ax.plot(*way.T, color=colour, lw=1.8, zorder=9)
-    ax.plot(*way[0], "o", ms=5, mfc="white", mec=colour, mew=1.4, zorder=10)
+    ax.plot(*way[0], "o", ms=5, mfc=PAPER, mec=colour, mew=1.4, zorder=10)
     ax.plot(*way[-1], "o", ms=5, color=colour, zorder=10)
 
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from dva_sim.experiments.effects import MOST_PANELS, Factor, Floats, Setting, View
 from dva_sim.experiments.figures.numbers import Numbers, with_unit
+from dva_sim.experiments.figures.palette import DIVERGING, INK, PAPER
 from dva_sim.experiments.figures.style import (
-    INK,
     Drawn,
     axis_label,
     finish,
@@ -127,10 +127,10 @@ def _colours(ax: Axes, mean: Floats, reach: float) -> QuadMesh:
     return ax.pcolormesh(
         *np.meshgrid(np.arange(mean.shape[1] + 1) - 0.5, np.arange(mean.shape[0] + 1) - 0.5),
         np.ma.masked_invalid(mean),
-        cmap="PuOr_r",
+        cmap=DIVERGING,
         vmin=-reach,
         vmax=reach,
-        edgecolor="white",
+        edgecolor=PAPER,
         linewidth=0.5,
     )
 
@@ -151,7 +151,7 @@ def _write(ax: Axes, field: Field, image: QuadMesh, reach: float) -> None:
             va="center",
             fontsize=8,
             fontweight="bold" if told else "normal",
-            color="white" if abs(mean) > _DARK * reach else INK,
+            color=PAPER if abs(mean) > _DARK * reach else INK,
             bbox={"fc": paint, "ec": "none", "pad": 0.6},  # no line through it
             zorder=5,
         )

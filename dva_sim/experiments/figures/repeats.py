@@ -7,13 +7,10 @@ from typing import TYPE_CHECKING
 from dva_sim.experiments.asking import STRATEGY
 from dva_sim.experiments.effects import Factor, View
 from dva_sim.experiments.figures.numbers import Numbers, with_unit
+from dva_sim.experiments.figures.palette import FAINT, INK, ONE, PAPER, SOFT, colours
 from dva_sim.experiments.figures.style import (
-    FAINT,
-    INK,
-    SOFT,
     Drawn,
     axis_label,
-    colours,
     finish,
     panels,
 )
@@ -71,8 +68,8 @@ def _numbers(view: View, robustness: Robustness) -> Numbers:
 def _own(ax: Axes, stop: Stop) -> None:
     if stop.smallest is not None:
         ax.axvspan(-stop.smallest, stop.smallest, color=FAINT, alpha=0.5, lw=0, zorder=0)
-    ax.axvspan(stop.low, stop.high, color="#0072B2", alpha=0.15, lw=0, zorder=0)
-    ax.axvline(stop.found, color="#0072B2", lw=1, zorder=1)
+    ax.axvspan(stop.low, stop.high, color=ONE.colour, alpha=0.15, lw=0, zorder=0)
+    ax.axvline(stop.found, color=ONE.colour, lw=1, zorder=1)
     ax.axvline(0, color=INK, lw=0.8, zorder=1)
 
 
@@ -101,7 +98,7 @@ def _row(ax: Axes, y: float, repeat: Repeat, colour: str) -> None:
         y,
         "D" if usual else "o",
         ms=5 if usual else 3.5,
-        color="white" if repeat.is_beyond else colour,
+        color=PAPER if repeat.is_beyond else colour,
         mec=edge,
         mew=1.0 if repeat.is_beyond else 0.5,
     )

@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from dva_sim.experiments.asking import POINT
 from dva_sim.experiments.effects import Floats, Part, Setting, View, nan_mean
+from dva_sim.experiments.figures.keys import legend
 from dva_sim.experiments.figures.numbers import Numbers, with_unit
+from dva_sim.experiments.figures.palette import INK, ONE, PAPER, SOFT, Look, looks
 from dva_sim.experiments.figures.style import (
-    INK,
-    SOFT,
     Drawn,
     axis_label,
-    colours,
     finish,
-    legend,
-    marks,
+    log_axis,
     panels,
     wrapped,
 )
@@ -69,7 +69,8 @@ def scatters(reading: Reading) -> list[Drawn]:
     panel = view.panels[0] | ({view.over.name: view.stops[-1]} if view.over else {})
     where = nan_mean(np.stack([_per_point(part, name, {}) for name in names]), axis=-1)
     clouds = list(_clouds(view, part, panel))
-    drawn = [_against_each(view, clouds, names, where, panel)]
+    ranges = (reading.study.get("design") or {}).get("ranges") or {}
+    drawn = [_against_each(view, clouds, names, where, panel, ranges)]
     if (reading.study.get("design") or {}).get("saltelli"):
         drawn.append(_indices(view, clouds, names, where, panel))
     return drawn
@@ -100,7 +101,12 @@ def _clouds(view: View, part: Part, panel: Setting) -> list[Cloud]:
 
 
 def _against_each(
-    view: View, clouds: list[Cloud], names: list[str], where: Floats, panel: Setting
+    view: View,
+    clouds: list[Cloud],
+    names: list[str],
+    where: Floats,
+    panel: Setting,
+    ranges: Mapping[str, Any],
 ) -> Drawn:
     """A panel for each factor: a dot for each point, the mean over all its runs."""
     columns = min(_ABREAST, len(names))
@@ -111,8 +117,10 @@ def _against_each(
     means = [nan_mean(c.values.reshape(len(c.values), -1), axis=1) for c in clouds]
     for ax, name, x in zip(axes, names, where, strict=False):
         for cloud, y in zip(clouds, means, strict=True):
-            _dots(ax, x, y, *_look(view, cloud))
-        ax.set_xlabel(capital(head_of(name)))
+            _dots(ax, x, y, _look(view, cloud))
+        ax.set_xlabel(wrapped(capital(head_of(name)), 30))
+        if (ranges.get(name) or {}).get("scale") == "log":
+            log_axis(ax, "x")
         if len(clouds) == 1 and clouds[0].level is None and view.contrast is not None:
             ax.axhline(0, color=INK, lw=0.8, zorder=1)
     for ax in axes[len(names) :]:
@@ -121,7 +129,7 @@ def _against_each(
     for row in grid:
         row[0].set_ylabel(axis_label(view.measure, wrapped(label, 26)))
     if view.contrast is None:
-        legend(figure, view.line, colours(view.line))
+        legend(figure, view.line)
     for cloud, y in zip(clouds, means, strict=True):
         told = dict(zip(names, where, strict=True)) | {with_unit("mean", view.measure): y}
         numbers.add(panel | {"of": cloud.name}, {POINT: range(len(y))} | told)
@@ -130,9 +138,10 @@ def _against_each(
 
 
 _SCATTER = (
-    "Each dot is a point of the ranges, the mean over all persons and trials there; all other "
-    "factors vary too, which is most of the scatter. Line: means of eighths of the points, in "
-    "order of the factor. A slope is seen where the factor matters on average; what it does only "
+    "Each small mark is a point of the ranges, the mean over all persons and trials there; all "
+    "other factors vary too, which is most of the scatter. Line: means of equally many points in "
+    "order of the factor; shaded, the 95 % interval of each by the scatter of its points, for "
+    "these persons. A slope is seen where the factor matters on average; what it does only "
     "together with another is not."
 )
 
@@ -147,24 +156,40 @@ def _place(panel: Setting) -> str:
     return f" ({setting(panel)})" if panel else ""
 
 
-def _look(view: View, cloud: Cloud) -> tuple[str, str]:
-    if cloud.level is None:
-        return "#0072B2", "o"
-    return colours(view.line)[cloud.level], marks(view.line)[cloud.level]
+def _look(view: View, cloud: Cloud) -> Look:
+    return ONE if cloud.level is None else looks(view.line)[cloud.level]
 
 
-def _dots(ax: Axes, x: Floats, y: Floats, colour: str, mark: str) -> None:
+def _dots(ax: Axes, x: Floats, y: Floats, look: Look) -> None:
     """Points, and the means of as many equal parts of them as there are enough for."""
     there = np.isfinite(x) & np.isfinite(y)
     x, y = x[there], y[there]
-    small = 14 if len(x) < 200 else 5
-    ax.scatter(x, y, s=small, marker=mark, color=colour, alpha=0.45, lw=0, rasterized=len(x) > 500)
-    bins = min(_BINS, len(x) // _FEWEST_IN_BIN)
-    if bins < 2:
-        return
-    order = np.array_split(np.argsort(x, kind="stable"), bins)
-    middle = [float(x[part].mean()) for part in order], [float(y[part].mean()) for part in order]
-    ax.plot(*middle, color=colour, lw=1.4, zorder=1)
+    few: dict[str, Any] = {"s": 12 if len(x) < 200 else 5, "rasterized": len(x) > 500}
+    ax.scatter(x, y, marker=look.mark, color=look.colour, alpha=0.35, lw=0, zorder=2, **few)
+    middle, mean, half = trend(x, y)
+    ax.fill_between(middle, mean - half, mean + half, color=look.colour, alpha=0.16, lw=0)
+    line: dict[str, Any] = {"color": look.colour, "marker": look.mark, "mec": PAPER, "mew": 0.6}
+    ax.plot(middle, mean, "-", ms=5, lw=1.4, zorder=3, **line)
+
+
+def trend(x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
+    """Means of equally many points each, in order of x, with half their 95 % intervals.
+
+    The points of a part differ by all other factors, as drawn: their scatter is what the interval
+    is made of. Three empty arrays where there are too few.
+
+    Returns:
+        The middle of each part along x, the mean of y there, half the interval's width; `(parts,)`.
+    """
+    from scipy.stats import t
+
+    parts = min(_BINS, len(x) // _FEWEST_IN_BIN)
+    if parts < 2:
+        return np.array([]), np.array([]), np.array([])
+    order = np.array_split(np.argsort(x, kind="stable"), parts)
+    spread = [np.std(y[i], ddof=1) / math.sqrt(len(i)) * t.ppf(0.975, len(i) - 1) for i in order]
+    middle = [np.median(x[part]) for part in order]
+    return np.array(middle), np.array([y[part].mean() for part in order]), np.array(spread)
 
 
 # --- Sobol's indices -------------------------------------------------------------------------

@@ -15,24 +15,22 @@ from dva_sim.experiments.effects import (
     as_floats,
     codes_of,
 )
+from dva_sim.experiments.figures.keys import box, legend
 from dva_sim.experiments.figures.numbers import Numbers
+from dva_sim.experiments.figures.palette import FATES, Look, looks
+from dva_sim.experiments.figures.stacks import Stacks, stack
 from dva_sim.experiments.figures.style import (
     Drawn,
-    bars,
-    colours,
     dodge,
     finish,
-    legend,
     outer_labels,
     panels,
     stops_axis,
-    wrapped,
 )
-from dva_sim.experiments.labels import Level, level_name
+from dva_sim.experiments.labels import Level
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 _TIMES = {
     "Guard arrives": ("guard", "response_s"),
@@ -40,25 +38,18 @@ _TIMES = {
     "Guard confirms": ("guard", "confirmation_s"),
     "Robot confirms": ("robot", "confirmation_s"),
 }
-# What may become of an event, the best first; blue is confirmed.
-_FATES = {
-    "confirmed by a robot": "#0b559f",
-    "confirmed by a guard": "#75b4d8",
-    "refuted": "#CC79A7",
-    "escalated": "#E69F00",
-    "expired": "#8c4a00",
-    "undetected": "#3b3b3b",
-    "open at the end": "#a8a8a8",
-    "other": "#e3e3e3",
-}
+_NAMES = {"open": "open at the end"}
+_FATES = (  # as they are stacked
+    *("confirmed by a robot", "confirmed by a guard", "refuted", "escalated", "expired"),
+    *("undetected", "open", "other"),
+)
 
 
 def fates(outcome: NDArray[Any], responder_kind: NDArray[Any]) -> NDArray[np.str_]:
     """What became of each event, in words of `_FATES`; outcomes it does not know are `other`."""
     words = np.char.add("confirmed by a ", responder_kind.astype(str))
     words = np.where(np.isin(outcome, ("confirmed", "contained")), words, outcome.astype(str))
-    words = np.where(words == "open", "open at the end", words)
-    return np.where(np.isin(words, list(_FATES)), words, "other")
+    return np.where(np.isin(words, _FATES), words, "other")
 
 
 class Events:
@@ -137,22 +128,22 @@ def responses(view: View, events: Events) -> Drawn | None:
     if not met:
         return None
     figure, axes = panels(len(shown), len(met), 2.4, sharex=True, sharey=True)
-    paint = colours(view.line)
+    look = looks(view.line)
     for row, panel in zip(axes, shown, strict=True):
         for ax, (title, (kind, column)) in zip(row, met.items(), strict=True):
             for level, offset in dodge(view.lines):
                 masks = [events.by(kind) & events.under(panel, level, v) for v in view.stops]
                 times = [events.times(column, mask) for mask in masks]
-                _quartiles(ax, offset, times, paint[level])
+                _quartiles(ax, offset, times, look[level])
                 where = view.setting(panel, level) | {"responder_kind": kind, "time": column}
                 numbers.add(where, view.along_x() | _quantiles(times))
             stops_axis(ax, view.over)
             ax.set_title(title if row is axes[0] else "")
     axes[0][0].set_ylim(bottom=0)
     outer_labels(axes, shown, "Since detection [s]")
-    legend(figure, view.line, paint)
+    legend(figure, view.line)
     caption = (
-        "Dot, the median; bar, the middle half. Only events that were reached or confirmed have "
+        "Mark, the median; bar, the middle half. Only events that were reached or confirmed have "
         f"such a time{_what_else_came(events)}."
     )
     return finish(figure, "story_times", "Response, by who responded", caption, numbers)
@@ -162,41 +153,39 @@ def outcomes(view: View, events: Events) -> Drawn | None:
     """What became of every event, as shares that add up to one; None if all met one fate."""
     if events.one_fate() is not None:
         return None
-    shown, numbers = view.shown, Numbers()
-    figure, axes = panels(len(shown), len(view.lines), 2.3, sharex=True, sharey=True)
-    for row, panel in zip(axes, shown, strict=True):
-        for ax, level in zip(row, view.lines, strict=True):
-            shares = [events.shares(events.under(panel, level, v)) for v in view.stops]
-            _stack(ax, shares)
-            told = {fate: [share[fate] for share in shares] for fate in _FATES}
-            numbers.add(view.setting(panel, level), view.along_x() | told)
-            stops_axis(ax, view.over)
-            if view.line and row is axes[0]:
-                ax.set_title(wrapped(level_name(view.line.name, level), 70 // len(view.lines)))
-    axes[0][0].yaxis.set_major_formatter(lambda y, _: f"{100 * y:.0f} %")
-    axes[0][0].set_ylim(0, 1)
-    outer_labels(axes, shown, "Share of events")
-    _key(figure, events)
+    met = events.shares(np.ones(len(events), dtype=bool))
+    parts = {_NAMES.get(fate, fate): box(FATES[fate]) for fate in _FATES if met[fate]}
+    stacks, numbers = Stacks(view, "Share of events", parts), Numbers()
+    for ax, panel, level in stacks.panels():
+        shares = [events.shares(events.under(panel, level, v)) for v in view.stops]
+        told = {fate: np.array([share[fate] for share in shares]) for fate in _FATES}
+        stack(ax, told, FATES)
+        numbers.add(view.setting(panel, level), view.along_x() | told)
+    stacks.close()
+    stacks.axes[0].set_xlim(0, 1)
+    stacks.axes[0].set_xticks([0, 0.5, 1])
+    stacks.axes[0].xaxis.set_major_formatter(lambda share, _: f"{100 * share:.0f} %")
     caption = f"All {len(events):,} events, none left out: each has one of these outcomes."
-    return finish(figure, "story_outcomes", "What became of the events", caption, numbers)
+    return finish(stacks.figure, "story_outcomes", "What became of the events", caption, numbers)
 
 
 def _what_else_came(events: Events) -> str:
     """What became of all events, or where that is to be seen."""
     if (fate := events.one_fate()) is not None:
-        return f"; all {len(events):,} were {fate}" if len(events) > 1 else f"; it was {fate}"
+        name = _NAMES.get(fate, fate)
+        return f"; all {len(events):,} were {name}" if len(events) > 1 else f"; it was {name}"
     return ", so this is to be read beside the outcomes: a fast median may hide misses"
 
 
-def _quartiles(ax: Axes, offset: float, times: list[Floats], colour: str) -> None:
+def _quartiles(ax: Axes, offset: float, times: list[Floats], look: Look) -> None:
     """Median and middle half of each stop; nothing where nobody came."""
     met = [stop for stop, values in enumerate(times) if len(values)]
     if not met:
         return
     low, middle, high = np.array([np.quantile(times[stop], [0.25, 0.5, 0.75]) for stop in met]).T
     x = np.array(met) + offset
-    ax.vlines(x, low, high, color=colour, lw=2.4, alpha=0.55)
-    ax.plot(x, middle, "o", color=colour, ms=3.2)
+    ax.vlines(x, low, high, color=look.colour, lw=2.4, alpha=0.55)
+    ax.plot(x, middle, look.mark, color=look.colour, ms=3.6)
 
 
 def _quantiles(times: list[Floats]) -> dict[str, Any]:
@@ -205,22 +194,3 @@ def _quantiles(times: list[Floats]) -> dict[str, Any]:
     names = ("p25_s", "p50_s", "p75_s")
     quartiles = {name: [float(q[i]) for q in found] for i, name in enumerate(names)}
     return {"events": [len(t) for t in times]} | quartiles
-
-
-def _stack(ax: Axes, shares: list[dict[str, float]]) -> None:
-    """A bar for each stop, its fates on top of each other."""
-    floor = np.zeros(len(shares))
-    for fate, colour in _FATES.items():
-        heights = np.nan_to_num([share[fate] for share in shares])
-        if heights.any():
-            bars(ax, floor, floor + heights, colour)
-        floor = floor + heights
-
-
-def _key(figure: Figure, events: Events) -> None:
-    """Name the fates that occur."""
-    from matplotlib.patches import Patch
-
-    met = events.shares(np.ones(len(events), dtype=bool))
-    handles = [Patch(color=colour, label=fate) for fate, colour in _FATES.items() if met[fate]]
-    figure.legend(handles=handles, loc="outside upper left", ncols=4, handlelength=1.2)

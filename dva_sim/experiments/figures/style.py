@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import io
 import textwrap
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from dva_sim.experiments.effects import Factor, Floats, Setting, View
+from dva_sim.experiments.effects import Factor, Setting, View
 from dva_sim.experiments.figures.numbers import Numbers
+from dva_sim.experiments.figures.palette import FAINT as FAINT
+from dva_sim.experiments.figures.palette import INK as INK
+from dva_sim.experiments.figures.palette import SOFT as SOFT
 from dva_sim.experiments.labels import (
     Level,
     brief,
@@ -29,23 +32,9 @@ if TYPE_CHECKING:
 
 _TITLE = 78  # characters of a title that the width holds
 _CROWDED = 45  # characters of ticks that fit beside each other in the width
-_HALF = 0.36  # of a bar's width, in stops
 _LEAST_TICK = 8  # characters of a tick's name in a line
 _ROW_LABEL = 28  # characters that the height of a row holds
 WIDTH = 8.4  # [in]; on screen and on paper it is stretched or shrunk to the column
-INK, SOFT, FAINT = "#222222", "#6b6b6b", "#d9d9d9"
-
-# Okabe & Ito: told apart under every common colour blindness, and by lightness in print.
-_PATTERNS = {
-    "req-rep": "#D55E00",
-    "pipelined": "#CC79A7",
-    "pub-sub": "#0072B2",
-    "latest-wins": "#009E73",
-}
-_OTHERS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#222222", "#8a8a8a")
-# Beside the colours, which a print in grey does not show.
-_MARKS = "osD^vP*X"
-_MARK_OF = {"req-rep": "s", "pipelined": "D", "pub-sub": "o", "latest-wins": "^"}
 
 _STYLE: dict[str, Any] = {
     "font.family": "DejaVu Sans",
@@ -74,9 +63,6 @@ _STYLE: dict[str, Any] = {
     "svg.hashsalt": "dva-sim",
     "svg.fonttype": "path",
 }
-
-
-Ends = dict[Level, float]  # where each line ends
 
 
 @dataclass(frozen=True)
@@ -146,24 +132,6 @@ def finish(
     return Drawn(name, title, caption, svg.getvalue(), png.getvalue(), table, figure)
 
 
-def colours(factor: Factor | None) -> Mapping[Level, str]:
-    """A colour for each level: a pattern's own, wherever it appears."""
-    if factor is None:
-        return {None: _OTHERS[0]}
-    if all(level in _PATTERNS for level in factor.levels):
-        return {level: _PATTERNS[str(level)] for level in factor.levels}
-    return {level: _OTHERS[i % len(_OTHERS)] for i, level in enumerate(factor.levels)}
-
-
-def marks(factor: Factor | None) -> Mapping[Level, str]:
-    """A mark for each level, as lasting as its colour."""
-    if factor is None:
-        return {None: _MARKS[0]}
-    if all(level in _MARK_OF for level in factor.levels):
-        return {level: _MARK_OF[str(level)] for level in factor.levels}
-    return {level: _MARKS[i % len(_MARKS)] for i, level in enumerate(factor.levels)}
-
-
 def axis_label(name: str, text: str | None = None) -> str:
     """A measure or factor with its unit in brackets."""
     unit = unit_of(name)
@@ -176,41 +144,44 @@ def wrapped(text: str, width: int = 38) -> str:
     return "\n".join(textwrap.wrap(text, width))
 
 
-def bars(axes: Axes, floor: Floats, top: Floats, colour: str, hatch: str = "") -> None:
-    """A bar at each stop, from `floor` to `top` `(stops,)`: one artist for all of them."""
-    from matplotlib.collections import PolyCollection
-
-    left = np.arange(len(floor)) - _HALF
-    right = left + 2 * _HALF
-    x, y = np.stack([left, right, right, left]), np.stack([floor, floor, top, top])
-    corners = np.stack([x, y], axis=-1).swapaxes(0, 1)
-    look: dict[str, Any] = {"facecolor": colour, "hatch": hatch, "edgecolor": "white", "lw": 0.5}
-    axes.add_collection(PolyCollection(list(corners), **look))
-    axes.update_datalim([(-_HALF, 0.0), (len(floor) - 1 + _HALF, float(np.max(top, initial=0.0)))])
-    axes.autoscale_view()
-
-
 def stops_axis(axes: Axes, over: Factor | None) -> None:
     """The factor along x, level beside level: 0 to 1 s are all readable."""
     if over is None:
         axes.set_xticks([])
         return
-    names, unit = _tick_names(over)
+    names, unit = tick_names(over)
     narrow = max(_LEAST_TICK, _TITLE // len(names))
     axes.set_xticks(range(len(names)), [wrapped(name, narrow) for name in names])
-    axes.set_xlabel(f"{capital(factor_name(over.name))}{f' [{unit}]' if unit else ''}")
+    axes.set_xlabel(_factor_label(over, unit))
     axes.set_xlim(-0.5, len(names) - 0.5)
+    if not over.is_numeric:
+        for stop in range(1, len(names)):  # words are apart: nothing leads from one to the next
+            axes.axvline(stop - 0.5, color=FAINT, lw=0.8, zorder=0)
 
 
-def level_axis(axes: Axes, factor: Factor) -> None:
-    """A factor along y, level above level."""
-    names, unit = _tick_names(factor)
-    axes.set_yticks(range(len(names)), names)
-    axes.set_ylabel(f"{capital(factor_name(factor.name))}{f' [{unit}]' if unit else ''}")
+def level_axis(axes: Axes, factor: Factor, width: int = _ROW_LABEL) -> None:
+    """A factor along y, level above level, names in lines of at most `width` characters."""
+    names, unit = tick_names(factor)
+    axes.set_yticks(range(len(names)), [wrapped(name, width) for name in names])
+    axes.set_ylabel(_factor_label(factor, unit))
     axes.set_ylim(-0.5, len(names) - 0.5)
 
 
-def _tick_names(over: Factor) -> tuple[list[str], str]:
+def _factor_label(factor: Factor, unit: str) -> str:
+    """With its unit, and whether its levels are as far apart as their places."""
+    scale = "" if is_to_scale(factor) else ", not to scale"
+    return f"{capital(factor_name(factor.name))}{f' [{unit}]' if unit else ''}{scale}"
+
+
+def is_to_scale(factor: Factor) -> bool:
+    """Whether the steps between its levels are equal; words have none that could differ."""
+    if not factor.is_numeric:
+        return True
+    steps = np.diff([float(v) for v in factor.levels if isinstance(v, int | float)])
+    return bool(np.allclose(steps, steps[:1])) if len(steps) else True
+
+
+def tick_names(over: Factor) -> tuple[list[str], str]:
     """Short names of the levels and the unit they have in common; below 1 s in milliseconds."""
     values = [v for v in over.levels if isinstance(v, int | float)]
     unit = unit_of(over.name)
@@ -221,15 +192,16 @@ def _tick_names(over: Factor) -> tuple[list[str], str]:
     return [f"{v:g}" for v in values], unit
 
 
-def log_axis(axes: Axes) -> None:
+def log_axis(axes: Axes, which: Literal["x", "y"] = "y") -> None:
     """A logarithmic axis for what is drawn, with plain numbers at round places and no others."""
     from matplotlib.ticker import LogLocator, NullLocator
 
-    axes.set_yscale("log")
-    low, high = axes.get_ylim()
-    axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5) if high > 5 * low else range(1, 10)))
-    axes.yaxis.set_major_formatter("{x:g}")
-    axes.yaxis.set_minor_locator(NullLocator())
+    axis = axes.xaxis if which == "x" else axes.yaxis
+    axes.set(**{f"{which}scale": "log"})
+    low, high = axis.get_view_interval()
+    axis.set_major_locator(LogLocator(subs=(1, 2, 5) if high > 5 * low else range(1, 10)))
+    axis.set_major_formatter("{x:g}")
+    axis.set_minor_locator(NullLocator())
 
 
 def hatch_stops(axes: Axes, stops: Sequence[int]) -> None:
@@ -303,6 +275,11 @@ def _make_room(axes: Axes, columns: int) -> None:
         axes.set_xticks(axes.get_xticks(), words, fontsize=7)
 
 
+def has_lines(view: View) -> bool:
+    """Lines lead from number to number; between words there is nothing to lead through."""
+    return view.over is not None and view.over.is_numeric and len(view.stops) > 1
+
+
 def dodge(lines: tuple[Level, ...]) -> list[tuple[Level, float]]:
     """Each line's place beside its stop, so that the marks of a stop stand in a row."""
     width = 0.8 / len(lines)
@@ -315,59 +292,3 @@ def place_of(over: Factor, value: float) -> float | None:
     if not over.is_numeric or len(levels) < 2 or not levels[0] <= value <= levels[-1]:
         return None
     return float(np.interp(value, levels, np.arange(len(levels))))
-
-
-def name_lines(
-    axes: Sequence[Axes], ends: Sequence[Ends], factor: Factor | None, paint: Mapping[Level, str]
-) -> None:
-    """Write each line's name at its end, moved apart where lines end close together.
-
-    To be called last: the scale of y must be settled.
-    """
-    if factor is None:
-        return
-    for ax, heights in zip(axes, map(_in_axes, axes, ends), strict=True):
-        for level, height in zip(heights, _apart(list(heights.values()), gap=0.075), strict=True):
-            ax.annotate(
-                level_name(factor.name, level, short=True),
-                (1.01, height),
-                xycoords="axes fraction",
-                color=paint[level],
-                va="center",
-                fontweight="bold",
-                annotation_clip=False,
-            )
-
-
-def _in_axes(axes: Axes, ends: Ends) -> Ends:
-    """Heights as fractions of the axes, from the lowest up; lines without an end are left out."""
-    edges = axes.transData.transform([(0.0, y) for y in axes.get_ylim()])
-    bottom, top = float(edges[0, 1]), float(edges[1, 1])
-    there = sorted((item for item in ends.items() if np.isfinite(item[1])), key=lambda i: i[1])
-    return {
-        level: (float(axes.transData.transform((0.0, end))[1]) - bottom) / (top - bottom)
-        for level, end in there
-    }
-
-
-def _apart(heights: Sequence[float], gap: float) -> list[float]:
-    """Ascending heights, moved up where they are closer than `gap`, all of them below the top."""
-    placed: list[float] = []
-    for height in heights:
-        placed.append(max(height, placed[-1] + gap) if placed else height)
-    overshoot = max(0.0, placed[-1] - 1.0) if placed else 0.0
-    return [height - overshoot for height in placed]
-
-
-def legend(figure: Figure, factor: Factor | None, paint: Mapping[Level, str]) -> None:
-    """One key above all panels, for figures whose marks are too many to be named one by one."""
-    from matplotlib.lines import Line2D
-
-    if factor is None:
-        return
-    mark = marks(factor)
-    handles = [
-        Line2D([], [], color=paint[level], marker=mark[level], ls="") for level in factor.levels
-    ]
-    names = [level_name(factor.name, level) for level in factor.levels]
-    figure.legend(handles, names, loc="outside upper left", ncols=len(names))

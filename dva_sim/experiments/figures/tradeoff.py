@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dva_sim.experiments.effects import Floats, Setting, View, person_means, present
+from dva_sim.experiments.figures.keys import legend
 from dva_sim.experiments.figures.numbers import Numbers, with_unit
+from dva_sim.experiments.figures.palette import INK, looks
 from dva_sim.experiments.figures.style import (
     Drawn,
     axis_label,
-    colours,
     finish,
-    legend,
-    marks,
+    has_lines,
     panel_grid,
     panel_title,
 )
@@ -24,6 +24,7 @@ from dva_sim.experiments.statistics import Band, band
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+_ROOM = 0.15  # share of what persons span that is left free beyond them
 EXPOSURES = ("exposure_look_s", "exposure_s", "person_exposure_s")
 RESPONSES = ("response_mean_s", "confirmation_mean_s", "response_s", "drive_time_s")
 
@@ -50,9 +51,10 @@ def tradeoff(view: View) -> Drawn | None:
         panel_title(ax, panel, 78 // len(axes))
         ax.grid(True, axis="both")
         ax.margins(0.12)
+    _fit(axes[0], view, columns)
     figure.supxlabel(axis_label(columns[0]), fontsize="medium")
     figure.supylabel(axis_label(columns[1]), fontsize="medium")
-    legend(figure, view.line, colours(view.line))
+    legend(figure, view.line)
     title = f"The trade-off: {measure_name(columns[1])} against {measure_name(columns[0])}"
     return finish(figure, "tradeoff", title, _caption(view), numbers)
 
@@ -61,7 +63,9 @@ _EDGES = {"mean": "mean", "low": "pointwise_low", "high": "pointwise_high"}
 
 
 def _caption(view: View) -> str:
-    along = f", from one {factor_name(view.over.name)} to the next" if view.over else ""
+    along = ""
+    if has_lines(view) and view.over is not None:
+        along = f", from one {factor_name(view.over.name)} to the next"
     return (
         f"Down and to the left is better. Each mark is a cell, the mean over persons{along}; "
         "crosses are 95 % intervals of each mean alone. Times in danger are summed over all people."
@@ -85,21 +89,33 @@ def _band(view: View, column: str, panel: Setting, level: Level) -> Band:
     return band(means)
 
 
+def _fit(ax: Axes, view: View, columns: tuple[str, str]) -> None:
+    """Cut the crosses of few persons far beyond what any person did, lest they flatten all."""
+    for name, column in zip("xy", columns, strict=True):
+        grid = view.part.grid(column)
+        every = [person_means(view.curve(grid, p, v)) for p in view.shown for v in view.lines]
+        seen = present(np.concatenate([values.ravel() for values in every]))
+        room = _ROOM * (float(np.ptp(seen)) or 1.0)
+        low, high = ax.get_xlim() if name == "x" else ax.get_ylim()
+        low, high = max(low, seen.min() - room), min(high, seen.max() + room)
+        ax.set(**{f"{name}lim": (low, high)})
+
+
 def _line(ax: Axes, view: View, level: Level, exposure: Band, response: Band) -> None:
-    """Through all stops, the first and the last of them named."""
-    paint, mark = colours(view.line)[level], marks(view.line)[level]
+    """Through all stops that are numbers, the first and last of them named; words each."""
+    paint, mark = looks(view.line)[level]
     x, y = exposure.mean, response.mean
     ax.hlines(y, exposure.pointwise_low, exposure.pointwise_high, color=paint, lw=0.8, alpha=0.7)
     ax.vlines(x, response.pointwise_low, response.pointwise_high, color=paint, lw=0.8, alpha=0.7)
-    ax.plot(x, y, "-", marker=mark, color=paint, ms=5, lw=1.2)
+    ax.plot(x, y, "-" if has_lines(view) else "", marker=mark, color=paint, ms=5, lw=1.2)
     if view.over is None or len(x) < 2:
         return
-    for stop in (0, len(x) - 1):
+    for stop in (0, len(x) - 1) if has_lines(view) else range(len(x)):
         ax.annotate(
             level_name(view.over.name, view.over.levels[stop], short=True),
             (float(x[stop]), float(y[stop])),
             xytext=(5, 4),
             textcoords="offset points",
             fontsize=7.5,
-            color=paint,
+            color=INK,
         )

@@ -9,24 +9,14 @@ import numpy as np
 
 from dva_sim.experiments.effects import Floats, View, nan_mean, person_means
 from dva_sim.experiments.figures import effect
+from dva_sim.experiments.figures.keys import legend
 from dva_sim.experiments.figures.numbers import Numbers
-from dva_sim.experiments.figures.style import (
-    INK,
-    Drawn,
-    colours,
-    finish,
-    log_axis,
-    panels,
-    stops_axis,
-    styled,
-)
-from dva_sim.experiments.labels import Level, level_name
+from dva_sim.experiments.figures.palette import INK, Look, looks
+from dva_sim.experiments.figures.style import Drawn, finish, log_axis, panels, stops_axis, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
-MARKS = "os^DvPX*"  # beside the colours, where two are near
 WIDTH = 0.6  # of the marks of a stop, side by side
 
 
@@ -100,7 +90,7 @@ def _drawn(
         ax.set_visible(False)
     for ax in axes[: len(there) - 2]:
         ax.set_xlabel("")
-    _legend(figure, view)
+    legend(figure, view.line)
     return finish(figure, name, title, caption, _numbers(view, there))
 
 
@@ -117,10 +107,10 @@ def _numbers(view: View, shown: Sequence[Shown]) -> Numbers:
 
 def _panel(ax: Axes, view: View, shown: Shown) -> None:
     grid, count = shown.scale * view.part.grid(shown.column), len(view.lines)
-    for index, (level, (colour, mark)) in enumerate(_looks(view).items()):
+    for index, (level, look) in enumerate(looks(view.line).items()):
         values = person_means(view.curve(grid, view.panels[0], level))
         place = WIDTH * ((index + 0.5) / count - 0.5)
-        _marks(ax, place, values, colour, mark)
+        _marks(ax, place, values, look)
     ax.set_title(shown.title, fontweight="normal")
     stops_axis(ax, view.over)
     if shown.is_log:
@@ -131,31 +121,12 @@ def _panel(ax: Axes, view: View, shown: Shown) -> None:
         ax.axhline(1.0, color=INK, lw=0.8, ls=(0, (4, 2)), zorder=1)
 
 
-def _marks(ax: Axes, place: float, values: Floats, colour: str, mark: str) -> None:
+def _marks(ax: Axes, place: float, values: Floats, look: Look) -> None:
     """Means over persons of `values` `(persons, stops)`, with the middle 90 % of them."""
     means = nan_mean(values, axis=0)
     stops = np.flatnonzero(np.isfinite(means))
     if not len(stops):
         return
     low, high = np.nanpercentile(values[:, stops], [5, 95], axis=0)
-    ax.vlines(stops + place, low, high, color=colour, lw=1.2, zorder=2)
-    ax.plot(stops + place, means[stops], mark, color=colour, ms=4.5, zorder=3)
-
-
-def _legend(figure: Figure, view: View) -> None:
-    from matplotlib.lines import Line2D
-
-    if view.line is None:
-        return
-    looks = _looks(view)
-    handles = [Line2D([], [], color=c, marker=mark, ls="") for c, mark in looks.values()]
-    labels = [level_name(view.line.name, level) for level in looks]
-    figure.legend(handles, labels, loc="outside upper left", ncols=min(4, len(labels)))
-
-
-def _looks(view: View) -> dict[Level, tuple[str, str]]:
-    """Colour and mark of each line."""
-    paint = colours(view.line)
-    return {
-        level: (paint[level], MARKS[index % len(MARKS)]) for index, level in enumerate(view.lines)
-    }
+    ax.vlines(stops + place, low, high, color=look.colour, lw=1.2, zorder=2)
+    ax.plot(stops + place, means[stops], look.mark, color=look.colour, ms=4.5, zorder=3)

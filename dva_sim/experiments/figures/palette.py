@@ -1,0 +1,130 @@
+"""Every colour a figure may use, each with what carries it in a print: a mark, or a hatch.
+
+Colours of lines and marks are those of Okabe & Ito, without the yellow that white paper swallows,
+and eight more, chosen to stay far from all others under each of the three dichromacies.
+
+References:
+    Okabe, M. & Ito, K. (2008). Color universal design: how to make figures and presentations that
+        are friendly to colorblind people.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from dva_sim.experiments.effects import Factor
+from dva_sim.experiments.labels import Level
+
+INK, SOFT, FAINT, PAPER = "#222222", "#6b6b6b", "#d9d9d9", "white"
+WARNING, HAZARD = "#8a3800", "#8a0000"
+DIVERGING = "PuOr_r"  # purple below zero, white, orange above: far apart for every eye
+
+
+class Look(NamedTuple):
+    """Of a line and its marks."""
+
+    colour: str
+    mark: str
+
+
+class Fill(NamedTuple):
+    """Of a surface; white lines in it, if any."""
+
+    colour: str
+    hatch: str = ""
+
+
+_BLUE, _VERMILION, _GREEN = Look("#0072B2", "o"), Look("#D55E00", "s"), Look("#009E73", "^")
+_PURPLE, _ORANGE, _SKY = Look("#CC79A7", "D"), Look("#E69F00", "v"), Look("#56B4E9", "P")
+_BLACK, _VIOLET, _BROWN = Look("#222222", "X"), Look("#7a2fd0", "*"), Look("#613305", "h")
+_OLIVE, _PLUM, _CRIMSON = Look("#b4b464", "<"), Look("#91086f", ">"), Look("#da0b3f", "d")
+_NAVY, _MINT, _LILAC = Look("#2929a3", "p"), Look("#87c5a6", "8"), Look("#906ef7", "H")
+LOOKS = (
+    *(_BLUE, _VERMILION, _GREEN, _PURPLE, _ORANGE, _SKY, _BLACK, _VIOLET),
+    *(_BROWN, _OLIVE, _PLUM, _CRIMSON, _NAVY, _MINT, _LILAC),
+)
+ONE = _BLUE  # where there is nothing to be told apart
+
+# Levels that look the same in every figure of every study.
+_OWN: Mapping[str, Look] = {
+    "req-rep": _VERMILION,
+    "pipelined": _PURPLE,
+    "pub-sub": _BLUE,
+    "latest-wins": _GREEN,
+    "robot": _BLUE,
+    "guard": _VERMILION,
+    "bystander": _GREEN,
+    "random": _BLACK,
+    "nearest_idle": _BROWN,
+    "min_eta": _BLUE,
+    "priority_eta": _SKY,
+    "batch_optimal": _GREEN,
+    "auction": _ORANGE,
+    "preemptive": _PURPLE,
+    "hazard_team": _VERMILION,
+    "operator_aware": _VIOLET,
+    "coverage": _PLUM,
+    "preference": _OLIVE,
+    "oracle": _CRIMSON,
+}
+
+# What may become of an event, the best first. In a stack neighbours differ in a print, too.
+FATES: Mapping[str, Fill] = {
+    "confirmed by a robot": Fill("#0072B2"),
+    "confirmed by a guard": Fill("#D55E00", "////"),
+    "confirmed": Fill("#009E73"),
+    "cleared": Fill("#56B4E9", "////"),
+    "refuted": Fill("#CC79A7", "...."),
+    "false alarm confirmed": Fill("#CC79A7", "xxxx"),
+    "link lost": Fill("#da0b3f", "////"),
+    "given up": Fill("#777777", "----"),
+    "escalated": Fill("#E69F00", "\\\\\\\\"),
+    "open": Fill("#dedede"),
+    "expired": Fill("#613305", "xxxx"),
+    "undetected": Fill("#222222"),
+    "never reported": Fill("#222222", "||||"),
+    "other": Fill("#f0f0f0", "++++"),
+    "nothing": Fill("#dedede"),
+}
+
+# The way around the loop, from what the camera saw: blue the link, grey the person, orange the
+# phone, each of them pale or dark. Hatched is what holds a value until the next one comes.
+STAGES: Mapping[str, Fill] = {
+    "delay_frame_s": Fill("#d3ebf8", "////"),
+    "delay_downlink_s": Fill("#56b4e9"),
+    "delay_human_s": Fill("#d4d4d4"),
+    "delay_hand_s": Fill("#777777"),
+    "delay_filter_s": Fill("#e69f00"),
+    "delay_sampling_s": Fill("#fbe3a6", "////"),
+    "delay_pattern_s": Fill("#d55e00"),
+    "delay_uplink_s": Fill("#00507d"),
+    "delay_processing_s": Fill("#cc79a7"),
+    "delay_motor_s": Fill("#222222"),
+}
+
+
+def looks(factor: Factor | None) -> dict[Level, Look]:
+    """A look for each level: one's own, wherever it appears, or one that no other here has."""
+    if factor is None:
+        return {None: ONE}
+    own = {level: _OWN[str(level)] for level in factor.levels if str(level) in _OWN}
+    free = [look for look in LOOKS if look not in own.values()] or list(LOOKS)
+    others = [level for level in factor.levels if level not in own]
+    found = own | {level: free[i % len(free)] for i, level in enumerate(others)}
+    return {level: found[level] for level in factor.levels}
+
+
+def colours(factor: Factor | None) -> dict[Level, str]:
+    """A colour for each level."""
+    return {level: look.colour for level, look in looks(factor).items()}
+
+
+def marks(factor: Factor | None) -> dict[Level, str]:
+    """A mark for each level, as lasting as its colour."""
+    return {level: look.mark for level, look in looks(factor).items()}
+
+
+def look_of(name: str) -> Look:
+    """Of a kind of agents: its own, or that of what is alone."""
+    return _OWN.get(name, ONE)
