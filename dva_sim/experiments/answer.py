@@ -257,9 +257,11 @@ def _what_is_measured(f: Finding) -> str:
 
 
 def _what_the_band_is(f: Finding) -> str:
+    if not f.over:
+        return "More runs narrow the band, but do not make the model truer."
     return (
-        f"The band covers every {factor_name(f.over) if f.over else 'level'} at once; "
-        "more runs narrow it, but do not make the model truer."
+        f"The band covers every {factor_name(f.over)} at once; more runs narrow it, but do not "
+        "make the model truer."
     )
 
 

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from operator import itemgetter
 from typing import Any, NamedTuple
 
+from dva_sim.experiments.asking import POINT
 from dva_sim.experiments.effects import Factor
 from dva_sim.experiments.labels import factor_name, level_name
 
@@ -73,6 +74,10 @@ _CONDITIONS = {
 _WAYS = {"otherwise towards the robot": "link.up", "otherwise from the robot": "link.down"}
 _NOWHERE = "–"
 _SAFE_ROUND_TRIPS = 4
+_OF_WAITING = (
+    *("command.timeout_s", "robot.processing_s"),
+    *("link.delay_s", "link.up.delay_s", "link.down.delay_s"),
+)
 
 
 def conditions(
@@ -115,7 +120,7 @@ def timeout_remark(scenarios: Mapping[str, Mapping[str, Any]], study: Mapping[st
 
     Args:
         scenarios: Those of the parts.
-        study: Its factors and treatments say which conditions there are.
+        study: Its factors, treatments and the ends of its ranges say which conditions there are.
     """
     played = itertools.product(scenarios.values(), _changes(study))
     known = list(filter(None, (_waiting(*pair) for pair in played)))
@@ -164,13 +169,20 @@ def _waiting(scenario: Mapping[str, Any], changes: Mapping[str, Any]) -> _Waitin
 
 
 def _changes(study: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
-    """What each combination of levels changes in a scenario."""
+    """What each combination of levels, and of the ends of ranges, changes in a scenario."""
     named = study.get("treatments", {})
     factors = [
         [named[name][str(level)] if name in named else {name: level} for level in levels]
         for name, levels in study.get("factors", {}).items()
+        if name != POINT
     ]
-    for levels in itertools.product(*factors):
+    ranges = (study.get("design") or {}).get("ranges") or {}
+    ends = [
+        [{key: range_[end]} for end in ("low", "high")]
+        for key, range_ in ranges.items()
+        if key in _OF_WAITING
+    ]
+    for levels in itertools.product(*factors, *ends):
         yield {key: value for level in levels for key, value in level.items()}
 
 

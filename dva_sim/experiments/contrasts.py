@@ -1,8 +1,8 @@
 """Named comparisons and hypotheses as they came out: each contrast with interval, size and test.
 
 Levels of factors that a contrast does not name are averaged within each person. A hypothesis holds
-when its own test says so after Holm's adjustment within its family; it does not hold when the 95 %
-interval rules it out; all else is open.
+when its own test says so after Holm's adjustment within its family; it does not hold when the test
+of the opposite does; all else is open.
 """
 
 from __future__ import annotations
@@ -80,6 +80,8 @@ class Tested:
         difference: As measured, with its 95 % interval; None if not run.
         p: Of its own test: one-sided, or of equivalence within the margin.
         adjusted: The same by Holm within the family.
+        p_against: Of the test that it is the other way round, or beyond the margin.
+        against: The same by Holm among these of the family.
         verdict: Whether it held.
     """
 
@@ -90,46 +92,61 @@ class Tested:
     difference: Interval | None = None
     p: float = math.nan
     adjusted: float = math.nan
+    p_against: float = math.nan
+    against: float = math.nan
     verdict: Verdict = "not run"
 
 
-def compare_all(study: Mapping[str, Any], runs: Table) -> list[Compared]:
-    """Every named comparison at every level that it runs over, as the manifest has them."""
-    found = [
+class Judgement(NamedTuple):
+    """All comparisons and hypotheses of a study, as they came out."""
+
+    compared: list[Compared]
+    tested: list[Tested]
+
+
+def judged(study: Mapping[str, Any], runs: Table) -> Judgement:
+    """Every comparison and every hypothesis, as the manifest has them, and what came out.
+
+    All tests of a family share its chance of a false alarm, comparisons and hypotheses alike;
+    what speaks against hypotheses is adjusted among its own.
+    """
+    compared, tested = _compare_all(study, runs), _test_all(study, runs)
+    families = [x.contrast.family for x in (*compared, *tested)]
+    adjusted = holm([x.p for x in (*compared, *tested)], families)
+    against = holm([t.p_against for t in tested], families[len(compared) :])
+    of_claims = zip(tested, adjusted[len(compared) :], against, strict=True)
+    verdicts = [replace(t, adjusted=float(p), against=float(q)) for t, p, q in of_claims]
+    return Judgement(
+        [replace(c, adjusted=float(p)) for c, p in zip(compared, adjusted, strict=False)],
+        [replace(t, verdict=verdict_of(t)) for t in verdicts],
+    )
+
+
+def _compare_all(study: Mapping[str, Any], runs: Table) -> list[Compared]:
+    """Every named comparison at every level that it runs over."""
+    return [
         _compared(study, runs, name, contrast, at)
         for name, contrast in contrasts_of(study).items()
         if name != ANSWER
         for at in places_of(study, contrast)
     ]
-    adjusted = holm([c.p for c in found], [c.contrast.family for c in found])
-    return [replace(c, adjusted=float(p)) for c, p in zip(found, adjusted, strict=True)]
 
 
-def judge_hypotheses(study: Mapping[str, Any], runs: Table) -> list[Tested]:
-    """Every hypothesis, judged."""
+def _test_all(study: Mapping[str, Any], runs: Table) -> list[Tested]:
     named = contrasts_of(study)
-    found = [
+    return [
         _tested(study, runs, name, claim, named[claim.comparison])
         for name, claim in claims_of(study).items()
     ]
-    adjusted = holm([t.p for t in found], [t.contrast.family for t in found])
-    judged = (replace(t, adjusted=float(p)) for t, p in zip(found, adjusted, strict=True))
-    return [replace(t, verdict=verdict_of(t)) for t in judged]
 
 
 def verdict_of(tested: Tested) -> Verdict:
-    """Whether a hypothesis held, by its adjusted test and by the interval."""
-    found, margin = tested.difference, tested.hypothesis.margin
-    if found is None:
+    """Whether a hypothesis held, by its own test and by that of the opposite, both adjusted."""
+    if tested.difference is None:
         return "not run"
     if tested.adjusted <= _ALPHA:
         return "held"
-    ruled_out = {
-        "above": found.high <= margin,
-        "below": found.low >= -margin,
-        "same": found.low > margin or found.high < -margin,
-    }
-    return "did not hold" if ruled_out[tested.hypothesis.direction] else "open"
+    return "did not hold" if tested.against <= _ALPHA else "open"
 
 
 def pairs_of(
@@ -208,7 +225,8 @@ def _tested(
     found = paired_difference(*pairs) if pairs is not None else None
     if pairs is None or found is None or not found.n_persons:
         return Tested(name, claim, contrast, at)
-    return Tested(name, claim, contrast, at, found, _p(claim, pairs))
+    ps = {"p": _p(claim, pairs), "p_against": _p_against(claim, pairs)}
+    return Tested(name, claim, contrast, at, found, **ps)
 
 
 def _p(claim: Hypothesis, pairs: Pairs) -> float:
@@ -217,3 +235,13 @@ def _p(claim: Hypothesis, pairs: Pairs) -> float:
         return equivalence(*pairs, claim.margin).p
     margin = claim.margin if claim.direction == "above" else -claim.margin
     return one_sided_test(*pairs, margin, claim.direction)
+
+
+def _p_against(claim: Hypothesis, pairs: Pairs) -> float:
+    """Of the opposite: on the other side of the margin, or beyond either end of it."""
+    if claim.direction == "above":
+        return one_sided_test(*pairs, claim.margin, "below")
+    below = one_sided_test(*pairs, -claim.margin, "below") if claim.direction == "same" else 1.0
+    bound = claim.margin if claim.direction == "same" else -claim.margin
+    above = one_sided_test(*pairs, bound, "above")
+    return min(1.0, 2 * min(above, below)) if claim.direction == "same" else above

@@ -153,8 +153,10 @@ def _how_drives_ended(rows: Table, runs: Table, part: str) -> NDArray[np.str_]:
     A run tells of the drives to its first driven event only.
     """
     nothing = np.full(len(rows["part"]), "", dtype="U24")
+    if "outcome" not in runs:
+        return nothing
     keys = np.stack([rows[name] for name in ("cell", "person", "trial")], axis=1)
-    if "outcome" not in runs or len(np.unique(keys, axis=0)) < len(keys):
+    if len(np.unique(keys, axis=0)) < len(keys):
         return nothing
     here = np.asarray(runs["part"]) == part
     columns = (np.asarray(runs[name])[here] for name in ("cell", "person", "trial", "outcome"))

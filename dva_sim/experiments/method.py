@@ -76,14 +76,18 @@ def _tests(study: Mapping[str, Any]) -> Iterator[str]:
     if study.get("hypotheses"):
         yield (
             "Hypotheses are judged by a one-sided test against their margin, at 5 % (bootstrap-t "
-            "over persons), those of sameness by two such tests, one at each end of the margin; p "
-            "is adjusted by Holm within each family of hypotheses."
+            "over persons), those of sameness by two such tests, one at each end of the margin. "
+            "They are refuted by the test of the opposite."
         )
     if study.get("comparisons"):
         yield (
             "Comparisons are tested two-sided by permutation: a person's two sides are swapped, "
-            "all trials together (every way of swapping with up to 14 persons, else 10,000 drawn); "
-            "p is adjusted by Holm within each family of comparisons."
+            "all trials together (every way of swapping with up to 14 persons, else 10,000 drawn)."
+        )
+    if study.get("hypotheses") or study.get("comparisons"):
+        yield (
+            "Tests of one family, hypotheses and comparisons together, share a chance of 5 % that "
+            "any of them is a false alarm (Holm)."
         )
 
 

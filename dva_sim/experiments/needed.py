@@ -75,8 +75,23 @@ def plans(study: Mapping[str, Any], runs: Table) -> list[Plan]:
     others = {k: c for k, c in named.items() if k not in claimed and k != ANSWER}
     if not claims and not others:
         others = {k: c for k, c in named.items() if k == ANSWER}
-    tests = [*_of_claims(study, runs, claims, named), *_of_comparisons(study, runs, others)]
+    family = _families(study, claims, named)
+    tests = [
+        *_of_claims(study, runs, claims, named, family),
+        *_of_comparisons(study, runs, others, family),
+    ]
     return [_plan(test) for test in tests]
+
+
+def _families(
+    study: Mapping[str, Any], claims: Mapping[str, Hypothesis], named: Mapping[str, Contrast]
+) -> Counter[str]:
+    """How many tests share a chance of 5 %; the answer is one of them where it is all there is."""
+    tests = Counter(named[claim.comparison].family for claim in claims.values())
+    for name, contrast in named.items():
+        if name != ANSWER:
+            tests[contrast.family] += len(places_of(study, contrast))
+    return tests or Counter(contrast.family for contrast in named.values())
 
 
 def _of_claims(
@@ -84,8 +99,8 @@ def _of_claims(
     runs: Table,
     claims: Mapping[str, Hypothesis],
     named: Mapping[str, Contrast],
+    family: Counter[str],
 ) -> Iterator[_Test]:
-    family = Counter(named[claim.comparison].family for claim in claims.values())
     for name, claim in claims.items():
         contrast = named[claim.comparison]
         at = places_of(study, contrast)[-1] | claim.at
@@ -105,11 +120,11 @@ _CLAIMS = {"above": "above ", "below": "below \N{MINUS SIGN}", "same": "the same
 
 
 def _of_comparisons(
-    study: Mapping[str, Any], runs: Table, named: Mapping[str, Contrast]
+    study: Mapping[str, Any],
+    runs: Table,
+    named: Mapping[str, Contrast],
+    family: Counter[str],
 ) -> Iterator[_Test]:
-    family: Counter[str] = Counter()
-    for contrast in named.values():
-        family[contrast.family] += len(places_of(study, contrast))
     for name, contrast in named.items():
         at = places_of(study, contrast)[-1]
         if (pairs := _pairs(study, runs, contrast, at)) is None:

@@ -7,7 +7,7 @@ from typing import Any
 
 from dva_sim.experiments.asking import POINT
 from dva_sim.experiments.cells import CellTable
-from dva_sim.experiments.contrasts import judge_hypotheses
+from dva_sim.experiments.contrasts import judged
 from dva_sim.experiments.effects import Table
 from dva_sim.experiments.labels import factor_name, listing
 from dva_sim.experiments.tables_of_tests import bound_of, verdict_with_interval
@@ -50,7 +50,7 @@ def _size(study: Mapping[str, Any], persons: int | None) -> str:
 
 def _claims(study: Mapping[str, Any], runs: Table) -> Iterator[list[str]]:
     """The bound that each hypothesis was to be tested against, and what came out."""
-    for tested in judge_hypotheses(study, runs) if runs else ():
+    for tested in judged(study, runs).tested if runs else ():
         yield [f"hypothesis {tested.name}", bound_of(tested), verdict_with_interval(tested)]
 
 

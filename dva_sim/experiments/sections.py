@@ -20,7 +20,6 @@ from dva_sim.experiments.blocks import (
 )
 from dva_sim.experiments.cells import CellTable
 from dva_sim.experiments.conditions import conditions, timeout_remark
-from dva_sim.experiments.contrasts import compare_all, judge_hypotheses
 from dva_sim.experiments.dispatch import page as dispatch_page
 from dva_sim.experiments.endings_told import in_a_line
 from dva_sim.experiments.endings_told import sentences as sentences_of_endings
@@ -41,7 +40,7 @@ from dva_sim.experiments.predictions import Judged, judge_all
 from dva_sim.experiments.reading import factors_of, keys_of
 from dva_sim.experiments.registered import registration_table
 from dva_sim.experiments.robustness import sentences
-from dva_sim.experiments.status import status_of
+from dva_sim.experiments.status import Status, status_of
 from dva_sim.experiments.summary import Reading
 from dva_sim.experiments.tables_of_tests import comparison_table, hypothesis_table
 from dva_sim.experiments.tuning import tuned_table
@@ -84,14 +83,15 @@ def _status(reading: Reading) -> Iterator[Block]:
 
 
 def _claims(reading: Reading) -> Iterator[Block]:
-    hypotheses = judge_hypotheses(reading.study, reading.runs) if reading.runs else []
+    status = status_of(reading.manifest)
+    hypotheses = reading.judgement.tested
     if hypotheses:
-        registered = status_of(reading.manifest).kind == "confirmatory"
-        kind = "Registered hypotheses" if registered else "Hypotheses, not registered"
-        yield Heading(f"{kind}, beside what came out")
+        yield Heading(f"{_whose_claims(status)}, beside what came out")
         yield Printed(hypothesis_table(hypotheses), is_words=True)
-    if status_of(reading.manifest).registration:
+    if status.registration:
         yield Heading("Registration")
+        if status.kind != "confirmatory":
+            yield Words("This run is not the one that was registered: it settles nothing.", "note")
         yield Printed(
             registration_table(reading.manifest, reading.runs, reading.persons), is_words=True
         )
@@ -101,6 +101,14 @@ def _claims(reading: Reading) -> Iterator[Block]:
         yield Printed(_prediction_table(predictions), is_words=True)
 
 
+def _whose_claims(status: Status) -> str:
+    if status.kind == "confirmatory":
+        return "Registered hypotheses"
+    return (
+        "Hypotheses, not run as registered" if status.registration else "Hypotheses, not registered"
+    )
+
+
 def _prediction_table(predictions: Sequence[Judged]) -> CellTable:
     heads = ["predicted", "of the contrast", "found (95 % interval)", "verdict"]
     rows = [[p.text, p.expected, p.found, p.verdict] for p in predictions]
@@ -108,10 +116,9 @@ def _prediction_table(predictions: Sequence[Judged]) -> CellTable:
 
 
 def _comparisons(reading: Reading) -> Iterator[Block]:
-    found = compare_all(reading.study, reading.runs) if reading.runs else []
-    if found:
+    if reading.judgement.compared:
         yield Heading("Named comparisons")
-        yield Printed(comparison_table(found), is_words=True)
+        yield Printed(comparison_table(reading.judgement), is_words=True)
 
 
 def _endings(reading: Reading) -> Iterator[Block]:

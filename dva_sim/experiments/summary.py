@@ -13,6 +13,7 @@ from dva_sim.experiments import statistics
 from dva_sim.experiments.answer import Answer, Finding, answer
 from dva_sim.experiments.asking import POINT, REPEATS
 from dva_sim.experiments.cells import SUMMARIES, CellTable, cell_table
+from dva_sim.experiments.contrasts import Judgement, judged
 from dva_sim.experiments.dispatch import page as dispatch_page
 from dva_sim.experiments.dispatch.shifts import Shifts, is_dispatch
 from dva_sim.experiments.effects import Part, Table, View, as_floats
@@ -182,6 +183,11 @@ class Reading:
             return found
         told = precision(self.finding, self.view, self.cluster)
         return replace(found, notes=[*found.notes, told]) if told else found
+
+    @cached_property
+    def judgement(self) -> Judgement:
+        """The comparisons and hypotheses as they came out."""
+        return judged(self.study, self.runs) if self.runs else Judgement([], [])
 
     @cached_property
     def plans(self) -> list[Plan]:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 
 from dva_sim.experiments.cells import CellTable
-from dva_sim.experiments.contrasts import Compared, Tested, Verdict
+from dva_sim.experiments.contrasts import Compared, Judgement, Tested, Verdict
 from dva_sim.experiments.effects import Setting
 from dva_sim.experiments.labels import level_name, measure_name, number, quantity, setting, unit_of
 from dva_sim.experiments.statistics import LEVEL, Interval
@@ -23,28 +24,32 @@ _LEAST_P = 0.001
 
 def hypothesis_table(tested: Sequence[Tested]) -> CellTable:
     """Each hypothesis: the claim, what was found, the adjusted test, the verdict."""
-    heads = ["hypothesis", "claim", "found (95 % interval)", "p by Holm", "verdict"]
+    heads = ["hypothesis", "claim", "found (95 % interval)"]
+    heads += ["p by Holm", "p of the opposite", "verdict"]
     rows = [
         [
             ": ".join(filter(None, (t.name, t.hypothesis.text))),
             _claim(t),
             _interval(t.difference, t.contrast.measure),
             _p(t.adjusted),
+            _p(t.against),
             _VERDICTS[t.verdict],
         ]
         for t in tested
     ]
     note = (
         "A claim holds where its own test (one-sided against the margin, bootstrap-t over persons; "
-        "two one-sided tests for sameness) stays below 5 % after Holm's adjustment within its "
-        "family. It does not hold where the 95 % interval, which is of its row alone, rules it "
-        "out. All else is open: absence of evidence."
+        "two one-sided tests for sameness) stays below 5 % after Holm's adjustment for all tests "
+        "of its family, comparisons among them. It does not hold where the opposite, tested "
+        "likewise and adjusted among its like, does. All else is open: absence of evidence. Each "
+        "interval is of its row alone."
     )
     return CellTable("", heads, len(heads), rows, note=note)
 
 
-def comparison_table(compared: Sequence[Compared]) -> CellTable:
+def comparison_table(found: Judgement) -> CellTable:
     """Each comparison at each level it runs over."""
+    compared = found.compared
     heads = ["comparison", "difference in", "at", "first minus second (95 % interval)"]
     heads += ["in standard deviations", "correlation of pairs", "p", "p by Holm", "apart?"]
     rows = [
@@ -61,15 +66,14 @@ def comparison_table(compared: Sequence[Compared]) -> CellTable:
         ]
         for c in compared
     ]
-    families = {c.contrast.family: 0 for c in compared}
-    for c in compared:
-        families[c.contrast.family] += 1
+    families = Counter(x.contrast.family for x in (*compared, *found.tested))
     counted = "; ".join(f"{name}: {count}" for name, count in families.items())
     note = (
         "Each interval is of its row alone; p is of the permutation test (the labels of a person's "
-        "runs could as well be swapped), two-sided, by Holm for all tests of its family together "
-        f"(tests in each family: {counted}). Standard deviations are those of persons under the "
-        "two levels, on average. Levels of factors that a comparison does not name are averaged."
+        "runs could as well be swapped), two-sided, by Holm for all tests of its family together, "
+        f"hypotheses among them (tests in each family: {counted}). Standard deviations are those "
+        "of persons under the two levels, on average. Levels of factors that a comparison does not "
+        "name are averaged."
         f"{_too_few(compared)}"
     )
     return CellTable("", heads, len(heads), rows, note=note)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from dva_sim.experiments.conditions import timeout_remark
+from dva_sim.experiments.conditions import conditions, timeout_remark
+from dva_sim.experiments.reading import keys_of
 
 SCENARIO = {
     "command": {"timeout_s": 9.0},
@@ -63,3 +64,18 @@ def test_the_mean_of_a_law_of_processing_counts() -> None:
 
 def test_where_nobody_asks_nothing_is_said() -> None:
     assert timeout_remark({"drive": {"link": {"delay_s": 0.1}}}, {}) == ""
+
+
+def test_in_a_range_the_farthest_end_counts() -> None:
+    """Four round trips of 600 ms, and 200 ms."""
+    ranges = {"link.delay_s": {"low": 0.0, "high": 0.3}, "link.loss": {"low": 0.0, "high": 0.1}}
+    ranges["robot.processing_s"] = {"low": 0.02, "high": 0.2}
+    study = {"factors": {"point": list(range(8))}, "design": {"sobol": 8, "ranges": ranges}}
+    told = timeout_remark({"drive": SCENARIO}, study)
+    assert told.endswith("in every condition (2.6\N{NO-BREAK SPACE}s at most).")
+
+
+def test_what_lies_in_a_range_is_said_to_vary() -> None:
+    design = {"sobol": 8, "ranges": {"link.delay_s": {"low": 0.0, "high": 0.3}}}
+    factors = keys_of({"factors": {"point": list(range(8))}, "design": design})
+    assert ("one-way delay", ["varied"]) in conditions({"drive": SCENARIO}, factors)
