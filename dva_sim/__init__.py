@@ -13,7 +13,23 @@ from importlib import import_module
 from typing import Any
 
 __version__ = "0.7.0"
-__all__ = ["Comparison", "Episode", "Results", "compare", "episode", "load", "run"]
+__all__ = [
+    "Comparison",
+    "Episode",
+    "Results",
+    "compare",
+    "dry_run",
+    "episode",
+    "export",
+    "load",
+    "new",
+    "register",
+    "replay",
+    "report",
+    "run",
+    "show",
+    "tune",
+]
 
 
 def __getattr__(name: str) -> Any:

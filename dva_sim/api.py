@@ -1,35 +1,51 @@
 """What the command line does, for programs and notebooks: `import dva_sim; dva_sim.run(...)`.
 
-The results are the same bytes as those of the same command. Nothing is printed; mistakes are
-`DvaSimError`. A script needs no `if __name__ == "__main__"` around it.
+Commands and options have the same names, and the results are the same bytes; a limit in seconds
+is `limit_s`, and `--dry-run` a function. Only `show` prints; mistakes are `DvaSimError`. A script
+needs no `if __name__ == "__main__"` around it.
 """
 
 from __future__ import annotations
 
-import json
 import sys
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
-from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dva_sim import scenario as scenarios
-from dva_sim.config import parse_changes, parse_scalar
-from dva_sim.errors import ConfigError, DvaSimError
+from dva_sim.errors import DvaSimError
 from dva_sim.experiments.comparing import Comparison
-from dva_sim.experiments.dictionary import describe
-from dva_sim.experiments.frames import Frame, frame_of, plain
-from dva_sim.experiments.models import AnyScenario, model_of
 from dva_sim.experiments.results import Results
+from dva_sim.experiments.settings import Settings, pairs_of
+from dva_sim.experiments.single import Episode, episode, replay
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-__all__ = ["Comparison", "Episode", "Results", "compare", "episode", "load", "run"]
+    from dva_sim.experiments.planning import DryRun
+    from dva_sim.experiments.registration import Registration
+    from dva_sim.experiments.study import Study
+    from dva_sim.experiments.tuned import Tuned
 
-Settings = Mapping[str, Any] | Iterable[str]
+__all__ = [
+    "Comparison",
+    "Episode",
+    "Results",
+    "compare",
+    "dry_run",
+    "episode",
+    "export",
+    "load",
+    "new",
+    "register",
+    "replay",
+    "report",
+    "run",
+    "show",
+    "tune",
+]
+
+Folder = Results | str | Path
 
 
 def run(
@@ -69,16 +85,10 @@ def run(
             kept as recordings and could not.
         KeyboardInterrupt: the finished runs are kept, and the same call goes on.
     """
-    from dva_sim.experiments.episode import rehearse_all
     from dva_sim.experiments.recording import record_study
     from dva_sim.experiments.runner import run_study
-    from dva_sim.experiments.running import Version
-    from dva_sim.experiments.study import load_study
 
-    pairs = [*_pairs(set), *([f"seed={seed}"] if seed is not None else [])]
-    asked = load_study(study, pairs, full=full, pilot=pilot)
-    folder = Path(out) if out is not None else Version(full, pilot).folder(str(study))
-    rehearse_all(asked)
+    asked, folder = _asked(study, out, pairs_of(set, seed), full, pilot)
     options: dict[str, Any] = {"jobs": jobs, "scheduler": scheduler}
     with _without_main():
         run_study(asked, folder, progress=progress, limit_s=limit_s, **options)
@@ -91,6 +101,148 @@ def run(
     return results
 
 
+def dry_run(
+    study: str | Path,
+    out: str | Path | None = None,
+    *,
+    set: Settings = (),
+    seed: int | None = None,
+    full: bool = False,
+    pilot: int | None = None,
+    jobs: int | None = None,
+) -> DryRun:
+    """What `run` would do, and how long it would take; a few runs are tried if none is done yet.
+
+    Raises:
+        DvaSimError: a mistake in what was asked for.
+    """
+    from dva_sim.experiments.episode import run_job
+    from dva_sim.experiments.planning import dry_run as planned
+
+    asked, folder = _asked(study, out, pairs_of(set, seed), full, pilot)
+    return planned(asked, folder, jobs=jobs, probe=run_job)
+
+
+def _asked(
+    study: str | Path, out: str | Path | None, pairs: list[str], full: bool, pilot: int | None
+) -> tuple[Study, Path]:
+    """A study without mistakes, and the folder of its results."""
+    from dva_sim.experiments.episode import rehearse_all
+    from dva_sim.experiments.running import Version
+    from dva_sim.experiments.study import load_study
+
+    asked = load_study(study, pairs, full=full, pilot=pilot)
+    rehearse_all(asked)
+    return asked, Path(out) if out is not None else Version(full, pilot).folder(str(study))
+
+
+def new(name: str | Path) -> Path:
+    """Write a study to begin with, which runs as it stands; its file.
+
+    Raises:
+        DvaSimError: there is such a file, or it cannot be written.
+    """
+    from dva_sim.experiments.starting import write_study
+
+    return write_study(str(name))
+
+
+def register(study: str | Path, *, full: bool = False, again: bool = False) -> Registration:
+    """Fix a study's hypotheses and size before it is run; the run then confirms or refutes them.
+
+    Args:
+        study: By name or path.
+        full: Its larger version.
+        again: In place of an earlier registration; it will be told.
+
+    Raises:
+        DvaSimError: nothing to register, a size left open, or a registration that is there.
+    """
+    from dva_sim.experiments.registration import register as write_down
+    from dva_sim.experiments.registration import registration_of
+    from dva_sim.experiments.study import load_study
+
+    write_down(load_study(study, full=full), again)
+    found = registration_of(load_study(study, full=full))
+    assert found is not None
+    return found
+
+
+def tune(
+    study: str | Path,
+    out: str | Path | None = None,
+    *,
+    jobs: int | None = None,
+    progress: Callable[[int, int], object] | None = None,
+) -> Tuned:
+    """Choose what a study has tuned, on persons who take no part in it, and keep it beside it.
+
+    Raises:
+        DvaSimError: the study tunes nothing, or runs failed.
+    """
+    from dva_sim.experiments.running import folder_of_tuning
+    from dva_sim.experiments.study import load_study
+    from dva_sim.experiments.tuned import save_tuned
+    from dva_sim.experiments.tuning import tune as try_all
+
+    asked = load_study(study)
+    folder = Path(out) if out is not None else folder_of_tuning(str(study))
+    with _without_main():
+        tuned = try_all(asked, folder, jobs=jobs, progress=progress)
+    save_tuned(asked, tuned)
+    return tuned
+
+
+def report(folder: Folder, *, pdf: bool = False) -> Path:
+    """Make the report of a results folder again; its page.
+
+    Raises:
+        DvaSimError: no results there, or a disk that cannot be written.
+    """
+    from dva_sim.experiments.report import write_report
+
+    return write_report(_results(folder).folder, pdf)
+
+
+def show(
+    folder: Folder, *, table: str | None = None, rows: int = 20, columns: bool = False
+) -> None:
+    """Print what results hold: the answer and every cell, a table, or what columns mean.
+
+    Raises:
+        ConfigError: no results there, or no such table.
+    """
+    from dva_sim.experiments import showing_console
+
+    showing_console.show(_results(folder), table, columns, rows)
+
+
+def export(
+    folder: Folder,
+    out: str | Path,
+    *,
+    table: str | Sequence[str] = (),
+    format: str | None = None,
+    overwrite: bool = False,
+) -> list[Path]:
+    """Write tables of results for other programs, with what their columns mean; the files.
+
+    Args:
+        folder: Of the results.
+        out: `X.csv` or `X.parquet` for one table, or a folder.
+        table: Only this one, or these.
+        format: `csv` or `parquet`, in a folder.
+        overwrite: Replace what is there.
+
+    Raises:
+        DvaSimError: no such table or format, a file that is there, or one that cannot be written.
+    """
+    from dva_sim.experiments.exporting import export as write
+
+    tables = [table] if isinstance(table, str) else table
+    return write(_results(folder), Path(out), tables, format, overwrite)
+
+
 def load(folder: str | Path) -> Results:
     """Open a results folder.
 
@@ -100,87 +252,19 @@ def load(folder: str | Path) -> Results:
     return Results.load(folder)
 
 
-def compare(first: Results | str | Path, second: Results | str | Path) -> Comparison:
+def compare(first: Folder, second: Folder) -> Comparison:
     """Two results, or their folders, side by side: what the second has otherwise.
+
+    `frame(measure, by)` tells it as columns, and `judge(fail_if)` what a gate makes of it.
 
     Raises:
         ConfigError: one is no results folder, or they have no configuration in common.
     """
-    a, b = (x if isinstance(x, Results) else load(x) for x in (first, second))
-    return Comparison(a, b)
+    return Comparison(_results(first), _results(second))
 
 
-@dataclass(frozen=True)
-class Episode:
-    """One run of one scenario.
-
-    Attributes:
-        scenario: As it was run.
-        seed: Of its luck.
-        tables: Its rows as columns, by table: `runs`, `events`, ...
-    """
-
-    scenario: AnyScenario
-    seed: int
-    tables: dict[str, Frame]
-
-    @property
-    def measures(self) -> dict[str, Any]:
-        """The one row of the table of runs."""
-        return {name: values.tolist()[0] for name, values in self.tables["runs"].items()}
-
-    def _repr_html_(self) -> str:
-        told = describe("runs", list(self.measures), [self.scenario.model], [])
-        rows = [
-            f"<tr><td>{escape(c.name)}</td><td>{escape(plain(self.measures[c.name]))}</td>"
-            f"<td>{escape(c.meaning)}</td></tr>"
-            for c in told
-        ]
-        return f"<table>{''.join(rows)}</table>"
-
-
-def episode(scenario: str | Path, seed: int = 1, *, set: Settings = ()) -> Episode:
-    """Run one scenario once.
-
-    Args:
-        scenario: By name or path.
-        seed: Of its luck.
-        set: Keys to change, as a mapping or as `key=value` pairs.
-
-    Raises:
-        ConfigError: there is none, or it is not valid with these changes.
-    """
-    document = scenarios.load(str(scenario))
-    model = model_of(document)
-    built = model.build(document, parse_changes(_pairs(set)))
-    tables = model.tables(built, seed, with_tracks=True)
-    return Episode(built, seed, {name: frame_of(rows) for name, rows in tables.items()})
-
-
-def _pairs(settings: Settings) -> list[str]:
-    """Settings as on the command line."""
-    if not isinstance(settings, Mapping):
-        return list(settings)
-    return [f"{key}={_as_text(key, value)}" for key, value in settings.items()]
-
-
-def _as_text(key: str, value: Any) -> str:
-    """A value as YAML: words as they are where that is possible, all else as JSON."""
-    if isinstance(value, str | Path) and parse_scalar(str(value)) == str(value):
-        return str(value)
-    try:
-        return json.dumps(value, default=_plain)
-    except (TypeError, ValueError):
-        raise ConfigError(f"set: {key} cannot be {value!r}") from None
-
-
-def _plain(value: Any) -> Any:
-    """Numbers and arrays of numpy, and paths, as JSON can hold them."""
-    if isinstance(value, Path):
-        return str(value)
-    if hasattr(value, "tolist"):
-        return value.tolist()
-    raise TypeError(f"{type(value).__name__} is no number, word, list or mapping")
+def _results(folder: Folder) -> Results:
+    return folder if isinstance(folder, Results) else load(folder)
 
 
 @contextmanager

@@ -59,9 +59,9 @@ def run(
 @app.command()
 def new(name: Annotated[str, typer.Argument(help="Name or path of the new study.")]) -> None:
     """Write a study to begin with: it runs as it stands, and comments say what can be changed."""
-    from dva_sim.experiments.starting import write_study
+    from dva_sim.experiments.starting import told, write_study
 
-    typer.echo(write_study(name))
+    typer.echo(told(write_study(name)))
 
 
 @app.command()
@@ -116,8 +116,9 @@ def show(
 ) -> None:
     """Show what a results folder holds: the answer, every cell, a table, or what columns mean."""
     from dva_sim.experiments import showing_console
+    from dva_sim.experiments.results import Results
 
-    showing_console.show(folder, table, columns, rows)
+    showing_console.show(Results.load(folder), table, columns, rows)
 
 
 @app.command()

@@ -170,7 +170,7 @@ class Comparison:
                 found.append(difference(group.part, group.levels, *rows))
         return found
 
-    def judge(self, condition: str) -> list[Verdict]:
+    def judge(self, fail_if: str) -> list[Verdict]:
         """Look at a condition such as `p95(response_s) > 1.05x`, part by part.
 
         Raises:
@@ -179,7 +179,7 @@ class Comparison:
         from dva_sim.experiments.comparing_conditions import parse
         from dva_sim.experiments.comparing_gates import judge
 
-        return judge(parse(condition), self)
+        return judge(parse(fail_if), self)
 
     def changed(self) -> tuple[list[str], int]:
         """Measures that are not the same in every pair of runs, and how many there are in all.

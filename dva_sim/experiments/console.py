@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import time
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -21,7 +23,7 @@ from dva_sim.experiments.pictures import Wanted
 from dva_sim.experiments.transports import TransportScenario, told
 from dva_sim.recordings import write_recording
 from dva_sim.scenario import Scenario
-from dva_sim.simulation import Recording, simulate
+from dva_sim.simulation import Playback, Recording, simulate
 from dva_sim.tasks import TaskScenario
 from dva_sim.timed import TimedScenario
 
@@ -29,6 +31,11 @@ PATTERNS = ("req-rep", "pipelined", "pub-sub", "latest-wins")
 
 console = Console(highlight=False)
 say = partial(console.print, soft_wrap=True)  # one line stays one line, also in a file
+
+
+def nowhere() -> Console:
+    """For what need not be told."""
+    return Console(file=io.StringIO(), quiet=True)
 
 
 # --- episodes --------------------------------------------------------------------------
@@ -41,8 +48,13 @@ def episode(
     side_by_side: str | None,
     pictures: Wanted,
     record: Path | None,
-) -> None:
-    """Run one scenario, tell its timeline, draw the pictures asked for, and keep it if asked to."""
+    where: Console = console,
+) -> Recording | None:
+    """Run one scenario, tell its timeline, draw the pictures asked for, and keep it if asked to.
+
+    Returns:
+        The run, if it is of the full model; of two side by side the first.
+    """
     if record is not None:
         _check_record(record, side_by_side)
     document = scenarios.load(name)
@@ -54,28 +66,35 @@ def episode(
         if pictures.any or side_by_side is not None:
             raise ConfigError(f"{name} is a {scenario.model} scenario: there is nothing to see")
         if isinstance(scenario, TransportScenario):
-            told.tell(scenario, seed, console)
+            told.tell(scenario, seed, where)
         else:
-            shifts.tell(scenario, seed, console)
-        return
+            shifts.tell(scenario, seed, where)
+        return None
     if isinstance(scenario, TaskScenario):
-        _task(name, scenario, seed, side_by_side, pictures)
-        return
+        _task(name, scenario, seed, side_by_side, pictures, where)
+        return None
     settings: list[dict[str, Any]] = [changes]
     if side_by_side is not None:
         settings = [changes | {"pattern": p} for p in _two_patterns(side_by_side)]
     pictures.check(scenario)
     keep = pictures.any or record is not None
-    runs = [_tell(scenarios.build(document, each), seed, keep) for each in settings]
+    runs = [_tell(scenarios.build(document, each), seed, keep, where) for each in settings]
     if record is not None:
         (run, tables), about = runs[0], {"scenario": name}
         write_recording(run, record, tables=tables, about=about)
-        say(f"Recording: {record}")
-    if pictures.any:
-        with console.status("Drawing ..."):
-            written = list(pictures.write([run for run, _ in runs]))
-        for line in written:
-            say(line)
+        where.print(f"Recording: {record}", soft_wrap=True)
+    draw(pictures, [run for run, _ in runs], where)
+    return runs[0][0]
+
+
+def draw(pictures: Wanted, runs: Sequence[Playback], where: Console) -> None:
+    """Write the pictures asked for, and say where they are."""
+    if not pictures.any:
+        return
+    with where.status("Drawing ..."):
+        written = list(pictures.write(runs))
+    for line in written:
+        where.print(line, soft_wrap=True)
 
 
 def _check_record(path: Path, side_by_side: str | None) -> None:
@@ -89,15 +108,20 @@ def _check_record(path: Path, side_by_side: str | None) -> None:
 
 
 def _task(
-    name: str, scenario: TaskScenario, seed: int, side_by_side: str | None, pictures: Wanted
+    name: str,
+    scenario: TaskScenario,
+    seed: int,
+    side_by_side: str | None,
+    pictures: Wanted,
+    where: Console,
 ) -> None:
     """Play a block of trials, and draw the first one if asked for."""
     if side_by_side is not None or (pictures.any and not pictures.is_plain_still):
         raise ConfigError(f"{name} is a task: only --still shows something of it, its first trial")
-    tasks.tell(scenario, seed, console)
+    tasks.tell(scenario, seed, where)
     if pictures.still is not None:
         tasks.draw(scenario, seed, pictures.still)
-        say(f"Still: {pictures.still}")
+        where.print(f"Still: {pictures.still}", soft_wrap=True)
 
 
 def _two_patterns(text: str) -> list[str]:
@@ -111,12 +135,14 @@ def _two_patterns(text: str) -> list[str]:
     return patterns
 
 
-def _tell(scenario: Scenario, seed: int, keep_traffic: bool) -> tuple[Recording, Tables]:
+def _tell(
+    scenario: Scenario, seed: int, keep_traffic: bool, where: Console
+) -> tuple[Recording, Tables]:
     started = time.perf_counter()
     recording = simulate(scenario, seed, keep_traffic)
     took, tables = time.perf_counter() - started, tables_of(recording)
-    telling.tell_story(recording, console)
-    telling.tell_outcome(tables, f"simulated in {took:.2f} s", console)
+    telling.tell_story(recording, where)
+    telling.tell_outcome(tables, f"simulated in {took:.2f} s", where)
     return recording, tables
 
 

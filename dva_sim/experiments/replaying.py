@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from rich.console import Console
+
 from dva_sim.experiments import telling
-from dva_sim.experiments.console import console, say
+from dva_sim.experiments.console import console, draw
 from dva_sim.experiments.pictures import Wanted
-from dva_sim.recordings import read_recording
+from dva_sim.recordings import Opened, read_recording
 
 
-def replay(file: Path, pictures: Wanted, ros2: Path | None) -> None:
+def replay(file: Path, pictures: Wanted, ros2: Path | None, where: Console = console) -> Opened:
     """Tell the story of a recording, and draw or export what is asked for.
 
     Raises:
@@ -19,20 +21,17 @@ def replay(file: Path, pictures: Wanted, ros2: Path | None) -> None:
     opened = read_recording(file)
     run = opened.playback
     pictures.check(run.scenario)
-    telling.tell_story(run, console)
+    telling.tell_story(run, where)
     if opened.tables is not None:
         made = f"simulated by dva-sim {opened.about['version']}"
-        telling.tell_outcome(opened.tables, made, console)
+        telling.tell_outcome(opened.tables, made, where)
     if not opened.is_whole:
         there = f"{run.duration:.0f} of {opened.lasted:.0f} s are there"
-        say(f"[yellow]{file} was cut short: {there}[/yellow]")
-    if pictures.any:
-        with console.status("Drawing ..."):
-            written = list(pictures.write([run]))
-        for line in written:
-            say(line)
+        where.print(f"[yellow]{file} was cut short: {there}[/yellow]", soft_wrap=True)
+    draw(pictures, [run], where)
     if ros2 is not None:
         from dva_sim.recordings.ros2 import write_bag
 
         write_bag(run, ros2)
-        say(f"ROS 2 bag: {ros2}")
+        where.print(f"ROS 2 bag: {ros2}", soft_wrap=True)
+    return opened

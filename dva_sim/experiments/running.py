@@ -83,6 +83,11 @@ def run(name: str, pairs: list[str], out: Path | None, workers: Workers, version
     return 1 if failures else 0
 
 
+def folder_of_tuning(name: str) -> Path:
+    """Where the trials of a tuning go if nobody says."""
+    return Path("results") / f"{Path(name).stem}-tuning"
+
+
 def tune(name: str, out: Path | None, jobs: int | None) -> int:
     """Choose what a study has tuned, and write it beside the study; the exit code."""
     from dva_sim.experiments.tuned import save_tuned
@@ -91,7 +96,7 @@ def tune(name: str, out: Path | None, jobs: int | None) -> int:
 
     study = load_study(name)
     trials = tuning_study(study)
-    folder = out if out is not None else Path("results") / f"{Path(name).stem}-tuning"
+    folder = out if out is not None else folder_of_tuning(name)
     say(f"[bold]{escape(trials.question)}[/bold]")
     before = dry_run(trials, folder, jobs=jobs)
     say(_plan(before, folder))

@@ -13,9 +13,8 @@ from dva_sim.experiments.results import Results
 console = Console(highlight=False)
 
 
-def show(folder: Path, table: str | None, columns: bool, rows: int) -> None:
-    """Show what is in a results folder: the answer, a table, or what columns mean."""
-    results = Results.load(folder)
+def show(results: Results, table: str | None, columns: bool, rows: int) -> None:
+    """Show what results hold: the answer, a table, or what columns mean."""
     if columns:
         showing.show_columns(results, [] if table is None else [table], console)
     elif table is not None:

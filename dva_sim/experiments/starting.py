@@ -9,11 +9,14 @@ from dva_sim.errors import ConfigError, DvaSimError
 TEMPLATE = Path(__file__).parent / "templates" / "study.yaml"
 
 
-def write_study(name: str) -> str:
-    """Write a new study, and say what can be done with it.
+def write_study(name: str) -> Path:
+    """Write a new study.
 
     Args:
         name: Its name, or the path of its file.
+
+    Returns:
+        Its file.
 
     Raises:
         ConfigError: there is such a file already.
@@ -27,6 +30,11 @@ def write_study(name: str) -> str:
         raise ConfigError(f"{path} is there already; give another name") from None
     except OSError as error:
         raise DvaSimError(f"{path} cannot be written: {error.strerror}") from None
+    return path
+
+
+def told(path: Path) -> str:
+    """What can be done with a new study."""
     steps = [
         f"dva-sim {step}" for step in (f"check {path}", f"run {path} --dry-run", f"run {path}")
     ]

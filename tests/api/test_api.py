@@ -1,6 +1,7 @@
 """The Python API: the results of the command line, in scripts and notebooks, without a word."""
 
 import asyncio
+import inspect
 import json
 import subprocess
 import sys
@@ -8,11 +9,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import typer
 
 import dva_sim
-from dva_sim.api import _pairs
+from dva_sim import cli
 from dva_sim.config import parse_changes
 from dva_sim.errors import ConfigError
+from dva_sim.experiments.settings import pairs_of
 
 STUDY = """\
 question: Does a second of delay cost time?
@@ -26,6 +29,20 @@ parts:
     scenario: drive-to-event
     changes: {horizon_s: 40}
 """
+
+REGISTERED = (
+    STUDY
+    + """\
+answer:
+  part: drive
+  measure: drive_time_s
+  factor: link.delay_s
+  contrast: [0.3, 0]
+  smallest_effect: 1
+hypotheses:
+  late: {direction: above, margin: 1}
+"""
+)
 
 
 @pytest.fixture(scope="module")
@@ -119,6 +136,78 @@ def test_a_script_needs_no_guard(study):
     assert python(str(script), folder=study.parent) == "4\n"
 
 
+# Options of the command line that a notebook has elsewhere, or under a name with its unit.
+ELSEWHERE = {
+    "run": {"dry_run": dva_sim.dry_run, "limit": "limit_s"},
+    "compare": {"measure": dva_sim.Comparison.frame, "by": dva_sim.Comparison.frame}
+    | {"fail_if": dva_sim.Comparison.judge},
+}
+COMMANDS = ["run", "new", "register", "tune", "report", "show", "export", "compare"]
+
+
+@pytest.mark.parametrize("name", [*COMMANDS, "episode", "replay"])
+def test_commands_and_functions_have_the_same_words(name):
+    command = typer.main.get_command(cli.app).commands[name]
+    options = {p.opts[-1].removeprefix("--").replace("-", "_") for p in command.params}
+    function = getattr(dva_sim, name)
+    known = set(inspect.signature(function).parameters)
+    for option in options:
+        other = ELSEWHERE.get(name, {}).get(option)
+        if callable(other):
+            assert option in {other.__name__, *inspect.signature(other).parameters}
+        else:
+            assert (other or option) in known, option
+    assert known - options <= {"progress", "limit_s"} | ({"report"} if name == "run" else set())
+
+
+def test_a_dry_run_asks_as_a_run_does():
+    asked = inspect.signature(dva_sim.dry_run).parameters
+    there = inspect.signature(dva_sim.run).parameters
+    assert set(there) - set(asked) == {"scheduler", "limit_s", "progress", "report"}
+    assert {name: there[name] for name in asked} == dict(asked)
+
+
+def test_a_dry_run_tells_what_is_left(study, results):
+    plan = dva_sim.dry_run(study, results.folder, set={"persons": 1}, jobs=1)
+    assert (plan.runs, plan.done, plan.estimate_s) == (2, 2, 0.0)
+
+
+def test_results_are_told_shown_and_exported(results, tmp_path, capsys):
+    (runs,) = dva_sim.export(results, tmp_path / "runs.csv")
+    assert len(runs.read_text().splitlines()) == 3
+    files = dva_sim.export(results.folder, tmp_path, table="events", format="parquet")
+    assert [path.name for path in files] == ["events.parquet", "columns.csv"]
+    dva_sim.show(results, table="runs", rows=1)
+    assert "... and 1 more rows" in capsys.readouterr().out
+
+
+def test_a_new_study_is_written_and_registered(tmp_path):
+    path = dva_sim.new(tmp_path / "mine")
+    assert path == tmp_path / "mine.yaml"
+    with pytest.raises(ConfigError, match="is there already"):
+        dva_sim.new(path)
+    path.write_text(REGISTERED)
+    made = dva_sim.register(path)
+    assert made.study == "mine"
+    assert made.hash in (tmp_path / "mine.registration.yaml").read_text()
+    with pytest.raises(ConfigError, match="is there already"):
+        dva_sim.register(path)
+    assert dva_sim.register(path, again=True).earlier == (made.hash,)
+
+
+def test_an_episode_is_kept_drawn_and_played_again(tmp_path, capfd):
+    kept, still = tmp_path / "a.mcap", tmp_path / "a.png"
+    short = {"horizon_s": 15}
+    once = dva_sim.episode("drive-to-event", seed=2, set=short, record=kept, still=still, at=10)
+    assert still.read_bytes().startswith(b"\x89PNG")
+    again = dva_sim.replay(kept, strip=tmp_path / "b.svg", at=[5, 10])
+    assert (tmp_path / "b.svg").exists()
+    assert again.seed == once.seed == 2
+    assert again.measures["path_m"] == once.measures["path_m"] > 0
+    assert once.tables["tracks"].rows > 0
+    assert capfd.readouterr() == ("", "")
+
+
 def test_it_works_where_an_event_loop_runs(study, results):
     """As in a notebook."""
 
@@ -166,7 +255,7 @@ def test_what_is_there_is_told_and_nothing_else_is_found():
     ],
 )
 def test_settings_are_written_as_on_the_command_line(key, value, text):
-    assert _pairs({key: value}) == [text]
+    assert pairs_of({key: value}) == [text]
     again = parse_changes([text])[key]
     assert json.dumps(again) == json.dumps(
         value, default=lambda x: x.item() if hasattr(x, "item") else str(x)
@@ -175,4 +264,4 @@ def test_settings_are_written_as_on_the_command_line(key, value, text):
 
 def test_a_value_that_no_file_could_hold_is_refused():
     with pytest.raises(ConfigError, match="persons cannot be"):
-        _pairs({"persons": object()})
+        pairs_of({"persons": object()})
