@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import copy
-import difflib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationError
+from pydantic_core import CoreSchema
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
 from dva_sim.errors import ConfigError
+from dva_sim.wording import first_mistake
 
 Path_ = tuple[str | int, ...]
 M = TypeVar("M", bound=BaseModel)
@@ -22,10 +23,32 @@ Fail = Callable[[str, Path_], ConfigError]
 """Makes the error for a problem at a key path."""
 
 
+def _make_strict(schema: Any) -> None:
+    """Let no number in a schema be read from something else; lists and paths may be."""
+    if isinstance(schema, dict):
+        if schema.get("type") in ("int", "float", "bool"):
+            schema["strict"] = True
+        for key in schema.keys() - {"default", "metadata"}:
+            _make_strict(schema[key])
+    elif isinstance(schema, list | tuple):
+        for inner in schema:
+            _make_strict(inner)
+
+
 class Config(BaseModel):
-    """Base of all configuration: unknown keys are mistakes, values do not change."""
+    """Base of all configuration: unknown keys are mistakes, values do not change.
+
+    Numbers are numbers: neither `true` nor `"2"` is one, and `2.0` is no whole number.
+    """
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """The schema of the model, with its numbers and truth values strict."""
+        schema = handler(source)
+        _make_strict(schema)
+        return schema
 
 
 MOST_VALUES = 20_000  # in one file
@@ -53,6 +76,23 @@ class Document:
         return ConfigError(problem, self.file, line, column)
 
 
+def read_text(path: Path) -> str:
+    """The text of a file in UTF-8.
+
+    Raises:
+        ConfigError: unreadable, or a byte that such a text cannot have, with its place.
+    """
+    try:
+        data = path.read_bytes()
+        return data.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
+    except OSError as error:
+        raise ConfigError(f"cannot be read: {error.strerror}", path) from error
+    except UnicodeDecodeError as error:
+        before = data[: error.start].decode("utf-8", "replace")
+        line, column = before.count("\n") + 1, len(before) - (before.rfind("\n") + 1) + 1
+        raise ConfigError("is not text in UTF-8", path, line, column) from error
+
+
 def load_yaml(path: str | Path) -> Document:
     """Read a mapping from a YAML file.
 
@@ -60,12 +100,7 @@ def load_yaml(path: str | Path) -> Document:
         ConfigError: unreadable, not YAML, a key twice, or not a mapping.
     """
     path = Path(path)
-    try:
-        text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise ConfigError(f"cannot be read: {error.strerror}", path) from error
-    except UnicodeDecodeError as error:
-        raise ConfigError("is not text in UTF-8", path) from error
+    text = read_text(path)
     try:
         tree = YAML(typ="rt", pure=True).load(text)
     except MarkedYAMLError as error:
@@ -223,63 +258,9 @@ def validate(
     try:
         return model.model_validate(data)
     except ValidationError as problems:
-        first = problems.errors(include_url=False)[0]
-        path = tuple(p for p in first["loc"] if not _is_tag(p, data, first["loc"]))
-        text = _explain(model, first, path)
+        text, path = first_mistake(model, data, problems.errors(include_url=False))
         raise (error or _unplaced)(text, path) from None
 
 
 def _unplaced(problem: str, path: Path_) -> ConfigError:
     return ConfigError(problem)
-
-
-def _is_tag(part: str | int, data: Any, loc: Sequence[str | int]) -> bool:
-    """Whether `part` of an error location names a union member rather than a key."""
-    for step in loc:
-        inside = isinstance(data, Mapping) and step in data
-        inside = inside or (isinstance(data, list) and isinstance(step, int) and step < len(data))
-        if step == part:
-            # The last part is a missing key where there are keys.
-            is_key = step == loc[-1] and isinstance(data, Mapping)
-            return not inside and not is_key and isinstance(step, str)
-        if inside:
-            data = data[step]
-    return False
-
-
-def _explain(model: type[BaseModel], problem: Any, path: Path_) -> str:
-    key = ".".join(str(p) for p in path)
-    if problem["type"] == "extra_forbidden":
-        known = _fields_at(model, path[:-1])
-        near = difflib.get_close_matches(str(path[-1]), known, n=1)
-        hint = f"did you mean {near[0]!r}?" if near else f"known here: {', '.join(sorted(known))}"
-        return f"unknown key {key!r}; {hint}" if known else f"unknown key {key!r}"
-    if problem["type"] == "missing":
-        return f"missing key {key!r}"
-    message = problem["msg"].removeprefix("Value error, ")
-    message = message[0].lower() + message[1:]
-    given = problem["input"]
-    shown = f", not {given!r}" if isinstance(given, str | int | float | bool) else ""
-    return f"{key}: {message}{shown}" if key else f"{message}"
-
-
-def _fields_at(model: Any, path: Path_) -> list[str]:
-    """Names of the fields of the model that stands at `path` inside `model`."""
-    for step in path:
-        if isinstance(step, int):
-            continue
-        info = getattr(model, "model_fields", {}).get(step)
-        if info is not None:  # else a key that the user chose, inside a mapping to models
-            model = _model_in(info.annotation)
-    return list(getattr(model, "model_fields", {}))
-
-
-def _model_in(annotation: Any) -> Any:
-    """The first pydantic model inside an annotation such as `tuple[Event, ...] | None`."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    for inner in getattr(annotation, "__args__", ()):
-        found = _model_in(inner)
-        if found is not None:
-            return found
-    return None

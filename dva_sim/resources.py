@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 from dva_sim.errors import ConfigError
@@ -15,12 +16,14 @@ REGISTRATION = ".registration.yaml"  # ending of a file that belongs to the stud
 
 def roots() -> list[Path]:
     """Folders that may hold `worlds/`, `agents/`, ...: working folder, source tree, wheel."""
+    return [Path.cwd(), *_installed()]
+
+
+@cache
+def _installed() -> tuple[Path, ...]:
     source = _PACKAGE.parent
-    found = [Path.cwd()]
-    if (source / "pyproject.toml").is_file():
-        found.append(source)
-    found.append(_PACKAGE / "_data")
-    return found
+    tree = (source,) if (source / "pyproject.toml").is_file() else ()
+    return *tree, _PACKAGE / "_data"
 
 
 def available(folder: str, pattern: str = "*.yaml") -> dict[str, Path]:
@@ -35,7 +38,7 @@ def available(folder: str, pattern: str = "*.yaml") -> dict[str, Path]:
 
 def is_there(name: str, folder: str) -> bool:
     """Whether there is a file of that name, without reading whole folders."""
-    return any((root / folder / f"{name}.yaml").is_file() for root in roots())
+    return any(root.joinpath(folder, f"{name}.yaml").is_file() for root in roots())
 
 
 def find(name: str, folder: str, suffix: str = ".yaml", base: Path | None = None) -> Path:

@@ -23,9 +23,11 @@ Direction = Literal["above", "below", "same"]
 
 
 def _distinct(levels: tuple[Level, ...]) -> tuple[Level, ...]:
-    for index, level in enumerate(levels):
-        if level in levels[:index]:
+    seen: set[Level] = set()
+    for level in levels:
+        if level in seen:
             raise ValueError(f"level {level!r} stands twice")
+        seen.add(level)
     return levels
 
 

@@ -12,7 +12,7 @@ from dva_sim import scenario as scenarios
 from dva_sim.config import Document, Path_
 from dva_sim.errors import ConfigError
 from dva_sim.experiments import designs
-from dva_sim.experiments.asking import POINT, REPEATS, TUNED, TUNING, Level, Part
+from dva_sim.experiments.asking import POINT, REPEATS, TUNED, TUNING, Level
 from dva_sim.experiments.identity import stable_hash
 from dva_sim.experiments.models import AnyScenario, model_for, model_of
 from dva_sim.experiments.repeats import (
@@ -100,6 +100,7 @@ def cells(study: Study) -> list[Cell]:
             measure that its runs do not have.
     """
     refuse_unknown_measures(study)
+    _at_ends(study)
     own = [cell for name in study.parts for cell in _cells_of(study, name)]
     return [*own, *_repeats_of(study)]
 
@@ -111,7 +112,7 @@ def refuse_unknown_measures(study: Study) -> None:
         ConfigError: it is none.
     """
     for path, part, measure in _asked_measures(study):
-        known = model_of(_source(study, study.parts[part])).measures()
+        known = model_of(_source(study, part)).measures()
         if measure not in known:
             problem = f"measure {measure!r} is unknown; known: {', '.join(known)}"
             raise study.error(problem, path)
@@ -131,7 +132,7 @@ def _asked_measures(study: Study) -> Iterator[tuple[Path_, str, str]]:
 
 def base_scenario(study: Study, part: str) -> AnyScenario:
     """A part's scenario before any factor has changed it."""
-    return _build(study, part, _source(study, study.parts[part]), {})
+    return _build(study, part, _source(study, part), {})
 
 
 def basis_of_tuning(study: Study) -> Basis:
@@ -164,20 +165,32 @@ def jobs(study: Study, grid: Sequence[Cell] | None = None) -> list[Job]:
 
 
 def to_rehearse(study: Study, every: Iterable[Cell]) -> list[Cell]:
-    """The cells in which a mistake would show: of points in ranges, the outermost of each."""
-    if POINT not in study.factors:
-        return list(every)
-    outermost = {row[POINT] for row in designs.outermost(study)}
-    return [c for c in every if not c.levels or dict(c.levels).get(POINT) in outermost]
+    """The cells in which a mistake would show: instead of points in ranges, the ranges' ends."""
+    ends = _at_ends(study)
+    return [*ends, *(cell for cell in every if not (ends and cell.levels))]
+
+
+def _at_ends(study: Study) -> list[Cell]:
+    """Cells at both ends of every range, whichever points are drawn; none without ranges.
+
+    Raises:
+        ConfigError: a range has an end that is not valid.
+    """
+    rows = list(designs.settings_at_ends(study))
+    return [cell for name in study.parts if rows for cell in _cells_at(study, name, rows)]
 
 
 def _cells_of(study: Study, name: str) -> Iterator[Cell]:
-    part = study.parts[name]
-    source = _source(study, part)
-    if part.reference is not None:
-        yield _cell(name, REFERENCE, {}, _build(study, name, source, part.reference))
-    change = _changer(study)
-    for index, levels in enumerate(designs.settings(study)):
+    reference = study.parts[name].reference
+    if reference is not None:
+        built = _build(study, name, _source(study, name), reference)
+        yield _cell(name, REFERENCE, {}, built)
+    yield from _cells_at(study, name, designs.settings(study))
+
+
+def _cells_at(study: Study, name: str, rows: Iterable[Mapping[str, Level]]) -> Iterator[Cell]:
+    source, change = _source(study, name), _changer(study)
+    for index, levels in enumerate(rows):
         yield _cell(name, index, levels, _build(study, name, source, change(levels)))
 
 
@@ -187,7 +200,7 @@ def _repeats_of(study: Study) -> Iterator[Cell]:
     if not factors or study.answer is None:
         return
     part, fixed, sets = study.answer.part, settings_of_repeats(study), parameter_sets(study)
-    source, change = _source(study, study.parts[part]), _changer(study)
+    source, change = _source(study, part), _changer(study)
     for index, levels in enumerate(_grid(factors)):
         chosen = dict(levels)
         traits = sets[int(str(chosen.pop(PARAMETERS)))]
@@ -225,8 +238,13 @@ def _cell(part: str, index: int, levels: Mapping[str, Level], scenario: AnyScena
     return Cell(part, index, tuple(levels.items()), scenario, config)
 
 
-def _source(study: Study, part: Part) -> Document:
-    return scenarios.load(part.scenario, base=study.folder)
+def _source(study: Study, part: str) -> Document:
+    path = ("parts", part, "scenario")
+    try:
+        return scenarios.load(study.parts[part].scenario, base=study.folder)
+    except ConfigError as error:
+        is_here = error.file is None and study.is_from_file(path)
+        raise study.error(error.problem, path) if is_here else error from None
 
 
 def _build(study: Study, part: str, source: Document, changes: Mapping[str, Any]) -> AnyScenario:
@@ -237,8 +255,7 @@ def _build(study: Study, part: str, source: Document, changes: Mapping[str, Any]
         return model.build(source, _located({**fixed, **changes}, study.folder))
     except ConfigError as error:
         every = {**study.parts[part].changes, **study.changes, **changes}
-        blamed = _blamed(study, part, error, every) if error.file is None else None
-        raise (blamed or error) from None
+        raise _blamed(study, part, error, every) from None
 
 
 def _located(changes: dict[str, Any], folder: Path) -> dict[str, Any]:
@@ -249,21 +266,35 @@ def _located(changes: dict[str, Any], folder: Path) -> dict[str, Any]:
     return {**changes, key: named["dispatch"]["policy"]} if key in changes else changes
 
 
-def _blamed(
-    study: Study, part: str, error: ConfigError, changes: Mapping[str, Any]
-) -> ConfigError | None:
-    places: list[Path_] = [("factors",), ("parts", part, "reference"), ("parts", part, "changes")]
-    places += [("treatments", f, level) for f, named in study.treatments.items() for level in named]
-    if study.is_full:
-        places.append(("full",))
-    for key, value in changes.items():
-        named = key in error.problem or (isinstance(value, str) and repr(value) in error.problem)
-        in_design = designs.place_of(study, key, value)
-        every = [*((*place, key) for place in places), *([in_design] if in_design else [])]
-        for path in every if named else ():
+def _blamed(study: Study, part: str, error: ConfigError, changes: Mapping[str, Any]) -> ConfigError:
+    """The mistake at the key of the study that makes it; as it is if a file has been named."""
+    if error.file is not None:
+        return error
+    named = {key: value for key, value in changes.items() if _is_named(key, value, error.problem)}
+    for key, value in named.items():
+        for path in _places(study, part, key, value):
             if study.is_from_file(path):
                 return study.error(error.problem, path)
-    return None
+    return ConfigError(f"--set: {error.problem}") if named and study.settings else error
+
+
+def _is_named(key: str, value: Any, problem: str) -> bool:
+    return key in problem or (isinstance(value, str) and repr(value) in problem)
+
+
+def _places(study: Study, part: str, key: str, value: Any) -> Iterator[Path_]:
+    """Where the study might give a key of its scenarios that value."""
+    yield "factors", key
+    yield "parts", part, "reference", key
+    yield "parts", part, "changes", key
+    for factor, levels in study.treatments.items():
+        for level in levels:
+            yield "treatments", factor, level, key
+    if study.is_full:
+        yield "full", key
+    in_design = designs.place_of(study, key, value)
+    if in_design is not None:
+        yield in_design
 
 
 def _jobs_of(study: Study, name: str, part_cells: Sequence[Cell]) -> Iterator[Job]:

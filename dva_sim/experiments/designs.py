@@ -10,7 +10,6 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from operator import itemgetter
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, field_validator, model_validator
@@ -28,8 +27,8 @@ if TYPE_CHECKING:
 
 Row = dict[str, Level]
 
-_MOST_POINTS = 2**16
-_MOST_CELLS = 10_000  # of a grid that listed rows may leave empty in part
+MOST_POINTS = 2**16
+MOST_CELLS = 10_000  # of a grid, which listed rows may leave empty in part
 
 
 class Span(Config):
@@ -76,7 +75,7 @@ Ranges = dict[
         Span, BeforeValidator(_spelled_out, json_schema_input_type=Span | tuple[float, float])
     ],
 ]
-Points = Annotated[int, Field(ge=2, le=_MOST_POINTS)]
+Points = Annotated[int, Field(ge=2, le=MOST_POINTS)]
 Dyadic = Annotated[Points, AfterValidator(_power_of_two)]
 
 
@@ -155,20 +154,32 @@ def all_factors(
     if design.is_sampled:
         return {POINT: tuple(range(design.points)), **declared}
     levels = {key: tuple(dict.fromkeys(row[key] for row in rows)) for key in rows[0]}
-    if math.prod(map(len, levels.values())) > _MOST_CELLS:
+    if math.prod(map(len, levels.values())) > MOST_CELLS:
         return {POINT: tuple(range(len(rows))), **declared}
     return {**levels, **declared}
 
 
 def settings(study: Study) -> Iterator[Row]:
     """The level of every factor in every cell, in the order of the cells: last factor fastest."""
-    for parts in itertools.product(*_axes(study)):
+    return _crossed(study, rows_of(study))
+
+
+def settings_at_ends(study: Study) -> Iterator[Row]:
+    """The same with each range at each of its ends, and the others in their middle.
+
+    Which points are drawn depends on the seed; whether the ends are valid does not.
+    """
+    return _crossed(study, _ends_of(study)) if _ranges_of(study) else iter(())
+
+
+def _crossed(study: Study, rows: list[Row]) -> Iterator[Row]:
+    for parts in itertools.product(*_axes(study, rows)):
         yield {key: level for part in parts for key, level in part.items()}
 
 
-def _axes(study: Study) -> Iterator[list[Row]]:
+def _axes(study: Study, rows: list[Row]) -> Iterator[list[Row]]:
     """What is crossed: the rows where the first of their factors stands, and each other factor."""
-    rows, in_rows = rows_of(study), together(study)
+    in_rows = together(study)
     for factor, levels in study.factors.items():
         if factor not in in_rows:
             yield [{factor: level} for level in levels]
@@ -194,11 +205,27 @@ def rows_of(study: Study) -> list[Row]:
     return [{POINT: i, **row} for i, row in enumerate(rows)] if POINT in study.factors else rows
 
 
-def outermost(study: Study) -> list[Row]:
-    """Of the points in ranges, those with the least or the greatest value of some factor."""
-    rows, ranges = rows_of(study), study.design.ranges if study.design is not None else {}
-    ends = [end(rows, key=itemgetter(key)) for key in ranges for end in (min, max)]
-    return ends or rows
+def _ends_of(study: Study) -> list[Row]:
+    from dva_sim.experiments.designs_sampled import value_at
+
+    spans = _ranges_of(study)
+    middle: Row = {key: value_at(span, 0.5) for key, span in spans.items()}
+    return [{**middle, key: value_at(spans[key], end)} for key in spans for end in (0.0, 1.0)]
+
+
+def _ranges_of(study: Study) -> Mapping[str, Span]:
+    return study.design.ranges if study.design is not None else {}
+
+
+def size(study: Study) -> int:
+    """How many cells each part has, without making them."""
+    design, in_rows = study.design, together(study)
+    crossed = math.prod(len(levels) for f, levels in study.factors.items() if f not in in_rows)
+    if design is None:
+        return crossed
+    if design.zip is not None:
+        return crossed * len(study.factors[design.zip[0]])
+    return crossed * (design.points or len(study.listed_rows))
 
 
 def together(study: Study) -> set[str]:

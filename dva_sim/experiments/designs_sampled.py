@@ -26,7 +26,7 @@ def sample(design: Design, seed: int) -> list[dict[str, Level]]:
     spans = design.ranges
     places = _places(design, len(spans), np.random.default_rng(derive_seed(seed, "design")))
     return [
-        {key: _value(span, float(u)) for (key, span), u in zip(spans.items(), place, strict=True)}
+        {key: value_at(span, float(u)) for (key, span), u in zip(spans.items(), place, strict=True)}
         for place in places
     ]
 
@@ -69,7 +69,7 @@ def saltelli(axes: int, base: int, rng: np.random.Generator) -> Floats:
     return blocks.reshape(-1, axes)
 
 
-def _value(span: Span, share: float) -> float | int:
+def value_at(span: Span, share: float) -> float | int:
     """What stands at a share of the way from `low` to `high`."""
     if span.scale == "whole":
         return min(int(span.high), math.floor(span.low + share * (span.high - span.low + 1)))

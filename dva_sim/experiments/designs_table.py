@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import csv
+import math
 import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from dva_sim.config import MOST_VALUES, Document, Path_, parse_scalar
+from dva_sim.config import MOST_VALUES, Document, Path_, parse_scalar, read_text
 from dva_sim.errors import ConfigError
 from dva_sim.experiments.asking import Level, refuse_keys_of_the_design
 
@@ -23,7 +24,7 @@ def read_table(path: Path) -> Document:
     Raises:
         ConfigError: unreadable, a row of another length, an empty cell, a key twice.
     """
-    lines = _lines(path)
+    lines = read_text(path).split("\n")
     places: dict[Path_, tuple[int, int]] = {}
     header: list[str] = []
     rows: list[dict[str, Level]] = []
@@ -46,15 +47,6 @@ def read_table(path: Path) -> Document:
     if not rows:
         raise ConfigError("should have a header of factors, and rows of levels", path, 1, 1)
     return Document({ROWS: rows}, path, places)
-
-
-def _lines(path: Path) -> list[str]:
-    try:
-        return path.read_text(encoding="utf-8-sig").split("\n")
-    except OSError as error:
-        raise ConfigError(f"cannot be read: {error.strerror}", path) from None
-    except UnicodeDecodeError:
-        raise ConfigError("is not text in UTF-8", path) from None
 
 
 def _cells(path: Path, lines: list[str]) -> Iterator[tuple[int, str, list[str]]]:
@@ -99,4 +91,7 @@ def _level(path: Path, line: int, column: int, key: str, text: str) -> Level:
         raise ConfigError(error.problem, path, line, column) from None
     if not isinstance(level, bool | int | float | str | None):
         raise ConfigError(f"{text.strip()!r} is not one level of {key!r}", path, line, column)
+    if isinstance(level, float) and not math.isfinite(level):
+        problem = f"level of {key!r} should be a finite number, not {level}"
+        raise ConfigError(problem, path, line, column)
     return level

@@ -19,7 +19,15 @@ from dva_sim.experiments.asking import (
     Prediction,
     refuse_keys_of_the_design,
 )
-from dva_sim.experiments.designs import keys_of, place_of, together
+from dva_sim.experiments.designs import (
+    MOST_CELLS,
+    MOST_POINTS,
+    keys_of,
+    place_of,
+    size,
+    together,
+)
+from dva_sim.experiments.dictionary import DESIGN, DICTIONARY
 
 if TYPE_CHECKING:
     from dva_sim.experiments.study import Study
@@ -84,6 +92,7 @@ def of_factors(study: Study) -> Iterator[Fault]:
         levels = _levels_of(study, factor)
         named = study.treatments.get(factor)
         if named is not None:
+            yield from _faults_of_name(study, factor)
             for level in (level for level in levels if level not in named):
                 known = ", ".join(named)
                 yield f"{level!r} is not a treatment; named: {known}", _place(study, factor, level)
@@ -99,6 +108,26 @@ def of_factors(study: Study) -> Iterator[Fault]:
     except ValueError as error:
         yield str(error), ()
     yield from _faults_of_tuning(study)
+    yield from _faults_of_size(study)
+
+
+def _faults_of_name(study: Study, factor: str) -> Iterator[Fault]:
+    """A treatment is a column of every table, so no other column is called so."""
+    measured = {name for model in DICTIONARY.values() for table in model.values() for name in table}
+    if factor in DESIGN or factor in measured or factor == TUNING:
+        what = "the design" if factor in DESIGN else "what is measured"
+        what = "the tuning" if factor == TUNING else f"a column of {what}"
+        yield f"a treatment cannot be called {factor!r}: {what} is", ("treatments", factor)
+
+
+def _faults_of_size(study: Study) -> Iterator[Fault]:
+    """A slip in a grid would take minutes to build and years to run."""
+    count, has_points = size(study), POINT in study.factors
+    most = MOST_POINTS if has_points else MOST_CELLS
+    if count > most:
+        how = "points or levels" if has_points else "levels, or draw points with 'design'"
+        problem = f"a part would have {count:,} cells, more than {most:,}; have fewer {how}"
+        yield problem, ("design",) if has_points else ("factors",)
 
 
 def _levels_of(study: Study, factor: str) -> Sequence[Level]:

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from types import UnionType
+from typing import Annotated, Any, Union, get_args, get_origin
+
+from pydantic import BaseModel
 
 from dva_sim.config import Path_
 from dva_sim.errors import ConfigError
@@ -30,7 +33,7 @@ class Changed:
         return not any(path[: len(t)] == t for t in self.touched)
 
 
-def change(before: Changed, pairs: Mapping[str, Any], known: Collection[str]) -> Changed:
+def change(before: Changed, pairs: Mapping[str, Any], model: type[BaseModel]) -> Changed:
     """Change some keys.
 
     A key of the study (`seed`, `factors.pattern`) changes the study. Any other is one of the
@@ -39,7 +42,7 @@ def change(before: Changed, pairs: Mapping[str, Any], known: Collection[str]) ->
     Args:
         before: What is changed.
         pairs: New values by dotted key.
-        known: Keys of a study.
+        model: The keys of a study.
 
     Raises:
         ConfigError: a part of a key that the study does not have.
@@ -47,35 +50,65 @@ def change(before: Changed, pairs: Mapping[str, Any], known: Collection[str]) ->
     data, changes, touched = copy.deepcopy(before.data), dict(before.changes), [*before.touched]
     factors = data.setdefault("factors", {})
     for key, value in pairs.items():
-        path = _study_path(key, factors, known)
-        if path is None:
+        if key not in factors and key.partition(".")[0] not in model.model_fields:
             changes[key] = value
-        else:
-            _put(data, path, [value] if _is_level(path, value) else value)
-            touched.append(path)
+            continue
+        path = ("factors", key) if key in factors else _path(data, key, model)
+        _put(data, path, [value] if _is_level(path, value) else value)
+        touched.append(path)
     return Changed(data, changes, tuple(touched))
-
-
-def _study_path(
-    key: str, factors: Mapping[str, Any], known: Collection[str]
-) -> tuple[str, ...] | None:
-    """Where a key stands in the study; None for a key of the scenario."""
-    head, _, rest = key.partition(".")
-    if key in factors:
-        return "factors", key
-    if head == "factors" and rest:
-        return "factors", rest
-    return tuple(key.split(".")) if head in known else None
 
 
 def _is_level(path: tuple[str, ...], value: Any) -> bool:
     return path[0] == "factors" and len(path) == 2 and not isinstance(value, list)
 
 
+def _path(data: Any, key: str, kind: Any) -> tuple[str, ...]:
+    """Where a dotted key of the study stands, by what may stand there.
+
+    Raises:
+        ConfigError: it leads through what is not there, or to what holds no keys.
+    """
+    path: tuple[str, ...] = ()
+    while key:
+        kind = _bare(kind)
+        there = data if isinstance(data, dict) else {}
+        if isinstance(kind, type) and issubclass(kind, BaseModel):
+            step = key.partition(".")[0]
+            field = kind.model_fields.get(step)
+            kind = field.annotation if field is not None else None
+        elif get_origin(kind) is dict:
+            kind = get_args(kind)[1]
+            step = _entry(there, key) if _holds_keys(_bare(kind)) else key
+        else:
+            raise ConfigError(f"{'.'.join(path)!r} holds no keys, so no {key!r}")
+        path, key, data = (*path, step), key[len(step) + 1 :], there.get(step)
+    return path
+
+
+def _bare(kind: Any) -> Any:
+    """A type without what may be said of it besides, and without its None."""
+    while get_origin(kind) in (Annotated, Union, UnionType):
+        kind = get_args(kind)[0]
+    return kind
+
+
+def _holds_keys(kind: Any) -> bool:
+    return get_origin(kind) is dict or (isinstance(kind, type) and issubclass(kind, BaseModel))
+
+
+def _entry(there: Mapping[str, Any], key: str) -> str:
+    """The name in a mapping that a dotted key begins with; the whole key may be a new name."""
+    names = [name for name in there if key == name or key.startswith(f"{name}.")]
+    if not names and "." in key:
+        known = ", ".join(there) or "nothing"
+        raise ConfigError(f"no {key.partition('.')[0]!r} in the study to change; there: {known}")
+    return max(names, key=len, default=key)
+
+
 def _put(data: dict[str, Any], path: tuple[str, ...], value: Any) -> None:
     for step in path[:-1]:
-        inner = data.get(step)
-        if not isinstance(inner, dict):
-            raise ConfigError(f"no {step!r} in the study to change; there: {', '.join(data)}")
-        data = inner
+        if not isinstance(data.get(step), dict):
+            data[step] = {}
+        data = data[step]
     data[path[-1]] = value

@@ -101,6 +101,7 @@ def register(study: Study, again: bool = False) -> str:
         plan=plan_of(study),
     )
     made = made.model_copy(update={"hash": made.proper_hash})
+    design.cells(study.model_copy(update={"seed": made.seed}))  # its points are valid, too
     try:
         path.write_text(_as_text(made), encoding="utf-8", newline="\n")
     except OSError as error:

@@ -17,7 +17,8 @@ from pydantic import Field, field_validator
 from dva_sim import resources
 from dva_sim.agents.operator.person import Population
 from dva_sim.config import Config, load_yaml, validate
-from dva_sim.experiments.asking import STRATEGY, Level, Range, Robustness
+from dva_sim.errors import ConfigError
+from dva_sim.experiments.asking import REPEATS, STRATEGY, Level, Range, Robustness
 from dva_sim.experiments.study import Study
 from dva_sim.streams import Streams
 
@@ -113,5 +114,9 @@ def _between(band: Range, share: float) -> float:
 
 
 def _bands_of(study: Study, robustness: Robustness) -> Mapping[str, Range]:
-    document = load_yaml(resources.find(robustness.bands, PEOPLE, base=study.folder))
+    try:
+        document = load_yaml(resources.find(robustness.bands, PEOPLE, base=study.folder))
+    except ConfigError as error:
+        here = study.error(error.problem, (REPEATS, "bands"))
+        raise here if error.file is None else error from None
     return validate(Bands, document.data, document.error).bands

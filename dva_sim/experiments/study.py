@@ -231,7 +231,7 @@ def _version(document: Document, full: bool) -> tuple[Study, Changed]:
             raise document.error("has no larger version: no key 'full'")
         return study, written
     try:
-        data = change(written, study.full, Study.model_fields)
+        data = change(written, study.full, Study)
         larger = _built(data, document)
     except ConfigError as error:
         raise _told_in_full(study, error) from None
@@ -252,7 +252,7 @@ def _told_in_full(study: Study, error: ConfigError) -> ConfigError:
 def _with_settings(data: Changed, document: Document, settings: tuple[str, ...]) -> Study:
     """The study changed by `--set`; claims about levels that are gone are gone, too."""
     try:
-        changed = change(data, parse_changes(settings), Study.model_fields)
+        changed = change(data, parse_changes(settings), Study)
         study = _built(changed, document, may_lose=True)
     except ConfigError as error:
         is_elsewhere = error.file not in (None, str(document.file))
@@ -285,9 +285,7 @@ def _built(data: Changed, document: Document, may_lose: bool = False) -> Study:
         document, places={p: at for p, at in document.places.items() if data.holds(p)}
     )
     study._changes = data.changes
-    if study.design is not None and study.design.csv is not None:
-        path = resources.find(study.design.csv, FOLDER, suffix=".csv", base=study.folder)
-        study._table = read_table(path)
+    study._table = _table_of(study)
     _tell_first(study, faults.of_design(study))
     factors = all_factors(study.design, study.factors, study.listed_rows)
     study = study.model_copy(update={"factors": factors})
@@ -298,6 +296,18 @@ def _built(data: Changed, document: Document, may_lose: bool = False) -> Study:
         _tell_first(study, faults.of_claims(study))
     _tell_first(study, faults.of_stop(study))
     return study
+
+
+def _table_of(study: Study) -> Document | None:
+    """The rows of the file that the design names; None if it names none."""
+    if study.design is None or study.design.csv is None:
+        return None
+    try:
+        path = resources.find(study.design.csv, FOLDER, suffix=".csv", base=study.folder)
+    except ConfigError as error:
+        problem = error.problem.replace("experiment ", "file of rows ", 1)
+        raise study.error(problem, ("design", "csv")) from None
+    return read_table(path)
 
 
 def _tell_first(study: Study, found: Iterable[faults.Fault]) -> None:

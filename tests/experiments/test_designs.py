@@ -8,7 +8,7 @@ import pytest
 from small_study import STUDY, cheap, study_in, write_study
 
 from dva_sim.errors import ConfigError
-from dva_sim.experiments import design
+from dva_sim.experiments import design, designs
 from dva_sim.experiments.designs_sampled import saltelli
 from dva_sim.experiments.results import Results
 from dva_sim.experiments.runner import run_study
@@ -117,6 +117,7 @@ def test_a_row_may_name_treatments(tmp_path):
         ("link.delay_s\n[1]\n", "rows.csv:2:1: '[1]' is not one level of 'link.delay_s'"),
         ("operator.person\n1\n", "rows.csv:1:1: 'operator.person' is set by the study"),
         ("link.delay_s\n", "rows.csv:1:1: should have a header of factors, and rows of levels"),
+        ("link.delay_s\n.nan\n", "rows.csv:2:1: level of 'link.delay_s' should be a finite"),
         ("pattern\npub-sub\n", "study.yaml:6:3: 'pattern' is varied by the design already"),
     ],
 )
@@ -125,13 +126,19 @@ def test_a_mistake_in_a_file_of_rows_is_told_with_line_and_column(tmp_path, csv,
     assert complaint(tmp_path, ONLY_PATTERN + "design: {csv: rows.csv}\n").startswith(told)
 
 
+def test_a_file_of_rows_in_another_encoding_is_told_with_line_and_column(tmp_path):
+    (tmp_path / "rows.csv").write_bytes("link.delay_s\n0.5\nzw\u00f6lf\n".encode("latin-1"))
+    told = complaint(tmp_path, ONLY_PATTERN + "design: {csv: rows.csv}\n")
+    assert told == "rows.csv:3:3: is not text in UTF-8"
+
+
 @pytest.mark.parametrize(
     ("asked", "told"),
     [
         ("{}", "study.yaml:14:1: design: should have one of zip, rows, csv, latin_hypercube"),
         ("{sobol: 8, latin_hypercube: 8}", "study.yaml:14:1: design: should have one of zip"),
         ("{sobol: 8}", "study.yaml:14:1: design: sobol needs ranges"),
-        ("{csv: no.csv}", "'no.csv' not found"),
+        ("{csv: no.csv}", "study.yaml:14:10: file of rows 'no.csv' not found"),
         ("{zip: [pattern, link.loss]}", "study.yaml:14:25: 'link.loss' is not a factor; factors"),
         ("{zip: [pattern, pattern]}", "study.yaml:14:25: 'pattern' stands twice"),
         ("{rows: [{link.loss: 0}, {link.los: 1}]}", "study.yaml:14:33: row should name the same"),
@@ -283,16 +290,56 @@ def test_every_model_takes_a_sampled_factor(tmp_path, scenario, key, low, high):
     assert all(low <= dict(cell.levels)[key] <= high for cell in cells)
 
 
-def test_of_many_points_only_the_outermost_are_rehearsed(tmp_path):
+def test_of_many_points_only_the_ends_of_the_ranges_are_rehearsed(tmp_path):
     study = study_in(tmp_path, text=ONLY_PATTERN + SAMPLED.format(kind="sobol"))
-    cells = [cell for cell in design.cells(study) if cell.part == "drive"]
-    chosen = [dict(cell.levels) for cell in design.to_rehearse(study, cells)]
-    every = [dict(cell.levels) for cell in cells]
-    assert chosen[0] == {}
-    assert len(chosen) <= 1 + 2 * 6 < len(every)
-    for key in ("link.delay_s", "link.loss"):
-        values = [cell[key] for cell in every if cell]
-        assert {min(values), max(values)} <= {cell[key] for cell in chosen if cell}
+    chosen = [c for c in design.to_rehearse(study, design.cells(study)) if c.part == "drive"]
+    assert [dict(c.levels) for c in chosen if not c.levels] == [{}]
+    ends = [tuple(dict(c.levels).values()) for c in chosen if c.scenario.pattern == "req-rep"]
+    assert ends == [
+        (0, 0.01, 3, "req-rep"),
+        (0.5, 0.01, 3, "req-rep"),
+        (0.25, 0.001, 3, "req-rep"),
+        (0.25, 0.1, 3, "req-rep"),
+        (0.25, 0.01, 1, "req-rep"),
+        (0.25, 0.01, 4, "req-rep"),
+    ]
+
+
+def test_an_end_of_a_range_that_no_point_meets_must_be_valid_too(tmp_path):
+    """Two points with seed 3 lie below 0.9, as the scenario wants it; others might not."""
+    text = ONLY_PATTERN + "design: {sobol: 2, ranges: {link.loss: [0, 0.95]}}\n"
+    assert "study.yaml:14:29: link.loss: input should be less than" in complaint(tmp_path, text)
+
+
+@pytest.mark.parametrize(
+    ("asked", "cells"),
+    [
+        ("{}", 4),
+        ("design: {zip: [pattern, link.delay_s]}", 2),
+        ("design: {rows: [{link.loss: 0}, {link.loss: 0.1}, {link.loss: 0.2}]}", 12),
+        ("design: {sobol: 8, ranges: {link.loss: [0, 0.1]}}", 32),
+        ("design: {saltelli: 8, ranges: {link.loss: [0, 0.1]}}", 96),
+    ],
+)
+def test_how_many_cells_there_will_be_is_known_before_they_are_made(tmp_path, asked, cells):
+    study = study_in(tmp_path, text=PLAIN + asked.replace("{}", "", 1))
+    assert designs.size(study) == len(levels(study)) == cells
+
+
+def test_a_grid_of_ten_thousand_cells_is_taken_and_a_larger_one_is_refused(tmp_path):
+    losses = [i / 1000 for i in range(100)]
+    grid = PLAIN.replace(DELAYS, f"  link.loss: {losses}\n  link.delay_s: {{delays}}\n")
+    delays = [i / 1000 for i in range(51)]
+    taken = study_in(tmp_path, text=grid.replace("{delays}", str(delays[:50])))
+    assert designs.size(taken) == 10_000
+    told = "study.yaml:5:1: a part would have 10,200 cells, more than 10,000; have fewer levels"
+    assert complaint(tmp_path, grid.replace("{delays}", str(delays))).startswith(told)
+
+
+def test_too_many_points_with_too_many_levels_are_refused(tmp_path):
+    text = PLAIN + "design: {sobol: 65536, ranges: {link.loss: [0, 0.1]}}\n"
+    told = complaint(tmp_path, text)
+    assert told.startswith("study.yaml:15:1: a part would have 262,144 cells, more than 65,536")
 
 
 def test_an_item_of_a_list_can_be_a_factor(tmp_path):

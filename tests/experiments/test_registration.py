@@ -245,6 +245,14 @@ def test_points_of_a_registered_design_follow_from_the_registration(tmp_path, de
     assert [dict(cell.levels) for cell in design.cells(study)] != before
 
 
+def test_a_range_with_an_end_that_is_not_valid_cannot_be_registered(tmp_path):
+    design_ = "design: {sobol: 2, ranges: {link.loss: [0, 0.95]}}\n"
+    path = write_study(tmp_path, CLAIMED + design_)
+    with pytest.raises(ConfigError, match=r"link\.loss: input should be less than"):
+        register(load_study(path))
+    assert not beside(path).exists()
+
+
 def test_a_registration_is_checked_with_the_study_beside_it(tmp_path):
     path = registered(tmp_path)
     assert (check_file(beside(path)).kind, check_file(beside(path)).problems) == (

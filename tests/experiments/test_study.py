@@ -62,6 +62,25 @@ def test_a_study_that_makes_no_sense_is_refused(tmp_path, old, new, place):
     assert complaint(tmp_path, old, new).startswith(place)
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("persons: 3", "persons: true", "study:3:1: persons: input should be a valid integer, not"),
+        ("persons: 3", 'persons: "3"', "study:3:1: persons: input should be a valid integer, not"),
+        ("persons: 3", "persons: 3.0", "study:3:1: persons: input should be a valid integer, not"),
+        ("fect_s: 2.0", 'fect_s: "2"', "study:21:3: answer.smallest_effect_s: input should be a"),
+        ("0.25]", ".nan]", "study:7:21: factors.link.delay_s.1: input should be a finite number"),
+        ("0.25]", "[1]]", "study:7:21: factors.link.delay_s.1: should be a number, text, or true"),
+        ("[0, 0.25]", "[]", "study:7:3: factors.link.delay_s: should have at least 1 item"),
+        ("[0, 0.25]", "0.25", "study:7:3: factors.link.delay_s: should be a list, not 0.25"),
+        ("-rep, latest-wins]\n  over", "-rep]\n  over", "study:19:3: answer.contrast: should have"),
+        ("scenario: one.yaml", "scenario: on.yaml", "study:10:5: scenario 'on.yaml' not found"),
+    ],
+)
+def test_a_value_of_another_kind_is_refused_in_plain_words(tmp_path, old, new, told):
+    assert complaint(tmp_path, old, new).startswith(told)
+
+
 def test_settings_of_the_study_change_the_study(tmp_path):
     study = study_in(tmp_path, "seed=9", "persons=2", "parts.drive.replications=4")
     assert (study.seed, study.persons, study.replications) == (9, 2, 2)
@@ -80,6 +99,29 @@ def test_any_other_setting_changes_the_scenario_of_every_part(tmp_path):
     assert {cell.scenario.robot.processing_s for cell in design.cells(study)} == {0.2}
 
 
+@pytest.mark.parametrize(
+    ("setting", "scenario_key", "value"),
+    [
+        ("parts.drive.changes.horizon_s=10", "horizon_s", 10),
+        ("parts.drive.changes.link.loss=0.1", "link.loss", 0.1),
+    ],
+)
+def test_a_setting_may_go_into_a_mapping_that_the_file_leaves_out(
+    tmp_path, setting, scenario_key, value
+):
+    study = study_in(tmp_path, setting)
+    assert study.parts["drive"].changes == {scenario_key: value}
+    assert study.parts["story"].changes == {}
+
+
+def test_a_setting_may_begin_a_key_that_the_file_leaves_out(tmp_path):
+    study = study_in(tmp_path, "answer.within.link.delay_s=0.25", "answer.over=null")
+    assert study.answer.within == {"link.delay_s": 0.25}
+    told = "--set: missing key 'stop.batch_persons'"
+    with pytest.raises(ConfigError, match=told):
+        study_in(tmp_path, "stop.half_width=1", "stop.comparison=answer")
+
+
 def test_a_setting_that_takes_the_contrast_away_leaves_no_declared_answer(tmp_path):
     assert study_in(tmp_path, "link.delay_s=1").answer is not None
     assert study_in(tmp_path, "pattern=req-rep").answer is None
@@ -92,8 +134,12 @@ def test_a_setting_that_takes_the_contrast_away_leaves_no_declared_answer(tmp_pa
         ("persons=none", "--set: persons: input should be a valid integer"),
         ("parts.drve.replications=2", "--set: no 'drve' in the study"),
         ("operator.person=3", "'operator.person' is set by the study"),
-        ("robot.procesing_s=1", "unknown key 'robot.procesing_s'; did you mean 'processing_s'"),
-        ("link.delay_s=-1", "link.delay_s: input should be greater than or equal to 0"),
+        ("persons.a=3", "--set: 'persons' holds no keys, so no 'a'"),
+        (
+            "robot.procesing_s=1",
+            "--set: unknown key 'robot.procesing_s'; did you mean 'pro",
+        ),
+        ("link.delay_s=-1", "--set: link.delay_s: input should be greater than or equal to 0"),
     ],
 )
 def test_a_setting_that_makes_no_sense_is_refused_in_one_line(tmp_path, setting, told):
@@ -154,6 +200,22 @@ predictions:
   - text: Nobody will notice.
 """
 )
+
+
+@pytest.mark.parametrize(
+    ("name", "told"),
+    [
+        ("person", "a treatment cannot be called 'person': a column of the design is"),
+        ("config", "a treatment cannot be called 'config': a column of the design is"),
+        ("drive_time_s", "a treatment cannot be called 'drive_time_s': a column of what is"),
+        ("tuning", "a treatment cannot be called 'tuning': the tuning is"),
+    ],
+)
+def test_a_treatment_cannot_be_called_as_another_column(tmp_path, name, told):
+    path = write_study(tmp_path, (TREATED + TREATMENTS).replace("remedy", name))
+    with pytest.raises(ConfigError) as caught:
+        load_study(path)
+    assert str(caught.value).startswith(f"{path}:23:3: {told}")
 
 
 def test_predictions_are_kept_in_words_and_numbers(tmp_path):
