@@ -111,9 +111,10 @@ def judged(study: Mapping[str, Any], runs: Table) -> Judgement:
     what speaks against hypotheses is adjusted among its own.
     """
     compared, tested = _compare_all(study, runs), _test_all(study, runs)
-    families = [x.contrast.family for x in (*compared, *tested)]
-    adjusted = holm([x.p for x in (*compared, *tested)], families)
-    against = holm([t.p_against for t in tested], families[len(compared) :])
+    claimed = [t.contrast.family for t in tested]
+    families = [*(c.contrast.family for c in compared), *claimed]
+    adjusted = holm([*(c.p for c in compared), *(t.p for t in tested)], families)
+    against = holm([t.p_against for t in tested], claimed)
     of_claims = zip(tested, adjusted[len(compared) :], against, strict=True)
     verdicts = [replace(t, adjusted=float(p), against=float(q)) for t, p, q in of_claims]
     return Judgement(
@@ -225,8 +226,8 @@ def _tested(
     found = paired_difference(*pairs) if pairs is not None else None
     if pairs is None or found is None or not found.n_persons:
         return Tested(name, claim, contrast, at)
-    ps = {"p": _p(claim, pairs), "p_against": _p_against(claim, pairs)}
-    return Tested(name, claim, contrast, at, found, **ps)
+    p, against = _p(claim, pairs), _p_against(claim, pairs)
+    return Tested(name, claim, contrast, at, found, p=p, p_against=against)
 
 
 def _p(claim: Hypothesis, pairs: Pairs) -> float:

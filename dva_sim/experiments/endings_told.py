@@ -107,9 +107,15 @@ def _share(found: Interval) -> str:
 
 def _note(view: View, cluster: str) -> str:
     where = f" with {setting(view.panels[0])}" if view.panels[0] else ""
+    drives = (
+        " An event is open until the DVA closes it, so a drive that was given up late may leave it "
+        "open; in the table of cells stands how last drives ended."
+        if view.part.has("confirmed")
+        else ""
+    )
     return (
         f"Shares of the events{where} that had ended in each way, with 95 % intervals. What comes "
         "first rules out the others, so they compete, and a row adds up to 100 % (cumulative "
         f"incidence, Aalen-Johansen). Each interval is of its share alone, with the {cluster} "
-        "as the cluster. Conditions in which all were confirmed are left out."
+        f"as the cluster. Conditions in which all were confirmed are left out.{drives}"
     )

@@ -167,7 +167,7 @@ def _alike(reading: Reading) -> str:
     if reading.pair_correlation is None:
         return ""
     words = (
-        f"; the two sides of the contrast correlate with {reading.pair_correlation:.2f} at the "
+        f"; the two sides of the contrast correlate with {number(reading.pair_correlation)} at the "
         "last level"
     )
     found = _reduction(reading)

@@ -26,6 +26,7 @@ from dva_sim.experiments.endings_told import sentences as sentences_of_endings
 from dva_sim.experiments.endings_told import table as endings_table
 from dva_sim.experiments.figures import Drawn
 from dva_sim.experiments.labels import (
+    capital,
     factor_name,
     is_in_file,
     level_name,
@@ -140,7 +141,7 @@ def _endings(reading: Reading) -> Iterator[Block]:
 
 def _needed(reading: Reading) -> Iterator[Block]:
     if reading.plans:
-        yield Heading("Persons that a study of this would need")
+        yield Heading(f"{capital(reading.cluster)}s that a study of this would need")
         yield Printed(plan_table(reading.plans, reading.cluster), is_words=True)
 
 

@@ -66,7 +66,8 @@ def comparison_table(found: Judgement) -> CellTable:
         ]
         for c in compared
     ]
-    families = Counter(x.contrast.family for x in (*compared, *found.tested))
+    families = Counter(c.contrast.family for c in compared)
+    families.update(t.contrast.family for t in found.tested)
     counted = "; ".join(f"{name}: {count}" for name, count in families.items())
     note = (
         "Each interval is of its row alone; p is of the permutation test (the labels of a person's "
