@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Field, field_validator, model_validator
+from pydantic import AfterValidator, ConfigDict, Field, field_validator, model_validator
 
 from dva_sim.config import Config
 
@@ -37,11 +37,24 @@ def _ascending(range_: tuple[float, float]) -> tuple[float, float]:
     return range_
 
 
-Levels = Annotated[tuple[Level, ...], Field(min_length=1), AfterValidator(_distinct)]
+Levels = Annotated[
+    tuple[Level, ...],
+    Field(min_length=1, json_schema_extra={"uniqueItems": True}),
+    AfterValidator(_distinct),
+]
 Count = Annotated[int, Field(ge=1)]
 Seed = Annotated[int, Field(ge=0, lt=2**63)]
 Range = Annotated[tuple[float, float], AfterValidator(_ascending)]
 Changes = dict[str, Any]
+
+
+def says(*keys: str, not_: str = "") -> dict[str, Any]:
+    """The JSON Schema of a mapping with something under these keys, and nothing under another."""
+    rules: dict[str, Any] = {key: {"not": {"type": "null"}} for key in keys}
+    return {
+        "required": list(keys),
+        "properties": rules | ({not_: {"maxProperties": 0}} if not_ else {}),
+    }
 
 
 def refuse_keys_of_the_design(keys: Iterable[str]) -> None:
@@ -123,6 +136,15 @@ class Hypothesis(Config):
             `within`, and the last level of the factor it runs `over`.
     """
 
+    model_config = ConfigDict(
+        json_schema_extra={
+            "anyOf": [
+                {"properties": {"direction": {"enum": ["above", "below"]}}},
+                {"required": ["margin"], "properties": {"margin": {"exclusiveMinimum": 0}}},
+            ]
+        }
+    )
+
     text: str = ""
     comparison: str = ANSWER
     direction: Direction
@@ -155,6 +177,10 @@ class Stop(Config):
         Chow & Robbins, Annals of Mathematical Statistics 36 (1965), 457-462: why a fixed width
         can be waited for, and that the interval holds in the limit only.
     """
+
+    model_config = ConfigDict(
+        json_schema_extra={"oneOf": [says("comparison"), says("measure", "part")]}
+    )
 
     half_width: Annotated[float, Field(gt=0)]
     measure: str | None = None

@@ -12,7 +12,14 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field, field_validator, model_validator
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    field_validator,
+    model_validator,
+)
 
 from dva_sim.config import Config, Path_
 from dva_sim.experiments.asking import (
@@ -20,6 +27,7 @@ from dva_sim.experiments.asking import (
     Level,
     Levels,
     refuse_keys_of_the_design,
+    says,
 )
 
 if TYPE_CHECKING:
@@ -76,7 +84,20 @@ Ranges = dict[
     ],
 ]
 Points = Annotated[int, Field(ge=2, le=MOST_POINTS)]
-Dyadic = Annotated[Points, AfterValidator(_power_of_two)]
+Dyadic = Annotated[
+    Points,
+    AfterValidator(_power_of_two),
+    Field(json_schema_extra={"enum": [2**n for n in range(1, 17)]}),
+]
+
+LISTED = ("zip", "rows", "csv")
+SAMPLED = ("latin_hypercube", "sobol", "saltelli")
+KINDS = (*LISTED, *SAMPLED)
+
+_ONE_KIND: list[Any] = [
+    *(says(kind, not_="ranges") for kind in LISTED),
+    *(says(kind, "ranges") for kind in SAMPLED),
+]
 
 
 class Design(Config):
@@ -92,6 +113,8 @@ class Design(Config):
             estimated from: it has two more points for each than there are ranges.
         ranges: Continuous factors: `[low, high]`, or `{low, high, scale}`.
     """
+
+    model_config = ConfigDict(json_schema_extra={"oneOf": _ONE_KIND})
 
     zip: Annotated[tuple[str, ...], Field(min_length=2)] | None = None
     rows: Annotated[tuple[Row, ...], Field(min_length=1)] | None = None
@@ -136,9 +159,6 @@ class Design(Config):
         if self.saltelli is not None:
             return self.saltelli * (len(self.ranges) + 2)
         return self.latin_hypercube or self.sobol or 0
-
-
-KINDS = ("zip", "rows", "csv", "latin_hypercube", "sobol", "saltelli")
 
 
 def all_factors(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import dva_sim
@@ -33,21 +33,37 @@ _CODE = (
     "experiments/transports",
     "experiments/workload.py",
 )
+# What says whether a hypothesis held: a registration fixes it, other results may be judged anew.
+_JUDGES = (
+    "experiments/contrasts.py",
+    "experiments/effects.py",
+    "experiments/reading.py",
+    "experiments/statistics",
+)
 _EDITED = ("agents", "protocol", "worlds")
 _SUFFIXES = {".yaml", ".geojson", ".xsd", ".pgm", ".png", ".py"}
 
 
 def fingerprint() -> str:
     """64 bits over the simulating code and every profile, site and schema within reach."""
+    return _hash_of((*_code(_CODE), *_edited()))
+
+
+def fingerprint_of_judges() -> str:
+    """64 bits over the code that comes from tables of runs to verdicts."""
+    return _hash_of(_code(_JUDGES))
+
+
+def _hash_of(files: Iterable[tuple[str, Path]]) -> str:
     total = hashlib.sha256()
-    for name, path in (*_code(), *_edited()):
+    for name, path in files:
         total.update(name.encode() + b"\0" + hashlib.sha256(path.read_bytes()).digest())
     return total.hexdigest()[:16]
 
 
-def _code() -> Iterator[tuple[str, Path]]:
+def _code(parts: Iterable[str]) -> Iterator[tuple[str, Path]]:
     package = Path(dva_sim.__file__).parent
-    for part in _CODE:
+    for part in parts:
         start = package / part
         for path in sorted(start.rglob("*.py")) if start.is_dir() else [start]:
             yield path.relative_to(package).as_posix(), path

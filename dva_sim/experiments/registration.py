@@ -16,7 +16,7 @@ from dva_sim.config import Config, Document, load_yaml, validate
 from dva_sim.errors import ConfigError, DvaSimError
 from dva_sim.experiments import design
 from dva_sim.experiments.asking import POINT
-from dva_sim.experiments.fingerprint import fingerprint
+from dva_sim.experiments.fingerprint import fingerprint, fingerprint_of_judges
 from dva_sim.experiments.identity import digest, inputs, stable_hash
 from dva_sim.experiments.status import Status
 from dva_sim.experiments.study import Study
@@ -33,6 +33,7 @@ class Registration(Config):
     Attributes:
         study: Name of the study.
         made_with: Version of the program, and the fingerprint of what simulates.
+        judged_with: The fingerprint of what will judge the hypotheses.
         full: Whether it is the larger version.
         earlier: Hashes of the registrations that this one replaces, the oldest first.
         plan: All that is fixed: the keys of the study, and hashes of its rows, its scenarios
@@ -43,6 +44,7 @@ class Registration(Config):
 
     study: str
     made_with: str
+    judged_with: str = ""
     full: bool = False
     earlier: tuple[str, ...] = ()
     plan: dict[str, Any]
@@ -96,6 +98,7 @@ def register(study: Study, again: bool = False) -> str:
     made = Registration(
         study=study.file.stem,
         made_with=f"{__version__} {fingerprint()}",
+        judged_with=fingerprint_of_judges(),
         full=study.is_full,
         earlier=(*found.earlier, found.hash) if found is not None else (),
         plan=plan_of(study),

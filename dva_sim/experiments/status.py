@@ -8,6 +8,7 @@ from typing import Any, Literal
 from pydantic import Field
 
 from dva_sim.config import Config
+from dva_sim.experiments.fingerprint import fingerprint_of_judges
 from dva_sim.experiments.limit import RunTooLong
 
 
@@ -33,14 +34,25 @@ def status_of(manifest: Mapping[str, Any]) -> Status:
     """What the result may be called; results that do not say are judged by what was set.
 
     A confirmation has all the runs that were registered. Runs that took too long are others on
-    another machine.
+    another machine. Verdicts are made anew whenever they are told, by the program as it is then.
     """
     if "status" in manifest:
-        return _without(manifest.get("failures", []), Status.model_validate(manifest["status"]))
+        status = Status.model_validate(manifest["status"])
+        return _judged_anew(_without(manifest.get("failures", []), status))
     changes = [_as_words(change) for change in manifest.get("set", [])]
     if not changes:
         return Status(kind="declared")
     return Status(kind="exploratory", why=(f"changed on the command line: {', '.join(changes)}",))
+
+
+def _judged_anew(status: Status) -> Status:
+    """The status, with a word if hypotheses are judged by another program than was registered."""
+    meant = (status.registration or {}).get("judged_with", "")
+    now = fingerprint_of_judges()
+    if meant in ("", now):
+        return status
+    remark = f"what judges its hypotheses has changed since it was registered ({meant}; now {now})"
+    return status.model_copy(update={"why": (*status.why, remark)})
 
 
 def _without(failed: Sequence[Mapping[str, Any]], status: Status) -> Status:

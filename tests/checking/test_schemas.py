@@ -9,6 +9,7 @@ from lxml import etree
 from dva_sim.checking.schemas import KINDS, schema_text
 from dva_sim.config import load_yaml
 from dva_sim.errors import ConfigError
+from dva_sim.experiments.study import load_study
 
 ROOT = Path(__file__).parents[2]
 SHIPPED = {
@@ -34,8 +35,8 @@ SILENT = {"$schema", "$defs", "title", "description", "default", "discriminator"
 ONLY_FOR = {
     (int, float): {"minimum", "maximum", "exclusiveMinimum", "exclusiveMaximum"},
     str: {"minLength", "maxLength"},
-    list: {"items", "prefixItems", "minItems", "maxItems"},
-    dict: {"properties", "required", "additionalProperties", "minProperties"},
+    list: {"items", "prefixItems", "minItems", "maxItems", "uniqueItems"},
+    dict: {"properties", "required", "additionalProperties", "minProperties", "maxProperties"},
 }  # keywords that say nothing of values of another type
 
 
@@ -60,6 +61,15 @@ class Validator:
 
     def _oneOf(self, data, schema):  # noqa: N802
         return sum(self.accepts(data, inner) for inner in schema["oneOf"]) == 1
+
+    def _not(self, data, schema):
+        return not self.accepts(data, schema["not"])
+
+    def _uniqueItems(self, data, schema):  # noqa: N802
+        return all(item not in data[:i] for i, item in enumerate(data))
+
+    def _maxProperties(self, data, schema):  # noqa: N802
+        return len(data) <= schema["maxProperties"]
 
     def _type(self, data, schema):
         flag = isinstance(data, bool) and schema["type"] in ("integer", "number")
@@ -149,6 +159,7 @@ def test_ranges_and_choices_are_in_the_schema():
 
 NEW_KEYS = """\
 question: what?
+persons: 4
 parts: {it: {scenario: drive-to-event}}
 factors: {pattern: [req-rep, latest-wins]}
 design:
@@ -161,7 +172,7 @@ hypotheses:
 stop: {half_width: 1, comparison: far, batch_persons: 2, most_persons: 9}
 budget_s: 60
 record: worst
-full: {persons: 40}
+full: {persons: 8}
 """
 
 
@@ -186,11 +197,32 @@ def test_what_a_study_may_say_of_designs_claims_and_stops_is_in_the_schema(tmp_p
         ("record: worst", "record: best"),
         ("budget_s: 60", "budget_s: 0"),
         ("measure: contacts, ", ""),
+        ("sobol: 8", "sobol: 6"),
+        ("sobol: 8", "sobol: true"),
+        ("sobol: 8", 'sobol: "8"'),
+        ("sobol: 8\n", "rows: [{link.loss: 0}]\n"),
+        ("sobol: 8\n", "sobol: 8\n  latin_hypercube: 8\n"),
+        ("  sobol: 8\n", ""),
+        ("latest-wins]}\nhyp", "latest-wins], within: 3}\nhyp"),
+        ("pattern: [req-rep, latest-wins]", "pattern: [req-rep, req-rep]"),
+        ("direction: above, margin: 0.5", "direction: same"),
+        ("direction: above, margin: 0.5", "direction: same, margin: 0"),
+        ("comparison: far, batch", "batch"),
+        ("comparison: far, batch", "measure: contacts, batch"),
+        ("comparison: far, batch", "comparison: far, measure: contacts, part: it, batch"),
     ],
 )
-def test_a_mistake_there_does_not_follow_the_schema(tmp_path, old, new):
+def test_a_mistake_there_follows_neither_the_schema_nor_the_program(tmp_path, old, new):
     assert old in NEW_KEYS
-    assert not accepts_study(tmp_path, NEW_KEYS.replace(old, new))
+    text = NEW_KEYS.replace(old, new)
+    assert not accepts_study(tmp_path, text)
+    with pytest.raises(ConfigError):
+        load_study(tmp_path / "study.yaml")
+
+
+def test_what_follows_the_schema_is_taken_by_the_program(tmp_path):
+    (tmp_path / "study.yaml").write_text(NEW_KEYS)
+    assert load_study(tmp_path / "study.yaml").design.sobol == 8
 
 
 def test_the_schema_tells_what_each_key_of_a_study_means():

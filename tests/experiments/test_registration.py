@@ -199,6 +199,18 @@ def test_another_program_is_told_and_changes_nothing_else(tmp_path, monkeypatch)
     assert remark.endswith("another)")
 
 
+def test_other_code_that_judges_is_told_whenever_verdicts_are(tmp_path, monkeypatch):
+    study = load_study(registered(tmp_path))
+    manifest = {"status": study.status.model_dump(mode="json")}
+    assert status_of(manifest).why == ()
+    monkeypatch.setattr("dva_sim.experiments.status.fingerprint_of_judges", lambda: "another")
+    told = status_of(manifest)
+    assert told.kind == "confirmatory"
+    (remark,) = told.why
+    assert remark.startswith("what judges its hypotheses has changed since it was registered (")
+    assert remark.endswith("now another)")
+
+
 def test_registering_anew_has_to_be_meant_and_is_told(tmp_path):
     path = registered(tmp_path)
     first = load_registration(load_yaml(beside(path)))

@@ -108,6 +108,14 @@ def test_it_is_enough_once_every_width_is_below_the_bound(tmp_path):
     assert not stopping.is_enough(study, rows_of(study, one_wide_cell, 6))
 
 
+@pytest.mark.parametrize("text", [STUDY + STOP, STUDY + ON_ANSWER])
+def test_where_all_persons_are_alike_the_first_batch_is_enough(tmp_path, text):
+    study = study_in(tmp_path, text=text)
+    rows = rows_of(study, lambda job: 40.0 + job.index, 3)
+    assert (stopping.half_widths(study, study.stop, rows) == 0).all()
+    assert stopping.is_enough(study, rows)
+
+
 def test_a_contrast_is_paired_so_what_a_person_brings_along_does_not_count(tmp_path):
     study = study_in(tmp_path, text=STUDY + ON_ANSWER)
 
