@@ -72,7 +72,7 @@ def run(
         full: The study's larger version.
         pilot: Only so many persons, with luck of their own.
         jobs: Processes of this machine; by default one for each core.
-        scheduler: Address of a dask.distributed cluster to use instead.
+        scheduler: Address of a dask.distributed cluster to use instead; recordings are made here.
         limit_s: A run that takes longer, by the wall clock, has failed.
         progress: Called with the number of runs done and of all runs, as they finish.
         report: Whether to write the report.

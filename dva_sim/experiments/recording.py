@@ -6,6 +6,7 @@ study. What is chosen hangs on the tables alone: not on processes, interruptions
 
 from __future__ import annotations
 
+import errno
 import math
 import os
 from collections.abc import Callable, Iterable, Mapping
@@ -25,6 +26,7 @@ from dva_sim.experiments.study import Study
 from dva_sim.scenario import Scenario
 
 FOLDER = "recordings"
+_FULL = os.strerror(errno.ENOSPC)
 MORE_IS_BETTER = frozenset({"confirmed", "evacuated_share", "commands_applied"})
 """Measures whose smallest value is the worst; of all others the largest is."""
 
@@ -68,7 +70,8 @@ def record_study(
         limit_s: A run that takes longer, by the wall clock, has failed.
 
     Returns:
-        What went wrong, a line for each recording that could not be made.
+        What went wrong, a line for each recording that could not be made; of a full disk one
+        line for all of them.
 
     Raises:
         ConfigError: what `refuse_what_cannot_be_recorded` says, or no results there.
@@ -93,6 +96,8 @@ def record_study(
                 done += outcome.error is None
                 problems += [] if outcome.error is None else [outcome.error]
                 tell(done, total)
+                if (outcome.error or "").endswith(_FULL):
+                    return [f"{outcome.error}; {done} of {total} are made: free space, then again"]
     except KeyboardInterrupt:
         raise KeyboardInterrupt(f"{done} of {total} recordings are made") from None
     return sorted(problems)

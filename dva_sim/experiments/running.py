@@ -181,6 +181,8 @@ def _recorded(study: Study, folder: Path, workers: Workers) -> int:
         return 0
     from dva_sim.experiments.recording import record_study
 
+    if workers.scheduler is not None:
+        say("Recordings are made on this machine, from the same seeds")
     with _shown("recording", 0) as show:
         problems = record_study(
             study, folder, jobs=workers.jobs, progress=show, limit_s=workers.limit_s

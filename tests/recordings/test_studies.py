@@ -1,6 +1,8 @@
 """Which runs of a study are kept, and that they are the same however they are made."""
 
+import errno
 import math
+import os
 import resource
 from dataclasses import replace
 from pathlib import Path
@@ -203,6 +205,28 @@ def test_a_full_disk_costs_recordings_and_not_the_study(kept):
     assert [problem.partition(": ")[0] for problem in problems] == ["DvaSimError"] * 3
     assert all("cannot be written: File too large" in problem for problem in problems)
     assert recordings(out) == {}
+    assert record_study(study, out, jobs=1) == []
+    assert recordings(out) == before
+
+
+def test_a_disk_with_no_room_left_is_told_once_and_no_further_run_is_made(kept, monkeypatch):
+    study, out = kept
+    before = recordings(out)
+    for name in before:
+        (out / "recordings" / name).unlink()
+
+    def full(handle):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "fsync", full)
+    (problem,) = record_study(study, out, jobs=1)
+    first = out / "recordings" / "drive-reference-0-0.mcap"
+    assert problem == (
+        f"DvaSimError: {first} cannot be written: No space left on device; "
+        "0 of 3 are made: free space, then again"
+    )
+    assert list((out / "recordings").iterdir()) == []
+    monkeypatch.undo()
     assert record_study(study, out, jobs=1) == []
     assert recordings(out) == before
 
