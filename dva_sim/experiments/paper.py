@@ -239,8 +239,8 @@ def _squeezed(
     if sum(widths) <= room:
         return list(widths)
     least = [
-        _GAP + max(_longest(row[i], cell) for row in [*table.rows, table.heads])
-        for i in range(len(widths))
+        _GAP + max([_longest(title, head), *(_longest(row[i], cell) for row in table.rows)])
+        for i, title in enumerate(table.heads)
     ]
     if sum(least) >= room:
         return [room * width / sum(least) for width in least]

@@ -7,7 +7,7 @@ from dva_sim.experiments.blocks import Box, Heading, Items, Printed, Shown, Verb
 from dva_sim.experiments.cells import CellTable
 from dva_sim.experiments.figures.numbers import Numbers
 from dva_sim.experiments.figures.style import finish
-from dva_sim.experiments.paper import write_pdf
+from dva_sim.experiments.paper import _squeezed, write_pdf
 from dva_sim.experiments.typeset import Face, broken, columns_that_fit, width_of
 
 FACE = Face(9)
@@ -71,6 +71,14 @@ def test_a_word_wider_than_the_line_is_cut():
 )
 def test_columns_that_do_not_fit_go_below_with_the_names_of_their_rows(room, groups):
     assert columns_that_fit([20.0] * 4, labels=1, room=room) == groups
+
+
+def test_no_word_in_the_head_of_a_squeezed_table_is_cut():
+    table = CellTable("", ["claim", "verdict"], 2, [["a long claim " * 20, "held"]])
+    bold = Face(9, "bold")
+    widths = _squeezed(table, FACE, bold, [900.0, 40.0], 300.0)
+    assert sum(widths) == pytest.approx(300.0)
+    assert widths[1] > width_of("verdict", bold) > width_of("verdict", FACE)
 
 
 def test_numbers_behind_a_figure_are_rows_with_levels_and_gaps():
