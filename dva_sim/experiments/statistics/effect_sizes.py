@@ -77,7 +77,7 @@ def _size(pairs: Pairs, spread: Floats) -> Floats:
     """Mean differences over a spread that is as if divided by one less; nan without any."""
     there = spread > 0
     size = pairs.difference / np.where(there, spread, 1)
-    return np.where(there, size * np.sqrt(np.maximum(pairs.count - 1, 0) / pairs.count), np.nan)
+    return np.where(there, size * np.sqrt(np.maximum(pairs.persons - 1, 0) / pairs.persons), np.nan)
 
 
 def _times(found: Interval, factor: float) -> Interval:

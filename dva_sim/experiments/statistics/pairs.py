@@ -20,14 +20,14 @@ class Pairs(NamedTuple):
     """What is known of the pairs of means of some persons, each entry of the same shape.
 
     Attributes:
-        count: How many persons.
+        persons: How many.
         difference: Mean of first minus second.
         first: Variance of the first means, divided by the number of persons.
         second: Of the second.
         apart: Of the differences.
     """
 
-    count: Floats
+    persons: Floats
     difference: Floats
     first: Floats
     second: Floats

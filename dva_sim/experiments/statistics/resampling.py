@@ -47,23 +47,21 @@ def bootstrap_interval(
     """
     rows, who = np.asarray(values, dtype=float), np.asarray(person)
     there = np.isfinite(rows.reshape(len(rows), -1)).all(axis=1)
-    rows, who = rows[there], who[there]
-    own = [rows[who == each] for each in np.unique(who)]
-    if not own:
+    rows, (persons, code) = rows[there], np.unique(who[there], return_inverse=True)
+    if not len(persons):
         return Interval(math.nan, math.nan, math.nan, 0)
     estimate = float(statistic(rows))
-    if len(own) < 2:
+    if len(persons) < 2:
         return Interval(estimate, math.nan, math.nan, 1)
-    counts = draws(len(own), seed, resamples).astype(int)
-    drawn = np.array([statistic(_together(own, count)) for count in counts])
-    left_out = [statistic(_together(own, count)) for count in 1 - np.eye(len(own), dtype=int)]
-    low, high = _bca(estimate, drawn, np.array(left_out), level)
-    return Interval(estimate, low, high, len(own))
 
+    def of(counts: NDArray[np.int_]) -> Floats:
+        """The statistic of each draw of persons `(b, persons)`, with all the runs of each."""
+        return np.array([statistic(np.repeat(rows, count[code], axis=0)) for count in counts])
 
-def _together(own: list[Floats], counts: NDArray[np.int_]) -> Floats:
-    """The runs of persons, each repeated as often as drawn."""
-    return np.concatenate([rows for rows, n in zip(own, counts, strict=True) for _ in range(n)])
+    drawn = of(draws(len(persons), seed, resamples).astype(int))
+    left_out = of(1 - np.eye(len(persons), dtype=int))
+    low, high = _bca(estimate, drawn, left_out, level)
+    return Interval(estimate, low, high, len(persons))
 
 
 def _bca(estimate: float, drawn: Floats, left_out: Floats, level: float) -> tuple[float, float]:

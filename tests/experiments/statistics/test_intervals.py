@@ -31,6 +31,13 @@ def test_the_interval_of_a_paired_difference_is_that_of_a_bootstrap_t_written_ou
     assert up > either > students
 
 
+def test_the_interval_of_mirrored_values_is_the_mirrored_interval():
+    values = np.random.default_rng(4).gamma(0.4, 20, 24)
+    found, mirrored = (statistics.mean_interval(side * values, range(24)) for side in (1, -1))
+    assert (mirrored.low, mirrored.high) == pytest.approx((-found.high, -found.low))
+    assert found.high - found.mean > 1.2 * (found.mean - found.low)
+
+
 def test_with_fewer_than_six_persons_the_interval_is_students():
     values = np.array([1.0, 4.0, 2.0, 7.0, 3.0])
     found = statistics.mean_interval(values, np.arange(5))
@@ -138,6 +145,21 @@ def test_a_level_that_few_persons_have_does_not_take_the_band_from_the_others():
     assert 1 < (band.pointwise_high - band.pointwise_low)[1] / (alone.high - alone.low) < 2
 
 
+def test_draws_that_say_nothing_of_a_level_do_not_take_away_its_interval():
+    """Of draws of 60 persons, 1.4 in 100 hold fewer than two of these 6."""
+    values = np.random.default_rng(22).normal(size=(60, 2))
+    values[6:, 0] = np.nan
+    band = statistics.band(values, level=0.99)
+    assert np.isfinite([*band.low, *band.high, *band.pointwise_low, *band.pointwise_high]).all()
+
+
+def test_a_band_of_one_level_is_its_interval_however_skewed():
+    values = np.random.default_rng(4).gamma(0.4, 20, (24, 1))
+    band = statistics.band(values)
+    assert (band.low, band.high) == (band.pointwise_low, band.pointwise_high)
+    assert band.high - band.mean > 1.2 * (band.mean - band.low)
+
+
 def test_a_level_of_three_persons_gets_bonferronis_t_and_the_rest_what_it_leaves():
     values = np.random.default_rng(18).normal(size=(200, 4))
     values[3:, 0] = np.nan
@@ -153,6 +175,11 @@ def test_the_width_of_the_band_is_the_largest_of_bootstrapped_t_written_out():
     ratios = (drawn.mean(axis=1) - values.mean(axis=0)) / stats.sem(drawn, axis=1)
     largest = np.quantile(abs(ratios).max(axis=1), 0.95)
     assert statistics.band(values).critical == pytest.approx([largest] * 5, rel=0.04)
+
+
+def test_persons_who_are_all_alike_have_a_band_without_width():
+    band = statistics.band(np.full((3, 2), 1.5))
+    assert band.low.tolist() == band.high.tolist() == [1.5, 1.5]
 
 
 def test_a_level_without_spread_has_a_band_without_width():

@@ -5,6 +5,7 @@ import pytest
 from scipy import stats
 
 from dva_sim.experiments.statistics import sobol_indices
+from dva_sim.experiments.statistics.persons import draws
 
 NAMES = ("x", "y", "z")
 
@@ -61,6 +62,47 @@ def test_a_sum_has_no_interactions_so_that_first_and_total_agree_with_the_varian
     for index, weight in zip(found, (1, 4, 9), strict=True):
         assert index.first.mean == pytest.approx(weight / 14, abs=0.01)
         assert index.total.mean == pytest.approx(weight / 14, abs=0.01)
+
+
+def test_sobols_g_function_has_its_known_indices():
+    a = np.array([0.0, 1.0, 4.5])
+    points = saltelli(2048, 9)
+    values = np.prod((abs(2 * points / math.pi) + a) / (1 + a), axis=1)  # |4 u - 2| of u in (0, 1)
+    part = 1 / (3 * (1 + a) ** 2)
+    whole = np.prod(1 + part) - 1
+    found = indices(points, values, resamples=10)
+    assert [i.first.mean for i in found] == pytest.approx(part / whole, abs=0.02)
+    total = part * np.prod(1 + part) / (1 + part) / whole
+    assert [i.total.mean for i in found] == pytest.approx(total, abs=0.02)
+
+
+def test_the_interval_is_that_of_blocks_drawn_anew_written_out():
+    points = saltelli(16, 11)
+    blocks = points.reshape(16, 5, 3)
+    drawn = [np.repeat(blocks, own, axis=0) for own in draws(16, 1, 100).astype(int)]
+    rows = [block.reshape(-1, 3) for block in drawn]
+    first = [indices(own, ishigami(own), resamples=2)[0].first.mean for own in rows]
+    found = indices(points, ishigami(points), resamples=100)[0].first
+    assert (found.low, found.high) == pytest.approx(tuple(np.quantile(first, [0.025, 0.975])))
+
+
+@pytest.mark.slow
+def test_their_intervals_hold_in_at_least_93_of_100_studies_of_few_points_and_persons():
+    """Ishigami's function, which noise of variance 1 in each cell of 12 persons blurs by 1/12."""
+    parts = 0.5 * (1 + 0.1 * math.pi**4 / 5) ** 2, 7**2 / 8, 0.1**2 * math.pi**8 * (1 / 18 - 1 / 50)
+    first, total = np.array([*parts[:2], 0]), np.array([parts[0] + parts[2], parts[1], parts[2]])
+    blur, rng = 1 / 12, np.random.default_rng(10)
+    truth = np.array([first, total + blur]) / (sum(parts) + blur)
+    held, studies = np.zeros((2, 3)), 300
+    for seed in range(studies):
+        points = saltelli(64, seed)
+        levels = dict(zip(NAMES, np.repeat(points, 12, axis=0).T, strict=True))
+        values = ishigami(points)[:, np.newaxis] + rng.normal(size=(len(points), 12))
+        runs = np.repeat(np.arange(len(points)), 12), np.tile(np.arange(12), len(points))
+        found = sobol_indices(levels, values.ravel(), runs[1], runs[0], resamples=300)
+        ends = np.array([[(x.low, x.high) for x in (i.first, i.total)] for i in found])
+        held += ((ends[:, :, 0] <= truth.T) & (ends[:, :, 1] >= truth.T)).T
+    assert np.all(held / studies >= 0.93)
 
 
 def test_persons_count_in_the_mean_and_in_the_interval():
