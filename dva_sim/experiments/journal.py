@@ -86,7 +86,7 @@ class Journal:
             self._db.close()
             raise ConfigError(
                 f"{folder} holds another study ({self.identity}, not {identity}), or this one "
-                "before it or the program was changed; give another folder with -o"
+                "before it, the program or its libraries were changed; give another folder with -o"
             )
 
     def _connected(self, must_exist: bool) -> sqlite3.Connection:

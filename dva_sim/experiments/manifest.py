@@ -54,7 +54,7 @@ def manifest_of(study: Study, cells: Sequence[Cell], todo: Sequence[Job]) -> dic
             "rule": "a run's seed depends on the study's seed, the part, the person and the "
             "trial, never on the cell: all cells share their luck, and repeats share it too",
         },
-        "versions": {"dva-sim": __version__, "fingerprint": fingerprint()},
+        "versions": _simulating(),
     }
     identity = stable_hash(content)
     content["versions"] = versions()
@@ -68,9 +68,13 @@ def versions() -> dict[str, str | bool | None]:
     has changed, so a study goes on when only a report or a text has. The commit is then that of
     the program which completed it.
     """
-    own = {"dva-sim": __version__, "fingerprint": fingerprint()}
+    return {**_simulating(), **program_state(), "python": platform.python_version()}
+
+
+def _simulating() -> dict[str, str]:
+    """What the numbers of a run depend on; a folder holds runs of one such state only."""
     packages = {name: version(name) for name in _PACKAGES}
-    return own | program_state() | {"python": platform.python_version()} | packages
+    return {"dva-sim": __version__, "fingerprint": fingerprint()} | packages
 
 
 def failures(todo: Sequence[Job], journal: Journal) -> list[dict[str, Any]]:

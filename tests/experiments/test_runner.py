@@ -12,6 +12,7 @@ import pytest
 import small_study as kit
 
 from dva_sim.errors import ConfigError
+from dva_sim.experiments import manifest
 from dva_sim.experiments.planning import dry_run
 from dva_sim.experiments.results import Results
 from dva_sim.experiments.runner import run_study
@@ -241,6 +242,13 @@ def test_the_folder_of_another_study_is_refused(tmp_path, plain):
             run_study(
                 kit.study_in(tmp_path, *settings), tmp_path / "plain", jobs=1, episode=kit.cheap
             )
+    assert kit.files(tmp_path / "plain") == plain
+
+
+def test_a_folder_whose_runs_were_made_with_another_numpy_is_refused(tmp_path, plain, monkeypatch):
+    monkeypatch.setattr(manifest, "version", lambda name: f"other {name}")
+    with pytest.raises(ConfigError, match="the program or its libraries were changed"):
+        run_study(kit.study_in(tmp_path), tmp_path / "plain", jobs=1, episode=kit.cheap)
     assert kit.files(tmp_path / "plain") == plain
 
 
