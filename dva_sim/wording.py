@@ -79,6 +79,8 @@ def _in_words(problems: Sequence[Any]) -> str:
     allowed = [word for kind, word in _KINDS.items() if kind in kinds]
     if len(allowed) > 1 and first["type"] in _KINDS:
         return f"should be {', '.join(allowed[:-1])}, or {allowed[-1]}"
+    if first["type"].startswith("int_") and isinstance(first["input"], float):
+        return "should be a whole number, without a point"
     if first["type"] in _STRUCTURES:
         return f"should be {_STRUCTURES[first['type']]}"
     message: str = first["msg"].removeprefix("Value error, ")

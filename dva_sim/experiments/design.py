@@ -243,8 +243,10 @@ def _source(study: Study, part: str) -> Document:
     try:
         return scenarios.load(study.parts[part].scenario, base=study.folder)
     except ConfigError as error:
-        is_here = error.file is None and study.is_from_file(path)
-        raise study.error(error.problem, path) if is_here else error from None
+        if error.file is not None:
+            raise
+        here = study.error(error.problem, path)
+        raise here if study.is_from_file(path) else _set(study, error) from None
 
 
 def _build(study: Study, part: str, source: Document, changes: Mapping[str, Any]) -> AnyScenario:
@@ -275,7 +277,12 @@ def _blamed(study: Study, part: str, error: ConfigError, changes: Mapping[str, A
         for path in _places(study, part, key, value):
             if study.is_from_file(path):
                 return study.error(error.problem, path)
-    return ConfigError(f"--set: {error.problem}") if named and study.settings else error
+    return _set(study, error) if named else error
+
+
+def _set(study: Study, error: ConfigError) -> ConfigError:
+    """A mistake in what the study's file does not say: in a setting, if there are any."""
+    return ConfigError(f"--set: {error.problem}") if study.settings else error
 
 
 def _is_named(key: str, value: Any, problem: str) -> bool:

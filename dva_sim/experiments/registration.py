@@ -32,6 +32,7 @@ class Registration(Config):
 
     Attributes:
         study: Name of the study.
+        question: As it was worded then.
         made_with: Version of the program, and the fingerprint of what simulates.
         judged_with: The fingerprint of what will judge the hypotheses.
         full: Whether it is the larger version.
@@ -43,6 +44,7 @@ class Registration(Config):
     """
 
     study: str
+    question: str = ""
     made_with: str
     judged_with: str = ""
     full: bool = False
@@ -97,6 +99,7 @@ def register(study: Study, again: bool = False) -> str:
         raise ConfigError(f"{path} is there already; --again replaces it, and that will be told")
     made = Registration(
         study=study.file.stem,
+        question=study.question,
         made_with=f"{__version__} {fingerprint()}",
         judged_with=fingerprint_of_judges(),
         full=study.is_full,
@@ -146,7 +149,7 @@ def settled(study: Study) -> Study:
     why = [*_liberties(study), *(departures(found, study) if found is not None else ())]
     confirms = found is not None and not why
     if found is not None:
-        why += _remarks(found)
+        why += _remarks(found, study)
     kept = study.model_copy(update={"seed": found.seed} if found and confirms else {})
     kept._status = Status(
         kind="confirmatory" if confirms else "exploratory" if why else "declared",
@@ -181,8 +184,12 @@ def departures(found: Registration, study: Study) -> Iterator[str]:
         yield f"other than registered: {', '.join(others)}"
 
 
-def _remarks(found: Registration) -> Iterator[str]:
+def _remarks(found: Registration, study: Study) -> Iterator[str]:
     """What a reader should know, although it is no departure."""
+    if found.study != study.file.stem:
+        yield f"it was registered as {found.study!r}"
+    if found.question not in ("", study.question):
+        yield f"its question was worded otherwise when it was registered: {found.question!r}"
     now = f"{__version__} {fingerprint()}"
     if found.made_with != now:
         yield f"the program is another than when it was registered ({found.made_with}; now {now})"

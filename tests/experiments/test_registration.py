@@ -102,10 +102,19 @@ def test_a_file_that_a_scenario_names_counts_by_its_content_wherever_it_lies(tmp
     assert here == there != other
 
 
-def test_words_may_be_mended_after_the_registration(tmp_path):
+def test_words_may_be_mended_after_the_registration_and_are_told(tmp_path):
     path = registered(tmp_path)
     path.write_text(CLAIMED.replace("Which is quicker?", "Which one is quicker?"))
-    assert load_study(path).status.kind == "confirmatory"
+    status = load_study(path).status
+    told = "its question was worded otherwise when it was registered: 'Which is quicker?'"
+    assert (status.kind, status.why) == ("confirmatory", (told,))
+
+
+def test_the_registration_of_another_study_is_told(tmp_path):
+    beside(registered(tmp_path)).rename(tmp_path / "other.registration.yaml")
+    (tmp_path / "other.yaml").write_text(CLAIMED)
+    status = load_study(tmp_path / "other.yaml").status
+    assert (status.kind, status.why) == ("confirmatory", ("it was registered as 'study'",))
 
 
 def test_settings_make_it_exploratory_with_the_luck_of_the_study(tmp_path):
@@ -273,7 +282,7 @@ def test_a_registration_is_checked_with_the_study_beside_it(tmp_path):
     )
     path.write_text(CLAIMED.replace("margin: 1.0", "margin: 0.5"))
     (problem,) = check_file(beside(path)).problems
-    assert (problem.line, problem.text) == (7, "other than registered: hypotheses")
+    assert (problem.line, problem.text) == (9, "other than registered: hypotheses")
     path.unlink()
     (problem,) = check_file(beside(path)).problems
     assert problem.text == "study.yaml, the study it is of, is not beside it"

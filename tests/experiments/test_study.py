@@ -67,7 +67,11 @@ def test_a_study_that_makes_no_sense_is_refused(tmp_path, old, new, place):
     [
         ("persons: 3", "persons: true", "study:3:1: persons: input should be a valid integer, not"),
         ("persons: 3", 'persons: "3"', "study:3:1: persons: input should be a valid integer, not"),
-        ("persons: 3", "persons: 3.0", "study:3:1: persons: input should be a valid integer, not"),
+        (
+            "persons: 3",
+            "persons: 3.0",
+            "study:3:1: persons: should be a whole number, without a point",
+        ),
         ("fect_s: 2.0", 'fect_s: "2"', "study:21:3: answer.smallest_effect_s: input should be a"),
         ("0.25]", ".nan]", "study:7:21: factors.link.delay_s.1: input should be a finite number"),
         ("0.25]", "[1]]", "study:7:21: factors.link.delay_s.1: should be a number, text, or true"),
@@ -134,6 +138,7 @@ def test_a_setting_that_takes_the_contrast_away_leaves_no_declared_answer(tmp_pa
         ("persons=none", "--set: persons: input should be a valid integer"),
         ("parts.drve.replications=2", "--set: no 'drve' in the study"),
         ("operator.person=3", "'operator.person' is set by the study"),
+        ("parts.drive.scenario=two.yaml", "--set: scenario 'two.yaml' not found"),
         ("persons.a=3", "--set: 'persons' holds no keys, so no 'a'"),
         (
             "robot.procesing_s=1",
