@@ -241,7 +241,7 @@ def _misses(f: Finding) -> list[str]:
 
 
 def _what_misses_count(f: Finding) -> str:
-    if f.measure != "drive_time_s":
+    if f.measure not in ("drive_time_s", "confirmation_mean_s"):
         return "Such a run counts with what was measured until it ended."
     horizon = f" ({quantity(f.horizon, 's')})" if f.horizon is not None else ""
     return (

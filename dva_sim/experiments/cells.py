@@ -132,6 +132,9 @@ _ENDINGS = {
     "refuted": "refuted",
     "lost link": "link lost",
     "gave up": "given up",
+    "escalated": "escalated",
+    "expired": "expired",
+    "undetected": "never reported",
     "timeout": "nothing by the end",
     "no drive": "no drive",
 }

@@ -7,6 +7,7 @@ open when nobody looked any more is cut off; it is not taken for an ending.
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -86,10 +87,10 @@ class Endings:
         late = self.time > self.horizon
         return tuple(w for w in WAYS if w == NOTHING or np.any((self.way == w) & ~late))
 
-    def under(self, line: Level, stop: Level) -> NDArray[np.bool_]:
+    def under(self, line: Level, stop: Level, panel: Setting | None = None) -> NDArray[np.bool_]:
         """Which events happened under these levels, and else as the answer has it `(n,)`."""
         view = self._view
-        wanted: Setting = dict(view.panels[0])
+        wanted: Setting = dict(view.panels[0] if panel is None else panel)
         wanted |= {f.name: v for f, v in ((view.line, line), (view.over, stop)) if f}
         mask = np.ones(len(self), dtype=bool)
         for factor in view.part.factors:
@@ -98,9 +99,9 @@ class Endings:
                 mask &= self._codes[factor.name] == code
         return mask
 
-    def at(self, line: Level, stop: Level) -> Ended:
+    def at(self, line: Level, stop: Level, panel: Setting | None = None) -> Ended:
         """Shares by the horizon, each with its 95 % interval over persons."""
-        mask = self.under(line, stop)
+        mask = self.under(line, stop, panel)
         way, time, person = self.way[mask], self.time[mask], self._person[mask]
         causes = list(np.where(way == NOTHING, "", way))
         found = cumulative_incidence(time, causes, self.horizon, person)
@@ -121,6 +122,42 @@ class Endings:
             int(person): float(done[mask & (self._person == person)].mean())
             for person in np.unique(self._person[mask])
         }
+
+
+def with_endings(runs: Table, events: Table) -> Table:
+    """Runs with `confirmed` as the share of their true events that were, whoever was sent.
+
+    The table itself tells of drives alone. `outcome` says of a run without any how its event
+    ended, if it had but one.
+    """
+    is_true = np.asarray(events["is_true"]).astype(bool)
+    times, words = as_floats(np.asarray(events["confirmation_s"])), np.asarray(events["outcome"])
+    met: dict[tuple[Any, ...], list[bool]] = defaultdict(list)
+    how: dict[tuple[Any, ...], list[str]] = defaultdict(list)
+    for key, real, time, word in zip(_keys(events), is_true, times, words, strict=True):
+        if real:
+            met[key].append(bool(np.isfinite(time)))
+            how[key].append(_OF_RUNS.get(str(word), str(word)))
+    keys = _keys(runs)
+    share = [float(np.mean(met[key])) if key in met else math.nan for key in keys]
+    told = np.asarray(runs.get("outcome", np.full(len(keys), None)), dtype=object)
+    outcome = [
+        how[key][0] if not isinstance(word, str) and len(how[key]) == 1 else word
+        for key, word in zip(keys, told, strict=True)
+    ]
+    return dict(runs) | {
+        "confirmed": np.array(share),
+        "outcome": np.array(outcome, dtype=object),
+    }
+
+
+_OF_RUNS = {"contained": CONFIRMED, "open": "timeout"}
+
+
+def _keys(table: Table) -> list[tuple[Any, ...]]:
+    """Which run each row is of."""
+    names = ("part", "cell", "person", "trial", "is_reference")
+    return list(zip(*(np.asarray(table[name]).tolist() for name in names), strict=True))
 
 
 def horizon_of(view: View, scenario: Mapping[str, Any]) -> float:

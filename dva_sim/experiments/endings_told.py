@@ -8,7 +8,7 @@ import numpy as np
 
 from dva_sim.experiments.answer import Finding, place_of
 from dva_sim.experiments.cells import CellTable
-from dva_sim.experiments.effects import View
+from dva_sim.experiments.effects import Setting, View
 from dva_sim.experiments.endings import CLEARED, CONFIRMED, NOTHING, Ended, Endings
 from dva_sim.experiments.labels import (
     Level,
@@ -47,28 +47,64 @@ def in_a_line(endings: Endings, failed: int = 0) -> str:
 
 
 def table(endings: Endings, view: View, cluster: str) -> CellTable:
-    """Share of each way, line by line at each stop at which not all went right."""
+    """Share of each way, line by line at each stop at which not all went right.
+
+    If there is no such stop where the answer looks, elsewhere.
+    """
+    panels = view.panels[:1]
+    if not (places := _places(endings, view, panels)):
+        panels = view.panels[1:]
+        places = _places(endings, view, panels)
     rows = [
-        [*_names(view, ended), str(ended.events), *map(_share, ended.shares.values())]
-        for stop in view.stops
-        if not _all_right(endings, view.lines, stop)
-        for ended in (endings.at(line, stop) for line in view.lines)
+        [*map(_level, setting), str(ended.events), *map(_share, ended.shares.values())]
+        for panel, stop in places[:_MOST_PLACES]
+        for setting, ended in _rows(endings, view, panel, stop)
         if ended.events
     ]
-    factors = [factor_name(f.name) for f in (view.over, view.line) if f is not None]
+    names = [f.name for f in (view.over, view.line) if f is not None]
+    if panels != view.panels[:1]:
+        names = [*view.panels[0], *names]
+    factors = [factor_name(name) for name in names]
     last = f"nothing by {quantity(endings.horizon, 's')}"
     heads = [*factors, "events", *(last if w == NOTHING else w for w in endings.ways)]
-    return CellTable(view.part.name, heads, len(factors), rows, note=_note(view, cluster))
+    note = _note(view, cluster, view.panels[0] if panels == view.panels[:1] else {})
+    if len(places) > _MOST_PLACES:
+        note += f" Shown are {_MOST_PLACES} of {len(places)} such conditions."
+    return CellTable(view.part.name, heads, len(factors), rows, note=note)
 
 
-def _all_right(endings: Endings, lines: Sequence[Level], stop: Level) -> bool:
-    return all(bool(endings.is_right[endings.under(line, stop)].all()) for line in lines)
+_MOST_PLACES = 12
 
 
-def _names(view: View, ended: Ended) -> Iterator[str]:
-    for factor, level in ((view.over, ended.stop), (view.line, ended.line)):
-        if factor is not None:
-            yield level_name(factor.name, level)
+def _places(endings: Endings, view: View, panels: Sequence[Setting]) -> list[tuple[Setting, Level]]:
+    """Where not all went right."""
+    return [
+        (panel, stop)
+        for panel in panels
+        for stop in view.stops
+        if not _all_right(endings, view.lines, stop, panel)
+    ]
+
+
+def _rows(
+    endings: Endings, view: View, panel: Setting, stop: Level
+) -> Iterator[tuple[list[tuple[str, Level]], Ended]]:
+    """Each line there, with the levels that name it."""
+    named = list(panel.items()) if panel != view.panels[0] else []
+    named += [(view.over.name, stop)] if view.over else []
+    for line in view.lines:
+        own = [(view.line.name, line)] if view.line else []
+        yield [*named, *own], endings.at(line, stop, panel)
+
+
+def _level(named: tuple[str, Level]) -> str:
+    return level_name(*named)
+
+
+def _all_right(
+    endings: Endings, lines: Sequence[Level], stop: Level, panel: Setting | None = None
+) -> bool:
+    return all(bool(endings.is_right[endings.under(line, stop, panel)].all()) for line in lines)
 
 
 def _side(view: View, ended: Ended) -> str:
@@ -105,8 +141,8 @@ def _share(found: Interval) -> str:
     return f"{percent(found.mean)} ({low} to {percent(found.high)})"
 
 
-def _note(view: View, cluster: str) -> str:
-    where = f" with {setting(view.panels[0])}" if view.panels[0] else ""
+def _note(view: View, cluster: str, panel: Setting) -> str:
+    where = f" with {setting(panel)}" if panel else ""
     drives = (
         " An event is open until the DVA closes it, so a drive that was given up late may leave it "
         "open; in the table of cells stands how last drives ended."

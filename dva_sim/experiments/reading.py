@@ -232,13 +232,13 @@ def _missed(view: View) -> tuple[Missed, ...]:
     found = []
     for level in view.lines:
         seen = present(view.curve(grid, view.panels[0], level)[-1])
-        found.append(Missed(level, int((seen == 0).sum()), len(seen)))
+        found.append(Missed(level, int((seen < 1).sum()), len(seen)))
     return tuple(found)
 
 
 def _all_confirmed(view: View) -> bool:
     """Whether no run of any cell ended without a confirmation."""
-    return view.part.has("confirmed") and bool(present(view.part.grid("confirmed")).all())
+    return view.part.has("confirmed") and bool((present(view.part.grid("confirmed")) == 1).all())
 
 
 def _horizon(view: View) -> float | None:

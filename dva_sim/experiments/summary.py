@@ -17,10 +17,10 @@ from dva_sim.experiments.contrasts import Judgement, judged
 from dva_sim.experiments.dispatch import page as dispatch_page
 from dva_sim.experiments.dispatch.shifts import Shifts, is_dispatch
 from dva_sim.experiments.effects import Part, Table, View, as_floats
-from dva_sim.experiments.endings import Endings, horizon_of
+from dva_sim.experiments.endings import Endings, horizon_of, with_endings
 from dva_sim.experiments.episodes_kept import Episode, Tables, typical_and_worst
 from dva_sim.experiments.needed import Plan, plans
-from dva_sim.experiments.needed_told import precision
+from dva_sim.experiments.needed_told import few_that_weigh, precision
 from dva_sim.experiments.reading import (
     finding_of,
     layout_of,
@@ -57,9 +57,18 @@ class Reading:
         """Columns of a table; nothing where the study has no such table."""
         if name not in self._tables:
             table: Table = self.results.table(name) if self.results.has(name) else {}
+            if name == "runs" and self._is_of_events and self.results.has("events"):
+                table = with_endings(table, self.results.table("events"))
             names = {} if name in ("runs", REPEATS) else row_names(self.study, self.runs)
             self._tables[name] = with_rows(table, names) if table and names else table
         return self._tables[name]
+
+    @property
+    def _is_of_events(self) -> bool:
+        """Whether the answer is about events, whoever saw to them, and not about drives."""
+        measure = (self.study.get("answer") or {}).get("measure")
+        models = {s.get("model") for s in self.scenarios.values()}
+        return measure in ("confirmation_mean_s", "response_mean_s") and "timed" not in models
 
     @property
     def runs(self) -> Table:
@@ -181,8 +190,11 @@ class Reading:
     def _with_precision(self, found: Answer) -> Answer:
         if self.finding is None or self.view is None:
             return found
-        told = precision(self.finding, self.view, self.cluster)
-        return replace(found, notes=[*found.notes, told]) if told else found
+        told = [
+            few_that_weigh(self.finding, self.view),
+            precision(self.finding, self.view, self.cluster),
+        ]
+        return replace(found, notes=[*found.notes, *filter(None, told)])
 
     @cached_property
     def judgement(self) -> Judgement:

@@ -6,7 +6,7 @@ import pytest
 import synthetic_study
 
 from dva_sim.experiments.effects import Factor, Part, View
-from dva_sim.experiments.endings import NOTHING, Endings, horizon_of
+from dva_sim.experiments.endings import NOTHING, Endings, horizon_of, with_endings
 from dva_sim.experiments.endings_told import in_a_line, sentences, table
 from dva_sim.experiments.figures.incidence import endings_in_time
 from dva_sim.experiments.reading import finding_of
@@ -31,17 +31,18 @@ def escalated(person, line, at=20.0):
     return event(person, line, outcome="escalated", closing_s=at)
 
 
-def endings(events, how="lost link"):
+def endings(events, how="lost link", factors=()):
     """The events, and runs that say how their last drive ended."""
     runs = [
         {key: row[key] for key in ("part", "cell", "person", "trial", "is_reference")}
-        | {"command.timeout_s": row["command.timeout_s"], "seed": 1}
+        | {name: row[name] for name in ("command.timeout_s", *(f.name for f in factors))}
+        | {"seed": 1}
         | {"confirmed": row["outcome"] == "confirmed", "drive_time_s": 50.0 + row["person"]}
         | {"outcome": how if row["outcome"] == "escalated" else "timeout"}
         for row in events
     ]
     table_of_runs = synthetic_study.columns(runs)
-    part = Part(table_of_runs, "drive", [Factor("command.timeout_s", LEVELS)])
+    part = Part(table_of_runs, "drive", [Factor("command.timeout_s", LEVELS), *factors])
     view = View(part, "drive_time_s", part.factors[0], None, LEVELS, {})
     return Endings(view, synthetic_study.columns(events), table_of_runs, HORIZON_S), view
 
@@ -164,3 +165,33 @@ def test_the_figure_ends_at_the_shares_of_the_table():
 def test_where_all_were_confirmed_there_is_no_figure():
     found, view = endings([confirmed(p, line) for p in range(3) for line in LEVELS])
     assert endings_in_time(found, view) is None
+
+
+def test_a_run_without_a_drive_is_confirmed_if_its_events_were():
+    """A guard goes: nobody drives, so the table of runs says nothing."""
+    keys = ("part", "cell", "person", "trial", "is_reference")
+    rows = [confirmed(0, "short"), escalated(1, "short"), event(2, "short")]
+    rows += [event(3, "short", is_true=False, outcome="refuted")]
+    runs = [{key: row[key] for key in keys} for row in rows]
+    runs = synthetic_study.columns(runs) | {"outcome": np.array([None] * 4, dtype=object)}
+    found = with_endings(runs, synthetic_study.columns(rows))
+    assert found["confirmed"][:3].tolist() == [1.0, 0.0, 0.0]
+    assert np.isnan(found["confirmed"][3])  # a false alarm is not to be confirmed
+    assert found["outcome"].tolist() == ["confirmed", "escalated", "timeout", None]
+
+
+def test_of_several_events_of_a_run_it_is_the_share():
+    rows = [confirmed(0, "short"), escalated(0, "short"), confirmed(0, "short"), event(0, "short")]
+    keys = ("part", "cell", "person", "trial", "is_reference")
+    runs = synthetic_study.columns([{key: rows[0][key] for key in keys}])
+    assert with_endings(runs, synthetic_study.columns(rows))["confirmed"].tolist() == [0.5]
+
+
+def test_where_all_went_right_in_the_answers_panel_the_table_shows_the_others():
+    rows = [confirmed(p, line) | {"guard.way_m": 5} for p in range(3) for line in LEVELS]
+    far = [escalated(p, line) | {"guard.way_m": 60, "cell": 2} for p in range(3) for line in LEVELS]
+    found, view = endings([*rows, *far], factors=[Factor("guard.way_m", (5, 60))])
+    made = table(found, view, "person")
+    assert made.heads[:2] == ["guard way", "command timeout"]
+    assert [row[1:3] for row in made.rows] == [["short", "3"], ["long", "3"]]
+    assert made.rows[0][0] == "60\N{NO-BREAK SPACE}m"

@@ -6,7 +6,7 @@ import synthetic_study
 from scipy import stats
 
 from dva_sim.experiments.needed import plans
-from dva_sim.experiments.needed_told import plan_lines, plan_table, precision
+from dva_sim.experiments.needed_told import few_that_weigh, plan_lines, plan_table, precision
 from dva_sim.experiments.reading import finding_of, view_of
 
 PATTERNS = ["req-rep", "latest-wins"]
@@ -132,3 +132,21 @@ def test_where_the_question_is_open_it_says_what_the_effect_that_matters_takes()
 def test_an_answer_without_an_interval_has_no_precision():
     view = view_of(study(), {key: values[:2] for key, values in runs(persons=2).items()})
     assert precision(finding_of(view), view, "person") == ""
+
+
+def test_a_mean_that_hangs_on_a_run_with_the_whole_horizon_is_told_with_the_median():
+    """11 persons differ by 2 s; the twelfth was not confirmed and counts with 600 s."""
+    rows = runs(persons=12)
+    rows["drive_time_s"] = np.where(rows["cell"] == 0, 52.0, 50.0)
+    rows["confirmed"] = np.ones(24)
+    rows["confirmed"][0], rows["drive_time_s"][0] = 0.0, 600.0
+    view = view_of(study(), rows)
+    told = few_that_weigh(finding_of(view), view).replace("\N{NO-BREAK SPACE}", " ")
+    assert told.startswith("Where some runs count with 600 s, the mean hangs on them")
+    assert "1 of 24 runs, median 2.0 s (2.0 to 2.0 s)" in told
+
+
+def test_where_all_were_confirmed_no_run_weighs_more_than_another():
+    rows = runs(persons=12) | {"confirmed": np.ones(24)}
+    view = view_of(study(), rows)
+    assert few_that_weigh(finding_of(view), view) == ""
