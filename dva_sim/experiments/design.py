@@ -13,6 +13,7 @@ from dva_sim.config import Document, Path_
 from dva_sim.errors import ConfigError
 from dva_sim.experiments import designs
 from dva_sim.experiments.asking import POINT, REPEATS, TUNED, TUNING, Level
+from dva_sim.experiments.blame import blamed, in_setting
 from dva_sim.experiments.identity import stable_hash
 from dva_sim.experiments.models import AnyScenario, model_for, model_of
 from dva_sim.experiments.repeats import (
@@ -246,7 +247,7 @@ def _source(study: Study, part: str) -> Document:
         if error.file is not None:
             raise
         here = study.error(error.problem, path)
-        raise here if study.is_from_file(path) else _set(study, error) from None
+        raise here if study.is_from_file(path) else in_setting(study, error) from None
 
 
 def _build(study: Study, part: str, source: Document, changes: Mapping[str, Any]) -> AnyScenario:
@@ -257,7 +258,7 @@ def _build(study: Study, part: str, source: Document, changes: Mapping[str, Any]
         return model.build(source, _located({**fixed, **changes}, study.folder))
     except ConfigError as error:
         every = {**study.parts[part].changes, **study.changes, **changes}
-        raise _blamed(study, part, error, every) from None
+        raise blamed(study, part, error, every) from None
 
 
 def _located(changes: dict[str, Any], folder: Path) -> dict[str, Any]:
@@ -266,42 +267,6 @@ def _located(changes: dict[str, Any], folder: Path) -> dict[str, Any]:
     named: dict[str, Any] = {"dispatch": {"policy": changes.get(key)}}
     scenarios.locate_files(named, [folder])
     return {**changes, key: named["dispatch"]["policy"]} if key in changes else changes
-
-
-def _blamed(study: Study, part: str, error: ConfigError, changes: Mapping[str, Any]) -> ConfigError:
-    """The mistake at the key of the study that makes it; as it is if a file has been named."""
-    if error.file is not None:
-        return error
-    named = {key: value for key, value in changes.items() if _is_named(key, value, error.problem)}
-    for key, value in named.items():
-        for path in _places(study, part, key, value):
-            if study.is_from_file(path):
-                return study.error(error.problem, path)
-    return _set(study, error) if named else error
-
-
-def _set(study: Study, error: ConfigError) -> ConfigError:
-    """A mistake in what the study's file does not say: in a setting, if there are any."""
-    return ConfigError(f"--set: {error.problem}") if study.settings else error
-
-
-def _is_named(key: str, value: Any, problem: str) -> bool:
-    return key in problem or (isinstance(value, str) and repr(value) in problem)
-
-
-def _places(study: Study, part: str, key: str, value: Any) -> Iterator[Path_]:
-    """Where the study might give a key of its scenarios that value."""
-    yield "factors", key
-    yield "parts", part, "reference", key
-    yield "parts", part, "changes", key
-    for factor, levels in study.treatments.items():
-        for level in levels:
-            yield "treatments", factor, level, key
-    if study.is_full:
-        yield "full", key
-    in_design = designs.place_of(study, key, value)
-    if in_design is not None:
-        yield in_design
 
 
 def _jobs_of(study: Study, name: str, part_cells: Sequence[Cell]) -> Iterator[Job]:
