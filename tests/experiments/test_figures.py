@@ -114,6 +114,7 @@ def test_a_way_is_found_by_its_pattern_delay_and_profile(view):
     [
         ((0.05, 0.7), ["0.05", "0.1", "0.2", "0.5"]),
         ((0.3, 0.45), ["0.3", "0.4"]),
+        ((0.001, 10.0), ["0.001", "0.01", "0.1", "1", "10"]),
         ((0.02, 30.0), ["0.02", "0.05", "0.1", "0.2", "0.5", "1", "2", "5", "10", "20"]),
     ],
 )
@@ -306,13 +307,13 @@ def test_an_axis_says_when_its_levels_are_not_as_far_apart_as_their_places():
 
 
 def test_the_trend_of_points_is_made_of_means_with_the_scatter_of_their_points():
-    x = np.arange(32.0)
-    middle, mean, half = trend(x, np.where(x % 2, 3.0, 1.0) + (x > 15))
-    assert middle[:2] == pytest.approx([1.5, 5.5])
+    x = np.arange(48.0)
+    middle, mean, half = trend(x, np.where(x % 2, 3.0, 1.0) + (x > 23))
+    assert middle[:2] == pytest.approx([2.5, 8.5])
     assert mean == pytest.approx([2, 2, 2, 2, 3, 3, 3, 3])
-    # Two at 1 and two at 3: a standard deviation of 1.1547, over 2, times Student's 3.1824.
-    assert half == pytest.approx(np.full(8, 1.8374), abs=1e-4)
+    # Three at 1 and three at 3: a standard deviation of 1.0954 over 2.4495, times 2.5706.
+    assert half == pytest.approx(np.full(8, 1.1496), abs=1e-4)
 
 
-def test_seven_points_are_too_few_for_a_trend():
-    assert trend(np.arange(7.0), np.arange(7.0))[0].size == 0
+def test_eleven_points_are_too_few_for_a_trend():
+    assert trend(np.arange(11.0), np.arange(11.0))[0].size == 0

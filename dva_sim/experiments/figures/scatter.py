@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 _ABREAST = 3
 _BINS = 8  # of equally many points, through whose means the trend is drawn
-_FEWEST_IN_BIN = 4
+_FEWEST_IN_BIN = 6
 
 
 class Cloud(NamedTuple):

@@ -23,6 +23,7 @@ _ABREAST = 4  # panels
 _BAR = 0.2  # height of a bar with the gap to the next [in]
 _AROUND = 0.85  # height of a panel's title and axis [in]
 _TITLE = 72  # characters of titles that stand abreast
+_PER_INCH, _LEAST = 13, 12  # characters of a factor's name along the height, and the fewest
 _NAME = 24  # characters of a stop's name in a line
 
 
@@ -113,8 +114,9 @@ def _along_y(ax: Axes, over: Factor | None, is_first: bool) -> None:
         return
     level_axis(ax, over, _NAME)
     ax.invert_yaxis()
-    if not is_first:
-        ax.set_ylabel("")
+    height = _BAR * len(over.levels) * _most_lines(over)
+    words = wrapped(ax.get_ylabel(), max(_LEAST, int(_PER_INCH * height)))
+    ax.set_ylabel(words if is_first else "")
 
 
 def _most_lines(over: Factor) -> int:

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
 _TITLE = 78  # characters of a title that the width holds
 _CROWDED = 45  # characters of ticks that fit beside each other in the width
+_DECADES = 5e3  # of the ends of a logarithmic axis, from which on 2 and 5 have no room
 _LEAST_TICK = 8  # characters of a tick's name in a line
 _ROW_LABEL = 28  # characters that the height of a row holds
 WIDTH = 8.4  # [in]; on screen and on paper it is stretched or shrunk to the column
@@ -148,6 +149,7 @@ def stops_axis(axes: Axes, over: Factor | None) -> None:
     """The factor along x, level beside level: 0 to 1 s are all readable."""
     if over is None:
         axes.set_xticks([])
+        axes.set_xlim(-0.5, 0.5)
         return
     names, unit = tick_names(over)
     narrow = max(_LEAST_TICK, _TITLE // len(names))
@@ -199,7 +201,9 @@ def log_axis(axes: Axes, which: Literal["x", "y"] = "y") -> None:
     axis = axes.xaxis if which == "x" else axes.yaxis
     axes.set(**{f"{which}scale": "log"})
     low, high = axis.get_view_interval()
-    axis.set_major_locator(LogLocator(subs=(1, 2, 5) if high > 5 * low else range(1, 10)))
+    ratio = high / low
+    subs = (1,) if ratio > _DECADES else (1, 2, 5) if ratio > 5 else range(1, 10)
+    axis.set_major_locator(LogLocator(subs=subs))
     axis.set_major_formatter("{x:g}")
     axis.set_minor_locator(NullLocator())
 

@@ -9,7 +9,7 @@ import numpy as np
 from dva_sim.experiments.effects import Floats, Setting, View, person_means, present
 from dva_sim.experiments.figures.keys import legend
 from dva_sim.experiments.figures.numbers import Numbers, with_unit
-from dva_sim.experiments.figures.palette import INK, looks
+from dva_sim.experiments.figures.palette import looks
 from dva_sim.experiments.figures.style import (
     Drawn,
     axis_label,
@@ -24,6 +24,8 @@ from dva_sim.experiments.statistics import Band, band
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+_BELOW = 0.3  # of that room, below: there is little that is less than none
+_NEAR = 0.05  # share of an axis, below which two names would be written over each other
 _ROOM = 0.15  # share of what persons span that is left free beyond them
 EXPOSURES = ("exposure_look_s", "exposure_s", "person_exposure_s")
 RESPONSES = ("response_mean_s", "confirmation_mean_s", "response_s", "drive_time_s")
@@ -35,11 +37,12 @@ def tradeoff(view: View) -> Drawn | None:
     if columns is None:
         return None
     figure, axes = panel_grid(view, 3.6)
-    numbers = Numbers()
+    numbers, ends = Numbers(), []
     for ax, panel in zip(axes, view.shown, strict=True):
         for level in view.lines:
             bands = [_band(view, column, panel, level) for column in columns]
             _line(ax, view, level, *bands)
+            ends.append((ax, bands[0].mean, bands[1].mean))
             told = {
                 with_unit(f"{word}_{edge}", column): getattr(found, name)
                 for word, column, found in zip(
@@ -52,6 +55,8 @@ def tradeoff(view: View) -> Drawn | None:
         ax.grid(True, axis="both")
         ax.margins(0.12)
     _fit(axes[0], view, columns)
+    for ax, x, y in ends:
+        _name_stops(ax, view, x, y)
     figure.supxlabel(axis_label(columns[0]), fontsize="medium")
     figure.supylabel(axis_label(columns[1]), fontsize="medium")
     legend(figure, view.line)
@@ -97,25 +102,34 @@ def _fit(ax: Axes, view: View, columns: tuple[str, str]) -> None:
         seen = present(np.concatenate([values.ravel() for values in every]))
         room = _ROOM * (float(np.ptp(seen)) or 1.0)
         low, high = ax.get_xlim() if name == "x" else ax.get_ylim()
-        low, high = max(low, seen.min() - room), min(high, seen.max() + room)
+        low, high = max(low, seen.min() - _BELOW * room), min(high, seen.max() + room)
         ax.set(**{f"{name}lim": (low, high)})
 
 
 def _line(ax: Axes, view: View, level: Level, exposure: Band, response: Band) -> None:
-    """Through all stops that are numbers, the first and last of them named; words each."""
+    """A mark at each stop, joined where stops are numbers."""
     paint, mark = looks(view.line)[level]
     x, y = exposure.mean, response.mean
     ax.hlines(y, exposure.pointwise_low, exposure.pointwise_high, color=paint, lw=0.8, alpha=0.7)
     ax.vlines(x, response.pointwise_low, response.pointwise_high, color=paint, lw=0.8, alpha=0.7)
     ax.plot(x, y, "-" if has_lines(view) else "", marker=mark, color=paint, ms=5, lw=1.2)
+
+
+def _name_stops(ax: Axes, view: View, x: Floats, y: Floats) -> None:
+    """The ends of a line, or each word; none beside another that it would be written over."""
     if view.over is None or len(x) < 2:
         return
+    wide, high = np.ptp(ax.get_xlim()), np.ptp(ax.get_ylim())
+    named: list[int] = []
     for stop in (0, len(x) - 1) if has_lines(view) else range(len(x)):
+        gaps = [(abs(x[i] - x[stop]) / wide, abs(y[i] - y[stop]) / high) for i in named]
+        if any(max(gap) < _NEAR for gap in gaps):
+            continue
+        named.append(stop)
         ax.annotate(
             level_name(view.over.name, view.over.levels[stop], short=True),
             (float(x[stop]), float(y[stop])),
-            xytext=(5, 4),
+            xytext=(6, 4 if stop else -9),
             textcoords="offset points",
             fontsize=7.5,
-            color=INK,
         )
