@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dva_sim.experiments.answer_places import at, condition, is_ordered, places
 from dva_sim.experiments.labels import (
     Level,
     factor_name,
@@ -17,22 +17,12 @@ from dva_sim.experiments.labels import (
     number,
     percent,
     quantity,
-    setting,
     unit_of,
 )
 
 Floats = NDArray[np.float64]
 
 _LEAST = 0.01  # that is not printed as zero
-# What is not there at a level of zero.
-_ABSENT = {
-    "link.delay_s": "delay",
-    "link.up.delay_s": "delay of commands",
-    "link.down.delay_s": "delay of frames",
-    "link.jitter_s": "jitter",
-    "link.loss": "packet loss",
-    "robot.processing_s": "processing time",
-}
 
 
 @dataclass(frozen=True)
@@ -127,18 +117,18 @@ def _tellable(f: Finding) -> list[str]:
     for chosen in (f.low > 0, f.high < 0):
         where = np.flatnonzero(chosen)
         if len(where):
-            head = "Elsewhere it turns round: " if sentences else _condition(f)
+            head = "Elsewhere it turns round: " if sentences else condition(f)
             sentences.append(_capital(f"{head}{_effect(f, where)}"))
     return sentences
 
 
 def _effect(f: Finding, where: NDArray[np.intp]) -> str:
     """`A takes 4.5 s longer than B at ... (band). The difference can be told from zero ...`."""
-    at = _telling_level(f, where)
-    band = f"{number(f.low[at])} to {quantity(f.high[at], f.unit)}"
-    reach = "only there" if len(where) == 1 < len(f.levels) else _places(f, where)
+    stop = _telling_level(f, where)
+    band = f"{number(f.low[stop])} to {quantity(f.high[stop], f.unit)}"
+    reach = "only there" if len(where) == 1 < len(f.levels) else places(f, where)
     return (
-        f"{_comparison(f, f.mean[at])} {_at(f, [at])} (95 % Monte Carlo band, given the model: "
+        f"{_comparison(f, f.mean[stop])} {at(f, [stop])} (95 % Monte Carlo band, given the model: "
         f"{band}). The difference can be told from zero {reach}{_remark_on_size(f, where)}."
     )
 
@@ -159,7 +149,7 @@ def _ruled_out(f: Finding) -> list[str]:
     nowhere = bool((holds_zero == np.isfinite(f.low)).all())
     sentences = [_no_difference(f)] if nowhere else []
     if len(same := np.flatnonzero(holds_zero & (bounds == 0))):
-        sentences.append(f"No {f.cluster} fares differently {_places(f, same)}.")
+        sentences.append(f"No {f.cluster} fares differently {places(f, same)}.")
     if len(settled := np.flatnonzero(holds_zero & (bounds > 0) & (bounds <= limit))):
         sentences.append(_settled(f, settled, float(bounds[settled].max()), nowhere))
     if len(undecided := np.flatnonzero(holds_zero & (bounds > limit))):
@@ -169,7 +159,7 @@ def _ruled_out(f: Finding) -> list[str]:
 
 def _undecided(f: Finding, where: NDArray[np.intp], bound: float) -> str:
     """Nothing is ruled out: say how large an effect may be, unless as large as it ever can."""
-    still = f"The question stays open {_places(f, where)}: "
+    still = f"The question stays open {places(f, where)}: "
     if bound >= f.widest:
         return f"{still}{f.persons} {f.cluster}s rule out nothing at all; more are needed."
     return (
@@ -183,15 +173,15 @@ def _settled(f: Finding, where: NDArray[np.intp], bound: float, nowhere: bool) -
     verdict = f"effect above {quantity(bound, f.unit)} either way is ruled out"
     matters = f", and with it the {_declared(f)} declared to matter" if f.smallest_effect else ""
     if nowhere:
-        return f"An {verdict} {_places(f, where)}{matters}."
-    return f"It cannot be told from zero {_places(f, where)}, where an {verdict}{matters}."
+        return f"An {verdict} {places(f, where)}{matters}."
+    return f"It cannot be told from zero {places(f, where)}, where an {verdict}{matters}."
 
 
 def _no_difference(f: Finding) -> str:
     first, second = level_name(f.factor, f.first), level_name(f.factor, f.second)
     anywhere = f" at any {factor_name(f.over)} tried" if f.over else ""
     return _capital(
-        f"{_condition(f)}no difference between {first} and {second} can be told from zero"
+        f"{condition(f)}no difference between {first} and {second} can be told from zero"
         f"{anywhere} (95 % Monte Carlo band, given the model)."
     )
 
@@ -202,7 +192,7 @@ def _declared(f: Finding) -> str:
 
 def _unpaired(f: Finding) -> list[str]:
     missing = [int(i) for i in np.flatnonzero(~np.isfinite(f.low))]
-    return [f"Nothing can be said {_at(f, missing)}: runs are missing."] if missing else []
+    return [f"Nothing can be said {at(f, missing)}: runs are missing."] if missing else []
 
 
 def _without_band(f: Finding) -> str:
@@ -210,12 +200,12 @@ def _without_band(f: Finding) -> str:
     there = np.flatnonzero(np.isfinite(f.mean))
     if not len(there):
         return "No pair of runs is complete, so the question stays open."
-    at = int(there[-1])
+    stop = int(there[-1])
     if f.persons < 2:
         why = f"Too few {f.cluster}s to answer: an interval needs at least two, here is one."
     else:
         why = f"The difference is the same for every {f.cluster}, so that no interval can be given."
-    seen = f"{_condition(f, inside=True)}{_comparison(f, f.mean[at])} {_at(f, [at])}"
+    seen = f"{condition(f, inside=True)}{_comparison(f, f.mean[stop])} {at(f, [stop])}"
     return f"{why} In the runs that were made, {seen}."
 
 
@@ -230,7 +220,7 @@ def _misses(f: Finding) -> list[str]:
     every = f"Every event{' of the runs that did not fail' if f.failed else ''} was confirmed"
     if f.all_confirmed:
         return [f"{every}, in every cell."]
-    where = _at(f, [len(f.levels) - 1])
+    where = at(f, [len(f.levels) - 1])
     if not any(m.missed for m in f.missed):
         return [f"{every} {where}, under each {factor_name(f.factor)}."]
     shares = [
@@ -269,12 +259,6 @@ def _persons(f: Finding) -> str:
     return f"one simulated {f.cluster}" if f.persons == 1 else f"{f.persons} simulated {f.cluster}s"
 
 
-def _condition(f: Finding, inside: bool = False) -> str:
-    if not f.within:
-        return ""
-    return f"{'with' if inside else 'With'} {setting(f.within)}, "
-
-
 def _comparison(f: Finding, difference: float) -> str:
     first, second = level_name(f.factor, f.first), level_name(f.factor, f.second)
     if difference == 0:
@@ -288,28 +272,7 @@ def _comparison(f: Finding, difference: float) -> str:
 
 def _telling_level(f: Finding, where: NDArray[np.intp]) -> int:
     """The last level of a quantity, for that is the question; else the largest difference."""
-    return int(where[-1] if _is_ordered(f) else where[np.argmax(abs(f.mean[where]))])
-
-
-def _is_ordered(f: Finding) -> bool:
-    values = [v for v in f.levels if isinstance(v, int | float)]
-    return len(values) == len(f.levels) and values == sorted(values)
-
-
-def _at(f: Finding, where: Sequence[int]) -> str:
-    if not f.over:
-        return f.everywhere
-    if spoken := _spoken(f, where):
-        return spoken
-    names = listing([level_name(f.over, f.levels[i]) for i in where])
-    name = factor_name(f.over)
-    vowel = name[0] in "aeiou" and not name.startswith("one")
-    article = "" if len(where) > 1 else "an " if vowel else "a "
-    return f"at {article}{name} {_of(f)}{names}"
-
-
-def _of(f: Finding) -> str:
-    return "of " if unit_of(f.over) or _is_ordered(f) else ""
+    return int(where[-1] if is_ordered(f) else where[np.argmax(abs(f.mean[where]))])
 
 
 def telling_stop(finding: Finding) -> int | None:
@@ -319,36 +282,3 @@ def telling_stop(finding: Finding) -> int | None:
             return _telling_level(finding, where)
     there = np.flatnonzero(np.isfinite(finding.low))
     return int(there[-1]) if len(there) else None
-
-
-def place_of(finding: Finding, stop: int) -> str:
-    """Where one stop of a finding lies: `with profile default, at a one-way delay of 1 s`."""
-    return f"{_condition(finding, inside=True)}{_at(finding, [stop])}"
-
-
-def _places(f: Finding, where: NDArray[np.intp]) -> str:
-    """`from 250 ms on`, `up to 100 ms`, `at every delay`, or the levels one by one."""
-    if not f.over:
-        return f.everywhere
-    names = [level_name(f.over, f.levels[int(i)]) for i in where]
-    solid = len(where) > 1 and bool((np.diff(where) == 1).all()) and _is_ordered(f)
-    if len(where) == len(f.levels) > 1:
-        return f"at every {factor_name(f.over)} tried"
-    if solid and where[-1] == len(f.levels) - 1:
-        return f"from {names[0]} on"
-    if solid and where[0] == 0:
-        return f"up to {names[-1]}"
-    return _spoken(f, where) or f"at {listing(names)}"
-
-
-def _spoken(f: Finding, where: Iterable[int]) -> str:
-    """`without delay`, `on the poor link`, `with filter none`: where a bare level is no English."""
-    levels = [f.levels[int(i)] for i in where]
-    if len(levels) == 1 and levels[0] == 0 and f.over in _ABSENT:
-        return f"without {_ABSENT[f.over]}"
-    if all(isinstance(level, int | float) and not isinstance(level, bool) for level in levels):
-        return ""
-    names = listing([level_name(f.over, level) for level in levels])
-    if f.over == "link":
-        return f"on the {names} link{'s' if len(levels) > 1 else ''}"
-    return f"with {factor_name(f.over)} {names}"

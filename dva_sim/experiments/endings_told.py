@@ -6,7 +6,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from dva_sim.experiments.answer import Finding, place_of
+from dva_sim.experiments.answer import Finding
+from dva_sim.experiments.answer_places import place_of
 from dva_sim.experiments.cells import CellTable
 from dva_sim.experiments.effects import Setting, View
 from dva_sim.experiments.endings import CLEARED, CONFIRMED, NOTHING, Ended, Endings

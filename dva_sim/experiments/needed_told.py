@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.experiments.answer import Finding, place_of, telling_stop
+from dva_sim.experiments.answer import Finding, telling_stop
+from dva_sim.experiments.answer_places import place_of
 from dva_sim.experiments.cells import CellTable
 from dva_sim.experiments.effects import Floats, View
 from dva_sim.experiments.labels import level_name, number, quantity

@@ -9,6 +9,7 @@ from dva_sim.experiments.asking import POINT
 from dva_sim.experiments.cells import CellTable
 from dva_sim.experiments.contrasts import judged
 from dva_sim.experiments.effects import Table
+from dva_sim.experiments.fingerprint import fingerprint_of_judges
 from dva_sim.experiments.labels import factor_name, listing
 from dva_sim.experiments.tables_of_tests import bound_of, verdict_with_interval
 
@@ -38,6 +39,7 @@ def registration_table(manifest: Mapping[str, Any], runs: Table, persons: int) -
         *_claims(dict(study) | {key: plan.get(key) for key in _CLAIMS}, runs),
         ["design", _design(plan), _design(study)],
         ["made with", found.get("made_with", "–"), _program(versions)],
+        ["judged with", found.get("judged_with") or "–", fingerprint_of_judges()],
         ["hash", str(found.get("hash", ""))[:_DIGITS], ""],
         ["earlier registrations", *_earlier(found.get("earlier") or ())],
     ]

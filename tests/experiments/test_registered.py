@@ -1,6 +1,7 @@
 import pytest
 import synthetic_study
 
+from dva_sim.experiments.fingerprint import fingerprint_of_judges
 from dva_sim.experiments.registered import registration_table
 
 PATTERNS = ["req-rep", "latest-wins"]
@@ -23,7 +24,12 @@ def runs():
 
 
 def rows_of(runs, plan=PLAN, study=PLAN, persons=4, **found):
-    registration = {"made_with": "0.7.0 abc", "hash": "0123456789abcdef" * 4, "plan": plan}
+    registration = {
+        "made_with": "0.7.0 abc",
+        "judged_with": "0a1b",
+        "hash": "0123456789abcdef" * 4,
+        "plan": plan,
+    }
     manifest = {
         "study": dict(study),
         "status": {"registration": registration | found},
@@ -43,6 +49,7 @@ def test_what_was_registered_stands_beside_what_was_run(runs):
         "every combination: messaging pattern (2 levels), one-way delay (2 levels)"
     )
     assert rows["made with"] == ("0.7.0 abc", "0.7.1 def")
+    assert rows["judged with"] == ("0a1b", fingerprint_of_judges())
     assert rows["hash"][0] == "0123456789abcdef"
     assert rows["earlier registrations"][0] == "none told"
 
