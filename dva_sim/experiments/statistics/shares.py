@@ -120,4 +120,4 @@ def _is_compatible(share: Floats, n: float, q: float, level: float) -> NDArray[n
     with np.errstate(invalid="ignore"):
         is_below = special.betainc(seen, n - seen + 1, q) <= beyond
         is_above = special.betainc(seen + 1, n - seen, q) >= 1 - beyond
-    return ~((share > 0) & is_below) & ~((share < 1) & is_above)
+    return np.asarray(~((share > 0) & is_below) & ~((share < 1) & is_above), dtype=bool)

@@ -196,10 +196,10 @@ def test_an_interval_of_a_share_holds_in_93_to_97_of_100_studies(share, icc):
 @pytest.mark.parametrize(
     ("q", "icc", "true"), [(0.5, 0.3, 0.0), (0.95, 0.3, 1.6449), (0.95, 0.7, 1.6449)]
 )
-def test_an_interval_of_a_quantile_holds_in_93_to_97_of_100_studies(q, icc, true):
+def test_an_interval_of_a_quantile_holds_in_93_to_98_of_100_studies(q, icc, true):
     runs = clustered(normal, icc, STUDIES, np.random.default_rng(2018)).reshape(STUDIES, -1)
     held = np.mean([holds(quantile_interval(own, WHO, q), true) for own in runs])
-    assert 0.93 <= held <= 0.975
+    assert 0.93 <= held <= 0.98
 
 
 @pytest.mark.slow
