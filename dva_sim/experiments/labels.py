@@ -47,7 +47,7 @@ _FACTORS = {
     "robot.profile": "robot",
     "robot.count": "robots",
     "operator.count": "operators",
-    "team": "who goes",
+    "team": "responder",
     "guard.mobilisation_s": "time until the guard sets out",
     "guard.way_m": "way of the guard",
     "phone.max_delay_s": "longest time between two values of the phone",

@@ -283,13 +283,24 @@ def overlapping(figure, texts):
     ]
 
 
+def test_who_does_not_drive_has_no_delay_budget(view):
+    runs = {**view.part.treated, "is_reference": np.zeros(len(view.part.treated["part"]), bool)}
+    guards = runs["pattern"] == "pub-sub"
+    stages = {k: np.where(guards, np.nan, v) for k, v in runs.items() if k.startswith("delay_")}
+    part = Part(runs | stages, "drive", view.part.factors)
+    with styled():
+        figure = delay_budget(replace(view, part=part)).figure
+    titles = [ax.get_title("left").rpartition(", ")[2] for ax in figure.axes]
+    assert titles == ["REQ/REP", "latest-wins"] * 2
+
+
 def test_names_of_six_links_stand_clear_of_each_other_beside_the_delay_budget(view):
     with styled():
         figure = delay_budget(of_links(view, 6)).figure
     axes = [ax for ax in figure.axes if ax.get_visible()]
     names = list(axes[0].get_yticklabels())
     assert [text.get_text() for text in names][::5] == ["ideal", "cellular-at-the-edge"]
-    assert overlapping(figure, [*names, *(ax.title for ax in axes)]) == []
+    assert overlapping(figure, [*names, *(ax._left_title for ax in axes)]) == []
 
 
 @pytest.mark.parametrize(

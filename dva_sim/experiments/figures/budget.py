@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from dva_sim.experiments.effects import Floats, Setting, View, nan_mean
+import numpy as np
+
+from dva_sim.experiments.effects import Factor, Floats, Setting, View, nan_mean
 from dva_sim.experiments.figures.keys import box
 from dva_sim.experiments.figures.numbers import Numbers
 from dva_sim.experiments.figures.palette import INK, PAPER, STAGES
@@ -36,6 +39,7 @@ def delay_budget(view: View) -> Drawn | None:
     stages = [column for column in _NAMES if view.part.has(column)]
     if not stages:
         return None
+    view = _driven(view, stages[0])
     stacks, numbers = Stacks(view, "Delay [s]", _parts(stages)), Numbers()
     for ax, panel, level in stacks.panels():
         means = {stage: _means(view, stage, panel, level) for stage in stages}
@@ -53,6 +57,15 @@ def delay_budget(view: View) -> Drawn | None:
         "processing it is the age of the command in force."
     )
     return finish(stacks.figure, "delay_budget", "Where the delay comes from", caption, numbers)
+
+
+def _driven(view: View, stage: str) -> View:
+    """Without the lines under which nobody drove, such as guards without robots."""
+    if view.line is None:
+        return view
+    name, grid = view.line.name, view.part.grid(stage)
+    there = [v for v in view.lines if np.isfinite(view.part.where(grid, {name: v})).any()]
+    return replace(view, line=Factor(name, tuple(there)))
 
 
 def _means(view: View, column: str, panel: Setting, level: Level) -> Floats:

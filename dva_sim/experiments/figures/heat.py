@@ -20,7 +20,7 @@ from dva_sim.experiments.figures.style import (
     panels,
     stops_axis,
 )
-from dva_sim.experiments.labels import Level, level_name, measure_name, number
+from dva_sim.experiments.labels import Level, capital, level_name, measure_name, number
 from dva_sim.experiments.statistics import band
 
 if TYPE_CHECKING:
@@ -75,7 +75,7 @@ def heat_map(view: View) -> Drawn | None:
         ax.set_xlabel("")
     bar = figure.colorbar(image, ax=axes, pad=0.02)
     bar.set_label(axis_label(view.measure, f"{first}\nminus {other}"))
-    title = f"{first} minus {other} in {measure_name(view.measure)}, over two factors"
+    title = f"{capital(first)} minus {other} in {measure_name(view.measure)}, over two factors"
     numbers = _numbers(view, fields)
     return finish(figure, "heat_map", title, _caption(first, other, has_zero), numbers)
 
