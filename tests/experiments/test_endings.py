@@ -192,6 +192,6 @@ def test_where_all_went_right_in_the_answers_panel_the_table_shows_the_others():
     far = [escalated(p, line) | {"guard.way_m": 60, "cell": 2} for p in range(3) for line in LEVELS]
     found, view = endings([*rows, *far], factors=[Factor("guard.way_m", (5, 60))])
     made = table(found, view, "person")
-    assert made.heads[:2] == ["guard way", "command timeout"]
+    assert made.heads[:2] == ["way of the guard", "command timeout"]
     assert [row[1:3] for row in made.rows] == [["short", "3"], ["long", "3"]]
     assert made.rows[0][0] == "60\N{NO-BREAK SPACE}m"
