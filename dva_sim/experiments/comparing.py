@@ -131,6 +131,15 @@ class Comparison:
         rows, shared = self._rows(side, table, column, group), self._shared(group)
         return rows.of(shared) if shared else rows
 
+    def failed(self, side: int, group: Group) -> frozenset[Run]:
+        """The runs of some cells that failed in the first (0) or second (1) folder."""
+        number = {(p.first, p.second)[side]: p.first for p in group.pairs}
+        return frozenset(
+            (number[run["cell"]], run["person"], run["trial"], run["seed"])
+            for run in self.sides[side].failures
+            if run["part"] == group.part and run["cell"] in number
+        )
+
     def _shared(self, group: Group) -> frozenset[Run]:
         """The runs of some cells that both folders have."""
         if group not in self._luck:

@@ -71,16 +71,46 @@ def _verdicts(
     gate: Gate, comparison: Comparison, table: str, column: str, groups: Iterator[Group]
 ) -> Iterator[Verdict]:
     for group in groups:
+        crashed = [comparison.failed(n, group) for n in (0, 1)]
+        if gate.statistic != "missing":
+            _refuse_crashed(group, len(crashed[1] - crashed[0]))
         sides = [_tested(gate, comparison.rows(n, table, column, group), column) for n in (0, 1)]
         if not any(len(_values(gate, side)) for side in sides):
             continue
-        first, second = (_statistic(gate, side) for side in sides)
+        shares = [_missing(side, len(runs)) for side, runs in zip(sides, crashed, strict=True)]
+        found = shares
+        if gate.statistic != "missing":
+            found = [_statistic(gate, side) for side in _both(gate, *sides)]
+        first, second = found
         _refuse_undecided(gate, group, first, second)
-        shares = [
-            float(np.isnan(side.values).mean()) if len(side.values) else 1.0 for side in sides
-        ]
         bound = gate.bound.for_(first)
         yield Verdict(gate, group.part, group.levels, first, second, bound, (shares[0], shares[1]))
+
+
+def _refuse_crashed(group: Group, runs: int) -> None:
+    """What would have come of runs that failed is not known."""
+    if runs:
+        raise ConfigError(
+            f"in part {group.part} {runs} runs of the second folder failed that did not in the "
+            "first; a condition on missing(...) counts them"
+        )
+
+
+def _missing(rows: Rows, crashed: int) -> float:
+    """Share of the rows without a value; a run that failed is one of them."""
+    every = len(rows.values) + crashed
+    return float((np.isnan(rows.values).sum() + crashed) / every) if every else 1.0
+
+
+def _both(gate: Gate, first: Rows, second: Rows) -> tuple[Rows, Rows]:
+    """Of pairs of runs those with a value on both sides: who has none is not among the best."""
+    alone = gate.statistic == "share" or gate.bound.kind == "absolute"
+    if alone or first.runs != second.runs:
+        return first, second
+    there = np.isfinite(first.values) & np.isfinite(second.values)
+    if not there.any():
+        return first, second
+    return first.where(there), second.where(there)
 
 
 def _tested(gate: Gate, rows: Rows, column: str) -> Rows:

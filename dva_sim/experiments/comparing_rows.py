@@ -48,7 +48,10 @@ class Rows:
 
     def of(self, runs: Set[Run]) -> Rows:
         """The rows of some runs."""
-        chosen = np.array([run in runs for run in self.runs], dtype=bool)
+        return self.where(np.array([run in runs for run in self.runs], dtype=bool))
+
+    def where(self, chosen: Array) -> Rows:
+        """Some rows, by a mask `(n,)`."""
         columns = (self.values, self.cell, self.person, self.trial, self.seed)
         return Rows(*(column[chosen] for column in columns))
 

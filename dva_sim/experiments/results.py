@@ -110,8 +110,14 @@ class Results:
 
     @cached_property
     def runs(self) -> Frame:
-        """The table of runs, one row each, repeats apart; empty if none was completed."""
-        return self.table("runs") if self.has("runs") else Frame()
+        """The table of runs, one row each, repeats apart; empty if none was completed.
+
+        Raises:
+            ConfigError: the manifest tells of runs, and the table is not there or damaged.
+        """
+        if not self.has("runs") and self.manifest.get("runs", 0) <= len(self.failures):
+            return Frame()
+        return self.table("runs")
 
     def columns(self, table: str) -> list[Column]:
         """What the columns of a table mean.

@@ -1,5 +1,7 @@
 """Conditions that a comparison fails by: how they are read, and when they hold."""
 
+import math
+
 import numpy as np
 import pytest
 from small_study import cheap, study_in
@@ -186,6 +188,49 @@ def test_what_is_missing_is_told_beside_what_was_found(comparison):
     assert verdict.holds
     assert verdict.second == 1.0
     assert verdict.missing == (verdict.first, 1.0)
+
+
+def crashes(job):
+    """Whoever is first never comes to an end."""
+    if job.person == 0:
+        raise RuntimeError("fell")
+    return cheap(job)
+
+
+def never_arrives(job):
+    """Of whoever is first no time is known, and all others take a second more."""
+    tables = cheap(job)
+    run = tables["runs"][0]
+    run["drive_time_s"] = math.nan if job.person == 0 else run["drive_time_s"] + 1.0
+    return tables
+
+
+def against(folder, episode):
+    """The small study, and the same with other episodes."""
+    study = study_in(folder)
+    return Comparison(
+        *(
+            Results.load(run_study(study, folder / e.__name__, jobs=1, episode=e))
+            for e in (cheap, episode)
+        )
+    )
+
+
+def test_runs_that_crashed_in_the_second_folder_do_not_pass(tmp_path):
+    comparison = against(tmp_path, crashes)
+    with pytest.raises(ConfigError, match=r"in part drive 8 runs of the second folder failed"):
+        comparison.judge("p95(drive_time_s) > 1.05x")
+    drive = comparison.judge("missing(drive_time_s) > 0 %")[0]
+    assert (drive.first, drive.second, drive.holds) == (0.0, 1 / 3, True)
+
+
+def test_pairs_with_a_value_on_both_sides_are_held_against_each_other(tmp_path):
+    comparison = against(tmp_path, never_arrives)
+    drive = comparison.judge("mean(drive_time_s) > +0.9 s")[0]
+    assert drive.second - drive.first == pytest.approx(1.0)
+    assert drive.missing == (0.0, 1 / 3)
+    whole = comparison.judge("mean(drive_time_s) > 0 s")[0]
+    assert whole.second == pytest.approx(drive.second)
 
 
 @pytest.mark.parametrize(

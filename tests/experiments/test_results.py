@@ -100,3 +100,11 @@ def test_a_folder_of_something_else_is_refused(tmp_path):
     (tmp_path / "manifest.json").write_text(json.dumps({"name": "a web page"}))
     with pytest.raises(ConfigError, match="not the manifest of a study"):
         Results.load(tmp_path)
+
+
+def test_a_table_of_runs_that_has_gone_is_told(tmp_path):
+    study = study_in(tmp_path)
+    out = run_study(study, tmp_path / "out", jobs=1, episode=cheap)
+    (out / "tables" / "runs.parquet").unlink()
+    with pytest.raises(ConfigError, match=r"has no table 'runs'; tables: tracks"):
+        _ = Results.load(out).runs
