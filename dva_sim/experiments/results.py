@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,6 +23,18 @@ if TYPE_CHECKING:
 MANIFEST = "manifest.json"
 MACHINE = "machine.json"
 TABLES = "tables"
+_NOT_AS_WRITTEN = "is damaged, edited or of other results; the study's command makes it again"
+
+
+def digests(folder: Path) -> dict[str, str]:
+    """SHA-256 of every table in a folder, by the table's name."""
+    return {path.stem: digest_of(path) for path in sorted(folder.glob("*.parquet"))}
+
+
+def digest_of(path: Path) -> str:
+    """SHA-256 of a file."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 @dataclass(frozen=True)
@@ -142,12 +155,18 @@ class Results:
         """The Parquet file of a table.
 
         Raises:
-            ConfigError: no such table.
+            ConfigError: no such table, or another than the manifest was written beside.
         """
         if not self.has(table):
             there = ", ".join(self.tables) or "none"
             raise ConfigError(f"{self.folder} has no table {table!r}; tables: {there}")
-        return self.folder / TABLES / f"{table}.parquet"
+        path = self.folder / TABLES / f"{table}.parquet"
+        expected = self.manifest.get("tables", {}).get(table)
+        if expected is not None and table not in self._seen:
+            if digest_of(path) != expected:
+                raise ConfigError(_NOT_AS_WRITTEN, path)
+            self._seen.add(table)
+        return path
 
     def report(self) -> Path:
         """Make `report.html` and `figures/` in the folder.
@@ -190,6 +209,11 @@ class Results:
         except duckdb.Error as error:
             raise ConfigError(f"cannot be read: {str(error).splitlines()[0]}", file) from None
         return Frame({key: without_mask(column) for key, column in found.items()})
+
+    @cached_property
+    def _seen(self) -> set[str]:
+        """Tables that were found as written."""
+        return set()
 
     def _repr_html_(self) -> str:
         """What a notebook shows: question, answer, and how many runs stand behind it."""

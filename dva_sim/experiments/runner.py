@@ -18,7 +18,7 @@ from dva_sim.experiments.journal import FILE, Journal
 from dva_sim.experiments.manifest import failures, machine, manifest_of, write_json
 from dva_sim.experiments.places import Place, PlaceLost
 from dva_sim.experiments.pool import Episode
-from dva_sim.experiments.results import MACHINE, MANIFEST
+from dva_sim.experiments.results import MACHINE, MANIFEST, TABLES, digests
 from dva_sim.experiments.stopping import is_enough, rounds
 from dva_sim.experiments.study import Study
 from dva_sim.experiments.tables import design_row, write_tables
@@ -75,6 +75,7 @@ def run_study(
                 write_tables(out, carried_out, journal)
                 manifest["runs"] = len({job.key for job in carried_out})
                 manifest |= {"stopped": stopped, "failures": failures(carried_out, journal)}
+                manifest["tables"] = digests(out / TABLES)
                 write_json(out / MANIFEST, manifest)
         facts = {"cores": places.cores(), "jobs": place.width, "started": started.isoformat()}
         facts |= {"wall_s": time.perf_counter() - clock}

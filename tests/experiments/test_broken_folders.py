@@ -17,6 +17,7 @@ from dva_sim.errors import ConfigError, DvaSimError
 from dva_sim.experiments import limit, pool
 from dva_sim.experiments.journal import FILE
 from dva_sim.experiments.planning import dry_run
+from dva_sim.experiments.report import write_report
 from dva_sim.experiments.results import Results
 from dva_sim.experiments.runner import run_study
 
@@ -46,8 +47,17 @@ def test_what_is_damaged_or_gone_is_made_again_from_the_journal(
 
 def test_a_damaged_table_is_told_with_its_file(out: Path) -> None:
     (out / "tables" / "runs.parquet").write_bytes(b"PAR1 no more")
-    with pytest.raises(ConfigError, match=r"runs\.parquet: cannot be read"):
+    with pytest.raises(ConfigError, match=r"runs\.parquet: is damaged, edited or of other results"):
         Results.load(out).table("runs")
+
+
+def test_a_table_of_other_results_is_no_evidence_for_these(tmp_path: Path, out: Path) -> None:
+    other = run_study(
+        kit.study_in(tmp_path, "seed=4"), tmp_path / "other", jobs=1, episode=kit.cheap
+    )
+    shutil.copy(other / "tables" / "runs.parquet", out / "tables" / "runs.parquet")
+    with pytest.raises(ConfigError, match="of other results"):
+        write_report(out)
 
 
 def test_a_damaged_journal_is_told_with_what_to_do(tmp_path: Path, out: Path) -> None:
