@@ -58,15 +58,6 @@ def read_lapse(path: Path) -> Lapse:
     )
 
 
-def tracks_of(path: Path) -> Columns:
-    """Where everybody was: the columns of the table `tracks`, of guards and bystanders, too.
-
-    Raises:
-        ConfigError: no such file, or not a recording.
-    """
-    return read_lapse(path).tracks
-
-
 def _columns(rows: list[tuple[Any, ...]], *names: str) -> Columns:
     columns = list(zip(*rows, strict=True)) or [()] * len(names)
     return {name: np.array(column) for name, column in zip(names, columns, strict=True)}

@@ -15,7 +15,7 @@ from dva_sim.errors import ConfigError, DvaSimError
 from dva_sim.experiments.models import tables_of
 from dva_sim.experiments.pictures.stills import still
 from dva_sim.recordings import read_recording, write_recording, writing
-from dva_sim.recordings.lapse import read_lapse, tracks_of
+from dva_sim.recordings.lapse import read_lapse
 from dva_sim.simulation import simulate
 
 RUNS = {"drive": drive, "drill": drill, "evacuation": evacuation}
@@ -184,7 +184,7 @@ def pixels(path):
 
 
 def test_a_figure_gets_its_columns(folder):
-    columns = tracks_of(folder / "evacuation.mcap")
+    columns = read_lapse(folder / "evacuation.mcap").tracks
     assert list(columns) == ["agent", "t_s", "x_m", "y_m", "heading_rad", "mode"]
     assert {"robot-1", "guard-1", "bystander-1"} <= set(columns["agent"])
     assert len({len(column) for column in columns.values()}) == 1

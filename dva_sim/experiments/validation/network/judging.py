@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 
 from dva_sim.experiments.validation.network.kinds import Kind, is_bounded, may_livelock
-from dva_sim.experiments.validation.network.samples import JUDGED_EXACTLY, Cell, Measure
+from dva_sim.experiments.validation.network.samples import JUDGED_EXACTLY, Cell
 
 Word = Literal["inside", "outside", "shown only"]
 
@@ -123,8 +123,3 @@ def share_inside(verdicts: Sequence[Verdict]) -> tuple[int, int]:
     """How many of those that are judged lie inside, and how many are judged."""
     judged = [v for v in verdicts if v.word != "shown only"]
     return sum(v.word == "inside" for v in judged), len(judged)
-
-
-def measures_of(verdicts: Sequence[Verdict]) -> list[Measure]:
-    """The measures that appear, each once."""
-    return list(dict.fromkeys(v.cell.measure for v in verdicts))

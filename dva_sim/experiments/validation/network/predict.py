@@ -31,7 +31,6 @@ from dva_sim.streams import Streams
 
 Depth = Literal["auto", "message", "segment", "datagram"]
 Played = Literal["message", "segment", "datagram"]
-DEPTHS: tuple[Depth, ...] = ("auto", "message", "segment", "datagram")
 
 _PATIENCE_S = 120.0  # for a handshake; then nothing is ever sent
 _UNLIMITED_BPS = 1e12
