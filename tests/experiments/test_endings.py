@@ -162,6 +162,12 @@ def test_the_figure_ends_at_the_shares_of_the_table():
     assert (float(first["confirmed"]), float(first[NOTHING])) == (0.0, 1.0)
 
 
+def test_where_nothing_ever_came_of_an_event_the_figure_says_so():
+    found, view = endings([event(person, line) for line in LEVELS for person in range(2)])
+    rows = list(csv.DictReader(io.StringIO(endings_in_time(found, view).csv.decode())))
+    assert {float(row["nothing"]) for row in rows} == {1.0}
+
+
 def test_where_all_were_confirmed_there_is_no_figure():
     found, view = endings([confirmed(p, line) for p in range(3) for line in LEVELS])
     assert endings_in_time(found, view) is None

@@ -356,7 +356,8 @@ def test_without_an_open_door_nobody_gets_in(ring: KeyRing, make: Make) -> None:
     server.security.close()
     client.connect(zmq.REQ, ROBOT, endpoint).send(b"list")
     run([server, client], lambda: client.said)
-    assert client.said[0].reason == Reason.WRONG_SERVER_KEY  # as good as it can know
+    # As good as it can know: hung up, or silent for too long if the machine was busy meanwhile.
+    assert client.said[0].reason in (Reason.WRONG_SERVER_KEY, Reason.SILENT)
     assert not router.poll(0)
 
 

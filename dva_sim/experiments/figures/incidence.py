@@ -83,7 +83,7 @@ def _shares(endings: Endings, mask: NDArray[np.bool_], times: Floats) -> dict[st
     causes = np.array([codes.get(way, CUT) for way in endings.way[mask]], dtype=np.intp)
     curve = incidence(endings.time[mask], causes, len(ways))
     shares = {way: curve.at(times, code) for way, code in codes.items()}
-    return shares | {NOTHING: 1.0 - np.sum(list(shares.values()), axis=0)}
+    return shares | {NOTHING: 1.0 - sum(shares.values(), np.zeros_like(times))}
 
 
 def _stack(ax: Axes, shares: dict[str, Floats], times: Floats) -> None:
