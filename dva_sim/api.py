@@ -14,10 +14,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dva_sim.errors import DvaSimError
-from dva_sim.experiments.comparing import Comparison
-from dva_sim.experiments.results import Results
+from dva_sim.experiments.comparing import Comparison as Comparison
+from dva_sim.experiments.results import Results as Results
 from dva_sim.experiments.settings import Settings, pairs_of
-from dva_sim.experiments.single import Episode, episode, replay
+from dva_sim.experiments.single import Episode as Episode
+from dva_sim.experiments.single import episode as episode
+from dva_sim.experiments.single import replay as replay
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -26,24 +28,6 @@ if TYPE_CHECKING:
     from dva_sim.experiments.registration import Registration
     from dva_sim.experiments.study import Study
     from dva_sim.experiments.tuned import Tuned
-
-__all__ = [
-    "Comparison",
-    "Episode",
-    "Results",
-    "compare",
-    "dry_run",
-    "episode",
-    "export",
-    "load",
-    "new",
-    "register",
-    "replay",
-    "report",
-    "run",
-    "show",
-    "tune",
-]
 
 Folder = Results | str | Path
 
@@ -162,8 +146,9 @@ def register(study: str | Path, *, full: bool = False, again: bool = False) -> R
     from dva_sim.experiments.registration import registration_of
     from dva_sim.experiments.study import load_study
 
-    write_down(load_study(study, full=full), again)
-    found = registration_of(load_study(study, full=full))
+    asked = load_study(study, full=full)
+    write_down(asked, again)
+    found = registration_of(asked)
     assert found is not None
     return found
 
