@@ -38,7 +38,7 @@ def precision(finding: Finding, view: View, cluster: str) -> str:
     half = _count_of(needed(values, person, found.half_width / 2))
     return (
         f"The 95 % interval of the difference {place_of(finding, stop)}{alone} is {width}; half "
-        f"as wide would take about {half}.{_where_open(finding, view)} That is if more of them "
+        f"as wide would take about {half}.{_where_open(finding)} That is if more of them "
         "spread as these do, with as many runs of each."
     )
 
@@ -81,20 +81,23 @@ def needed(values: Floats, person: NDArray[Any], half_width: float) -> float:
         return math.inf
 
 
-def _where_open(finding: Finding, view: View) -> str:
-    """What it would take wherever an effect that matters is not ruled out yet."""
+def _where_open(finding: Finding) -> str:
+    """What it would take wherever an effect that matters is not ruled out yet.
+
+    Counted from the band as it is, which narrows with the root of the number of persons.
+    """
     limit = finding.smallest_effect
     if limit is None:
         return ""
     holds_zero = (finding.low <= 0) & (finding.high >= 0)
     is_open = holds_zero & (np.maximum(-finding.low, finding.high) > limit)
-    stops = [int(stop) for stop in np.flatnonzero(is_open)]
-    if not stops:
+    half = np.maximum(finding.high - finding.mean, finding.mean - finding.low)[is_open]
+    if not np.any(half > limit):
         return ""
-    most = max(needed(*_differences(finding, view, stop), limit) for stop in stops)
+    most = math.ceil(finding.persons * (half.max() / limit) ** 2)
     matters = level_name(finding.measure, limit)
     return (
-        f" Where the question stays open, about {_count_of(most)} would narrow it to ±{matters}, "
+        f" Where the question stays open, about {most:,} would narrow the band to ±{matters}, "
         "the smallest effect declared to matter."
     )
 

@@ -126,7 +126,14 @@ def test_where_the_question_is_open_it_says_what_the_effect_that_matters_takes()
     declared["answer"] = CONTRAST | {"smallest_effect_s": 0.5}
     view = view_of(declared, runs(persons=12, mean_s=0.1))
     told = precision(finding_of(view), view, "person").replace("\N{NO-BREAK SPACE}", " ")
-    assert "Where the question stays open, about 64 would narrow it to ±500 ms" in told
+    found = finding_of(view)
+    half_s = max(found.high[0] - found.mean[0], found.mean[0] - found.low[0])
+    assert half_s == pytest.approx(1.3, abs=0.1)
+    persons = math.ceil(12 * (half_s / 0.5) ** 2)
+    assert f"stays open, about {persons} would narrow the band to ±500 ms" in told
+    declared["answer"]["smallest_effect_s"] = 1.4  # the band is that narrow, and off its middle
+    shifted = view_of(declared, runs(persons=12, mean_s=1.2))
+    assert "stays open" not in precision(finding_of(shifted), shifted, "person")
 
 
 def test_an_answer_without_an_interval_has_no_precision():
