@@ -56,6 +56,19 @@ robustness:
 )
 BANDS = "bands: {crossover_rad_s: [1.0, 2.0], hand_lag_s: [0.1, 0.2]}\n"
 REPEATED_RUNS = RUNS + 3 * 2 * 4  # with the usual parameters they are runs of the part itself
+SHIFT = {
+    "model": "timed",
+    "area": {"width_m": 60, "height_m": 40},
+    "responders": [
+        {"name": "guard", "count": 2, "base": [5, 5], "look": 5, "act": 30, "after": "recall"},
+        {"name": "robot", "kind": "robot", "base": [55, 35], "speed_mps": 0.4, "after": "return"},
+    ],
+    "operators": {"count": 1},
+    "demand": [{"between": {"law": "exponential", "mean_s": 120}, "false_share": 0.3}],
+    "dispatch": {"escalate_after_s": 120, "containment": True},
+    "warm_up_s": 300,
+    "horizon_s": 3900,
+}
 
 
 def write_study(folder: Path, text: str = STUDY) -> Path:

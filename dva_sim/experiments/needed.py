@@ -14,11 +14,7 @@ from dva_sim.experiments.asking import ANSWER, Contrast, Hypothesis
 from dva_sim.experiments.contrasts import Pairs, claims_of, contrasts_of, pairs_of, places_of
 from dva_sim.experiments.effects import Setting, Table
 from dva_sim.experiments.labels import level_name, measure_name, quantity, setting, unit_of
-from dva_sim.experiments.statistics import (
-    LEVEL,
-    person_means,
-    power,
-)
+from dva_sim.experiments.statistics import LEVEL, person_means, power
 
 POWERS = (0.8, 0.9)
 MOST_PERSONS = 10_000
@@ -134,9 +130,7 @@ def _of_comparisons(
         why = "as found" if smallest is None else "the smallest that matters"
         what, assumed = f"{_sides(contrast, at)}: not zero", f"{quantity(effect, unit)}, {why}"
         alpha = _ALPHA / family[contrast.family]
-        least = math.ceil(
-            math.log2(2 / alpha)
-        )  # of swapped labels, 2 ways in 2 ** n are as far off
+        least = math.ceil(math.log2(2 / alpha))  # 2 in 2 ** n ways to swap labels are as far off
         yield _Test(name, what, assumed, pairs, effect, 1 - alpha, least=least)
 
 

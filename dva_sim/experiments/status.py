@@ -47,9 +47,8 @@ def status_of(manifest: Mapping[str, Any]) -> Status:
 
 def _judged_anew(status: Status) -> Status:
     """The status, with a word if hypotheses are judged by another program than was registered."""
-    meant = (status.registration or {}).get("judged_with", "")
-    now = fingerprint_of_judges()
-    if meant in ("", now):
+    meant = (status.registration or {}).get("judged_with")
+    if not meant or meant == (now := fingerprint_of_judges()):
         return status
     remark = f"what judges its hypotheses has changed since it was registered ({meant}; now {now})"
     return status.model_copy(update={"why": (*status.why, remark)})
@@ -60,11 +59,12 @@ def _without(failed: Sequence[Mapping[str, Any]], status: Status) -> Status:
     if not failed:
         return status
     confirmed = status.kind == "confirmatory"
-    why = [f"{len(failed)} of the registered runs failed"] if confirmed else []
     slow = sum(str(row["error"]).startswith(RunTooLong.__name__) for row in failed)
-    why += [f"{slow} of the runs met their limit of time; on another machine others may"] * bool(
-        slow
-    )
+    why = []
+    if confirmed:
+        why.append(f"{len(failed)} of the registered runs failed")
+    if slow:
+        why.append(f"{slow} of the runs met their limit of time; on another machine others may")
     return status.model_copy(
         update={
             "kind": "exploratory" if confirmed else status.kind,

@@ -21,7 +21,7 @@ from dva_sim.experiments.labels import (
         ("pattern", "req-rep", "REQ/REP"),
         ("operator.strategy", "pursuit", "pursuit"),
         ("phone.ideal", True, "yes"),
-        ("phone.filter", "/tmp/mine.py:MyFilter", "MyFilter"),
+        ("phone.filter", "/some/where/mine.py:MyFilter", "MyFilter"),
     ],
 )
 def test_a_level_is_named_with_its_unit(factor, level, text):

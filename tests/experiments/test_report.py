@@ -280,5 +280,5 @@ def test_conditions_name_what_a_study_changed_and_a_class_with_its_file():
     rows = dict(conditions({"drive": scenario}, [], also=["pattern", "operator.traits"]))
     assert rows["messaging pattern"] == ["latest-wins"]
     assert rows["operator traits"] == ["crossover_rad_s 1.2"]
-    levels = _levels("phone.filter", ("none", "/tmp/mine.py:Mine"))
-    assert levels == "none and Mine (/tmp/mine.py)"
+    levels = _levels("phone.filter", ("none", "/some/where/mine.py:Mine"))
+    assert levels == "none and Mine (/some/where/mine.py)"

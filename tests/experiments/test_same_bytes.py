@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import synthetic_study
+from small_study import SHIFT
 
 import dva_sim
 from dva_sim.experiments.dispatch import measures
@@ -25,19 +26,6 @@ from dva_sim.experiments.report import write_report
 for folder in sys.argv[1:]:
     write_report(Path(folder), pdf=True)
 """
-SHIFT = {
-    "model": "timed",
-    "area": {"width_m": 60, "height_m": 40},
-    "responders": [
-        {"name": "guard", "count": 2, "base": [5, 5], "look": 5, "act": 30, "after": "recall"},
-        {"name": "robot", "kind": "robot", "base": [55, 35], "speed_mps": 0.4, "after": "return"},
-    ],
-    "operators": {"count": 1},
-    "demand": [{"between": {"law": "exponential", "mean_s": 120}, "false_share": 0.3}],
-    "dispatch": {"escalate_after_s": 120, "containment": True},
-    "warm_up_s": 300,
-    "horizon_s": 3900,
-}
 
 
 def grid(folder):

@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 import synthetic_study
+from small_study import SHIFT
 
 from dva_sim.experiments.dispatch import measures
 from dva_sim.experiments.dispatch.percentiles import pooled
@@ -15,19 +16,6 @@ pytestmark = pytest.mark.slow
 
 POLICIES = ["random", "nearest_idle", "min_eta"]
 RATES = [1, 3]
-SCENARIO = {
-    "model": "timed",
-    "area": {"width_m": 60, "height_m": 40},
-    "responders": [
-        {"name": "guard", "count": 2, "base": [5, 5], "look": 5, "act": 30, "after": "recall"},
-        {"name": "robot", "kind": "robot", "base": [55, 35], "speed_mps": 0.4, "after": "return"},
-    ],
-    "operators": {"count": 1},
-    "demand": [{"between": {"law": "exponential", "mean_s": 120}, "false_share": 0.3}],
-    "dispatch": {"escalate_after_s": 120, "containment": True},
-    "warm_up_s": 300,
-    "horizon_s": 3900,
-}
 FACTS = {
     "study": {
         "question": "Who should go?",
@@ -43,7 +31,7 @@ FACTS = {
             "smallest_effect_s": 5.0,
         },
     },
-    "scenarios": {"shift": build(SCENARIO).model_dump(mode="json")},
+    "scenarios": {"shift": build(SHIFT).model_dump(mode="json")},
     "set": [],
 }
 
@@ -53,7 +41,7 @@ def report(tmp_path_factory):
     tables = {"runs": [], "events": []}
     for policy, rate, shift in itertools.product(POLICIES, RATES, range(3)):
         changes = {"dispatch.policy": policy, "intensity": rate}
-        made = measures.tables(simulate_timed(build(SCENARIO, changes), shift))
+        made = measures.tables(simulate_timed(build(SHIFT, changes), shift))
         design = {"part": "shift", "person": shift, "trial": 0, "seed": shift}
         for name, rows in tables.items():
             rows += [design | changes | {"is_reference": False} | row for row in made[name]]
