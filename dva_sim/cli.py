@@ -38,6 +38,7 @@ def run(
     limit: Annotated[
         float, typer.Option(metavar="SECONDS", min=1, help="A run that takes longer has failed.")
     ] = 600,
+    quick: Annotated[bool, typer.Option("--quick", help="The study's small version.")] = False,
     full: Annotated[bool, typer.Option("--full", help="The study's larger version.")] = False,
     pilot: Annotated[
         int | None,
@@ -47,13 +48,15 @@ def run(
 ) -> None:
     """Run a study, or go on with one that was interrupted, and write its report."""
     from dva_sim.experiments import running
+    from dva_sim.experiments.versions import Variant
 
     changes = [*(set_ or []), *([f"seed={seed}"] if seed is not None else [])]
-    version, workers = running.Version(full, pilot), running.Workers(jobs, scheduler, limit)
+    variant = Variant.of(quick=quick, full=full, pilot=pilot)
+    workers = running.Workers(jobs, scheduler, limit)
     if dry_run:
-        running.plan(study, changes, out, workers, version)
+        running.plan(study, changes, out, workers, variant)
         return
-    raise typer.Exit(running.run(study, changes, out, workers, version))
+    raise typer.Exit(running.run(study, changes, out, workers, variant))
 
 
 @app.command()
@@ -76,7 +79,7 @@ def register(
     from dva_sim.experiments.registration import register as write_down
     from dva_sim.experiments.study import load_study
 
-    typer.echo(write_down(load_study(study, full=full), again))
+    typer.echo(write_down(load_study(study, version="full" if full else None), again))
 
 
 @app.command()
@@ -116,9 +119,9 @@ def show(
 ) -> None:
     """Show what a results folder holds: the answer, every cell, a table, or what columns mean."""
     from dva_sim.experiments import showing_console
-    from dva_sim.experiments.results import Results
+    from dva_sim.experiments.unfinished import load_so_far
 
-    showing_console.show(Results.load(folder), table, columns, rows)
+    showing_console.show(load_so_far(folder), table, columns, rows)
 
 
 @app.command()

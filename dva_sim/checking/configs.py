@@ -149,7 +149,7 @@ def _quoted(document: Document, problem: str) -> Path_:
 def _check_study(document: Document) -> Iterator[ConfigError]:
     """The study, its scenarios in every cell, and one run of each built as by the runner."""
     study = load_study(document.file)
-    versions = [study, *([load_study(document.file, full=True)] if study.full else [])]
+    versions = [study, *(load_study(document.file, version=name) for name in study.versions)]
     cells = [design.to_rehearse(version, design.cells(version)) for version in versions]
     for cell in {cell.config: cell for some in cells for cell in some}.values():
         try:
@@ -165,7 +165,7 @@ def _check_registration(document: Document) -> Iterator[ConfigError]:
     if not file.is_file():
         yield document.error(f"{file.name}, the study it is of, is not beside it", ("study",))
         return
-    for problem in departures(found, load_study(file, full=found.full)):
+    for problem in departures(found, load_study(file, version="full" if found.full else None)):
         yield document.error(problem, ("plan",))
 
 

@@ -18,28 +18,11 @@ from dva_sim.experiments.console import console, say
 from dva_sim.experiments.planning import DryRun, dry_run
 from dva_sim.experiments.results import Results
 from dva_sim.experiments.study import Study, load_study
+from dva_sim.experiments.versions import Variant
 
 INTERRUPTED = 130  # exit code of a program ended by Ctrl-C
 _LINE_S = 30.0  # between two lines of progress in a file
 _MINUTE_S, _HOUR_S = 60, 3600
-
-
-@dataclass(frozen=True)
-class Version:
-    """Which version of a study is meant.
-
-    Attributes:
-        full: The larger one.
-        pilot: Only so many persons.
-    """
-
-    full: bool = False
-    pilot: int | None = None
-
-    def folder(self, name: str) -> Path:
-        """Where results go if nobody says: each version has its own folder."""
-        marks = ["-full"] * self.full + ["-pilot"] * (self.pilot is not None)
-        return Path("results") / "".join([Path(name).stem, *marks])
 
 
 @dataclass(frozen=True)
@@ -57,13 +40,13 @@ class Workers:
     limit_s: float = 600.0
 
 
-def run(name: str, pairs: list[str], out: Path | None, workers: Workers, version: Version) -> int:
+def run(name: str, pairs: list[str], out: Path | None, workers: Workers, variant: Variant) -> int:
     """Run a study and show how far it is, then write its report; the exit code."""
     from dva_sim.experiments.report import write_report
     from dva_sim.experiments.runner import run_study
 
     try:
-        study, folder = _loaded(name, pairs, out, version)
+        study, folder = _loaded(name, pairs, out, variant)
         before = _planned(study, folder, workers, tries=False)
         with _shown("running", before.runs) as show:
             run_study(
@@ -74,7 +57,8 @@ def run(name: str, pairs: list[str], out: Path | None, workers: Workers, version
                 progress=show,
                 limit_s=workers.limit_s,
             )
-        failures = _told_failures(Results.load(folder)) + _recorded(study, folder, workers)
+        results = Results.load(folder)
+        failures = _told_failures(results) + _recorded(study, folder, workers)
         with console.status("Writing the report ..."):
             report = write_report(folder)
     except KeyboardInterrupt as stopped:
@@ -112,16 +96,16 @@ def tune(name: str, out: Path | None, jobs: int | None) -> int:
     return 0
 
 
-def plan(name: str, pairs: list[str], out: Path | None, workers: Workers, version: Version) -> None:
+def plan(name: str, pairs: list[str], out: Path | None, workers: Workers, variant: Variant) -> None:
     """Say what `run` would do."""
-    study, folder = _loaded(name, pairs, out, version)
+    study, folder = _loaded(name, pairs, out, variant)
     _planned(study, folder, workers, tries=True)
 
 
-def _loaded(name: str, pairs: list[str], out: Path | None, version: Version) -> tuple[Study, Path]:
-    study = load_study(name, pairs, full=version.full, pilot=version.pilot)
+def _loaded(name: str, pairs: list[str], out: Path | None, variant: Variant) -> tuple[Study, Path]:
+    study = load_study(name, pairs, version=variant.version, pilot=variant.pilot)
     say(f"[bold]{escape(study.question)}[/bold]")
-    return study, out if out is not None else version.folder(name)
+    return study, out if out is not None else variant.folder(name)
 
 
 def _planned(study: Study, folder: Path, workers: Workers, tries: bool) -> DryRun:

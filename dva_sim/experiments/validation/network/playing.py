@@ -98,7 +98,7 @@ def _jobs(order: Order, seed: int) -> list[Job]:
         asked = order.condition.to_row(), order.depth, order.without, first, count
         cell = (("order", json.dumps(asked)),)
         name, nobody = _name(order, first), cast(AnyScenario, None)
-        jobs.append(Job("network", cell, 0, 0, 0, seed, nobody, name))
+        jobs.append(Job("network", cell, 0, 0, 0, seed, name, nobody))
     return jobs
 
 
