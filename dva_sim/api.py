@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dva_sim.errors import DvaSimError
+from dva_sim.errors import RunsFailed
 from dva_sim.experiments.comparing import Comparison as Comparison
 from dva_sim.experiments.results import Results as Results
 from dva_sim.experiments.settings import Settings, pairs_of
@@ -85,7 +85,7 @@ def run(
     if report:
         results.report()
     if problems:
-        raise DvaSimError(f"{folder}: {'; '.join(problems)}; the results are complete")
+        raise RunsFailed(f"{folder}: {'; '.join(problems)}; the results are complete")
     return results
 
 

@@ -14,13 +14,13 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn
 
+from dva_sim.exit_codes import ExitCode
 from dva_sim.experiments.console import console, say
 from dva_sim.experiments.planning import DryRun, dry_run
 from dva_sim.experiments.results import Results
 from dva_sim.experiments.study import Study, load_study
 from dva_sim.experiments.versions import Variant
 
-INTERRUPTED = 130  # exit code of a program ended by Ctrl-C
 _LINE_S = 30.0  # between two lines of progress in a file
 _MINUTE_S, _HOUR_S = 60, 3600
 
@@ -40,7 +40,9 @@ class Workers:
     limit_s: float = 600.0
 
 
-def run(name: str, pairs: list[str], out: Path | None, workers: Workers, variant: Variant) -> int:
+def run(
+    name: str, pairs: list[str], out: Path | None, workers: Workers, variant: Variant
+) -> ExitCode:
     """Run a study and show how far it is, then write its report; the exit code."""
     from dva_sim.experiments.report import write_report
     from dva_sim.experiments.runner import run_study
@@ -64,7 +66,7 @@ def run(name: str, pairs: list[str], out: Path | None, workers: Workers, variant
     except KeyboardInterrupt as stopped:
         return _stopped(stopped)
     say(f"Report: {report}")
-    return 1 if failures else 0
+    return ExitCode.RUNS_FAILED if failures else ExitCode.OK
 
 
 def folder_of_tuning(name: str) -> Path:
@@ -72,7 +74,7 @@ def folder_of_tuning(name: str) -> Path:
     return Path("results") / f"{Path(name).stem}-tuning"
 
 
-def tune(name: str, out: Path | None, jobs: int | None) -> int:
+def tune(name: str, out: Path | None, jobs: int | None) -> ExitCode:
     """Choose what a study has tuned, and write it beside the study; the exit code."""
     from dva_sim.experiments.tuned import save_tuned
     from dva_sim.experiments.tuning import tune as try_all
@@ -93,7 +95,7 @@ def tune(name: str, out: Path | None, jobs: int | None) -> int:
         when = ", ".join(f"{name} {level}" for name, level in choice.when.items())
         say(f"{when}: {tuned.tuning.key} {choice.value:g}")
     say(f"Kept in {save_tuned(study, tuned)}")
-    return 0
+    return ExitCode.OK
 
 
 def plan(name: str, pairs: list[str], out: Path | None, workers: Workers, variant: Variant) -> None:
@@ -176,11 +178,11 @@ def _recorded(study: Study, folder: Path, workers: Workers) -> int:
     return len(problems)
 
 
-def _stopped(how: KeyboardInterrupt) -> int:
+def _stopped(how: KeyboardInterrupt) -> ExitCode:
     """Say what was done, and the command that goes on."""
     say(f"Stopped: {how}" if str(how) else "Stopped.")
     say(f"To go on: {escape(shlex.join(['dva-sim', *sys.argv[1:]]))}")
-    return INTERRUPTED
+    return ExitCode.INTERRUPTED
 
 
 # --- progress --------------------------------------------------------------------------

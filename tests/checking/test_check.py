@@ -260,7 +260,7 @@ def test_the_printed_schema_can_be_written_to_a_file(here):
     assert call("schema", "site").stdout.startswith(b'{\n  "$schema"')
     wrong = call("schema", "sites")
     assert wrong.returncode == 2
-    assert re.fullmatch(rb"dva-sim: no schema 'sites'; did you mean 'site'\?.*\n", wrong.stderr)
+    assert re.fullmatch(rb"error: no schema 'sites'; did you mean 'site'\?.*\n", wrong.stderr)
 
 
 def test_the_word_link_asks_for_the_emulated_link(check, monkeypatch):
