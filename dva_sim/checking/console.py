@@ -105,6 +105,8 @@ def _check_one(name: str) -> ExitCode:
         where = _near(problem.file) if problem.file else name
         _say(f"{where}:{problem.line}:{problem.column}: {problem.text}")
     number = len(verdict.problems)
+    for doubt in verdict.doubts:
+        _say(f"{name}: warning: {doubt}")
     if not number:
         _say(f"{name}: {verdict.kind}: valid")
         return VALID

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from dva_sim import resources
@@ -22,7 +23,7 @@ from dva_sim.experiments.models import Tables, model_of, tables_of
 from dva_sim.experiments.pictures import Wanted
 from dva_sim.experiments.transports import TransportScenario, told
 from dva_sim.recordings import write_recording
-from dva_sim.scenario import Scenario
+from dva_sim.scenario import Scenario, contradictions
 from dva_sim.simulation import Playback, Recording, simulate
 from dva_sim.tasks import TaskScenario
 from dva_sim.timed import TimedScenario
@@ -39,6 +40,12 @@ def nowhere() -> Console:
 
 
 # --- episodes --------------------------------------------------------------------------
+
+
+def warn(doubts: Sequence[str], where: Console = console) -> None:
+    """Say what does not go together, a line for each."""
+    for doubt in doubts:
+        where.print(f"[yellow]warning:[/yellow] {escape(doubt)}", soft_wrap=True)
 
 
 def episode(
@@ -78,7 +85,9 @@ def episode(
         settings = [changes | {"pattern": p} for p in _two_patterns(side_by_side)]
     pictures.check(scenario)
     keep = pictures.any or record is not None
-    runs = [_tell(scenarios.build(document, each), seed, keep, where) for each in settings]
+    built = [scenarios.build(document, each) for each in settings]
+    warn(list(dict.fromkeys(told for each in built for told in contradictions(each))), where)
+    runs = [_tell(each, seed, keep, where) for each in built]
     if record is not None:
         (run, tables), about = runs[0], {"scenario": name}
         write_recording(run, record, tables=tables, about=about)

@@ -15,7 +15,7 @@ from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn
 
 from dva_sim.exit_codes import ExitCode
-from dva_sim.experiments.console import console, say
+from dva_sim.experiments.console import console, say, warn
 from dva_sim.experiments.planning import DryRun, dry_run
 from dva_sim.experiments.results import Results
 from dva_sim.experiments.study import Study, load_study
@@ -112,9 +112,10 @@ def _loaded(name: str, pairs: list[str], out: Path | None, variant: Variant) -> 
 
 def _planned(study: Study, folder: Path, workers: Workers, tries: bool) -> DryRun:
     """Say what will run, and find mistakes before the first run."""
-    from dva_sim.experiments.episode import rehearse_all, run_job
+    from dva_sim.experiments.episode import contradictions_in, rehearse_all, run_job
 
     rehearse_all(study)
+    warn(contradictions_in(study))
     jobs = workers.jobs if workers.scheduler is None else 1  # who knows how many are free there
     found = dry_run(study, folder, jobs=jobs, probe=run_job if tries else None)
     if found.remark:
