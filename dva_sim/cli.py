@@ -229,7 +229,7 @@ def episode(
     ] = False,
     side_by_side: Annotated[
         str | None,
-        typer.Option(metavar="PATTERN,PATTERN", help="Show the same seed under two patterns."),
+        typer.Option(metavar="PATTERN,PATTERN", help="Run the same seed under two patterns."),
     ] = None,
     record: Annotated[
         Path | None, typer.Option(help="Keep the run as a file: .mcap, for replay and viewers.")
