@@ -38,7 +38,7 @@ def episode(
     inset: Inset = False,
     side_by_side: Annotated[
         str | None,
-        Option(metavar="PATTERN,PATTERN", help="Show the same seed under two patterns."),
+        Option(metavar="PATTERN,PATTERN", help="Run the same seed under two patterns."),
     ] = None,
     record: Annotated[
         Path | None,

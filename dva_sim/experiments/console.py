@@ -64,6 +64,8 @@ def episode(
     """
     if record is not None:
         _check_record(record, side_by_side)
+    if side_by_side is not None and pictures.camera is not None:
+        raise ConfigError("--camera shows one run; it does not go with --side-by-side")
     document = scenarios.load(name)
     changes = parse_changes(pairs)
     scenario = model_of(document).build(document, changes)
@@ -87,13 +89,15 @@ def episode(
     keep = pictures.any or record is not None
     built = [scenarios.build(document, each) for each in settings]
     warn(list(dict.fromkeys(told for each in built for told in contradictions(each))), where)
-    runs = [_tell(each, seed, keep, where) for each in built]
+    played = [_tell(each, seed, keep, where) for each in built]
+    runs = [run for run, _ in played]
+    if side_by_side is not None:
+        telling.tell_side_by_side(runs, where)
     if record is not None:
-        (run, tables), about = runs[0], {"scenario": name}
-        write_recording(run, record, tables=tables, about=about)
+        write_recording(runs[0], record, tables=played[0][1], about={"scenario": name})
         where.print(f"Recording: {record}", soft_wrap=True)
-    draw(pictures, [run for run, _ in runs], where)
-    return runs[0][0]
+    draw(pictures, runs, where)
+    return runs[0]
 
 
 def draw(pictures: Wanted, runs: Sequence[Playback], where: Console) -> None:
