@@ -6,18 +6,21 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 RUNTIME := $(VENV)/.runtime
 DEV := $(VENV)/.dev
 BENCH := $(VENV)/.bench
-DEMO := results/req-rep-vs-pub-sub
+DEMO := results/demo
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test check bench clean
+.PHONY: help setup demo published test check bench clean
 
 help:  ## say what can be made
 	@grep -E '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /make \1\t/' | expand -t 14
 
 setup: $(DEV)  ## the development environment, in .venv
 
-demo: $(RUNTIME)  ## run the main study and write its report
-	@$(BIN)/dva-sim run req-rep-vs-pub-sub -o $(DEMO)
+demo: $(RUNTIME)  ## one drive as picture and film, and the main study's small version: a minute
+	@$(BIN)/dva-sim demo -o $(DEMO)
+
+published: $(RUNTIME)  ## the main study at its published size, and its report: ten minutes
+	@$(BIN)/dva-sim run req-rep-vs-pub-sub -o results/req-rep-vs-pub-sub
 
 test: $(DEV)  ## all tests
 	@echo "Running the tests ..."

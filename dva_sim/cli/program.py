@@ -16,7 +16,7 @@ from dva_sim.errors import DvaSimError, error_line
 from dva_sim.exit_codes import ExitCode
 
 _PANELS: dict[str, tuple[Callable[..., None], ...]] = {
-    "Studies": (studies.run, studies.new, studies.register, studies.tune),
+    "Studies": (studies.demo, studies.run, studies.new, studies.register, studies.tune),
     "Results": (results.report, results.show, results.export, results.compare),
     "Single runs": (runs.episode, runs.replay, runs.live, runs.keys),
     "Names, files and evidence": (files.list_, files.check, files.schema, files.validate),

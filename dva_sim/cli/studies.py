@@ -1,7 +1,8 @@
-"""The commands that make results: run, new, register, tune."""
+"""The commands that make results: demo, run, new, register, tune."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -9,6 +10,26 @@ from typer import Option
 
 from dva_sim.cli.options import Jobs, Results, Sets, StudyName
 from dva_sim.cli.values import number, whole
+
+
+def demo(
+    out: Annotated[
+        Path,
+        Option("-o", "--out", metavar="FOLDER", help="Where pictures, film and report go."),
+    ] = Path("results/demo"),
+    jobs: Jobs = None,
+) -> None:
+    """See in about a minute what delay and a messaging pattern do.
+
+    It shows one drive under two patterns, as a picture, a story and a film, then runs the small
+    version of the main study and writes its report.
+
+    Examples:
+        dva-sim demo  # into results/demo
+    """
+    from dva_sim.experiments.demo import demo as show_it
+
+    raise typer.Exit(show_it(out, jobs))
 
 
 def run(
