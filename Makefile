@@ -9,10 +9,14 @@ BENCH := $(VENV)/.bench
 DEMO := results/demo
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo published test check bench clean
+.PHONY: help setup demo published test test-all test-contract test-system test-soak check bench clean
+
+# Two processes share the tests. Compiled files are kept whatever a shell says: without them each
+# run compiles all tests again, for half a minute.
+PYTEST := PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest --halves
 
 help:  ## say what can be made
-	@grep -E '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /make \1\t/' | expand -t 14
+	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /make \1\t/' | expand -t 20
 
 setup: $(DEV)  ## the development environment, in .venv
 
@@ -22,9 +26,22 @@ demo: $(RUNTIME)  ## one drive as picture and film, and the main study's small v
 published: $(RUNTIME)  ## the main study at its published size, and its report: ten minutes
 	@$(BIN)/dva-sim run req-rep-vs-pub-sub -o results/req-rep-vs-pub-sub
 
-test: $(DEV)  ## all tests
+test: $(DEV)  ## the tests that are quick, which are nearly all
 	@echo "Running the tests ..."
-	@$(BIN)/python -m pytest
+	@$(PYTEST) -m "not system and not soak"
+
+test-all: $(DEV)  ## all tests
+	@echo "Running all tests ..."
+	@$(PYTEST)
+
+test-contract: $(DEV)  ## what every transport promises, in virtual time and over sockets
+	@$(PYTEST) -m contract
+
+test-system: $(DEV)  ## programs as users start them, with real processes, sockets and signals
+	@$(PYTEST) -m system
+
+test-soak: $(DEV)  ## long tests, and searches of 20 times as many cases, new ones each time
+	@DVA_SIM_SEARCH=20 $(PYTEST) -m "soak or hypothesis"
 
 check: $(DEV)  ## lint, format, types, import contracts
 	@echo "Checking style, types and import contracts ..."

@@ -159,12 +159,11 @@ class Dispatcher:
     def _relocate(self, move: Relocation, view: View, now: float) -> list[Send] | None:
         """Let an idle guard wait elsewhere, unless it is there already, or on its way there."""
         entry, cover = view.team.entries[move.responder], view.situation.cover
-        if cover is None or view.team.engaged[move.responder] is not None:
-            return None
+        assert cover is not None, "without stations there is no such advice: see _check_form"
         place = self._ground.stations[move.station].position
         if entry.position is not None and same_place(place, entry.position):
             return None
-        eta = float(cover.eta[move.responder, move.station])
+        eta = float(cover.eta[move.responder, move.station])  # infinite unless an idle guard's
         if not math.isfinite(eta) or cover.bound_for[move.responder] == move.station:
             return None
         self.lookout.sends_to_wait(entry.device.id_tag, move.station, eta, now)

@@ -7,8 +7,9 @@ import math
 import numpy as np
 import pytest
 from fleet import EMPTY, Fleet, map_of_caparica
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from searching import search
 
 from dva_sim.agents.collision_guard import KEEP_WALL, TIME_TO_CONTACT, CollisionGuard
 from dva_sim.agents.nearby import PERSONAL, Nearby
@@ -72,7 +73,7 @@ def test_a_robot_stops_before_a_person_and_passes_beside_one() -> None:
 poses = st.tuples(st.floats(0.0, 40.0), st.floats(0.0, 24.0), st.floats(-4.0, 4.0))
 
 
-@settings(deadline=None, max_examples=300)
+@search(300)
 @given(poses, st.floats(0.0, TOP), st.floats(-0.6, 0.6), poses)
 def test_it_never_makes_anything_faster_and_what_it_allows_can_be_braked(
     pose: tuple[float, float, float],

@@ -72,7 +72,7 @@ def python(*words, folder):
     return done.stdout
 
 
-@pytest.mark.slow  # two reports
+@pytest.mark.system  # and two reports
 def test_a_run_gives_the_bytes_of_the_same_command(study, results):
     results.report()
     out = str(study.parent / "cli")
@@ -124,7 +124,7 @@ def test_an_episode_is_the_run_of_a_study_with_that_seed(results):
         assert once.measures[name] == first[name][0]
 
 
-@pytest.mark.slow  # processes of its own
+@pytest.mark.system
 def test_a_script_needs_no_guard(study):
     """Worker processes would run it again, and start the study within the study."""
     script = study.parent / "script.py"

@@ -5,8 +5,9 @@ from __future__ import annotations
 from random import Random
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from searching import search
 from transports import (
     BRIEF,
     NODES,
@@ -27,6 +28,8 @@ from transports import (
 )
 
 from dva_sim.network.keys import KeyRing
+
+pytestmark = pytest.mark.contract
 
 plans = st.builds(Plan, st.floats(0, 0.9), st.floats(0, 1), st.floats(0, 5 * BRIEF))
 
@@ -62,7 +65,7 @@ def ask_in_trouble(
 
 
 @pytest.mark.parametrize("kind", VIRTUAL)
-@settings(deadline=None, max_examples=100)
+@search()
 @given(
     seed=st.integers(0, 2**32),
     plan=plans,
@@ -87,7 +90,7 @@ def test_each_request_ends_once_over_sockets(ring: KeyRing, window: int, keys: b
 
 
 @pytest.mark.parametrize("kind", VIRTUAL)
-@settings(deadline=None, max_examples=50)
+@search(50)
 @given(
     seed=st.integers(0, 2**32),
     absences=st.lists(
@@ -105,7 +108,6 @@ def test_each_request_ends_once_while_nodes_come_and_go_in_virtual_time(
     ask_in_trouble(world, seed, Plan(lose=0.1, double=0.3, hold=BRIEF), window)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("window", [1, 3])
 @pytest.mark.parametrize("keys", [False, True], ids=["plain", "with keys"])
 def test_each_request_ends_once_while_the_service_comes_and_goes_over_sockets(

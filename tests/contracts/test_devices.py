@@ -29,6 +29,8 @@ from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode
 from dva_sim.protocol.exchange import Outbox
 
+pytestmark = pytest.mark.contract
+
 TROUBLE = Plan(lose=0.3, double=0.5, hold=0.1)
 SESSION = 7
 

@@ -26,6 +26,8 @@ from dva_sim.network.sockets import LARGEST
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode
 
+pytestmark = pytest.mark.contract
+
 BAD_FORMS = {"no frame": [], "two frames": [b"a", b"b"], "1000 frames": numbered(1000)}
 WINDOWS = pytest.mark.parametrize("window", [1, 4], ids=["one at a time", "pipelined"])
 

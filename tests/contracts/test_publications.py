@@ -30,6 +30,8 @@ from dva_sim.network.patterns import Request
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import encode
 
+pytestmark = pytest.mark.contract
+
 Publish = Callable[..., None]
 
 

@@ -19,6 +19,8 @@ from transports import (
 
 from dva_sim.network.patterns import QUEUE_LIMIT, Request
 
+pytestmark = pytest.mark.contract
+
 WINDOWS = pytest.mark.parametrize("window", [1, 4], ids=["one at a time", "pipelined"])
 
 

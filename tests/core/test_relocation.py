@@ -63,6 +63,24 @@ def test_who_has_an_order_is_not_sent_to_wait() -> None:
     assert office.tick(1.0) == []
 
 
+class Grabbing(Eastward):
+    """It may call away who is under way, and would rather have everybody wait in the east."""
+
+    preempts = True
+
+
+def test_a_guard_under_way_to_an_event_is_not_sent_to_wait() -> None:
+    office = office_of(Grabbing())
+    office.busy(ROBOT, OPERATOR)
+    office.ok(office.fire(12))
+    office.progress(GUARD, "accepted")
+    overruled = office.desk.counters["overruled"]
+    assert office.tick(1.0) == []
+    assert office.desk.counters["overruled"] > overruled  # it was advised
+    assert office.desk.counters["relocated"] == 0
+    assert office.working[GUARD] == 1
+
+
 def test_an_order_interrupts_the_way_and_the_guard_may_be_sent_again_after_it() -> None:
     office = office_of(Eastward())
     office.busy(ROBOT, OPERATOR)

@@ -25,7 +25,7 @@ def test_a_day_that_goes_wrong_breaks_no_rule_and_ends_well(policy: str, tmp_pat
         walk(seed, tmp_path, SHORT, policy)
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 @pytest.mark.parametrize("policy", POLICY_NAMES)
 def test_long_days_that_go_wrong(policy: str, tmp_path: Path) -> None:
     for seed in range(100, 115):

@@ -19,6 +19,8 @@ from dva_sim.emulator.measure import COLUMNS, job_of, measure
 from dva_sim.emulator.running import EmulatorError, run_job, start_job, why_no_packets
 from dva_sim.network.condition import Condition
 
+pytestmark = pytest.mark.system
+
 LONG = Condition("pub", 10, dur_s=600)
 WAITING = """
 from dva_sim.emulator.measure import measure
@@ -54,7 +56,6 @@ def run() -> Iterator[Run]:
         run.leave()
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("rootless", [False, True], ids=["root or not", "user namespace"])
 def test_real_packets_are_lost_as_told(rootless: bool) -> None:
     need_link(rootless)
@@ -65,7 +66,6 @@ def test_real_packets_are_lost_as_told(rootless: bool) -> None:
         assert [str(finding) for finding in find(crossing) if not finding.passed] == []
 
 
-@pytest.mark.slow
 def test_no_real_packet_is_early_or_faster_than_the_line() -> None:
     """It may be late on a busy machine: how late is what the link's own check asks."""
     need_link()

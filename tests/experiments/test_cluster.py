@@ -31,7 +31,7 @@ def dask(tmp_path: Path) -> Iterator[DaskCluster]:
         yield started
 
 
-@pytest.mark.slow
+@pytest.mark.system
 def test_a_worker_killed_half_way_loses_and_doubles_nothing(
     tmp_path: Path, dask: DaskCluster, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -57,7 +57,7 @@ def test_a_worker_killed_half_way_loses_and_doubles_nothing(
     assert rows == kit.RUNS
 
 
-@pytest.mark.slow
+@pytest.mark.system
 def test_a_scheduler_killed_half_way_ends_in_one_line_and_another_goes_on(
     tmp_path: Path,
     dask: DaskCluster,
@@ -89,7 +89,7 @@ def test_a_scheduler_killed_half_way_ends_in_one_line_and_another_goes_on(
     assert kit.files(out) == plain
 
 
-@pytest.mark.slow
+@pytest.mark.system
 def test_a_cluster_nobody_works_or_answers_in_is_told(
     dask: DaskCluster, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -106,7 +106,7 @@ def test_a_cluster_nobody_works_or_answers_in_is_told(
         dask.scheduler.send_signal(signal.SIGCONT)
 
 
-@pytest.mark.slow
+@pytest.mark.system
 def test_a_worker_with_another_profile_near_it_is_refused(
     tmp_path: Path, dask: DaskCluster
 ) -> None:

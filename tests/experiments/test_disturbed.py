@@ -27,7 +27,7 @@ def told(*words: str | Path) -> dict[str, Any]:
     return json.loads(ran.stdout)
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
 def test_a_hundred_kills_at_any_moment_lose_and_double_nothing(tmp_path: Path) -> None:
     found = told(sys.executable, "-m", "disturbed_study", "kills", tmp_path)
@@ -46,7 +46,7 @@ def mounts_are_allowed(folder: Path) -> bool:
     return subprocess.run(words, capture_output=True, check=False).returncode == 0
 
 
-@pytest.mark.slow
+@pytest.mark.system
 def test_a_full_disk_is_told_in_one_line_and_nothing_is_lost(tmp_path: Path) -> None:
     if not mounts_are_allowed(tmp_path):
         pytest.skip("this system lets nobody but root mount a small disk")

@@ -17,7 +17,7 @@ from dva_sim.experiments.dispatch import measures
 from dva_sim.experiments.transports.measures import MEASURES
 from dva_sim.timed import build, simulate_timed
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.soak
 
 PROGRAM = """
 import sys

@@ -13,7 +13,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 
 pytestmark = [
-    pytest.mark.slow,
+    pytest.mark.soak,
     pytest.mark.skipif(
         importlib.util.find_spec("atheris") is None,
         reason="atheris guides the search; it is not to be had for this platform",

@@ -74,7 +74,7 @@ def keys(tmp_path: Path) -> Path:
     return folder
 
 
-@pytest.mark.slow
+@pytest.mark.system
 def test_a_run_with_keys_goes_like_one_without(programs: Programs, tmp_path: Path) -> None:
     made = programs.start("keys", "ours", "drive-to-event")
     assert made.ends() == 0
@@ -110,7 +110,7 @@ def dva_and_operator(
     return dva, operator
 
 
-@pytest.mark.slow
+@pytest.mark.system
 def test_an_operator_whose_key_is_unknown_is_told_so_at_both_ends(
     programs: Programs, address: str, keys: Path
 ) -> None:
@@ -121,7 +121,7 @@ def test_an_operator_whose_key_is_unknown_is_told_so_at_both_ends(
     operator.wait_to_say(f"{DVA} does not know the key of {OPERATOR}")
 
 
-@pytest.mark.slow
+@pytest.mark.system
 def test_an_operator_who_has_a_wrong_key_of_the_dva_is_told_so_at_both_ends(
     programs: Programs, address: str, keys: Path
 ) -> None:
@@ -131,7 +131,7 @@ def test_an_operator_who_has_a_wrong_key_of_the_dva_is_told_so_at_both_ends(
     operator.wait_to_say(f"the public key of {DVA} here is not the one it has")
 
 
-@pytest.mark.slow
+@pytest.mark.system
 def test_an_operator_without_keys_is_told_so_at_both_ends(
     programs: Programs, address: str, keys: Path
 ) -> None:
@@ -140,7 +140,7 @@ def test_an_operator_without_keys_is_told_so_at_both_ends(
     operator.wait_to_say(f"{DVA} wants keys, this end has none")
 
 
-@pytest.mark.slow
+@pytest.mark.system
 def test_an_operator_with_keys_at_a_dva_without_is_told_so_at_both_ends(
     programs: Programs, address: str, keys: Path
 ) -> None:
@@ -149,7 +149,7 @@ def test_an_operator_with_keys_at_a_dva_without_is_told_so_at_both_ends(
     operator.wait_to_say(f"{DVA} has no keys switched on, this end has")
 
 
-@pytest.mark.slow
+@pytest.mark.system
 def test_a_missing_secret_key_ends_in_one_line(programs: Programs, keys: Path) -> None:
     (keys / "secret" / f"{OPERATOR.replace(':', '-')}.key_secret").unlink()
     run = programs.start(*LIVE, "--for", "60", "--keys", keys)

@@ -16,7 +16,7 @@ from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode
 
 pytestmark = [
-    pytest.mark.slow,
+    pytest.mark.system,
     pytest.mark.skipif(not Path("/proc/self/environ").exists(), reason="no list of processes"),
 ]
 

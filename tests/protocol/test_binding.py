@@ -13,10 +13,11 @@ from enum import Enum
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from message_oracle import says
 from message_strategies import BODIES, messages, with_header
+from searching import search
 
 from dva_sim.protocol.codec import decode, encode
 
@@ -26,7 +27,6 @@ from xsdata.formats.dataclass.serializers import XmlSerializer
 
 PROTOCOL = Path(__file__).parents[2] / "protocol"
 VALID = sorted((PROTOCOL / "samples" / "valid").glob("*.xml"))
-SLOWLY = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
 
 
 @pytest.fixture(scope="session")
@@ -82,7 +82,7 @@ def understood(binding, data):
 def test_every_element_of_every_message_is_the_same_in_the_binding_and_on_the_way_back(
     binding, kind
 ):
-    @settings(SLOWLY, max_examples=15)
+    @search(15)
     @given(BODIES[kind].flatmap(with_header))
     def both_ways(sent):
         held = understood(binding, encode(sent))
@@ -99,7 +99,7 @@ def test_the_binding_and_the_codec_read_the_same_in_a_sample(binding, path):
 
 
 @given(st.data())
-@settings(SLOWLY, max_examples=30)
+@search(30)
 def test_a_value_changed_in_the_binding_is_noticed(binding, data):
     """The comparison can fail: it would be worth nothing otherwise."""
     sent = data.draw(messages)

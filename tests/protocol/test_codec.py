@@ -4,9 +4,10 @@ from typing import get_args
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from lxml import etree
 from message_strategies import BODIES, ROBOT, TABLET, message, messages
+from searching import search
 
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import MAX_BYTES, decode, encode, timestamp
@@ -19,7 +20,7 @@ def test_every_body_has_a_strategy():
     assert set(BODIES) == set(get_args(m.Body))
 
 
-@settings(deadline=None)
+@search()
 @given(messages)
 def test_what_is_encoded_is_valid_and_decodes_to_the_same_message(sent):
     data = encode(sent)
@@ -166,6 +167,18 @@ def test_a_device_list_longer_than_a_message_is_not_encoded():
     assert decode(encode(message(fits))).body == fits
     with pytest.raises(ProtocolError, match=str(MAX_BYTES)):
         encode(message(m.Reply(1, m.OK, "", m.DeviceList((device,) * 64))))
+
+
+def test_a_message_of_8192_bytes_is_encoded_and_one_of_8193_is_not():
+    def listing(*lengths):
+        devices = tuple(m.Device(ROBOT, "r" * n, "Robot", "192.168.1.20") for n in lengths)
+        return message(m.Reply(1, m.OK, "", m.DeviceList(devices)))
+
+    full = listing(*[22] * 46, *[21] * 4)
+    assert len(encode(full)) == 8192
+    assert decode(encode(full)) == full
+    with pytest.raises(ProtocolError, match="8193 bytes"):
+        encode(listing(*[22] * 47, *[21] * 3))
 
 
 def test_a_whole_turn_of_a_lidar_fits_into_a_message_in_millimetres():

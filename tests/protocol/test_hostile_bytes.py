@@ -12,11 +12,12 @@ from pathlib import Path
 from random import Random
 
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 from message_mutations import LEAF, mutated
 from message_oracle import decode_or_refuse
 from message_strategies import message
+from searching import search
 
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import MAX_BYTES, decode, encode
@@ -57,7 +58,7 @@ def test_a_flipped_bit_gives_what_the_bytes_say_or_a_refusal(data):
         decode_or_refuse(damaged)
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 @each_kind
 def test_a_flipped_bit_in_any_kind_gives_what_the_bytes_say_or_a_refusal(data):
     for damaged in with_every_bit_flipped(data):
@@ -85,7 +86,7 @@ def test_the_fields_of_a_command_stand_in_one_order_once():
         refused(speed + turn_rate, instead)
 
 
-@settings(deadline=None)
+@search()
 @given(st.binary(max_size=300))
 @example(b"")
 @example(b"<")
@@ -98,16 +99,16 @@ def test_any_bytes_are_refused(data):
     assert decode_or_refuse(data) is None
 
 
-@settings(deadline=None)
+@search()
 @given(st.integers(55, len(REPLY)), st.integers(0, 12), st.binary(max_size=12))
 def test_any_bytes_in_a_message_give_what_they_say_or_a_refusal(at, width, inserted):
     decode_or_refuse(REPLY[:at] + inserted + REPLY[at + width :])
 
 
-@settings(deadline=None, max_examples=300)
-@given(st.sampled_from(list(ALL.values())), st.randoms(use_true_random=False))
-def test_a_damaged_message_gives_what_it_says_or_a_refusal(data, rng):
-    decode_or_refuse(mutated(data, rng))
+@search(300)
+@given(st.sampled_from(list(ALL.values())), st.integers(0, 2**32))
+def test_a_damaged_message_gives_what_it_says_or_a_refusal(data, seed):
+    decode_or_refuse(mutated(data, Random(seed)))
 
 
 @pytest.mark.parametrize(
@@ -410,7 +411,7 @@ def test_blanks_between_elements_mean_nothing_and_are_no_value():
                     decode_or_refuse(before + start + value + rest[rest.index(b"<") :])
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 @reads_proc
 def test_a_million_hostile_messages_leave_no_memory_behind():
     rng, seeds = Random(8192), list(ALL.values())

@@ -78,7 +78,6 @@ def test_a_dva_that_is_killed_again_and_again_loses_nothing(tmp_path: Path) -> N
     assert killed.dva.desk.book.total == 3
 
 
-@pytest.mark.slow
 def test_neither_kills_nor_a_link_that_loses_leave_an_event_hanging(tmp_path: Path) -> None:
     killed = Killed(tmp_path, [20.0, 70.0], 4.0, **{"link.loss": 0.1, "link.delay_s": 0.1})
     assert len(killed.events) == 3

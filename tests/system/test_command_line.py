@@ -1,4 +1,4 @@
-"""The program as users call it: real processes, real files, real exit codes."""
+"""The program as users call it: its words, its files, its exit codes; once as a real process."""
 
 from __future__ import annotations
 
@@ -8,15 +8,44 @@ import sys
 from pathlib import Path
 
 import pytest
+from command_line import call
 
-DATA = Path(__file__).parents[2].parent / "shared"
-SETTINGS = ("persons=2", "replications=1", "phone.profile=default", "link.delay_s=[0, 0.5]")
-SMALL = [word for setting in SETTINGS for word in ("--set", setting)]
+MAPS = Path(__file__).parents[1] / "data"
+TRACES = Path(__file__).parents[2] / "experiments" / "traces"
+STUDY = """\
+question: Which is quicker?
+persons: 3
+replications: 1
+factors:
+  pattern: [req-rep, latest-wins]
+  link.delay_s: [0, 0.5]
+parts:
+  drive: {scenario: drive-to-event, changes: {horizon_s: 60}}
+  story: {scenario: fire-drill, changes: {horizon_s: 30}}
+answer:
+  part: drive
+  measure: drive_time_s
+  factor: pattern
+  contrast: [req-rep, latest-wins]
+  over: link.delay_s
+"""
 
 
-def call(*words: str | Path, cwd: Path) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "dva_sim.cli", *map(str, words)]
-    return subprocess.run(command, capture_output=True, text=True, cwd=cwd, check=False)
+@pytest.fixture(scope="module")
+def ran(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a small study, and in it its results, made by one process."""
+    folder = tmp_path_factory.mktemp("study")
+    (folder / "quicker.yaml").write_text(STUDY)
+    ran = run(folder, jobs="1")
+    assert ran.returncode == 0, ran.stderr
+    assert "report.html" in ran.stdout.replace("\n", "")
+    return folder
+
+
+def run(folder: Path, jobs: str, *more: str) -> subprocess.CompletedProcess[str]:
+    """Results go into a folder named after the number of processes."""
+    few = ("--set", "persons=2", *more)
+    return call("run", "quicker.yaml", *few, "--jobs", jobs, "-o", jobs, cwd=folder)
 
 
 def bytes_of(folder: Path) -> dict[str, bytes]:
@@ -53,37 +82,40 @@ def test_help_imports_nothing_heavy(words: list[str], heavy: set[str]) -> None:
     assert modules & heavy == set()
 
 
-def test_a_study_gives_the_same_bytes_with_any_number_of_processes(tmp_path: Path) -> None:
-    for jobs in ("1", "2"):
-        ran = call("run", "req-rep-vs-pub-sub", *SMALL, "--jobs", jobs, "-o", jobs, cwd=tmp_path)
-        assert ran.returncode == 0, ran.stderr
-        assert "report.html" in ran.stdout.replace("\n", "")
-    one, two = bytes_of(tmp_path / "1"), bytes_of(tmp_path / "2")
-    assert set(one) == {
-        *(
-            "runs.parquet",
-            "events.parquet",
-            "operators.parquet",
-            "people.parquet",
-            "tracks.parquet",
-        ),
-        *("manifest.json", "report.html"),
-    }
+def test_a_study_gives_the_same_bytes_with_any_number_of_processes(ran: Path) -> None:
+    assert run(ran, jobs="2").returncode == 0
+    one, two = bytes_of(ran / "1"), bytes_of(ran / "2")
+    tables = {"runs", "events", "operators", "people", "tracks"}
+    assert set(one) == {f"{name}.parquet" for name in tables} | {"manifest.json", "report.html"}
     assert one == two
-    assert json.loads(one["manifest.json"])["set"]
-    assert b"exploratory" in one["report.html"]
-    assert b"<script src" not in one["report.html"]
-
-    again = call("report", "1", cwd=tmp_path)
-    assert again.returncode == 0
-    assert bytes_of(tmp_path / "1") == one
 
 
-def test_another_study_is_not_written_into_the_same_folder(tmp_path: Path) -> None:
-    assert call("run", "req-rep-vs-pub-sub", *SMALL, "-o", "a", cwd=tmp_path).returncode == 0
-    other = call("run", "req-rep-vs-pub-sub", *SMALL, "--seed", "5", "-o", "a", cwd=tmp_path)
+def test_a_study_that_was_changed_on_the_command_line_is_called_exploratory(ran: Path) -> None:
+    files = bytes_of(ran / "1")
+    assert json.loads(files["manifest.json"])["set"] == ["persons=2"]
+    assert b"exploratory" in files["report.html"]
+    assert b"<script src" not in files["report.html"]
+
+
+def test_the_report_made_again_by_its_command_has_the_same_bytes(ran: Path) -> None:
+    before = bytes_of(ran / "1")
+    assert call("report", "1", cwd=ran).returncode == 0
+    assert bytes_of(ran / "1") == before
+
+
+def test_another_study_is_not_written_into_the_same_folder(ran: Path) -> None:
+    other = run(ran, "1", "--seed", "5")
     assert other.returncode == 2
     assert "holds another study" in other.stderr
+
+
+def test_the_program_itself_ends_a_mistake_with_one_line_and_exit_code_2(tmp_path: Path) -> None:
+    """All others call it within this process: see `command_line`."""
+    words = [sys.executable, "-m", "dva_sim.cli", "run", "req-rep-vs-pubsub"]
+    ended = subprocess.run(words, capture_output=True, text=True, cwd=tmp_path, check=False)
+    assert (ended.returncode, ended.stdout) == (2, "")
+    assert ended.stderr.startswith("dva-sim: ")
+    assert len(ended.stderr.splitlines()) == 1
 
 
 @pytest.mark.parametrize(
@@ -125,7 +157,7 @@ def test_an_episode_tells_its_story_and_films_it(tmp_path: Path) -> None:
     from PIL import Image
 
     told = call(
-        *("episode", "drive-to-event", "--seed", "8", "--set", "horizon_s=20"),
+        *("episode", "drive-to-event", "--seed", "8", "--set", "horizon_s=6"),
         *("--video", "film.gif", "--side-by-side", "req-rep,latest-wins"),
         cwd=tmp_path,
     )
@@ -135,7 +167,7 @@ def test_an_episode_tells_its_story_and_films_it(tmp_path: Path) -> None:
     with Image.open(tmp_path / "film.gif") as film:
         assert film.n_frames > 20  # type: ignore[attr-defined]
         first = film.convert("RGB").tobytes()
-        film.seek(100)
+        film.seek(50)
         assert film.convert("RGB").tobytes() != first
 
 
@@ -147,15 +179,10 @@ def test_everything_that_can_be_named_is_listed(tmp_path: Path) -> None:
         assert name in listed
 
 
-@pytest.mark.slow
-@pytest.mark.skipif(not DATA.is_dir(), reason=f"no real maps and traces at {DATA}")
-def test_a_real_map_and_a_real_cellular_trace_carry_a_whole_study(tmp_path: Path) -> None:
-    trace = DATA / "traces" / "ATT-LTE-driving-2016"
-    ran = call(
-        *("run", "req-rep-vs-pub-sub", *SMALL, "-o", "real"),
-        *("--set", f"site.map={DATA / 'maps' / 'depot.yaml'}"),
-        *("--set", f"link.trace_up={trace}.up", "--set", f"link.trace_down={trace}.down"),
-        cwd=tmp_path,
-    )
-    assert ran.returncode == 0, ran.stderr + ran.stdout
-    assert b"Ways taken" in bytes_of(tmp_path / "real")["report.html"]
+def test_a_map_and_a_cellular_trace_of_ones_own_carry_a_whole_study(tmp_path: Path) -> None:
+    (tmp_path / "quicker.yaml").write_text(STUDY)
+    ways = [f"link.trace_{way}={TRACES / 'cellular'}.{way}" for way in ("up", "down")]
+    settings = (f"site.map={MAPS / 'hall.yaml'}", "factors.link.delay_s=[0]", *ways)
+    ended = run(tmp_path, "1", *(word for s in settings for word in ("--set", s)))
+    assert ended.returncode == 0, ended.stderr + ended.stdout
+    assert b"Ways taken" in bytes_of(tmp_path / "1")["report.html"]

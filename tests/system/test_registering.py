@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
-import pytest
+from command_line import call
 
 STUDY = """\
 question: Does the nearest come sooner?
@@ -27,17 +25,11 @@ hypotheses:
 """
 
 
-def call(*words: str, cwd: Path) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "dva_sim.cli", *words]
-    return subprocess.run(command, capture_output=True, text=True, cwd=cwd, check=False)
-
-
 def status_of(folder: Path) -> dict[str, object]:
     found: dict[str, object] = json.loads((folder / "manifest.json").read_text())["status"]
     return found
 
 
-@pytest.mark.slow
 def test_a_study_is_registered_run_and_told_apart_from_what_was_only_tried(tmp_path: Path) -> None:
     study = tmp_path / "mine.yaml"
     study.write_text(STUDY)

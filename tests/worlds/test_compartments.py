@@ -9,7 +9,7 @@ from dva_sim.worlds.maps import FREE, OCCUPIED, OccupancyGrid, rasterise
 from dva_sim.worlds.parts import Room
 from dva_sim.worlds.site import load_site, map_site
 
-MAPS = Path(__file__).parents[3] / "shared" / "maps"
+MAPS = Path(__file__).parents[1] / "data"
 
 
 def box(name, xmin, ymin, xmax, ymax, **more):
@@ -115,9 +115,8 @@ def test_a_nook_of_less_than_four_square_metres_belongs_to_its_neighbour():
     assert (found.labels >= 0).sum() == (cells == FREE).sum()
 
 
-@pytest.mark.skipif(not MAPS.is_dir(), reason="recorded maps are not beside the project")
-def test_all_floor_of_the_depot_map_is_one_network_of_blocks():
-    site = map_site(MAPS / "depot.yaml", 1, robots=1, guards=1)
+def test_all_floor_of_a_map_as_robots_record_them_is_one_network_of_blocks():
+    site = map_site(MAPS / "hall.yaml", 1, robots=1, guards=1)
     floor = site.grid.floor(0.30)
     assert sum(c.area for c in site.compartments) == pytest.approx(floor.sum() * 0.05**2)
     reached = {site.compartments[0].name}

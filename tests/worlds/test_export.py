@@ -10,7 +10,7 @@ from dva_sim.worlds import console
 from dva_sim.worlds.export import write_site
 from dva_sim.worlds.site import load_site, map_site
 
-MAPS = Path(__file__).parents[3] / "shared" / "maps"
+MAPS = Path(__file__).parents[1] / "data"
 
 
 def sides(walls):
@@ -43,16 +43,16 @@ def test_a_site_written_and_read_again_is_the_same_to_a_millimetre(tmp_path, nam
     assert np.mean(again.grid.cells == site.grid.cells) > 0.999
 
 
-@pytest.mark.skipif(not MAPS.is_dir(), reason="recorded maps are not beside the project")
 def test_a_ros_map_becomes_a_drawn_site_with_one_room_and_the_same_walls(tmp_path):
-    site = map_site(MAPS / "depot.yaml", 1, robots=0, guards=0)
+    site = map_site(MAPS / "hall.yaml", 1, robots=0, guards=0)
     again = load_site(write_site(site, tmp_path))
     assert [room.name for room in again.rooms] == ["Floor"]
     old, new = (shapely.multilinestrings(s.walls.reshape(-1, 2, 2)) for s in (site, again))
     assert shapely.union_all(new).within(shapely.buffer(old, 1e-3))
     assert shapely.union_all(old).within(shapely.buffer(new, 1e-3))
     both = again.grid.reachable(0.3).sum() * again.grid.resolution**2
-    assert both == pytest.approx(site.grid.reachable(0.3).sum() * 0.05**2, rel=0.02)
+    # Its cells are larger: along the walls some floor is lost.
+    assert both == pytest.approx(site.grid.reachable(0.3).sum() * 0.05**2, rel=0.04)
 
 
 def test_a_folder_that_cannot_be_made_is_told(tmp_path):

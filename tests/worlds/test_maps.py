@@ -4,6 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
+from data.make_maps import hall, racks, ragged
 from PIL import Image
 
 from dva_sim.errors import ConfigError
@@ -11,7 +12,19 @@ from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.maps import FREE, OCCUPIED, UNKNOWN, OccupancyGrid, load_ros_map, outline
 from dva_sim.worlds.site import map_site
 
-MAPS = Path(__file__).parents[3] / "shared" / "maps"
+MAPS = Path(__file__).parents[1] / "data"
+RECORDED = Path(__file__).parents[3] / "shared" / "maps"  # by robots; not everybody has them
+needs_them = pytest.mark.skipif(not RECORDED.is_dir(), reason=f"no recorded maps at {RECORDED}")
+EACH_MAP = pytest.mark.parametrize(
+    ("path", "most"),  # and its walls
+    [
+        (MAPS / "hall.yaml", 400),
+        (MAPS / "racks.yaml", 800),
+        pytest.param(RECORDED / "depot.yaml", 600, marks=needs_them),
+        pytest.param(RECORDED / "warehouse.yaml", 1200, marks=needs_them),
+    ],
+    ids=lambda value: getattr(value, "stem", None),
+)
 
 
 def write_map(folder, pixels, **changes):
@@ -162,11 +175,15 @@ def test_places_on_a_bare_map_depend_on_the_seed_and_not_on_the_size_of_the_team
     assert {d.kind for d in small.detectors} == {"smoke", "gas", "water"}
 
 
-@pytest.mark.skipif(not MAPS.is_dir(), reason="recorded maps are not beside the project")
-@pytest.mark.parametrize("name", ["depot", "warehouse"])
-def test_a_recorded_map_becomes_a_site_of_few_walls_and_free_bases(name):
-    site = map_site(MAPS / f"{name}.yaml", 3, robots=3, guards=2)
-    assert len(site.walls) < 2000
+@pytest.mark.parametrize("draw", [hall, racks])
+def test_the_maps_for_tests_are_what_their_script_makes(draw):
+    with Image.open(MAPS / f"{draw.__name__}.png") as image:
+        assert (np.asarray(image) == ragged(draw())).all()
+
+
+@EACH_MAP
+def test_a_recorded_map_becomes_a_site_with_free_bases(path, most):
+    site = map_site(path, 3, robots=3, guards=2)
     reached = site.grid.reachable(0.30)
     for pose in (*site.robot_bases, *site.guard_posts):
         assert site.is_free(pose.x, pose.y, 0.30)
@@ -190,10 +207,9 @@ def farthest(lines, others):
     return gaps.max()
 
 
-@pytest.mark.skipif(not MAPS.is_dir(), reason="recorded maps are not beside the project")
-@pytest.mark.parametrize(("name", "most"), [("depot", 600), ("warehouse", 1200)])
-def test_the_walls_of_a_recorded_map_are_few_true_to_a_cell_and_closed(name, most):
-    site = map_site(MAPS / f"{name}.yaml", 1, robots=0, guards=0)
+@EACH_MAP
+def test_the_walls_of_a_recorded_map_are_few_true_to_a_cell_and_closed(path, most):
+    site = map_site(path, 1, robots=0, guards=0)
     walls = shapely.linestrings(site.walls.reshape(-1, 2, 2))
     edges = borders(site.grid, site.grid.floor(0.30))
     assert len(walls) < most < len(edges) / 8

@@ -4,8 +4,9 @@ import math
 import numpy as np
 import pytest
 import shapely
-from hypothesis import HealthCheck, example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
+from searching import search
 
 from dva_sim.errors import ConfigError
 from dva_sim.worlds.maps import FREE
@@ -15,9 +16,7 @@ from dva_sim.worlds.office_rooms import assign
 from dva_sim.worlds.planning import Planner
 from dva_sim.worlds.site import load_site
 
-few = settings(
-    max_examples=15, deadline=None, suppress_health_check=[HealthCheck.too_slow], derandomize=True
-)
+few = search(8)
 blocks = st.fixed_dictionaries(
     {
         "seed": st.integers(0, 10_000),

@@ -5,8 +5,9 @@ import math
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from searching import search
 
 from dva_sim.agents.profile import load_robot
 from dva_sim.errors import ConfigError
@@ -233,7 +234,7 @@ def body_of(size, box, speed):
     turn_rate=st.floats(-0.5, 0.5),
     corners=st.lists(st.floats(4.0, 6.0), min_size=5, max_size=9),
 )
-@settings(max_examples=60, deadline=None)
+@search(60)
 def test_no_body_leaves_a_room_of_thin_walls_at_any_speed_that_it_may_have(
     size, box, share, heading, turn_rate, corners
 ):

@@ -11,7 +11,7 @@ from dva_sim.worlds.planning import Disc, Planner
 from dva_sim.worlds.sight import Sight
 from dva_sim.worlds.site import Site, load_site, map_site
 
-MAPS = Path(__file__).parents[3] / "shared" / "maps"
+MAPS = Path(__file__).parents[1] / "data"
 
 
 def make_site(walls, size=10.0):
@@ -123,9 +123,8 @@ def test_walls_block_sight_and_openings_do_not():
     assert planner.line_of_sight((2, 3), (4, 9))
 
 
-@pytest.mark.skipif(not MAPS.is_dir(), reason="recorded maps are not beside the project")
-def test_on_a_recorded_map_all_bases_reach_each_other():
-    site = map_site(MAPS / "depot.yaml", 2, robots=3, guards=1)
+def test_on_a_map_as_robots_record_them_all_bases_reach_each_other():
+    site = map_site(MAPS / "hall.yaml", 2, robots=3, guards=1)
     planner = Planner(site, 0.3)
     for base in site.robot_bases:
         assert math.isfinite(planner.distance(base[:2], site.guard_posts[0][:2]))

@@ -208,7 +208,7 @@ class Sender:
 
     def _transmit(self, now: float) -> None:
         """Send what the windows allow: first what is lost, then what is new."""
-        if self.board.lost and self.recovery.state != OPEN:
+        if self.board.lost:
             self._repeat_lost(now)
         if self.total == self.next:
             return

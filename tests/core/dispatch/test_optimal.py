@@ -4,8 +4,9 @@ from itertools import permutations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from searching import search
 from small_situations import INF, look, pairs, situation, total_eta
 
 from dva_sim.core.dispatch import BatchOptimal, MinEta, NearestIdle, OperatorAware
@@ -74,7 +75,7 @@ def best_by_trying(eta, robots, operators):
     return best[0], -best[1]
 
 
-@settings(max_examples=150, deadline=None)
+@search(150)
 @given(st.data())
 def test_it_is_the_best_of_all_ways_with_so_many_operators(data):
     tasks, team = data.draw(st.integers(1, 4)), data.draw(st.integers(1, 4))
@@ -91,7 +92,7 @@ def test_it_is_the_best_of_all_ways_with_so_many_operators(data):
         assert found == pytest.approx(best_by_trying(eta, robots, operators))
 
 
-@settings(max_examples=300, deadline=None)
+@search(300)
 @given(eta_tables, st.integers(0, 6), st.sampled_from([0.0, 1.0]))
 def test_it_is_never_worse_than_one_after_the_other(eta, operators, ageing):
     """All have waited equally long."""

@@ -4,8 +4,9 @@ from itertools import permutations, product
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from searching import search
 from small_situations import INF, look, pairs, situation
 
 from dva_sim.core.dispatch import Instance, MinEta, Oracle, Policy, solve
@@ -57,7 +58,7 @@ def _total(given_, order, choice):
     return total
 
 
-@settings(max_examples=60, deadline=None)
+@search(60)
 @given(st.data())
 def test_no_order_and_no_choice_of_units_is_better(data):
     events, units = data.draw(st.integers(1, 4)), data.draw(st.integers(1, 3))

@@ -12,8 +12,6 @@ from dva_sim.experiments.dispatch.percentiles import pooled
 from dva_sim.experiments.report import write_report
 from dva_sim.timed import build, simulate_timed
 
-pytestmark = pytest.mark.slow
-
 POLICIES = ["random", "nearest_idle", "min_eta"]
 RATES = [1, 3]
 FACTS = {

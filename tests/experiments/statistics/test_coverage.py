@@ -93,7 +93,7 @@ def test_the_main_study_is_of_24_persons_and_5_trials():
     assert (PERSONS, TRIALS) == (24, 5)
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 @pytest.mark.parametrize("case", CASES)
 def test_an_interval_of_95_percent_holds_in_93_to_97_of_100_studies(case):
     rng = np.random.default_rng(2014)
@@ -132,7 +132,7 @@ def levels_of_one_line(persons, n, rng):
     return values
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 @pytest.mark.parametrize(("persons", "studies"), [(24, 10_000), (12, 3000), (6, 3000)])
 def test_a_band_over_six_levels_holds_all_of_them_in_93_to_97_of_100_studies(persons, studies):
     rng = np.random.default_rng(2015)
@@ -166,7 +166,7 @@ def true_sizes(a, b):
     )
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 def test_intervals_of_sizes_and_of_what_pairing_did_hold_in_93_to_98_of_100_skewed_studies():
     rng = np.random.default_rng(2016)
     truth = true_sizes(*skilled_pairs(2_000_000, 1, rng))
@@ -184,7 +184,7 @@ def happened(share, icc, n, rng):
     return (rng.random((n, PERSONS, TRIALS)) < chance).reshape(n, -1)
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 @pytest.mark.parametrize(("share", "icc"), [(0.5, 0.3), (0.2, 0.3), (0.2, 0.7)])
 def test_an_interval_of_a_share_holds_in_93_to_97_of_100_studies(share, icc):
     flags = happened(share, icc, STUDIES, np.random.default_rng(2017))
@@ -192,7 +192,7 @@ def test_an_interval_of_a_share_holds_in_93_to_97_of_100_studies(share, icc):
     assert 0.93 <= held <= 0.97
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 @pytest.mark.parametrize(
     ("q", "icc", "true"), [(0.5, 0.3, 0.0), (0.95, 0.3, 1.6449), (0.95, 0.7, 1.6449)]
 )
@@ -202,7 +202,7 @@ def test_an_interval_of_a_quantile_holds_in_93_to_98_of_100_studies(q, icc, true
     assert 0.93 <= held <= 0.98
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 def test_nothing_is_found_in_a_factorial_without_effects_in_3_to_7_of_100_skewed_studies():
     rng = np.random.default_rng(2019)
     one, two = (np.repeat(x, PERSONS) for x in (list("aaabbb"), [0, 1, 2, 0, 1, 2]))

@@ -86,7 +86,7 @@ def test_the_interval_is_that_of_blocks_drawn_anew_written_out():
     assert (found.low, found.high) == pytest.approx(tuple(np.quantile(first, [0.025, 0.975])))
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 def test_their_intervals_hold_in_at_least_93_of_100_studies_of_few_points_and_persons():
     """Ishigami's function, which noise of variance 1 in each cell of 12 persons blurs by 1/12."""
     parts = 0.5 * (1 + 0.1 * math.pi**4 / 5) ** 2, 7**2 / 8, 0.1**2 * math.pi**8 * (1 / 18 - 1 / 50)

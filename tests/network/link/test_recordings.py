@@ -13,7 +13,7 @@ from dva_sim.network.link import Link, LinkConfig, read_delay_log, read_trace
 from dva_sim.network.radio import make_link
 from dva_sim.streams import Streams
 
-TRACES = Path(__file__).parents[3].parent / "shared" / "traces"
+TRACES = Path(__file__).parents[3] / "experiments" / "traces"
 PING = """\
 PING 10.0.0.7 (10.0.0.7) 56(84) bytes of data.
 [1700000001.030000] 64 bytes from 10.0.0.7: icmp_seq=1 ttl=57 time=30.0 ms
@@ -158,9 +158,8 @@ def test_a_missing_log_is_named() -> None:
         link("no.log")
 
 
-@pytest.mark.skipif(not TRACES.is_dir(), reason=f"no recorded cellular links at {TRACES}")
-@pytest.mark.parametrize("name", ["ATT-LTE-driving-2016.up", "TMobile-UMTS-driving.down"])
-def test_a_real_cellular_link_lets_through_what_was_recorded(name: str) -> None:
+@pytest.mark.parametrize("name", ["cellular.up", "cellular.down"])
+def test_a_cellular_link_lets_through_what_was_recorded(name: str) -> None:
     times = read_trace(str(TRACES / name))
     way = {"trace_up": str(TRACES / name), "queue_bytes": 10**9}
     line = make_link(LinkConfig(**way), "up", Streams(1), "link")  # type: ignore[arg-type]
@@ -171,9 +170,8 @@ def test_a_real_cellular_link_lets_through_what_was_recorded(name: str) -> None:
     assert np.sort(np.diff(arrivals[: n + 1])) == pytest.approx(np.sort(gaps), abs=1e-9)
 
 
-@pytest.mark.skipif(not TRACES.is_dir(), reason=f"no recorded cellular links at {TRACES}")
-def test_on_a_real_cellular_link_commands_wait_for_each_gap_in_coverage() -> None:
-    path = str(TRACES / "TMobile-UMTS-driving.up")
+def test_on_a_cellular_link_commands_wait_for_each_gap_in_coverage() -> None:
+    path = str(TRACES / "cellular.up")
     times = read_trace(path)
     line = make_link(LinkConfig(trace_up=path), "up", Streams(1), "link")
     sent = np.arange(0, float(times[-1]), 0.1)

@@ -3,6 +3,9 @@
 import pytest
 from scripted_tcp import Pair, keep_writing, options
 
+from dva_sim.clock import Clock
+from dva_sim.network.tcp.sender import Sender
+
 
 def lost_at(times, lost, until=20.0, late=None, **changes):
     """Write 400 B at each of `times`, lose the segments of these numbers."""
@@ -64,6 +67,23 @@ def test_a_needless_probe_does_not_reduce_it():
     assert pair.opener.congestion_window == 10.0
 
 
+@pytest.mark.parametrize(("again", "window"), [(True, 10.0), (False, 7.0)])
+def test_a_probe_whose_end_is_acknowledged_twice_was_needless(again, window):
+    """RFC 8985, section 7.4.2, for another end that says nothing of duplicates."""
+    clock, edge = Clock(), 1_000_000
+    sender = Sender(clock, options(), lambda *segment: None, lambda: None)
+    sender.established(0.1, 0, edge)
+    sender.write(400)
+    clock.run(0.31)
+    assert sender.tail_probes == 1
+    sender.acknowledge(0.35, 400, edge, (), duplicate=False, echo=0.0)
+    sender.write(400)
+    if again:
+        sender.acknowledge(0.4, 400, edge, (), duplicate=False, echo=0.3)
+    sender.acknowledge(0.45, 800, edge, (), duplicate=False, echo=0.31)
+    assert sender.window.window == window
+
+
 def test_a_loss_is_seen_a_quarter_of_the_round_trip_after_a_later_segment_was_due():
     # the second is acknowledged at 1.11; the first was due at 1.1 and may be 25 ms late
     assert lost_at([1.0, 1.01], {1}).sent(1.0) == pytest.approx([1.0, 1.01, 1.125])
@@ -91,6 +111,14 @@ def test_a_lost_repetition_is_found_by_what_was_sent_after_it():
     assert pair.sent(1.0) == pytest.approx([1.0, 1.1, 1.101, 1.102, 1.2, 1.21, 1.31])
     assert pair.opener.sender.timeouts == 0
     assert sum(count for _, count in pair.arrivals) == 2000
+
+
+def test_a_repeated_first_segment_has_a_whole_timeout_of_its_own():
+    # The third is acknowledged at 1.281: the first, whose time-out would come at 1.3, is sent
+    # again, and the second is in doubt until 1.305. It comes late, and nothing times out.
+    pair = lost_at([1.0, 1.18, 1.181], {1}, late={2: 0.02}, tail_probe=False)
+    assert pair.sent(1.0) == pytest.approx([1.0, 1.18, 1.181, 1.281])
+    assert pair.opener.sender.timeouts == 0
 
 
 def test_a_segment_late_within_the_patience_is_not_repeated():

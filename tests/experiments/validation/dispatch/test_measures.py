@@ -194,7 +194,7 @@ def test_the_way_back_is_work_for_who_returns():
     assert busy == pytest.approx(simulate_timed(scenario, 2).units[0].busy, rel=1e-6)
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 @pytest.mark.parametrize(
     ("changes", "names"),
     [
@@ -227,7 +227,7 @@ def a_plain_queue(rng, servers=3, rate=2.4, until=1200.0):
     return Sample(*heads, times, start, start, end, never, never, end, nobody, start, end)
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 def test_the_waits_of_three_guards_are_estimated_without_bias_and_with_honest_errors():
     look, between = RANDOM | {"mean_s": 1.0}, RANDOM | {"mean_s": 1 / 2.4}
     team = [{"name": "guard", "count": 3, "look": look}]

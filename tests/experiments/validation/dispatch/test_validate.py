@@ -63,7 +63,7 @@ def test_a_wrong_answer_fails(tmp_path, capsys, only_one_identity):
     assert "1 of" in capsys.readouterr().out
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 def test_what_is_written_is_the_same_bytes_each_time(tmp_path, only_one_identity):
     path = a_file(tmp_path)
     for name in ("one", "two"):
@@ -77,7 +77,7 @@ def test_what_is_written_is_the_same_bytes_each_time(tmp_path, only_one_identity
     assert {"exact", "simulated", "standard_error", "plain", "deviation"} <= rows[0].keys()
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 def test_the_number_of_processes_changes_nothing(tmp_path):
     cases = load_cases(a_file(tmp_path))
     alone, together = (check_cases(cases, 2, True, workers) for workers in (1, 2))
@@ -99,7 +99,7 @@ def test_a_case_that_seems_to_differ_is_played_again_and_longer(tmp_path):
     assert check.verdict == "differs"
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 @pytest.mark.parametrize("name", IDENTITIES)
 def test_an_identity_holds_with_other_luck(name):
     assert all(off == 0.0 for _, off in check_identity(name, seed=8))

@@ -23,7 +23,7 @@ def test_an_exact_check_passes_in_all_its_lines(check, seed):
     assert passing(check, seed) == [line.id for line in LINES if line.check == check]
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 def test_nine_in_ten_helpers_are_as_quick_as_the_standard_asks():
     assert passing("S16b", 1) == ["S16b/turnout-fire", "S16b/turnout-ems", "S16b/travel"]
 

@@ -78,7 +78,7 @@ def test_what_does_not_belong_together_is_refused(what, options, words):
         validate(what, None, **options)
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 def test_what_is_written_is_the_same_bytes_each_time(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(console, "QUICK_PERSONS", 3)
     for name in ("one", "two"):

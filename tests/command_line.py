@@ -1,0 +1,57 @@
+"""The command line, called in this process: its words, what it prints, its exit code.
+
+To start a program takes a second or more of computing; only `test_command_line` does, once, and
+whoever needs a process that can be stopped: see `programs`.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from subprocess import CompletedProcess
+from unittest import mock
+
+from dva_sim import cli
+
+WIDE = "200"  # columns, so that no line is broken
+
+
+def call(*words: str | Path, cwd: Path | None = None, said: str = "") -> CompletedProcess[str]:
+    """What becomes of `dva-sim WORDS` in a folder, with `said` on its standard input."""
+    command = ["dva-sim", *map(str, words)]
+    out, errors = _written(), _written()
+    with _terminal(out, errors, said), contextlib.chdir(cwd or Path.cwd()):
+        code = _exit_code(command)
+    return CompletedProcess(command, code, *(_text(stream) for stream in (out, errors)))
+
+
+def _exit_code(command: list[str]) -> int:
+    with mock.patch.object(sys, "argv", command):
+        try:
+            cli.main()
+        except SystemExit as end:
+            return end.code if isinstance(end.code, int) else int(end.code is not None)
+    return 0
+
+
+@contextlib.contextmanager
+def _terminal(out: io.TextIOWrapper, errors: io.TextIOWrapper, said: str) -> Iterator[None]:
+    typed = io.TextIOWrapper(io.BytesIO(said.encode()), "utf-8")
+    with (
+        mock.patch.object(sys, "stdin", typed),
+        mock.patch.dict("os.environ", {"COLUMNS": WIDE}),
+        contextlib.redirect_stdout(out),
+        contextlib.redirect_stderr(errors),
+    ):
+        yield
+
+
+def _written() -> io.TextIOWrapper:
+    return io.TextIOWrapper(io.BytesIO(), "utf-8", newline="\n", write_through=True)
+
+
+def _text(stream: io.TextIOWrapper) -> str:
+    return stream.buffer.getvalue().decode()  # type: ignore[attr-defined,no-any-return]

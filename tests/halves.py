@@ -1,0 +1,160 @@
+"""`pytest --halves`: two processes share the tests, and one tells what came of all of them.
+
+Both collect everything. The one that was started, the leader, takes file after file from the
+front, its helper from the back, until they meet; so nobody has to know what a file costs. A file
+is taken by creating an empty file of its name. The helper's reports go through a file too, so
+that it never waits for the leader, who reads them between its own tests.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+FIRST = ("live", "system")
+"""Folders whose files are dear: the halves had better not meet there."""
+
+LOOK_S = 0.05
+PATIENCE_S = 60.0  # with a helper that was told to stop
+GOOD = (pytest.ExitCode.OK, pytest.ExitCode.TESTS_FAILED, pytest.ExitCode.NO_TESTS_COLLECTED)
+
+
+class Half:
+    """Takes files, and leaves alone what the other half has taken."""
+
+    def __init__(self, folder: Path, backwards: bool) -> None:
+        self._folder, self._backwards = folder, backwards
+        self._taken: dict[Path, bool] = {}
+
+    @pytest.hookimpl(trylast=True)
+    def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
+        files = {item.path: None for item in items}
+        order = sorted(files, key=lambda path: not set(FIRST).intersection(path.parts))
+        place = {path: n for n, path in enumerate(reversed(order) if self._backwards else order)}
+        items.sort(key=lambda item: place[item.path])
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_runtest_protocol(self, item: pytest.Item) -> bool | None:
+        if item.path not in self._taken:
+            self._taken[item.path] = self._take(item.nodeid.partition("::")[0])
+        return None if self._taken[item.path] else True
+
+    def _take(self, name: str) -> bool:
+        try:
+            (self._folder / name.replace("/", "+")).touch(exist_ok=False)
+        except FileExistsError:
+            return False
+        return True
+
+
+class Helper(Half):
+    """The half that nobody watches: it writes its reports down, and ends with its leader."""
+
+    def __init__(self, config: pytest.Config, folder: Path) -> None:
+        super().__init__(folder, backwards=True)
+        self._config, self._leader = config, os.getppid()
+        self._reports = (folder / "reports").open("a", encoding="utf-8")
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_runtest_protocol(self, item: pytest.Item) -> bool | None:
+        if os.getppid() != self._leader:
+            pytest.exit("the other half is gone")
+        return super().pytest_runtest_protocol(item)
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        data = self._config.hook.pytest_report_to_serializable(config=self._config, report=report)
+        self._reports.write(json.dumps(data, default=str) + "\n")
+        self._reports.flush()
+
+
+class Leader(Half):
+    """The half that tells: starts the helper, reads its reports, and ends it."""
+
+    def __init__(self, config: pytest.Config) -> None:
+        self._kept = tempfile.TemporaryDirectory(prefix="dva-sim-halves-")
+        super().__init__(Path(self._kept.name), backwards=False)
+        self._config = config
+        self._reports = self._folder / "reports"
+        self._reports.touch()
+        self._read = 0
+        self._missing: set[str] = set()
+
+    @pytest.hookimpl(wrapper=True, trylast=True)
+    def pytest_runtestloop(self, session: pytest.Session) -> Iterator[None]:
+        self._missing = {item.nodeid for item in session.items}
+        with (self._folder / "said").open("wb") as said:
+            helper = subprocess.Popen(
+                [sys.executable, "-m", "pytest", *self._words()],
+                cwd=self._config.invocation_params.dir,
+                stdin=subprocess.DEVNULL,
+                stdout=said,
+                stderr=subprocess.STDOUT,
+                start_new_session=True,  # Ctrl-C reaches it through its leader, once
+            )
+        try:
+            done = yield
+            while helper.poll() is None:
+                self._tell_its_reports()
+                time.sleep(LOOK_S)
+            self._tell_its_reports()
+            self._check(helper.returncode)
+        finally:
+            _end(helper)
+        return done
+
+    def _words(self) -> list[str]:
+        """Of the command that started this process, for the helper."""
+        words = [str(w) for w in self._config.invocation_params.args if w != "--halves"]
+        return [*words, "--half-of", str(self._folder), "--color=no"]
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        self._missing.discard(report.nodeid)
+
+    def pytest_runtest_logfinish(self) -> None:
+        if self._read < self._reports.stat().st_size:
+            self._tell_its_reports()
+
+    def _tell_its_reports(self) -> None:
+        hook = self._config.hook
+        for data in self._news():
+            report = hook.pytest_report_from_serializable(config=self._config, data=data)
+            if isinstance(report.longrepr, list):
+                report.longrepr = tuple(report.longrepr)  # of a skip: where, line, reason
+            hook.pytest_runtest_logreport(report=report)
+
+    def _news(self) -> list[dict[str, Any]]:
+        """Whole lines that have been written since the last time."""
+        with self._reports.open("rb") as reports:
+            reports.seek(self._read)
+            whole = reports.read().rpartition(b"\n")[0]
+        self._read += len(whole) + bool(whole)
+        return [json.loads(line) for line in whole.splitlines()]
+
+    def _check(self, code: int) -> None:
+        """Nothing may be lost: neither the helper nor a test."""
+        if code not in GOOD:
+            said = (self._folder / "said").read_text(encoding="utf-8", errors="replace")
+            pytest.exit(f"the second process ended with {code}:\n{said}", returncode=3)
+        if self._missing:
+            pytest.exit(f"nobody ran {sorted(self._missing)}", returncode=3)
+
+
+def _end(helper: subprocess.Popen[bytes]) -> None:
+    """Leave no process behind."""
+    if helper.poll() is None:
+        helper.send_signal(signal.SIGINT)
+        try:
+            helper.wait(PATIENCE_S)
+        except subprocess.TimeoutExpired:
+            helper.kill()
+            helper.wait()
