@@ -6,10 +6,10 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 RUNTIME := $(VENV)/.runtime
 DEV := $(VENV)/.dev
 BENCH := $(VENV)/.bench
-DEMO := results/req-rep-vs-pub-sub
+DEMO := results/demo
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-all test-contract test-system test-soak check bench clean
+.PHONY: help setup demo published test test-all test-contract test-system test-soak check bench clean
 
 # Two processes share the tests. Compiled files are kept whatever a shell says: without them each
 # run compiles all tests again, for half a minute.
@@ -20,8 +20,11 @@ help:  ## say what can be made
 
 setup: $(DEV)  ## the development environment, in .venv
 
-demo: $(RUNTIME)  ## run the main study and write its report
-	@$(BIN)/dva-sim run req-rep-vs-pub-sub -o $(DEMO)
+demo: $(RUNTIME)  ## one drive as picture and film, and the main study's small version: a minute
+	@$(BIN)/dva-sim demo -o $(DEMO)
+
+published: $(RUNTIME)  ## the main study at its published size, and its report: ten minutes
+	@$(BIN)/dva-sim run req-rep-vs-pub-sub -o results/req-rep-vs-pub-sub
 
 test: $(DEV)  ## the tests that are quick, which are nearly all
 	@echo "Running the tests ..."

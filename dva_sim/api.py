@@ -13,13 +13,14 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dva_sim.errors import DvaSimError
+from dva_sim.errors import RunsFailed
 from dva_sim.experiments.comparing import Comparison as Comparison
 from dva_sim.experiments.results import Results as Results
 from dva_sim.experiments.settings import Settings, pairs_of
 from dva_sim.experiments.single import Episode as Episode
 from dva_sim.experiments.single import episode as episode
 from dva_sim.experiments.single import replay as replay
+from dva_sim.experiments.versions import Variant
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -38,6 +39,7 @@ def run(
     *,
     set: Settings = (),
     seed: int | None = None,
+    quick: bool = False,
     full: bool = False,
     pilot: int | None = None,
     jobs: int | None = None,
@@ -53,8 +55,9 @@ def run(
         out: Results folder; by default `results/` and the study's name.
         set: Keys to change, as a mapping or as `key=value` pairs.
         seed: Of the whole study, instead of its own.
+        quick: The study's small version.
         full: The study's larger version.
-        pilot: Only so many persons, with luck of their own.
+        pilot: Only so many persons, with random seeds that the study itself never uses.
         jobs: Processes of this machine; by default one for each core.
         scheduler: Address of a dask.distributed cluster to use instead; recordings are made here.
         limit_s: A run that takes longer, by the wall clock, has failed.
@@ -72,7 +75,8 @@ def run(
     from dva_sim.experiments.recording import record_study
     from dva_sim.experiments.runner import run_study
 
-    asked, folder = _asked(study, out, pairs_of(set, seed), full, pilot)
+    variant = Variant.of(quick=quick, full=full, pilot=pilot)
+    asked, folder = _asked(study, out, pairs_of(set, seed), variant)
     options: dict[str, Any] = {"jobs": jobs, "scheduler": scheduler}
     with _without_main():
         run_study(asked, folder, progress=progress, limit_s=limit_s, **options)
@@ -81,7 +85,7 @@ def run(
     if report:
         results.report()
     if problems:
-        raise DvaSimError(f"{folder}: {'; '.join(problems)}; the results are complete")
+        raise RunsFailed(f"{folder}: {'; '.join(problems)}; the results are complete")
     return results
 
 
@@ -91,6 +95,7 @@ def dry_run(
     *,
     set: Settings = (),
     seed: int | None = None,
+    quick: bool = False,
     full: bool = False,
     pilot: int | None = None,
     jobs: int | None = None,
@@ -103,21 +108,21 @@ def dry_run(
     from dva_sim.experiments.episode import run_job
     from dva_sim.experiments.planning import dry_run as planned
 
-    asked, folder = _asked(study, out, pairs_of(set, seed), full, pilot)
+    variant = Variant.of(quick=quick, full=full, pilot=pilot)
+    asked, folder = _asked(study, out, pairs_of(set, seed), variant)
     return planned(asked, folder, jobs=jobs, probe=run_job)
 
 
 def _asked(
-    study: str | Path, out: str | Path | None, pairs: list[str], full: bool, pilot: int | None
+    study: str | Path, out: str | Path | None, pairs: list[str], variant: Variant
 ) -> tuple[Study, Path]:
     """A study without mistakes, and the folder of its results."""
     from dva_sim.experiments.episode import rehearse_all
-    from dva_sim.experiments.running import Version
     from dva_sim.experiments.study import load_study
 
-    asked = load_study(study, pairs, full=full, pilot=pilot)
+    asked = load_study(study, pairs, version=variant.version, pilot=variant.pilot)
     rehearse_all(asked)
-    return asked, Path(out) if out is not None else Version(full, pilot).folder(str(study))
+    return asked, Path(out) if out is not None else variant.folder(str(study))
 
 
 def new(name: str | Path) -> Path:
@@ -146,7 +151,7 @@ def register(study: str | Path, *, full: bool = False, again: bool = False) -> R
     from dva_sim.experiments.registration import registration_of
     from dva_sim.experiments.study import load_study
 
-    asked = load_study(study, full=full)
+    asked = load_study(study, version="full" if full else None)
     write_down(asked, again)
     found = registration_of(asked)
     assert found is not None
@@ -179,14 +184,14 @@ def tune(
 
 
 def report(folder: Folder, *, pdf: bool = False) -> Path:
-    """Make the report of a results folder again; its page.
+    """Make the report of a results folder again, or of a study under way so far; its page.
 
     Raises:
         DvaSimError: no results there, or a disk that cannot be written.
     """
     from dva_sim.experiments.report import write_report
 
-    return write_report(_results(folder).folder, pdf)
+    return write_report(folder.folder if isinstance(folder, Results) else Path(folder), pdf)
 
 
 def show(
@@ -194,12 +199,14 @@ def show(
 ) -> None:
     """Print what results hold: the answer and every cell, a table, or what columns mean.
 
+    Of a study under way it is what is known so far.
+
     Raises:
         ConfigError: no results there, or no such table.
     """
     from dva_sim.experiments import showing_console
 
-    showing_console.show(_results(folder), table, columns, rows)
+    showing_console.show(_so_far(folder), table, columns, rows)
 
 
 def export(
@@ -246,6 +253,12 @@ def compare(first: Folder, second: Folder) -> Comparison:
         ConfigError: one is no results folder, or they have no configuration in common.
     """
     return Comparison(_results(first), _results(second))
+
+
+def _so_far(folder: Folder) -> Results:
+    from dva_sim.experiments.unfinished import load_so_far
+
+    return folder if isinstance(folder, Results) else load_so_far(folder)
 
 
 def _results(folder: Folder) -> Results:

@@ -3,10 +3,25 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import ClassVar
+
+from dva_sim.exit_codes import ExitCode
 
 
 class DvaSimError(Exception):
-    """Base of all errors a user can cause and mend."""
+    """Base of all errors a user can cause and mend.
+
+    Attributes:
+        exit_code: What the command line ends with.
+    """
+
+    exit_code: ClassVar[ExitCode] = ExitCode.MISTAKE
+
+
+class RunsFailed(DvaSimError):
+    """Runs failed, so there is nothing to go on with; the input was as it should be."""
+
+    exit_code = ExitCode.RUNS_FAILED
 
 
 class ConfigError(DvaSimError):
@@ -38,3 +53,14 @@ class ConfigError(DvaSimError):
 
     def __reduce__(self) -> tuple[object, ...]:
         return type(self), (self.problem, self.file, self.line, self.column)
+
+
+ERROR = "error: "
+
+
+def error_line(problem: object) -> str:
+    """A mistake as the command line says it: one line, whatever a name or a file in it holds."""
+    text = " ".join(str(problem).split())
+    return ERROR + "".join(
+        c if c.isprintable() else c.encode("unicode_escape").decode() for c in text
+    )

@@ -20,6 +20,7 @@ from dva_sim.config import Config, Document, Path_, validate
 from dva_sim.errors import ConfigError
 from dva_sim.experiments import design
 from dva_sim.experiments.design import Cell
+from dva_sim.experiments.episode import contradictions_in
 from dva_sim.experiments.models import model_for, model_of
 from dva_sim.experiments.registration import Registration, departures, load_registration
 from dva_sim.experiments.repeats import Bands
@@ -29,7 +30,7 @@ from dva_sim.experiments.tuned import Tuned
 from dva_sim.experiments.validation.dispatch.cases import CaseFile, load_cases
 from dva_sim.experiments.validation.network.plan import PlanConfig, load_plan
 from dva_sim.experiments.validation.operators.targets import SplitFile, TargetFile, load_split
-from dva_sim.scenario import Scenario
+from dva_sim.scenario import Scenario, build, contradictions
 from dva_sim.tasks import TaskScenario
 from dva_sim.timed.scenario import TimedScenario
 from dva_sim.worlds.geo import GeoFrame
@@ -69,6 +70,13 @@ class Kind:
 def check_config(kind: Kind, document: Document) -> list[Problem]:
     """What is wrong with a configuration, by the code that runs it."""
     return _collect(document.file, partial(kind.check, document), partial(_blamed, document))
+
+
+def doubts(kind: Kind, document: Document) -> list[str]:
+    """What does not go together in a valid study or scenario."""
+    if kind.model is Study:
+        return contradictions_in(load_study(document.file))
+    return contradictions(build(document)) if kind.model is Scenario else []
 
 
 def check_plan(path: Path) -> list[Problem]:
@@ -149,7 +157,7 @@ def _quoted(document: Document, problem: str) -> Path_:
 def _check_study(document: Document) -> Iterator[ConfigError]:
     """The study, its scenarios in every cell, and one run of each built as by the runner."""
     study = load_study(document.file)
-    versions = [study, *([load_study(document.file, full=True)] if study.full else [])]
+    versions = [study, *(load_study(document.file, version=name) for name in study.versions)]
     cells = [design.to_rehearse(version, design.cells(version)) for version in versions]
     for cell in {cell.config: cell for some in cells for cell in some}.values():
         try:
@@ -165,7 +173,7 @@ def _check_registration(document: Document) -> Iterator[ConfigError]:
     if not file.is_file():
         yield document.error(f"{file.name}, the study it is of, is not beside it", ("study",))
         return
-    for problem in departures(found, load_study(file, full=found.full)):
+    for problem in departures(found, load_study(file, version="full" if found.full else None)):
         yield document.error(problem, ("plan",))
 
 

@@ -15,15 +15,17 @@ from dva_sim.checking.schemas import schema_text
 from dva_sim.checking.trials import TRIALS, Trial
 from dva_sim.config import parse_changes
 from dva_sim.errors import ConfigError
+from dva_sim.exit_codes import ExitCode
 
 STDIN: Final = "-"
 LINK: Final = "link"
-VALID, INVALID, NOT_READ = 0, 1, 2  # exit codes; the highest of all files counts
+# The highest of all files counts.
+VALID, INVALID, NOT_READ = ExitCode.OK, ExitCode.DOES_NOT_HOLD, ExitCode.MISTAKE
 _SHOWN: Final = 50  # problems of one file
 
 
-def check(names: Sequence[str], options: Sequence[str] = ()) -> int:
-    """Tell of each file whether it is valid, and if not, why; the exit code.
+def check(names: Sequence[str], options: Sequence[str] = ()) -> ExitCode:
+    """Tell of each file whether it is valid, and if not, why; how it ended.
 
     Args:
         names: Paths of files; or a word of `TRIALS`, such as `policy`, and names of such; or
@@ -44,7 +46,7 @@ def check(names: Sequence[str], options: Sequence[str] = ()) -> int:
     return _sum_up("file", "files", [_check_one(name) for name in names])
 
 
-def _check_link(names: Sequence[str], options: Sequence[str]) -> int:
+def _check_link(names: Sequence[str], options: Sequence[str]) -> ExitCode:
     """Measure the emulated link; there is but one."""
     from dva_sim.emulator import console  # late: nobody else needs it
 
@@ -53,7 +55,7 @@ def _check_link(names: Sequence[str], options: Sequence[str]) -> int:
     return console.check()
 
 
-def _try_all(kind: str, names: Sequence[str], options: Mapping[str, Any]) -> int:
+def _try_all(kind: str, names: Sequence[str], options: Mapping[str, Any]) -> ExitCode:
     trial = TRIALS[kind]
     if not names:
         known = ", ".join(trial.known())
@@ -61,7 +63,7 @@ def _try_all(kind: str, names: Sequence[str], options: Mapping[str, Any]) -> int
     return _sum_up(kind, trial.many, [_try(kind, trial, name, options) for name in names])
 
 
-def _try(kind: str, trial: Trial, name: str, options: Mapping[str, Any]) -> int:
+def _try(kind: str, trial: Trial, name: str, options: Mapping[str, Any]) -> ExitCode:
     """Try something and say what came of it."""
     try:
         outcome = trial.run(name, options)
@@ -80,7 +82,7 @@ def _try(kind: str, trial: Trial, name: str, options: Mapping[str, Any]) -> int:
     return INVALID if outcome.broken else VALID
 
 
-def _sum_up(one: str, many: str, codes: Sequence[int]) -> int:
+def _sum_up(one: str, many: str, codes: Sequence[ExitCode]) -> ExitCode:
     count = Counter(codes)
     words = {VALID: "valid", INVALID: "invalid", NOT_READ: "not read"}
     found = ", ".join(f"{count[code]} {word}" for code, word in words.items() if count[code])
@@ -93,7 +95,7 @@ def print_schema(kind: str) -> None:
     sys.stdout.write(schema_text(kind))
 
 
-def _check_one(name: str) -> int:
+def _check_one(name: str) -> ExitCode:
     try:
         verdict = _judge(name)
     except NotReadError as error:
@@ -103,6 +105,8 @@ def _check_one(name: str) -> int:
         where = _near(problem.file) if problem.file else name
         _say(f"{where}:{problem.line}:{problem.column}: {problem.text}")
     number = len(verdict.problems)
+    for doubt in verdict.doubts:
+        _say(f"{name}: warning: {doubt}")
     if not number:
         _say(f"{name}: {verdict.kind}: valid")
         return VALID

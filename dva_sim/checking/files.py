@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import stat
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -33,10 +34,14 @@ class NotReadError(DvaSimError):
 
 @dataclass(frozen=True)
 class Verdict:
-    """What was found: the kind of a file, and its problems; none if it is valid."""
+    """What was found: the kind of a file, its problems, and what does not go together in it.
+
+    It is valid if it has no problems.
+    """
 
     kind: str
     problems: list[Problem]
+    doubts: Sequence[str] = ()
 
 
 def check_file(path: Path) -> Verdict:
@@ -98,7 +103,7 @@ def _check_plan(path: Path) -> Verdict:
 
 def _check_yaml(path: Path) -> Verdict:
     """A message needs none of what reads configurations: it is imported here."""
-    from dva_sim.checking.configs import check_config, recognise
+    from dva_sim.checking.configs import check_config, doubts, recognise
 
     problems = _flawed(path, YAML_BYTES)
     document, problem = (None, problems[0]) if problems else _parse(path)
@@ -107,7 +112,8 @@ def _check_yaml(path: Path) -> Verdict:
     kind = recognise(document)
     if kind is None:
         return Verdict("unknown", [Problem(1, 1, _UNKNOWN)])
-    return Verdict(kind.name, check_config(kind, document))
+    problems = check_config(kind, document)
+    return Verdict(kind.name, problems, () if problems else doubts(kind, document))
 
 
 def _parse(path: Path) -> tuple[Document | None, Problem | None]:

@@ -6,14 +6,15 @@ from rich.console import Console
 
 from dva_sim.emulator.check import check_link
 from dva_sim.emulator.running import EmulatorError, why_no_packets
+from dva_sim.exit_codes import ExitCode
 
 console = Console(highlight=False, soft_wrap=True)
 OFFER = "a relay of TCP over the loopback can take its place for measurements without loss"
 QUIET = "real-time priority, which root has, or a quiet machine helps"
 
 
-def check() -> int:
-    """Print what is found about the emulated link; the exit code.
+def check() -> ExitCode:
+    """Print what is found about the emulated link; how it ended.
 
     Raises:
         EmulatorError: there is none here: why, and what there is instead.
@@ -25,6 +26,6 @@ def check() -> int:
     for finding in findings:
         console.print(str(finding), markup=False)
     if all(finding.passed for finding in findings):
-        return 0
+        return ExitCode.OK
     console.print(f"What is late only now and then waited for the processor: {QUIET}.")
-    return 1
+    return ExitCode.DOES_NOT_HOLD

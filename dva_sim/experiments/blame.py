@@ -40,8 +40,8 @@ def _places(study: Study, part: str, key: str, value: Any) -> Iterator[Path_]:
     for factor, levels in study.treatments.items():
         for level in levels:
             yield "treatments", factor, level, key
-    if study.is_full:
-        yield "full", key
+    if study.version is not None:
+        yield study.version, key
     in_design = designs.place_of(study, key, value)
     if in_design is not None:
         yield in_design

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from operator import itemgetter
 from typing import Any, NamedTuple
 
 from dva_sim.experiments.asking import POINT
 from dva_sim.experiments.effects import Factor
 from dva_sim.experiments.labels import factor_name, level_name
+from dva_sim.scenario import TRIPS_OF_A_START, time_out_s
 
 _VARIED = "varied"
 _CONDITIONS = {
@@ -73,7 +74,6 @@ _CONDITIONS = {
 }
 _WAYS = {"otherwise towards the robot": "link.up", "otherwise from the robot": "link.down"}
 _NOWHERE = "–"
-_SAFE_ROUND_TRIPS = 4
 _OF_WAITING = (
     *("command.timeout_s", "robot.processing_s"),
     *("link.delay_s", "link.up.delay_s", "link.down.delay_s"),
@@ -154,18 +154,36 @@ class _Waiting(NamedTuple):
 def _waiting(scenario: Mapping[str, Any], changes: Mapping[str, Any]) -> _Waiting | None:
     """Of one condition; None where there are no requests."""
 
+    def base(key: str) -> Any:
+        return get(scenario, key)
+
     def of(key: str) -> Any:
-        return changes[key] if key in changes else get(scenario, key)
+        return changes[key] if key in changes else base(key)
 
     timeout, processing, delay = (
         of(key) for key in ("command.timeout_s", "robot.processing_s", "link.delay_s")
     )
     if timeout is None or processing is None or delay is None:
         return None
+    trip, needed = _needed(of)
+    if "command.timeout_s" not in changes and timeout == _usual(base):
+        timeout = time_out_s(needed)  # nobody gave one, so it follows the link
+    return _Waiting(float(timeout), trip, needed)
+
+
+def _usual(of: Callable[[str], Any]) -> float | None:
+    """The time-out where nobody gives one [s]; None where that cannot be known."""
+    known = of("link.delay_s") is not None and of("robot.processing_s") is not None
+    return time_out_s(_needed(of)[1]) if known else None
+
+
+def _needed(of: Callable[[str], Any]) -> tuple[float, float]:
+    """The round trip, and what the first answer over a new connection takes [s]."""
+    delay, processing = of("link.delay_s"), of("robot.processing_s")
     ways = (of(f"link.{way}.delay_s") for way in ("up", "down"))
     trip = float(sum(delay if way is None else way for way in ways))
     mean = processing["mean_s"] if isinstance(processing, Mapping) else processing
-    return _Waiting(float(timeout), trip, _SAFE_ROUND_TRIPS * trip + float(mean))
+    return trip, TRIPS_OF_A_START * trip + float(mean)
 
 
 def _changes(study: Mapping[str, Any]) -> Iterator[dict[str, Any]]:

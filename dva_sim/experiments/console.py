@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from dva_sim import resources
@@ -22,7 +23,7 @@ from dva_sim.experiments.models import Tables, model_of, tables_of
 from dva_sim.experiments.pictures import Wanted
 from dva_sim.experiments.transports import TransportScenario, told
 from dva_sim.recordings import write_recording
-from dva_sim.scenario import Scenario
+from dva_sim.scenario import Scenario, contradictions
 from dva_sim.simulation import Playback, Recording, simulate
 from dva_sim.tasks import TaskScenario
 from dva_sim.timed import TimedScenario
@@ -41,6 +42,12 @@ def nowhere() -> Console:
 # --- episodes --------------------------------------------------------------------------
 
 
+def warn(doubts: Sequence[str], where: Console = console) -> None:
+    """Say what does not go together, a line for each."""
+    for doubt in doubts:
+        where.print(f"[yellow]warning:[/yellow] {escape(doubt)}", soft_wrap=True)
+
+
 def episode(
     name: str,
     seed: int,
@@ -57,6 +64,8 @@ def episode(
     """
     if record is not None:
         _check_record(record, side_by_side)
+    if side_by_side is not None and pictures.camera is not None:
+        raise ConfigError("--camera shows one run; it does not go with --side-by-side")
     document = scenarios.load(name)
     changes = parse_changes(pairs)
     scenario = model_of(document).build(document, changes)
@@ -78,13 +87,17 @@ def episode(
         settings = [changes | {"pattern": p} for p in _two_patterns(side_by_side)]
     pictures.check(scenario)
     keep = pictures.any or record is not None
-    runs = [_tell(scenarios.build(document, each), seed, keep, where) for each in settings]
+    built = [scenarios.build(document, each) for each in settings]
+    warn(list(dict.fromkeys(told for each in built for told in contradictions(each))), where)
+    played = [_tell(each, seed, keep, where) for each in built]
+    runs = [run for run, _ in played]
+    if side_by_side is not None:
+        telling.tell_side_by_side(runs, where)
     if record is not None:
-        (run, tables), about = runs[0], {"scenario": name}
-        write_recording(run, record, tables=tables, about=about)
+        write_recording(runs[0], record, tables=played[0][1], about={"scenario": name})
         where.print(f"Recording: {record}", soft_wrap=True)
-    draw(pictures, [run for run, _ in runs], where)
-    return runs[0][0]
+    draw(pictures, runs, where)
+    return runs[0]
 
 
 def draw(pictures: Wanted, runs: Sequence[Playback], where: Console) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -52,8 +53,8 @@ class Cell:
 
 
 @dataclass(frozen=True, slots=True)
-class Job:
-    """One run.
+class Run:
+    """One run of a study, by its place in the design.
 
     Attributes:
         part: Name of the part.
@@ -61,8 +62,7 @@ class Job:
         index: Position of the cell in the design, or `REFERENCE`.
         person: Index of the simulated person, from 0.
         trial: Index of the trial, from 0.
-        seed: The run's luck: the same for this person and trial in every cell.
-        scenario: All that the run needs but its seed.
+        seed: Random seed of the run: the same for this person and trial in every cell.
         config: Hash of the scenario but for the person.
     """
 
@@ -72,7 +72,6 @@ class Job:
     person: int
     trial: int
     seed: int
-    scenario: AnyScenario
     config: str
 
     @property
@@ -89,6 +88,17 @@ class Job:
     def key(self) -> Key:
         """What tells this run from all others; equal keys are the same run."""
         return self.config, self.seed
+
+
+@dataclass(frozen=True, slots=True)
+class Job(Run):
+    """A run with all that is needed to make it.
+
+    Attributes:
+        scenario: All that the run needs but its seed.
+    """
+
+    scenario: AnyScenario
 
 
 def cells(study: Study) -> list[Cell]:
@@ -163,6 +173,22 @@ def jobs(study: Study, grid: Sequence[Cell] | None = None) -> list[Job]:
     names = dict.fromkeys(cell.part for cell in every)
     parts = [(name, [cell for cell in every if cell.part == name]) for name in names]
     return [job for name, part_cells in parts for job in _jobs_of(study, name, part_cells)]
+
+
+def runs_in(manifest: Mapping[str, Any]) -> list[Run]:
+    """The runs that a manifest tells of, in the order of `jobs`.
+
+    Args:
+        manifest: Of a study that may be under way; only its study and cells are read.
+    """
+    study, rows = Study.model_validate(manifest["study"]), manifest["cells"]
+    return [
+        Run(part, tuple(row["levels"].items()), row["cell"], *draw, row["config"])
+        for part in dict.fromkeys(row["part"] for row in rows)
+        for row in rows
+        if row["part"] == part
+        for draw in _draws(study, part)
+    ]
 
 
 def to_rehearse(study: Study, every: Iterable[Cell]) -> list[Cell]:
@@ -272,17 +298,27 @@ def _located(changes: dict[str, Any], folder: Path) -> dict[str, Any]:
 def _jobs_of(study: Study, name: str, part_cells: Sequence[Cell]) -> Iterator[Job]:
     # Persons of one cluster follow each other, so that no two clusters share an operator.
     team = max(1, *(model_for(cell.scenario).team(cell.scenario) for cell in part_cells))
-    persons, trials, luck = _size(study, name)
+    draws = _draws(study, name)
     for cell in part_cells:
-        for person in range(persons):
-            scenario = model_for(cell.scenario).played_by(cell.scenario, person * team)
-            for trial in range(trials):
-                seed = derive_seed(study.seed, luck, person, trial)
-                yield Job(name, cell.levels, cell.index, person, trial, seed, scenario, cell.config)
+        play = partial(model_for(cell.scenario).played_by, cell.scenario)
+        scenarios = {person: play(person * team) for person, _, _ in draws}
+        for draw in draws:
+            scenario = scenarios[draw[0]]
+            yield Job(name, cell.levels, cell.index, *draw, cell.config, scenario)
+
+
+def _draws(study: Study, name: str) -> list[tuple[int, int, int]]:
+    """Person, trial and seed of each run in a cell of a part, in order."""
+    persons, trials, part = _size(study, name)
+    return [
+        (person, trial, derive_seed(study.seed, part, person, trial))
+        for person in range(persons)
+        for trial in range(trials)
+    ]
 
 
 def _size(study: Study, name: str) -> tuple[int, int, str]:
-    """Persons, trials, and the part whose luck is met: a repeat shares that of its part."""
+    """Persons, trials, and the part whose random seeds it has: a repeat shares its part's."""
     if name == REPEATS and study.robustness is not None and study.answer is not None:
         persons = min(study.robustness.persons, study.persons)
         return persons, study.robustness.replications, study.answer.part

@@ -6,11 +6,12 @@ import json
 import os
 import sqlite3
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
+from typing import Any
 
 from dva_sim.errors import ConfigError, DvaSimError
 
@@ -20,7 +21,8 @@ _LOOK_S = 1.0  # Ctrl-C is not heard for as long
 
 _SCHEMA = """
 CREATE TABLE IF NOT EXISTS study (
-  id INTEGER PRIMARY KEY CHECK (id = 1), identity TEXT NOT NULL, wall_s REAL NOT NULL DEFAULT 0);
+  id INTEGER PRIMARY KEY CHECK (id = 1), identity TEXT NOT NULL, wall_s REAL NOT NULL DEFAULT 0,
+  manifest TEXT);
 CREATE TABLE IF NOT EXISTS runs (
   config TEXT, seed INTEGER, tables TEXT, cost_s REAL NOT NULL, error TEXT,
   PRIMARY KEY (config, seed), CHECK ((tables IS NULL) <> (error IS NULL)));
@@ -165,6 +167,24 @@ class Journal:
             except sqlite3.OperationalError as error:
                 if "locked" not in str(error) or time.monotonic() > end:
                     raise
+
+    def describe(self, manifest: Mapping[str, Any]) -> None:
+        """Keep what the study is, so that it can be read from here before it is complete.
+
+        Raises:
+            DvaSimError: the disk is full, or another program holds the journal.
+        """
+        with self._told(), self._transaction():
+            self._db.execute("UPDATE study SET manifest = ?", [json.dumps(manifest)])
+
+    def manifest(self) -> dict[str, Any] | None:
+        """What the study is, as `describe` was told; None if nobody has."""
+        columns = {row[1] for row in self._db.execute("PRAGMA table_info(study)")}
+        if "manifest" not in columns:
+            return None
+        with self._told():
+            (text,) = self._db.execute("SELECT manifest FROM study").fetchone()
+        return None if text is None else dict(json.loads(text))
 
     def done(self) -> set[Key]:
         """Keys of the runs that need not be run again."""

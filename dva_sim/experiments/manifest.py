@@ -14,7 +14,7 @@ from typing import Any
 from dva_sim import __version__
 from dva_sim.errors import DvaSimError
 from dva_sim.experiments import design
-from dva_sim.experiments.design import Cell, Job
+from dva_sim.experiments.design import Cell, Job, Run
 from dva_sim.experiments.fingerprint import fingerprint
 from dva_sim.experiments.identity import inputs, stable_hash
 from dva_sim.experiments.journal import Journal
@@ -77,13 +77,13 @@ def _simulating() -> dict[str, str]:
     return {"dva-sim": __version__, "fingerprint": fingerprint()} | packages
 
 
-def failures(todo: Sequence[Job], journal: Journal) -> list[dict[str, Any]]:
+def failures(todo: Sequence[Run], journal: Journal) -> list[dict[str, Any]]:
     """Failed runs in the order of the design."""
     failed = journal.failures()
     return [design_row(j) | {"error": failed[j.key]} for j in todo if j.key in failed]
 
 
-def machine(todo: Sequence[Job], journal: Journal) -> dict[str, Any]:
+def machine(todo: Sequence[Run], journal: Journal) -> dict[str, Any]:
     """What is different on every machine and at every time."""
     costs = journal.costs()
     spent: dict[str, list[float]] = defaultdict(list)

@@ -1,23 +1,37 @@
-"""How many persons a study needs to show what it claims, counted from a pilot or an earlier one."""
+"""How many persons a study needs to show what it claims, counted from a pilot or an earlier one.
+
+Every number follows one law (`statistics.planning`): the interval or band that the report shows,
+narrowed as persons are added.
+"""
 
 from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dva_sim.experiments.asking import ANSWER, Contrast, Hypothesis
 from dva_sim.experiments.contrasts import Pairs, claims_of, contrasts_of, pairs_of, places_of
-from dva_sim.experiments.effects import Setting, Table
+from dva_sim.experiments.effects import Setting, Table, View
 from dva_sim.experiments.labels import level_name, measure_name, quantity, setting, unit_of
-from dva_sim.experiments.statistics import LEVEL, person_means, power
+from dva_sim.experiments.reading import view_of
+from dva_sim.experiments.statistics import (
+    LEVEL,
+    MOST_PERSONS,
+    Band,
+    Interval,
+    Law,
+    band,
+    law_of,
+    mean_interval,
+)
 
 POWERS = (0.8, 0.9)
-MOST_PERSONS = 10_000
 _ALPHA = 1 - LEVEL
 
 
@@ -57,37 +71,83 @@ class _Test(NamedTuple):
     name: str
     what: str
     assumed: str
-    pairs: Pairs
+    law: Law
     distance: float  # of the true difference from the bound that is tested
-    level: float  # of a two-sided interval that would test it
     is_same: bool = False
     least: int = 2  # persons without whom the test cannot come out
 
 
-def plans(study: Mapping[str, Any], runs: Table) -> list[Plan]:
-    """What each hypothesis and each other comparison would need; the answer if there is none."""
+def plans(study: Mapping[str, Any], runs: Table, but: Collection[str] = ()) -> list[Plan]:
+    """What each hypothesis and each other comparison would need, and the answer where it is open.
+
+    An answer that is not open counts only where nothing else is claimed.
+
+    Args:
+        study: As the manifest has it.
+        runs: The table of runs.
+        but: Names of hypotheses and comparisons that are decided.
+    """
     claims, named = claims_of(study), contrasts_of(study)
     claimed = {claim.comparison for claim in claims.values()}
     others = {k: c for k, c in named.items() if k not in claimed and k != ANSWER}
-    if not claims and not others:
-        others = {k: c for k, c in named.items() if k == ANSWER}
     family = _families(study, claims, named)
     tests = [
+        *_of_answer(view_of(study, runs), is_alone=not claims and not others and not but),
         *_of_claims(study, runs, claims, named, family),
         *_of_comparisons(study, runs, others, family),
     ]
-    return [_plan(test) for test in tests]
+    return [_plan(test) for test in tests if test.name not in but]
 
 
 def _families(
     study: Mapping[str, Any], claims: Mapping[str, Hypothesis], named: Mapping[str, Contrast]
 ) -> Counter[str]:
-    """How many tests share a chance of 5 %; the answer is one of them where it is all there is."""
+    """How many tests share a chance of 5 %: all hypotheses and comparisons of a family."""
     tests = Counter(named[claim.comparison].family for claim in claims.values())
     for name, contrast in named.items():
         if name != ANSWER:
             tests[contrast.family] += len(places_of(study, contrast))
-    return tests or Counter(contrast.family for contrast in named.values())
+    return tests
+
+
+def _of_answer(view: View | None, is_alone: bool) -> Iterator[_Test]:
+    """The answer's band where it leaves the question open, at the level that needs most persons."""
+    if view is None or view.contrast is None or view.line is None:
+        return
+    differences = view.difference(view.panels[0], *view.contrast)
+    found = band(differences)
+    if (stop := _widest(found, _open(found, view.smallest_effect, is_alone))) is None:
+        return
+    mean, unit = float(found.mean[stop]), unit_of(view.measure)
+    reach = mean - found.low[stop] if mean > 0 else found.high[stop] - mean
+    each = _ALPHA / max(int(np.isfinite(found.critical).sum()), 1)
+    law = law_of(differences[:, stop], np.arange(len(differences)), float(reach), 1 - each)
+    if law is None:
+        return
+    what = f"{_sides_of(view, stop)}: not zero"
+    for effect, why in _assumed(abs(mean), view.smallest_effect):
+        yield _Test(ANSWER, what, f"{quantity(effect, unit)}, {why}", law, effect)
+
+
+def _open(found: Band, smallest: float | None, is_alone: bool) -> NDArray[np.bool_]:
+    """Levels at which the band holds zero and an effect that matters; without one, all."""
+    bounds = np.maximum(-found.low, found.high)
+    is_open = (found.low <= 0) & (found.high >= 0) & (bounds > (smallest or 0.0))
+    return np.isfinite(found.critical) & (is_open | (is_alone and not is_open.any()))
+
+
+def _widest(found: Band, where: NDArray[np.bool_]) -> int | None:
+    """Of some levels that whose band is widest."""
+    widths = np.where(where, found.high - found.low, -1.0)
+    return int(widths.argmax()) if where.any() else None
+
+
+def _assumed(found: float, smallest: float | None) -> Iterator[tuple[float, str]]:
+    """True differences that one may count on: that found, if it matters, and the smallest."""
+    if found > (smallest or 0.0):
+        yield found, "as found"
+    if smallest is not None:
+        yield smallest, "the smallest that matters"
 
 
 def _of_claims(
@@ -100,16 +160,19 @@ def _of_claims(
     for name, claim in claims.items():
         contrast = named[claim.comparison]
         at = places_of(study, contrast)[-1] | claim.at
-        if (pairs := _pairs(study, runs, contrast, at)) is None:
+        level = 1 - 2 * _ALPHA / family[contrast.family]  # one-sided
+        if (pairs := pairs_of(study, runs, contrast, at)) is None:
             continue
-        mean, unit = _mean(pairs), unit_of(contrast.measure)
+        found, unit = _interval(pairs, level), unit_of(contrast.measure)
+        mean, is_same = found.mean, claim.direction == "same"
         side = -1 if claim.direction == "below" else 1
-        is_same = claim.direction == "same"
+        ends = {-1: found.high - mean, 1: mean - found.low}
+        law = _law(pairs, max(ends.values()) if is_same else ends[side], level)
         distance = claim.margin if is_same else side * mean - claim.margin
         what = f"{_sides(contrast, at)}: {_CLAIMS[claim.direction]}{quantity(claim.margin, unit)}"
         assumed = "none at all" if is_same else f"{quantity(mean, unit)}, as found"
-        level = 1 - 2 * _ALPHA / family[contrast.family]  # one-sided
-        yield _Test(name, what, assumed, pairs, distance, level, is_same)
+        if law is not None:
+            yield _Test(name, what, assumed, law, distance, is_same)
 
 
 _CLAIMS = {"above": "above ", "below": "below \N{MINUS SIGN}", "same": "the same within "}
@@ -123,28 +186,39 @@ def _of_comparisons(
 ) -> Iterator[_Test]:
     for name, contrast in named.items():
         at = places_of(study, contrast)[-1]
-        if (pairs := _pairs(study, runs, contrast, at)) is None:
-            continue
-        smallest, unit = contrast.smallest, unit_of(contrast.measure)
-        effect = abs(_mean(pairs)) if smallest is None else smallest
-        why = "as found" if smallest is None else "the smallest that matters"
-        what, assumed = f"{_sides(contrast, at)}: not zero", f"{quantity(effect, unit)}, {why}"
         alpha = _ALPHA / family[contrast.family]
+        if (pairs := pairs_of(study, runs, contrast, at)) is None:
+            continue
+        found, unit = _interval(pairs, 1 - alpha), unit_of(contrast.measure)
+        reach = found.mean - found.low if found.mean > 0 else found.high - found.mean
+        if (law := _law(pairs, reach, 1 - alpha)) is None:
+            continue
+        what = f"{_sides(contrast, at)}: not zero"
         least = math.ceil(math.log2(2 / alpha))  # 2 in 2 ** n ways to swap labels are as far off
-        yield _Test(name, what, assumed, pairs, effect, 1 - alpha, least=least)
+        for effect, why in _assumed(abs(found.mean), contrast.smallest):
+            assumed = f"{quantity(effect, unit)}, {why}"
+            yield _Test(name, what, assumed, law, effect, least=least)
+
+
+def _interval(pairs: Pairs, level: float) -> Interval:
+    """Of the mean difference, as a report shows it but for its level."""
+    return mean_interval(pairs.first - pairs.second, pairs.person, level)
+
+
+def _law(pairs: Pairs, reach: float, level: float) -> Law | None:
+    return law_of(pairs.first - pairs.second, pairs.person, reach, level)
 
 
 def _plan(test: _Test) -> Plan:
-    values = test.pairs.first - test.pairs.second
-    known = len(person_means(values, test.pairs.person)[0])
+    law = test.law
 
     def chance(persons: int) -> float:
-        found = power(values, test.pairs.person, test.distance, persons, level=test.level)
+        found = law.power(test.distance, persons)
         return 2 * found - 1 if test.is_same else found
 
     wanted = POWERS if test.distance > 0 else ()
-    counts = tuple(_count(chance, share, known, test.least) for share in wanted)
-    return Plan(test.name, test.what, test.assumed, known, counts)
+    counts = tuple(_count(chance, share, law.persons, test.least) for share in wanted)
+    return Plan(test.name, test.what, test.assumed, law.persons, counts)
 
 
 def _count(chance: Callable[[int], float], wanted: float, known: int, least: int) -> Count:
@@ -176,20 +250,19 @@ def _capped(persons: float) -> float:
     return math.inf if persons > MOST_PERSONS else math.ceil(persons)
 
 
-def _pairs(study: Mapping[str, Any], runs: Table, contrast: Contrast, at: Setting) -> Pairs | None:
-    """Both sides, if at least two persons have a difference and they are not all alike."""
-    pairs = pairs_of(study, runs, contrast, at)
-    if pairs is None:
-        return None
-    means = person_means(pairs.first - pairs.second, pairs.person)[1]
-    return pairs if len(means) > 1 and np.ptp(means) > 0 else None
-
-
-def _mean(pairs: Pairs) -> float:
-    return float(person_means(pairs.first - pairs.second, pairs.person)[1].mean())
-
-
 def _sides(contrast: Contrast, at: Setting) -> str:
-    first, second = (level_name(contrast.factor, x) for x in contrast.contrast)
+    return _told(contrast.factor, contrast.contrast, contrast.measure, at)
+
+
+def _sides_of(view: View, stop: int) -> str:
+    assert view.line is not None
+    assert view.contrast is not None
+    at = dict(view.panels[0]) | view.at_stop(stop)
+    return _told(view.line.name, view.contrast, view.measure, at)
+
+
+def _told(factor: str, levels: tuple[Any, Any], measure: str, at: Setting) -> str:
+    """`A minus B in driving time, at delay 1 s`."""
+    first, second = (level_name(factor, level) for level in levels)
     where = f", {setting(at)}" if at else ""
-    return f"{first} minus {second} in {measure_name(contrast.measure)}{where}"
+    return f"{first} minus {second} in {measure_name(measure)}{where}"

@@ -1,4 +1,4 @@
-"""How precise an answer is, and how many persons it takes, as a report says it."""
+"""How many persons it takes, and which few runs weigh much, as a report says it."""
 
 from __future__ import annotations
 
@@ -9,38 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.experiments.answer import Finding, telling_stop
-from dva_sim.experiments.answer_places import place_of
+from dva_sim.experiments.answer import Finding
 from dva_sim.experiments.cells import CellTable
 from dva_sim.experiments.effects import Floats, View
 from dva_sim.experiments.labels import level_name, number, quantity
-from dva_sim.experiments.needed import MOST_PERSONS, POWERS, Count, Plan
-from dva_sim.experiments.statistics import mean_interval, needed_persons, quantile_interval
-
-
-def precision(finding: Finding, view: View, cluster: str) -> str:
-    """How wide the answer's interval is, and how many persons less would take; empty without one.
-
-    Args:
-        finding: The answer.
-        view: The runs it rests on.
-        cluster: What is drawn anew: persons, or shifts.
-    """
-    stop = telling_stop(finding)
-    if stop is None:
-        return ""
-    values, person = _differences(finding, view, stop)
-    found = mean_interval(values, person)
-    if not found.half_width > 0:
-        return ""
-    alone = " alone" if finding.over else ""
-    width = f"±{quantity(found.half_width, finding.unit)} with {found.n_persons} {cluster}s"
-    half = _count_of(needed(values, person, found.half_width / 2))
-    return (
-        f"The 95 % interval of the difference {place_of(finding, stop)}{alone} is {width}; half "
-        f"as wide would take about {half}.{_where_open(finding)} That is if more of them "
-        "spread as these do, with as many runs of each."
-    )
+from dva_sim.experiments.needed import POWERS, Count, Plan
+from dva_sim.experiments.statistics import MOST_PERSONS, quantile_interval
 
 
 def few_that_weigh(finding: Finding, view: View) -> str:
@@ -73,35 +47,6 @@ def _weight(finding: Finding, view: View, stop: int) -> str:
     )
 
 
-def needed(values: Floats, person: NDArray[Any], half_width: float) -> float:
-    """Persons for an interval of a mean; infinite if there are more than a million."""
-    try:
-        return needed_persons(values, person, half_width)
-    except ValueError:
-        return math.inf
-
-
-def _where_open(finding: Finding) -> str:
-    """What it would take wherever an effect that matters is not ruled out yet.
-
-    Counted from the band as it is, which narrows with the root of the number of persons.
-    """
-    limit = finding.smallest_effect
-    if limit is None:
-        return ""
-    holds_zero = (finding.low <= 0) & (finding.high >= 0)
-    is_open = holds_zero & (np.maximum(-finding.low, finding.high) > limit)
-    half = np.maximum(finding.high - finding.mean, finding.mean - finding.low)[is_open]
-    if not np.any(half > limit):
-        return ""
-    most = math.ceil(finding.persons * (half.max() / limit) ** 2)
-    matters = level_name(finding.measure, limit)
-    return (
-        f" Where the question stays open, about {most:,} would narrow the band to ±{matters}, "
-        "the smallest effect declared to matter."
-    )
-
-
 def _differences(finding: Finding, view: View, stop: int) -> tuple[Floats, NDArray[Any]]:
     """First minus second, run by run, and whose they are."""
     values, panel = view.values, view.panels[0]
@@ -112,13 +57,10 @@ def _differences(finding: Finding, view: View, stop: int) -> tuple[Floats, NDArr
     return (first - second).ravel(), person
 
 
-def _count_of(persons: float) -> str:
-    return f"{persons:.0f}" if math.isfinite(persons) else "more than a million"
-
-
 def plan_table(found: Sequence[Plan], cluster: str) -> CellTable:
     """A line for each plan."""
-    heads = ["to show", "true difference assumed", *(f"for {100 * p:.0f} % power" for p in POWERS)]
+    heads = ["to show", "if the true difference is"]
+    heads += [f"{cluster}s for {100 * p:.0f} % power" for p in POWERS]
     rows = [
         [f"{p.name}: {p.what}", p.assumed, *(map(_told, p.counts) if p.counts else _NEVER)]
         for p in found
@@ -135,12 +77,12 @@ def plan_lines(found: Sequence[Plan], cluster: str) -> list[str]:
     return [*lines, _assumes(found, cluster)] if found else []
 
 
-_NEVER = ["not under this assumption"] * len(POWERS)
+_NEVER = ["no number: it is not true then"] * len(POWERS)
 
 
 def _line(plan: Plan, cluster: str) -> str:
     if not plan.counts:
-        return "no number, for then it is not true"
+        return "no number of them, for it is not true then"
     needed = [
         f"{_told(count)} {cluster}s for {100 * wanted:.0f} % power"
         for count, wanted in zip(plan.counts, POWERS, strict=True)
@@ -160,8 +102,9 @@ def _assumes(found: Sequence[Plan], cluster: str) -> str:
     counts = sorted({plan.known_from for plan in found})
     known = str(counts[0]) if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
     return (
-        f"Counted by the noncentral t, as many runs of each {cluster} as here, at 5 % divided by "
-        f"the tests of a family. How much {cluster}s spread is known from {known} of them only: in "
-        "brackets, what else would fit (95 %). What was found in a pilot tends to flatter: declare "
-        "the smallest difference that matters, and register before running."
+        f"Power is the chance that a study of that size shows it. All numbers follow one law: the "
+        f"interval shown here, narrowed by more {cluster}s with as many runs of each (noncentral "
+        f"t). How much {cluster}s spread is known from {known} of them only: in brackets, what "
+        "else would fit (95 %). A difference found in a few of them is often too large: rather "
+        "count on the smallest that matters."
     )

@@ -16,14 +16,14 @@ from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from typing import Any, ParamSpec, Protocol, TypeVar
 
-from dva_sim.errors import ConfigError, DvaSimError
+from dva_sim.errors import ConfigError, RunsFailed
 
 P = ParamSpec("P")
 R = TypeVar("R")
 _FAMILY = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
 
 
-class PlaceLost(DvaSimError):
+class PlaceLost(RunsFailed):
     """Nobody is left to run anything; what has been run is kept."""
 
 

@@ -102,7 +102,7 @@ def register(study: Study, again: bool = False) -> str:
         question=study.question,
         made_with=f"{__version__} {fingerprint()}",
         judged_with=fingerprint_of_judges(),
-        full=study.is_full,
+        full=study.version == "full",
         earlier=(*found.earlier, found.hash) if found is not None else (),
         plan=plan_of(study),
     )

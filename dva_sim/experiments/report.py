@@ -11,10 +11,10 @@ from dva_sim.errors import DvaSimError
 from dva_sim.experiments.blocks import Block
 from dva_sim.experiments.dispatch import figures as dispatch_figures
 from dva_sim.experiments.figures import Drawn, draw_all
-from dva_sim.experiments.results import Results
 from dva_sim.experiments.sections import blocks_of
 from dva_sim.experiments.summary import Reading
 from dva_sim.experiments.transports import figures as transport_figures
+from dva_sim.experiments.unfinished import load_so_far
 
 if TYPE_CHECKING:
     import jinja2
@@ -25,6 +25,8 @@ PAGE, PAPER, FIGURES = "report.html", "report.pdf", "figures"
 def write_report(folder: Path, pdf: bool = False) -> Path:
     """Make `report.html` and `figures/` from what lies in a results folder.
 
+    Of a study that is not finished, the page says what is known so far.
+
     Args:
         folder: Of the results.
         pdf: Make `report.pdf` too. One that is there already is made again in any case, so that
@@ -34,7 +36,7 @@ def write_report(folder: Path, pdf: bool = False) -> Path:
         ConfigError: the folder holds no results.
         DvaSimError: the disk is full or refuses to be written.
     """
-    reading = Reading(Results.load(folder))
+    reading = Reading(load_so_far(folder))
     drawn = _draw(reading)
     blocks = blocks_of(reading, drawn)
     question = str(reading.study.get("question", "A study without a question"))

@@ -47,11 +47,14 @@ class Results:
 
     Attributes:
         folder: Where it lies.
-        manifest: The study as resolved, its base scenarios, `--set` list, versions, failures.
+        manifest: The study as resolved, its base scenarios, `--set` list, versions, failures;
+            `partial` where the study is not finished.
+        aside: Where its tables lie for now, if the study is not finished.
     """
 
     folder: Path
     manifest: dict[str, Any]
+    aside: Path | None = None
 
     @classmethod
     def load(cls, folder: str | Path) -> Results:
@@ -99,6 +102,18 @@ class Results:
         return self.reading.answer
 
     @property
+    def partial(self) -> str:
+        """How much of an unfinished study is there; nothing where it is complete."""
+        found = self.manifest.get("partial")
+        if found is None:
+            return ""
+        persons = self.study["persons"]
+        return (
+            f"Partial: {found['done']} of {found['of']} runs are done. What follows rests on the "
+            f"{found['persons']} of {persons} persons who have all of theirs, and will change."
+        )
+
+    @property
     def machine(self) -> dict[str, Any]:
         """Times, costs and machine; nothing where they have not come along."""
         try:
@@ -115,7 +130,7 @@ class Results:
     @property
     def tables(self) -> list[str]:
         """Names of the tables."""
-        return sorted(path.stem for path in (self.folder / TABLES).glob("*.parquet"))
+        return sorted(path.stem for path in self._tables.glob("*.parquet"))
 
     def has(self, name: str) -> bool:
         """Whether the study wrote a table of that name."""
@@ -160,7 +175,7 @@ class Results:
         if not self.has(table):
             there = ", ".join(self.tables) or "none"
             raise ConfigError(f"{self.folder} has no table {table!r}; tables: {there}")
-        path = self.folder / TABLES / f"{table}.parquet"
+        path = self._tables / f"{table}.parquet"
         expected = self.manifest.get("tables", {}).get(table)
         if expected is not None and table not in self._seen:
             if digest_of(path) != expected:
@@ -210,6 +225,10 @@ class Results:
             raise ConfigError(f"cannot be read: {str(error).splitlines()[0]}", file) from None
         return Frame({key: without_mask(column) for key, column in found.items()})
 
+    @property
+    def _tables(self) -> Path:
+        return (self.aside or self.folder) / TABLES
+
     @cached_property
     def _seen(self) -> set[str]:
         """Tables that were found as written."""
@@ -234,6 +253,6 @@ def _not_results(folder: Path) -> str:
     if (folder / JOURNAL).exists():
         return (
             f"{folder} holds a study that is not finished; the command that began it goes on "
-            "from there, and with --dry-run it tells what is done"
+            "from there, and 'dva-sim show' and 'report' tell what is known so far"
         )
     return f"{folder} holds no finished results: it has no {MANIFEST}; finish the study first"

@@ -67,6 +67,7 @@ def run_study(
     with ExitStack() as stack:
         place = stack.enter_context(_place(jobs, scheduler))
         journal = stack.enter_context(_opened(out, manifest["hash"]))
+        journal.describe(manifest)
         session = _Session(todo, journal, place, episode or _simulation(), progress, limit_s)
         with session.told():
             carried_out, stopped = _run_rounds(study, todo, session)
@@ -120,9 +121,13 @@ class _Session:
         self._tell(self._count, self._total)
 
     def left(self, batch: Sequence[Job]) -> list[Job]:
-        """What is not done yet, each run once."""
+        """What is not done yet, each run once, person by person.
+
+        So what is known on the way is known of whole persons, in all cells.
+        """
         done = self.journal.done()
-        return [job for key, job in {job.key: job for job in batch}.items() if key not in done]
+        rest = [job for key, job in {job.key: job for job in batch}.items() if key not in done]
+        return sorted(rest, key=lambda job: (job.person, job.trial))
 
     def run(self, rest: Sequence[Job]) -> None:
         """Run some; what comes together is in the journal before it is counted."""

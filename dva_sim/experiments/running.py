@@ -14,32 +14,15 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn
 
-from dva_sim.experiments.console import console, say
+from dva_sim.exit_codes import ExitCode
+from dva_sim.experiments.console import console, say, warn
 from dva_sim.experiments.planning import DryRun, dry_run
 from dva_sim.experiments.results import Results
 from dva_sim.experiments.study import Study, load_study
+from dva_sim.experiments.versions import Variant
 
-INTERRUPTED = 130  # exit code of a program ended by Ctrl-C
 _LINE_S = 30.0  # between two lines of progress in a file
 _MINUTE_S, _HOUR_S = 60, 3600
-
-
-@dataclass(frozen=True)
-class Version:
-    """Which version of a study is meant.
-
-    Attributes:
-        full: The larger one.
-        pilot: Only so many persons.
-    """
-
-    full: bool = False
-    pilot: int | None = None
-
-    def folder(self, name: str) -> Path:
-        """Where results go if nobody says: each version has its own folder."""
-        marks = ["-full"] * self.full + ["-pilot"] * (self.pilot is not None)
-        return Path("results") / "".join([Path(name).stem, *marks])
 
 
 @dataclass(frozen=True)
@@ -57,13 +40,15 @@ class Workers:
     limit_s: float = 600.0
 
 
-def run(name: str, pairs: list[str], out: Path | None, workers: Workers, version: Version) -> int:
+def run(
+    name: str, pairs: list[str], out: Path | None, workers: Workers, variant: Variant
+) -> ExitCode:
     """Run a study and show how far it is, then write its report; the exit code."""
     from dva_sim.experiments.report import write_report
     from dva_sim.experiments.runner import run_study
 
     try:
-        study, folder = _loaded(name, pairs, out, version)
+        study, folder = _loaded(name, pairs, out, variant)
         before = _planned(study, folder, workers, tries=False)
         with _shown("running", before.runs) as show:
             run_study(
@@ -74,13 +59,14 @@ def run(name: str, pairs: list[str], out: Path | None, workers: Workers, version
                 progress=show,
                 limit_s=workers.limit_s,
             )
-        failures = _told_failures(Results.load(folder)) + _recorded(study, folder, workers)
+        results = Results.load(folder)
+        failures = _told_failures(results) + _recorded(study, folder, workers)
         with console.status("Writing the report ..."):
             report = write_report(folder)
     except KeyboardInterrupt as stopped:
         return _stopped(stopped)
     say(f"Report: {report}")
-    return 1 if failures else 0
+    return ExitCode.RUNS_FAILED if failures else ExitCode.OK
 
 
 def folder_of_tuning(name: str) -> Path:
@@ -88,7 +74,7 @@ def folder_of_tuning(name: str) -> Path:
     return Path("results") / f"{Path(name).stem}-tuning"
 
 
-def tune(name: str, out: Path | None, jobs: int | None) -> int:
+def tune(name: str, out: Path | None, jobs: int | None) -> ExitCode:
     """Choose what a study has tuned, and write it beside the study; the exit code."""
     from dva_sim.experiments.tuned import save_tuned
     from dva_sim.experiments.tuning import tune as try_all
@@ -109,26 +95,27 @@ def tune(name: str, out: Path | None, jobs: int | None) -> int:
         when = ", ".join(f"{name} {level}" for name, level in choice.when.items())
         say(f"{when}: {tuned.tuning.key} {choice.value:g}")
     say(f"Kept in {save_tuned(study, tuned)}")
-    return 0
+    return ExitCode.OK
 
 
-def plan(name: str, pairs: list[str], out: Path | None, workers: Workers, version: Version) -> None:
+def plan(name: str, pairs: list[str], out: Path | None, workers: Workers, variant: Variant) -> None:
     """Say what `run` would do."""
-    study, folder = _loaded(name, pairs, out, version)
+    study, folder = _loaded(name, pairs, out, variant)
     _planned(study, folder, workers, tries=True)
 
 
-def _loaded(name: str, pairs: list[str], out: Path | None, version: Version) -> tuple[Study, Path]:
-    study = load_study(name, pairs, full=version.full, pilot=version.pilot)
+def _loaded(name: str, pairs: list[str], out: Path | None, variant: Variant) -> tuple[Study, Path]:
+    study = load_study(name, pairs, version=variant.version, pilot=variant.pilot)
     say(f"[bold]{escape(study.question)}[/bold]")
-    return study, out if out is not None else version.folder(name)
+    return study, out if out is not None else variant.folder(name)
 
 
 def _planned(study: Study, folder: Path, workers: Workers, tries: bool) -> DryRun:
     """Say what will run, and find mistakes before the first run."""
-    from dva_sim.experiments.episode import rehearse_all, run_job
+    from dva_sim.experiments.episode import contradictions_in, rehearse_all, run_job
 
     rehearse_all(study)
+    warn(contradictions_in(study))
     jobs = workers.jobs if workers.scheduler is None else 1  # who knows how many are free there
     found = dry_run(study, folder, jobs=jobs, probe=run_job if tries else None)
     if found.remark:
@@ -192,11 +179,11 @@ def _recorded(study: Study, folder: Path, workers: Workers) -> int:
     return len(problems)
 
 
-def _stopped(how: KeyboardInterrupt) -> int:
+def _stopped(how: KeyboardInterrupt) -> ExitCode:
     """Say what was done, and the command that goes on."""
     say(f"Stopped: {how}" if str(how) else "Stopped.")
     say(f"To go on: {escape(shlex.join(['dva-sim', *sys.argv[1:]]))}")
-    return INTERRUPTED
+    return ExitCode.INTERRUPTED
 
 
 # --- progress --------------------------------------------------------------------------

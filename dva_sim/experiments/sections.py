@@ -76,6 +76,8 @@ def blocks_of(reading: Reading, drawn: Sequence[Drawn]) -> list[Block]:
 
 def _status(reading: Reading) -> Iterator[Block]:
     status = status_of(reading.manifest)
+    if reading.results.partial:
+        yield Words(reading.results.partial, "warning")
     yield Words(_KINDS[status.kind], "label")
     for why in status.why:
         yield Words(f"{why[:1].upper()}{why[1:]}.", "note")

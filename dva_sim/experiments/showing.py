@@ -23,6 +23,8 @@ _ENDS = {"enough": "its interval is narrow enough", "budget": "its time is spent
 def show(results: Results, console: Console) -> None:
     """Question, status, answer, warnings, every cell, and where it comes from."""
     console.print(f"[bold]{escape(results.question)}[/bold]", soft_wrap=True)
+    if results.partial:
+        console.print(f"[bold yellow]{escape(results.partial)}[/]", soft_wrap=True)
     for line in _facts(results):
         console.print(escape(line), soft_wrap=True)
     console.print()

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from rich.console import Console
 
+from dva_sim.exit_codes import ExitCode
 from dva_sim.experiments import showing
 from dva_sim.experiments.results import Results
 
@@ -35,8 +36,8 @@ def export(
 
 def compare(
     first: Path, second: Path, measures: Sequence[str], by: Sequence[str], fail_if: Sequence[str]
-) -> int:
-    """Compare two results folders; the exit code: 1 if a condition holds."""
+) -> ExitCode:
+    """Compare two results folders; how it ended, by whether a condition holds."""
     from dva_sim.experiments.comparing import Comparison
     from dva_sim.experiments.comparing_conditions import parse
     from dva_sim.experiments.comparing_gates import judge
@@ -46,4 +47,4 @@ def compare(
     comparison = Comparison(Results.load(first), Results.load(second))
     verdicts = [verdict for gate in gates for verdict in judge(gate, comparison)]
     tell(comparison, measures, by, console)
-    return 1 if tell_verdicts(verdicts, console) else 0
+    return ExitCode.GATE_FAILED if tell_verdicts(verdicts, console) else ExitCode.OK

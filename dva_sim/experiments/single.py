@@ -14,6 +14,7 @@ from dva_sim.experiments.dictionary import describe
 from dva_sim.experiments.frames import Frame, frame_of, plain
 from dva_sim.experiments.models import AnyScenario, model_of, tables_of
 from dva_sim.experiments.settings import Settings, pairs_of
+from dva_sim.scenario import Scenario, contradictions
 
 if TYPE_CHECKING:
     from dva_sim.experiments.pictures import Wanted
@@ -32,6 +33,11 @@ class Episode:
     scenario: AnyScenario
     seed: int
     tables: dict[str, Frame]
+
+    @property
+    def warnings(self) -> list[str]:
+        """What in the scenario does not go together, each in a sentence."""
+        return contradictions(self.scenario) if isinstance(self.scenario, Scenario) else []
 
     @property
     def measures(self) -> dict[str, Any]:

@@ -33,6 +33,7 @@ from dva_sim.experiments.designs import Design, Row, all_factors
 from dva_sim.experiments.designs_table import ROWS, read_table
 from dva_sim.experiments.overrides import Changed, change
 from dva_sim.experiments.status import Status
+from dva_sim.experiments.versions import SIZES, VERSIONS, Version
 from dva_sim.streams import derive_seed
 
 FOLDER = "experiments"
@@ -59,6 +60,7 @@ class Study(Config):
         stop: When enough persons were simulated.
         budget_s: Time by the clock [s] after which no further persons are begun.
         record: Which episodes are kept as recordings.
+        quick: Keys that are otherwise in the small version, which `--quick` runs.
         full: Keys that are otherwise in the larger version, which `--full` runs.
     """
 
@@ -79,6 +81,7 @@ class Study(Config):
     stop: Stop | None = None
     budget_s: Annotated[float, Field(gt=0)] | None = None
     record: Literal["all", "worst", "sample"] | None = None
+    quick: Changes = Field(default_factory=dict)
     full: Changes = Field(default_factory=dict)
 
     _document: Document = PrivateAttr(default_factory=lambda: Document({}, Path()))
@@ -86,7 +89,7 @@ class Study(Config):
     _changes: Changes = PrivateAttr(default_factory=dict)
     _settings: tuple[str, ...] = PrivateAttr(default=())
     _pilot: int | None = PrivateAttr(default=None)
-    _is_full: bool = PrivateAttr(default=False)
+    _version: Version | None = PrivateAttr(default=None)
     _status: Status = PrivateAttr(default_factory=Status)
 
     @field_validator("factors")
@@ -138,7 +141,7 @@ class Study(Config):
 
     def asked(self) -> dict[str, Any]:
         """All keys that say what is run and how it is read, as JSON would hold them."""
-        return self.model_dump(mode="json", exclude={"record", "full"})
+        return self.model_dump(mode="json", exclude={"record", *VERSIONS})
 
     @property
     def file(self) -> Path:
@@ -166,9 +169,14 @@ class Study(Config):
         return self._pilot
 
     @property
-    def is_full(self) -> bool:
-        """Whether it is the larger version."""
-        return self._is_full
+    def version(self) -> Version | None:
+        """Which of its versions it is; None where it is as its file says."""
+        return self._version
+
+    @property
+    def versions(self) -> list[Version]:
+        """The versions that its file has beside the one that it describes."""
+        return [version for version in VERSIONS if getattr(self, version)]
 
     @property
     def status(self) -> Status:
@@ -194,7 +202,7 @@ def load_study(
     name: str | Path,
     settings: Iterable[str] = (),
     *,
-    full: bool = False,
+    version: Version | None = None,
     pilot: int | None = None,
 ) -> Study:
     """Read a study by name or path.
@@ -204,8 +212,8 @@ def load_study(
         settings: `key=value` pairs. A key of the study (`seed=2`, `factors.pattern=[req-rep]`)
             changes the study. Any other key is one of the scenario and holds in every part; if
             it is a factor, its value or list of values takes the place of the factor's levels.
-        full: The larger version, by the study's key `full`.
-        pilot: Only so many persons, with luck that the study itself never meets.
+        version: The small or the larger version, by the study's key `quick` or `full`.
+        pilot: Only so many persons, with random seeds that the study itself never uses.
 
     Raises:
         ConfigError: not found, not valid, or changes that make no sense.
@@ -213,40 +221,51 @@ def load_study(
     from dva_sim.experiments.registration import settled  # it knows cells, which studies make
 
     document = load_yaml(resources.find(str(name), FOLDER))
-    study, data = _version(document, full)
+    study, data = _in_version(document, version)
     if settings := tuple(settings):
         study = _with_settings(data, document, settings)
-    study._is_full = full
+    study._version = version
     if pilot is not None:
         study = _piloted(study, pilot)
     return settled(study)
 
 
-def _version(document: Document, full: bool) -> tuple[Study, Changed]:
-    """The study as its file says, or its larger version; both are judged."""
+def _in_version(document: Document, version: Version | None) -> tuple[Study, Changed]:
+    """The study as its file says, or one of its versions; all of them are judged."""
     written = Changed(document.data, {}, ())
     study = _built(written, document)
-    if not study.full:
-        if full:
-            raise document.error("has no larger version: no key 'full'")
+    made = {name: _version_of(study, written, document, name) for name in study.versions}
+    if version is None:
         return study, written
+    if version not in made:
+        raise document.error(f"has no {SIZES[version]} version: no key {version!r}")
+    return made[version]
+
+
+def _version_of(
+    study: Study, written: Changed, document: Document, version: Version
+) -> tuple[Study, Changed]:
+    """A version, and its keys; claims about what the small version leaves out are left out."""
     try:
-        data = change(written, study.full, Study)
-        larger = _built(data, document)
+        data = change(written, getattr(study, version), Study)
+        made = _built(data, document, may_lose=version == "quick")
+        if made.answer is None and study.answer is not None:
+            _built(data, document)  # which tells why it cannot be answered
+        return made, data
     except ConfigError as error:
-        raise _told_in_full(study, error) from None
-    return (larger, data) if full else (study, written)
+        raise _told_in(study, version, error) from None
 
 
-def _told_in_full(study: Study, error: ConfigError) -> ConfigError:
-    """A mistake of the larger version, at the key that it names."""
+def _told_in(study: Study, version: Version, error: ConfigError) -> ConfigError:
+    """A mistake of a version, at the key that it names."""
     named = [
         key
-        for key in study.full
+        for key in getattr(study, version)
         if key.rpartition(".")[2] in error.problem
         or any(repr(step) in error.problem for step in key.split("."))
     ]
-    return study.error(f"in the larger version: {error.problem}", ("full", *named[:1]))
+    problem = f"in the {SIZES[version]} version: {error.problem}"
+    return study.error(problem, (version, *named[:1]))
 
 
 def _with_settings(data: Changed, document: Document, settings: tuple[str, ...]) -> Study:

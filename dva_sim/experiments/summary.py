@@ -20,7 +20,7 @@ from dva_sim.experiments.effects import Part, Table, View, as_floats
 from dva_sim.experiments.endings import Endings, horizon_of, with_endings
 from dva_sim.experiments.episodes_kept import Episode, Tables, typical_and_worst
 from dva_sim.experiments.needed import Plan, plans
-from dva_sim.experiments.needed_told import few_that_weigh, precision
+from dva_sim.experiments.needed_told import few_that_weigh
 from dva_sim.experiments.reading import (
     finding_of,
     layout_of,
@@ -179,22 +179,19 @@ class Reading:
         if self.view is None:
             return Answer("No run was completed, so there is nothing to answer with.")
         if self.shifts is not None:
-            return self._with_precision(dispatch_page.answer_of(self.finding, self.shifts))
+            return self._weighed(dispatch_page.answer_of(self.finding, self.shifts))
         if self.finding is not None:
-            return self._with_precision(answer(self.finding))
+            return self._weighed(answer(self.finding))
         return Answer(
             "The contrast that would answer the question was not declared or not run; "
             "the figures and the table show what was."
         )
 
-    def _with_precision(self, found: Answer) -> Answer:
+    def _weighed(self, found: Answer) -> Answer:
         if self.finding is None or self.view is None:
             return found
-        told = [
-            few_that_weigh(self.finding, self.view),
-            precision(self.finding, self.view, self.cluster),
-        ]
-        return replace(found, notes=[*found.notes, *filter(None, told)])
+        told = few_that_weigh(self.finding, self.view)
+        return replace(found, notes=[*found.notes, *([told] if told else [])])
 
     @cached_property
     def judgement(self) -> Judgement:
@@ -203,10 +200,18 @@ class Reading:
 
     @cached_property
     def plans(self) -> list[Plan]:
-        """What a study would need, counted from an exploratory one: others have been planned."""
-        if not self.runs or status_of(self.manifest).kind != "exploratory":
+        """What a study would need: of an exploratory one for all, else for what stayed open."""
+        if not self.runs:
             return []
-        return plans(self.study, self.runs)
+        explores = status_of(self.manifest).kind == "exploratory"
+        return plans(self.study, self.runs, () if explores else self._decided)
+
+    @property
+    def _decided(self) -> set[str]:
+        """Hypotheses and comparisons that need no more persons."""
+        tested, compared = self.judgement.tested, self.judgement.compared
+        shown = {c.name for c in compared if c.adjusted <= 1 - statistics.LEVEL}
+        return {t.name for t in tested if t.verdict != "open"} | shown
 
     @cached_property
     def cells(self) -> list[CellTable]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections import defaultdict
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from dva_sim.errors import DvaSimError
 from dva_sim.experiments.asking import REPEATS
-from dva_sim.experiments.design import Job
+from dva_sim.experiments.design import Run
 from dva_sim.experiments.journal import Journal, Value
 from dva_sim.experiments.results import TABLES
 
@@ -26,7 +26,7 @@ _BATCH_ROWS = 20_000
 Row = dict[str, Value]
 
 
-def write_tables(folder: Path, jobs: list[Job], journal: Journal) -> None:
+def write_tables(folder: Path, jobs: Sequence[Run], journal: Journal) -> None:
     """Write `tables/<name>.parquet` for every table that some run filled.
 
     Rows are in the order of `jobs`: part, cell, person, trial. The runs of repeats make a table
@@ -62,7 +62,7 @@ def write_tables(folder: Path, jobs: list[Job], journal: Journal) -> None:
         ) from None
 
 
-def design_row(job: Job) -> Row:
+def design_row(job: Run) -> Row:
     """The columns that say which run it was; a reference run has no levels."""
     return {
         "part": job.part,
@@ -76,14 +76,14 @@ def design_row(job: Job) -> Row:
     }
 
 
-def _rows(jobs: Iterable[Job], journal: Journal, table: str) -> Iterator[Row]:
+def _rows(jobs: Iterable[Run], journal: Journal, table: str) -> Iterator[Row]:
     for job in jobs:
         design = design_row(job)
         for row in (journal.tables(job.key) or {}).get(table, ()):
             yield design | row
 
 
-def _columns(jobs: Iterable[Job], journal: Journal) -> dict[str, dict[str, str]]:
+def _columns(jobs: Iterable[Run], journal: Journal) -> dict[str, dict[str, str]]:
     """The SQL type of every column of every table, in the order first met."""
     factors = dict.fromkeys(factor for job in jobs for factor, _ in job.cell)
     order = ("part", "cell", "config", *factors, "is_reference", "person", "trial", "seed")

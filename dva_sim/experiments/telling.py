@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rich.console import Console
@@ -10,6 +10,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from dva_sim.experiments.models import Tables
+from dva_sim.experiments.verdicts import story
 from dva_sim.simulation import Playback
 
 STYLES = {"safety": "bold red", "mode": "dim", "order": "cyan", "drive": "cyan", "link": "yellow"}
@@ -29,6 +30,13 @@ def tell_story(playback: Playback, console: Console) -> None:
         style = STYLES.get(moment.kind, "")
         table.add_row(f"{moment.time:7.1f} s", moment.who, escape(moment.what), style=style)
     console.print(table)
+
+
+def tell_side_by_side(runs: Sequence[Playback], console: Console) -> None:
+    """How runs under several patterns ended, beside each other."""
+    console.rule("side by side")
+    for line in story(runs):
+        console.print(line, soft_wrap=True)
 
 
 def tell_outcome(tables: Tables, how: str, console: Console) -> None:

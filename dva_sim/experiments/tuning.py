@@ -9,7 +9,7 @@ from typing import Any
 
 from dva_sim import __version__
 from dva_sim.config import validate
-from dva_sim.errors import ConfigError, DvaSimError
+from dva_sim.errors import ConfigError, RunsFailed
 from dva_sim.experiments.asking import Level, Levels, Tuning
 from dva_sim.experiments.cells import CellTable
 from dva_sim.experiments.design import basis_of_tuning, refuse_unknown_measures
@@ -90,7 +90,7 @@ def tune(
 
     Raises:
         ConfigError: the study tunes nothing, or asks for a measure that there is none of.
-        DvaSimError: runs failed, so that values would be judged by different persons.
+        RunsFailed: some did, so that values would be judged by different persons.
     """
     rule, trials = _rule_of(study), tuning_study(study)
     refuse_unknown_measures(study)
@@ -98,7 +98,7 @@ def tune(
     results = Results.load(out)
     if results.failures:
         error = str(results.failures[0]["error"])
-        raise DvaSimError(f"{len(results.failures)} runs failed, so nothing is chosen: {error}")
+        raise RunsFailed(f"{len(results.failures)} runs failed, so nothing is chosen: {error}")
     factors = [Factor(name, levels) for name, levels in trials.factors.items()]
     part = Part(results.table("runs"), rule.part, factors)
     if not part.has(rule.measure):

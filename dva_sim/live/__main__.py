@@ -6,7 +6,7 @@ import json
 import sys
 from pathlib import Path
 
-from dva_sim.errors import DvaSimError
+from dva_sim.errors import DvaSimError, error_line
 from dva_sim.live.options import PATHS, Options
 from dva_sim.live.process import Teller, run_part
 
@@ -28,8 +28,8 @@ def main(argument: str) -> int:
             supervised=True,
         )
     except DvaSimError as error:
-        print(f"dva-sim: {error}", file=sys.stderr)
-        return 2
+        print(error_line(error), file=sys.stderr)
+        return error.exit_code
     return 0
 
 

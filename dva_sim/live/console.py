@@ -16,6 +16,7 @@ from dva_sim.live.options import Options
 from dva_sim.live.process import Report, run_part
 from dva_sim.live.supervisor import Summary, Supervisor
 from dva_sim.network.sockets import DEFAULT_PORT
+from dva_sim.scenario import contradictions
 
 STORY_LINES = 12
 DEFAULT_DVA = f"127.0.0.1:{DEFAULT_PORT}"  # of a part that is run alone and told no other
@@ -105,6 +106,7 @@ def run_all(options: Options) -> None:
         DvaSimError: the scenario cannot be run, or a part failed.
     """
     console, board = _console(), Board()
+    warn(console, options)
     if not console.is_terminal:
         supervisor = Supervisor(options, lambda _, report: _print_story(console, board, report))
         _conclude(console, board, supervisor.run())
@@ -119,6 +121,12 @@ def run_all(options: Options) -> None:
     for line in board.story:
         _print(console, story_line(line))
     _conclude(console, board, summary)
+
+
+def warn(console: Console, options: Options) -> None:
+    """Say what does not go together, before anything starts."""
+    for told in contradictions(options.read(), live=True):
+        _print(console, f"warning: {told}")
 
 
 def _print(console: Console, line: str) -> None:
@@ -137,6 +145,7 @@ def run_one(part: str, options: Options, number: int) -> None:
         DvaSimError: the scenario, the keys or the ports are not as they should be.
     """
     console, board = _console(), Board()
+    warn(console, options)
     if options.dva is None and (part != "dva" or not options.port):
         options = replace(options, dva=DEFAULT_DVA)
     with Live(console=console, refresh_per_second=4, transient=True) as screen:

@@ -14,7 +14,8 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import IO
 
-from dva_sim.errors import DvaSimError
+from dva_sim.errors import ERROR, DvaSimError, RunsFailed
+from dva_sim.exit_codes import ExitCode
 from dva_sim.live.options import PATHS, Options
 from dva_sim.live.process import Report
 from dva_sim.scenario import Scenario
@@ -25,7 +26,7 @@ SETTLED_FOR = 3.0  # all parts settled for so long: the run is over [s]
 LOOK = 0.5  # between looks at whether all parts are still there [s]
 
 
-class PartFailed(DvaSimError):
+class PartFailed(RunsFailed):
     """A part ended before it was asked to."""
 
 
@@ -162,6 +163,7 @@ class Supervisor:
 
         Raises:
             PartFailed: one of them is gone.
+            DvaSimError: what one of them was given is not as it should be.
         """
         self._read(LOOK)
         for child in self._children:
@@ -169,8 +171,9 @@ class Supervisor:
             if code is not None and code != 0 and not self._interrupted:
                 self._read(0.0)
                 said = child.errors.decode(errors="replace").strip().splitlines()
-                why = said[-1].removeprefix("dva-sim: ") if said else f"exit code {code}"
-                raise PartFailed(f"{child.name} has ended by itself: {why}")
+                why = said[-1].removeprefix(ERROR) if said else f"exit code {code}"
+                kind = DvaSimError if code == ExitCode.MISTAKE else PartFailed
+                raise kind(f"{child.name} has ended by itself: {why}")
             if code is None and time.monotonic() - child.heard > SPEAK_WITHIN:
                 raise PartFailed(f"{child.name} has said nothing for {SPEAK_WITHIN:g} s")
 

@@ -19,7 +19,7 @@ from dva_sim.recordings import bodies, messages, sites, story
 from dva_sim.recordings.messages import XML
 from dva_sim.recordings.writing import ABOUT, DIGEST, FORMAT, RUN, SCENARIO, SITE, TABLES, digest
 from dva_sim.scenario import Scenario
-from dva_sim.simulation import Playback
+from dva_sim.simulation import Ending, Playback
 from dva_sim.simulation.incidents import Incident
 from dva_sim.worlds.hazards import Surroundings
 from dva_sim.worlds.hazards.making import KINDS
@@ -182,6 +182,7 @@ def _opened(raw: _Raw) -> Opened:
         radii=run["radii_m"],
         duration=raw.time if raw.is_cut else run["duration_s"],
         contained=contained,
+        endings=[] if raw.is_cut else [_ending(entry) for entry in run.get("endings", [])],
     )
     tables = _tables(raw.files[TABLES]) if TABLES in raw.files else None
     return Opened(playback, raw.about or {}, tables, run["duration_s"])
@@ -202,6 +203,10 @@ def _incident(entry: Mapping[str, Any]) -> Incident:
     return Incident(
         entry["kind"], entry["room"], entry["start_s"], detected, None, hazard, entry["false_alarm"]
     )
+
+
+def _ending(entry: Mapping[str, Any]) -> Ending:
+    return Ending(entry["outcome"], inf if entry["time_s"] is None else entry["time_s"])
 
 
 def _surroundings(

@@ -194,6 +194,10 @@ def facts(playback: Playback) -> dict[str, Any]:
         "radii_m": playback.radii,
         "incidents": [_incident(incident) for incident in playback.incidents],
         "contained_s": {str(number): time for number, time in playback.contained.items()},
+        "endings": [
+            {"outcome": ending.outcome, "time_s": messages.finite(ending.time)}
+            for ending in playback.endings
+        ],
         "drives": [
             {
                 "robot": drive.robot,

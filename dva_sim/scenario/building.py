@@ -10,6 +10,7 @@ from dva_sim import config, resources
 from dva_sim.config import Document, Fail, load_yaml
 from dva_sim.errors import ConfigError
 from dva_sim.scenario.names import check_names, check_phone, locate_files
+from dva_sim.scenario.patience import command_timeout_s, request_timeout_s
 from dva_sim.scenario.profiles import phone_profile, robot_profiles, site_of
 from dva_sim.scenario.scenario import Scenario
 from dva_sim.worlds.site import load_site
@@ -51,7 +52,13 @@ def _complete(scenario: Scenario, error: Fail) -> Scenario:
     if scenario.robot.processing_s is None and len(processing) == 1:
         robot = scenario.robot.model_copy(update={"processing_s": processing.pop()})
         scenario = scenario.model_copy(update={"robot": robot})
-    return scenario
+    waits = {"request": request_timeout_s(scenario), "command": command_timeout_s(scenario)}
+    return scenario.model_copy(
+        update={
+            key: getattr(scenario, key).model_copy(update={"timeout_s": timeout})
+            for key, timeout in waits.items()
+        }
+    )
 
 
 def _check_options(scenario: Scenario, error: Fail) -> None:

@@ -134,13 +134,14 @@ class CommandConfig(Config):
     """How commands are sent, the same for every pattern.
 
     Attributes:
-        timeout_s: Of a command that is to be answered.
+        timeout_s: Of a command that is to be answered; left out: 9 s, or as much longer as the
+            link's round trip needs.
         attempts: How often it is sent before the link counts as lost.
         window: How many requests may be unanswered at once under `pipelined`.
     """
 
     rate_hz: Annotated[float, Field(gt=0, le=100)] = 10.0
-    timeout_s: Annotated[float, Field(gt=0, le=120)] = 9.0
+    timeout_s: Annotated[float, Field(gt=0, le=120)] | None = None
     attempts: Annotated[int, Field(ge=1, le=10)] = 3
     window: Annotated[int, Field(ge=2, le=1000)] = 8
 
@@ -150,9 +151,13 @@ class RequestConfig(Config):
 
     A time-out below four round trips is never met over a new connection, which needs three
     before the request leaves: nothing would ever be answered.
+
+    Attributes:
+        timeout_s: Of a request; left out: 9 s, or as much longer as the link's round trip needs.
+        attempts: How often it is sent before the link counts as lost.
     """
 
-    timeout_s: Annotated[float, Field(gt=0, le=120)] = 9.0
+    timeout_s: Annotated[float, Field(gt=0, le=120)] | None = None
     attempts: Annotated[int, Field(ge=1, le=10)] = 3
 
 

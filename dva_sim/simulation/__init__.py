@@ -1,6 +1,6 @@
 """From a scenario and a seed to what happened."""
 
-from dva_sim.simulation.recording import Playback, Recording
+from dva_sim.simulation.recording import Ending, Playback, Recording
 from dva_sim.simulation.run import rehearse, simulate
 
-__all__ = ["Playback", "Recording", "rehearse", "simulate"]
+__all__ = ["Ending", "Playback", "Recording", "rehearse", "simulate"]

@@ -28,7 +28,13 @@ from dva_sim.core.service import Desk
 from dva_sim.core.sessions import Sessions
 from dva_sim.errors import ConfigError
 from dva_sim.protocol import messages as m
-from dva_sim.scenario import Scenario, guard_profile, phone_profile, population
+from dva_sim.scenario import (
+    Scenario,
+    command_timeout_s,
+    guard_profile,
+    phone_profile,
+    population,
+)
 from dva_sim.simulation.dva import DvaAgent
 from dva_sim.simulation.names import DVA
 from dva_sim.simulation.stage import Stage, middle_of
@@ -177,7 +183,7 @@ def add_operator(
     setup = OperatorSetup(
         scenario.window,
         command.rate_hz,
-        command.timeout_s,
+        command_timeout_s(scenario),
         command.attempts,
         truth=truth if needs_truth else None,
         guarded=scenario.control == "coordinated",

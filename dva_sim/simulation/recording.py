@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from dva_sim.agents.robot import RobotAgent
-from dva_sim.core.events import Event
+from dva_sim.core.events import Event, State
 from dva_sim.network.link import Link
 from dva_sim.recorder import Recorder
 from dva_sim.scenario import Scenario
@@ -43,6 +43,19 @@ class PersonLog(NamedTuple):
     out: float = math.inf
 
 
+class Ending(NamedTuple):
+    """What became of an incident, as far as the DVA knows.
+
+    Attributes:
+        outcome: `confirmed`, `refuted`, `escalated` or `expired`; `open` if none of them came
+            before the run ended, and `undetected` if nobody reported it.
+        time: When [s]; infinite if it is open or undetected.
+    """
+
+    outcome: str
+    time: float
+
+
 @dataclass(kw_only=True)
 class Playback:
     """What can be told and shown of a run, with or without what ran.
@@ -55,6 +68,8 @@ class Playback:
         radii: Of the robots, seen from above, by id [m].
         duration: How long the run lasted [s].
         contained: When incidents were dealt with [s], by their place in `incidents`.
+        endings: What became of each incident, in the order of `incidents`; empty if that is not
+            known, as of a recording that was cut short.
     """
 
     scenario: Scenario
@@ -67,6 +82,7 @@ class Playback:
     radii: dict[str, float]
     duration: float
     contained: dict[int, float] = field(default_factory=dict)
+    endings: list[Ending] = field(default_factory=list)
 
     def robot_named(self, label: str) -> str | None:
         """The id of a robot, if there is one of that name."""
@@ -94,6 +110,17 @@ class Recording(Playback):
     def event_of(self, number: int) -> Event | None:
         """The DVA's event about incident `number`, if it knows of it."""
         return event_about(self.incidents[number], self.events, self.site)
+
+
+def ending_of(event: Event | None) -> Ending:
+    """What became of an incident that was reported as `event`, or as none."""
+    if event is None:
+        return Ending("undetected", math.inf)
+    if "confirmed" in event.times and event.state is not State.REFUTED:
+        return Ending("confirmed", event.times["confirmed"])
+    if event.open:
+        return Ending("open", math.inf)
+    return Ending(event.state.value, event.times["closed"])
 
 
 def event_about(incident: Incident, events: list[Event], site: Site) -> Event | None:

@@ -25,7 +25,7 @@ from dva_sim.simulation.control_room import add_dva, add_operator
 from dva_sim.simulation.field import Danger, Field, is_dangerous
 from dva_sim.simulation.names import id_of
 from dva_sim.simulation.offered import connector_of
-from dva_sim.simulation.recording import PersonLog, Recording, event_about
+from dva_sim.simulation.recording import PersonLog, Recording, ending_of, event_about
 from dva_sim.simulation.stage import Stage
 from dva_sim.simulation.watch import broken_event_rules, broken_rules
 
@@ -97,6 +97,7 @@ class Run:
         self._watch()
         self._sample()
         stage, field = self.stage, self.field
+        events = list(self.dva.events.values())
         return Recording(
             scenario=self.scenario,
             seed=stage.seed,
@@ -108,7 +109,8 @@ class Run:
             radii={name: robot.body.spec.radius for name, robot in field.robots.items()},
             duration=self.clock.now,
             contained=field.contained,
-            events=list(self.dva.events.values()),
+            endings=[ending_of(event_about(i, events, stage.site)) for i in field.incidents],
+            events=events,
             robots=field.robots,
             links=self.links,
             people=self._people(),

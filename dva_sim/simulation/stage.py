@@ -16,7 +16,7 @@ from dva_sim.errors import ConfigError
 from dva_sim.network.patterns import Transport
 from dva_sim.protocol.exchange import NOON
 from dva_sim.recorder import Recorder
-from dva_sim.scenario import Scenario, robot_profiles, site_of
+from dva_sim.scenario import Scenario, request_timeout_s, robot_profiles, site_of
 from dva_sim.simulation.names import DVA, address_of, id_of, label_of
 from dva_sim.streams import Streams
 from dva_sim.worlds.geo import Pose
@@ -83,7 +83,6 @@ class Stage:
 
     def device(self, kind: str, number: int) -> Device:
         """A new device: its identity and ways to talk."""
-        request = self.scenario.request
         return Device(
             id_of(kind, number),
             label_of(kind, number),
@@ -93,8 +92,8 @@ class Stage:
             self.network,
             self.recorder,
             self.site.frame,
-            request.timeout_s,
-            request.attempts,
+            request_timeout_s(self.scenario),
+            self.scenario.request.attempts,
             self.labels,
             self.time_of_day,
         )

@@ -50,6 +50,8 @@ def draw_site(
     coverage: bool = False,
     views: bool = False,
     scale: bool = True,
+    small_marks: bool = True,
+    least: float = 0.0,
 ) -> None:
     """Draw a site into `ax`, in metres, without axes.
 
@@ -62,8 +64,10 @@ def draw_site(
         coverage: Where the radio link is not good, as a faint layer.
         views: What fixed cameras see, as a faint layer.
         scale: A bar below the site that tells lengths.
+        small_marks: Detectors, cameras, antennas and guard posts among the equipment.
+        least: Names that would have to be smaller than this are left out [pt].
     """
-    _set_limits(ax, site)
+    set_limits(ax, site)
     if site.rooms:
         _draw_rooms(ax, site)
     else:
@@ -78,8 +82,8 @@ def draw_site(
         draw_views(ax, site)
     if labels:
         _draw_zones(ax, site)
-        draw_equipment(ax, site)
-        write_names(ax, site)
+        draw_equipment(ax, site, small_marks)
+        write_names(ax, site, least)
         draw_north(ax, site)
     if scale:
         draw_scale_bar(ax, site)
@@ -92,7 +96,8 @@ def limits(site: Site) -> tuple[tuple[float, float], tuple[float, float]]:
     return (xmin - margin, xmax + margin), (ymin - margin - below, ymax + margin)
 
 
-def _set_limits(ax: Axes, site: Site) -> None:
+def set_limits(ax: Axes, site: Site) -> None:
+    """Make `ax` a map of a site, still empty, without axes."""
     across, up = limits(site)
     ax.set(xlim=across, ylim=up)
     ax.set_aspect("equal")
@@ -147,7 +152,7 @@ def _draw_grid(ax: Axes, site: Site) -> None:
         zorder=1,
     )
     image.set_transform(turn.translate(grid.origin.x, grid.origin.y) + ax.transData)
-    _set_limits(ax, site)  # which the image has moved
+    set_limits(ax, site)  # which the image has moved
 
 
 # --- walls and ways through them -------------------------------------------------------

@@ -49,10 +49,17 @@ def scale_of(ax: Axes) -> float:
     return min(1.1, max(0.45, math.sqrt(points_per_metre(ax) / FULL_SIZE)))
 
 
-def draw_equipment(ax: Axes, site: Site) -> None:
-    """Detectors, bases (a robot fits into the ring), guard posts, desks, cameras, antennas."""
-    _draw_detectors(ax, site)
+def draw_equipment(ax: Axes, site: Site, small_marks: bool = True) -> None:
+    """Bases (a robot fits into the ring) and desks; unless the map is too small for them also
+    detectors, guard posts, cameras and antennas."""
     _draw_bases(ax, site)
+    _draw_desks(ax, site)
+    if small_marks:
+        _draw_small_marks(ax, site)
+
+
+def _draw_small_marks(ax: Axes, site: Site) -> None:
+    _draw_detectors(ax, site)
     for post in site.guard_posts:
         ax.plot(
             post.x,
@@ -64,7 +71,6 @@ def draw_equipment(ax: Axes, site: Site) -> None:
             mew=0.5,
             zorder=3.5,
         )
-    _draw_desks(ax, site)
     for camera in site.cameras:
         _draw_camera(ax, camera)
     for station in site.base_stations:

@@ -36,12 +36,13 @@ class Setting(NamedTuple):
     worth: float
 
 
-def write_names(ax: Axes, site: Site) -> None:
+def write_names(ax: Axes, site: Site, least: float = 0.0) -> None:
     """Write the name of each room where it covers nothing, if it can.
 
     Args:
         ax: Its limits are those of the finished picture.
         site: Gives the rooms and what stands in them.
+        least: A name that would have to be smaller is left out [pt].
     """
     import shapely
 
@@ -53,7 +54,7 @@ def write_names(ax: Axes, site: Site) -> None:
             area = area - shapely.union_all(
                 [shapely.Polygon(r.polygon) for r in site.rooms[:number]]
             )
-        found = _best(area.buffer(-GAP, join_style="mitre"), room.name, things, metre)
+        found = _best(area.buffer(-GAP, join_style="mitre"), room.name, things, metre, least)
         if found is not None:
             setting, x, y = found
             _write(ax, room, setting, x, y)
@@ -74,7 +75,9 @@ def _things(site: Site) -> list[Any]:
     return [*discs, *(shapely.Polygon(corners) for corners in site.solids)]
 
 
-def _best(area: Any, name: str, things: Any, metre: float) -> tuple[Setting, float, float] | None:
+def _best(
+    area: Any, name: str, things: Any, metre: float, least: float
+) -> tuple[Setting, float, float] | None:
     """The most legible setting that fits, and where."""
     import shapely
 
@@ -85,6 +88,8 @@ def _best(area: Any, name: str, things: Any, metre: float) -> tuple[Setting, flo
     for setting in _settings(name):
         if setting.worth <= best:
             break  # they come from the most to the least legible
+        if setting.size < least:
+            continue
         width, height = (side / metre for side in _box(setting))
         spots = _spots(area, width, height)
         if not len(spots):

@@ -1,28 +1,39 @@
 import math
 import sys
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from PIL import Image
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.text import Annotation, Text
+from PIL import Image, ImageColor
 
 from dva_sim import scenario as scenarios
 from dva_sim.errors import ConfigError
 from dva_sim.experiments.pictures import Wanted, style
 from dva_sim.experiments.pictures.bodies import Body
-from dva_sim.experiments.pictures.film import Film, new_figure
+from dva_sim.experiments.pictures.film import Film
 from dva_sim.experiments.pictures.moments import Moments
 from dva_sim.experiments.pictures.names import Box, Names
 from dva_sim.experiments.pictures.scene import Scene
-from dva_sim.experiments.pictures.stills import even_times, still, strip
+from dva_sim.experiments.pictures.stills import best_time, even_times, still, strip
 from dva_sim.experiments.pictures.writing import write_film
+from dva_sim.experiments.verdicts import verdicts
 from dva_sim.recorder import TrackPoint
-from dva_sim.simulation import simulate
+from dva_sim.simulation import Ending, simulate
 
 
 def run_of(name="drive-to-event", seed=1, **changes):
     return simulate(scenarios.build(scenarios.load(name), changes), seed, keep_traffic=True)
+
+
+def new_figure(size):
+    figure = Figure(figsize=size, dpi=100)
+    FigureCanvasAgg(figure)
+    return figure
 
 
 @pytest.fixture(scope="module")
@@ -59,8 +70,8 @@ def test_an_mp4_has_every_frame_at_the_size_of_the_film(film, tmp_path):
     path = tmp_path / "film.mp4"
     write_film(film, path)
     frames, seconds = imageio_ffmpeg.count_frames_and_secs(str(path))
-    assert frames == len(film) == 40
-    assert seconds == pytest.approx(frames / 10)
+    assert frames == len(film) == 48
+    assert seconds == pytest.approx(frames / 8)
     reader = imageio_ffmpeg.read_frames(str(path))
     meta, first = next(reader), next(reader)
     reader.close()
@@ -75,7 +86,7 @@ def test_a_gif_has_every_frame_and_moves(film, tmp_path):
     path = tmp_path / "film.gif"
     write_film(film, path)
     with Image.open(path) as gif:
-        assert gif.n_frames == pytest.approx(len(film), abs=15)  # the same twice is one
+        assert gif.n_frames == pytest.approx(len(film), abs=25)  # the same twice is one
         first = gif.convert("RGB").tobytes()
         gif.seek(gif.n_frames - 1)
         assert gif.convert("RGB").tobytes() != first
@@ -117,11 +128,100 @@ def test_without_any_ffmpeg_one_is_told_what_to_install_before_the_run(tmp_path,
         Wanted(video=tmp_path / "film.mp4")
 
 
-def test_two_runs_side_by_side_are_twice_as_wide_and_differ(drive):
+def test_two_runs_side_by_side_share_the_width_and_differ(drive):
     other = run_of(**{"horizon_s": 30, "link.delay_s": 0.5, "pattern": "req-rep"})
     picture = Film([drive, other]).at(25.0)
     half = picture.shape[1] // 2
     assert not np.array_equal(picture[:, :half], picture[:, half : 2 * half])
+
+
+# --- how a film ends -----------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def race():
+    """Two runs of which one ends after 12 s and the other, with its robot on the way, after 20."""
+    return [run_of(**{"horizon_s": 20 - 8 * number, "link.delay_s": 0.1}) for number in (0, 1)]
+
+
+def halves(picture):
+    half = picture.shape[1] // 2
+    return picture[:, :half], picture[:, half:]
+
+
+def pixels_of(picture, colour):
+    wanted = np.array(ImageColor.getrgb(colour))
+    return int((np.abs(picture.astype(int) - wanted).max(axis=2) < 10).sum())
+
+
+@pytest.mark.parametrize("inset", [False, True])
+def test_a_side_that_has_ended_stays_as_it_was_at_its_end_with_its_robot_there(race, inset):
+    film = Film(race, inset)
+    (goes_on, ended), (last, still_ended) = halves(film.at(13.0)), halves(film.at(20.0))
+    assert np.array_equal(ended, still_ended)
+    assert not np.array_equal(goes_on, last)
+    for side in (last, still_ended):
+        assert pixels_of(side, style.ROBOT_MODES["Teleoperation"]) > 40
+
+
+def test_a_film_stands_long_enough_at_its_end_to_be_read(film):
+    frames = list(film.frames())
+    assert all(np.array_equal(frame, frames[-1]) for frame in frames[-24:])
+
+
+def test_below_each_map_stands_how_its_run_ended_from_then_on_and_not_before(race):
+    film = Film(race)
+    told = [scene_lines(ax) for ax in film.figure.axes[:2]]
+    film.at(11.9)
+    assert [ended.get_text() for _, ended in told] == [
+        "not confirmed within 20 s",
+        "not confirmed within 12 s",
+    ]
+    before, after = film.at(11.9), film.at(12.0)
+    assert pixels_of(halves(before)[1], style.FAILED) == 0
+    assert pixels_of(halves(after)[1], style.FAILED) > 1000
+    assert pixels_of(halves(after)[0], style.FAILED) == 0
+
+
+def scene_lines(ax):
+    """The two lines below a map: what happened last, and how it ended."""
+    return [child for child in ax.get_children() if isinstance(child, Annotation)]
+
+
+@pytest.mark.parametrize("inset", [False, True])
+def test_every_word_of_a_film_is_legible_at_the_width_of_a_page(race, inset):
+    figure = Film(race, inset).figure
+    assert figure.bbox.width == 840
+    words = [t for t in figure.findobj(Text) if t.get_text().strip() and t.get_visible()]
+    assert len(words) > 40
+    assert min(word.get_fontsize() for word in words) * figure.dpi / 72 >= 9
+
+
+@pytest.mark.parametrize("inset", [False, True])
+@pytest.mark.parametrize("name", ["race", "drill"])
+def test_lines_above_and_below_the_maps_do_not_meet(request, name, inset):
+    runs = request.getfixturevalue(name)
+    figure = Film(runs if isinstance(runs, list) else [runs], inset).figure
+    lines = [figure.legends[0], *figure.texts]
+    for ax in figure.axes:
+        lines += [t for t in (ax.title, ax._left_title, ax._right_title) if t.get_text()]
+        lines += [t for t in scene_lines(ax) if t.get_text().strip()]
+        lines += [*ax.get_xticklabels(), *ax.get_yticklabels()] if ax.axison else []
+    boxes = boxes_of(lines, figure.axes[0])
+    page = Box(0, 0, *figure.bbox.size)
+    for number, box in enumerate(boxes):
+        assert box.beyond(page) < 3, lines[number]
+        assert not any(box.overlap(other) > 2 for other in boxes[number + 1 :]), lines[number]
+
+
+def test_the_film_of_the_first_page_is_small_and_as_wide_as_the_page_and_ends_with_both_robots():
+    film = Path(__file__).parents[2] / "experiments/pictures/one-second-away.gif"
+    assert film.stat().st_size < 1_000_000
+    with Image.open(film) as gif:
+        assert gif.width == 840
+        gif.seek(gif.n_frames - 1)
+        for side in halves(np.asarray(gif.convert("RGB"))):
+            assert pixels_of(side, style.ROBOT_MODES["Teleoperation"]) > 40
 
 
 # --- what a picture shows ------------------------------------------------------------------
@@ -272,10 +372,29 @@ def test_the_picture_a_camera_takes_changes_as_the_robot_moves(drive):
 
 
 def test_a_strip_has_a_panel_for_each_moment_with_its_clock(drive):
-    figure = strip(drive, even_times(drive, 5))
+    figure = strip([drive], even_times([drive], 5))
     clocks = [ax.get_title(loc="right") for ax in figure.axes]
     assert clocks == ["6.0 s", "12.0 s", "18.0 s", "24.0 s", "30.0 s"]
     assert len(figure.legends) == 1
+
+
+def test_a_strip_of_two_runs_has_a_column_for_each(race):
+    figure = strip(race, even_times(race, 2))
+    clocks = [ax.get_title(loc="right") for ax in figure.axes]
+    assert clocks == ["10.0 s", "10.0 s", "20.0 s", "12.0 s"]
+    assert len({ax.get_position().x0 for ax in figure.axes}) == 2
+
+
+def test_a_still_of_two_runs_shows_the_moment_when_the_first_one_is_done(race):
+    late, early = (replace(run, endings=[]) for run in race)
+    assert best_time([late, early]) == 20.0  # nobody is
+    late.endings, early.endings = [Ending("confirmed", 19.5)], [Ending("confirmed", 11.25)]
+    assert best_time([late, early]) == 11.25
+    assert best_time([late]) == 20.0
+    figure = still([late, early], best_time([late, early]))
+    told = [line.get_text() for ax in figure.axes for line in scene_lines(ax) if line.get_visible()]
+    assert told == ["still under way, confirmed at 19.5 s", "confirmed at 11.2 s, 8.2 s ahead"]
+    assert [ax.get_title(loc="right") for ax in figure.axes] == ["11.2 s", "11.2 s"]
 
 
 def test_a_still_shows_the_moment_asked_for(drive, tmp_path):
@@ -348,7 +467,7 @@ def test_a_moment_after_the_end_is_refused(drive, tmp_path):
 
 def test_a_scene_fixed_at_a_moment_keeps_only_what_is_there_then(drill):
     figure = new_figure((8, 6))
-    scene = Scene(figure.add_subplot(), Moments(drill))
+    scene = Scene(figure.add_subplot(), Moments(drill), *verdicts([drill]))
     figure.draw_without_rendering()
     scene.fix(1.0)
     children = figure.axes[0].get_children()

@@ -250,8 +250,8 @@ def test_nothing_is_registered_without_a_hypothesis(tmp_path):
 
 def test_the_larger_version_is_registered_on_its_own(tmp_path):
     path = write_study(tmp_path, CLAIMED + "full: {persons: 6}\n")
-    register(load_study(path, full=True))
-    assert load_study(path, full=True).status.kind == "confirmatory"
+    register(load_study(path, version="full"))
+    assert load_study(path, version="full").status.kind == "confirmatory"
     status = load_study(path).status
     assert status.kind == "exploratory"
     assert status.why == ("6 persons were registered, not 3",)

@@ -12,7 +12,8 @@ import small_study as kit
 from dva_sim.experiments import planning, running
 from dva_sim.experiments.planning import DryRun, dry_run
 from dva_sim.experiments.runner import run_study
-from dva_sim.experiments.running import Pace, Version, Workers, duration
+from dva_sim.experiments.running import Pace, Workers, duration
+from dva_sim.experiments.versions import Variant
 
 
 @pytest.mark.parametrize(
@@ -132,7 +133,7 @@ def test_what_is_stopped_names_the_command_that_goes_on(
         raise KeyboardInterrupt("interrupted after 7 of 42 runs")
 
     monkeypatch.setattr("dva_sim.experiments.runner.run_study", stop)
-    code = running.run(str(study), [], tmp_path / "out", Workers(jobs=1), Version())
+    code = running.run(str(study), [], tmp_path / "out", Workers(jobs=1), Variant())
     assert code == 130
     *_, what, how = capsys.readouterr().out.splitlines()
     assert what == "Stopped: interrupted after 7 of 42 runs"

@@ -20,7 +20,7 @@ def fresh(tmp_path, monkeypatch):
 
 def test_a_new_study_is_valid_as_it_stands_in_both_versions(fresh):
     assert check_file(fresh).problems == []
-    assert load_study(fresh, full=True).persons == 24
+    assert load_study(fresh, version="full").persons == 24
 
 
 def test_it_is_small_enough_to_try_at_once(fresh):

@@ -300,7 +300,7 @@ FULL = STUDY + "full: {persons: 6, link.delay_s: [0, 0.25, 0.5], robot.processin
 
 def test_the_larger_version_has_its_own_keys_levels_and_scenario_keys(tmp_path):
     path = write_study(tmp_path, FULL)
-    small, full = load_study(path), load_study(path, full=True)
+    small, full = load_study(path), load_study(path, version="full")
     assert (small.persons, small.factors["link.delay_s"], small.changes) == (3, (0, 0.25), {})
     assert (full.persons, full.factors["link.delay_s"]) == (6, (0, 0.25, 0.5))
     assert {cell.scenario.robot.processing_s for cell in design.cells(full)} == {0.1}
@@ -309,12 +309,14 @@ def test_the_larger_version_has_its_own_keys_levels_and_scenario_keys(tmp_path):
 
 def test_the_larger_version_holds_all_runs_of_the_smaller(tmp_path):
     path = write_study(tmp_path, STUDY + "full: {persons: 6, replications: 3}\n")
-    small, full = ({j.key for j in design.jobs(load_study(path, full=f))} for f in (False, True))
+    small, full = (
+        {j.key for j in design.jobs(load_study(path, version=f))} for f in (None, "full")
+    )
     assert small < full
 
 
 def test_a_larger_version_can_be_changed_by_settings_too(tmp_path):
-    full = load_study(write_study(tmp_path, FULL), ["persons=7"], full=True)
+    full = load_study(write_study(tmp_path, FULL), ["persons=7"], version="full")
     assert (full.persons, full.factors["link.delay_s"]) == (7, (0, 0.25, 0.5))
 
 
@@ -330,13 +332,40 @@ def test_a_larger_version_can_be_changed_by_settings_too(tmp_path):
 def test_a_larger_version_that_makes_no_sense_is_refused_with_the_study(tmp_path, full, told):
     path = write_study(tmp_path, STUDY + f"full: {full}\n")
     with pytest.raises(ConfigError) as caught:
-        design.cells(load_study(path, full=True))
+        design.cells(load_study(path, version="full"))
     assert told in str(caught.value).replace(str(path), "study")
+
+
+QUICK = COMPARED + "quick: {persons: 2, link.delay_s: [0, 0.5]}\n"
+
+
+def test_the_small_version_leaves_out_what_was_claimed_of_levels_it_leaves_out(tmp_path):
+    path = write_study(tmp_path, QUICK)
+    study, quick = load_study(path), load_study(path, version="quick")
+    assert (quick.persons, quick.factors["link.delay_s"]) == (2, (0, 0.5))
+    assert (study.version, quick.version) == (None, "quick")
+    assert list(quick.contrasts) == ["answer"]
+    assert quick.status.kind == "declared"
+    assert len(study.contrasts) > 1
+
+
+def test_a_small_version_must_keep_the_answer(tmp_path):
+    path = write_study(tmp_path, STUDY + "quick: {pattern: [pub-sub]}\n")
+    with pytest.raises(ConfigError, match="in the small version: 'req-rep' is not a level"):
+        load_study(path)
+
+
+def test_the_small_version_of_the_main_study_asks_the_same_of_the_same_persons():
+    published, quick = (load_study("req-rep-vs-pub-sub", version=v) for v in (None, "quick"))
+    assert quick.answer == published.answer
+    assert (quick.seed, quick.persons) == (published.seed, published.persons)
+    same = {job.key for job in design.jobs(published)}
+    assert {job.key for job in design.jobs(quick)} < same
 
 
 def test_a_study_without_a_larger_version_says_so(tmp_path):
     with pytest.raises(ConfigError, match=r"study\.yaml:1:1: has no larger version: no key 'full'"):
-        load_study(write_study(tmp_path), full=True)
+        load_study(write_study(tmp_path), version="full")
 
 
 def test_what_is_recorded_and_the_larger_version_do_not_change_what_is_asked(tmp_path):
@@ -345,6 +374,6 @@ def test_what_is_recorded_and_the_larger_version_do_not_change_what_is_asked(tmp
     assert study_in(tmp_path, text=STUDY + "budget_s: 60\n").asked() != plain
 
 
-def test_the_main_study_fits_on_thirty_lines():
+def test_the_main_study_fits_on_one_screen():
     text = load_study("req-rep-vs-pub-sub").file.read_text()
-    assert len(text.splitlines()) <= 30
+    assert len(text.splitlines()) <= 40

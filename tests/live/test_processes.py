@@ -105,9 +105,9 @@ def test_a_part_that_is_killed_ends_the_run(programs: Programs, part: str) -> No
     run = programs.start(*SCRIPTED)
     run.wait_to_say("is now in mode Teleoperation")
     os.kill(programs.process_of(part), signal.SIGKILL)
-    assert run.ends() == 2
+    assert run.ends() == 3
     name = "operator-1" if part == "operator" else part
-    assert run.complained == [f"dva-sim: {name} has ended by itself: exit code -9"]
+    assert run.complained == [f"error: {name} has ended by itself: exit code -9"]
     assert programs.processes() == {}
 
 
@@ -123,13 +123,13 @@ def test_a_part_that_is_killed_ends_the_run(programs: Programs, part: str) -> No
         (["--set", "link.delay_ms=1"], "did you mean 'delay_s'?"),
         (["--only", "nothing"], "--only 'nothing' should be dva, world, operator"),
         (["--only", "operator", "--number", "2"], "the scenario has operators 1 to 1"),
-        (["--only", "operator", "--number", "0"], "the scenario has operators 1 to 1"),
+        (["--only", "operator", "--number", "0"], "should be a whole number of at least 1"),
         (["--operators", "idle"], "should be simulated or scripted"),
-        (["--port", "70000"], "should be from 1 to 64999"),
+        (["--port", "70000"], "should be a whole number from 0 to 64999"),
         (["--dva", "a:b:c"], "should be HOST:PORT"),
         (["--dva", "127.0.0.1:65535"], "should be HOST:PORT"),
-        (["--for", "-1"], "should be a number of seconds above 0"),
-        (["--for", "nan"], "should be a number of seconds above 0"),
+        (["--for", "-1"], "--for '-1' should be a number above 0"),
+        (["--for", "nan"], "--for 'nan' should be a number above 0"),
         (["--keys", "no"], "there is no such folder; make keys with: dva-sim keys no NAME..."),
         (["--keys", "."], "holds no keys"),
         (["--record", "/dev/null"], "/dev/null: cannot be written: File exists"),
@@ -141,7 +141,7 @@ def test_a_mistake_ends_in_one_line_and_exit_code_2(
     run = programs.start("live", "drive-to-event", "--for", "60", *words)
     assert run.ends() == 2
     (line,) = run.complained
-    assert line.startswith("dva-sim: ")
+    assert line.startswith("error: ")
     assert said in line
     assert programs.processes() == {}
 

@@ -138,6 +138,19 @@ def test_the_tables_come_with_it(folder):
     assert [row["kind"] for row in tables["events"]] == ["fire", "gas_leak"]
 
 
+@pytest.mark.parametrize("name", RUNS)
+def test_how_everything_ended_comes_back(folder, name):
+    endings = read_recording(folder / f"{name}.mcap").playback.endings
+    assert endings == RUNS[name]().endings
+    assert len(endings) == len(RUNS[name]().incidents) > 0
+
+
+def test_of_a_file_cut_short_nobody_knows_how_it_ended(folder, tmp_path):
+    whole = (folder / "drive.mcap").read_bytes()
+    (tmp_path / "cut.mcap").write_bytes(whole[: int(0.7 * len(whole))])
+    assert read_recording(tmp_path / "cut.mcap").playback.endings == []
+
+
 def test_the_site_and_its_hazards_are_the_same(folder):
     now, then = read_recording(folder / "drill.mcap").playback, drill()
     assert np.array_equal(now.site.grid.cells, then.site.grid.cells)

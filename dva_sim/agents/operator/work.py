@@ -12,7 +12,7 @@ from dva_sim.network.patterns import Subscription
 from dva_sim.protocol import messages as m
 from dva_sim.recorder import DriveLog, Shown
 
-BLIND_AFTER = 20.0  # without a frame for so long, the link counts as lost [s]
+BLIND_AFTER = 20.0  # [s]; without a frame for so long the link counts as lost
 
 
 class Work:
@@ -118,6 +118,8 @@ class Work:
 
     def _watch_picture(self) -> bool:
         """No picture for too long: the link is lost, whatever the pattern."""
-        if not self.over and self._clock.now - self._last_frame > BLIND_AFTER:
+        if not self.over and self._clock.now - self._last_frame > max(
+            BLIND_AFTER, self._device.timeout
+        ):
             self.link_lost()
         return not self.over

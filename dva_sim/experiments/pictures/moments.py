@@ -60,6 +60,10 @@ class Moments:
         """Everybody of some kinds who left a track."""
         return [name for kind in kinds for name in self.tracks if kind_of(name) == kind]
 
+    def within(self, time: float) -> float:
+        """The moment [s] to show at `time`: a run that has ended stays as it was at its end."""
+        return min(time, self.recording.duration)
+
     def is_there(self, name: str, time: float) -> bool:
         """Whether somebody is on the site at `time` [s]; tracks of those who leave end."""
         return time <= self._times[name][-1] + GONE

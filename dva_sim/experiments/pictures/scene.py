@@ -1,4 +1,4 @@
-"""One run on one map: the site, its hazards, everybody on it, and what is told."""
+"""One run on one map: the site, its hazards, everybody on it, what is told, and how it ended."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from dva_sim.experiments.pictures.bodies import Body
 from dva_sim.experiments.pictures.fields import LAYER, Fields
 from dva_sim.experiments.pictures.moments import BYSTANDER, GUARD, ROBOT, Moments
 from dva_sim.experiments.pictures.names import Names
+from dva_sim.experiments.verdicts import Verdict
 from dva_sim.recorder import Moment
 
 if TYPE_CHECKING:
@@ -20,51 +21,81 @@ if TYPE_CHECKING:
 
 
 class Scene:
-    """A map that can show any moment of a run.
+    """A map that can show any moment of a run; a run that has ended stays as it was at its end.
 
     Args:
-        ax: Where.
+        ax: Where; it has its size already.
         moments: The run.
+        verdict: How it ended, told below the map from then on.
         title: Above the map on the left.
-        tell: Whether to write the newest line of the story below it.
+        outlook: Told below the map until then; None for the newest line of the story.
     """
 
-    def __init__(self, ax: Axes, moments: Moments, title: str = "", tell: bool = True) -> None:
-        from dva_sim.worlds.view import draw_site
-
-        self._ax, self._moments = ax, moments
-        self._timeline = moments.recording.recorder.timeline if tell else []
-        draw_site(ax, moments.recording.site)
-        # What hazards must not cover is drawn after them.
-        self._upper: list[Any] = [artist for artist in ax.get_children() if _stands_out(artist)]
-        for artist in self._upper:
-            artist.set_animated(True)
-        limits = ax.get_xlim(), ax.get_ylim()
+    def __init__(
+        self,
+        ax: Axes,
+        moments: Moments,
+        verdict: Verdict,
+        title: str = "",
+        outlook: str | None = None,
+    ) -> None:
+        self._ax, self._moments, self._verdict, self._outlook = ax, moments, verdict, outlook
+        limits = self._draw_ground()
         names = moments.names(BYSTANDER, GUARD, ROBOT)
         self._fields = Fields(ax, moments)
         self._bodies = [Body(ax, moments, name) for name in names]
         self._names = Names(ax, self._bodies)
         ax.set(xlim=limits[0], ylim=limits[1], aspect="equal")
-        self._clock = ax.set_title("", loc="right", fontsize=10, pad=1)
-        # Between the scale bar and the arrow that points north.
-        self._told = ax.text(
-            0.65, 0.005, "", transform=ax.transAxes, ha="center", va="bottom",
-            fontsize=style.FONT + 0.5, color=style.INK, animated=True,
-        )  # fmt: skip
+        self._clock = ax.set_title("", loc="right", fontsize=style.TITLE, pad=2)
         self._clock.set_animated(True)
-        ax.set_title(title, fontsize=10, loc="left", pad=1)
+        ax.set_title(title, fontsize=style.TITLE, fontweight="bold", loc="left", pad=2)
+        self._told, self._ended = self._line(), self._line(_colour_of(verdict))
+        self._ended.set_text(verdict.told or " ")
+
+    def _draw_ground(self) -> tuple[Any, Any]:
+        """The site; the limits of what is seen."""
+        from dva_sim.worlds.view import draw_site
+        from dva_sim.worlds.view_marks import points_per_metre
+
+        ax, site = self._ax, self._moments.recording.site
+        draw_site(ax, site, small_marks=points_per_metre(ax) > style.ROOMY, least=style.LEAST)
+        # What hazards must not cover is drawn after them.
+        self._upper: list[Any] = [artist for artist in ax.get_children() if _stands_out(artist)]
+        for artist in self._upper:
+            artist.set_animated(True)
+        return ax.get_xlim(), ax.get_ylim()
+
+    def _line(self, colour: str | None = None) -> Any:
+        """A line of text below the map; in a box of a colour."""
+        box = {"boxstyle": "round,pad=0.25", "fc": colour, "ec": "none"} if colour else None
+        return self._ax.annotate(
+            " ", (0.5, 0.0), xycoords="axes fraction", xytext=(0, -4), textcoords="offset points",
+            ha="center", va="top", animated=True, bbox=box,
+            fontsize=style.TITLE if colour else style.FONT + 0.5,
+            fontweight="bold" if colour else "normal", color="white" if colour else style.INK,
+        )  # fmt: skip
 
     def show(self, time: float) -> list[Artist]:
         """Artists that change, as they are at a moment [s], the lowest first."""
-        artists = [*self._fields.show(time), *self._upper]
+        now = self._moments.within(time)
+        artists = [*self._fields.show(now), *self._upper]
         for body in self._bodies:
-            artists += body.show(time)
-        sources = [incident.hazard.position for incident in self._moments.going_on(time)]
-        artists += self._names.show(time, sources)
+            artists += body.show(now)
+        sources = [incident.hazard.position for incident in self._moments.going_on(now)]
+        artists += self._names.show(now, sources)
         artists.sort(key=lambda artist: artist.get_zorder())
-        self._told.set_text(_told(self._timeline, time))
-        self._clock.set_text(f"{min(time, self._moments.recording.duration):.1f} s")
-        return [*artists, self._told, self._clock]
+        self._clock.set_text(f"{now:.1f} s")
+        return [*artists, self._clock, self._below(now)]
+
+    def _below(self, time: float) -> Artist:
+        """The line below the map: what happened last, or how it ended."""
+        ended: Artist = self._ended
+        if self._verdict.text and time >= self._verdict.time:
+            return ended
+        timeline = self._moments.recording.recorder.timeline
+        self._told.set_text(_told(timeline, time) if self._outlook is None else self._outlook)
+        told: Artist = self._told
+        return told
 
     def freeze(self, canvas: Any) -> None:
         """From now on draw what stands still as one sheet: the layout is final."""
@@ -103,6 +134,13 @@ def _stands_out(artist: Artist) -> bool:
     from matplotlib.spines import Spine
 
     return artist.get_zorder() > LAYER and not isinstance(artist, Axis | Spine)
+
+
+def _colour_of(verdict: Verdict) -> str:
+    """Of the box in which a run's end is told."""
+    if not verdict.good:
+        return style.FAILED
+    return style.BEHIND if verdict.ahead < 0 else style.AHEAD
 
 
 def _told(timeline: Sequence[Moment], time: float) -> str:

@@ -1,54 +1,49 @@
-"""Single pictures of a run: one moment, a strip of moments, a robot's-eye view."""
+"""Single pictures of runs: one moment, a strip of moments, a robot's-eye view."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dva_sim.errors import ConfigError
-from dva_sim.experiments.pictures.film import add_legend, height_of_map, new_figure, title_of
+from dva_sim.experiments.pictures.layout import Sheet, heading_of
 from dva_sim.experiments.pictures.moments import Moments
 from dva_sim.experiments.pictures.scene import Scene
+from dva_sim.experiments.verdicts import Verdict, decided_at, pattern_name, verdicts
 from dva_sim.simulation import Playback
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-DPI = 160
-WIDE = 9.0  # a still [in]
-PANEL = 5.0  # a panel of a strip [in]
-LEGEND = 0.45  # height [in]
+DPI = 200
 
 
 def still(recordings: Sequence[Playback], time: float) -> Figure:
     """Runs side by side at one moment [s]."""
-    runs = [Moments(recording) for recording in recordings]
-    across = WIDE if len(runs) == 1 else 6.5
-    height = height_of_map(recordings[0], across) + LEGEND
-    figure = new_figure((across * len(runs), height), DPI)
-    scenes = [
-        Scene(figure.add_subplot(1, len(runs), number), run, title_of(run.recording))
-        for number, run in enumerate(runs, 1)
-    ]
-    return _fixed(figure, scenes, runs, [time] * len(runs))
+    return _sheet(recordings, [time], len(recordings))
 
 
-def strip(recording: Playback, times: Sequence[float]) -> Figure:
-    """One run at several moments [s], from left to right and from top to bottom."""
-    run = Moments(recording)
-    height = height_of_map(recording, PANEL)
-    columns = _columns(len(times), height / PANEL)
-    rows = math.ceil(len(times) / columns)
-    figure = new_figure((PANEL * columns, height * rows + LEGEND), DPI)
-    scenes = [Scene(figure.add_subplot(rows, columns, n), run) for n in range(1, len(times) + 1)]
-    return _fixed(figure, scenes, [run], times)
+def strip(recordings: Sequence[Playback], times: Sequence[float]) -> Figure:
+    """A run at several moments [s], from left to right and from top to bottom; of several runs
+    each has a column."""
+    count = len(recordings)
+    return _sheet(recordings, times, count if count > 1 else _columns(len(times)))
 
 
-def even_times(recording: Playback, panels: int) -> list[float]:
-    """Moments spread evenly over a run, its end among them [s]."""
-    return [recording.duration * (n + 1) / panels for n in range(panels)]
+def best_time(recordings: Sequence[Playback]) -> float:
+    """The moment that shows most [s]: of one run its end, of several when the first one is done."""
+    ends = max(recording.duration for recording in recordings)
+    if len(recordings) == 1:
+        return ends
+    first = decided_at(verdicts(recordings))
+    return ends if first is None else first
+
+
+def even_times(recordings: Sequence[Playback], panels: int) -> list[float]:
+    """Moments spread evenly over the runs, the end among them [s]."""
+    ends = max(recording.duration for recording in recordings)
+    return [ends * (n + 1) / panels for n in range(panels)]
 
 
 def save_eye(recording: Playback, robot: str, time: float, path: Path) -> None:
@@ -62,33 +57,40 @@ def save_eye(recording: Playback, robot: str, time: float, path: Path) -> None:
     Image.fromarray(Moments(recording).eye(robot, time, 640, 480)).save(path)
 
 
-def check_times(recording: Playback, times: Sequence[float]) -> None:
-    """Refuse moments that a run does not have.
+def check_times(recordings: Sequence[Playback], times: Sequence[float]) -> None:
+    """Refuse moments that no run has.
 
     Raises:
-        ConfigError: before its beginning or after its end.
+        ConfigError: before the beginning or after the end.
     """
-    wrong = [time for time in times if not 0 <= time <= recording.duration]
+    ends = max(recording.duration for recording in recordings)
+    wrong = [time for time in times if not 0 <= time <= ends]
     if wrong:
-        problem = f"--at {wrong[0]:g} is not within the run, which lasts {recording.duration:.0f} s"
-        raise ConfigError(problem)
+        raise ConfigError(f"--at {wrong[0]:g} is not within the run, which lasts {ends:.0f} s")
 
 
-def _columns(panels: int, tall: float) -> int:
-    """Columns that bring the whole nearest to a sheet of 3 by 2."""
-
-    def shape(columns: int) -> float:
-        return columns / (math.ceil(panels / columns) * tall)
-
-    return min(range(1, panels + 1), key=lambda n: abs(math.log(shape(n) / 1.5)))
+def _columns(panels: int) -> int:
+    """One or two: more would be too small to read."""
+    return min(panels, 2)
 
 
-def _fixed(
-    figure: Figure, scenes: Sequence[Scene], runs: Sequence[Moments], times: Sequence[float]
-) -> Figure:
-    """The figure with each scene at its moment."""
-    add_legend(figure, runs)
-    figure.draw_without_rendering()  # names are placed when sizes are known
-    for scene, time in zip(scenes, times, strict=True):
+def _sheet(recordings: Sequence[Playback], times: Sequence[float], columns: int) -> Figure:
+    """All runs at all moments, and a key."""
+    runs = [Moments(recording) for recording in recordings]
+    several, ends = len(runs) > 1, verdicts(recordings)
+    panels = [(time, *each) for time in times for each in zip(runs, ends, strict=True)]
+    sheet = Sheet(runs, len(panels), columns, heading_of(recordings), dpi=DPI)
+    scenes = []
+    for ax, (_, run, end) in zip(sheet.maps, panels, strict=True):
+        title = pattern_name(run.recording) if several else sheet.title
+        outlook = _outlook(end) if several and len(times) == 1 else None
+        scenes.append(Scene(ax, run, end, title, outlook))
+    sheet.figure.draw_without_rendering()  # names are placed when sizes are known
+    for scene, (time, *_) in zip(scenes, panels, strict=True):
         scene.fix(time)
-    return figure
+    return sheet.figure
+
+
+def _outlook(verdict: Verdict) -> str | None:
+    """What is told of a run that goes on while another one is done."""
+    return f"still under way, {verdict.text}" if verdict.text else None

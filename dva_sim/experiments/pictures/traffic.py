@@ -6,13 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dva_sim.simulation import Playback
+from dva_sim.experiments.pictures import style
+from dva_sim.experiments.pictures.moments import Moments
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
-WINDOW_S = 20.0
+WINDOW_S = 10.0
 
 
 class Traffic:
@@ -20,18 +21,19 @@ class Traffic:
 
     Args:
         ax: Where.
-        recording: A run made with `keep_traffic`.
+        moments: A run made with `keep_traffic`.
     """
 
-    def __init__(self, ax: Axes, recording: Playback) -> None:
+    def __init__(self, ax: Axes, moments: Moments) -> None:
+        self._moments, recording = moments, moments.recording
         robots = set(recording.radii)
         traffic = recording.recorder.traffic or []
         self._up = np.array([sent.time for sent in traffic if sent.destination in robots])
         self._down = np.array([sent.time for sent in traffic if sent.source in robots])
         ax.set_xlim(-WINDOW_S, 0)
         ax.set_ylim(-1, 1)
-        ax.set_yticks([0.5, -0.5], ["to robots", "from robots"], fontsize=7.5)
-        ax.set_xticks([-20, -10, 0], ["20 s ago", "10 s ago", "now"], fontsize=7.5)
+        ax.set_yticks([0.5, -0.5], ["to robots", "from robots"], fontsize=style.FONT)
+        ax.set_xticks([-10, -5, 0], ["10 s ago", "5 s ago", "now"], fontsize=style.FONT)
         ax.spines[["top", "right", "left"]].set_visible(False)
         ax.axhline(0, color="0.7", lw=0.6)
         ax.tick_params(length=0)
@@ -41,7 +43,8 @@ class Traffic:
         ]
 
     def show(self, time: float) -> list[Artist]:
-        """The strip at a moment [s]."""
+        """The strip at a moment [s]; after the end of the run its last one."""
+        time = self._moments.within(time)
         for lines, times, height in zip(
             self._lines, (self._up, self._down), (0.85, -0.85), strict=True
         ):

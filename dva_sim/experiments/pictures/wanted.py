@@ -24,7 +24,7 @@ class Wanted:
         still: One moment, `.png`, `.pdf` or `.svg`.
         strip: Several moments in one figure, likewise.
         at: The moments of still or strip [s], separated by commas; left out, the end for a
-            still and even steps for a strip.
+            still, or of two runs the moment when the first is done, and even steps for a strip.
         panels: How many moments a strip shows.
         camera: A robot by its label; the still is what its camera sees, `.png` or `.jpg`.
         inset: Show in the film what a robot's camera sees.
@@ -103,7 +103,7 @@ class Wanted:
         """Write everything, and say of each what it is and where.
 
         Args:
-            recordings: Runs made with `keep_traffic`; a strip shows the first one.
+            recordings: Runs made with `keep_traffic`; a camera is one of the first run.
 
         Raises:
             ConfigError: a moment after the run ended, or a failing ffmpeg.
@@ -111,18 +111,17 @@ class Wanted:
         from dva_sim.experiments.pictures import stills, writing
         from dva_sim.experiments.pictures.film import Film
 
-        first = recordings[0]
-        stills.check_times(first, self.times)
+        stills.check_times(recordings, self.times)
         if self.still is not None:
-            time = self.times[0] if self.times else first.duration
+            time = self.times[0] if self.times else stills.best_time(recordings)
             if self.camera is not None:
-                stills.save_eye(first, self.camera, time, self.still)
+                stills.save_eye(recordings[0], self.camera, time, self.still)
             else:
                 stills.still(recordings, time).savefig(self.still)
             yield f"Still: {self.still}"
         if self.strip is not None:
-            times = self.times or stills.even_times(first, self.panels)
-            stills.strip(first, times).savefig(self.strip)
+            times = self.times or stills.even_times(recordings, self.panels)
+            stills.strip(recordings, times).savefig(self.strip)
             yield f"Strip: {self.strip}"
         if self.video is not None:
             writing.write_film(Film(recordings, self.inset), self.video)

@@ -10,11 +10,15 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import IO, Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from dva_sim.errors import ConfigError
 from dva_sim.experiments.pictures import style
 from dva_sim.experiments.pictures.film import FPS, Film
 
 COLOURS = 112  # of a GIF
+ALIKE = 8  # a colour that differs less from the last picture's stays as it was, of 255
 SAMPLES = 6  # pictures that these are chosen from
 
 
@@ -74,11 +78,21 @@ def _write_gif(film: Film, path: Path) -> None:
     palette.putpalette(common[: 3 * most] + [v for c in style.SMALL for v in ImageColor.getrgb(c)])
     pictures = [
         Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE)
-        for frame in film.frames()
+        for frame in _steady(film.frames())
     ]
     pictures[0].save(
         path, save_all=True, append_images=pictures[1:], duration=1000 // FPS, loop=0, optimize=True
     )
+
+
+def _steady(frames: Iterator[NDArray[np.uint8]]) -> Iterator[NDArray[np.uint8]]:
+    """Pictures that change only where one can see it: what stays the same takes no room."""
+    shown = next(frames)
+    yield shown
+    for frame in frames:
+        differs = np.abs(frame.astype(np.int16) - shown).max(axis=2) >= ALIKE
+        shown = np.where(differs[:, :, None], frame, shown)
+        yield shown
 
 
 def _write_mp4(film: Film, path: Path) -> None:

@@ -69,13 +69,14 @@ from dva_sim.experiments.statistics.pairing import (
 )
 from dva_sim.experiments.statistics.permutation import PermutationTest, permutation_test
 from dva_sim.experiments.statistics.persons import LEVEL, Interval, person_means
-from dva_sim.experiments.statistics.planning import needed_persons, power
+from dva_sim.experiments.statistics.planning import MOST_PERSONS, Law, law_of
 from dva_sim.experiments.statistics.resampling import bootstrap_interval
 from dva_sim.experiments.statistics.shares import quantile_interval, share_interval
 from dva_sim.experiments.statistics.sobol import SobolIndex, sobol_indices
 
 __all__ = [
     "LEVEL",
+    "MOST_PERSONS",
     "Band",
     "Components",
     "Effect",
@@ -83,6 +84,7 @@ __all__ = [
     "Equivalence",
     "Incidence",
     "Interval",
+    "Law",
     "PermutationTest",
     "SobolIndex",
     "VarianceReduction",
@@ -94,14 +96,13 @@ __all__ = [
     "equivalence",
     "factorial_effects",
     "holm",
+    "law_of",
     "mean_interval",
-    "needed_persons",
     "one_sided_test",
     "pair_correlation",
     "paired_difference",
     "permutation_test",
     "person_means",
-    "power",
     "quantile_interval",
     "share_interval",
     "sobol_indices",

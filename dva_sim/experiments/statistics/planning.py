@@ -1,113 +1,87 @@
-"""How many persons a study needs, from a pilot or an earlier one."""
+"""How many persons a study needs, from a pilot or an earlier one: one law for every number told.
+
+What is shown is shown by an interval that leaves zero (or a margin) out. An interval of `n`
+persons reaches `stretch * t(n - 1) * spread / sqrt(n)` from its mean, where `t` is Student's
+quantile at the interval's level. How persons spread and how much farther than Student's their
+interval reaches, because they are skewed or because a band covers several levels at once, are
+taken from the study at hand: with as many persons as it has, the law gives the very interval that
+its report shows.
+
+References:
+    Cohen, Statistical Power Analysis for the Behavioral Sciences (1988), chapter 2 (noncentral t).
+"""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dva_sim.experiments.statistics.components import components
-from dva_sim.experiments.statistics.persons import LEVEL, Floats, person_means, students_t
+from dva_sim.experiments.statistics.persons import LEVEL, person_means, students_t
 
-MOST_PERSONS = 1_000_000
+MOST_PERSONS = 10_000
 
 
-def needed_persons(
-    values: ArrayLike,
-    person: ArrayLike,
-    half_width: float,
-    trials: int | None = None,
-    level: float = LEVEL,
-) -> int:
-    """The fewest persons whose interval of the mean can be expected to be narrow enough.
+@dataclass(frozen=True)
+class Law:
+    """How far an interval reaches from its mean, by the number of persons.
 
-    Student's quantile falls as persons are added, so the number is sought step by step. About
-    every second study of that size will come out a little wider: take a reserve.
+    Attributes:
+        spread: Standard deviation of persons' means.
+        persons: From how many it is known.
+        level: Two-sided confidence level whose quantile of Student's shrinks with more persons.
+        stretch: How many times as far as Student's the interval reaches.
+    """
+
+    spread: float
+    persons: int
+    level: float = LEVEL
+    stretch: float = 1.0
+
+    def reach(self, persons: int) -> float:
+        """Distance from the mean to the end of the interval."""
+        return self._critical(persons) * self.spread / math.sqrt(persons)
+
+    def power(self, effect: float, persons: int) -> float:
+        """The chance that the interval of so many lies beyond zero if the true mean is `effect`.
+
+        Beyond zero means on the side of the effect; the other side is no success.
+
+        Raises:
+            ValueError: fewer than two persons.
+        """
+        from scipy import special
+
+        if persons < 2:
+            raise ValueError(f"a study needs at least 2 persons, not {persons}")
+        shift, critical = abs(effect) / self.spread * math.sqrt(persons), self._critical(persons)
+        below = float(special.nctdtr(persons - 1, shift, critical))
+        # Far from all doubt the series does not converge; so many persons are as good as normal.
+        return float(special.ndtr(shift - critical)) if math.isnan(below) else 1 - below
+
+    def _critical(self, persons: int) -> float:
+        return self.stretch * students_t(self.level, persons)
+
+
+def law_of(
+    values: ArrayLike, person: ArrayLike, reach: float | None = None, level: float = LEVEL
+) -> Law | None:
+    """The law that a study's own interval follows; None where its persons are all alike.
 
     Args:
-        values: One value per run of the pilot `(n,)`, nan where missing: of a comparison, the
-            difference of the pair of runs.
+        values: One value per run `(n,)`, nan where missing: of a comparison, the difference of
+            the pair of runs.
         person: Whose run it was `(n,)`.
-        half_width: Of the interval wanted, in the unit of the values.
-        trials: How many each person is to make; as many as in the pilot if left out.
-        level: Confidence level.
-
-    Returns:
-        At least 2.
-
-    Raises:
-        ValueError: the width is not above zero, the pilot is too small to tell, or more than a
-            million persons are needed.
+        reach: How far the study's interval or band reaches from its mean, towards the side that
+            counts; as far as Student's if left out.
+        level: Of that interval; of a band, that of each of its levels alone (Bonferroni).
     """
-    if not half_width > 0:
-        raise ValueError(f"the half-width wanted must be above zero, not {half_width}")
-    spread = _spread(values, person, trials)
-    at_least = (students_t(level, MOST_PERSONS) * spread / half_width) ** 2
-    if at_least > MOST_PERSONS:
-        raise ValueError(f"more than {MOST_PERSONS} persons would be needed")
-    n = max(2, math.floor(at_least))
-    while students_t(level, n) * spread > half_width * math.sqrt(n):
-        n += 1
-    return n
-
-
-def power(
-    values: ArrayLike,
-    person: ArrayLike,
-    effect: float,
-    persons: int,
-    trials: int | None = None,
-    level: float = LEVEL,
-) -> float:
-    """The chance that a study tells a true effect of this size from zero.
-
-    Args:
-        values: One value per run of the pilot `(n,)`, nan where missing: of a comparison, the
-            difference of the pair of runs. Only their spread counts.
-        person: Whose run it was `(n,)`.
-        effect: True mean, in the unit of the values.
-        persons: How many the study is to have, at least 2.
-        trials: How many each person is to make; as many as in the pilot if left out.
-        level: Confidence level of the study's interval.
-
-    Raises:
-        ValueError: fewer than two persons, or the pilot is too small to tell.
-
-    References:
-        Cohen, Statistical Power Analysis for the Behavioral Sciences (1988), chapter 2.
-    """
-    from scipy import special
-
-    if persons < 2:
-        raise ValueError(f"a study needs at least 2 persons, not {persons}")
-    spread = _spread(values, person, trials)
-    if spread == 0:
-        return float(effect != 0)
-    shift, t = abs(effect) / spread * math.sqrt(persons), students_t(level, persons)
-    too_far, other_way = special.nctdtr(persons - 1, shift, [t, -t])
-    return float(1 - too_far + other_way)
-
-
-def _spread(values: ArrayLike, person: ArrayLike, trials: int | None) -> float:
-    """Standard deviation of persons' means, if each makes so many trials."""
-    persons, means = person_means(values, person)
-    if len(persons) < 2:
-        raise ValueError("the spread of persons takes a pilot of at least two")
-    if trials is None:
-        return float(means.std(ddof=1))
-    parts = components(_table(values, person))
-    if math.isnan(parts.within):
-        raise ValueError("what more trials do takes a pilot with at least two for a person")
-    return math.sqrt(parts.between + parts.within / trials)
-
-
-def _table(values: ArrayLike, person: ArrayLike) -> Floats:
-    """Runs by person `(persons, trials)`, nan where there are fewer."""
-    numbers, owner = np.asarray(values, dtype=float), np.unique(person, return_inverse=True)[1]
-    counts = np.bincount(owner)
-    table = np.full((len(counts), int(counts.max())), np.nan)
-    order = np.argsort(owner, kind="stable")
-    place = np.arange(len(owner)) - np.repeat(np.cumsum(counts) - counts, counts)
-    table[owner[order], place] = numbers[order]
-    return table
+    means = person_means(values, person)[1]
+    if len(means) < 2 or not np.ptp(means) > 0:
+        return None
+    plain = Law(float(means.std(ddof=1)), len(means), level)
+    if reach is None:
+        return plain
+    return Law(plain.spread, plain.persons, level, reach / plain.reach(len(means)))

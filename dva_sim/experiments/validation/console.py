@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dva_sim.errors import ConfigError
+from dva_sim.exit_codes import ExitCode
 from dva_sim.experiments.validation.telling import say
 
 WHAT = ("dispatch", "operators", "network")
-INTERRUPTED = 130  # exit code of a program ended by Ctrl-C
 
 
 @dataclass(frozen=True)
@@ -37,8 +37,8 @@ def validate(
     seed: int = 1,
     strategy: str | None = None,
     sockets: Sockets = Sockets(),
-) -> int:
-    """Play, print the comparison, write it if asked to; the exit code.
+) -> ExitCode:
+    """Play, print the comparison, write it if asked to; how it ended.
 
     Args:
         what: `dispatch`, `operators` or `network`.
@@ -72,7 +72,7 @@ def validate(
         return validate_network(cases, out, setting, sockets.measure, sockets.live)
     except KeyboardInterrupt:
         say("Stopped.")
-        return INTERRUPTED
+        return ExitCode.INTERRUPTED
 
 
 def _refuse_foreign(what: str, cases: str | None, strategy: str | None, sockets: Sockets) -> None:

@@ -4,72 +4,77 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from dva_sim.experiments.statistics import mean_interval, needed_persons, power
+from dva_sim.experiments.statistics import Law, band, law_of, mean_interval
 
 PILOT = np.array([-1.5, 0.5, 1.0])  # variance 1.75
+SKEWED = np.array([0.2, 0.4, 0.5, 0.9, 1.1, 1.4, 2.0, 9.5])
 
 
-def by_brute_force(spread, half_width):
-    n = np.arange(2, 10_000)
-    return n[stats.t.isf(0.025, n - 1) * spread / np.sqrt(n) <= half_width][0]
+def power_by_hand(persons, effect, spread, alpha=0.025):
+    critical, shift = stats.t.isf(alpha, persons - 1), effect / spread * math.sqrt(persons)
+    return stats.nct.sf(critical, persons - 1, shift)
 
 
-@pytest.mark.parametrize("half_width", [4.0, 1.0, 0.5, 0.1])
-def test_the_number_is_the_first_whose_student_interval_is_narrow_enough(half_width):
-    expected = by_brute_force(math.sqrt(1.75), half_width)
-    assert needed_persons(PILOT, [0, 1, 2], half_width) == expected
+def test_without_an_interval_of_its_own_a_study_follows_students_law():
+    law = law_of(PILOT, [0, 1, 2])
+    assert (law.persons, law.stretch) == (3, 1.0)
+    assert law.reach(10) == pytest.approx(stats.t.isf(0.025, 9) * math.sqrt(1.75 / 10))
+    assert law.power(1.0, 10) == pytest.approx(power_by_hand(10, 1.0, math.sqrt(1.75)))
+    assert law.power(-1.0, 10) == law.power(1.0, 10)
 
 
-def test_studies_of_that_size_are_as_narrow_as_wanted_on_the_average():
+def test_with_as_many_persons_the_law_gives_the_interval_that_is_shown():
+    shown = mean_interval(SKEWED, range(8))
+    up, down = shown.high - shown.mean, shown.mean - shown.low
+    assert law_of(SKEWED, range(8), up).reach(8) == pytest.approx(up)
+    assert law_of(SKEWED, range(8), down).reach(8) == pytest.approx(down)
+    assert law_of(SKEWED, range(8), up).stretch > 1.5  # Student's alone knows nothing of skewness
+
+
+def test_with_as_many_persons_the_law_gives_the_band_that_is_shown():
     rng = np.random.default_rng(1)
-    n = needed_persons(rng.normal(0, 3, 4000), range(4000), half_width=1.0)
-    widths = [mean_interval(x, range(n)).half_width for x in rng.normal(0, 3, (200, n))]
-    assert n == 38
-    assert np.mean(widths) == pytest.approx(1.0, abs=0.05)
+    differences = rng.normal(1.0, 2.0, (12, 5))
+    shown = band(differences)
+    for level in range(5):
+        reach = shown.mean[level] - shown.low[level]
+        law = law_of(differences[:, level], range(12), reach, 1 - 0.05 / 5)
+        assert law.reach(12) == pytest.approx(reach)
 
 
-def test_more_trials_save_persons_only_as_far_as_a_persons_own_luck_goes():
-    rng = np.random.default_rng(2)
-    values = rng.normal(0, 3, (2000, 1)) + rng.normal(0, 2, (2000, 5))
-    person = np.repeat(np.arange(2000), 5)
-    found = [needed_persons(values.ravel(), person, 1.0, trials=k) for k in (1, 5, 1000)]
-    for n, spread in zip(found, (math.sqrt(9 + 4), math.sqrt(9 + 4 / 5), 3), strict=True):
-        assert n == pytest.approx(by_brute_force(spread, 1.0), rel=0.08)
-    assert needed_persons(values.ravel(), person, 1.0) == pytest.approx(found[1], rel=0.02)
+def test_studies_of_a_size_are_as_narrow_as_the_law_says_on_the_average():
+    rng = np.random.default_rng(1)
+    law = law_of(rng.normal(0, 3, 4000), range(4000))
+    widths = [mean_interval(x, range(38)).half_width for x in rng.normal(0, 3, (200, 38))]
+    assert law.reach(38) == pytest.approx(1.0, abs=0.02)
+    assert np.mean(widths) == pytest.approx(law.reach(38), abs=0.05)
 
 
-def test_the_power_is_that_of_the_noncentral_t():
-    shift = 1.0 / math.sqrt(1.75) * math.sqrt(10)
-    t = stats.t.isf(0.025, 9)
-    exact = stats.nct.sf(t, 9, shift) + stats.nct.cdf(-t, 9, shift)
-    assert power(PILOT, [0, 1, 2], effect=1.0, persons=10) == pytest.approx(exact)
-    assert power(PILOT, [0, 1, 2], effect=-1.0, persons=10) == pytest.approx(exact)
-    assert power(PILOT, [0, 1, 2], effect=0.0, persons=10) == pytest.approx(0.05)
-
-
-def test_that_share_of_studies_tells_the_effect_from_zero():
+def test_that_share_of_studies_shows_the_effect():
     rng = np.random.default_rng(3)
-    told = [mean_interval(x, range(24)).low > 0 for x in rng.normal(0.6, 1, (400, 24))]
-    expected = power(rng.normal(0, 1, 5000), range(5000), effect=0.6, persons=24)
+    shown = [mean_interval(x, range(24)).low > 0 for x in rng.normal(0.6, 1, (400, 24))]
+    expected = law_of(rng.normal(0, 1, 5000), range(5000)).power(0.6, 24)
     assert expected == pytest.approx(0.80, abs=0.02)
-    assert np.mean(told) == pytest.approx(expected, abs=0.06)
+    assert np.mean(shown) == pytest.approx(expected, abs=0.06)
 
 
-def test_persons_who_are_all_alike_need_two_and_tell_everything():
-    assert needed_persons([1.0, 1.0], [0, 1], 0.1) == 2
-    assert power([1.0, 1.0], [0, 1], effect=0.1, persons=2) == 1
+@pytest.mark.parametrize("stretch", [1.0, 1.8])
+def test_more_persons_never_make_it_less_likely_to_show_an_effect(stretch):
+    law = Law(spread=16.0, persons=8, level=0.975, stretch=stretch)
+    chances = [law.power(1.0, n) for n in (100, 1000, 5000, 8038, 8039, 10_000, 16_384)]
+    assert chances == sorted(chances)
+    assert chances[-1] > 0.99
 
 
-@pytest.mark.parametrize(
-    ("ask", "message"),
-    [
-        (lambda: needed_persons([1, 2], [0, 1], 0), "above zero, not 0"),
-        (lambda: needed_persons([1, 2], [0, 0], 1), "a pilot of at least two"),
-        (lambda: needed_persons([1, 2], [0, 1], 1, trials=3), "at least two for a person"),
-        (lambda: needed_persons([1, 2], [0, 1], 1e-6), "more than 1000000 persons"),
-        (lambda: power([1, 2], [0, 1], 1, persons=1), "at least 2 persons, not 1"),
-    ],
-)
-def test_what_a_pilot_cannot_tell_is_said(ask, message):
-    with pytest.raises(ValueError, match=message):
-        ask()
+def test_trials_count_with_the_mean_of_their_person():
+    law = law_of([1.0, 3.0, 2.0, 6.0], [0, 0, 1, 1])
+    assert law.spread == pytest.approx(math.sqrt(2.0))
+
+
+def test_persons_who_are_all_alike_and_one_alone_follow_no_law():
+    assert law_of([1.0, 1.0], [0, 1]) is None
+    assert law_of([1.0, 2.0], [0, 0]) is None
+
+
+def test_a_study_of_one_person_is_refused():
+    with pytest.raises(ValueError, match="at least 2 persons, not 1"):
+        law_of(PILOT, [0, 1, 2]).power(1.0, 1)

@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from dva_sim.exit_codes import ExitCode
 from dva_sim.experiments.validation.dispatch import output
 from dva_sim.experiments.validation.dispatch.cases import SHIPPED, Case, load_cases
 from dva_sim.experiments.validation.dispatch.identities import IDENTITIES
@@ -31,8 +32,8 @@ STYLES = {"agrees": "green", "too rough": "yellow", "differs": "bold red"}
 
 def validate_dispatch(
     cases: str | None, out: Path | None, quick: bool, jobs: int, seed: int
-) -> int:
-    """Play every case, print the comparison, write it if asked to; the exit code.
+) -> ExitCode:
+    """Play every case, print the comparison, write it if asked to; how it ended.
 
     Raises:
         ConfigError: a mistake in the cases.
@@ -50,7 +51,8 @@ def validate_dispatch(
             "length": "quick" if quick else "full",
         }
         say(f"Report: {output.write(out, checks, conditions)}")
-    return int(any(c.verdict == "differs" or _too_rough(c, quick) for c in checks))
+    missed = any(c.verdict == "differs" or _too_rough(c, quick) for c in checks)
+    return ExitCode.GATE_FAILED if missed else ExitCode.OK
 
 
 def _too_rough(check: Check, quick: bool) -> bool:

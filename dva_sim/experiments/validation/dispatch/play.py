@@ -9,7 +9,7 @@ from typing import cast
 
 import numpy as np
 
-from dva_sim.errors import DvaSimError
+from dva_sim.errors import RunsFailed
 from dva_sim.experiments import places
 from dva_sim.experiments.design import Job
 from dva_sim.experiments.journal import Outcome, Tables
@@ -95,7 +95,7 @@ def check_cases(
         progress: Told how many runs are finished.
 
     Raises:
-        DvaSimError: a run failed.
+        RunsFailed: a run failed.
     """
     outcomes: dict[tuple[str, int], Outcome] = {}
     everything = [job for case in cases for job in _jobs(case, seed, _runs(case, quick))]
@@ -124,7 +124,7 @@ def _perform(
     for batch in run_all(jobs, play, places.local(workers)):
         for outcome in batch:
             if outcome.error is not None:
-                raise DvaSimError(f"a run of case {outcome.key[0]!r} failed: {outcome.error}")
+                raise RunsFailed(f"a run of case {outcome.key[0]!r} failed: {outcome.error}")
             outcomes[outcome.key] = outcome
         progress(len(outcomes))
 

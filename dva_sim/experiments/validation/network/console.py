@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from dva_sim.exit_codes import ExitCode
 from dva_sim.experiments.validation.network import output
 from dva_sim.experiments.validation.network.comparing import (
     Comparison,
@@ -33,8 +34,8 @@ _WORST = 12  # of the largest z that are named
 
 def validate_network(
     plan_name: str | None, out: Path | None, setting: Setting, measure: Path | None, live: bool
-) -> int:
-    """Compare the model with measurements, or make some; the exit code.
+) -> ExitCode:
+    """Compare the model with measurements, or make some; how it ended.
 
     Args:
         plan_name: The document that says where measurements are, and what to measure.
@@ -61,15 +62,15 @@ def validate_network(
 
 def judge_runs(
     runs: Sequence[Run], conditions: dict[str, str], out: Path | None, setting: Setting
-) -> int:
-    """Compare the model with measurements, print it, write it if asked to; the exit code."""
+) -> ExitCode:
+    """Compare the model with measurements, print it, write it if asked to; how it ended."""
     started = time.perf_counter()
     comparison = _play(grouped(runs), setting)
     _tell(comparison)
     say(f"{time.perf_counter() - started:.0f} s")
     if out is not None:
         say(f"Report: {output.write(out, comparison, conditions | _settings(comparison, setting))}")
-    return int(not comparison.passes)
+    return ExitCode.OK if comparison.passes else ExitCode.GATE_FAILED
 
 
 def _play(groups: Sequence[Group], setting: Setting) -> Comparison:

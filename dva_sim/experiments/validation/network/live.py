@@ -10,6 +10,7 @@ from dva_sim.emulator.campaign import Progress, measure_all
 from dva_sim.emulator.cell import PACKETS, PROXY
 from dva_sim.emulator.running import why_no_packets
 from dva_sim.errors import ConfigError
+from dva_sim.exit_codes import ExitCode
 from dva_sim.experiments.validation.network.measured import Run, SourceConfig, read_runs
 from dva_sim.experiments.validation.network.plan import BlockConfig, conditions_of
 from dva_sim.experiments.validation.telling import progress_bar, say
@@ -18,8 +19,8 @@ from dva_sim.network.condition import Condition
 QUICK_S = 12.0  # measured of each condition; enough for twenty commands in nearly all
 
 
-def measure_design(blocks: Sequence[BlockConfig], path: Path) -> int:
-    """Measure what a design wants and a table does not hold yet; the exit code.
+def measure_design(blocks: Sequence[BlockConfig], path: Path) -> ExitCode:
+    """Measure what a design wants and a table does not hold yet; how it ended.
 
     Raises:
         ConfigError: the table cannot be written, or holds something else.
@@ -35,7 +36,7 @@ def measure_design(blocks: Sequence[BlockConfig], path: Path) -> int:
     for problem in failures:
         say(problem, markup=False)
     say(f"{path} holds what could be measured.", markup=False)
-    return int(bool(failures))
+    return ExitCode.RUNS_FAILED if failures else ExitCode.OK
 
 
 def measure_now(blocks: Sequence[BlockConfig], path: Path, quick: bool) -> list[Run]:

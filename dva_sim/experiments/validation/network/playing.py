@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, cast
 
-from dva_sim.errors import DvaSimError
+from dva_sim.errors import RunsFailed
 from dva_sim.experiments import places
 from dva_sim.experiments.design import Job
 from dva_sim.experiments.journal import Tables
@@ -60,7 +60,7 @@ def play_all(
         progress: Told how many runs are finished.
 
     Raises:
-        DvaSimError: a run failed.
+        RunsFailed: a run failed.
     """
     jobs = [job for order in orders for job in _jobs(order, seed)]
     # The longest first, so that the processes finish together.
@@ -70,7 +70,7 @@ def play_all(
     for batch in run_all(jobs, perform, places.local(workers)):
         for outcome in batch:
             if outcome.error is not None:
-                raise DvaSimError(f"{outcome.key[0]} could not be played: {outcome.error}")
+                raise RunsFailed(f"{outcome.key[0]} could not be played: {outcome.error}")
             rows[outcome.key] = json.loads(outcome.tables or "")["rows"]
             done += len(rows[outcome.key])
         progress(done)
@@ -98,7 +98,7 @@ def _jobs(order: Order, seed: int) -> list[Job]:
         asked = order.condition.to_row(), order.depth, order.without, first, count
         cell = (("order", json.dumps(asked)),)
         name, nobody = _name(order, first), cast(AnyScenario, None)
-        jobs.append(Job("network", cell, 0, 0, 0, seed, nobody, name))
+        jobs.append(Job("network", cell, 0, 0, 0, seed, name, nobody))
     return jobs
 
 

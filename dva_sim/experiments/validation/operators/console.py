@@ -11,6 +11,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from dva_sim.agents.operator.strategies import try_strategy
+from dva_sim.exit_codes import ExitCode
 from dva_sim.experiments.validation.operators import output
 from dva_sim.experiments.validation.operators.exact import EXACT
 from dva_sim.experiments.validation.operators.experiments import EXPERIMENTS
@@ -34,8 +35,8 @@ STYLES = {"passes": "green", "misses": "bold red", "shown only": "dim"}
 
 def validate_operators(
     strategy: str | None, out: Path | None, quick: bool, jobs: int, seed: int
-) -> int:
-    """Play every check, print the comparison, write it if asked to; the exit code.
+) -> ExitCode:
+    """Play every check, print the comparison, write it if asked to; how it ended.
 
     Raises:
         ConfigError: there is no such strategy, or a mistake in the files.
@@ -57,7 +58,7 @@ def validate_operators(
     if out is not None:
         page = output.write(out, verdicts, outcome, played, _conditions(setting))
         say(f"Report: {page}")
-    return int(not outcome.passes)
+    return ExitCode.OK if outcome.passes else ExitCode.GATE_FAILED
 
 
 def _play(setting: Setting) -> tuple[dict[str, Found], dict[str, Cells]]:

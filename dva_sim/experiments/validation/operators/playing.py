@@ -9,7 +9,7 @@ from typing import Any, cast
 
 from dva_sim import resources
 from dva_sim.config import load_yaml
-from dva_sim.errors import DvaSimError
+from dva_sim.errors import RunsFailed
 from dva_sim.experiments import places
 from dva_sim.experiments.design import Job
 from dva_sim.experiments.journal import Tables
@@ -62,7 +62,7 @@ def play_exact(
     """The value of each line of some exact checks, by its id.
 
     Raises:
-        DvaSimError: one of them could not be simulated.
+        RunsFailed: one of them could not be simulated.
     """
     jobs = [_job(_EXACT, check, 0, setting.seed, None) for check in checks]
     rows = _played(jobs, setting.workers, progress)
@@ -77,7 +77,7 @@ def play_experiments(
 
     Raises:
         ConfigError: a task cannot be read, or there is no such strategy.
-        DvaSimError: a trial failed.
+        RunsFailed: a trial failed.
     """
     jobs = [job for e in experiments for job in _jobs(e, setting)]
     rows = _played(jobs, setting.workers, progress)
@@ -148,7 +148,7 @@ def _played(
     for batch in run_all(jobs, perform, places.local(workers)):
         for outcome in batch:
             if outcome.error is not None:
-                raise DvaSimError(f"{outcome.key[0]!r} could not be simulated: {outcome.error}")
+                raise RunsFailed(f"{outcome.key[0]!r} could not be simulated: {outcome.error}")
             rows[outcome.key] = json.loads(outcome.tables or "")["rows"]
         progress(len(rows))
     return rows

@@ -1,0 +1,115 @@
+"""The commands about names and files: list, check, schema, and validate for the program itself."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from typer import Argument, Option
+
+from dva_sim.cli.options import Jobs
+from dva_sim.cli.values import whole
+
+
+def list_() -> None:
+    """Name all studies, scenarios, sites, agents and policies.
+
+    Examples:
+        dva-sim list  # all of them
+    """
+    from dva_sim.experiments import console
+
+    console.list_all()
+
+
+def check(
+    files: Annotated[
+        list[str],
+        Argument(
+            metavar="FILE...",
+            help="Messages, studies, scenarios, sites, plans, maps, agents; - reads a message. "
+            "Or policy, robot, operator, filter or mapping, and names of such or mine.py:Mine. "
+            "Or link: the emulated one.",
+        ),
+    ],
+    set_: Annotated[
+        list[str] | None,
+        Option("--set", metavar="KEY=VALUE", help="An option of what is tried."),
+    ] = None,
+) -> None:
+    """Tell of each file whether it is valid, and if not, where and why.
+
+    Of a policy, a robot, an operator, a filter or a mapping: whether it keeps its promises. Of the
+    emulated link: whether real packets cross it as it is told.
+
+    Examples:
+        dva-sim check message.xml my-study.yaml worlds/*.yaml  # files of any kind
+        dva-sim check - < message.xml  # a message from a pipe
+        dva-sim check policy agents/policies/patrol.py:Patrol  # does it keep its promises?
+        dva-sim check link  # does the emulated link do what it is told?
+    """
+    from dva_sim.checking import console
+
+    raise typer.Exit(console.check(files, set_ or []))
+
+
+def schema(
+    kind: Annotated[
+        str,
+        Argument(metavar="KIND", help="message, study, scenario, cases, site or agent."),
+    ],
+) -> None:
+    """Print the schema of a kind of file.
+
+    It is XSD for messages, and JSON Schema for all others.
+
+    Examples:
+        dva-sim schema scenario > scenario.schema.json  # for an editor
+    """
+    from dva_sim.checking import console
+
+    console.print_schema(kind)
+
+
+def validate(
+    what: Annotated[
+        str, Argument(metavar="WHAT", help="dispatch, operators or network.")
+    ] = "dispatch",
+    out: Annotated[
+        Path | None,
+        Option("-o", "--out", metavar="FOLDER", help="Write tables, figures and a page there."),
+    ] = None,
+    cases: Annotated[
+        str | None,
+        Option(metavar="FILE", help="A file of cases, by name or path; not for operators."),
+    ] = None,
+    strategy: Annotated[
+        str | None,
+        Option(metavar="NAME", help="How operators drive; operators only."),
+    ] = None,
+    quick: Annotated[bool, Option("--quick", help="Fewer runs, wider errors.")] = False,
+    jobs: Jobs = None,
+    seed: Annotated[int, Option("--seed", metavar="N", parser=whole(), help="Random seed.")] = 1,
+    ablate: Annotated[
+        bool, Option("--ablate", help="Leave mechanisms out one by one; network only.")
+    ] = False,
+    live: Annotated[bool, Option("--live", help="Measure real sockets now; network only.")] = False,
+    measure: Annotated[
+        Path | None,
+        Option(metavar="FILE", help="Measure the whole design, or go on with it; network only."),
+    ] = None,
+) -> None:
+    """Compare the models with theory, people and sockets.
+
+    It plays what the answer is known of, and ends with 4 if a prediction misses.
+
+    Examples:
+        dva-sim validate dispatch --quick  # against queueing theory and geometry
+        dva-sim validate operators -o evidence  # against published experiments
+        dva-sim validate network --live --quick  # against sockets of this machine
+    """
+    from dva_sim.experiments.validation import console
+
+    sockets = console.Sockets(ablate, live, measure)
+    raise typer.Exit(console.validate(what, out, cases, quick, jobs, seed, strategy, sockets))

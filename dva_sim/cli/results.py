@@ -1,0 +1,121 @@
+"""The commands that read results: report, show, export, compare."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from typer import Argument, Option
+
+from dva_sim.cli.options import Folder
+from dva_sim.cli.values import whole
+
+
+def report(
+    folder: Folder,
+    pdf: Annotated[bool, Option("--pdf", help="As PDF too, for print.")] = False,
+) -> None:
+    """Make the report of a results folder again.
+
+    It is a page, its figures, and the numbers in them. Of a study that still runs, the page
+    says what is known so far.
+
+    Examples:
+        dva-sim report results/req-rep-vs-pub-sub --pdf  # and report.pdf for print
+    """
+    from dva_sim.experiments.report import write_report
+
+    page = write_report(folder, pdf)
+    typer.echo(f"Report: {page}{' and report.pdf' if pdf else ''}")
+
+
+def show(
+    folder: Folder,
+    table: Annotated[str | None, Option(metavar="NAME", help="Show the rows of a table.")] = None,
+    rows: Annotated[
+        int,
+        Option(metavar="N", parser=whole(1), help="How many of them."),
+    ] = 20,
+    columns: Annotated[
+        bool, Option("--columns", help="Say what the columns mean, of one table or all.")
+    ] = False,
+) -> None:
+    """Show a results folder in the terminal.
+
+    It shows the answer and every cell, or a table, or what the columns mean. Of a study that
+    still runs it shows what is known so far.
+
+    Examples:
+        dva-sim show small  # the answer and every cell
+        dva-sim show small --table events --rows 5  # the first rows of a table
+        dva-sim show small --columns  # what the columns of every table mean
+    """
+    from dva_sim.experiments import showing_console
+    from dva_sim.experiments.unfinished import load_so_far
+
+    showing_console.show(load_so_far(folder), table, columns, rows)
+
+
+def export(
+    folder: Folder,
+    out: Annotated[
+        Path,
+        Option(
+            "-o", "--out", metavar="PATH", help="X.csv or X.parquet for one table, or a folder."
+        ),
+    ],
+    table: Annotated[
+        list[str] | None,
+        Option(metavar="NAME", help="Only this one; may be given again."),
+    ] = None,
+    form: Annotated[
+        str | None, Option("--format", metavar="csv|parquet", help="In a folder; default: csv.")
+    ] = None,
+    overwrite: Annotated[bool, Option("--overwrite", help="Replace what is there.")] = False,
+) -> None:
+    """Write tables of results for other programs.
+
+    In a folder, columns.csv says what the columns mean.
+
+    Examples:
+        dva-sim export small -o small.csv  # one row for each run
+        dva-sim export small -o tables --format parquet  # every table
+    """
+    from dva_sim.experiments import showing_console
+
+    showing_console.export(folder, out, table or [], form, overwrite)
+
+
+def compare(
+    first: Annotated[Path, Argument(metavar="A", help="A results folder.")],
+    second: Annotated[Path, Argument(metavar="B", help="What is compared with it.")],
+    measure: Annotated[
+        list[str] | None,
+        Option(
+            metavar="MEASURE",
+            help="NAME or TABLE.NAME; default: the answer's. May be given again.",
+        ),
+    ] = None,
+    by: Annotated[
+        list[str] | None,
+        Option(metavar="FACTOR", help="Its levels in place of cells; may be given again."),
+    ] = None,
+    fail_if: Annotated[
+        list[str] | None,
+        Option(metavar="CONDITION", help="Exit with 4 if it holds; may be given again."),
+    ] = None,
+) -> None:
+    """Compare two results folders, run by run.
+
+    Runs with the same random seed are compared in pairs.
+
+    Examples:
+        dva-sim compare before after --by pattern  # by the levels of a factor
+        dva-sim compare a b --fail-if 'p95(drive_time_s) > 1.05x'  # B's over A's
+        dva-sim compare a b --fail-if 'mean(drive_time_s) per cell > +0.5 s'  # B minus A
+        dva-sim compare a b --fail-if 'share(confirmed) < 95 %'  # of B alone
+    """
+    from dva_sim.experiments import showing_console
+
+    raise typer.Exit(showing_console.compare(first, second, measure or [], by or [], fail_if or []))

@@ -1,0 +1,181 @@
+"""The commands that play or replay one scenario: episode, replay, live, keys."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from typer import Argument, Option
+
+from dva_sim.cli.options import (
+    At,
+    Camera,
+    Inset,
+    Panels,
+    ScenarioName,
+    Seed,
+    Sets,
+    Still,
+    Strip,
+    Video,
+)
+from dva_sim.cli.values import number, whole
+
+_MOST_PORT = 64_999
+
+
+def episode(
+    scenario: ScenarioName,
+    seed: Seed = 1,
+    set_: Sets = None,
+    video: Video = None,
+    still: Still = None,
+    strip: Strip = None,
+    at: At = None,
+    panels: Panels = 6,
+    camera: Camera = None,
+    inset: Inset = False,
+    side_by_side: Annotated[
+        str | None,
+        Option(metavar="PATTERN,PATTERN", help="Run the same seed under two patterns."),
+    ] = None,
+    record: Annotated[
+        Path | None,
+        Option(metavar="FILE", help="Keep the run as a file: .mcap, for replay and viewers."),
+    ] = None,
+) -> None:
+    """Run one scenario and tell its story.
+
+    Examples:
+        dva-sim episode fire-drill --seed 3  # the story, line by line
+        dva-sim episode drive-to-event --set link.delay_s=1  # over a slower link
+        dva-sim episode evacuation --strip fire.png  # several moments in one figure
+        dva-sim episode fire-drill --record drill.mcap  # for `dva-sim replay` and viewers
+    """
+    from dva_sim.experiments import console
+    from dva_sim.experiments.pictures import Wanted
+
+    pictures = Wanted(video, still, strip, at, panels, camera, inset)
+    console.episode(scenario, seed, set_ or [], side_by_side, pictures, record)
+
+
+def replay(
+    file: Annotated[Path, Argument(metavar="FILE", help="A recording: .mcap.")],
+    video: Video = None,
+    still: Still = None,
+    strip: Strip = None,
+    at: At = None,
+    panels: Panels = 6,
+    camera: Camera = None,
+    inset: Inset = False,
+    ros2: Annotated[
+        Path | None, Option(metavar="FOLDER", help="Write a ROS 2 bag; the folder is new.")
+    ] = None,
+) -> None:
+    """Tell and draw a recorded run from its file alone.
+
+    Examples:
+        dva-sim replay drill.mcap --strip drill.png  # several moments in one figure
+        dva-sim replay drill.mcap --ros2 bag  # for the tools of ROS 2
+    """
+    from dva_sim.experiments import replaying
+    from dva_sim.experiments.pictures import Wanted
+
+    replaying.replay(file, Wanted(video, still, strip, at, panels, camera, inset), ros2)
+
+
+def live(
+    scenario: ScenarioName,
+    only: Annotated[
+        str | None, Option(metavar="dva|world|operator", help="Run one part alone.")
+    ] = None,
+    which: Annotated[
+        int,
+        Option(
+            "--number",
+            metavar="N",
+            parser=whole(1),
+            help="Which operator, with --only operator.",
+        ),
+    ] = 1,
+    operators: Annotated[
+        str,
+        Option(metavar="simulated|scripted", help="Who drives."),
+    ] = "simulated",
+    dva: Annotated[
+        str | None,
+        Option(metavar="HOST:PORT", help="Where the DVA listens; 127.0.0.1:5600 with --only."),
+    ] = None,
+    host: Annotated[
+        str, Option(metavar="HOST", help="Address of this machine to listen on.")
+    ] = "127.0.0.1",
+    port: Annotated[
+        int,
+        Option(
+            metavar="PORT",
+            parser=whole(0, _MOST_PORT),
+            help="First port, two for each device; default: free ones.",
+        ),
+    ] = 0,
+    keys: Annotated[
+        Path | None, Option(metavar="FOLDER", help="Folder of keys: CURVE is on.")
+    ] = None,
+    record: Annotated[
+        Path | None, Option(metavar="FOLDER", help="Folder for the robots' traces.")
+    ] = None,
+    state: Annotated[
+        Path | None,
+        Option(metavar="FILE", help="File that lets a killed DVA go on where it was."),
+    ] = None,
+    seconds: Annotated[
+        float | None,
+        Option(
+            "--for",
+            metavar="SECONDS",
+            parser=number(),
+            help="How long; default: to the scenario's horizon.",
+        ),
+    ] = None,
+    seed: Seed = 1,
+    set_: Sets = None,
+) -> None:
+    """Run a scenario in real time, over sockets.
+
+    The DVA, the world and each operator are processes that talk by ZeroMQ.
+
+    Examples:
+        dva-sim live drive-to-event  # a simulated person drives
+        dva-sim live drive-to-event --operators scripted  # fixed commands, an emergency
+        dva-sim live drive-to-event --only dva --dva 192.168.1.10:5600  # one part here
+    """
+    from dva_sim.live import console
+    from dva_sim.live.options import Options
+
+    changes = tuple(set_ or ())
+    options = Options(
+        scenario, changes, seed, operators, host, dva, port, keys, record, state, seconds
+    )
+    if only is None:
+        console.run_all(options)
+    else:
+        console.run_one(only, options, which)
+
+
+def keys(
+    folder: Annotated[Path, Argument(metavar="FOLDER", help="Where to put them.")],
+    names: Annotated[
+        list[str], Argument(metavar="NAME...", help="Devices (robot-1, an id), or scenarios.")
+    ],
+) -> None:
+    """Make a pair of keys for each device that has none.
+
+    Existing keys are kept. `dva-sim live --keys FOLDER` uses them.
+
+    Examples:
+        dva-sim keys keys drive-to-event  # for each device of the scenario
+        dva-sim keys keys dva robot-1 operator-1  # for these devices
+    """
+    from dva_sim.live.keys import make_keys
+
+    typer.echo(make_keys(folder, names))

@@ -1,0 +1,136 @@
+"""The commands that make results: demo, run, new, register, tune."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from typer import Option
+
+from dva_sim.cli.options import Jobs, Results, Sets, StudyName
+from dva_sim.cli.values import number, whole
+
+
+def demo(
+    out: Annotated[
+        Path,
+        Option("-o", "--out", metavar="FOLDER", help="Where pictures, film and report go."),
+    ] = Path("results/demo"),
+    jobs: Jobs = None,
+) -> None:
+    """See in about a minute what delay and a messaging pattern do.
+
+    It shows one drive under two patterns, as a picture, a story and a film, then runs the small
+    version of the main study and writes its report.
+
+    Examples:
+        dva-sim demo  # into results/demo
+    """
+    from dva_sim.experiments.demo import demo as show_it
+
+    raise typer.Exit(show_it(out, jobs))
+
+
+def run(
+    study: StudyName,
+    out: Results = None,
+    set_: Sets = None,
+    seed: Annotated[
+        int | None,
+        Option("--seed", metavar="N", parser=whole(), help="Random seed of the whole study."),
+    ] = None,
+    jobs: Jobs = None,
+    scheduler: Annotated[
+        str | None,
+        Option(metavar="tcp://HOST:PORT", help="Use a dask.distributed cluster instead."),
+    ] = None,
+    limit: Annotated[
+        float,
+        Option(
+            metavar="SECONDS",
+            parser=number(),
+            help="A run that takes longer has failed.",
+        ),
+    ] = 600,
+    quick: Annotated[bool, Option("--quick", help="The study's small version.")] = False,
+    full: Annotated[bool, Option("--full", help="The study's larger version.")] = False,
+    pilot: Annotated[
+        int | None,
+        Option(
+            metavar="PERSONS",
+            parser=whole(1),
+            help="Only so many persons, with a random seed of their own.",
+        ),
+    ] = None,
+    dry_run: Annotated[bool, Option("--dry-run", help="Only say what would run.")] = False,
+) -> None:
+    """Run a study, or go on with it, and write its report.
+
+    A study that was interrupted goes on where it stopped: finished runs are kept in its folder.
+
+    Examples:
+        dva-sim run req-rep-vs-pub-sub --dry-run  # what would run, and how long it would take
+        dva-sim run req-rep-vs-pub-sub --quick  # its small version: an answer in a minute
+        dva-sim run req-rep-vs-pub-sub --set persons=4 -j 2 -o small  # smaller, two processes
+        dva-sim run mine.yaml --set 'link.delay_s=[0, 0.5]'  # other levels of a factor
+    """
+    from dva_sim.experiments import running
+    from dva_sim.experiments.versions import Variant
+
+    changes = [*(set_ or []), *([f"seed={seed}"] if seed is not None else [])]
+    variant = Variant.of(quick=quick, full=full, pilot=pilot)
+    workers = running.Workers(jobs, scheduler, limit)
+    if dry_run:
+        running.plan(study, changes, out, workers, variant)
+        return
+    raise typer.Exit(running.run(study, changes, out, workers, variant))
+
+
+def new(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="Name or path of the new study.")],
+) -> None:
+    """Write a study to begin with, which runs as it stands.
+
+    Comments in it say what can be changed.
+
+    Examples:
+        dva-sim new mine  # writes mine.yaml here
+    """
+    from dva_sim.experiments.starting import told, write_study
+
+    typer.echo(told(write_study(name)))
+
+
+def register(
+    study: StudyName,
+    full: Annotated[bool, Option("--full", help="The study's larger version.")] = False,
+    again: Annotated[
+        bool,
+        Option("--again", help="In place of an earlier registration; the report will say so."),
+    ] = False,
+) -> None:
+    """Fix a study's hypotheses and size before it is run.
+
+    The run then confirms or refutes the hypotheses.
+
+    Examples:
+        dva-sim register mine.yaml  # writes mine.registration.yaml beside it
+    """
+    from dva_sim.experiments.registration import register as write_down
+    from dva_sim.experiments.study import load_study
+
+    typer.echo(write_down(load_study(study, version="full" if full else None), again))
+
+
+def tune(study: StudyName, out: Results = None, jobs: Jobs = None) -> None:
+    """Choose the values that a study has tuned.
+
+    They are tried on persons who take no part in the study, and kept beside it.
+
+    Examples:
+        dva-sim tune filters  # writes tuned/filters.yaml beside it
+    """
+    from dva_sim.experiments import running
+
+    raise typer.Exit(running.tune(study, out, jobs))

@@ -1,0 +1,148 @@
+"""How the program is called: options, help, exit codes; all in this process."""
+
+from __future__ import annotations
+
+import shlex
+import subprocess
+import sys
+from itertools import takewhile
+
+import pytest
+from typer.main import get_command
+
+from dva_sim import __version__
+from dva_sim.cli import app, call
+from dva_sim.cli.layout import Group
+from dva_sim.errors import ConfigError, RunsFailed
+from dva_sim.exit_codes import ExitCode
+
+COMMANDS = [c.name or c.callback.__name__.rstrip("_") for c in app.registered_commands]
+PATHS = [[name] for name in COMMANDS] + [["site"], ["site", "show"], ["site", "export"]]
+WIDTH = 80
+
+
+@pytest.fixture
+def terminal(monkeypatch):
+    monkeypatch.setenv("COLUMNS", str(WIDTH))
+
+
+def test_the_version_is_printed(capsys):
+    assert call(["--version"]) == 0
+    assert capsys.readouterr().out == f"dva-sim {__version__}\n"
+
+
+@pytest.mark.parametrize("path", [[], *PATHS], ids=" ".join)
+def test_help_by_its_short_name_fits_a_terminal_of_80_columns(terminal, capsys, path):
+    assert call([*path, "-h"]) == 0
+    short = capsys.readouterr().out
+    assert call([*path, "--help"]) == 0
+    assert capsys.readouterr().out == short
+    assert short.startswith(" ".join(["Usage: dva-sim", *path]))
+    assert max(map(len, short.splitlines())) <= WIDTH
+    assert "..." not in short.replace("FILE...", "").replace("NAME...", "").replace("[ARGS]...", "")
+
+
+@pytest.mark.parametrize("path", [path for path in PATHS if path != ["site"]], ids=" ".join)
+def test_help_ends_with_examples_that_say_what_they_do(terminal, capsys, path):
+    call([*path, "--help"])
+    examples = capsys.readouterr().out.partition("\nExamples:\n")[2].splitlines()
+    calls = [line for line in examples if line.startswith("  dva-sim ")]
+    remarks = [line for line in examples if line.startswith("  # ")]
+    assert calls
+    assert len(remarks) == len(calls)
+    assert any(line.startswith(f"  dva-sim {' '.join(path)} ") for line in calls) or path == [
+        "list"
+    ]
+
+
+@pytest.mark.parametrize("path", [path for path in PATHS if path != ["site"]], ids=" ".join)
+def test_examples_use_words_and_options_that_there_are(path):
+    program = get_command(app)
+    for line, _ in command_at(path).examples:
+        words = list(takewhile(lambda word: word not in "<>", shlex.split(line)[1:]))
+        with program.make_context("dva-sim", words) as context:
+            _, command, rest = program.resolve_command(context, words)
+            while isinstance(command, Group):
+                command, rest = command.commands[rest[0]], rest[1:]
+            command.make_context("x", rest, parent=context).close()
+
+
+def command_at(path):
+    command = get_command(app)
+    for name in path:
+        command = command.commands[name]
+    return command
+
+
+def test_the_help_of_the_program_states_every_exit_code(terminal, capsys):
+    call(["--help"])
+    told = capsys.readouterr().out.partition("\nExit codes:\n")[2]
+    assert [int(line.split()[0]) for line in told.splitlines()] == list(ExitCode)
+
+
+def test_without_a_command_the_help_is_shown(capsys):
+    assert call([]) == 0
+    assert capsys.readouterr().out.startswith("Usage: dva-sim")
+
+
+@pytest.mark.parametrize(
+    ("words", "line"),
+    [
+        (["rn"], "dva-sim: 'rn' is no command; did you mean 'run'?; see dva-sim --help"),
+        (["run"], "dva-sim run needs STUDY: a study by name or path; see dva-sim run --help"),
+        (["run", "x", "--jbos", "2"], "dva-sim run has no option '--jbos'; did you mean '--jobs'?"),
+        (["run", "x", "--xyz"], "dva-sim run has no option '--xyz'; see dva-sim run --help"),
+        (["run", "x", "-j"], "-j takes a value"),
+        (["run", "x", "--full=3"], "--full takes no value"),
+        (
+            ["run", "x", "y"],
+            "dva-sim run does not know what to do with 'y'; see dva-sim run --help",
+        ),
+        (["run", "x", "--seed", "-1"], "--seed '-1' should be a whole number of at least 0"),
+        (["run", "x", "-j", "0"], "--jobs '0' should be a whole number from 1 to 1024"),
+        (["run", "x", "-j", "²"], "--jobs '²' should be a whole number from 1 to 1024"),
+        (["run", "x", "--limit", "nan"], "--limit 'nan' should be a number above 0"),
+        (["run", "x", "--limit", "5%"], "--limit '5%' should be a number above 0"),
+        (
+            ["episode", "x", "--seed", "9" * 30],
+            f"--seed '{'9' * 30}' should be a whole number of at least 0",
+        ),
+        (
+            ["site", "shwo"],
+            "dva-sim site: 'shwo' is no command; did you mean 'show'?; see dva-sim site --help",
+        ),
+    ],
+    ids=lambda value: " ".join(value)[:40] if isinstance(value, list) else "",
+)
+def test_a_mistake_in_the_words_is_one_line_that_says_what_would_be_right(capsys, words, line):
+    assert call(words) == 2
+    said = capsys.readouterr()
+    assert (said.out, said.err) == ("", f"error: {line}\n")
+
+
+@pytest.mark.parametrize(
+    ("raised", "code", "line"),
+    [
+        (ConfigError("no\nroom", "a.yaml", 3, 1), 2, "error: a.yaml:3:1: no room"),
+        (RunsFailed("3 runs failed"), 3, "error: 3 runs failed"),
+        (PermissionError(13, "Permission denied", "a\tb"), 2, "error: a b: Permission denied"),
+        (OSError(28, "No space left on device"), 2, "error: No space left on device"),
+        (KeyboardInterrupt(), 130, "error: stopped by Ctrl-C"),
+    ],
+)
+def test_what_goes_wrong_ends_in_one_line_and_its_code(monkeypatch, capsys, raised, code, line):
+    def fail(_):
+        raise raised
+
+    monkeypatch.setattr("dva_sim.checking.console.print_schema", fail)
+    assert call(["schema", "site"]) == code
+    assert capsys.readouterr().err == f"{line}\n"
+
+
+def test_the_program_is_a_module_and_a_reader_that_goes_away_is_no_traceback():
+    command = [sys.executable, "-m", "dva_sim", "schema", "message"]
+    program = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    program.stdout.close()
+    assert program.stderr.read() == b""
+    assert program.wait() == ExitCode.READER_GONE
+    program.stderr.close()
