@@ -1,7 +1,7 @@
 """The command line, called in this process: its words, what it prints, its exit code.
 
-To start a program takes a second or more of computing; only `test_command_line` does, once, and
-whoever needs a process that can be stopped: see `programs`.
+To start a program takes a second or more of computing. Only one test of `test_command_line` does,
+and whoever needs a process that can be stopped: see `programs`.
 """
 
 from __future__ import annotations
@@ -21,20 +21,10 @@ WIDE = "200"  # columns, so that no line is broken
 
 def call(*words: str | Path, cwd: Path | None = None, said: str = "") -> CompletedProcess[str]:
     """What becomes of `dva-sim WORDS` in a folder, with `said` on its standard input."""
-    command = ["dva-sim", *map(str, words)]
     out, errors = _written(), _written()
     with _terminal(out, errors, said), contextlib.chdir(cwd or Path.cwd()):
-        code = _exit_code(command)
-    return CompletedProcess(command, code, *(_text(stream) for stream in (out, errors)))
-
-
-def _exit_code(command: list[str]) -> int:
-    with mock.patch.object(sys, "argv", command):
-        try:
-            cli.main()
-        except SystemExit as end:
-            return end.code if isinstance(end.code, int) else int(end.code is not None)
-    return 0
+        code = cli.call([str(word) for word in words])
+    return CompletedProcess(words, code, *(_text(stream) for stream in (out, errors)))
 
 
 @contextlib.contextmanager

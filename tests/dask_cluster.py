@@ -6,11 +6,11 @@ import json
 import os
 import subprocess
 import sys
-import time
 from pathlib import Path
 
+from patience import becomes
+
 TESTS = Path(__file__).parent
-PATIENCE_S = 120.0  # for what takes seconds, on a machine that is busy
 _QUIET = {"DASK_DISTRIBUTED__LOGGING__DISTRIBUTED": "critical"}
 
 
@@ -45,11 +45,13 @@ class DaskCluster:
 
     def _text_of(self, file: Path) -> str:
         """As soon as it is there: it is written when the scheduler listens."""
-        end = time.monotonic() + PATIENCE_S
-        while not file.exists() or not file.read_text().endswith("}"):
+        try:
+            assert becomes(lambda: self.scheduler.poll() is not None or _is_whole(file))
             assert self.scheduler.poll() is None, "the scheduler has ended"
-            assert time.monotonic() < end, "the scheduler does not begin"
-            time.sleep(0.05)
+        except BaseException:
+            self.scheduler.kill()
+            self.scheduler.wait()
+            raise
         return file.read_text()
 
     def __enter__(self) -> DaskCluster:
@@ -59,3 +61,7 @@ class DaskCluster:
         for process in (*self.workers, self.scheduler):
             process.kill()
             process.wait()
+
+
+def _is_whole(file: Path) -> bool:
+    return file.exists() and file.read_text().endswith("}")

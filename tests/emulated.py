@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import os
 import select
-import time
-from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
 import pytest
+from patience import PATIENCE_S, becomes
 
 from dva_sim.emulator.cell import Job
 from dva_sim.emulator.running import EmulatorError, run_job
-
-PATIENCE_S = 20.0
 
 
 @cache
@@ -51,14 +48,6 @@ def wait_for_children(parent: int, count: int) -> list[int]:
 def networks(*processes: int) -> set[str]:
     """The network namespaces of some processes."""
     return {str(Path(f"/proc/{process}/ns/net").readlink()) for process in processes}
-
-
-def becomes(true: Callable[[], bool]) -> bool:
-    """Whether something becomes true before patience ends."""
-    limit = time.monotonic() + PATIENCE_S
-    while not true() and time.monotonic() < limit:
-        os.sched_yield()
-    return true()
 
 
 def all_end(handles: list[int]) -> bool:

@@ -8,6 +8,8 @@ from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
+from patience import PATIENCE_S
+
 from dva_sim import scenario as scenarios
 from dva_sim.agents.commands import topic_of
 from dva_sim.agents.modes import Decision, RobotController
@@ -28,7 +30,6 @@ from dva_sim.simulation.stage import Stage
 from dva_sim.streams import Streams
 
 ROBOT, OPERATOR = id_of("robot", 1), id_of("operator", 1)
-LIMIT = 300.0  # for a session that takes five seconds, on a machine that is busy [s]
 STEP = 0.02  # between two looks at whether it is over [s]
 
 # Far above any gap between commands, so that nothing hangs on how fast a clock goes.
@@ -189,10 +190,10 @@ def _act_out(stage: Stage, way: Way, trace: Path | None = None) -> list[Decided]
             if witness.trace is not None:
                 witness.trace.close()
             return witness.decisions
-    raise TimeoutError(f"not over within {LIMIT:g} s: {operator.transcript[-3:]}")
+    raise TimeoutError(f"not over within {PATIENCE_S:g} s: {operator.transcript[-3:]}")
 
 
 def _steps_of(clock: Clock) -> Iterator[None]:
-    while clock.now < LIMIT:
+    while clock.now < PATIENCE_S:
         clock.run(clock.now + STEP)
         yield

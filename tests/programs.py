@@ -12,22 +12,19 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
 
-LIMIT = 180.0  # for what takes seconds, on a machine that is busy [s]
-LOOK = 0.05  # between two looks [s]
+from patience import LOOK_S, PATIENCE_S, becomes
+
 WIDE = "200"  # columns, so that no line is broken
 
 
-def wait_until(condition: Callable[[], object], what: str, limit: float = LIMIT) -> None:
+def wait_until(condition: Callable[[], object], what: str) -> None:
     """Wait for as long as it takes.
 
     Raises:
         TimeoutError: it took too long; `what` was waited for.
     """
-    end = time.monotonic() + limit
-    while not condition():
-        if time.monotonic() > end:
-            raise TimeoutError(f"{what}: not within {limit:g} s")
-        time.sleep(LOOK)
+    if not becomes(condition):
+        raise TimeoutError(f"{what}: not within {PATIENCE_S:g} s")
 
 
 class Program:
@@ -67,9 +64,9 @@ class Program:
     def _has_ended(self) -> bool:
         return self.process.poll() is not None
 
-    def ends(self, within: float = LIMIT) -> int:
+    def ends(self) -> int:
         """Its exit code, as soon as there is one."""
-        wait_until(lambda: self._has_ended, "ends", within)
+        wait_until(lambda: self._has_ended, "ends")
         assert self.process.returncode is not None
         return self.process.returncode
 
@@ -125,7 +122,7 @@ class Programs:
             for pid in processes:
                 with suppress(ProcessLookupError):
                     os.kill(pid, signal.SIGKILL)
-            time.sleep(LOOK)
+            time.sleep(LOOK_S)
         for program in self._started:
             program.process.wait()
 

@@ -13,6 +13,7 @@ from random import Random
 from typing import Any
 
 import zmq
+from patience import PATIENCE_S
 
 from dva_sim.agents.device import Device
 from dva_sim.clock import Clock
@@ -41,8 +42,7 @@ GUARD = "02:00:00:00:00:05"  # has a key like them, but is elsewhere
 STRANGER = "02:00:00:00:00:99"  # nobody was ever told where it is
 
 BRIEF = 0.15  # a time-out that is meant to run out; an authenticated handshake fits in [s]
-PATIENT = 120.0  # one that is not [s]
-LIMIT = 60.0  # until what is waited for has happened, on a machine that is busy [s]
+PATIENT = PATIENCE_S  # one that is not [s]
 STEP = 0.005  # between two looks at a condition [s]
 DELAY = 0.001  # one way, in virtual time [s]
 
@@ -67,7 +67,7 @@ class World:
     def run_for(self, seconds: float) -> None:
         self.clock.run(self.clock.now + seconds)
 
-    def run_until(self, condition: Callable[[], object], limit: float = LIMIT) -> None:
+    def run_until(self, condition: Callable[[], object], limit: float = PATIENCE_S) -> None:
         """Let time pass until something is so."""
         end = self.clock.now + limit
         while not condition():

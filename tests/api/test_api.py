@@ -3,11 +3,11 @@
 import asyncio
 import inspect
 import json
-import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
+import patience
 import pytest
 import typer
 
@@ -67,7 +67,7 @@ def files(folder):
 
 def python(*words, folder):
     """What a Python of its own says, without any mistake or warning."""
-    done = subprocess.run([sys.executable, *words], capture_output=True, text=True, cwd=folder)
+    done = patience.run([sys.executable, *words], capture_output=True, text=True, cwd=folder)
     assert (done.returncode, done.stderr) == (0, "")
     return done.stdout
 

@@ -8,6 +8,7 @@ from contextlib import ExitStack
 
 import pytest
 import zmq
+from patience import PATIENCE_S
 from transports import (
     BRIEF,
     DVA,
@@ -145,7 +146,7 @@ def test_whatever_speaks_no_zeromq_at_a_port_harms_nobody(
 ) -> None:
     """Twenty connections stay open all the time."""
     for _ in range(20):
-        line = tcp.create_connection(("127.0.0.1", served.port(DVA, published)), timeout=60)
+        line = tcp.create_connection(("127.0.0.1", served.port(DVA, published)), timeout=PATIENCE_S)
         talkers.enter_context(line)
         line.sendall(GARBAGE[kind])
     others_are_served(served)

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 from typing import IO
 
 import pytest
-from emulated import all_end, becomes, need_link, networks, wait_for_children
+from emulated import all_end, need_link, networks, wait_for_children
+from patience import becomes
 
 from dva_sim.emulator.cell import Job, Outcome
 from dva_sim.emulator.check import PROBES, Crossing, find_bursts, find_loss
@@ -131,11 +132,13 @@ def test_a_killed_forwarder_leaves_nothing(run: Run) -> None:
 def test_a_killed_parent_leaves_nothing() -> None:
     need_link()
     parent = subprocess.Popen([sys.executable, "-c", WAITING], stderr=subprocess.DEVNULL)
-    (leader,) = wait_for_children(parent.pid, 1)
-    ends = wait_for_children(leader, 2)
-    handles = [os.pidfd_open(pid) for pid in (leader, *ends)]
-    parent.kill()
-    parent.wait()
+    try:
+        (leader,) = wait_for_children(parent.pid, 1)
+        ends = wait_for_children(leader, 2)
+        handles = [os.pidfd_open(pid) for pid in (leader, *ends)]
+    finally:
+        parent.kill()
+        parent.wait()
     assert all_end(handles)
 
 

@@ -1,6 +1,6 @@
-import subprocess
 import sys
 
+import patience
 import pytest
 
 from dva_sim.emulator.notes import Kind, Notes
@@ -19,7 +19,7 @@ print(notes.read())
 
 
 def test_notes_of_a_process_are_read_after_it_ended() -> None:
-    told = subprocess.run(
+    told = patience.run(
         [sys.executable, "-c", A_PROCESS_NOTES_AND_ENDS], capture_output=True, text=True, check=True
     )
     assert told.stdout == "[(4, 0, 1.5), (8, 3, 2.25)]\n"

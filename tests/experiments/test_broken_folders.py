@@ -6,10 +6,10 @@ import functools
 import os
 import shutil
 import signal
-import subprocess
 import sys
 from pathlib import Path
 
+import patience
 import pytest
 import small_study as kit
 
@@ -111,12 +111,12 @@ def test_a_folder_that_cannot_be_written_is_told(tmp_path: Path, out: Path) -> N
         "print(dry_run(study, folder / 'out').done)\n"
     )
     (tmp_path / "empty").mkdir()
-    can = shutil.which("unshare") and subprocess.run(
+    can = shutil.which("unshare") and patience.run(
         [*words, "mount", "-t", "tmpfs", "none", tmp_path / "empty"], capture_output=True
     )
     if not can or can.returncode:
         pytest.skip("this system lets nobody but root mount a folder read-only")
-    ran = subprocess.run(
+    ran = patience.run(
         [*words, sys.executable, "-c", program, tmp_path],
         capture_output=True,
         text=True,

@@ -5,12 +5,12 @@ from __future__ import annotations
 import json
 import os
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 from typing import Any
 
 import disturbed_study as kit
+import patience
 import pytest
 
 TESTS = Path(kit.__file__).parent
@@ -20,7 +20,7 @@ NAMESPACE = ["unshare", "--map-root-user", "--mount"]
 def told(*words: str | Path) -> dict[str, Any]:
     path = os.pathsep.join(map(str, (TESTS.parent, TESTS)))
     environment = {**os.environ, "PYTHONPATH": path}
-    ran = subprocess.run(
+    ran = patience.run(
         list(map(str, words)), capture_output=True, text=True, env=environment, check=False
     )
     assert ran.returncode == 0, ran.stderr
@@ -43,7 +43,7 @@ def mounts_are_allowed(folder: Path) -> bool:
     if shutil.which("unshare") is None:
         return False
     words = [*NAMESPACE, "mount", "-t", "tmpfs", "tmpfs", str(folder)]
-    return subprocess.run(words, capture_output=True, check=False).returncode == 0
+    return patience.run(words, capture_output=True, check=False).returncode == 0
 
 
 @pytest.mark.system

@@ -1,7 +1,6 @@
 """Commit and state of the program, by git checkouts made for the purpose."""
 
-import subprocess
-
+import patience
 import pytest
 
 from dva_sim.experiments.provenance import state_of
@@ -11,7 +10,7 @@ WHO = ("-c", "user.name=somebody", "-c", "user.email=somebody@example.org")
 
 def git(folder, *words):
     command = ["git", "-C", str(folder), *WHO, *words]
-    return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
+    return patience.run(command, capture_output=True, text=True, check=True).stdout.strip()
 
 
 @pytest.fixture

@@ -5,20 +5,21 @@ import os
 import signal
 import subprocess
 import sys
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 import small_study as kit
+from patience import PATIENCE_S
 
 from dva_sim.errors import ConfigError
-from dva_sim.experiments import manifest
+from dva_sim.experiments import manifest, pool
 from dva_sim.experiments.planning import dry_run
 from dva_sim.experiments.results import Results
 from dva_sim.experiments.runner import run_study
 
 TESTS = Path(kit.__file__).parent
-PATIENCE_S = 60
 
 
 @pytest.fixture
@@ -96,14 +97,29 @@ def test_a_finished_study_is_not_run_again(tmp_path, plain):
     assert kit.files(out) == plain
 
 
-def started(study: Path, out: Path) -> subprocess.Popen[str]:
-    return subprocess.Popen(
-        [sys.executable, "-m", "small_study", str(study), str(out), "2"],
-        stdout=subprocess.PIPE,
-        text=True,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(map(str, (TESTS.parent, TESTS)))},
-        cwd=study.parent,
-    )
+@pytest.fixture
+def started() -> Iterator[Callable[[Path, Path], subprocess.Popen[str]]]:
+    """Starts runners in processes of their own; none of them outlives the test."""
+    runners: list[subprocess.Popen[str]] = []
+
+    def start(study: Path, out: Path) -> subprocess.Popen[str]:
+        runner = subprocess.Popen(
+            [sys.executable, "-m", "small_study", str(study), str(out), "2"],
+            stdout=subprocess.PIPE,
+            text=True,
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(map(str, (TESTS.parent, TESTS)))},
+            cwd=study.parent,
+        )
+        runners.append(runner)
+        return runner
+
+    try:
+        yield start
+    finally:
+        for runner in runners:
+            runner.kill()
+            runner.wait()
+            runner.stdout.close()
 
 
 def stopped(runner: subprocess.Popen[str], when: int, how: signal.Signals) -> str:
@@ -116,7 +132,7 @@ def stopped(runner: subprocess.Popen[str], when: int, how: signal.Signals) -> st
     return runner.communicate(timeout=PATIENCE_S)[0]  # only returns when its workers are gone too
 
 
-def test_a_runner_killed_again_and_again_ends_with_the_same_bytes(tmp_path, plain):
+def test_a_runner_killed_again_and_again_ends_with_the_same_bytes(tmp_path, plain, started):
     study, out = kit.write_study(tmp_path), tmp_path / "killed"
     for when in (3, 20):
         runner = started(study, out)
@@ -127,7 +143,7 @@ def test_a_runner_killed_again_and_again_ends_with_the_same_bytes(tmp_path, plai
     assert kit.files(run_study(kit.study_in(tmp_path), out, jobs=1, episode=kit.cheap)) == plain
 
 
-def test_repeats_go_on_after_a_kill_too_and_end_with_the_same_bytes(tmp_path):
+def test_repeats_go_on_after_a_kill_too_and_end_with_the_same_bytes(tmp_path, started):
     study, out = kit.write_study(tmp_path, kit.REPEATED), tmp_path / "killed"
     whole = run_study(kit.load_study(study), tmp_path / "whole", jobs=1, episode=kit.cheap)
     stopped(started(study, out), kit.RUNS + 4, signal.SIGKILL)
@@ -137,7 +153,7 @@ def test_repeats_go_on_after_a_kill_too_and_end_with_the_same_bytes(tmp_path):
     assert "robustness.parquet" in kit.files(whole)
 
 
-def test_ctrl_c_keeps_what_is_done_and_says_how_to_go_on(tmp_path, plain):
+def test_ctrl_c_keeps_what_is_done_and_says_how_to_go_on(tmp_path, plain, started):
     study, out = kit.write_study(tmp_path), tmp_path / "stopped"
     runner = started(study, out)
     said = stopped(runner, 3, signal.SIGINT)
@@ -147,7 +163,7 @@ def test_ctrl_c_keeps_what_is_done_and_says_how_to_go_on(tmp_path, plain):
     assert kit.files(run_study(kit.study_in(tmp_path), out, jobs=1, episode=kit.cheap)) == plain
 
 
-def test_two_runners_on_one_folder_do_not_disturb_each_other(tmp_path, plain):
+def test_two_runners_on_one_folder_do_not_disturb_each_other(tmp_path, plain, started):
     study, out = kit.write_study(tmp_path), tmp_path / "shared"
     pair = [started(study, out) for _ in range(2)]
     for runner in pair:
@@ -194,7 +210,8 @@ def test_a_run_that_stalls_ends_as_a_failure_at_its_limit(tmp_path, jobs):
     assert (failure["part"], failure["cell"], failure["person"]) == ("story", 2, 1)
 
 
-def test_a_run_that_no_exception_reaches_is_ended_with_its_process(tmp_path):
+def test_a_run_that_no_exception_reaches_is_ended_with_its_process(tmp_path, monkeypatch):
+    monkeypatch.setattr(pool, "_LOOK_S", 0.2)
     study = kit.study_in(tmp_path)
     out = run_study(study, tmp_path / "out", jobs=2, episode=kit.never_comes_back, limit_s=1.0)
     (failure,) = Results.load(out).failures

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import synthetic_study
+from patience import PATIENCE_S
 from small_study import SHIFT
 
 import dva_sim
@@ -134,7 +135,11 @@ def test_every_kind_of_figure_page_and_paper_are_the_same_whatever_hashes_are(tm
         )
         for seed in "12"
     ]
-    assert [process.wait() for process in both] == [0, 0]
+    try:
+        assert [process.wait(PATIENCE_S) for process in both] == [0, 0]
+    finally:
+        for process in both:
+            process.kill()
     first, second = (
         {str(path.relative_to(tmp_path / seed)): path.read_bytes() for path in files}
         for seed in "12"

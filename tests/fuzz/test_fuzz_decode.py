@@ -4,10 +4,10 @@ import importlib.util
 import os
 import re
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 
+import patience
 import pytest
 
 ROOT = Path(__file__).parents[2]
@@ -24,13 +24,12 @@ pytestmark = [
 def search(root, folder, *options):
     """Run the search on the program that lies in a root; what it leaves goes to the folder."""
     script = root / "tests" / "fuzz" / "fuzz_decode.py"
-    return subprocess.run(
+    return patience.run(
         [sys.executable, str(script), *options],
         cwd=folder,
         env=os.environ | {"PYTHONPATH": str(root)},
         capture_output=True,
         text=True,
-        timeout=300,
         check=False,
     )
 

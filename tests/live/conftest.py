@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 import socket
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,14 +17,28 @@ def programs(tmp_path: Path) -> Iterator[Programs]:
 
 
 @pytest.fixture
-def address() -> str:
-    """Where nobody listens: two free ports in a row, of which the first is named."""
-    while True:
-        with socket.socket() as one, socket.socket() as two:
-            one.bind(("127.0.0.1", 0))
-            port = one.getsockname()[1]
-            try:
-                two.bind(("127.0.0.1", port + 1))
-            except (OSError, OverflowError):
-                continue
-            return f"127.0.0.1:{port}"
+def address() -> Iterator[str]:
+    """Where a program may listen: two free ports in a row, of which the first is named.
+
+    The port before them is held meanwhile, so that no other process of these tests gets them;
+    nor does anybody who asks for any free port: those lie above.
+    """
+    for first in random.sample(range(10_000, 19_990, 3), 3_000):
+        with socket.socket() as guard:
+            if _takes(guard, first) and _is_free(first + 1) and _is_free(first + 2):
+                yield f"127.0.0.1:{first + 1}"
+                return
+    pytest.fail("no three free ports in a row")
+
+
+def _is_free(port: int) -> bool:
+    with socket.socket() as one:
+        return _takes(one, port)
+
+
+def _takes(one: socket.socket, port: int) -> bool:
+    try:
+        one.bind(("127.0.0.1", port))
+    except OSError:
+        return False
+    return True

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 import zmq
+from patience import PATIENCE_S
 
 from dva_sim.errors import ConfigError
 from dva_sim.network import security as module
@@ -19,7 +20,6 @@ from dva_sim.network.refusals import Reason, Refusal
 from dva_sim.network.security import Security, user_of
 
 ROBOT, OPERATOR = "02:00:00:01:00:01", "02:00:00:03:00:01"
-DEADLINE = 20.0  # generous: for a machine that is busy with other things [s]
 NULL_GREETING = b"\xff" + bytes(8) + b"\x7f\x03\x00NULL" + bytes(48)
 
 Socket = zmq.Socket[bytes]
@@ -114,7 +114,7 @@ def knows_the_server_only(ring: KeyRing, other: KeyRing, folder: Path) -> KeyRin
 
 def run(ends: list[End], done: Callable[[], object]) -> None:
     """Turn all loops until something has come about."""
-    deadline = time.monotonic() + DEADLINE
+    deadline = time.monotonic() + PATIENCE_S
     while not done():
         assert time.monotonic() < deadline, "it never came about"
         for end in ends:
@@ -302,7 +302,7 @@ def test_a_loop_that_is_late_does_not_stop_the_traffic(ring: KeyRing, make: Make
     _, endpoint = server.bind(zmq.ROUTER)
     address = "127.0.0.1", int(endpoint.rpartition(":")[2])
     for _ in range(2500):
-        with tcp.create_connection(address, timeout=DEADLINE) as plain:
+        with tcp.create_connection(address, timeout=PATIENCE_S) as plain:
             plain.sendall(NULL_GREETING)
             while plain.recv(100):
                 pass

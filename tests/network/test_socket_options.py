@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 import zmq
+from patience import PATIENCE_S
 
 from dva_sim.errors import ConfigError
 from dva_sim.live.options import Options
@@ -14,7 +15,6 @@ from dva_sim.network.realtime import LiveClock
 from dva_sim.network.sockets import SocketNetwork
 
 PICTURE, COUNT = b"x" * 60_000, 200
-PATIENCE = 60.0
 SMALL = ZeromqConfig(high_water_mark=2, send_buffer_bytes=4096, receive_buffer_bytes=4096)
 
 
@@ -36,7 +36,7 @@ def live_until_heard(network: SocketNetwork, got: list[bytes], last: bytes) -> N
         return None
 
     network.clock.every(0.02, look)
-    network.clock.run(network.clock.now + PATIENCE)
+    network.clock.run(network.clock.now + PATIENCE_S)
 
 
 def heard(network: SocketNetwork) -> int:

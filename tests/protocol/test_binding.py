@@ -6,12 +6,12 @@ this project; what they hold is compared element by element with what was encode
 
 import importlib.util
 import os
-import subprocess
 import sys
 from dataclasses import fields, is_dataclass
 from enum import Enum
 from pathlib import Path
 
+import patience
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -36,7 +36,7 @@ def binding(tmp_path_factory):
     # The generator formats its output with a program installed beside the interpreter.
     path = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
     command = ["generate", str(PROTOCOL / "dva.xsd"), "--package", "dva_binding"]
-    done = subprocess.run(
+    done = patience.run(
         [sys.executable, "-m", "xsdata", *command, "--structure-style", "single-package"],
         cwd=folder,
         env=os.environ | {"PATH": path},

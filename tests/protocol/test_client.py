@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from patience import PATIENCE_S
 
 from dva_sim import scenario as scenarios
 from dva_sim.network.realtime import LiveClock
@@ -18,7 +19,6 @@ from dva_sim.simulation.stage import Stage
 
 SPECIFICATION = Path(__file__).parents[2] / "protocol" / "README.md"
 ROBOT = id_of("robot", 1)
-PATIENCE = 60.0
 
 
 @pytest.fixture
@@ -37,7 +37,7 @@ def live_until(clock, condition):
         return None
 
     clock.every(0.05, look)
-    clock.run(clock.now + PATIENCE)
+    clock.run(clock.now + PATIENCE_S)
 
 
 def test_the_client_of_the_specification_drives_a_robot(network, tmp_path):

@@ -5,8 +5,8 @@
 
 import json
 import shutil
-import subprocess
 
+import patience
 import pytest
 from mcap.reader import make_reader
 
@@ -33,13 +33,13 @@ const zstd = (data, size) => fzstd.decompress(data, new Uint8Array(Number(size))
 
 def test_another_implementation_counts_the_same_messages(folder):
     node = shutil.which("node")
-    known = node and subprocess.run(
+    known = node and patience.run(
         [node, "-e", 'require("@mcap/core"); require("fzstd")'], capture_output=True, check=False
     )
     if not known or known.returncode:
         pytest.skip("node with @mcap/core and fzstd is not installed")
     command = [node, "-e", READ, str(folder / "drill.mcap")]
-    told = json.loads(subprocess.run(command, capture_output=True, check=True).stdout)
+    told = json.loads(patience.run(command, capture_output=True, check=True).stdout)
     with (folder / "drill.mcap").open("rb") as file:
         summary = make_reader(file).get_summary()
         assert told["attached"] == [a.name for a in make_reader(file).iter_attachments()]

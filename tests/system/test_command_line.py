@@ -114,7 +114,7 @@ def test_the_program_itself_ends_a_mistake_with_one_line_and_exit_code_2(tmp_pat
     words = [sys.executable, "-m", "dva_sim.cli", "run", "req-rep-vs-pubsub"]
     ended = subprocess.run(words, capture_output=True, text=True, cwd=tmp_path, check=False)
     assert (ended.returncode, ended.stdout) == (2, "")
-    assert ended.stderr.startswith("dva-sim: ")
+    assert ended.stderr.startswith("error: ")
     assert len(ended.stderr.splitlines()) == 1
 
 
@@ -165,9 +165,9 @@ def test_an_episode_tells_its_story_and_films_it(tmp_path: Path) -> None:
     for word in ("breaks out", "is assigned to operator-1", "Teleoperation", "safety rules broken"):
         assert word in told.stdout
     with Image.open(tmp_path / "film.gif") as film:
-        assert film.n_frames > 20  # type: ignore[attr-defined]
+        assert film.n_frames > 10  # type: ignore[attr-defined]
         first = film.convert("RGB").tobytes()
-        film.seek(50)
+        film.seek(film.n_frames - 1)
         assert film.convert("RGB").tobytes() != first
 
 

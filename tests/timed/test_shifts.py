@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-import subprocess
-import sys
 from typing import Any
 
 import numpy as np
 import pytest
+from elsewhere import told_here_and_elsewhere
 
 from dva_sim.config import load_yaml
 from dva_sim.core.dispatch import known_policies
@@ -343,30 +342,18 @@ def test_a_look_takes_as_long_whoever_looks_and_whenever() -> None:
 
 
 PROGRAM = """
-import json, sys
 from dva_sim.timed import build, simulate_timed
-scenario = json.loads(sys.stdin.read())
-recording = simulate_timed(build(scenario), 7)
-sys.stdout.buffer.write(b"".join(c.tobytes() for c in recording.columns.values()))
+recording = simulate_timed(build({scenario!r}), 7)
+print([c.tobytes() for c in recording.columns.values()])
 print(recording.counters, [dict(u.spent) for u in recording.units])
 """
 
 
 def test_the_same_seed_gives_the_same_bytes_in_two_processes() -> None:
-    import json
-
-    outputs = [
-        subprocess.run(
-            [sys.executable, "-c", PROGRAM],
-            input=json.dumps(MIXED | {"dispatch": {"policy": "random"}}).encode(),
-            capture_output=True,
-            check=True,
-            env={"PYTHONHASHSEED": str(hash_seed), "PATH": ""},
-        ).stdout
-        for hash_seed in (1, 2)
-    ]
-    assert outputs[0] == outputs[1]
-    assert len(outputs[0]) > 10_000
+    scenario = MIXED | {"dispatch": {"policy": "random"}}
+    here, elsewhere = told_here_and_elsewhere(PROGRAM.format(scenario=scenario))
+    assert here == elsewhere
+    assert len(here) > 10_000
 
 
 def test_a_further_guard_changes_no_other_guard_s_luck() -> None:

@@ -1,0 +1,27 @@
+"""The same program run twice: in this process, and in one that hashes words otherwise."""
+
+from __future__ import annotations
+
+import io
+import sys
+from contextlib import redirect_stdout
+from pathlib import Path
+
+import patience
+
+PATHS = [str(Path(__file__).parent), str(Path(__file__).parents[1])]
+
+
+def told_here_and_elsewhere(program: str) -> tuple[str, str]:
+    """What a program prints in each of the two; it finds the helpers of the tests."""
+    here = io.StringIO()
+    with redirect_stdout(here):
+        exec(program, {"__name__": "__main__"})
+    elsewhere = patience.run(
+        [sys.executable, "-c", f"import sys\nsys.path[:0] = {PATHS!r}\n{program}"],
+        capture_output=True,
+        check=True,
+        text=True,
+        env={"PYTHONHASHSEED": "1", "PATH": ""},
+    )
+    return here.getvalue(), elsewhere.stdout

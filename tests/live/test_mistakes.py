@@ -1,0 +1,38 @@
+"""Mistakes in the words of `dva-sim live` that no process has to be started for."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from command_line import call
+
+from dva_sim.live import supervisor
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--set", "operator.strategy=oracle"], "only in virtual time"),
+        (["--set", "nonsense"], "should be key=value"),
+        (["--set", "link.delay_ms=1"], "did you mean 'delay_s'?"),
+        (["--only", "nothing"], "--only 'nothing' should be dva, world, operator"),
+        (["--only", "operator", "--number", "2"], "the scenario has operators 1 to 1"),
+        (["--only", "operator", "--number", "0"], "should be a whole number of at least 1"),
+        (["--operators", "idle"], "should be simulated or scripted"),
+        (["--port", "70000"], "should be a whole number from 0 to 64999"),
+        (["--dva", "a:b:c"], "should be HOST:PORT"),
+        (["--dva", "127.0.0.1:65535"], "should be HOST:PORT"),
+        (["--for", "-1"], "--for '-1' should be a number above 0"),
+        (["--for", "nan"], "--for 'nan' should be a number above 0"),
+    ],
+)
+def test_a_mistake_ends_in_one_line_before_anything_is_started(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: list[str], said: str
+) -> None:
+    monkeypatch.setattr(supervisor.subprocess, "Popen", lambda *_, **__: pytest.fail("started"))
+    ended = call("live", "drive-to-event", "--for", "60", *words, cwd=tmp_path)
+    assert ended.returncode == 2
+    (line,) = ended.stderr.splitlines()
+    assert line.startswith("error: ")
+    assert said in line

@@ -1,0 +1,26 @@
+"""How long tests wait for what should take a moment: nothing fails because a machine is busy."""
+
+from __future__ import annotations
+
+import functools
+import subprocess
+import time
+from collections.abc import Callable
+
+PATIENCE_S = 240.0
+"""Less than `faulthandler_timeout`, so that who waits in vain can tell what for."""
+
+LOOK_S = 0.02
+
+run = functools.partial(subprocess.run, timeout=PATIENCE_S)
+"""`subprocess.run`; who has not ended when patience does is killed."""
+
+
+def becomes(true: Callable[[], object]) -> bool:
+    """Whether something becomes true before patience ends."""
+    end = time.monotonic() + PATIENCE_S
+    while not true():
+        if time.monotonic() > end:
+            return False
+        time.sleep(LOOK_S)
+    return True
