@@ -15,6 +15,7 @@ from dva_sim import scenario as scenarios
 from dva_sim.config import Document
 from dva_sim.experiments.transports import scenario as transports
 from dva_sim.experiments.transports.scenario import TransportScenario
+from dva_sim.guesses import unknown
 from dva_sim.scenario import Scenario
 from dva_sim.tasks import scenario as tasks
 from dva_sim.tasks.scenario import TaskScenario
@@ -25,6 +26,12 @@ if TYPE_CHECKING:
     from dva_sim.simulation import Recording
 
 AnyScenario = Scenario | TimedScenario | TaskScenario | TransportScenario
+SCENARIOS: dict[str, type[AnyScenario]] = {
+    "full": Scenario,
+    "timed": TimedScenario,
+    "task": TaskScenario,
+    "transports": TransportScenario,
+}
 Tables = dict[str, list[dict[str, Any]]]
 
 
@@ -69,7 +76,7 @@ def model_of(document: Document) -> Model:
     """
     name = document.data.get("model", "full")
     if name not in MODELS:
-        raise document.error(f"model {name!r} is unknown; known: {', '.join(MODELS)}", ("model",))
+        raise document.error(unknown("model", name, MODELS), ("model",))
     return MODELS[name]
 
 

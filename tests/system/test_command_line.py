@@ -91,7 +91,7 @@ def test_another_study_is_not_written_into_the_same_folder(tmp_path: Path) -> No
     [
         (["run", "req-rep-vs-pubsub"], "did you mean 'req-rep-vs-pub-sub'?"),
         (["run", "bad.yaml"], "bad.yaml:5:5: unknown key 'parts.drive.refrence'"),
-        (["run", "req-rep-vs-pub-sub", "--set", "link.delay_s=-1"], "greater than or equal to 0"),
+        (["run", "req-rep-vs-pub-sub", "--set", "link.delay_s=-1"], "at least 0"),
         (["run", "req-rep-vs-pub-sub", "--set", "link.delay_ms=1"], "did you mean 'delay_s'?"),
         (["run", "req-rep-vs-pub-sub", "--set", "link.trace_up=no.up"], "no.up: trace cannot be"),
         (["run", "req-rep-vs-pub-sub", "--set", "link.trace_up=bad.up"], "bad.up:2:1: should be"),
