@@ -26,7 +26,7 @@ from dva_sim.experiments.repeats import (
 )
 from dva_sim.experiments.study import Study
 from dva_sim.experiments.tuned import Basis, load_tuned
-from dva_sim.guesses import unknown
+from dva_sim.guesses import listed, unknown
 from dva_sim.streams import derive_seed
 
 REFERENCE = -1
@@ -107,6 +107,7 @@ def cells(study: Study) -> list[Cell]:
     refuse_unknown_measures(study)
     _at_ends(study)
     own = [cell for name in study.parts for cell in _cells_of(study, name)]
+    _refuse_impossible_measures(study, own)
     return [*own, *_repeats_of(study)]
 
 
@@ -120,6 +121,16 @@ def refuse_unknown_measures(study: Study) -> None:
         known = model_of(_source(study, part)).measures()
         if measure not in known:
             raise study.error(unknown("measure", measure, known), path)
+
+
+def _refuse_impossible_measures(study: Study, every: Sequence[Cell]) -> None:
+    """What no run of a part can hold would only be missed when all of them are made."""
+    for path, part, measure in _asked_measures(study):
+        made = [c.scenario for c in every if c.part == part and c.index != REFERENCE]
+        possible = [model_for(scenario).measures(scenario) for scenario in made]
+        if not any(measure in names for names in possible):
+            problem = f"no run of part {part!r} has a value of the measure {measure!r}"
+            raise study.error(f"{problem}; it has: {listed(possible[0])}", path)
 
 
 def _asked_measures(study: Study) -> Iterator[tuple[Path_, str, str]]:
