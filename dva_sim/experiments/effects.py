@@ -95,8 +95,13 @@ class Part:
 
     def grid(self, column: str) -> Floats:
         """One column as `(levels of factor 1, ..., persons, trials)`; nan where no run is."""
-        none = np.full(len(self._known), np.nan)
-        return self.laid_out(as_floats(self.treated[column]) if column in self.treated else none)
+        return self.laid_out(self.values(column))
+
+    def values(self, column: str) -> Floats:
+        """One column, a value for each run; nan where no run of the study has any."""
+        if column not in self.treated:
+            return np.full(len(self._known), np.nan)
+        return as_floats(self.treated[column])
 
     def laid_out(self, values: Floats) -> Floats:
         """One value for each row of `treated`, as the same grid."""

@@ -42,4 +42,4 @@ def rehearse_all(study: Study) -> None:
     """
     refuse_what_cannot_be_recorded(study)
     for cell in design.to_rehearse(study, design.cells(study)):
-        model_for(cell.scenario).rehearse(cell.scenario, study.seed)
+        design.rehearse(study, cell)

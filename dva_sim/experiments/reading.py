@@ -246,7 +246,7 @@ def _horizon(view: View) -> float | None:
     if not view.part.has("confirmed") or unit_of(view.measure) != "s":
         return None
     missed = as_floats(view.part.treated["confirmed"]) == 0
-    counted = np.unique(present(as_floats(view.part.treated[view.measure])[missed]))
+    counted = np.unique(present(view.part.values(view.measure)[missed]))
     return float(counted[0]) if len(counted) == 1 else None
 
 
