@@ -273,6 +273,7 @@ def until(seconds: float) -> tuple[str, str]:
 EXPECTED = {
     "make demo": TARGET,
     "make test": TARGET,
+    "make test-all": TARGET,
     "make setup": TARGET,
     "make check": TARGET,
     "make bench": TARGET,
@@ -287,6 +288,9 @@ EXPECTED = {
     "dva-sim new mine": Expected(both(told("mine.yaml"), written("mine.yaml"))),
     "dva-sim register mine.yaml": Expected(written("mine.registration.yaml"), given=a_study),
     "dva-sim run req-rep-vs-pub-sub --dry-run": Expected(planned(MAIN), dear=True),
+    "dva-sim run req-rep-vs-pub-sub --quick": Expected(
+        told(MAIN, "264 runs in 13 configurations", " to go with "), DRY, dear=True
+    ),
     "dva-sim run req-rep-vs-pub-sub --scheduler tcp://HOST:8786": NOT_HERE,
     "dva-sim run req-rep-vs-pub-sub --set persons=4 --set replications=2 --jobs 2 -o small": (
         Expected(planned(MAIN), DRY, dear=True)
@@ -422,7 +426,7 @@ def test_every_target_is_one_that_make_knows(target: str) -> None:
 
 
 RUNNABLE = [
-    pytest.param(command, marks=[pytest.mark.slow] if expected.dear else [])
+    pytest.param(command, marks=[pytest.mark.system] if expected.dear else [])
     for command, expected in EXPECTED.items()
     if expected.look is not None
 ]
