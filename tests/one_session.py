@@ -137,13 +137,23 @@ def _next(steps: Script, reply: m.Reply | None) -> Ask | Pause | None:
 
 def in_virtual_time(way: Way = one_by_one, **changes: object) -> list[Decided]:
     """What the robot decided in a session that took no time."""
+    return _act_out(_stage(_quick_network(), changes), way)
+
+
+def told_in_virtual_time(**changes: object) -> list[str]:
+    """What the operator told of such a session."""
+    stage = _stage(_quick_network(), changes)
+    _act_out(stage, one_by_one)
+    return [moment.what for moment in stage.recorder.timeline if moment.who == "operator-1"]
+
+
+def _quick_network() -> VirtualNetwork:
+    """A network of a millisecond each way."""
     config = LinkConfig(delay_s=0.001)
-    links = {
-        pair: Link(config, ConstantRate(config.rate_bps), Streams(1), pair)
-        for pair in ("there", "back")
-    }
-    network = VirtualNetwork(Clock(), lambda *_: (links["there"], links["back"]))
-    return _act_out(_stage(network, changes), way)
+    there, back = (
+        Link(config, ConstantRate(config.rate_bps), Streams(1), name) for name in ("there", "back")
+    )
+    return VirtualNetwork(Clock(), lambda *_: (there, back))
 
 
 def over_sockets(

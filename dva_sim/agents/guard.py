@@ -134,13 +134,17 @@ class GuardAgent(OnFoot):
         if errand is not self._duty.errand:
             return
         goal, is_far_enough = self._goal(errand)
-        arrived, blocked = partial(self._arrive, errand), partial(self._finish, "failed")
+        arrived, blocked = partial(self._arrive, errand), self._cannot_pass
         self.activity = "walking"
         if not self.walking.go(goal, arrived, blocked, is_far_enough):
             self.device.tell("finds no way there", "event")
             self._finish("failed")
         elif errand.order is not None:
             self.device.progress(errand.order.event_id, "departed")
+
+    def _cannot_pass(self) -> None:
+        self.device.tell("cannot get past what is in the way, and gives up", "event")
+        self._finish("failed")
 
     def _goal(self, errand: Errand) -> tuple[Point, Callable[[Point], bool]]:
         """Where the way leads to, and from where on it need not be gone to its end."""

@@ -14,6 +14,7 @@ from dva_sim.experiments.verdicts import story
 from dva_sim.simulation import Playback
 
 STYLES = {"safety": "bold red", "mode": "dim", "order": "cyan", "drive": "cyan", "link": "yellow"}
+DRIVES = {"lost link": "given up, the link was taken for lost", "gave up": "given up"}
 
 Row = Mapping[str, Any]
 
@@ -51,8 +52,9 @@ def tell_outcome(tables: Tables, how: str, console: Console) -> None:
     lines = [_event(event) for event in tables["events"]]
     if "commands_sent" in row:
         cause = f" ({row['cause']})" if row["cause"] not in ("", row["outcome"]) else ""
-        attempts = f"in {row['attempts']} attempt(s)"
-        lines.append(f"robots: {row['outcome']}{cause} {attempts}, {_driven(row)}")
+        attempts = f"in {row['attempts']} attempt{'s' * (row['attempts'] != 1)}"
+        outcome = DRIVES.get(row["outcome"], row["outcome"])
+        lines.append(f"robots: {outcome}{cause} {attempts}, {_driven(row)}")
     if tables["people"]:
         lines.append(f"people: {_fared(row, tables['people'])}")
     counts = f"{row['messages']} messages, {row['violations']} safety rules broken"

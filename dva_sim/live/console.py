@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from dataclasses import replace
 from typing import Any
 
@@ -19,6 +20,7 @@ from dva_sim.network.sockets import DEFAULT_PORT
 from dva_sim.scenario import contradictions
 
 STORY_LINES = 12
+HELD = 2.0  # lines of several parts are told in order: so long does one wait for earlier ones [s]
 DEFAULT_DVA = f"127.0.0.1:{DEFAULT_PORT}"  # of a part that is run alone and told no other
 WIDTH = 120  # where there is no terminal to ask [characters]
 COLUMNS = (
@@ -47,9 +49,8 @@ class Board:
             self.devices.setdefault(row["label"], {}).update(row)
         if report.part == "dva":
             self.events = report.events
-        new = sorted(report.story)
-        self.story = (self.story + new)[-1000:]
-        return new
+        self.story = sorted(self.story + report.story)[-1000:]
+        return sorted(report.story)
 
     def table(self) -> Table:
         """The devices: what they are, do, and how the link to each is."""
@@ -108,8 +109,9 @@ def run_all(options: Options) -> None:
     console, board = _console(), Board()
     warn(console, options)
     if not console.is_terminal:
-        supervisor = Supervisor(options, lambda _, report: _print_story(console, board, report))
-        _conclude(console, board, supervisor.run())
+        with closing(InOrder(console, board)) as told:
+            summary = Supervisor(options, lambda _, report: told.hear(report)).run()
+        _conclude(console, board, summary)
         return
     with Live(console=console, refresh_per_second=4, transient=True) as screen:
 
@@ -160,9 +162,24 @@ def run_one(part: str, options: Options, number: int) -> None:
     console.print(board.table())
 
 
-def _print_story(console: Console, board: Board, report: Report) -> None:
-    for line in board.hear(report):
-        _print(console, story_line(line))
+class InOrder:
+    """Prints the story in order of time, although each part tells its own lines once a second."""
+
+    def __init__(self, console: Console, board: Board) -> None:
+        self._console, self._board = console, board
+        self._waiting: list[list[Any]] = []
+
+    def hear(self, report: Report) -> None:
+        """Take a report, and print what nothing earlier can come to any more."""
+        self._waiting = sorted(self._waiting + self._board.hear(report))
+        while self._waiting and self._waiting[0][0] <= self._board.time - HELD:
+            _print(self._console, story_line(self._waiting.pop(0)))
+
+    def close(self) -> None:
+        """Print what still waits."""
+        for line in self._waiting:
+            _print(self._console, story_line(line))
+        self._waiting = []
 
 
 def _conclude(console: Console, board: Board, summary: Summary) -> None:

@@ -79,6 +79,7 @@ class DvaPart:
         self._agent.start()
         self._stage = stage
         book = self._agent.desk.book
+        self._scripted = options.operators == "scripted"  # who follows a script settles no event
         self._settled_before = 0 if book.open else book.total
         self._beats: dict[str, Rate] = {}
 
@@ -108,7 +109,7 @@ class DvaPart:
     def settled(self) -> bool:
         """See `Part`."""
         book = self._agent.desk.book
-        return book.total > self._settled_before and not book.open
+        return self._scripted or (book.total > self._settled_before and not book.open)
 
     def _events(self) -> list[Event]:
         """The last that were closed, and all that are open."""

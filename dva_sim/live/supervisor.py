@@ -47,7 +47,7 @@ class Summary:
     """How a live run ended.
 
     Attributes:
-        why: `settled`, `time is up` or `interrupted`.
+        why: `settled`, `the script is done`, `time is up` or `interrupted`.
         latest: The last report of each part, by its name.
     """
 
@@ -142,7 +142,7 @@ class Supervisor:
             if time.monotonic() - self._epoch > limit or self._some_are_done():
                 return "time is up"
             if self._all_settled():
-                return "settled"
+                return "the script is done" if self._options.operators == "scripted" else "settled"
         return "interrupted"
 
     def _some_are_done(self) -> bool:

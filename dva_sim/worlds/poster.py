@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,9 +15,10 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.figure import Figure
 
-LONG_SIDE, MOST_INCHES = 11.0, 18.0  # of the picture [in]
-INCHES_PER_METRE = 0.1
-LEGEND = 0.4  # height [in]
+LONG_SIDE, MOST_INCHES = 8.4, 18.0  # of the picture [in]; a page shows 840 pixels of it
+INCHES_PER_METRE = 0.07
+FONT = 7.5  # of the key [pt]
+KEY, LINE = 1.25, 0.17  # width of one of its entries, and height of a line [in]
 
 
 def write_poster(site: Site, file: Path, coverage: bool, width: int) -> None:
@@ -46,17 +48,19 @@ def poster(site: Site, coverage: bool) -> Figure:
     across, up = right - left, high - low
     long = min(MOST_INCHES, max(LONG_SIDE, INCHES_PER_METRE * max(across, up)))
     width, height = (long * side / max(across, up) for side in (across, up))
-    tall = height + LEGEND
-    figure = Figure(figsize=(width, tall))
-    ax = figure.add_axes((0, LEGEND / tall, 1, height / tall))
-    draw_site(ax, site, coverage=coverage, views=True)
     handles = _handles(site, coverage)
+    columns = max(3, int(width / KEY))
+    key = LINE * (math.ceil(len(handles) / columns) + 1)
+    tall = height + key
+    figure = Figure(figsize=(width, tall))
+    ax = figure.add_axes((0, key / tall, 1, height / tall))
+    draw_site(ax, site, coverage=coverage, views=not coverage)  # one wash of colour at a time
     if handles:
         figure.legend(
             handles=handles,
             loc="lower center",
-            ncols=min(len(handles), max(3, int(width / 1.05))),
-            fontsize=6.5,
+            ncols=min(len(handles), columns),
+            fontsize=FONT,
             frameon=False,
             labelcolor=INK,
             handletextpad=0.5,
@@ -75,7 +79,7 @@ def _handles(site: Site, coverage: bool) -> list[Artist]:
             label = f"{kind.upper() if kind == 'co' else kind} detector"
             handles.append(_mark(marker, label, colour, mfc="white", ms=4))
     if site.cameras:
-        handles.append(_mark((3, 0, 0), "camera", CAMERA))
+        handles.append(_mark((3, 0, 0), "camera" if coverage else "camera, its view", CAMERA))
     if site.base_stations:
         handles.append(_mark(mast(), "base station", STATION, mfc="none", ms=8, mew=0.7))
     if site.exits:

@@ -35,7 +35,7 @@ ZONES = {
     "assembly": ("#009e73", "oo"),
 }
 # How coverage is shown: colour and opacity; good is left blank.
-COVERAGE = {"fair": ("#f0e442", 0.14), "poor": ("#e69f00", 0.26), "none": ("#8f5b8a", 0.32)}
+COVERAGE = {"fair": ("#f0e442", 0.24), "poor": ("#e69f00", 0.34), "none": ("#8f5b8a", 0.4)}
 WALL_WIDTH = 0.14  # as drawn [m]
 INK = "#59606a"
 MARGIN = (0.8, 0.012)  # around the site: at least [m], of its width

@@ -360,7 +360,7 @@ def test_the_small_version_of_the_main_study_asks_the_same_of_the_same_persons()
     assert quick.answer == published.answer
     assert (quick.seed, quick.persons) == (published.seed, published.persons)
     same = {job.key for job in design.jobs(published)}
-    assert {job.key for job in design.jobs(quick)} < same
+    assert {job.key for job in design.jobs(quick) if not job.is_repeat} < same
 
 
 def test_a_study_without_a_larger_version_says_so(tmp_path):

@@ -32,15 +32,19 @@ NEAR = ("--set", "events=[{kind: fire, at_s: 0, reported: true, room: Robot bay}
 # --- a whole run ---------------------------------------------------------------------------
 
 
-def test_a_run_tells_its_story_shows_all_devices_and_ends_when_all_is_settled(
+def test_a_run_tells_its_story_shows_all_devices_and_ends_when_its_script_is_done(
     programs: Programs, tmp_path: Path
 ) -> None:
-    settings = ("--set", "dispatch.escalate_after_s=5")  # nobody who follows a script goes there
-    run = programs.start(*SCRIPTED, *settings, "--record", "traces")
+    run = programs.start(*SCRIPTED, "--record", "traces")
     assert run.ends() == 0, run.complained
     for line in ("breaks out", "is now in mode Teleoperation", "is now in mode Idle"):
         assert line in run.said
-    assert "The run ended (settled): event 1 (fire) is escalated." in run.said
+    for line in ("200 of 200 commands obeyed", "an emergency: obeyed", "refused (wrong mode)"):
+        assert line in run.said
+    story = [float(line.split(" s ")[0]) for line in run.said.partition("after ")[0].splitlines()]
+    assert story == sorted(story)
+    # Nobody who follows a script goes to the fire.
+    assert "The run ended (the script is done): event 1 (fire) is pending." in run.said
     table = run.said[run.said.rindex("is now in mode Idle") :]
     for device in ("robot-1", "operator-1"):
         assert device in table

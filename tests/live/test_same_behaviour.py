@@ -14,6 +14,7 @@ from one_session import (
     over_sockets,
     pipelined,
     published,
+    told_in_virtual_time,
 )
 
 from dva_sim.protocol import messages as m
@@ -64,6 +65,23 @@ def test_the_session_is_what_it_says() -> None:
     refused = decisions[2 + 201]
     assert (refused.code, refused.mode, refused.speed) == (m.WRONG_MODE, "Idle", None)
     assert [d.message for d in decisions[-2:]] == ["StopTeleOp", "PermissionRevocation"]
+
+
+def test_the_operator_tells_what_was_done_and_what_came_of_it() -> None:
+    assert told_in_virtual_time() == [
+        "starts robot-1 and sends 200 commands",
+        "has driven robot-1: 200 of 200 commands obeyed",
+        "sends robot-1 an emergency: obeyed",
+        "sends robot-1 one more command: refused (wrong mode)",
+        "starts robot-1 and sends 10 commands",
+        "has driven robot-1: 10 of 10 commands obeyed",
+        "stops robot-1: obeyed",
+    ]
+
+
+def test_commands_that_came_too_late_are_not_told_as_obeyed() -> None:
+    slow = {"robot.processing_s": 0.3, "robot.max_age_s": 0.2}
+    assert "has driven robot-1: 1 of 200 commands obeyed" in told_in_virtual_time(**slow)
 
 
 @pytest.mark.parametrize(

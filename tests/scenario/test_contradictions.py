@@ -120,7 +120,7 @@ def test_a_study_tells_each_kind_once_with_the_number_of_configurations() -> Non
     study = load_study("req-rep-vs-pub-sub", ["link.delay_s=[0, 3, 4]"], version="quick")
     told = contradictions_in(study)
     assert [one.split()[0] for one in told].count("robot.max_age_s") == 1
-    assert any("in 4 of 7 configurations" in one for one in told)
+    assert any("in 4 of 11 configurations" in one for one in told)
 
 
 def test_an_episode_begins_with_the_warning() -> None:

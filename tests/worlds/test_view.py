@@ -7,8 +7,9 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from dva_sim.worlds.parts import FixedCamera
+from dva_sim.worlds.poster import poster
 from dva_sim.worlds.site import load_site, map_site
-from dva_sim.worlds.view import EXIT, WALL, draw_site
+from dva_sim.worlds.view import COVERAGE, EXIT, WALL, draw_site
 from dva_sim.worlds.view_marks import view_of
 
 
@@ -104,3 +105,43 @@ def test_a_bare_map_shows_its_known_free_floor(tmp_path):
     inside, outside = colour_at(figure, ax, 3.05, 3.05), colour_at(figure, ax, 0.5, 3.05)
     assert inside != outside == (255, 255, 255)
     assert ax.get_xlim() == pytest.approx((1.0 - 0.8, 7.0 + 0.8))
+
+
+def test_names_too_small_to_read_are_left_out_if_that_is_wanted():
+    site = load_site("campus")
+    _, ax = draw(site, least=6.0)
+    sizes = [text.get_fontsize() for text in ax.texts if site.room_at(*text.get_position())]
+    assert min(sizes) >= 6.0
+    assert len(sizes) < len(names_of(draw(site)[1]))
+
+
+def test_a_map_without_small_marks_still_has_its_bases_and_desks():
+    site = load_site("caparica")
+    full, few = draw(site)[1], draw(site, small_marks=False)[1]
+    assert len(few.lines) < len(full.lines)
+    assert len(few.patches) == len(full.patches)
+
+
+@pytest.mark.parametrize("name", ["caparica", "campus", "office-block"])
+@pytest.mark.parametrize("coverage", [False, True])
+def test_a_poster_has_a_key_that_fits_below_its_map_and_can_be_read_on_a_page(name, coverage):
+    figure = poster(load_site(name), coverage)
+    figure.draw_without_rendering()
+    (key,) = figure.legends
+    box = key.get_window_extent()
+    assert box.x0 >= 0
+    assert box.x1 <= figure.bbox.width
+    assert box.y1 <= figure.axes[0].bbox.y0 + 2
+    page = 840 / figure.get_figwidth() / 72  # pixels of a point
+    assert min(text.get_fontsize() for text in key.get_texts()) * page > 8
+
+
+def test_a_poster_of_coverage_has_no_other_wash_of_colour():
+    site = load_site("campus")
+    views, waves = poster(site, False).axes[0], poster(site, True).axes[0]
+    assert washes(views) == len(site.cameras)
+    assert washes(waves) == len([area for area in site.wifi if area.grade in COVERAGE])
+
+
+def washes(ax):
+    return sum(1.5 < patch.get_zorder() < 2 for patch in ax.patches)

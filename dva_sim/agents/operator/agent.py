@@ -19,6 +19,7 @@ ASK_AGAIN = 2.0  # when the robot is held by somebody else [s]
 START_TRIES = 20
 START_AGAIN = 1.0  # when the grant may still be on its way to the robot [s]
 STANDSTILL = 1.5  # after a stop, a robot certainly stands; before, it would refuse to start [s]
+TOLD = {"lost link": "takes the link for lost"}  # what a drive's end looks like to the operator
 REDIRECTED, RECALLED = BY_DVA = "redirected", "recalled"  # how a drive ends by the DVA's word
 
 
@@ -188,7 +189,7 @@ class OperatorAgent:
     def _finish(self, drive: Work, outcome: str, why: str) -> None:
         """A drive is over: stop the robot, tell the DVA, be free again."""
         device, order = self.device, drive.order
-        device.tell(f"{outcome}{': ' + why if why else ''}", "drive")
+        device.tell(f"{TOLD.get(outcome, outcome)}{': ' + why if why else ''}", "drive")
         found, by_dva = outcome in ("confirmed", "refuted"), outcome in BY_DVA
         if found:
             body = m.EventReport(order.event_id, order.kind, order.position, 0.5, 0.95, outcome)

@@ -67,6 +67,10 @@ class ScriptedOperator:
         network, me = self.device.network, self.device.id_tag
         network.subscribe(me, robot, STATUS, lambda data: self._on_status(robot, data))
 
+    def tell(self, what: str) -> None:
+        """Say what is done, and what came of it."""
+        self.device.tell(what, "drive")
+
     def put_down(self) -> None:
         """End the script here: its own last orders are sent, nobody waits for the answers."""
         if not self.done:
@@ -81,6 +85,8 @@ class ScriptedOperator:
     def _on_request(self, message: m.Message) -> m.Reply:
         if isinstance(message.body, m.PermissionRevocation):
             return m.Reply(message.message_id, m.OK, "")
+        if isinstance(message.body, m.Order):
+            self.tell(f"declines event {message.body.event_id}: it follows a script")
         return m.Reply(message.message_id, m.NOT_SUPPORTED, "follows a script")
 
     def _go_on(self, reply: m.Reply | None) -> None:
@@ -118,26 +124,51 @@ def drill(operator: ScriptedOperator, commands: int = 200) -> Script:
     """
     dva = operator.device.dva
     robot, session = yield from _take_a_robot(dva)
+    name = operator.device.label_of(robot)
     operator.watch_status(robot)
     try:
-        if not (yield from _start(robot, session)):
+        if not (yield from _drive(operator, robot, session, commands)):
             return
-        for number in range(commands):
-            yield Ask(robot, _swaying(number, operator.seen_tick), session)
-        yield Ask(robot, m.Emergency(), session)
-        yield Ask(robot, _swaying(0, operator.seen_tick), session)  # refused: the robot is idle
+        reply = yield Ask(robot, m.Emergency(), session)
+        operator.tell(f"sends {name} an emergency: {_answer(reply)}")
+        reply = yield Ask(robot, _swaying(0, operator.seen_tick), session)
+        operator.tell(f"sends {name} one more command: {_answer(reply)}")  # the robot is idle
         yield Pause(STANDSTILL)
-        if not (yield from _start(robot, session)):
+        if not (yield from _drive(operator, robot, session, COMMANDS_AGAIN)):
             return
-        for number in range(10):
-            yield Ask(robot, _swaying(number, operator.seen_tick), session)
-        yield Ask(robot, m.StopTeleOp(), session)
+        reply = yield Ask(robot, m.StopTeleOp(), session)
+        operator.tell(f"stops {name}: {_answer(reply)}")
     except GeneratorExit:
         operator.device.ask(robot, m.StopTeleOp(), session=session)
         raise
     yield Ask(dva, m.PermissionRevocation(robot, operator.device.id_tag, session))
 
 
+def _drive(
+    operator: ScriptedOperator, robot: str, session: int, commands: int
+) -> Generator[Ask | Pause, m.Reply | None, bool]:
+    """Start, and send so many commands; False if the robot cannot be started."""
+    name = operator.device.label_of(robot)
+    if not (yield from _start(robot, session)):
+        operator.tell(f"cannot start {name}")
+        return False
+    operator.tell(f"starts {name} and sends {commands} commands")
+    obeyed = 0
+    for number in range(commands):
+        reply = yield Ask(robot, _swaying(number, operator.seen_tick), session)
+        obeyed += reply is not None and reply.code == m.OK
+    operator.tell(f"has driven {name}: {obeyed} of {commands} commands obeyed")
+    return True
+
+
+def _answer(reply: m.Reply | None) -> str:
+    """What a robot made of a request, in words."""
+    if reply is None:
+        return "no answer"
+    return "obeyed" if reply.code == m.OK else f"refused ({m.CODE_NAMES[reply.code]})"
+
+
+COMMANDS_AGAIN = 10  # of the second drive
 STANDSTILL = 2.0  # after it a robot certainly stands [s]
 TRIES = 20  # to start
 AGAIN = 0.5  # before asking once more for what is not there yet [s]
