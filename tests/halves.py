@@ -29,6 +29,20 @@ PATIENCE_S = 60.0  # with a helper that was told to stop
 GOOD = (pytest.ExitCode.OK, pytest.ExitCode.TESTS_FAILED, pytest.ExitCode.NO_TESTS_COLLECTED)
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--halves", action="store_true", help="Share the tests with a second process.")
+    parser.addoption("--half-of", type=Path, help="This is the second process, and they meet here.")
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_configure(config: pytest.Config) -> None:
+    if config.option.half_of:
+        config.workerinput = {}  # as pytest calls it: who leads writes what is kept of a run
+        config.pluginmanager.register(Helper(config, config.option.half_of))
+    elif config.option.halves and not config.option.collectonly:
+        config.pluginmanager.register(Leader(config))
+
+
 class Half:
     """Takes files, and leaves alone what the other half has taken."""
 
@@ -62,8 +76,7 @@ class Helper(Half):
 
     def __init__(self, config: pytest.Config, folder: Path) -> None:
         super().__init__(folder, backwards=True)
-        self._config, self._leader = config, os.getppid()
-        self._reports = (folder / "reports").open("a", encoding="utf-8")
+        self._config, self._reports, self._leader = config, folder / "reports", os.getppid()
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtest_protocol(self, item: pytest.Item) -> bool | None:
@@ -73,8 +86,8 @@ class Helper(Half):
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         data = self._config.hook.pytest_report_to_serializable(config=self._config, report=report)
-        self._reports.write(json.dumps(data, default=str) + "\n")
-        self._reports.flush()
+        with self._reports.open("a", encoding="utf-8") as reports:
+            reports.write(json.dumps(data, default=str) + "\n")
 
 
 class Leader(Half):
@@ -88,12 +101,13 @@ class Leader(Half):
         self._reports.touch()
         self._read = 0
         self._missing: set[str] = set()
+        self._helper: subprocess.Popen[bytes]
 
     @pytest.hookimpl(wrapper=True, trylast=True)
     def pytest_runtestloop(self, session: pytest.Session) -> Iterator[None]:
         self._missing = {item.nodeid for item in session.items}
         with (self._folder / "said").open("wb") as said:
-            helper = subprocess.Popen(
+            self._helper = subprocess.Popen(
                 [sys.executable, "-m", "pytest", *self._words()],
                 cwd=self._config.invocation_params.dir,
                 stdin=subprocess.DEVNULL,
@@ -103,26 +117,35 @@ class Leader(Half):
             )
         try:
             done = yield
-            while helper.poll() is None:
-                self._tell_its_reports()
+            while self._is_at_work():
                 time.sleep(LOOK_S)
-            self._tell_its_reports()
-            self._check(helper.returncode)
+            if self._missing:
+                pytest.exit(f"nobody ran {sorted(self._missing)}", returncode=3)
         finally:
-            _end(helper)
+            _end(self._helper)
         return done
 
     def _words(self) -> list[str]:
         """Of the command that started this process, for the helper."""
         words = [str(w) for w in self._config.invocation_params.args if w != "--halves"]
-        return [*words, "--half-of", str(self._folder), "--color=no"]
+        return [*words, f"--half-of={self._folder}", "--color=no"]
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        self._missing.discard(report.nodeid)
+        if report.when == "teardown":
+            self._missing.discard(report.nodeid)
 
     def pytest_runtest_logfinish(self) -> None:
+        self._is_at_work()
+
+    def _is_at_work(self) -> bool:
+        """Whether the helper is; tells what it reported so far, and ends all if it broke down."""
+        code = self._helper.poll()
         if self._read < self._reports.stat().st_size:
             self._tell_its_reports()
+        if code is not None and code not in GOOD:
+            said = (self._folder / "said").read_text(encoding="utf-8", errors="replace")
+            pytest.exit(f"the second process ended with {code}:\n{said}", returncode=3)
+        return code is None
 
     def _tell_its_reports(self) -> None:
         hook = self._config.hook
@@ -139,14 +162,6 @@ class Leader(Half):
             whole = reports.read().rpartition(b"\n")[0]
         self._read += len(whole) + bool(whole)
         return [json.loads(line) for line in whole.splitlines()]
-
-    def _check(self, code: int) -> None:
-        """Nothing may be lost: neither the helper nor a test."""
-        if code not in GOOD:
-            said = (self._folder / "said").read_text(encoding="utf-8", errors="replace")
-            pytest.exit(f"the second process ended with {code}:\n{said}", returncode=3)
-        if self._missing:
-            pytest.exit(f"nobody ran {sorted(self._missing)}", returncode=3)
 
 
 def _end(helper: subprocess.Popen[bytes]) -> None:

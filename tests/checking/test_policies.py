@@ -139,7 +139,8 @@ def test_policies_are_checked_by_name_and_by_file(tmp_path, monkeypatch, capsys)
     (tmp_path / "bad.py").write_text(bad + "    def advise(self, situation, rng): return 1 / 0\n")
     assert console.check(["policy", "min_eta", "patrol.py:Patrol"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0].startswith("min_eta: policy: valid; 200 situations, slowest decision ")
+    said = "min_eta: policy: valid; 200 situations, slowest decision "
+    assert any(line.startswith(said) for line in lines)  # a busy machine has warnings, too
     assert lines[-1] == "2 policies: 2 valid"
     assert console.check(["policy", "bad.py:Bad"]) == 1
     lines = capsys.readouterr().out.splitlines()

@@ -116,7 +116,8 @@ def test_robots_are_checked_by_profile_and_by_file(tmp_path, monkeypatch, capsys
     (tmp_path / "bad.py").write_text(bad + "    def accelerations(self, *a): return 1 / 0\n")
     assert console.check(["robot", "servrobot", "tracked.py:Tracked"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0].startswith("servrobot: robot: valid; 154 drives, ")
+    said = "servrobot: robot: valid; 154 drives, "
+    assert any(line.startswith(said) for line in lines)  # a busy machine has warnings, too
     assert lines[-1] == "2 robots: 2 valid"
     assert console.check(["robot", "bad.py:Bad"]) == 1
     lines = capsys.readouterr().out.splitlines()

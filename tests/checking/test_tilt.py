@@ -259,7 +259,8 @@ def test_filters_and_mappings_are_checked_by_name_and_by_file(tmp_path, monkeypa
     )
     assert console.check(["filter", "median", "faithful.py:Faithful"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0].startswith("median: filter: valid; 40 runs, ")
+    said = "median: filter: valid; 40 runs, "
+    assert any(line.startswith(said) for line in lines)  # a busy machine has warnings, too
     assert lines[-1] == "2 filters: 2 valid"
     assert console.check(["filter", "bad.py:Bad"]) == 1
     lines = capsys.readouterr().out.splitlines()

@@ -24,7 +24,6 @@ from dva_sim.experiments.runner import run_study
 
 @pytest.fixture
 def dask(tmp_path: Path) -> Iterator[DaskCluster]:
-    pytest.importorskip("distributed")
     folder = tmp_path / "cluster"
     folder.mkdir()
     with DaskCluster(folder) as started:
@@ -137,7 +136,6 @@ def test_an_address_that_is_none_is_refused(tmp_path: Path, address: str) -> Non
 def test_a_scheduler_that_is_not_there_is_told(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    pytest.importorskip("distributed")
     monkeypatch.setattr(cluster, "_CONNECT_S", 0.01)
     with pytest.raises(ConfigError, match=r"no scheduler answers at tcp://127\.0\.0\.1:9: nothing"):
         run_study(kit.study_in(tmp_path), tmp_path / "out", scheduler="tcp://127.0.0.1:9")
@@ -150,7 +148,6 @@ def test_a_scheduler_that_is_not_there_is_told(
 def test_another_program_is_not_taken_for_a_scheduler(
     says: bytes, told: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    pytest.importorskip("distributed")
     monkeypatch.setattr(cluster, "_CONNECT_S", 30.0 if says else 0.2)
     over = threading.Event()
 

@@ -57,7 +57,8 @@ def test_a_message_with_a_field_too_few_or_too_many_would_be_found():
 @pytest.mark.parametrize("name", [name for name in SCHEMAS if name.startswith("foxglove.")])
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")
 def test_foxglove_itself_knows_these_types_and_fields(name):
-    known = pytest.importorskip("foxglove.messages")
+    import foxglove.messages as known
+
     assert list(_unknown(SCHEMAS[name], known)) == []
 
 

@@ -4,15 +4,11 @@ import math
 
 import pytest
 from recordings.runs import drill, drive
-
-from dva_sim.errors import ConfigError
-from dva_sim.recordings import read_recording
-
-pytest.importorskip("rosbags")
-
 from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_typestore
 
+from dva_sim.errors import ConfigError
+from dva_sim.recordings import read_recording
 from dva_sim.recordings.ros2 import write_bag
 
 
