@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from dva_sim.experiments import design
-from dva_sim.experiments.design import Job
+from dva_sim.experiments.design import Cell, Job
 from dva_sim.experiments.models import Tables, model_for
 from dva_sim.experiments.recording import refuse_what_cannot_be_recorded
 from dva_sim.experiments.study import Study
+
+Progress = Callable[[int, int], object]
 
 
 def run_job(job: Job) -> Tables:
@@ -15,12 +19,23 @@ def run_job(job: Job) -> Tables:
     return model_for(job.scenario).tables(job.scenario, job.seed, with_tracks=first)
 
 
-def rehearse_all(study: Study) -> None:
+def rehearse_all(study: Study, progress: Progress = lambda *_: None) -> list[Cell]:
     """Build one run of every configuration, so that a mistake is found before the first run.
+
+    Args:
+        study: From `load_study`.
+        progress: Called with the number of configurations that were built, and of all.
+
+    Returns:
+        The configurations, of which there may be so many that making them again takes time.
 
     Raises:
         ConfigError: what cannot be read, placed or recorded.
     """
     refuse_what_cannot_be_recorded(study)
-    for cell in design.to_rehearse(study, design.cells(study)):
+    cells = design.cells(study)
+    every = design.to_rehearse(study, cells)
+    for done, cell in enumerate(every, 1):
         design.rehearse(study, cell)
+        progress(done, len(every))
+    return cells
