@@ -50,7 +50,7 @@ def check_config(kind: FileKind, document: Document) -> list[Problem]:
 def doubts(kind: FileKind, document: Document) -> list[str]:
     """What does not go together in a valid study or scenario."""
     if kind.model is Study:
-        return contradictions_in(load_study(document.file))
+        return contradictions_in(design.cells(load_study(document.file)))
     return contradictions(build(document)) if kind.model is Scenario else []
 
 

@@ -22,8 +22,10 @@ from dva_sim.experiments.asking import (
 from dva_sim.experiments.designs import (
     MOST_CELLS,
     MOST_POINTS,
+    MOST_RUNS,
     keys_of,
     place_of,
+    runs_of,
     size,
     together,
 )
@@ -108,7 +110,7 @@ def of_factors(study: Study) -> Iterator[Fault]:
     except ValueError as error:
         yield str(error), ()
     yield from _faults_of_tuning(study)
-    yield from _faults_of_size(study)
+    yield from of_size(study)
 
 
 def _faults_of_name(study: Study, factor: str) -> Iterator[Fault]:
@@ -120,14 +122,21 @@ def _faults_of_name(study: Study, factor: str) -> Iterator[Fault]:
         yield f"a treatment cannot be called {factor!r}: {what} is", ("treatments", factor)
 
 
-def _faults_of_size(study: Study) -> Iterator[Fault]:
-    """A slip in a grid would take minutes to build and years to run."""
+def of_size(study: Study) -> Iterator[Fault]:
+    """A slip in a grid, or in how many persons there are, would take years to run."""
     count, has_points = size(study), POINT in study.factors
     most = MOST_POINTS if has_points else MOST_CELLS
     if count > most:
         how = "points or levels" if has_points else "levels, or draw points with 'design'"
         problem = f"a part would have {count:,} cells, more than {most:,}; have fewer {how}"
         yield problem, ("design",) if has_points else ("factors",)
+    elif (runs := runs_of(study)) > MOST_RUNS:
+        asked = "most_persons" if study.most_persons > study.persons else "persons"
+        is_trials = study.replications > study.most_persons
+        path: Path_ = ("stop", asked) if asked == "most_persons" else (asked,)
+        problem = f"there would be {runs:,} runs, more than {MOST_RUNS:,}"
+        fewer = "have fewer persons, replications or levels"
+        yield f"{problem}; {fewer}", ("replications",) if is_trials else path
 
 
 def _levels_of(study: Study, factor: str) -> Sequence[Level]:

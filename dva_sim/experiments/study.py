@@ -320,6 +320,8 @@ def _piloted(study: Study, persons: int) -> Study:
     seed = derive_seed(study.seed, "pilot")
     pilot = study.model_copy(update={"persons": persons, "seed": seed, "stop": None})
     pilot._pilot = persons
+    for problem, _ in faults.of_size(pilot):
+        raise ConfigError(f"a pilot of {persons} persons: {problem}")
     return pilot
 
 
