@@ -88,6 +88,7 @@ class Study(Config):
     _pilot: int | None = PrivateAttr(default=None)
     _is_full: bool = PrivateAttr(default=False)
     _status: Status = PrivateAttr(default_factory=Status)
+    _usual: dict[str, Any] = PrivateAttr(default_factory=dict)
 
     @field_validator("factors")
     @classmethod
@@ -171,6 +172,11 @@ class Study(Config):
         return self._is_full
 
     @property
+    def usual(self) -> dict[str, Any]:
+        """Its name and the size that its file gives it, whichever version of it this is."""
+        return self._usual
+
+    @property
     def status(self) -> Status:
         """What its results may be called."""
         return self._status
@@ -214,9 +220,10 @@ def load_study(
 
     document = load_yaml(resources.find(str(name), FOLDER))
     study, data = _version(document, full)
+    usual = study.usual
     if settings := tuple(settings):
         study = _with_settings(data, document, settings)
-    study._is_full = full
+    study._is_full, study._usual = full, usual
     if pilot is not None:
         study = _piloted(study, pilot)
     return settled(study)
@@ -226,6 +233,7 @@ def _version(document: Document, full: bool) -> tuple[Study, Changed]:
     """The study as its file says, or its larger version; both are judged."""
     written = Changed(document.data, {}, ())
     study = _built(written, document)
+    study._usual = _size_of(study)
     if not study.full:
         if full:
             raise document.error("has no larger version: no key 'full'")
@@ -235,7 +243,15 @@ def _version(document: Document, full: bool) -> tuple[Study, Changed]:
         larger = _built(data, document)
     except ConfigError as error:
         raise _told_in_full(study, error) from None
+    larger._usual = study.usual
     return (larger, data) if full else (study, written)
+
+
+def _size_of(study: Study) -> dict[str, Any]:
+    """What a report needs to tell one version of a study from another."""
+    factors = {name: list(levels) for name, levels in study.factors.items()}
+    size = {"persons": study.persons, "replications": study.replications, "factors": factors}
+    return {"name": study.file.stem} | size
 
 
 def _told_in_full(study: Study, error: ConfigError) -> ConfigError:
