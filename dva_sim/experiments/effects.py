@@ -227,11 +227,12 @@ class View:
             return self.part.excess(self.measure)
         return self.part.grid(self.measure)
 
-    def stops_outside(self, panel: Setting) -> list[int]:
-        """The stops of a panel at which at least one line is an extrapolation."""
+    def stops_outside(self, panel: Setting, lines: Sequence[Level] | None = None) -> list[int]:
+        """The stops of a panel at which at least one line, of some or all, is an extrapolation."""
         if self.outside is None:
             return []
-        marks = np.array([self._marks(panel, line) for line in self.lines]).any(axis=0)
+        some = self.lines if lines is None else lines
+        marks = np.array([self._marks(panel, line) for line in some]).any(axis=0)
         return [int(stop) for stop in np.flatnonzero(marks)]
 
     def _marks(self, panel: Setting, line: Level) -> NDArray[np.bool_]:

@@ -198,7 +198,8 @@ def finding_of(view: View) -> Finding | None:
         horizon=_horizon(view),
         widest=view.widest,
         all_confirmed=_all_confirmed(view),
-        everywhere="on average over the ranges" if view.averages_points else "throughout",
+        everywhere="on average over the ranges" if view.averages_points else "",
+        part=view.part.name,
     )
 
 

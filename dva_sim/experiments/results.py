@@ -237,7 +237,8 @@ class Results:
 
     def _repr_html_(self) -> str:
         """What a notebook shows: question, answer, and how many runs stand behind it."""
-        notes = "".join(f"<p>{escape(note)}</p>" for note in self.answer.notes)
+        depends = (f"{about}: {words}" for about, words in self.answer.depends.items())
+        notes = "".join(f"<p>{escape(note)}</p>" for note in (*depends, *self.answer.notes))
         failed = f", {len(self.failures)} failed" if self.failures else ""
         runs = f"<p>{self.runs.rows} runs{failed}, in {escape(str(self.folder))}</p>"
         lead = f"<p><b>{escape(self.answer.lead)}</b></p>"

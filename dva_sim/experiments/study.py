@@ -95,6 +95,7 @@ class Study(Config):
     _pilot: int | None = PrivateAttr(default=None)
     _version: Version | None = PrivateAttr(default=None)
     _status: Status = PrivateAttr(default_factory=Status)
+    _usual: dict[str, Any] = PrivateAttr(default_factory=dict)
 
     @field_validator("factors")
     @classmethod
@@ -183,6 +184,11 @@ class Study(Config):
         return [version for version in VERSIONS if getattr(self, version)]
 
     @property
+    def usual(self) -> dict[str, Any]:
+        """Its name and the size that its file gives it, whichever version of it this is."""
+        return self._usual
+
+    @property
     def status(self) -> Status:
         """What its results may be called."""
         return self._status
@@ -242,9 +248,10 @@ def load_study(
         from dva_sim.experiments.documents import of_other_kind  # it knows studies, too
 
         raise of_other_kind(document, "dva-sim run", "study") or error from None
+    usual = study.usual
     if settings := tuple(settings):
         study = _with_settings(data, document, settings)
-    study._version = version
+    study._version, study._usual = version, usual
     if pilot is not None:
         study = _piloted(study, pilot)
     return settled(study)
@@ -254,6 +261,7 @@ def _in_version(document: Document, version: Version | None) -> tuple[Study, Cha
     """The study as its file says, or one of its versions; all of them are judged."""
     written = Changed(document.data, {}, ())
     study = _built(written, document)
+    study._usual = _size_of(study)
     made = {name: _version_of(study, written, document, name) for name in study.versions}
     if version is None:
         return study, written
@@ -271,9 +279,17 @@ def _version_of(
         made = _built(data, document, may_lose=version == "quick")
         if made.answer is None and study.answer is not None:
             _built(data, document)  # which tells why it cannot be answered
+        made._usual = study.usual
         return made, data
     except ConfigError as error:
         raise _told_in(study, version, error) from None
+
+
+def _size_of(study: Study) -> dict[str, Any]:
+    """What a report needs to tell one version of a study from another."""
+    factors = {name: list(levels) for name, levels in study.factors.items()}
+    size = {"persons": study.persons, "replications": study.replications, "factors": factors}
+    return {"name": study.file.stem} | size
 
 
 def _told_in(study: Study, version: Version, error: ConfigError) -> ConfigError:
