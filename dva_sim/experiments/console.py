@@ -72,7 +72,9 @@ def episode(
     if record is not None and not isinstance(scenario, Scenario):
         raise ConfigError(f"{name} is a {scenario.model} scenario: only full ones are recorded")
     if isinstance(scenario, TimedScenario | TransportScenario):
-        if pictures.any or side_by_side is not None:
+        if side_by_side is not None:
+            raise ConfigError(f"{name} is a {scenario.model} scenario: only full ones run twice")
+        if pictures.any:
             raise ConfigError(f"{name} is a {scenario.model} scenario: there is nothing to see")
         if isinstance(scenario, TransportScenario):
             told.tell(scenario, seed, where)
