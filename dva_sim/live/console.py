@@ -13,7 +13,8 @@ from rich.table import Table
 from rich.text import Text
 
 from dva_sim.core.registry import DETECTOR
-from dva_sim.live.options import Options
+from dva_sim.live import process
+from dva_sim.live.options import PARTS, Options
 from dva_sim.live.process import Report, run_part
 from dva_sim.live.supervisor import Summary, Supervisor
 from dva_sim.network.sockets import DEFAULT_PORT
@@ -150,6 +151,9 @@ def run_one(part: str, options: Options, number: int) -> None:
     warn(console, options)
     if options.dva is None and (part != "dva" or not options.port):
         options = replace(options, dva=DEFAULT_DVA)
+    options.check()
+    if part in PARTS and part != "dva":
+        _print(console, f"Looking for the DVA at {options.dva} for {process.PATIENCE:g} s ...")
     with Live(console=console, refresh_per_second=4, transient=True) as screen:
 
         def say(report: Report) -> None:
