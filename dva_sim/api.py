@@ -25,6 +25,7 @@ from dva_sim.experiments.versions import Variant
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from dva_sim.experiments.design import Cell
     from dva_sim.experiments.planning import DryRun
     from dva_sim.experiments.registration import Registration
     from dva_sim.experiments.study import Study
@@ -76,8 +77,8 @@ def run(
     from dva_sim.experiments.runner import run_study
 
     variant = Variant.of(quick=quick, full=full, pilot=pilot)
-    asked, folder = _asked(study, out, pairs_of(set, seed), variant)
-    options: dict[str, Any] = {"jobs": jobs, "scheduler": scheduler}
+    asked, folder, cells = _asked(study, out, pairs_of(set, seed), variant)
+    options: dict[str, Any] = {"jobs": jobs, "scheduler": scheduler, "cells": cells}
     with _without_main():
         run_study(asked, folder, progress=progress, limit_s=limit_s, **options)
         problems = record_study(asked, folder, jobs=jobs, limit_s=limit_s)
@@ -109,20 +110,20 @@ def dry_run(
     from dva_sim.experiments.planning import dry_run as planned
 
     variant = Variant.of(quick=quick, full=full, pilot=pilot)
-    asked, folder = _asked(study, out, pairs_of(set, seed), variant)
-    return planned(asked, folder, jobs=jobs, probe=run_job)
+    asked, folder, cells = _asked(study, out, pairs_of(set, seed), variant)
+    return planned(asked, folder, jobs=jobs, probe=run_job, cells=cells)
 
 
 def _asked(
     study: str | Path, out: str | Path | None, pairs: list[str], variant: Variant
-) -> tuple[Study, Path]:
-    """A study without mistakes, and the folder of its results."""
+) -> tuple[Study, Path, list[Cell]]:
+    """A study without mistakes, the folder of its results, and its configurations."""
     from dva_sim.experiments.episode import rehearse_all
     from dva_sim.experiments.study import load_study
 
     asked = load_study(study, pairs, version=variant.version, pilot=variant.pilot)
-    rehearse_all(asked)
-    return asked, Path(out) if out is not None else variant.folder(str(study))
+    folder = Path(out) if out is not None else variant.folder(str(study))
+    return asked, folder, rehearse_all(asked)
 
 
 def new(name: str | Path) -> Path:

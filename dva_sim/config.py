@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import copy
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
@@ -161,83 +160,6 @@ def parse_scalar(text: str) -> Any:
         return _plain(YAML(typ="safe", pure=True).load(text), (), {})
     except (YAMLError, ValueError, RecursionError) as error:
         raise ConfigError(f"value {text[:80]!r} is not valid YAML") from error
-
-
-def parse_changes(pairs: Iterable[str]) -> dict[str, Any]:
-    """`key=value` pairs, as given on the command line, as a mapping.
-
-    Raises:
-        ConfigError: a pair without `=`, or a value that is not YAML.
-    """
-    changes = {}
-    for pair in pairs:
-        key, equals, value = pair.partition("=")
-        if not equals or not key.strip():
-            raise ConfigError(f"--set {pair!r} should be key=value, such as seed=2")
-        changes[key.strip()] = parse_scalar(value)
-    return changes
-
-
-def build(
-    model: type[M],
-    source: Document | Mapping[str, Any],
-    changes: Mapping[str, Any],
-    complete: Callable[[M, Fail], M],
-    locate: Callable[[dict[str, Any], Sequence[Path]], object],
-) -> M:
-    """A configuration with some keys changed, whose mistakes are told with their place.
-
-    Args:
-        model: What it is.
-        source: A document or plain data.
-        changes: New values by dotted key; a number chooses an item of a list.
-        complete: Judges what the model alone cannot, and adds what follows from it.
-        locate: Lets files that the data names be found from the folders given.
-
-    Raises:
-        ConfigError: an unknown key, a wrong type, a value out of range, or what `complete` finds.
-    """
-    document = source if isinstance(source, Document) else None
-    data = copy.deepcopy(dict(document.data if document else source))  # type: ignore[arg-type]
-    for key, value in changes.items():
-        set_key(data, key, value)
-
-    def error(problem: str, path: Path_) -> ConfigError:
-        dotted = ".".join(str(p) for p in path)
-        if document is None or any(dotted == k or dotted.startswith(k + ".") for k in changes):
-            return ConfigError(problem)
-        return document.error(problem, path)
-
-    locate(data, [document.file.parent] if document else [])
-    return complete(validate(model, data, error), error)
-
-
-def set_key(data: dict[str, Any], key: str, value: Any) -> None:
-    """Change one value by dotted key, making the mappings on the way.
-
-    Raises:
-        ConfigError: a part of the key names something that is not there, or holds no keys.
-    """
-    node: Any = data
-    above, names = "", key.split(".")
-    for depth, name in enumerate(names, 1):
-        place: Any = _place_in(node, name, above, key)
-        if depth == len(names):
-            node[place] = value
-        else:
-            node = node[place] if isinstance(node, list) else node.setdefault(place, {})
-            above = name
-
-
-def _place_in(node: Any, name: str, above: str, key: str) -> str | int:
-    """Where a part of a dotted key leads: a key of a mapping, or an item of a list."""
-    if isinstance(node, dict):
-        return name
-    if not isinstance(node, list):
-        raise ConfigError(f"unknown key {key!r}: {above!r} holds no keys")
-    if not name.isdigit() or int(name) >= len(node):
-        raise ConfigError(f"unknown key {key!r}: {above!r} has items 0 to {len(node) - 1}")
-    return int(name)
 
 
 def validate(

@@ -32,6 +32,7 @@ class ConfigError(DvaSimError):
         file: The file that holds the mistake, if one does.
         line: Line in that file, counted from 1.
         column: Column in that line, counted from 1.
+        keys: Which of the keys that were changed are at fault, if the file alone is valid.
     """
 
     def __init__(
@@ -40,7 +41,9 @@ class ConfigError(DvaSimError):
         file: str | Path | None = None,
         line: int | None = None,
         column: int | None = None,
+        keys: tuple[str, ...] = (),
     ) -> None:
+        self.keys = keys
         self.problem = problem
         self.file = None if file is None else str(file)
         self.line = line
@@ -52,7 +55,7 @@ class ConfigError(DvaSimError):
         return f"{place}: {self.problem}" if place else self.problem
 
     def __reduce__(self) -> tuple[object, ...]:
-        return type(self), (self.problem, self.file, self.line, self.column)
+        return type(self), (self.problem, self.file, self.line, self.column, self.keys)
 
 
 ERROR = "error: "

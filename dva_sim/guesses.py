@@ -4,42 +4,90 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from typing import Final
 
-_ALIKE = 0.75  # of two names that differ by a slip; by chance two words reach 0.6
-_LISTED = 12  # names in one line; more are counted
+_LETTERS: Final = 3  # at least, for the beginning of a name to tell which is meant
+_A_SLIP: Final = 4  # letters in which one slip is likely
+_LISTED: Final = 12  # names in one line; more are counted
 
 
 def guess(given: str, known: Iterable[str]) -> str | None:
-    """The name that was meant; None if no guess is good."""
-    from difflib import SequenceMatcher  # late: a mistake can wait for it
+    """The name that was meant; None if no guess is good.
 
-    wanted, best = _plain(given), (0.0, "")
-    for name in known:
-        plain = _plain(name)
-        score = SequenceMatcher(None, wanted, plain).ratio()
-        if len(wanted) > 2 and (plain.startswith(wanted) or wanted.startswith(plain)):
-            score += 1 - _ALIKE  # the beginning of a name is more than letters in common
-        best = max(best, (score, name), key=lambda pair: pair[0])
-    return best[1] if wanted and best[0] >= _ALIKE else None
+    A good guess differs by few slips, has the name as half of it or more, or is the only one that
+    begins with it.
+    """
+    wanted, names = plain_name(given), list(known)
+    if not wanted:
+        return None
+    slips = {name: _slips(wanted, plain_name(name)) for name in names}
+    near = min(slips, key=lambda name: slips[name], default=None)
+    if near is not None and slips[near] <= (len(wanted) + 1) // _A_SLIP and len(wanted) > _LETTERS:
+        return near
+    begun = {name: plain_name(name) for name in names if _begins(wanted, plain_name(name))}
+    halves = [name for name, plain in begun.items() if _is_half(wanted, plain)]
+    return halves[0] if halves else next(iter(begun)) if len(begun) == 1 else None
+
+
+def _is_half(one: str, other: str) -> bool:
+    return 2 * min(len(one), len(other)) >= max(len(one), len(other))
+
+
+def _begins(one: str, other: str) -> bool:
+    short, long = sorted((one, other), key=len)
+    return len(short) >= _LETTERS and long.startswith(short)
+
+
+def _slips(one: str, other: str) -> int:
+    """Letters left out, put in, changed, or exchanged with the next; many for another number."""
+    if abs(len(one) - len(other)) > len(one) // _A_SLIP + 1 or _is_numbered(one, other):
+        return len(one) + len(other)
+    before, row = list[int](), list(range(len(other) + 1))
+    for i, a in enumerate(one, 1):
+        above, before, row = before, row, [i]
+        for j, b in enumerate(other, 1):
+            least = min(before[j] + 1, row[j - 1] + 1, before[j - 1] + (a != b))
+            if i > 1 and j > 1 and (a, one[i - 2]) == (other[j - 2], b):
+                least = min(least, above[j - 2] + 1)
+            row.append(least)
+    return row[-1]
+
+
+def _is_numbered(one: str, other: str) -> bool:
+    """Whether two names differ in their number alone: no slip makes robot-9 of robot-1."""
+    digits = re.compile(r"[0-9]+")
+    return (
+        one != other
+        and digits.search(one) is not None
+        and digits.sub("0", one) == digits.sub("0", other)
+    )
 
 
 def hint(given: str, known: Iterable[str], there: str = "known") -> str:
-    """`did you mean 'x'?`, or if no guess is good what there is, not too much of it."""
+    """`did you mean 'x'?`; if no guess is good what there is, but not too much of it."""
     names = list(known)
     near = guess(given, names)
-    if near is not None:
-        return f"did you mean {near!r}?"
-    if not names:
-        return f"{there}: none"
-    more = f", ... ({len(names)} in all)" if len(names) > _LISTED else ""
-    return f"{there}: {', '.join(names[:_LISTED])}{more}"
+    return f"did you mean {near!r}?" if near is not None else f"{there}: {listed(names)}"
 
 
-def unknown(what: str, given: object, known: Iterable[str]) -> str:
+def unknown(what: str, given: object, known: Iterable[str], there: str = "known") -> str:
     """That there is nothing of a name, and which one was meant or what there is."""
-    return f"{what} {given!r} is unknown; {hint(str(given), known)}"
+    return f"{what} {given!r} is unknown; {hint(str(given), known, there)}"
 
 
-def _plain(name: str) -> str:
-    """A name without what people mix up: case, and the signs between words."""
+def listed(names: Iterable[object], most: int = _LISTED) -> str:
+    """Names in a line; of many the first, and how many there are."""
+    every = [str(name) for name in names]
+    more = f", ... ({len(every)} in all)" if len(every) > most else ""
+    return (", ".join(every[:most]) or "none") + more
+
+
+def either(names: Iterable[object]) -> str:
+    """`a, b or c`."""
+    every = [str(name) for name in names]
+    return " or ".join(part for part in (", ".join(every[:-1]), every[-1] if every else "") if part)
+
+
+def plain_name(name: str) -> str:
+    """A name without what people mix up: capitals, and the signs between words."""
     return re.sub(r"[\s_.-]+", "_", name.casefold())

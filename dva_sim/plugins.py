@@ -16,6 +16,7 @@ from typing import Any, Final, Generic, TypeVar
 
 from dva_sim import resources
 from dva_sim.errors import ConfigError
+from dva_sim.guesses import hint, unknown
 
 T = TypeVar("T")
 A = TypeVar("A")
@@ -101,7 +102,7 @@ class Plugins(Generic[T]):
         known = [p.name for p in parameters if p.kind not in (p.POSITIONAL_ONLY, p.VAR_POSITIONAL)]
         for option in options:
             if option not in known:
-                there = f"known: {', '.join(known)}" if known else "it has none"
+                there = hint(option, known) if known else "it has none"
                 raise ConfigError(f"{self.kind} {name!r} has no option {option!r}; {there}")
 
     # --- files -------------------------------------------------------------------------
@@ -114,9 +115,12 @@ class Plugins(Generic[T]):
         if not colon or not file.endswith(".py"):
             return None
         path = self._find_file(name, file, base)
-        found = vars(_run(path, self.kind)).get(wanted)
+        module = _run(path, self.kind)
+        found = vars(module).get(wanted)
         if found is None:
-            raise ConfigError(f"{self.kind} {name!r}: there is no class {wanted!r} in {path}")
+            there = [n for n, c in vars(module).items() if _is_own_class(c, module)]
+            problem = f"there is no class {wanted!r} in {path}; {hint(wanted, there, 'classes')}"
+            raise ConfigError(f"{self.kind} {name!r}: {problem}")
         return self._right_class(name, found)
 
     def _find_file(self, name: str, file: str, base: Path | None) -> Path:
@@ -136,8 +140,9 @@ class Plugins(Generic[T]):
         """The class that an installed package offers under a name."""
         offers = {entry.name: entry for entry in entry_points(group=self.group)}
         if name not in offers:
-            problem = f"{self.kind} {name!r} is unknown; known: {', '.join(self.known())}"
-            raise ConfigError(f"{problem}; or a file: mine.py:Mine")
+            problem = unknown(self.kind, name, self.known())
+            more = "" if problem.endswith("?") else "; or a file: mine.py:Mine"
+            raise ConfigError(problem + more)
         return self._right_class(name, self._offered(name, offers[name]))
 
     def _offered(self, name: str, entry: EntryPoint) -> Any:
@@ -206,6 +211,10 @@ def _run(path: Path, kind: str) -> ModuleType:
     except FAILURES as error:
         raise ConfigError(f"cannot be loaded: {said(error)}", path, _line(error, path)) from error
     return module
+
+
+def _is_own_class(value: object, module: ModuleType) -> bool:
+    return isinstance(value, type) and value.__module__ == module.__name__
 
 
 def _line(error: BaseException, path: Path) -> int | None:

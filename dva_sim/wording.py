@@ -2,21 +2,38 @@
 
 from __future__ import annotations
 
-import difflib
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from pydantic import BaseModel
 
-Path = tuple[str | int, ...]
+from dva_sim.guesses import either, guess, unknown
+from dva_sim.key_hints import Path, fields_at, meant
+from dva_sim.value_hints import as_number
 
-# What a value may be, where it may be of several kinds.
-_KINDS = {"float_type": "a number", "string_type": "text", "bool_type": "true or false"}
+_SHOWN = 60  # characters of a value
+
+# What a value should be, by what pydantic says that it is not.
+_KINDS = {
+    "float_type": "a number",
+    "int_type": "a whole number",
+    "string_type": "text",
+    "bool_type": "true or false",
+    "none_required": "null",
+}
 _STRUCTURES = {
     "tuple_type": "a list",
     "list_type": "a list",
     "dict_type": "a mapping of keys to values",
     "model_type": "a mapping of keys to values",
+    "model_attributes_type": "a mapping of keys to values",
+}
+_BOUNDS = {
+    "greater_than": ("above", "gt"),
+    "greater_than_equal": ("at least", "ge"),
+    "less_than": ("below", "lt"),
+    "less_than_equal": ("at most", "le"),
 }
 
 
@@ -53,18 +70,49 @@ def _explain(model: type[BaseModel], problems: Sequence[Any], path: Path) -> str
     """One mistake in words, from all that was found at its place: one for each kind allowed."""
     key, first = ".".join(str(p) for p in path), problems[0]
     if first["type"] == "extra_forbidden":
-        known = _fields_at(model, path[:-1])
-        near = difflib.get_close_matches(str(path[-1]), known, n=1)
-        hint = f"did you mean {near[0]!r}?" if near else f"known here: {', '.join(sorted(known))}"
-        return f"unknown key {key!r}; {hint}" if known else f"unknown key {key!r}"
+        hint = meant(path, first["input"], model)
+        return f"unknown key {key!r}; {hint}" if hint else f"unknown key {key!r}"
+    if first["type"] == "union_tag_not_found":
+        return f"missing key '{key}.{_tag(first)}'"
+    if first["type"] == "union_tag_invalid":
+        tag = first["ctx"]["tag"]
+        return f"{key}: {unknown(_tag(first), tag, _quoted(first['ctx']['expected_tags']))}"
     if first["type"] == "missing":
         item = path[-1]
         if isinstance(item, int):
             return f"{key.removesuffix(f'.{item}')}: should have at least {item + 1} items"
         return f"missing key {key!r}"
-    message, given = _in_words(problems), first["input"]
-    shown = f", not {given!r}" if isinstance(given, str | int | float | bool) else ""
-    return f"{key}: {message}{shown}" if key else f"{message}"
+    message = _in_words(problems)
+    message += f"{_given(first, message)}{_instead(model, problems, path)}"
+    return f"{key}: {message}" if key else message
+
+
+def _given(problem: Any, message: str) -> str:
+    """The value there is, unless it is long or has been told already."""
+    given = problem["input"]
+    if given is None:
+        return ", not null" if problem["type"] != "value_error" else ""
+    shown = repr(given)
+    if not isinstance(given, str | int | float | bool):
+        return ""
+    if problem["type"] == "value_error" and shown in message:
+        return ""
+    return f", not {shown if len(shown) <= _SHOWN else shown[:_SHOWN] + '...'}"
+
+
+def _instead(model: type[BaseModel], problems: Sequence[Any], path: Path) -> str:
+    """What to write instead, where that can be guessed."""
+    given, kinds = problems[0]["input"], {problem["type"] for problem in problems}
+    if isinstance(given, str) and "float_type" in kinds:
+        number = as_number(str(path[-1]) if path else "", given)
+        return f"; write {number}" if number else ""
+    if isinstance(given, str) and "literal_error" in kinds:
+        near = guess(given, _choices(problems[0]))
+        return f"; did you mean {near!r}?" if near is not None else ""
+    if kinds & {"model_type", "model_attributes_type"} and not isinstance(given, list | dict):
+        keys = list(fields_at(model, path))
+        return f", such as {'.'.join(map(str, (*path, keys[0])))}" if keys and path else ""
+    return ""
 
 
 def _in_words(problems: Sequence[Any]) -> str:
@@ -76,34 +124,38 @@ def _in_words(problems: Sequence[Any]) -> str:
         count = first["ctx"]["min_length" if few else "max_length"]
         items = "item" if count == 1 else "items"
         return f"should have at {'least' if few else 'most'} {count} {items}"
-    allowed = [word for kind, word in _KINDS.items() if kind in kinds]
-    if len(allowed) > 1 and first["type"] in _KINDS:
-        return f"should be {', '.join(allowed[:-1])}, or {allowed[-1]}"
+    if first["type"] in _BOUNDS:
+        word, name = _BOUNDS[first["type"]]
+        return f"should be {word} {first['ctx'][name]:g}"
+    if first["type"] == "literal_error":
+        return f"should be {either(_choices(first))}"
     if first["type"].startswith("int_") and isinstance(first["input"], float):
         return "should be a whole number, without a point"
     if first["type"] in _STRUCTURES:
         return f"should be {_STRUCTURES[first['type']]}"
-    message: str = first["msg"].removeprefix("Value error, ")
+    allowed = [word for kind, word in _KINDS.items() if kind in kinds]
+    if "float_type" in kinds and "int_type" in kinds:
+        allowed.remove(_KINDS["int_type"])  # which is a number, too
+    if first["type"] in _KINDS and allowed:
+        return f"should be {_or(allowed)}"
+    message: str = first["msg"].removeprefix("Value error, ").removeprefix("Input ")
     return message[0].lower() + message[1:]
 
 
-def _fields_at(model: Any, path: Path) -> list[str]:
-    """Names of the fields of the model that stands at `path` inside `model`."""
-    for step in path:
-        if isinstance(step, int):
-            continue
-        info = getattr(model, "model_fields", {}).get(step)
-        if info is not None:  # else a key that the user chose, inside a mapping to models
-            model = _model_in(info.annotation)
-    return list(getattr(model, "model_fields", {}))
+def _or(words: Sequence[str]) -> str:
+    """`a number, text, or true or false`."""
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])}, or {words[-1]}"
 
 
-def _model_in(annotation: Any) -> Any:
-    """The first pydantic model inside an annotation such as `tuple[Event, ...] | None`."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    for inner in getattr(annotation, "__args__", ()):
-        found = _model_in(inner)
-        if found is not None:
-            return found
-    return None
+def _choices(problem: Any) -> list[str]:
+    """The words that a value should be one of."""
+    return _quoted(problem["ctx"]["expected"])
+
+
+def _quoted(text: str) -> list[str]:
+    return re.findall(r"'([^']*)'", text)
+
+
+def _tag(problem: Any) -> str:
+    """The key whose value says of which kind a mapping is."""
+    return str(problem["ctx"]["discriminator"]).strip("'")

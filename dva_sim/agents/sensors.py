@@ -23,6 +23,7 @@ from pydantic import Field, field_validator, model_validator
 from dva_sim.agents.sensing import FASTEST, SensorPort
 from dva_sim.config import Config
 from dva_sim.errors import ConfigError
+from dva_sim.guesses import unknown
 from dva_sim.worlds.hazards import Conditions
 from dva_sim.worlds.lidar import Lidar
 from dva_sim.worlds.physics import RobotBody, World
@@ -121,7 +122,7 @@ class SensorConfig(Config):
     @classmethod
     def _is_known(cls, name: str) -> str:
         if name not in KINDS:
-            raise ValueError(f"sensor {name!r} is not known; known: {', '.join(KINDS)}")
+            raise ValueError(unknown("sensor", name, KINDS))
         return name
 
     @model_validator(mode="after")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
@@ -13,69 +12,45 @@ from PIL import Image
 
 from dva_sim.agents.operator.person import Population
 from dva_sim.agents.people import BystanderProfile, GuardProfile
-from dva_sim.agents.profile import RobotProfile, read_robot
+from dva_sim.agents.profile import read_robot
 from dva_sim.agents.tilt import AccelerometerPart, PhoneProfile, try_phone
 from dva_sim.checking.problem import Problem
-from dva_sim.config import Config, Document, Path_, validate
+from dva_sim.config import Config, Document, validate
 from dva_sim.errors import ConfigError
 from dva_sim.experiments import design
-from dva_sim.experiments.design import Cell
+from dva_sim.experiments.documents import FileKind, blamed_in
 from dva_sim.experiments.episode import contradictions_in
-from dva_sim.experiments.models import model_for, model_of
-from dva_sim.experiments.registration import Registration, departures, load_registration
+from dva_sim.experiments.models import model_of
+from dva_sim.experiments.registration import departures, load_registration
 from dva_sim.experiments.repeats import Bands
 from dva_sim.experiments.study import Study, load_study
-from dva_sim.experiments.transports import TransportScenario
 from dva_sim.experiments.tuned import Tuned
-from dva_sim.experiments.validation.dispatch.cases import CaseFile, load_cases
-from dva_sim.experiments.validation.network.plan import PlanConfig, load_plan
-from dva_sim.experiments.validation.operators.targets import SplitFile, TargetFile, load_split
+from dva_sim.experiments.validation.dispatch.cases import load_cases
+from dva_sim.experiments.validation.network.plan import load_plan
+from dva_sim.experiments.validation.operators.targets import TargetFile, load_split
 from dva_sim.scenario import Scenario, build, contradictions
-from dva_sim.tasks import TaskScenario
-from dva_sim.timed.scenario import TimedScenario
 from dva_sim.worlds.geo import GeoFrame
 from dva_sim.worlds.maps import RosMap
 from dva_sim.worlds.plan import read_plan
-from dva_sim.worlds.site import DEFAULT_FRAME, SiteFile, load_site, map_site
+from dva_sim.worlds.site import DEFAULT_FRAME, load_site, map_site
 
 # What readers may raise on files that nobody would write, besides what they say in words.
 _HOSTILE: Final = (ValueError, OverflowError, Image.DecompressionBombError)
 
-_COUNTS: Final = {
-    "robot base": ("robot", "count"),
-    "guard post": ("guard", "count"),
-    "operator desk": ("operator", "count"),
-}
-
 Check = Callable[[Document], Iterator[ConfigError]]
 
 
-@dataclass(frozen=True)
-class Kind:
-    """One kind of YAML file.
-
-    Attributes:
-        name: As it is called in the output.
-        model: Its keys.
-        folder: Where files of this kind lie.
-        check: Yields what is wrong, or raises it.
-    """
-
-    name: str
-    model: type[Config]
-    folder: str
-    check: Check
-
-
-def check_config(kind: Kind, document: Document) -> list[Problem]:
+def check_config(kind: FileKind, document: Document) -> list[Problem]:
     """What is wrong with a configuration, by the code that runs it."""
-    return _collect(document.file, partial(kind.check, document), partial(_blamed, document))
+    return _collect(
+        document.file, partial(CHECKS[kind.name], document), partial(blamed_in, document)
+    )
 
 
-def doubts(kind: Kind, document: Document) -> list[str]:
+def doubts(kind: FileKind, document: Document) -> list[str]:
     """What does not go together in a valid study or scenario."""
     if kind.model is Study:
-        return contradictions_in(load_study(document.file))
+        return contradictions_in(design.cells(load_study(document.file)))
     return contradictions(build(document)) if kind.model is Scenario else []
 
 
@@ -87,21 +62,6 @@ def check_plan(path: Path) -> list[Problem]:
         return iter(())
 
     return _collect(path, read, lambda error: error)
-
-
-def recognise(document: Document) -> Kind | None:
-    """The kind that knows most of the keys; among equals, the one whose folder it lies in."""
-    keys = document.data.keys() - {"description"}
-    model = document.data.get("model")
-    others = {TimedScenario: "timed", TaskScenario: "task", TransportScenario: "transports"}
-    kinds = [kind for kind in KINDS if others.get(kind.model, model) == model]
-    shared = {kind.name: len(keys & kind.model.model_fields.keys()) for kind in kinds}
-    likely = [kind for kind in kinds if shared[kind.name] == max(shared.values())]
-    if len(likely) == 1:
-        return likely[0]
-    folder = document.file.resolve().parent.as_posix()
-    here = [kind for kind in likely if folder.endswith(f"/{kind.folder}")]
-    return here[0] if len(here) == 1 else None
 
 
 def _collect(
@@ -129,28 +89,6 @@ def _told(path: Path, error: ConfigError) -> Problem:
     )
 
 
-def _blamed(document: Document, error: ConfigError) -> ConfigError:
-    """The same mistake at the key that it is about, unless another file holds it."""
-    problem = error.problem
-    if error.file is not None:
-        if Path(error.file).exists():
-            return error
-        problem = f"{error.file!r}: {problem}"
-    counts: list[Path_] = [path for phrase, path in _COUNTS.items() if phrase in problem]
-    return document.error(problem, counts[0] if counts else _quoted(document, problem))
-
-
-def _quoted(document: Document, problem: str) -> Path_:
-    """The deepest key whose value the problem quotes."""
-    for path in sorted(document.places, key=len, reverse=True):
-        value: Any = document.data
-        for step in path:
-            value = value[step]
-        if isinstance(value, str) and repr(value) in problem:
-            return path
-    return ()
-
-
 # --- kinds -----------------------------------------------------------------------------
 
 
@@ -161,9 +99,10 @@ def _check_study(document: Document) -> Iterator[ConfigError]:
     cells = [design.to_rehearse(version, design.cells(version)) for version in versions]
     for cell in {cell.config: cell for some in cells for cell in some}.values():
         try:
-            model_for(cell.scenario).rehearse(cell.scenario, study.seed)
+            design.rehearse(study, cell)
         except ConfigError as error:
-            yield _blamed_in_cell(document, cell, error)
+            place = ("parts", cell.part, "scenario")
+            yield error if error.file is not None else document.error(error.problem, place)
 
 
 def _check_registration(document: Document) -> Iterator[ConfigError]:
@@ -175,16 +114,6 @@ def _check_registration(document: Document) -> Iterator[ConfigError]:
         return
     for problem in departures(found, load_study(file, version="full" if found.full else None)):
         yield document.error(problem, ("plan",))
-
-
-def _blamed_in_cell(document: Document, cell: Cell, error: ConfigError) -> ConfigError:
-    """A mistake at the factor that makes it, or else at the scenario of the part."""
-    blamed = _blamed(document, error)
-    if blamed.file != str(document.file) or blamed.line != 1:
-        return blamed
-    keys = [".".join(path) for phrase, path in _COUNTS.items() if phrase in error.problem]
-    factors = [("factors", key) for key in keys if key in dict(cell.levels)]
-    return document.error(blamed.problem, (*factors, ("parts", cell.part, "scenario"))[0])
 
 
 def _check_scenario(document: Document) -> Iterator[ConfigError]:
@@ -253,27 +182,26 @@ def _frame_of(path: Path) -> GeoFrame:
     return GeoFrame(latitude, longitude) if abs(latitude) < 89 else DEFAULT_FRAME
 
 
-KINDS: Final = (
-    Kind("study", Study, "experiments", _check_study),
-    Kind("scenario", Scenario, "experiments/scenarios", _check_scenario),
-    Kind("timed scenario", TimedScenario, "experiments/scenarios", _check_scenario),
-    Kind("task", TaskScenario, "experiments/scenarios/tasks", _check_scenario),
-    Kind("transports", TransportScenario, "experiments/scenarios", _check_scenario),
-    Kind("validation cases", CaseFile, "experiments/validation", _check_cases),
-    Kind("targets", TargetFile, "experiments/validation", _check_model(TargetFile)),
-    Kind("measurements", PlanConfig, "experiments/validation", _check_plan),
-    Kind("split", SplitFile, "experiments/validation", _check_split),
-    Kind("site", SiteFile, "worlds", _check_site),
-    Kind("ROS map", RosMap, "worlds", _check_map),
-    Kind("robot", RobotProfile, "agents/robots", _check_robot),
-    Kind("phone", PhoneProfile, "agents/phones", _check_phone),
-    Kind(
-        "accelerometer", AccelerometerPart, "agents/accelerometers", _check_model(AccelerometerPart)
-    ),
-    Kind("guard", GuardProfile, "agents/people", _check_model(GuardProfile)),
-    Kind("bystanders", BystanderProfile, "agents/people", _check_model(BystanderProfile)),
-    Kind("operators", Population, "agents/people", _check_model(Population)),
-    Kind("bands of operators", Bands, "agents/people", _check_model(Bands)),
-    Kind("registration", Registration, "experiments", _check_registration),
-    Kind("tuned values", Tuned, "experiments/tuned", _check_model(Tuned)),
-)
+CHECKS: Final[dict[str, Check]] = {
+    "study": _check_study,
+    "scenario": _check_scenario,
+    "timed scenario": _check_scenario,
+    "task": _check_scenario,
+    "transports": _check_scenario,
+    "validation cases": _check_cases,
+    "targets": _check_model(TargetFile),
+    "measurements": _check_plan,
+    "split": _check_split,
+    "site": _check_site,
+    "ROS map": _check_map,
+    "robot": _check_robot,
+    "phone": _check_phone,
+    "accelerometer": _check_model(AccelerometerPart),
+    "guard": _check_model(GuardProfile),
+    "bystanders": _check_model(BystanderProfile),
+    "operators": _check_model(Population),
+    "bands of operators": _check_model(Bands),
+    "registration": _check_registration,
+    "tuned values": _check_model(Tuned),
+}
+"""How files of each kind are checked, by the names of `experiments.documents`."""

@@ -8,12 +8,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
+from dva_sim.changing import parse_changes
 from dva_sim.checking.files import NotReadError, Verdict, check_file
 from dva_sim.checking.messages import READ_BYTES, check_message
 from dva_sim.checking.promises import said
 from dva_sim.checking.schemas import schema_text
 from dva_sim.checking.trials import TRIALS, Trial
-from dva_sim.config import parse_changes
 from dva_sim.errors import ConfigError
 from dva_sim.exit_codes import ExitCode
 

@@ -103,7 +103,8 @@ def _check_plan(path: Path) -> Verdict:
 
 def _check_yaml(path: Path) -> Verdict:
     """A message needs none of what reads configurations: it is imported here."""
-    from dva_sim.checking.configs import check_config, doubts, recognise
+    from dva_sim.checking.configs import check_config, doubts
+    from dva_sim.experiments.documents import recognise
 
     problems = _flawed(path, YAML_BYTES)
     document, problem = (None, problems[0]) if problems else _parse(path)

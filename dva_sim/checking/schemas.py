@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import difflib
 import json
 import re
 from typing import Any, Final
 
 from dva_sim.checking.forms import schema_file
 from dva_sim.errors import ConfigError
+from dva_sim.guesses import hint
 
 KINDS: Final = ("message", "study", "scenario", "cases", "site", "agent")
 _KEYS: Final = "Attributes"  # the section of a model's description that tells its keys
@@ -29,9 +29,7 @@ def schema_text(kind: str) -> str:
         for model in (schema, *schema.get("$defs", {}).values()):
             _describe_keys(model)
         return json.dumps(schema, indent=2) + "\n"
-    near = difflib.get_close_matches(kind, KINDS, n=1)
-    hint = f"did you mean {near[0]!r}? " if near else ""
-    raise ConfigError(f"no schema {kind!r}; {hint}there are: {', '.join(KINDS)}")
+    raise ConfigError(f"no schema {kind!r}; {hint(kind, KINDS, 'there are')}")
 
 
 def _describe_keys(model: dict[str, Any]) -> None:

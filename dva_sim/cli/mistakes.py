@@ -29,7 +29,8 @@ def in_a_line(error: Any) -> str:
     if extra := re.fullmatch(r"Got unexpected extra argument(?:s|\(s\))? \((.*)\)", error.message):
         return f"{path} does not know what to do with {extra[1]!r}; {more}"
     problem = str(error.format_message()).rstrip(".")
-    return f"{path}: {problem[:1].lower()}{problem[1:]}; {more}"
+    told = f"{path}: {problem[:1].lower()}{problem[1:]}"
+    return told if told.endswith("?") else f"{told}; {more}"
 
 
 def name_of(param: Any) -> str:

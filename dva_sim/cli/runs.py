@@ -54,10 +54,12 @@ def episode(
         dva-sim episode fire-drill --record drill.mcap  # for `dva-sim replay` and viewers
     """
     from dva_sim.experiments import console
+    from dva_sim.experiments.opening import mistakes_of
     from dva_sim.experiments.pictures import Wanted
 
     pictures = Wanted(video, still, strip, at, panels, camera, inset)
-    console.episode(scenario, seed, set_ or [], side_by_side, pictures, record)
+    with mistakes_of(scenario, set_ or [], seed):
+        console.episode(scenario, seed, set_ or [], side_by_side, pictures, record)
 
 
 def replay(

@@ -25,7 +25,7 @@ def demo(
     version of the main study and writes its report.
 
     Examples:
-        dva-sim demo  # into results/demo
+        dva-sim demo -o first  # into a folder of your own, in place of results/demo
     """
     from dva_sim.experiments.demo import demo as show_it
 

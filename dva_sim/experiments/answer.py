@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from dva_sim.experiments.answer_places import at, condition, is_ordered, places
 from dva_sim.experiments.labels import (
     Level,
+    capital,
     factor_name,
     level_name,
     listing,
@@ -22,6 +23,7 @@ from dva_sim.experiments.labels import (
 
 Floats = NDArray[np.float64]
 
+_TAKEN = ("drive_time_s", "movement_time_s")  # times that a level takes
 _LEAST = 0.01  # that is not printed as zero
 
 
@@ -60,6 +62,7 @@ class Finding:
         all_confirmed: Whether no run of any cell was missed.
         everywhere: Where a contrast holds that runs over nothing.
         failed: Runs that are missing because they failed.
+        part: Part of the study that was looked at.
     """
 
     measure: str
@@ -80,8 +83,9 @@ class Finding:
     cluster: str = "person"
     widest: float = np.inf
     all_confirmed: bool = False
-    everywhere: str = "throughout"
+    everywhere: str = ""
     failed: int = 0
+    part: str = ""
 
     @property
     def unit(self) -> str:
@@ -94,43 +98,67 @@ class Answer:
     """What a reader should take home.
 
     Attributes:
-        lead: The answer in one to three sentences.
-        notes: What must be known to read it fairly.
+        lead: The answer in two sentences.
+        depends: What it depends on, by what each sentence is about: `Persons`, `Measured` ...
+        notes: What else was found or must be known to read it fairly.
     """
 
     lead: str
+    depends: dict[str, str] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
 
 
 def answer(finding: Finding) -> Answer:
-    """Say where the difference can be told from zero, how large it is, and what is ruled out."""
+    """Say how large the difference is, where it differs from zero, and what is ruled out."""
+    measured = {"Measured": " ".join([_what_is_measured(finding), *_misses(finding)])}
     if not np.isfinite(finding.low).any():
-        return Answer(_without_band(finding), [*_misses(finding), _what_is_measured(finding)])
-    sentences = [*_tellable(finding), *_ruled_out(finding), *_unpaired(finding)]
-    notes = [*_misses(finding), f"{_what_is_measured(finding)} {_what_the_band_is(finding)}"]
-    return Answer(" ".join(sentences), notes)
+        return Answer(_without_band(finding), measured)
+    return Answer(f"{_effect(finding)} {_reach(finding)}".strip(), measured)
 
 
-def _tellable(f: Finding) -> list[str]:
-    """Size and reach of the effect, for each direction in which a level differs from zero."""
-    sentences: list[str] = []
-    for chosen in (f.low > 0, f.high < 0):
-        where = np.flatnonzero(chosen)
-        if len(where):
-            head = "Elsewhere it turns round: " if sentences else condition(f)
-            sentences.append(_capital(f"{head}{_effect(f, where)}"))
-    return sentences
-
-
-def _effect(f: Finding, where: NDArray[np.intp]) -> str:
-    """`A takes 4.5 s longer than B at ... (band). The difference can be told from zero ...`."""
-    stop = _telling_level(f, where)
-    band = f"{number(f.low[stop])} to {quantity(f.high[stop], f.unit)}"
-    reach = "only there" if len(where) == 1 < len(f.levels) else places(f, where)
-    return (
-        f"{_comparison(f, f.mean[stop])} {at(f, [stop])} (95 % Monte Carlo band, given the model: "
-        f"{band}). The difference can be told from zero {reach}{_remark_on_size(f, where)}."
+def _effect(f: Finding) -> str:
+    """`A takes 4.5 s longer than B at 1 s (95 % band 3.0 to 6.0 s).`, or that there is none."""
+    where = np.flatnonzero(f.low > 0) if (f.low > 0).any() else np.flatnonzero(f.high < 0)
+    if len(where):
+        return capital(f"{condition(f)}{_size(f, _telling_level(f, where))}.")
+    first, second = level_name(f.factor, f.first), level_name(f.factor, f.second)
+    anywhere = f" at any {factor_name(f.over)} tried" if f.over else ""
+    return capital(
+        f"{condition(f)}no difference between {first} and {second} was found{anywhere} "
+        f"(95 % {_interval_name(f)})."
     )
+
+
+def _size(f: Finding, stop: int) -> str:
+    """`A takes 4.5 s longer than B at a one-way delay of 1 s (95 % band 3.0 to 6.0 s)`."""
+    ends = f"{number(f.low[stop])} to {quantity(f.high[stop], f.unit)}"
+    comparison = f"{_comparison(f, f.mean[stop])}{_after(at(f, [stop]))}"
+    return f"{comparison} (95 % {_interval_name(f)} {ends})"
+
+
+def _interval_name(f: Finding) -> str:
+    """A band covers several levels at once."""
+    return "band" if len(f.levels) > 1 else "interval"
+
+
+def _reach(f: Finding) -> str:
+    """One sentence: where it differs from zero, and what holds elsewhere."""
+    told = [*_differs(f), *_equal(f), *_settled(f), *_undecided(f), *_unpaired(f)]
+    return capital("; ".join(told)) + "." if told else ""
+
+
+def _differs(f: Finding) -> list[str]:
+    """Where, in the direction told first and in the other one."""
+    found = [np.flatnonzero(chosen) for chosen in (f.low > 0, f.high < 0) if chosen.any()]
+    if not found:
+        return []
+    where = found[0]
+    there = "only there" if len(where) == 1 < len(f.levels) else places(f, where)
+    told = [f"it differs from zero{_after(there)}{_remark_on_size(f, where)}"]
+    if len(found) > 1:
+        stop = _telling_level(f, found[1])
+        told.append(f"it is the other way round {places(f, found[1])}: {_size(f, stop)}")
+    return told
 
 
 def _remark_on_size(f: Finding, where: NDArray[np.intp]) -> str:
@@ -141,49 +169,52 @@ def _remark_on_size(f: Finding, where: NDArray[np.intp]) -> str:
     return f", but stays below the {_declared(f)} declared to matter"
 
 
-def _ruled_out(f: Finding) -> list[str]:
-    """What the runs say where the band holds zero: the same, settled, or still open."""
-    bounds = np.maximum(-f.low, f.high)
-    holds_zero = (f.low <= 0) & (f.high >= 0)
-    limit = np.inf if f.smallest_effect is None else f.smallest_effect
-    nowhere = bool((holds_zero == np.isfinite(f.low)).all())
-    sentences = [_no_difference(f)] if nowhere else []
-    if len(same := np.flatnonzero(holds_zero & (bounds == 0))):
-        sentences.append(f"No {f.cluster} fares differently {places(f, same)}.")
-    if len(settled := np.flatnonzero(holds_zero & (bounds > 0) & (bounds <= limit))):
-        sentences.append(_settled(f, settled, float(bounds[settled].max()), nowhere))
-    if len(undecided := np.flatnonzero(holds_zero & (bounds > limit))):
-        sentences.append(_undecided(f, undecided, float(bounds[undecided].max())))
-    return sentences
+def _holds_zero(f: Finding) -> NDArray[np.bool_]:
+    return np.asarray((f.low <= 0) & (f.high >= 0))
 
 
-def _undecided(f: Finding, where: NDArray[np.intp], bound: float) -> str:
+def _bounds(f: Finding) -> Floats:
+    """The largest effect, either way, that is not ruled out."""
+    return np.asarray(np.maximum(-f.low, f.high))
+
+
+def _limit(f: Finding) -> float:
+    return np.inf if f.smallest_effect is None else f.smallest_effect
+
+
+def _equal(f: Finding) -> list[str]:
+    where = np.flatnonzero(_holds_zero(f) & (_bounds(f) == 0))
+    return [f"{_there(f, where)}both are equal"] if len(where) else []
+
+
+def _settled(f: Finding) -> list[str]:
+    """Where an effect of some size is ruled out."""
+    bounds = _bounds(f)
+    where = np.flatnonzero(_holds_zero(f) & (bounds > 0) & (bounds <= _limit(f)))
+    if not len(where):
+        return []
+    bound = quantity(max(float(bounds[where].max()), _LEAST), f.unit)
+    matters = f", less than the {_declared(f)} declared to matter" if f.smallest_effect else ""
+    return [f"{_there(f, where)}any effect is below {bound}{matters}"]
+
+
+def _undecided(f: Finding) -> list[str]:
     """Nothing is ruled out: say how large an effect may be, unless as large as it ever can."""
-    still = f"The question stays open {places(f, where)}: "
+    bounds = _bounds(f)
+    where = np.flatnonzero(_holds_zero(f) & (bounds > _limit(f)))
+    if not len(where):
+        return []
+    bound, still = float(bounds[where].max()), f"{_there(f, where)}the question stays open"
     if bound >= f.widest:
-        return f"{still}{f.persons} {f.cluster}s rule out nothing at all; more are needed."
-    return (
-        f"{still}an effect as large as {quantity(bound, f.unit)} is not ruled out, so more "
-        f"{f.cluster}s are needed."
-    )
+        return [f"{still}: {f.persons} {f.cluster}s rule out nothing at all, more are needed"]
+    more = f"so more {f.cluster}s are needed"
+    return [f"{still}: up to {quantity(bound, f.unit)} is not ruled out, {more}"]
 
 
-def _settled(f: Finding, where: NDArray[np.intp], bound: float, nowhere: bool) -> str:
-    bound = max(bound, _LEAST)
-    verdict = f"effect above {quantity(bound, f.unit)} either way is ruled out"
-    matters = f", and with it the {_declared(f)} declared to matter" if f.smallest_effect else ""
-    if nowhere:
-        return f"An {verdict} {places(f, where)}{matters}."
-    return f"It cannot be told from zero {places(f, where)}, where an {verdict}{matters}."
-
-
-def _no_difference(f: Finding) -> str:
-    first, second = level_name(f.factor, f.first), level_name(f.factor, f.second)
-    anywhere = f" at any {factor_name(f.over)} tried" if f.over else ""
-    return _capital(
-        f"{condition(f)}no difference between {first} and {second} can be told from zero"
-        f"{anywhere} (95 % Monte Carlo band, given the model)."
-    )
+def _there(f: Finding, where: NDArray[np.intp]) -> str:
+    """`up to 100 ms `, or nothing where there is but one place."""
+    there = places(f, where)
+    return f"{there} " if there else ""
 
 
 def _declared(f: Finding) -> str:
@@ -191,8 +222,8 @@ def _declared(f: Finding) -> str:
 
 
 def _unpaired(f: Finding) -> list[str]:
-    missing = [int(i) for i in np.flatnonzero(~np.isfinite(f.low))]
-    return [f"Nothing can be said {at(f, missing)}: runs are missing."] if missing else []
+    missing = np.flatnonzero(~np.isfinite(f.low))
+    return [f"{_there(f, missing)}runs are missing"] if len(missing) else []
 
 
 def _without_band(f: Finding) -> str:
@@ -205,29 +236,33 @@ def _without_band(f: Finding) -> str:
         why = f"Too few {f.cluster}s to answer: an interval needs at least two, here is one."
     else:
         why = f"The difference is the same for every {f.cluster}, so that no interval can be given."
-    seen = f"{condition(f, inside=True)}{_comparison(f, f.mean[stop])} {at(f, [stop])}"
+    place = _after(at(f, [stop]))
+    seen = f"{condition(f, inside=True)}{_comparison(f, f.mean[stop])}{place}"
     return f"{why} In the runs that were made, {seen}."
-
-
-def _capital(sentence: str) -> str:
-    return sentence[:1].upper() + sentence[1:]
 
 
 def _misses(f: Finding) -> list[str]:
     """Misses are a result of their own: the mean alone would hide them behind the horizon."""
     if not f.missed:
         return []
-    every = f"Every event{' of the runs that did not fail' if f.failed else ''} was confirmed"
+    part = f"in part {f.part} " if f.part else ""
+    every = capital(f"{part}every event{' whose run did not fail' if f.failed else ''}")
+    where = _after(at(f, [len(f.levels) - 1]))
     if f.all_confirmed:
-        return [f"{every}, in every cell."]
-    where = at(f, [len(f.levels) - 1])
+        return [f"{every} was confirmed."]
     if not any(m.missed for m in f.missed):
-        return [f"{every} {where}, under each {factor_name(f.factor)}."]
+        return [f"{every} was confirmed{where}, under each {factor_name(f.factor)}."]
     shares = [
         f"{level_name(f.factor, m.line)} {percent(m.share)} ({m.missed} of {m.runs})"
         for m in f.missed
     ]
-    return [f"Not confirmed {where}: {listing(shares)}. {_what_misses_count(f)}"]
+    unseen = capital(f"{part}not confirmed{where}: {listing(shares)}.")
+    return [unseen, _what_misses_count(f)]
+
+
+def _after(where: str) -> str:
+    """A place behind other words; nothing where there is none."""
+    return f" {where}" if where else ""
 
 
 def _what_misses_count(f: Finding) -> str:
@@ -241,22 +276,9 @@ def _what_misses_count(f: Finding) -> str:
 
 
 def _what_is_measured(f: Finding) -> str:
-    same = f"the same {f.cluster} and trial"
-    excess = f", in excess of the reference run of {same}" if f.in_excess else ""
-    return f"Compared is the {measure_name(f.measure)}{excess}, over {_persons(f)}."
-
-
-def _what_the_band_is(f: Finding) -> str:
-    if not f.over:
-        return "More runs narrow the band, but do not make the model truer."
-    return (
-        f"The band covers every {factor_name(f.over)} at once; more runs narrow it, but do not "
-        "make the model truer."
-    )
-
-
-def _persons(f: Finding) -> str:
-    return f"one simulated {f.cluster}" if f.persons == 1 else f"{f.persons} simulated {f.cluster}s"
+    part = f"in part {f.part}, " if f.part else ""
+    excess = f", beyond that of the {f.cluster}'s own reference run" if f.in_excess else ""
+    return capital(f"{part}the {measure_name(f.measure)}{excess}.")
 
 
 def _comparison(f: Finding, difference: float) -> str:
@@ -264,7 +286,7 @@ def _comparison(f: Finding, difference: float) -> str:
     if difference == 0:
         return f"{first} equals {second}"
     size = quantity(abs(difference), f.unit)
-    if f.unit == "s" and f.measure == "drive_time_s":
+    if f.measure in _TAKEN:
         return f"{first} takes {size} {'longer' if difference > 0 else 'less'} than {second}"
     side = "above" if difference > 0 else "below"
     return f"{first} lies {size} {side} {second}"

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.experiments.labels import factor_name, level_name, listing, setting, unit_of
+from dva_sim.experiments.labels import factor_name, level_name, listing, named, setting, unit_of
 
 if TYPE_CHECKING:
     from dva_sim.experiments.answer import Finding
@@ -26,7 +26,7 @@ _ABSENT = {
 
 def place_of(finding: Finding, stop: int) -> str:
     """Where one stop of a finding lies: `with profile default, at a one-way delay of 1 s`."""
-    return f"{condition(finding, inside=True)}{at(finding, [stop])}"
+    return f"{condition(finding, inside=True)}{at(finding, [stop])}".removesuffix(", ")
 
 
 def condition(f: Finding, inside: bool = False) -> str:
@@ -72,8 +72,12 @@ def _spoken(f: Finding, where: Iterable[int]) -> str:
     if all(isinstance(level, int | float) and not isinstance(level, bool) for level in levels):
         return ""
     names = listing([level_name(f.over, level) for level in levels])
+    if all(str(level).isdigit() for level in levels):
+        return f"with {names} {factor_name(f.over)}"
     if f.over == "link":
         return f"on the {names} link{'s' if len(levels) > 1 else ''}"
+    if len(levels) == 1:
+        return f"with {named(f.over, levels[0])}"
     return f"with {factor_name(f.over)} {names}"
 
 

@@ -1,4 +1,4 @@
-"""Where in a study a mistake of one of its scenarios was made: at a key of its file, or `--set`."""
+"""Where in a study a mistake of one of its scenarios was made: by `--set`, or in a file."""
 
 from __future__ import annotations
 
@@ -12,20 +12,32 @@ from dva_sim.experiments.study import Study
 
 
 def blamed(study: Study, part: str, error: ConfigError, changes: Mapping[str, Any]) -> ConfigError:
-    """The mistake at the key of the study that makes it; as it is if a file has been named."""
+    """The mistake at what makes it; as it is if a file has been named.
+
+    Args:
+        study: Whose scenario it is.
+        part: Which one.
+        error: With the keys at fault, if changes of the scenario are.
+        changes: All changes of the scenario.
+    """
     if error.file is not None:
         return error
-    named = {key: value for key, value in changes.items() if _is_named(key, value, error.problem)}
-    for key, value in named.items():
-        for path in _places(study, part, key, value):
+    named = [key for key, value in changes.items() if _is_named(key, value, error.problem)]
+    keys = error.keys if len(error.keys) == 1 else (named or list(error.keys))
+    for key in keys:
+        if pair := study.setting_of(tuple(key.split("."))):
+            return ConfigError(f"--set {pair}: {error.problem.removeprefix(f'{key}: ')}")
+    for key in keys:
+        for path in _places(study, part, key, changes[key]):
             if study.is_from_file(path):
                 return study.error(error.problem, path)
-    return in_setting(study, error) if named else error
+    return in_setting(study, error) if keys else error
 
 
 def in_setting(study: Study, error: ConfigError) -> ConfigError:
-    """A mistake in what the study's file does not say: in a setting, if there are any."""
-    return ConfigError(f"--set: {error.problem}") if study.settings else error
+    """A mistake in what the study's file does not say: in the settings, if there are any."""
+    pairs = ", ".join(f"--set {pair}" for pair in study.settings)
+    return ConfigError(f"{pairs}: {error.problem}") if pairs else error
 
 
 def _is_named(key: str, value: Any, problem: str) -> bool:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
 from dva_sim.experiments.cells import CellTable
@@ -10,7 +11,7 @@ from dva_sim.experiments.cells import CellTable
 if TYPE_CHECKING:
     from dva_sim.experiments.figures.style import Drawn
 
-Kind = Literal["plain", "note", "warning", "label"]
+Kind = Literal["plain", "note", "warning", "label", "banner"]
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,7 @@ class Words:
 
     Attributes:
         text: In words.
-        kind: How loud it is said.
+        kind: How loud it is said; a banner stands above all else.
     """
 
     text: str
@@ -40,10 +41,18 @@ class Words:
 
 
 @dataclass(frozen=True)
-class Box:
-    """The answer, set apart: the first paragraph is the lead."""
+class First:
+    """What the first screen holds, and the first page of paper.
 
-    paragraphs: tuple[str, ...]
+    Attributes:
+        lead: The answer.
+        figure: That answers it.
+        depends: What it depends on: what each sentence is about, and the sentence.
+    """
+
+    lead: str
+    figure: Drawn | None = None
+    depends: tuple[tuple[str, str], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -75,10 +84,64 @@ class Shown:
 
 @dataclass(frozen=True)
 class Verbatim:
-    """Text to be kept as it is, folded away where that can be done."""
+    """Text to be kept as it is."""
 
-    title: str
     text: str
 
 
-Block = Heading | Words | Box | Items | Printed | Shown | Verbatim
+@dataclass(frozen=True)
+class Terms:
+    """Words and what they mean; `key` is where a link to one leads."""
+
+    entries: tuple[tuple[str, str, str], ...]
+
+
+@dataclass(frozen=True)
+class Folded:
+    """What is there for who looks for it: folded away on a page, in full on paper."""
+
+    title: str
+    blocks: tuple[Block, ...]
+
+
+Block = Heading | Words | First | Items | Printed | Shown | Verbatim | Terms | Folded
+
+
+def texts_of(blocks: Iterable[Block]) -> list[str]:
+    """All that is said in sentences, and the heads of tables, in order."""
+    found: list[str] = []
+
+    def note(text: str) -> str:
+        found.append(text)
+        return text
+
+    reworded(blocks, note)
+    return found
+
+
+def reworded(blocks: Iterable[Block], change: Callable[[str], str]) -> list[Block]:
+    """The same blocks with every text changed, in the order in which a reader meets them."""
+    return [_reworded(block, change) for block in blocks]
+
+
+def _reworded(block: Block, change: Callable[[str], str]) -> Block:
+    if isinstance(block, Words):
+        return replace(block, text=change(block.text))
+    if isinstance(block, First):
+        lead, figure = change(block.lead), block.figure and _captioned(block.figure, change)
+        depends = tuple((about, change(words)) for about, words in block.depends)
+        return First(lead, figure, depends)
+    if isinstance(block, Items):
+        return Items(tuple(map(change, block.items)))
+    if isinstance(block, Printed):
+        heads, note = list(map(change, block.table.heads)), change(block.table.note)
+        return replace(block, table=replace(block.table, heads=heads, note=note))
+    if isinstance(block, Shown):
+        return Shown(_captioned(block.figure, change))
+    if isinstance(block, Folded):
+        return replace(block, blocks=tuple(reworded(block.blocks, change)))
+    return block
+
+
+def _captioned(figure: Drawn, change: Callable[[str], str]) -> Drawn:
+    return replace(figure, caption=change(figure.caption))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -43,16 +43,18 @@ class CellTable:
     note: str = ""
 
 
+def _hundredths(share: float) -> str:
+    """A share in percent, whose sign stands in the head."""
+    return percent(share).removesuffix("\N{NO-BREAK SPACE}%")
+
+
 # column of the runs, head, how the runs of a cell become one number, how it is printed
 _Summarise = Callable[[Floats], Any]
 Summary = tuple[str, str, _Summarise, Callable[[float], str]]
 SUMMARIES: tuple[Summary, ...] = (
-    ("command_age_mean_s", "age of commands at application [s]", np.mean, number),
     ("age_in_force_mean_s", "age of the command in force [s]", np.mean, number),
-    ("loop_delay_mean_s", "observation to effect, sum of stages [s]", np.mean, number),
-    ("loop_delay_measured_s", "the same, measured [s]", np.mean, number),
     ("command_rate_hz", "applied commands [Hz]", np.mean, number),
-    ("stop_share", "in safe stop", np.mean, percent),
+    ("stop_share", "in safe stop [%]", np.mean, _hundredths),
     ("contacts", "contacts per run", np.mean, number),
     ("completed_share", "completed", np.mean, percent),
     ("error_share", "errors", np.mean, percent),
@@ -97,11 +99,34 @@ def cell_table(
         rows = [row for row, there in zip(rows, ran, strict=True) if there]
     empty = 0 if is_listed else ran.count(False)
     heads = [*names, *(head for head, _ in there)]
-    labels = len(names) + len(points)
-    return CellTable(part.name, heads, labels, rows, empty, _what_is_covered(support))
+    whole = CellTable(part.name, heads, len(names) + len(points), rows, empty)
+    return replace(_told_once(whole), note=_note(whole, _what_is_covered(support)))
+
+
+def _constant(table: CellTable) -> list[int]:
+    """Columns of which every row says the same; of a single row, none."""
+    columns = range(table.labels, len(table.heads))
+    if len(table.rows) < _FEWEST_ROWS:
+        return []
+    return [n for n in columns if len({row[n] for row in table.rows}) == 1]
+
+
+def _told_once(table: CellTable) -> CellTable:
+    """Without the columns that do not vary."""
+    kept = [n for n in range(len(table.heads)) if n not in _constant(table)]
+    heads, rows = [table.heads[n] for n in kept], [[row[n] for n in kept] for row in table.rows]
+    return replace(table, heads=heads, rows=rows)
+
+
+def _note(table: CellTable, covered: str) -> str:
+    """What all rows have in common, and which are extrapolated."""
+    same = [f"{table.heads[n]} {table.rows[0][n]}" for n in _constant(table)]
+    told = f"The same in all configurations: {', '.join(same)}." if same else ""
+    return " ".join(filter(None, (told, covered)))
 
 
 _Column = tuple[str, list[str]]
+_FEWEST_ROWS = 3  # with fewer, a column that does not vary says little
 _MARK = "\N{NO-BREAK SPACE}†"
 
 
@@ -192,7 +217,7 @@ def _beyond(support: Support | None) -> _Column | None:
         return None
     pairs = zip(support.delays.ravel(), support.outside.ravel(), strict=True)
     marked = [number(delay) + (_MARK if outside else "") for delay, outside in pairs]
-    return "loop without the person [s]", marked
+    return "picture to effect, without the person [s]", marked
 
 
 def _what_is_covered(support: Support | None) -> str:

@@ -20,6 +20,7 @@ from dva_sim.experiments.comparing_rows import Difference, Rows, Run, as_numbers
 from dva_sim.experiments.dictionary import DESIGN
 from dva_sim.experiments.frames import Frame
 from dva_sim.experiments.results import Results
+from dva_sim.guesses import hint
 
 if TYPE_CHECKING:
     from dva_sim.experiments.comparing_gates import Verdict
@@ -95,8 +96,9 @@ class Comparison:
         table, _, column = str(name).rpartition(".")
         where = [t for t, names in self._columns.items() if column in names and table in ("", t)]
         if not where:
-            there = ", ".join(self._columns.get(table or "runs", ()))
-            raise ConfigError(f"measure {name!r} is not in both; {table or 'runs'}: {there}")
+            there = self._columns.get(table or "runs", ())
+            told = hint(column, there, table or "runs")
+            raise ConfigError(f"measure {name!r} is not in both; {told}")
         if len(where) > 1 and where[0] != "runs":
             several = " or ".join(f"{table}.{column}" for table in where)
             raise ConfigError(f"measure {name!r} is in several tables; name {several}")
@@ -114,8 +116,8 @@ class Comparison:
         """
         known = dict.fromkeys(name for pair in self.matched.pairs for name, _ in pair.levels)
         if unknown := [name for name in by or () if name not in known]:
-            there = ", ".join(known) or "none"
-            raise ConfigError(f"factor {unknown[0]!r} is not common to both; common: {there}")
+            told = hint(unknown[0], known, "common")
+            raise ConfigError(f"factor {unknown[0]!r} is not common to both; {told}")
         groups: dict[tuple[str, Levels, int], list[Pair]] = {}
         for pair in self.matched.pairs:
             groups.setdefault(_group_of(pair, by), []).append(pair)

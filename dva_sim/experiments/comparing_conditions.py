@@ -25,6 +25,7 @@ from typing import Any, NamedTuple
 
 from dva_sim.errors import ConfigError
 from dva_sim.experiments.units import unit_of
+from dva_sim.guesses import unknown
 
 Compare = Callable[[Any, Any], Any]
 
@@ -159,8 +160,7 @@ def percent_of(statistic: str) -> float | None:
 def _statistic(words: _Reader) -> str:
     name = words.word
     if words.kind == "name" and name not in _STATISTICS and percent_of(name) is None:
-        known = f"{', '.join(_STATISTICS)}, p1 to p99"
-        raise words.error(f"statistic {name!r} is unknown; known: {known}")
+        raise words.error(unknown("statistic", name, [*_STATISTICS, "p1 to p99"]))
     return words.take("name", called="a statistic")
 
 

@@ -15,7 +15,7 @@ from rich.table import Table
 
 from dva_sim import resources
 from dva_sim import scenario as scenarios
-from dva_sim.config import parse_changes
+from dva_sim.changing import parse_changes
 from dva_sim.errors import ConfigError
 from dva_sim.experiments import shifts, telling
 from dva_sim.experiments import trials as tasks

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from dva_sim import scenario as scenarios
+from dva_sim.changing import blame
 from dva_sim.config import Document, Path_
 from dva_sim.errors import ConfigError
 from dva_sim.experiments import designs
 from dva_sim.experiments.asking import POINT, REPEATS, TUNED, TUNING, Level
-from dva_sim.experiments.blame import blamed, in_setting
+from dva_sim.experiments.blame import blamed
 from dva_sim.experiments.identity import stable_hash
 from dva_sim.experiments.models import AnyScenario, model_for, model_of
 from dva_sim.experiments.repeats import (
@@ -26,6 +27,7 @@ from dva_sim.experiments.repeats import (
 )
 from dva_sim.experiments.study import Study
 from dva_sim.experiments.tuned import Basis, load_tuned
+from dva_sim.guesses import listed, unknown
 from dva_sim.streams import derive_seed
 
 REFERENCE = -1
@@ -43,6 +45,7 @@ class Cell:
         levels: Level of each factor; none for the reference.
         scenario: As it will be run, but for the person.
         config: Hash of that scenario.
+        changes: What makes it of the scenario's file, by dotted key.
     """
 
     part: str
@@ -50,6 +53,7 @@ class Cell:
     levels: tuple[tuple[str, Level], ...]
     scenario: AnyScenario
     config: str
+    changes: Mapping[str, Any] = field(default_factory=dict, compare=False, repr=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,6 +117,7 @@ def cells(study: Study) -> list[Cell]:
     refuse_unknown_measures(study)
     _at_ends(study)
     own = [cell for name in study.parts for cell in _cells_of(study, name)]
+    _refuse_impossible_measures(study, own)
     return [*own, *_repeats_of(study)]
 
 
@@ -125,8 +130,17 @@ def refuse_unknown_measures(study: Study) -> None:
     for path, part, measure in _asked_measures(study):
         known = model_of(_source(study, part)).measures()
         if measure not in known:
-            problem = f"measure {measure!r} is unknown; known: {', '.join(known)}"
-            raise study.error(problem, path)
+            raise study.error(unknown("measure", measure, known), path)
+
+
+def _refuse_impossible_measures(study: Study, every: Sequence[Cell]) -> None:
+    """What no run of a part can hold would only be missed when all of them are made."""
+    for path, part, measure in _asked_measures(study):
+        made = [c.scenario for c in every if c.part == part and c.index != REFERENCE]
+        possible = [model_for(scenario).measures(scenario) for scenario in made]
+        if not any(measure in names for names in possible):
+            problem = f"no run of part {part!r} has a value of the measure {measure!r}"
+            raise study.error(f"{problem}; it has: {listed(possible[0])}", path)
 
 
 def _asked_measures(study: Study) -> Iterator[tuple[Path_, str, str]]:
@@ -143,7 +157,8 @@ def _asked_measures(study: Study) -> Iterator[tuple[Path_, str, str]]:
 
 def base_scenario(study: Study, part: str) -> AnyScenario:
     """A part's scenario before any factor has changed it."""
-    return _build(study, part, _source(study, part), {})
+    source = _source(study, part)
+    return _build(study, part, source, _every_change(study, part, source, {}))
 
 
 def basis_of_tuning(study: Study) -> Basis:
@@ -210,15 +225,14 @@ def _at_ends(study: Study) -> list[Cell]:
 def _cells_of(study: Study, name: str) -> Iterator[Cell]:
     reference = study.parts[name].reference
     if reference is not None:
-        built = _build(study, name, _source(study, name), reference)
-        yield _cell(name, REFERENCE, {}, built)
+        yield _cell(study, name, REFERENCE, {}, _source(study, name), reference)
     yield from _cells_at(study, name, designs.settings(study))
 
 
 def _cells_at(study: Study, name: str, rows: Iterable[Mapping[str, Level]]) -> Iterator[Cell]:
     source, change = _source(study, name), _changer(study)
     for index, levels in enumerate(rows):
-        yield _cell(name, index, levels, _build(study, name, source, change(levels)))
+        yield _cell(study, name, index, levels, source, change(levels))
 
 
 def _repeats_of(study: Study) -> Iterator[Cell]:
@@ -232,7 +246,7 @@ def _repeats_of(study: Study) -> Iterator[Cell]:
         chosen = dict(levels)
         traits = sets[int(str(chosen.pop(PARAMETERS)))]
         changes = change(fixed | chosen) | ({TRAITS: traits} if traits else {})
-        yield _cell(REPEATS, index, levels, _build(study, part, source, changes))
+        yield _cell(study, REPEATS, index, levels, source, changes)
 
 
 def _grid(factors: Mapping[str, Sequence[Level]]) -> Iterator[dict[str, Level]]:
@@ -260,9 +274,18 @@ def _changer(study: Study) -> Callable[[Mapping[str, Level]], dict[str, Any]]:
     return change
 
 
-def _cell(part: str, index: int, levels: Mapping[str, Level], scenario: AnyScenario) -> Cell:
+def _cell(
+    study: Study,
+    part: str,
+    index: int,
+    levels: Mapping[str, Level],
+    source: Document,
+    changes: Mapping[str, Any],
+) -> Cell:
+    every = _every_change(study, part, source, changes)
+    scenario = _build(study, part, source, every)
     config = stable_hash(scenario.model_dump(mode="json"))
-    return Cell(part, index, tuple(levels.items()), scenario, config)
+    return Cell(part, index, tuple(levels.items()), scenario, config, every)
 
 
 def _source(study: Study, part: str) -> Document:
@@ -272,19 +295,48 @@ def _source(study: Study, part: str) -> Document:
     except ConfigError as error:
         if error.file is not None:
             raise
-        here = study.error(error.problem, path)
-        raise here if study.is_from_file(path) else in_setting(study, error) from None
+        raise study.error(error.problem, path) from None
+
+
+def _every_change(
+    study: Study, part: str, source: Document, changes: Mapping[str, Any]
+) -> dict[str, Any]:
+    """What is otherwise than in a scenario's file: by the part, by `--set`, and by the cell."""
+    fixed = {**study.parts[_source_of(study, part)].changes, **study.changes}
+    of_study = model_of(source).set_by_study(study.seed)
+    return _located({**fixed, **of_study, **changes}, study.folder)
 
 
 def _build(study: Study, part: str, source: Document, changes: Mapping[str, Any]) -> AnyScenario:
     """The part's scenario; a mistake in a change is told where the study makes it."""
-    model = model_of(source)
-    fixed = {**study.parts[part].changes, **study.changes, **model.set_by_study(study.seed)}
     try:
-        return model.build(source, _located({**fixed, **changes}, study.folder))
+        return model_of(source).build(source, changes)
     except ConfigError as error:
-        every = {**study.parts[part].changes, **study.changes, **changes}
-        raise blamed(study, part, error, every) from None
+        raise blamed(study, _source_of(study, part), error, changes) from None
+
+
+def rehearse(study: Study, cell: Cell) -> None:
+    """Find what cannot work in a cell before anything runs.
+
+    Raises:
+        ConfigError: what cannot be read or placed, told where the study asks for it.
+    """
+    model = model_for(cell.scenario)
+    try:
+        model.rehearse(cell.scenario, study.seed)
+    except ConfigError as error:
+        part = _source_of(study, cell.part)
+        source = _source(study, part)
+
+        def make(changes: Mapping[str, Any]) -> None:
+            model.rehearse(model.build(source, changes), study.seed)
+
+        raise blamed(study, part, blame(error, cell.changes, make), cell.changes) from None
+
+
+def _source_of(study: Study, part: str) -> str:
+    """The part whose scenario is run: repeats have that of the answer."""
+    return study.answer.part if part == REPEATS and study.answer is not None else part
 
 
 def _located(changes: dict[str, Any], folder: Path) -> dict[str, Any]:

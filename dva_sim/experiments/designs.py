@@ -37,6 +37,7 @@ Row = dict[str, Level]
 
 MOST_POINTS = 2**16
 MOST_CELLS = 10_000  # of a grid, which listed rows may leave empty in part
+MOST_RUNS = 1_000_000  # whose list takes a gigabyte, and whose runs take days of CPU time
 
 
 class Span(Config):
@@ -246,6 +247,15 @@ def size(study: Study) -> int:
     if design.zip is not None:
         return crossed * len(study.factors[design.zip[0]])
     return crossed * (design.points or len(study.listed_rows))
+
+
+def runs_of(study: Study) -> int:
+    """How many runs a study has at most, without making their list."""
+    cells = size(study)
+    trials = [part.replications or study.replications for part in study.parts.values()]
+    has_reference = [part.reference is not None for part in study.parts.values()]
+    each = sum((cells + more) * count for more, count in zip(has_reference, trials, strict=True))
+    return each * study.most_persons
 
 
 def together(study: Study) -> set[str]:

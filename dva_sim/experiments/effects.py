@@ -95,8 +95,13 @@ class Part:
 
     def grid(self, column: str) -> Floats:
         """One column as `(levels of factor 1, ..., persons, trials)`; nan where no run is."""
-        none = np.full(len(self._known), np.nan)
-        return self.laid_out(as_floats(self.treated[column]) if column in self.treated else none)
+        return self.laid_out(self.values(column))
+
+    def values(self, column: str) -> Floats:
+        """One column, a value for each run; nan where no run of the study has any."""
+        if column not in self.treated:
+            return np.full(len(self._known), np.nan)
+        return as_floats(self.treated[column])
 
     def laid_out(self, values: Floats) -> Floats:
         """One value for each row of `treated`, as the same grid."""
@@ -222,11 +227,12 @@ class View:
             return self.part.excess(self.measure)
         return self.part.grid(self.measure)
 
-    def stops_outside(self, panel: Setting) -> list[int]:
-        """The stops of a panel at which at least one line is an extrapolation."""
+    def stops_outside(self, panel: Setting, lines: Sequence[Level] | None = None) -> list[int]:
+        """The stops of a panel at which at least one line, of some or all, is an extrapolation."""
         if self.outside is None:
             return []
-        marks = np.array([self._marks(panel, line) for line in self.lines]).any(axis=0)
+        some = self.lines if lines is None else lines
+        marks = np.array([self._marks(panel, line) for line in some]).any(axis=0)
         return [int(stop) for stop in np.flatnonzero(marks)]
 
     def _marks(self, panel: Setting, line: Level) -> NDArray[np.bool_]:

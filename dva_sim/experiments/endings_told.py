@@ -32,19 +32,23 @@ def sentences(endings: Endings, view: View, finding: Finding | None) -> list[str
     sides = (finding.first, finding.second)
     stops = [stop for stop in view.stops if not _all_right(endings, sides, stop)]
     if not stops:
-        return ["Where the answer looks every event was confirmed; elsewhere not all were."]
+        return [
+            f"In part {finding.part} every event was confirmed at the levels that the answer "
+            "compares; at the others not all were."
+        ]
     stop = stops[-1]
     told = "; ".join(_side(view, endings.at(level, stop)) for level in sides)
     where = place_of(finding, view.stops.index(stop))
     when = f"by {quantity(endings.horizon, 's')} after the report"
-    return [f"{capital(where)}, {when}: {told}.{_apart(endings, finding, stop)}"]
+    there = ", ".join(filter(None, (f"in part {finding.part}", where, when)))
+    return [f"{capital(there)}: {told}.{_apart(endings, finding, stop)}"]
 
 
-def in_a_line(endings: Endings, failed: int = 0) -> str:
-    """That all went right, in every cell; of failed runs nobody knows."""
-    every = f"Every event{' of the runs that did not fail' if failed else ''} was confirmed"
+def in_a_line(endings: Endings, part: str, failed: int = 0) -> str:
+    """That all went right in a part; of failed runs nobody knows."""
+    every = f"every event{' whose run did not fail' if failed else ''} was confirmed"
     cleared = ", and every false alarm cleared" if CLEARED in endings.ways else ""
-    return f"{every}{cleared}, in every cell."
+    return f"In part {part} {every}{cleared}."
 
 
 def table(endings: Endings, view: View, cluster: str) -> CellTable:
@@ -146,13 +150,12 @@ def _note(view: View, cluster: str, panel: Setting) -> str:
     where = f" with {setting(panel)}" if panel else ""
     drives = (
         " An event is open until the DVA closes it, so a drive that was given up late may leave it "
-        "open; in the table of cells stands how last drives ended."
+        "open; how last drives ended stands in the table of configurations."
         if view.part.has("confirmed")
         else ""
     )
     return (
-        f"Shares of the events{where} that had ended in each way, with 95 % intervals. What comes "
-        "first rules out the others, so they compete, and a row adds up to 100 % (cumulative "
-        f"incidence, Aalen-Johansen). Each interval is of its share alone, with the {cluster} "
-        f"as the cluster. Conditions in which all were confirmed are left out.{drives}"
+        f"Shares of the events{where} that had ended in each way, by what came first, so that a "
+        "row adds up to 100 % (cumulative incidence, Aalen-Johansen); each with its own 95 % "
+        f"interval over {cluster}s. Left out is where all were confirmed.{drives}"
     )

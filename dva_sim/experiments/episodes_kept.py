@@ -80,7 +80,7 @@ def typical_and_worst(
     here = np.asarray(tables.runs["part"]) == part
     here &= ~np.asarray(tables.runs["is_reference"]).astype(bool)
     runs = {name: np.asarray(values)[here] for name, values in tables.runs.items()}
-    values = as_floats(runs[measure])
+    values = as_floats(runs[measure]) if measure in runs else np.full(here.sum(), np.nan)
     files = _recorded(folder / RECORDINGS, part, runs)
     rows = np.array(sorted(files)) if files else _tracked(tables.tracks, part, runs)
     rows = rows[np.isfinite(values[rows])] if len(rows) else rows

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from dva_sim.errors import ConfigError, DvaSimError
 from dva_sim.experiments.results import Results
+from dva_sim.guesses import either
 
 FORMATS = ("csv", "parquet")
 DICTIONARY = "columns.csv"
@@ -61,7 +62,7 @@ def _files(
 ) -> dict[Path, _Write]:
     """How each file is written."""
     if form is not None and form not in FORMATS:
-        raise ConfigError(f"format {form!r} is unknown; known: {', '.join(FORMATS)}")
+        raise ConfigError(f"--format {form!r} should be {either(FORMATS)}")
     ending = out.suffix.removeprefix(".")
     if ending in FORMATS and not out.is_dir():
         if form not in (None, ending) or len(tables) > 1:

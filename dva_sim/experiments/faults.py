@@ -22,12 +22,15 @@ from dva_sim.experiments.asking import (
 from dva_sim.experiments.designs import (
     MOST_CELLS,
     MOST_POINTS,
+    MOST_RUNS,
     keys_of,
     place_of,
+    runs_of,
     size,
     together,
 )
 from dva_sim.experiments.dictionary import DESIGN, DICTIONARY
+from dva_sim.guesses import hint
 
 if TYPE_CHECKING:
     from dva_sim.experiments.study import Study
@@ -59,8 +62,7 @@ def _faults_of_zip(study: Study, names: Sequence[str]) -> Iterator[Fault]:
     for index, name in enumerate(names):
         path = ("design", "zip", index)
         if name not in study.factors:
-            known = ", ".join(study.factors)
-            yield f"{name!r} is not a factor; factors: {known}", path
+            yield f"{name!r} is not a factor; {hint(name, study.factors, 'factors')}", path
         elif name in names[:index]:
             yield f"{name!r} stands twice", path
         elif names[0] in study.factors:
@@ -94,8 +96,8 @@ def of_factors(study: Study) -> Iterator[Fault]:
         if named is not None:
             yield from _faults_of_name(study, factor)
             for level in (level for level in levels if level not in named):
-                known = ", ".join(named)
-                yield f"{level!r} is not a treatment; named: {known}", _place(study, factor, level)
+                told = hint(str(level), named, "named")
+                yield f"{level!r} is not a treatment; {told}", _place(study, factor, level)
         keys = {key for changes in (named or {}).values() for key in changes} or {factor}
         for key in keys if factor != TUNING else ():
             if setters.setdefault(key, factor) != factor:
@@ -108,7 +110,7 @@ def of_factors(study: Study) -> Iterator[Fault]:
     except ValueError as error:
         yield str(error), ()
     yield from _faults_of_tuning(study)
-    yield from _faults_of_size(study)
+    yield from of_size(study)
 
 
 def _faults_of_name(study: Study, factor: str) -> Iterator[Fault]:
@@ -120,14 +122,21 @@ def _faults_of_name(study: Study, factor: str) -> Iterator[Fault]:
         yield f"a treatment cannot be called {factor!r}: {what} is", ("treatments", factor)
 
 
-def _faults_of_size(study: Study) -> Iterator[Fault]:
-    """A slip in a grid would take minutes to build and years to run."""
+def of_size(study: Study) -> Iterator[Fault]:
+    """A slip in a grid, or in how many persons there are, would take years to run."""
     count, has_points = size(study), POINT in study.factors
     most = MOST_POINTS if has_points else MOST_CELLS
     if count > most:
         how = "points or levels" if has_points else "levels, or draw points with 'design'"
         problem = f"a part would have {count:,} cells, more than {most:,}; have fewer {how}"
         yield problem, ("design",) if has_points else ("factors",)
+    elif (runs := runs_of(study)) > MOST_RUNS:
+        asked = "most_persons" if study.most_persons > study.persons else "persons"
+        is_trials = study.replications > study.most_persons
+        path: Path_ = ("stop", asked) if asked == "most_persons" else (asked,)
+        problem = f"there would be {runs:,} runs, more than {MOST_RUNS:,}"
+        fewer = "have fewer persons, replications or levels"
+        yield f"{problem}; {fewer}", ("replications",) if is_trials else path
 
 
 def _levels_of(study: Study, factor: str) -> Sequence[Level]:
@@ -151,7 +160,8 @@ def _faults_of_tuning(study: Study) -> Iterator[Fault]:
     if tuning.seed == study.seed:
         yield "tuning needs a seed of its own: other persons, other luck", ("tuning", "seed")
     if tuning.part not in study.parts:
-        yield f"tuning.part {tuning.part!r} is not a part", ("tuning", "part")
+        told = hint(tuning.part, study.parts, "parts")
+        yield f"tuning.part {tuning.part!r} is not a part; {told}", ("tuning", "part")
     for name in tuning.by:
         yield from _fault_of_level(study, ("tuning", "by"), name, ())
     for name, level in tuning.at.items():
@@ -202,10 +212,11 @@ def of_answer(study: Study) -> Iterator[Fault]:
 
 def _faults_of_contrast(study: Study, asked: Contrast, path: Path_) -> Iterator[Fault]:
     if asked.part not in study.parts:
-        known = ", ".join(study.parts)
-        name = ".".join(map(str, (*path, "part")))
-        yield f"{name} {asked.part!r} is not a part; parts: {known}", (*path, "part")
-    yield from _fault_of_level(study, (*path, "factor"), asked.factor, asked.contrast)
+        name, told = ".".join(map(str, (*path, "part"))), hint(asked.part, study.parts, "parts")
+        yield f"{name} {asked.part!r} is not a part; {told}", (*path, "part")
+    yield from _fault_of_level(study, (*path, "factor"), asked.factor, ())
+    if asked.factor in study.factors:
+        yield from _fault_of_level(study, (*path, "contrast"), asked.factor, asked.contrast)
     ranges = study.design.ranges if study.design is not None else {}
     if asked.over is not None and asked.over not in ranges:
         yield from _fault_of_level(study, (*path, "over"), asked.over, ())
@@ -229,9 +240,8 @@ def _faults_of_hypothesis(study: Study, name: str) -> Iterator[Fault]:
     hypothesis, path = study.hypotheses[name], ("hypotheses", name)
     asked = study.contrasts.get(hypothesis.comparison)
     if asked is None:
-        known = ", ".join(study.contrasts) or "none"
-        problem = f"{hypothesis.comparison!r} is not a comparison; there are: {known}"
-        yield problem, (*path, "comparison")
+        told = hint(hypothesis.comparison, study.contrasts, "there are")
+        yield f"{hypothesis.comparison!r} is not a comparison; {told}", (*path, "comparison")
         return
     for factor, level in hypothesis.at.items():
         yield from _fault_of_level(study, (*path, "at", factor), factor, (level,))
@@ -245,12 +255,11 @@ def of_stop(study: Study) -> Iterator[Fault]:
     if stop is None:
         return
     if stop.comparison is not None and stop.comparison not in study.contrasts:
-        known = ", ".join(study.contrasts) or "none"
-        problem = f"{stop.comparison!r} is not a comparison; there are: {known}"
-        yield problem, ("stop", "comparison")
+        told = hint(stop.comparison, study.contrasts, "there are")
+        yield f"{stop.comparison!r} is not a comparison; {told}", ("stop", "comparison")
     if stop.part is not None and stop.part not in study.parts:
-        known = ", ".join(study.parts)
-        yield f"stop.part {stop.part!r} is not a part; parts: {known}", ("stop", "part")
+        told = hint(stop.part, study.parts, "parts")
+        yield f"stop.part {stop.part!r} is not a part; {told}", ("stop", "part")
     if stop.most_persons < study.persons:
         problem = f"most_persons should be at least the first batch, persons: {study.persons}"
         yield problem, ("stop", "most_persons")
@@ -290,10 +299,9 @@ def _fault_of_level(
     study: Study, path: Path_, factor: str, levels: Sequence[Level]
 ) -> Iterator[Fault]:
     if factor not in study.factors:
-        known = ", ".join(study.factors)
-        yield f"{factor!r} is not a factor; factors: {known}", path
+        yield f"{factor!r} is not a factor; {hint(factor, study.factors, 'factors')}", path
         return
     for level in levels:
         if level not in study.factors[factor]:
-            known = ", ".join(map(str, study.factors[factor]))
-            yield f"{level!r} is not a level of {factor!r}; levels: {known}", path
+            told = hint(str(level), map(str, study.factors[factor]), "levels")
+            yield f"{level!r} is not a level of {factor!r}; {told}", path

@@ -158,8 +158,8 @@ def number(value: float) -> str:
 
 
 def capital(text: str) -> str:
-    """A capital letter first; the others as they are."""
-    return text[:1].upper() + text[1:]
+    """A capital letter first, unless that is of a name such as `min_eta`; others as they are."""
+    return text if "_" in text.partition(" ")[0] else text[:1].upper() + text[1:]
 
 
 def quantity(value: float, unit: str) -> str:
@@ -221,10 +221,14 @@ def _brief(factor: str, level: Level, units: Sequence[str]) -> str:
 
 
 def setting(levels: Mapping[str, Level]) -> str:
-    """Levels of several factors in a row: `profile default, jitter 20 ms`."""
-    return ", ".join(
-        f"{factor_name(factor)} {level_name(factor, level)}" for factor, level in levels.items()
-    )
+    """Levels of several factors in a row: `profile default, direct control, jitter 20 ms`."""
+    return ", ".join(named(factor, level) for factor, level in levels.items())
+
+
+def named(factor: str, level: Level) -> str:
+    """A level behind its factor's name, unless its own has that: `direct control`."""
+    name, own = factor_name(factor), level_name(factor, level)
+    return own if name in own.split() else f"{name} {own}"
 
 
 def listing(words: Sequence[str], last: str = "and") -> str:

@@ -58,7 +58,7 @@ def manifest_of(study: Study, cells: Sequence[Cell], todo: Sequence[Job]) -> dic
     }
     identity = stable_hash(content)
     content["versions"] = versions()
-    return content | {"hash": identity}
+    return content | {"hash": identity, "usual": study.usual}
 
 
 def versions() -> dict[str, str | bool | None]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from dva_sim.experiments.asking import POINT
 from dva_sim.experiments.dispatch import page as dispatch_page
-from dva_sim.experiments.labels import number
+from dva_sim.experiments.labels import capital, number
 from dva_sim.experiments.statistics import VarianceReduction, variance_reduction
 from dva_sim.experiments.summary import Reading
 from dva_sim.experiments.transports import page as transport_page
@@ -76,19 +76,15 @@ def _tests(study: Mapping[str, Any]) -> Iterator[str]:
     if study.get("hypotheses"):
         yield (
             "Hypotheses are judged by a one-sided test against their margin, at 5 % (bootstrap-t "
-            "over persons), those of sameness by two such tests, one at each end of the margin. "
-            "They are refuted by the test of the opposite."
+            "over persons), those of sameness by two. The test of the opposite refutes them."
         )
     if study.get("comparisons"):
         yield (
             "Comparisons are tested two-sided by permutation: a person's two sides are swapped, "
-            "all trials together (every way of swapping with up to 14 persons, else 10,000 drawn)."
+            "all trials together (all ways with up to 14 persons, else 10,000)."
         )
     if study.get("hypotheses") or study.get("comparisons"):
-        yield (
-            "Tests of one family, hypotheses and comparisons together, share a chance of 5 % that "
-            "any of them is a false alarm (Holm)."
-        )
+        yield ("All tests of a family share a chance of 5 % that any is a false alarm (Holm).")
 
 
 def _made_by(reading: Reading) -> str:
@@ -109,56 +105,46 @@ def _usual(reading: Reading) -> Iterator[str]:
     block = "block" if is_task else "trial"
     luck = "" if is_task else "start, event, "
     yield (
-        f"A {block} meets the same luck in every cell: {luck}noise of hand and sensor, weather of "
-        f"the link. Differences are taken within person and {block} (common random "
-        f"numbers){_alike(reading)}."
+        f"A {block} has the same random numbers in every configuration: {luck}noise of hand and "
+        f"sensor, weather of the link. Differences are taken within person and {block} (common "
+        f"random numbers){_alike(reading)}."
     )
     few = (
-        " With as few persons as here Student's stands alone, and Bonferroni's t for bands."
+        " With as few persons as here it is Student's alone, and Bonferroni's t for bands."
         if reading.persons < _FEW
         else ""
     )
     yield (
-        f"The person is the cluster: {block}s are averaged within a person first, and intervals "
-        "are taken over persons. Intervals of one level reach as far as Student's or the "
-        "bootstrap-t over persons does; bands cover all levels of a line at once (max-t over a "
-        f"bootstrap of persons).{few} Both are Monte Carlo intervals, given the model."
+        f"{capital(block)}s are averaged within a person, and intervals are over persons: as far "
+        "as Student's or the bootstrap-t reaches, bands by max-t over a bootstrap of persons."
+        f"{few} More persons narrow them, but do not make the model truer."
     )
     if POINT in study.get("factors", {}):
         yield (
-            "Each point of the ranges was played by every person; where levels are compared, they "
-            "are compared at each point and averaged over all of them."
+            "Every person met each point of the ranges; levels are compared at each point, and "
+            "the differences averaged."
         )
     if any(part.get("reference") for part in study.get("parts", {}).values()):
         yield (
-            "Where a reference is declared, every run is judged in excess of the reference run of "
-            "the same person and trial: an oracle that sees the true state without delay, on the "
-            "same way."
+            "Where there is a reference run, its value is subtracted from every run of the same "
+            "person and trial."
         )
     if "confirmed" in reading.runs and reading.view and reading.view.measure == "drive_time_s":
-        yield (
-            "A run that was not confirmed counts with all the time it was given and is shown as "
-            "such; it is not dropped."
-        )
-    yield (
-        "No learning is modelled: the last trial of a person is like the first, so trials may come "
-        "in any order and no treatment gains from practice."
-    )
+        yield "A run that was not confirmed is kept: it counts with all the time it was given."
+    yield "Nobody learns: a person's last trial is like the first."
     yield _not_modelled(is_task)
 
 
 def _not_modelled(is_task: bool) -> str:
     if is_task:
         return (
-            "Not modelled either: fatigue of persons, artefacts of video compression, and the "
-            "radio itself (the link is delay, jitter and loss). Operators are control models; no "
-            "human took part."
+            "Not modelled: fatigue, video compression, and the radio itself (the link is delay, "
+            "jitter and loss). Operators are control models."
         )
     return (
-        "Not modelled either: fatigue of persons, cooperation between operators, artefacts of "
-        "video compression, uneven floors, and the radio itself (the link is a queue with rate, "
-        "delay, jitter and loss, a recorded trace, or what the Wi-Fi zones of the site say). "
-        "Operators are control models; no human took part."
+        "Not modelled: fatigue, cooperation between operators, video compression, uneven floors, "
+        "and the radio itself (the link is a queue with rate, delay, jitter and loss, a recorded "
+        "trace, or the Wi-Fi zones of a site). Operators are control models."
     )
 
 
@@ -166,19 +152,14 @@ def _alike(reading: Reading) -> str:
     """What pairing gave, where it was seen: nothing is claimed beyond that."""
     if reading.pair_correlation is None:
         return ""
-    words = (
-        f"; the two sides of the contrast correlate with {number(reading.pair_correlation)} at the "
-        "last level"
-    )
+    words = f"; at the last level the two sides correlate with {number(reading.pair_correlation)}"
     found = _reduction(reading)
     if found is None or not np.isfinite(found.ratio.mean):
         return words
     ratio = found.ratio
     told = f"{number(ratio.mean)} ({number(ratio.low)} to {number(ratio.high)})"
     if found.is_lower:
-        return (
-            f"{words}, so that the variance of the difference is {told} of what unpaired runs give"
-        )
+        return f"{words}, so the variance of the difference is {told} of that of unpaired runs"
     return f"{words}; that pairing lowers the variance is not shown (ratio {told})"
 
 

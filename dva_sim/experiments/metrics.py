@@ -12,13 +12,14 @@ from dva_sim.core.events import Event
 from dva_sim.experiments import workload
 from dva_sim.experiments.budget import QUANTILES, STAGES, command_ages, delay_budget, driven
 from dva_sim.recorder import DriveLog
+from dva_sim.scenario import Scenario
 from dva_sim.simulation import Recording
 
 Row = dict[str, Any]
 NAN = math.nan
 SETTLED = "confirmed", "contained", "refuted"  # outcomes of events that somebody has looked at
 
-MEASURES = (
+_OF_DRIVES = (
     *("confirmed", "drive_time_s", "attempts"),
     *("path_m", "contacts", "contact_impulse_n_s", "person_contacts", "jams"),
     *("command_age_mean_s", *(f"command_age_p{q:02}_s" for q in QUANTILES), "age_in_force_mean_s"),
@@ -27,16 +28,32 @@ MEASURES = (
     *("command_rate_hz", "commands_sent", "commands_applied", "commands_stale"),
     *("commands_superseded", "round_trip_p50_s", "round_trip_p95_s", "round_trip_max_s"),
     *("samples_per_value", "queue_max", "timeouts", "alerts", "stop_share"),
-    *("response_mean_s", "confirmation_mean_s", "settled_per_min"),
-    *("events", "person_exposure_s", "dose_heat_max", "dose_toxic_max", "incapacitated"),
-    *("evacuated_share", "evacuated_s"),
+)
+_OF_PEOPLE = ("dose_heat_max", "dose_toxic_max", "incapacitated")
+_OF_BYSTANDERS = ("evacuated_share", "evacuated_s")
+_OF_OPERATORS = (
     *("utilisation", "attending_share", "queue_mean", "turns_per_min"),
     *("reversals_per_min", "command_changes_per_min", "steering_entropy", "waiting_share"),
     *("move_waits", "move_and_wait_share", "path_error_rms_m", "path_error_max_m"),
-    *("missed", "false_confirmations", "replans", "messages", "traffic_bytes", "refused"),
+    *("missed", "false_confirmations"),
+)
+MEASURES = (
+    *_OF_DRIVES,
+    *("response_mean_s", "confirmation_mean_s", "settled_per_min"),
+    *("events", "person_exposure_s", *_OF_PEOPLE, *_OF_BYSTANDERS, *_OF_OPERATORS),
+    *("replans", "messages", "traffic_bytes", "refused"),
     *("plugin_failures", "violations", "simulated_s"),
 )
 """Numbers that a row of `run_row` may hold, and so what a study may ask for."""
+
+
+def measures_of(scenario: Scenario) -> tuple[str, ...]:
+    """Those of `MEASURES` that a run of a scenario may hold: without robots nobody drives one."""
+    bystanders, guards = scenario.bystander.count, scenario.guard.count
+    there = {_OF_DRIVES: scenario.robot.count, _OF_OPERATORS: scenario.operator.count}
+    there |= {_OF_PEOPLE: bystanders + guards, _OF_BYSTANDERS: bystanders}
+    gone = {name for names, count in there.items() if not count for name in names}
+    return tuple(name for name in MEASURES if name not in gone)
 
 
 def run_row(recording: Recording) -> Row:

@@ -15,6 +15,7 @@ from dva_sim import scenario as scenarios
 from dva_sim.config import Document
 from dva_sim.experiments.transports import scenario as transports
 from dva_sim.experiments.transports.scenario import TransportScenario
+from dva_sim.guesses import unknown
 from dva_sim.scenario import Scenario
 from dva_sim.tasks import scenario as tasks
 from dva_sim.tasks.scenario import TaskScenario
@@ -25,14 +26,20 @@ if TYPE_CHECKING:
     from dva_sim.simulation import Recording
 
 AnyScenario = Scenario | TimedScenario | TaskScenario | TransportScenario
+SCENARIOS: dict[str, type[AnyScenario]] = {
+    "full": Scenario,
+    "timed": TimedScenario,
+    "task": TaskScenario,
+    "transports": TransportScenario,
+}
 Tables = dict[str, list[dict[str, Any]]]
 
 
 class Model(Protocol):
     """What a study does with a scenario."""
 
-    def measures(self) -> tuple[str, ...]:
-        """Columns of the runs that a study may ask for."""
+    def measures(self, scenario: AnyScenario | None = None) -> tuple[str, ...]:
+        """Columns of the runs that a study may ask for: of some scenario, or of a certain one."""
 
     def build(self, source: Document, changes: Mapping[str, Any]) -> AnyScenario:
         """The scenario of a file, with some keys changed.
@@ -69,7 +76,7 @@ def model_of(document: Document) -> Model:
     """
     name = document.data.get("model", "full")
     if name not in MODELS:
-        raise document.error(f"model {name!r} is unknown; known: {', '.join(MODELS)}", ("model",))
+        raise document.error(unknown("model", name, MODELS), ("model",))
     return MODELS[name]
 
 
@@ -91,10 +98,10 @@ def tables_of(recording: Recording) -> Tables:
 
 
 class _Full:
-    def measures(self) -> tuple[str, ...]:
+    def measures(self, scenario: AnyScenario | None = None) -> tuple[str, ...]:
         from dva_sim.experiments import metrics
 
-        return metrics.MEASURES
+        return metrics.measures_of(scenario) if isinstance(scenario, Scenario) else metrics.MEASURES
 
     def build(self, source: Document, changes: Mapping[str, Any]) -> Scenario:
         return scenarios.build(source, changes)
@@ -130,10 +137,10 @@ class _Full:
 class _Timed:
     """Its persons are but names for independent runs."""
 
-    def measures(self) -> tuple[str, ...]:
-        from dva_sim.experiments.dispatch.measures import MEASURES
+    def measures(self, scenario: AnyScenario | None = None) -> tuple[str, ...]:
+        from dva_sim.experiments.dispatch.measures import MEASURES, measures_of
 
-        return MEASURES
+        return measures_of(scenario) if isinstance(scenario, TimedScenario) else MEASURES
 
     def build(self, source: Document, changes: Mapping[str, Any]) -> TimedScenario:
         return timed.build(source, changes)
@@ -164,10 +171,10 @@ class _Timed:
 class _Task:
     """A run is a block of trials of one person; `trials` has a row for each."""
 
-    def measures(self) -> tuple[str, ...]:
-        from dva_sim.tasks.summary import MEASURES
+    def measures(self, scenario: AnyScenario | None = None) -> tuple[str, ...]:
+        from dva_sim.tasks.summary import MEASURES, measures_of
 
-        return MEASURES
+        return measures_of(scenario) if isinstance(scenario, TaskScenario) else MEASURES
 
     def build(self, source: Document, changes: Mapping[str, Any]) -> TaskScenario:
         return tasks.build(source, changes)
@@ -201,7 +208,7 @@ class _Task:
 class _Transports:
     """A run is the network first, and then one drive of one person over it."""
 
-    def measures(self) -> tuple[str, ...]:
+    def measures(self, scenario: AnyScenario | None = None) -> tuple[str, ...]:
         from dva_sim.experiments.transports.measures import MEASURES
 
         return MEASURES

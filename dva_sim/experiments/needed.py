@@ -13,11 +13,10 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dva_sim.experiments.asking import ANSWER, Contrast, Hypothesis
 from dva_sim.experiments.contrasts import Pairs, claims_of, contrasts_of, pairs_of, places_of
-from dva_sim.experiments.effects import Setting, Table, View
+from dva_sim.experiments.effects import Floats, Setting, Table, View
 from dva_sim.experiments.labels import level_name, measure_name, quantity, setting, unit_of
 from dva_sim.experiments.reading import view_of
 from dva_sim.experiments.statistics import (
@@ -66,37 +65,40 @@ class Plan:
 
 
 class _Test(NamedTuple):
-    """A claim as it would be tested: twice one-sided if it is one of sameness."""
+    """A claim as it would be tested: on two sides if it is that an effect is small."""
 
     name: str
     what: str
     assumed: str
     law: Law
-    distance: float  # of the true difference from the bound that is tested
-    is_same: bool = False
+    distance: float  # of the true difference from the nearest bound that is tested
+    other: float = math.inf  # its distance from the bound on the other side, if there is one
     least: int = 2  # persons without whom the test cannot come out
 
 
-def plans(study: Mapping[str, Any], runs: Table, but: Collection[str] = ()) -> list[Plan]:
+def plans(
+    study: Mapping[str, Any], runs: Table, decided: Collection[str] | None = None
+) -> list[Plan]:
     """What each hypothesis and each other comparison would need, and the answer where it is open.
-
-    An answer that is not open counts only where nothing else is claimed.
 
     Args:
         study: As the manifest has it.
         runs: The table of runs.
-        but: Names of hypotheses and comparisons that are decided.
+        decided: Names of hypotheses and comparisons that are left out because they need no more.
+            None for a pilot, where nothing is left out; without any claim not even an answer
+            that is not open.
     """
     claims, named = claims_of(study), contrasts_of(study)
     claimed = {claim.comparison for claim in claims.values()}
     others = {k: c for k, c in named.items() if k not in claimed and k != ANSWER}
     family = _families(study, claims, named)
+    in_any_case = decided is None and not claims and not others
     tests = [
-        *_of_answer(view_of(study, runs), is_alone=not claims and not others and not but),
+        *_of_answer(view_of(study, runs), in_any_case),
         *_of_claims(study, runs, claims, named, family),
         *_of_comparisons(study, runs, others, family),
     ]
-    return [_plan(test) for test in tests if test.name not in but]
+    return [_plan(test) for test in tests if test.name not in (decided or ())]
 
 
 def _families(
@@ -110,36 +112,42 @@ def _families(
     return tests
 
 
-def _of_answer(view: View | None, is_alone: bool) -> Iterator[_Test]:
-    """The answer's band where it leaves the question open, at the level that needs most persons."""
+def _of_answer(view: View | None, in_any_case: bool) -> list[_Test]:
+    """What would settle the answer's question where it is open, at the level that needs most."""
     if view is None or view.contrast is None or view.line is None:
-        return
+        return []
     differences = view.difference(view.panels[0], *view.contrast)
     found = band(differences)
-    if (stop := _widest(found, _open(found, view.smallest_effect, is_alone))) is None:
-        return
-    mean, unit = float(found.mean[stop]), unit_of(view.measure)
-    reach = mean - found.low[stop] if mean > 0 else found.high[stop] - mean
-    each = _ALPHA / max(int(np.isfinite(found.critical).sum()), 1)
-    law = law_of(differences[:, stop], np.arange(len(differences)), float(reach), 1 - each)
-    if law is None:
-        return
-    what = f"{_sides_of(view, stop)}: not zero"
-    for effect, why in _assumed(abs(mean), view.smallest_effect):
-        yield _Test(ANSWER, what, f"{quantity(effect, unit)}, {why}", law, effect)
-
-
-def _open(found: Band, smallest: float | None, is_alone: bool) -> NDArray[np.bool_]:
-    """Levels at which the band holds zero and an effect that matters; without one, all."""
+    holds_zero = (found.low <= 0) & (found.high >= 0)
     bounds = np.maximum(-found.low, found.high)
-    is_open = (found.low <= 0) & (found.high >= 0) & (bounds > (smallest or 0.0))
-    return np.isfinite(found.critical) & (is_open | (is_alone and not is_open.any()))
+    is_open = holds_zero & (bounds > (view.smallest_effect or 0.0)) & np.isfinite(found.critical)
+    if not is_open.any() and in_any_case:
+        is_open = np.isfinite(found.critical)
+    tests = [list(_to_settle(view, found, differences, int(i))) for i in np.flatnonzero(is_open)]
+    return max(filter(None, tests), key=lambda some: _plan(some[0]).counts[0].persons, default=[])
 
 
-def _widest(found: Band, where: NDArray[np.bool_]) -> int | None:
-    """Of some levels that whose band is widest."""
-    widths = np.where(where, found.high - found.low, -1.0)
-    return int(widths.argmax()) if where.any() else None
+def _to_settle(view: View, found: Band, differences: Floats, stop: int) -> Iterator[_Test]:
+    """An effect that seems not to matter is to be shown small, any other not to be zero."""
+    mean, smallest = float(found.mean[stop]), view.smallest_effect
+    reach = mean - float(found.low[stop]), float(found.high[stop]) - mean
+    sides, unit = _sides_of(view, stop), unit_of(view.measure)
+    each = 1 - _ALPHA / int(np.isfinite(found.critical).sum())
+
+    def law(reach: float) -> Law:
+        known = law_of(differences[:, stop], np.arange(len(differences)), reach, each)
+        assert known is not None  # there is a band
+        return known
+
+    if smallest is not None and abs(mean) < smallest:
+        assumed = f"{quantity(abs(mean), unit)}, as found"
+        what = f"{sides}: below {quantity(smallest, unit)}, the smallest that matters"
+        bounds = smallest - abs(mean), smallest + abs(mean)
+        yield _Test(ANSWER, what, assumed, law(max(reach)), *bounds)
+        return
+    for effect, why in _assumed(abs(mean), smallest):
+        assumed = f"{quantity(effect, unit)}, {why}"
+        yield _Test(ANSWER, f"{sides}: not zero", assumed, law(reach[mean < 0]), effect)
 
 
 def _assumed(found: float, smallest: float | None) -> Iterator[tuple[float, str]]:
@@ -172,7 +180,8 @@ def _of_claims(
         what = f"{_sides(contrast, at)}: {_CLAIMS[claim.direction]}{quantity(claim.margin, unit)}"
         assumed = "none at all" if is_same else f"{quantity(mean, unit)}, as found"
         if law is not None:
-            yield _Test(name, what, assumed, law, distance, is_same)
+            other = claim.margin if is_same else math.inf
+            yield _Test(name, what, assumed, law, distance, other)
 
 
 _CLAIMS = {"above": "above ", "below": "below \N{MINUS SIGN}", "same": "the same within "}
@@ -213,8 +222,8 @@ def _plan(test: _Test) -> Plan:
     law = test.law
 
     def chance(persons: int) -> float:
-        found = law.power(test.distance, persons)
-        return 2 * found - 1 if test.is_same else found
+        missed = [1 - law.power(d, persons) for d in (test.distance, test.other) if d < math.inf]
+        return 1 - sum(missed)
 
     wanted = POWERS if test.distance > 0 else ()
     counts = tuple(_count(chance, share, law.persons, test.least) for share in wanted)

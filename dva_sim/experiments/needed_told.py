@@ -102,9 +102,8 @@ def _assumes(found: Sequence[Plan], cluster: str) -> str:
     counts = sorted({plan.known_from for plan in found})
     known = str(counts[0]) if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
     return (
-        f"Power is the chance that a study of that size shows it. All numbers follow one law: the "
-        f"interval shown here, narrowed by more {cluster}s with as many runs of each (noncentral "
-        f"t). How much {cluster}s spread is known from {known} of them only: in brackets, what "
-        "else would fit (95 %). A difference found in a few of them is often too large: rather "
-        "count on the smallest that matters."
+        f"Power: the chance that a study of that size shows it. All by one law: the interval shown "
+        f"here, narrowed by more {cluster}s with as many runs of each (noncentral t). In brackets, "
+        f"what else would fit (95 %), since the spread is known from {known} {cluster}s only. What "
+        "few of them found is often too large: rather count on the smallest that matters."
     )

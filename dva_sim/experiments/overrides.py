@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import UnionType
 from typing import Annotated, Any, Union, get_args, get_origin
@@ -12,6 +12,8 @@ from pydantic import BaseModel
 
 from dva_sim.config import Path_
 from dva_sim.errors import ConfigError
+from dva_sim.guesses import hint
+from dva_sim.key_hints import meant
 
 
 @dataclass(frozen=True)
@@ -33,7 +35,12 @@ class Changed:
         return not any(path[: len(t)] == t for t in self.touched)
 
 
-def change(before: Changed, pairs: Mapping[str, Any], model: type[BaseModel]) -> Changed:
+def change(
+    before: Changed,
+    pairs: Mapping[str, Any],
+    model: type[BaseModel],
+    scenarios: Sequence[type[BaseModel]],
+) -> Changed:
     """Change some keys.
 
     A key of the study (`seed`, `factors.pattern`) changes the study. Any other is one of the
@@ -43,14 +50,19 @@ def change(before: Changed, pairs: Mapping[str, Any], model: type[BaseModel]) ->
         before: What is changed.
         pairs: New values by dotted key.
         model: The keys of a study.
+        scenarios: The keys of the scenarios that there are.
 
     Raises:
-        ConfigError: a part of a key that the study does not have.
+        ConfigError: a key that neither the study nor any scenario has.
     """
     data, changes, touched = copy.deepcopy(before.data), dict(before.changes), [*before.touched]
     factors = data.setdefault("factors", {})
     for key, value in pairs.items():
-        if key not in factors and key.partition(".")[0] not in model.model_fields:
+        first = key.partition(".")[0]
+        if key not in factors and first not in model.model_fields:
+            if not any(first in scenario.model_fields for scenario in scenarios):
+                hint = meant(tuple(key.split(".")), value, model, *scenarios)
+                raise ConfigError(f"unknown key {key!r}; {hint}")
             changes[key] = value
             continue
         path = ("factors", key) if key in factors else _path(data, key, model)
@@ -101,8 +113,8 @@ def _entry(there: Mapping[str, Any], key: str) -> str:
     """The name in a mapping that a dotted key begins with; the whole key may be a new name."""
     names = [name for name in there if key == name or key.startswith(f"{name}.")]
     if not names and "." in key:
-        known = ", ".join(there) or "nothing"
-        raise ConfigError(f"no {key.partition('.')[0]!r} in the study to change; there: {known}")
+        first = key.partition(".")[0]
+        raise ConfigError(f"no {first!r} in the study to change; {hint(first, there, 'there')}")
     return max(names, key=len, default=key)
 
 

@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from dva_sim.experiments.blocks import (
     Block,
-    Box,
+    First,
+    Folded,
     Heading,
     Items,
     Kind,
     Printed,
     Shown,
+    Terms,
     Verbatim,
     Words,
+    reworded,
+    texts_of,
 )
 from dva_sim.experiments.cells import CellTable
 from dva_sim.experiments.figures.palette import SOFT, WARNING
+from dva_sim.experiments.glossary import RING, Marker, terms_in
 from dva_sim.experiments.typeset import (
     SMALL,
     Face,
@@ -28,6 +35,9 @@ from dva_sim.experiments.typeset import (
     words_of,
 )
 
+if TYPE_CHECKING:
+    from dva_sim.experiments.figures.style import Drawn
+
 _TITLE = Face(16, "bold")
 _SECTION, _BELOW = Face(12, "bold"), Face(9.5, "bold")
 _PLAIN, _LEAD = Face(9), Face(10.5, "bold")
@@ -36,6 +46,7 @@ _KINDS: dict[Kind, Face] = {
     "note": SMALL,
     "warning": Face(9, "bold", colour=WARNING),
     "label": Face(9, "bold"),
+    "banner": Face(10.5, "bold", colour=WARNING),
 }
 _MONO = Face(5.5, family="DejaVu Sans Mono")
 _CELL, _HEAD = Face(7), Face(7, "bold", colour=SOFT)
@@ -43,6 +54,7 @@ _TIGHT, _TIGHT_HEAD = Face(6), Face(6, "bold", colour=SOFT)
 _GAP = 9.0  # between columns [pt]
 _NAMES = 0.4  # of the width is what names of rows may take before they are broken
 _INDENT = 10.0  # of a list, and of the answer [pt]
+_ANSWERING = 340.0  # width of the figure that answers, so that the first page holds all [pt]
 
 
 def write_pdf(path: Path, question: str, blocks: Sequence[Block]) -> None:
@@ -51,11 +63,17 @@ def write_pdf(path: Path, question: str, blocks: Sequence[Block]) -> None:
 
     with rc_context({"pdf.fonttype": 42, "pdf.compression": 6, "text.usetex": False}):
         paper = Paper(path, question)
-        _text(paper, "Question", SMALL)
+        terms = terms_in(texts_of(blocks))
+        ringed = reworded(blocks, Marker(terms).ringed)
+        banners = [b for b in ringed if isinstance(b, Words) and b.kind == "banner"]
+        for banner in banners:
+            _set(paper, banner)
         _text(paper, question, _TITLE)
-        paper.skip(6)
-        for block in blocks:
-            _set(paper, block)
+        if terms:
+            _text(paper, f"The list at the end explains words marked {RING}.", SMALL)
+        for block in ringed:
+            if block not in banners:
+                _set(paper, block)
         paper.close()
 
 
@@ -64,19 +82,35 @@ def _set(paper: Paper, block: Block) -> None:
         _heading(paper, block)
     elif isinstance(block, Words):
         _text(paper, block.text, _KINDS[block.kind])
-    elif isinstance(block, Box):
-        _box(paper, block)
+    elif isinstance(block, First):
+        _first(paper, block)
     elif isinstance(block, Items):
-        for item in block.items:
-            paper.need(_PLAIN.leading)
-            paper.line("•", _PLAIN)
-            _text(paper, item, _PLAIN, _INDENT)
+        _items(paper, block.items)
     elif isinstance(block, Printed):
         _table(paper, block.table, block.is_words)
     elif isinstance(block, Shown):
-        _figure(paper, block)
+        _figure(paper, block.figure)
+    elif isinstance(block, Terms):
+        _terms(paper, block)
+    elif isinstance(block, Folded):
+        _heading(paper, Heading(block.title, 3))
+        for inner in block.blocks:
+            _set(paper, inner)
     else:
         _verbatim(paper, block)
+
+
+def _items(paper: Paper, items: Sequence[str]) -> None:
+    for item in items:
+        paper.need(_PLAIN.leading)
+        paper.line("•", _PLAIN)
+        _text(paper, item, _PLAIN, _INDENT)
+
+
+def _terms(paper: Paper, block: Terms) -> None:
+    """A word and what it means in a line or two."""
+    for _, name, means in block.entries:
+        _text(paper, f"{name}: {means}", SMALL, after=1.5)
 
 
 def _text(paper: Paper, text: str, face: Face, x: float = 0.0, after: float = 4.0) -> None:
@@ -95,27 +129,30 @@ def _heading(paper: Paper, block: Heading) -> None:
     _text(paper, block.text, face)
 
 
-def _box(paper: Paper, block: Box) -> None:
-    """The answer, indented between two rules."""
+def _first(paper: Paper, block: First) -> None:
+    """The answer between two rules, the figure that answers, and what it depends on."""
     paper.skip(4)
     paper.rule()
     paper.y -= 7
-    for index, paragraph in enumerate(block.paragraphs):
-        _text(paper, paragraph, _PLAIN if index else _LEAD, _INDENT, after=5)
+    _text(paper, block.lead, _LEAD, after=5)
     paper.rule()
-    paper.skip(8)
+    paper.skip(10)
+    if block.figure is not None:
+        _figure(paper, block.figure, _ANSWERING)
+    if block.depends:
+        _heading(paper, Heading("What this depends on", 3))
+        _items(paper, [f"{about}: {words}" for about, words in block.depends])
 
 
-def _figure(paper: Paper, block: Shown) -> None:
+def _figure(paper: Paper, drawn: Drawn, most: float = math.inf) -> None:
     """Title, figure and caption on one page; smaller where it is too high for that."""
-    drawn = block.figure
     if drawn.figure is None:
         return
     title = list(broken(drawn.title, _BELOW, paper.width))
     caption = list(broken(drawn.caption, SMALL, paper.width))
     words = len(title) * _BELOW.leading + len(caption) * SMALL.leading + 12
     wide, high = drawn.figure.get_size_inches()
-    width = min(paper.width, (paper.height - words) * float(wide) / float(high))
+    width = min(most, paper.width, (paper.height - words) * float(wide) / float(high))
     height = width * float(high) / float(wide)
     paper.need(words + height)
     _text(paper, drawn.title, _BELOW)
@@ -126,7 +163,6 @@ def _figure(paper: Paper, block: Shown) -> None:
 
 def _verbatim(paper: Paper, block: Verbatim) -> None:
     """Line by line, in two columns."""
-    _heading(paper, Heading(block.title))
     width = (paper.width - _GAP) / 2
     most = int(width / width_of("m", _MONO))
     lines = [

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from dva_sim.experiments import design, places
-from dva_sim.experiments.design import Job, Key
+from dva_sim.experiments.design import Cell, Job, Key
 from dva_sim.experiments.journal import FILE, Journal
 from dva_sim.experiments.limit import RunTooLong, limited
 from dva_sim.experiments.manifest import manifest_of
@@ -64,7 +64,12 @@ class _Tried(NamedTuple):
 
 
 def dry_run(
-    study: Study, out: str | Path, *, jobs: int | None = None, probe: Episode | None = None
+    study: Study,
+    out: str | Path,
+    *,
+    jobs: int | None = None,
+    probe: Episode | None = None,
+    cells: Sequence[Cell] | None = None,
 ) -> DryRun:
     """What `run_study` would do, without doing it.
 
@@ -74,11 +79,12 @@ def dry_run(
         jobs: Processes; by default one for each core.
         probe: Makes the tables of one run. With it, a few runs are tried for the estimate if none
             is done yet.
+        cells: The study's configurations, if they have been made already.
 
     Raises:
         ConfigError: the study is not valid, or the folder holds another one.
     """
-    cells = design.cells(study)
+    cells = design.cells(study) if cells is None else cells
     todo = list({job.key: job for job in design.jobs(study, cells)}.values())
     costs: dict[Key, float] = {}
     if (Path(out) / FILE).exists():

@@ -198,7 +198,8 @@ def finding_of(view: View) -> Finding | None:
         horizon=_horizon(view),
         widest=view.widest,
         all_confirmed=_all_confirmed(view),
-        everywhere="on average over the ranges" if view.averages_points else "throughout",
+        everywhere="on average over the ranges" if view.averages_points else "",
+        part=view.part.name,
     )
 
 
@@ -246,7 +247,7 @@ def _horizon(view: View) -> float | None:
     if not view.part.has("confirmed") or unit_of(view.measure) != "s":
         return None
     missed = as_floats(view.part.treated["confirmed"]) == 0
-    counted = np.unique(present(as_floats(view.part.treated[view.measure])[missed]))
+    counted = np.unique(present(view.part.values(view.measure)[missed]))
     return float(counted[0]) if len(counted) == 1 else None
 
 

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import base64
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dva_sim.errors import DvaSimError
-from dva_sim.experiments.blocks import Block
+from dva_sim.experiments.blocks import Block, Heading, texts_of
 from dva_sim.experiments.dispatch import figures as dispatch_figures
+from dva_sim.experiments.effects import View
 from dva_sim.experiments.figures import Drawn, draw_all
+from dva_sim.experiments.figures.contrast import contrast
+from dva_sim.experiments.figures.style import styled
+from dva_sim.experiments.glossary import Marker, terms_in
 from dva_sim.experiments.sections import blocks_of
 from dva_sim.experiments.summary import Reading
 from dva_sim.experiments.transports import figures as transport_figures
@@ -18,6 +23,7 @@ from dva_sim.experiments.unfinished import load_so_far
 
 if TYPE_CHECKING:
     import jinja2
+    from markupsafe import Markup
 
 PAGE, PAPER, FIGURES = "report.html", "report.pdf", "figures"
 
@@ -58,12 +64,26 @@ def write_report(folder: Path, pdf: bool = False) -> Path:
 
 
 def _draw(reading: Reading) -> list[Drawn]:
+    """All figures, first the one that answers."""
     if reading.view is None:
         return []
+    return [*_answering(reading), *_others(reading, reading.view)]
+
+
+def _answering(reading: Reading) -> list[Drawn]:
+    view, finding = reading.view, reading.told
+    if view is None or view.contrast is None or finding is None:
+        return []
+    with styled():
+        drawn = contrast(finding, view.difference(view.panels[0], *view.contrast))
+    return [drawn] if drawn is not None else []
+
+
+def _others(reading: Reading, view: View) -> list[Drawn]:
     if reading.shifts is not None:
         return dispatch_figures.draw_all(reading.shifts)
     if reading.is_contest:
-        return transport_figures.draw_all(reading.view)
+        return transport_figures.draw_all(view)
     return draw_all(reading)
 
 
@@ -85,11 +105,12 @@ def _write_figures(folder: Path, drawn: Sequence[Drawn]) -> None:
 
 def _page(question: str, blocks: Sequence[Block]) -> str:
     """Fill the template."""
-    named = [(type(block).__name__, block) for block in blocks]
-    return _template().render(question=question, blocks=named)
+    sections = [block.text for block in blocks if isinstance(block, Heading) and block.level == 2]
+    marker = Marker(terms_in(texts_of(blocks)))
+    return _template(marker).render(question=question, blocks=blocks, sections=sections)
 
 
-def _template() -> jinja2.Template:
+def _template(marker: Marker) -> jinja2.Template:
     import jinja2
 
     environment = jinja2.Environment(
@@ -99,8 +120,30 @@ def _template() -> jinja2.Template:
         lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
     )
-    environment.filters["data_uri"] = _data_uri
+    environment.filters |= {
+        "data_uri": _data_uri,
+        "explained": lambda text: _explained(text, marker),
+        "kind": lambda block: type(block).__name__,
+        "key": _key,
+    }
     return environment.get_template("report.html.j2")
+
+
+def _explained(text: str, marker: Marker) -> Markup:
+    """With a link from each word that is said for the first time to what it means."""
+    from markupsafe import Markup
+
+    link = Markup('<dfn><a href="#{}" title="{}">{}</a></dfn>')
+    pieces = [
+        link.format(term.key, f"{term.means}.", piece) if term else Markup.escape(piece)
+        for piece, term in marker.split(text)
+    ]
+    return Markup("").join(pieces)
+
+
+def _key(text: str) -> str:
+    """A heading as an identifier."""
+    return re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-")
 
 
 def _data_uri(svg: bytes) -> str:

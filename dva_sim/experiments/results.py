@@ -15,6 +15,7 @@ from dva_sim.errors import ConfigError
 from dva_sim.experiments.dictionary import Column, describe
 from dva_sim.experiments.frames import Frame, without_mask
 from dva_sim.experiments.journal import FILE as JOURNAL
+from dva_sim.guesses import hint
 
 if TYPE_CHECKING:
     from dva_sim.experiments.answer import Answer
@@ -173,8 +174,8 @@ class Results:
             ConfigError: no such table, or another than the manifest was written beside.
         """
         if not self.has(table):
-            there = ", ".join(self.tables) or "none"
-            raise ConfigError(f"{self.folder} has no table {table!r}; tables: {there}")
+            told = hint(table, self.tables, "tables")
+            raise ConfigError(f"{self.folder} has no table {table!r}; {told}")
         path = self._tables / f"{table}.parquet"
         expected = self.manifest.get("tables", {}).get(table)
         if expected is not None and table not in self._seen:
@@ -236,7 +237,8 @@ class Results:
 
     def _repr_html_(self) -> str:
         """What a notebook shows: question, answer, and how many runs stand behind it."""
-        notes = "".join(f"<p>{escape(note)}</p>" for note in self.answer.notes)
+        depends = (f"{about}: {words}" for about, words in self.answer.depends.items())
+        notes = "".join(f"<p>{escape(note)}</p>" for note in (*depends, *self.answer.notes))
         failed = f", {len(self.failures)} failed" if self.failures else ""
         runs = f"<p>{self.runs.rows} runs{failed}, in {escape(str(self.folder))}</p>"
         lead = f"<p><b>{escape(self.answer.lead)}</b></p>"

@@ -119,6 +119,11 @@ class Robustness:
     persons: int
     trials: int
 
+    @property
+    def unit(self) -> str:
+        """Unit of what is compared."""
+        return unit_of(self.measure)
+
 
 def robustness_of(
     study: Mapping[str, Any],

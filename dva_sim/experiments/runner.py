@@ -13,7 +13,7 @@ from typing import Any
 
 from dva_sim.errors import ConfigError, DvaSimError
 from dva_sim.experiments import design, places, pool
-from dva_sim.experiments.design import Job
+from dva_sim.experiments.design import Cell, Job
 from dva_sim.experiments.journal import FILE, Journal
 from dva_sim.experiments.manifest import failures, machine, manifest_of, write_json
 from dva_sim.experiments.places import Place, PlaceLost
@@ -35,6 +35,7 @@ def run_study(
     episode: Episode | None = None,
     progress: Progress | None = None,
     limit_s: float = pool.LIMIT_S,
+    cells: Sequence[Cell] | None = None,
 ) -> Path:
     """Run what the results folder does not hold yet, then write its tables and manifest.
 
@@ -50,6 +51,7 @@ def run_study(
         episode: Makes the tables of one run; by default a simulation.
         progress: Called with the number of runs done and of all runs, as they finish.
         limit_s: A run that takes longer, by the wall clock, has failed.
+        cells: The study's configurations, if they have been made already.
 
     Returns:
         The results folder.
@@ -61,7 +63,7 @@ def run_study(
         KeyboardInterrupt: after tidying up; its message says what has been done.
     """
     out, started, clock = Path(out), datetime.now(UTC), time.perf_counter()
-    cells = design.cells(study)
+    cells = design.cells(study) if cells is None else cells
     todo = design.jobs(study, cells)
     manifest = manifest_of(study, cells, todo)
     with ExitStack() as stack:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,11 +16,16 @@ from rich.progress import BarColumn, Progress, TextColumn
 
 from dva_sim.exit_codes import ExitCode
 from dva_sim.experiments.console import console, say, warn
+from dva_sim.experiments.design import Cell
+from dva_sim.experiments.designs import runs_of, size
 from dva_sim.experiments.planning import DryRun, dry_run
+from dva_sim.experiments.pool import Episode
 from dva_sim.experiments.results import Results
 from dva_sim.experiments.study import Study, load_study
 from dva_sim.experiments.versions import Variant
 
+_MANY = 500  # configurations, which take some seconds to check
+_MANY_RUNS = 100_000  # whose list takes seconds, too
 _LINE_S = 30.0  # between two lines of progress in a file
 _MINUTE_S, _HOUR_S = 60, 3600
 
@@ -49,7 +54,8 @@ def run(
 
     try:
         study, folder = _loaded(name, pairs, out, variant)
-        before = _planned(study, folder, workers, tries=False)
+        cells = _checked(study)
+        before = _planned(study, folder, workers, cells)
         with _shown("running", before.runs) as show:
             run_study(
                 study,
@@ -58,6 +64,7 @@ def run(
                 scheduler=workers.scheduler,
                 progress=show,
                 limit_s=workers.limit_s,
+                cells=cells,
             )
         results = Results.load(folder)
         failures = _told_failures(results) + _recorded(study, folder, workers)
@@ -101,7 +108,9 @@ def tune(name: str, out: Path | None, jobs: int | None) -> ExitCode:
 def plan(name: str, pairs: list[str], out: Path | None, workers: Workers, variant: Variant) -> None:
     """Say what `run` would do."""
     study, folder = _loaded(name, pairs, out, variant)
-    _planned(study, folder, workers, tries=True)
+    from dva_sim.experiments.episode import run_job
+
+    say(escape(_time(_planned(study, folder, workers, _checked(study), run_job))))
 
 
 def _loaded(name: str, pairs: list[str], out: Path | None, variant: Variant) -> tuple[Study, Path]:
@@ -110,19 +119,36 @@ def _loaded(name: str, pairs: list[str], out: Path | None, variant: Variant) -> 
     return study, out if out is not None else variant.folder(name)
 
 
-def _planned(study: Study, folder: Path, workers: Workers, tries: bool) -> DryRun:
-    """Say what will run, and find mistakes before the first run."""
-    from dva_sim.experiments.episode import contradictions_in, rehearse_all, run_job
+def _checked(study: Study) -> list[Cell]:
+    """Find mistakes before the first run; where that takes a while, it is told."""
+    from dva_sim.experiments.episode import contradictions_in, rehearse_all
 
-    rehearse_all(study)
-    warn(contradictions_in(study))
+    count = size(study) * len(study.parts)
+    if count < _MANY:
+        cells = rehearse_all(study)
+    else:
+        say("Checking every configuration before the first run ...")
+        with _shown("checking", count, "configurations") as show:
+            cells = rehearse_all(study, show)
+    warn(contradictions_in(cells))
+    return cells
+
+
+def _planned(
+    study: Study,
+    folder: Path,
+    workers: Workers,
+    cells: Sequence[Cell],
+    probe: Episode | None = None,
+) -> DryRun:
+    """Say what will run."""
+    if (most := runs_of(study)) > _MANY_RUNS:
+        say(f"Making the list of up to {most:,} runs ...")
     jobs = workers.jobs if workers.scheduler is None else 1  # who knows how many are free there
-    found = dry_run(study, folder, jobs=jobs, probe=run_job if tries else None)
+    found = dry_run(study, folder, jobs=jobs, probe=probe, cells=cells)
     if found.remark:
         say(f"[yellow]{escape(found.remark)}[/yellow]")
     say(escape(_plan(found, folder)))
-    if tries:
-        say(escape(_time(found)))
     return found
 
 
@@ -190,9 +216,9 @@ def _stopped(how: KeyboardInterrupt) -> ExitCode:
 
 
 @contextmanager
-def _shown(what: str, total: int) -> Iterator[Callable[[int, int], None]]:
+def _shown(what: str, total: int, things: str = "runs") -> Iterator[Callable[[int, int], None]]:
     """A bar on a terminal; elsewhere a line now and then."""
-    pace = Pace(time.monotonic)
+    pace = Pace(time.monotonic, things)
     if not console.is_terminal:
         yield _Lines(console, pace).show
         return
@@ -224,10 +250,11 @@ class Pace:
 
     Args:
         clock: Seconds of a clock that only goes forward.
+        things: What is counted.
     """
 
-    def __init__(self, clock: Callable[[], float]) -> None:
-        self._clock = clock
+    def __init__(self, clock: Callable[[], float], things: str = "runs") -> None:
+        self._clock, self._things = clock, things
         self._first: tuple[int, float] | None = None
 
     def line(self, done: int, total: int) -> str:
@@ -236,11 +263,13 @@ class Pace:
         self._first = self._first or (done, now)
         made, took = done - self._first[0], now - self._first[1]
         if not made or not took:
-            return f"{done}/{total} runs"
+            return f"{done}/{total} {self._things}"
         rate = made / took
         left = "" if done == total else f", {duration((total - done) / rate)} left"
-        often = f"{rate:.1f} runs/s" if rate >= 1 else f"{rate * _MINUTE_S:.1f} runs/min"
-        return f"{done}/{total} runs, {often}{left}"
+        often = f"{rate:.1f} {self._things}/s"
+        if rate < 1:
+            often = f"{rate * _MINUTE_S:.1f} {self._things}/min"
+        return f"{done}/{total} {self._things}, {often}{left}"
 
 
 def duration(seconds: float) -> str:

@@ -7,16 +7,20 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain
 from typing import Any
 
+from dva_sim.experiments.answer_table import answer_table
 from dva_sim.experiments.asking import POINT
 from dva_sim.experiments.blocks import (
     Block,
-    Box,
+    First,
+    Folded,
     Heading,
     Items,
     Printed,
     Shown,
+    Terms,
     Verbatim,
     Words,
+    texts_of,
 )
 from dva_sim.experiments.cells import CellTable
 from dva_sim.experiments.conditions import conditions, timeout_remark
@@ -25,6 +29,7 @@ from dva_sim.experiments.endings_told import in_a_line
 from dva_sim.experiments.endings_told import sentences as sentences_of_endings
 from dva_sim.experiments.endings_told import table as endings_table
 from dva_sim.experiments.figures import Drawn
+from dva_sim.experiments.glossary import terms_in
 from dva_sim.experiments.labels import (
     capital,
     factor_name,
@@ -41,48 +46,63 @@ from dva_sim.experiments.predictions import Judged, judge_all
 from dva_sim.experiments.reading import factors_of, keys_of
 from dva_sim.experiments.registered import registration_table
 from dva_sim.experiments.robustness import sentences
+from dva_sim.experiments.size import size_of
 from dva_sim.experiments.status import Status, status_of
 from dva_sim.experiments.summary import Reading
 from dva_sim.experiments.tables_of_tests import comparison_table, hypothesis_table
 from dva_sim.experiments.tuning import tuned_table
 from dva_sim.experiments.variance import spread_table
 
+WORDS = "Words"
+_MOST_ROWS = 12  # of a table that is not folded away
 _KINDS = {
     "confirmatory": "Confirmatory: run as registered beforehand",
-    "declared": "Declared: run as its file says, but nothing was registered beforehand",
-    "exploratory": "Exploratory: not to be taken for a test of what it found",
+    "declared": "Declared: run as its file says, not registered beforehand",
+    "exploratory": "Exploratory: no test of what it found",
 }
 
 
 def blocks_of(reading: Reading, drawn: Sequence[Drawn]) -> list[Block]:
-    """The whole report below its title."""
-    return list(
+    """The whole report below its title.
+
+    Args:
+        reading: The results.
+        drawn: The figures; the first is the one that answers.
+    """
+    blocks = list(
         chain(
             _status(reading),
-            [Box((reading.answer.lead, *reading.answer.notes))],
+            [_first(reading, drawn)],
             _claims(reading),
             _comparisons(reading),
             _endings(reading),
-            _needed(reading),
-            _robustness(reading),
+            _found(reading),
             _what_varied(reading),
-            _figures(drawn),
+            _figures(reading, drawn[1:]),
             _tables(reading),
+            _needed(reading),
             _method(reading),
-            _manifest(reading),
         )
     )
+    return [*blocks, *_words(blocks), *_manifest(reading)]
 
 
 def _status(reading: Reading) -> Iterator[Block]:
-    status = status_of(reading.manifest)
     if reading.results.partial:
-        yield Words(reading.results.partial, "warning")
+        yield Words(reading.results.partial, "banner")
+    status = status_of(reading.manifest)
+    yield Words(size_of(reading), "note")
     yield Words(_KINDS[status.kind], "label")
-    for why in status.why:
-        yield Words(f"{why[:1].upper()}{why[1:]}.", "note")
+    if status.why:
+        yield Words(f"Why: {'; '.join(status.why)}.", "note")
     for warning in reading.warnings:
         yield Words(warning, "warning")
+
+
+def _first(reading: Reading, drawn: Sequence[Drawn]) -> First:
+    """The answer, the figure that answers it, and what it depends on."""
+    found = reading.answer
+    return First(found.lead, drawn[0] if drawn else None, tuple(found.depends.items()))
 
 
 def _claims(reading: Reading) -> Iterator[Block]:
@@ -131,23 +151,27 @@ def _endings(reading: Reading) -> Iterator[Block]:
         return
     if endings.is_right.all():
         if reading.finding is None or not reading.finding.missed:
-            yield Words(in_a_line(endings, len(reading.results.failures)))
+            yield Words(in_a_line(endings, view.part.name, len(reading.results.failures)))
         return
-    yield Heading("How it ended")
+    yield Heading(f"How it ended, in part {view.part.name}")
     for sentence in sentences_of_endings(endings, view, reading.finding):
         yield Words(sentence)
     found = endings_table(endings, view, reading.cluster)
-    if found.rows:
+    if len(found.rows) > _MOST_ROWS:
+        yield Folded(f"The shares of all {len(found.rows)} configurations", (Printed(found),))
+    elif found.rows:
         yield Printed(found)
 
 
-def _needed(reading: Reading) -> Iterator[Block]:
-    if reading.plans:
-        yield Heading(f"{capital(reading.cluster)}s that a study of this would need")
-        yield Printed(plan_table(reading.plans, reading.cluster), is_words=True)
-
-
-def _robustness(reading: Reading) -> Iterator[Block]:
+def _found(reading: Reading) -> Iterator[Block]:
+    """The answer level by level, what else was found, and what other models of persons say."""
+    table = answer_table(reading)
+    if table is not None or reading.answer.notes:
+        yield Heading("The answer in numbers")
+    if table is not None:
+        yield Printed(table)
+    for note in reading.answer.notes:
+        yield Words(note)
     if reading.robustness is not None:
         yield Heading("Under other models of the persons")
         for sentence in sentences(reading.robustness):
@@ -155,7 +179,7 @@ def _robustness(reading: Reading) -> Iterator[Block]:
 
 
 def _what_varied(reading: Reading) -> Iterator[Block]:
-    """Short, before the figures: their words must be known."""
+    """Before the figures, whose words must be known."""
     factors = [f for f in factors_of(reading.study) if f.name != POINT]
     design = reading.study.get("design") or {}
     told = [f"{factor_name(f.name)} ({_levels(f.name, f.levels)})" for f in factors]
@@ -164,8 +188,8 @@ def _what_varied(reading: Reading) -> Iterator[Block]:
         f"{with_unit(k)} from {number(r['low'])} to {number(r['high'])}" for k, r in ranges.items()
     ]
     if told:
-        yield Heading("What was compared")
-        yield Words(f"Varied, {_how(design, len(factors))}: {'; '.join(told)}.")
+        yield Heading("What was varied")
+        yield Words(f"{capital(_how(design, len(factors)))}: {'; '.join(told)}.")
     if treatments := _treatments(reading.study):
         yield Items(tuple(f"{level}: {changes}" for level, changes in treatments))
 
@@ -190,57 +214,74 @@ _SAMPLED = {
 }
 
 
-def _figures(drawn: Sequence[Drawn]) -> Iterator[Block]:
-    if drawn:
-        yield Heading("Figures")
-        yield from map(Shown, drawn)
+def _figures(reading: Reading, drawn: Sequence[Drawn]) -> Iterator[Block]:
+    """All others than the one that answers; what several share is said once."""
+    if not drawn or reading.view is None:
+        return
+    yield Heading("Figures")
+    reads = dict.fromkeys(chain.from_iterable(figure.reads for figure in drawn))
+    told = [f"Of part {reading.view.part.name}, unless the title names another one", *reads]
+    yield Words(f"{'; '.join(told)}.")
+    yield from map(Shown, drawn)
 
 
 def _tables(reading: Reading) -> Iterator[Block]:
-    yield Heading("Every cell")
+    yield Heading("Every configuration")
     if not reading.cells:
         yield Words("No run was completed.")
     for table in reading.cells:
-        yield Heading(f"Part {table.part}", 3)
         if table.empty:
-            yield Words(f"{table.empty} of {len(table.rows)} cells have no run.", "warning")
-        yield Printed(table)
-    if spread := spread_table(reading.view) if reading.view else None:
-        yield Heading("Between and within persons")
-        yield Words(
-            "Standard deviations of single runs, by the method of moments. What lies between "
-            "persons is not narrowed by more trials, only by more persons."
-        )
-        yield Printed(spread)
+            some = f"{table.empty} of {len(table.rows)} configurations have no run"
+            yield Words(f"Part {table.part}: {some}.", "warning")
+        title = f"Part {table.part}: {len(table.rows)} configurations"
+        yield Folded(title, (Printed(table),))
     if tuned := tuned_table(reading.manifest):
         yield Heading("Tuning")
         whose, what = " and ".join(tuned.heads[: tuned.labels]), tuned.heads[tuned.labels]
         yield Words(
             f"Each {whose} has a {what} that suits it best, so for each the same number of values "
-            "was tried. Both tuned and untuned cells are above."
+            "was tried. Both tuned and untuned configurations are above."
         )
         yield Printed(tuned)
 
 
+def _needed(reading: Reading) -> Iterator[Block]:
+    if reading.plans:
+        yield Heading(f"How many {reading.cluster}s it would take")
+        yield Printed(plan_table(reading.plans, reading.cluster), is_words=True)
+
+
 def _method(reading: Reading) -> Iterator[Block]:
     yield Heading("Method")
+    yield Items(tuple(remarks(reading)))
     scenarios, study = reading.scenarios, reading.study
     if reading.shifts:
         stated = dispatch_page.conditions(scenarios, keys_of(study))
     else:
         stated = conditions(scenarios, keys_of(study), _changed(study))
     if stated:
-        yield Words("The same for all that is compared, unless varied:")
         rows = [[name, *values] for name, values in stated]
-        yield Printed(CellTable("", ["condition", *scenarios], 1, rows))
-        if remark := timeout_remark(scenarios, study):
-            yield Words(remark)
-    yield Items(tuple(remarks(reading)))
+        settings = Printed(CellTable("", ["setting", *scenarios], 1, rows))
+        remark = timeout_remark(scenarios, study)
+        yield Folded("All settings", (settings, *([Words(remark)] if remark else [])))
+    if spread := spread_table(reading.view) if reading.view else None:
+        told = (
+            "Standard deviations of single runs, by the method of moments. What lies between "
+            "persons is not narrowed by more trials, only by more persons."
+        )
+        yield Folded("Between and within persons", (Words(told), Printed(spread)))
+
+
+def _words(blocks: Sequence[Block]) -> Iterator[Block]:
+    """What the words that were used mean."""
+    if terms := terms_in(texts_of(blocks)):
+        yield Heading(WORDS)
+        yield Terms(tuple((term.key, term.name, f"{term.means}.") for term in terms))
 
 
 def _manifest(reading: Reading) -> Iterator[Block]:
     text = json.dumps(reading.manifest, indent=2, sort_keys=True, ensure_ascii=False)
-    yield Verbatim("Manifest", text)
+    yield Folded("Manifest: all that was asked, and by which program", (Verbatim(text),))
 
 
 def _levels(name: str, levels: Sequence[Any]) -> str:

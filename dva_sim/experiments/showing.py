@@ -29,6 +29,8 @@ def show(results: Results, console: Console) -> None:
         console.print(escape(line), soft_wrap=True)
     console.print()
     console.print(escape(results.answer.lead), soft_wrap=True)
+    for about, words in results.answer.depends.items():
+        console.print(f"{about}: {escape(words)}", style="dim", soft_wrap=True)
     for note in results.answer.notes:
         console.print(escape(note), style="dim", soft_wrap=True)
     for warning in results.reading.warnings:

@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dva_sim import scenario as scenarios
-from dva_sim.config import parse_changes
+from dva_sim.changing import parse_changes
 from dva_sim.experiments.dictionary import describe
 from dva_sim.experiments.frames import Frame, frame_of, plain
-from dva_sim.experiments.models import AnyScenario, model_of, tables_of
+from dva_sim.experiments.models import AnyScenario, Tables, model_of, tables_of
+from dva_sim.experiments.opening import mistakes_of
 from dva_sim.experiments.settings import Settings, pairs_of
 from dva_sim.scenario import Scenario, contradictions
 
@@ -88,23 +89,35 @@ def episode(
     Raises:
         ConfigError: there is none, it is not valid with these changes, or it cannot be drawn so.
     """
+    wanted = _wanted(video, still, strip, at, panels, camera, inset)
+    sides = None if side_by_side is None else _joined(side_by_side)
+    kept, pairs = None if record is None else Path(record), pairs_of(set)
+    with mistakes_of(str(scenario), pairs, seed):
+        built, tables = _played(str(scenario), pairs, seed, wanted, sides, kept)
+    return Episode(built, seed, {name: frame_of(rows) for name, rows in tables.items()})
+
+
+def _played(
+    scenario: str,
+    pairs: list[str],
+    seed: int,
+    wanted: Wanted,
+    sides: str | None,
+    kept: Path | None,
+) -> tuple[AnyScenario, Tables]:
+    """The scenario as it was run, and its rows by table."""
     from dva_sim.experiments import console
     from dva_sim.experiments.metrics import track_rows
 
-    document, pairs = scenarios.load(str(scenario)), pairs_of(set)
+    document = scenarios.load(scenario)
     model = model_of(document)
     built = model.build(document, parse_changes(pairs))
-    wanted = _wanted(video, still, strip, at, panels, camera, inset)
     run = None
-    if wanted.any or side_by_side is not None or record is not None:
-        sides = None if side_by_side is None else _joined(side_by_side)
-        kept, where = None if record is None else Path(record), console.nowhere()
-        run = console.episode(str(scenario), seed, pairs, sides, wanted, kept, where)
+    if wanted.any or sides is not None or kept is not None:
+        run = console.episode(scenario, seed, pairs, sides, wanted, kept, console.nowhere())
     if run is None:
-        tables = model.tables(built, seed, with_tracks=True)
-    else:
-        built, tables = run.scenario, tables_of(run) | {"tracks": track_rows(run)}
-    return Episode(built, seed, {name: frame_of(rows) for name, rows in tables.items()})
+        return built, model.tables(built, seed, with_tracks=True)
+    return run.scenario, tables_of(run) | {"tracks": track_rows(run)}
 
 
 def replay(

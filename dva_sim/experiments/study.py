@@ -10,7 +10,8 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, PrivateAttr, field_validator
 
 from dva_sim import resources
-from dva_sim.config import Config, Document, Path_, load_yaml, parse_changes, validate
+from dva_sim.changing import blame, parse_changes, set_by
+from dva_sim.config import Config, Document, Path_, load_yaml, validate
 from dva_sim.errors import ConfigError
 from dva_sim.experiments import faults
 from dva_sim.experiments.asking import (
@@ -31,9 +32,12 @@ from dva_sim.experiments.asking import (
 )
 from dva_sim.experiments.designs import Design, Row, all_factors
 from dva_sim.experiments.designs_table import ROWS, read_table
+from dva_sim.experiments.models import SCENARIOS
 from dva_sim.experiments.overrides import Changed, change
 from dva_sim.experiments.status import Status
 from dva_sim.experiments.versions import SIZES, VERSIONS, Version
+from dva_sim.key_hints import AlsoCalled
+from dva_sim.scenario import load as load_scenario
 from dva_sim.streams import derive_seed
 
 FOLDER = "experiments"
@@ -66,9 +70,9 @@ class Study(Config):
 
     question: str
     predictions: tuple[Prediction, ...] = ()
-    seed: Seed = 1
-    persons: Count = 24
-    replications: Count = 5
+    seed: Annotated[Seed, AlsoCalled("random_seed")] = 1
+    persons: Annotated[Count, AlsoCalled("participants", "subjects", "n_persons")] = 24
+    replications: Annotated[Count, AlsoCalled("trials", "repetitions", "repeats", "runs")] = 5
     factors: dict[str, Levels] = Field(default_factory=dict)
     design: Design | None = None
     treatments: dict[str, dict[str, Changes]] = Field(default_factory=dict)
@@ -91,6 +95,7 @@ class Study(Config):
     _pilot: int | None = PrivateAttr(default=None)
     _version: Version | None = PrivateAttr(default=None)
     _status: Status = PrivateAttr(default_factory=Status)
+    _usual: dict[str, Any] = PrivateAttr(default_factory=dict)
 
     @field_validator("factors")
     @classmethod
@@ -179,17 +184,33 @@ class Study(Config):
         return [version for version in VERSIONS if getattr(self, version)]
 
     @property
+    def usual(self) -> dict[str, Any]:
+        """Its name and the size that its file gives it, whichever version of it this is."""
+        return self._usual
+
+    @property
     def status(self) -> Status:
         """What its results may be called."""
         return self._status
 
     def error(self, problem: str, path: Path_) -> ConfigError:
-        """A mistake at a key of the study's file, or in the file of its rows."""
+        """A mistake at what `--set` gives, at a key of the study's file, or in that of its rows."""
+        if pair := self.setting_of(path):
+            return ConfigError(f"--set {pair}: {problem}")
         if self._table is not None and path[:2] == ("design", ROWS):
             return self._table.error(problem, path[1:])
         return (
             self._document.error(problem, path) if self._document.places else ConfigError(problem)
         )
+
+    def setting_of(self, path: Path_) -> str | None:
+        """The last pair of `--set` that gives what stands at a key of the study."""
+        key = ".".join(map(str, path))
+        for pair in reversed(self.settings):
+            given = pair.partition("=")[0].strip()
+            if f"{key}.".removeprefix("factors.").startswith(f"{given.removeprefix('factors.')}."):
+                return pair
+        return None
 
     def is_from_file(self, path: Path_) -> bool:
         """Whether the study's file, rather than `--set`, says what stands at `path`."""
@@ -220,11 +241,17 @@ def load_study(
     """
     from dva_sim.experiments.registration import settled  # it knows cells, which studies make
 
-    document = load_yaml(resources.find(str(name), FOLDER))
-    study, data = _in_version(document, version)
+    document = load_yaml(resources.find(str(name), FOLDER, is_asked=True))
+    try:
+        study, data = _in_version(document, version)
+    except ConfigError as error:
+        from dva_sim.experiments.documents import of_other_kind  # it knows studies, too
+
+        raise of_other_kind(document, "dva-sim run", "study") or error from None
+    usual = study.usual
     if settings := tuple(settings):
         study = _with_settings(data, document, settings)
-    study._version = version
+    study._version, study._usual = version, usual
     if pilot is not None:
         study = _piloted(study, pilot)
     return settled(study)
@@ -234,6 +261,7 @@ def _in_version(document: Document, version: Version | None) -> tuple[Study, Cha
     """The study as its file says, or one of its versions; all of them are judged."""
     written = Changed(document.data, {}, ())
     study = _built(written, document)
+    study._usual = _size_of(study)
     made = {name: _version_of(study, written, document, name) for name in study.versions}
     if version is None:
         return study, written
@@ -247,13 +275,21 @@ def _version_of(
 ) -> tuple[Study, Changed]:
     """A version, and its keys; claims about what the small version leaves out are left out."""
     try:
-        data = change(written, getattr(study, version), Study)
+        data = change(written, getattr(study, version), Study, _scenarios_of(written, document))
         made = _built(data, document, may_lose=version == "quick")
         if made.answer is None and study.answer is not None:
             _built(data, document)  # which tells why it cannot be answered
+        made._usual = study.usual
         return made, data
     except ConfigError as error:
         raise _told_in(study, version, error) from None
+
+
+def _size_of(study: Study) -> dict[str, Any]:
+    """What a report needs to tell one version of a study from another."""
+    factors = {name: list(levels) for name, levels in study.factors.items()}
+    size = {"persons": study.persons, "replications": study.replications, "factors": factors}
+    return {"name": study.file.stem} | size
 
 
 def _told_in(study: Study, version: Version, error: ConfigError) -> ConfigError:
@@ -270,15 +306,27 @@ def _told_in(study: Study, version: Version, error: ConfigError) -> ConfigError:
 
 def _with_settings(data: Changed, document: Document, settings: tuple[str, ...]) -> Study:
     """The study changed by `--set`; claims about levels that are gone are gone, too."""
+    changes, scenarios = parse_changes(settings), _scenarios_of(data, document)
+
+    def make(some: Mapping[str, Any]) -> Study:
+        return _built(change(data, some, Study, scenarios), document, may_lose=True)
+
     try:
-        changed = change(data, parse_changes(settings), Study)
-        study = _built(changed, document, may_lose=True)
+        study = make(changes)
     except ConfigError as error:
-        is_elsewhere = error.file not in (None, str(document.file))
-        told = error.problem if error.problem.startswith("--set") else f"--set: {error.problem}"
-        raise error if is_elsewhere else ConfigError(told) from None
+        raise set_by(settings, blame(error, changes, make, document)) from None
     study._settings = settings
     return study
+
+
+def _scenarios_of(data: Changed, document: Document) -> list[type[Config]]:
+    """The kinds of scenarios that the parts have; all kinds where one cannot be read."""
+    try:
+        named = [part["scenario"] for part in data.data["parts"].values()]
+        files = [load_scenario(name, base=document.file.parent) for name in named]
+        return list({SCENARIOS[str(file.data.get("model", "full"))]: None for file in files})
+    except (ConfigError, LookupError, TypeError, AttributeError):
+        return list(SCENARIOS.values())
 
 
 def _piloted(study: Study, persons: int) -> Study:
@@ -288,6 +336,8 @@ def _piloted(study: Study, persons: int) -> Study:
     seed = derive_seed(study.seed, "pilot")
     pilot = study.model_copy(update={"persons": persons, "seed": seed, "stop": None})
     pilot._pilot = persons
+    for problem, _ in faults.of_size(pilot):
+        raise ConfigError(f"a pilot of {persons} persons: {problem}")
     return pilot
 
 
@@ -310,6 +360,8 @@ def _built(data: Changed, document: Document, may_lose: bool = False) -> Study:
     study = study.model_copy(update={"factors": factors})
     _tell_first(study, faults.of_factors(study))
     if may_lose:
+        # A claim that is made in the same breath is a mistake and no loss.
+        _tell_first(study, (f for f in faults.of_claims(study) if not data.holds(f[1])))
         study = faults.kept_claims(study)
     else:
         _tell_first(study, faults.of_claims(study))
@@ -324,7 +376,7 @@ def _table_of(study: Study) -> Document | None:
     try:
         path = resources.find(study.design.csv, FOLDER, suffix=".csv", base=study.folder)
     except ConfigError as error:
-        problem = error.problem.replace("experiment ", "file of rows ", 1)
+        problem = error.problem.replace("study ", "file of rows ", 1)
         raise study.error(problem, ("design", "csv")) from None
     return read_table(path)
 

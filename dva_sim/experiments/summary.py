@@ -14,6 +14,7 @@ from dva_sim.experiments.answer import Answer, Finding, answer
 from dva_sim.experiments.asking import POINT, REPEATS
 from dva_sim.experiments.cells import SUMMARIES, CellTable, cell_table
 from dva_sim.experiments.contrasts import Judgement, judged
+from dva_sim.experiments.depends import depends
 from dva_sim.experiments.dispatch import page as dispatch_page
 from dva_sim.experiments.dispatch.shifts import Shifts, is_dispatch
 from dva_sim.experiments.effects import Part, Table, View, as_floats
@@ -107,6 +108,13 @@ class Reading:
         found = finding_of(self.view) if self.view is not None else None
         return replace(found, failed=len(self.results.failures)) if found is not None else None
 
+    @property
+    def told(self) -> Finding | None:
+        """The finding in the words of the report: where loads are known, along them."""
+        if self.finding is None or self.shifts is None:
+            return self.finding
+        return dispatch_page.along_loads(self.finding, self.shifts)
+
     @cached_property
     def shifts(self) -> Shifts | None:
         """The runs as shifts, where a study compares policies of dispatch on them."""
@@ -175,23 +183,26 @@ class Reading:
 
     @cached_property
     def answer(self) -> Answer:
-        """What a reader should take home."""
+        """What a reader should take home, and what it depends on."""
         if self.view is None:
             return Answer("No run was completed, so there is nothing to answer with.")
         if self.shifts is not None:
-            return self._weighed(dispatch_page.answer_of(self.finding, self.shifts))
-        if self.finding is not None:
-            return self._weighed(answer(self.finding))
-        return Answer(
-            "The contrast that would answer the question was not declared or not run; "
-            "the figures and the table show what was."
-        )
+            found = dispatch_page.answer_of(self.finding, self.shifts)
+        elif self.finding is not None:
+            found = answer(self.finding)
+        else:
+            return Answer(
+                "The contrast that would answer the question was not declared or not run; "
+                "the figures and the table show what was."
+            )
+        weighed = [few_that_weigh(self.finding, self.view)] if self.finding is not None else []
+        notes = [*found.notes, *filter(None, weighed)]
+        return replace(found, depends=found.depends | depends(self), notes=notes)
 
-    def _weighed(self, found: Answer) -> Answer:
-        if self.finding is None or self.view is None:
-            return found
-        told = few_that_weigh(self.finding, self.view)
-        return replace(found, notes=[*found.notes, *([told] if told else [])])
+    def trials_of(self, part: str) -> int:
+        """How many each person made in a part; 0 where that is not known."""
+        own = (self.study.get("parts", {}).get(part) or {}).get("replications")
+        return int(own or self.study.get("replications") or 0)
 
     @cached_property
     def judgement(self) -> Judgement:
@@ -204,7 +215,7 @@ class Reading:
         if not self.runs:
             return []
         explores = status_of(self.manifest).kind == "exploratory"
-        return plans(self.study, self.runs, () if explores else self._decided)
+        return plans(self.study, self.runs, None if explores else self._decided)
 
     @property
     def _decided(self) -> set[str]:

@@ -38,11 +38,8 @@ def hypothesis_table(tested: Sequence[Tested]) -> CellTable:
         for t in tested
     ]
     note = (
-        "A claim holds where its own test (one-sided against the margin, bootstrap-t over persons; "
-        "two one-sided tests for sameness) stays below 5 % after Holm's adjustment for all tests "
-        "of its family, comparisons among them. It does not hold where the opposite, tested "
-        "likewise and adjusted among its like, does. All else is open: absence of evidence. Each "
-        "interval is of its row alone."
+        "A claim held if p by Holm is below 5 %, and did not hold if p of the opposite is; else it "
+        "is open, which is no evidence either way. Each interval is of its row alone."
     )
     return CellTable("", heads, len(heads), rows, note=note)
 
@@ -70,11 +67,10 @@ def comparison_table(found: Judgement) -> CellTable:
     families.update(t.contrast.family for t in found.tested)
     counted = "; ".join(f"{name}: {count}" for name, count in families.items())
     note = (
-        "Each interval is of its row alone; p is of the permutation test (the labels of a person's "
-        "runs could as well be swapped), two-sided, by Holm for all tests of its family together, "
-        f"hypotheses among them (tests in each family: {counted}). Standard deviations are those "
-        "of persons under the two levels, on average. Levels of factors that a comparison does not "
-        "name are averaged."
+        "Each interval is of its row alone; p is of the two-sided permutation test, by Holm for "
+        f"all tests of its family together (tests in each family: {counted}). Standard deviations "
+        "are those of persons under the two levels, on average. Levels of factors that a "
+        "comparison does not name are averaged."
         f"{_too_few(compared)}"
     )
     return CellTable("", heads, len(heads), rows, note=note)

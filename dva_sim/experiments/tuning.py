@@ -10,6 +10,7 @@ from typing import Any
 from dva_sim import __version__
 from dva_sim.config import validate
 from dva_sim.errors import ConfigError, RunsFailed
+from dva_sim.experiments import faults
 from dva_sim.experiments.asking import Level, Levels, Tuning
 from dva_sim.experiments.cells import CellTable
 from dva_sim.experiments.design import basis_of_tuning, refuse_unknown_measures
@@ -65,6 +66,8 @@ def tuning_study(study: Study) -> Study:
             "record": None,
         }
     )
+    for problem, _ in faults.of_size(trials):
+        raise study.error(f"tuning: {problem}", ("tuning",))
     trials._status, trials._table = Status(), None
     return trials
 

@@ -7,7 +7,7 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from dva_sim.config import parse_changes
+from dva_sim.changing import parse_changes, set_by
 from dva_sim.errors import ConfigError
 from dva_sim.scenario import Scenario, build, load
 
@@ -60,7 +60,7 @@ class Options:
             raise ConfigError(f"--for {self.duration:g} should be a number of seconds above 0")
         if self.dva is not None and not _is_address(self.dva):
             raise ConfigError(f"--dva {self.dva!r} should be HOST:PORT, as in 127.0.0.1:5600")
-        scenario = build(load(self.scenario), parse_changes(self.changes))
+        scenario = self._built()
         if scenario.operator.strategy == "oracle":
             raise ConfigError("operator.strategy 'oracle' knows the truth: only in virtual time")
         if scenario.transport != "zeromq":
@@ -71,6 +71,13 @@ class Options:
                 "sockets would keep one part of a message and not the message"
             )
         return scenario
+
+    def _built(self) -> Scenario:
+        document, changes = load(self.scenario), parse_changes(self.changes)
+        try:
+            return build(document, changes)
+        except ConfigError as error:
+            raise set_by(self.changes, error) from None
 
 
 def _is_address(text: str) -> bool:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import Any, get_type_hints
 
 from dva_sim.errors import ConfigError
+from dva_sim.guesses import unknown
 
 COMMAND_BYTES = 400
 REPLY_BYTES = 200
@@ -98,8 +99,7 @@ class Condition:
     def __post_init__(self) -> None:
         for name, known in _CHOICES.items():
             if getattr(self, name) not in known:
-                value = getattr(self, name)
-                raise ConfigError(f"{name} {value!r} is unknown; known: {', '.join(known)}")
+                raise ConfigError(unknown(name, getattr(self, name), known))
         given = [value is not None for value in (self.timeout_ms, self.attempts)]
         if given != [self.pattern == "req"] * 2:
             raise ConfigError("timeout_ms and attempts belong to pattern req, and only to it")

@@ -10,6 +10,7 @@ from pydantic import Field
 
 from dva_sim.clock import Clock
 from dva_sim.config import Config
+from dva_sim.key_hints import AlsoCalled
 from dva_sim.network.datagrams import DatagramConnection
 from dva_sim.network.link import Link
 from dva_sim.network.pipes import HIGH_WATER_MARK
@@ -38,7 +39,7 @@ class ZeromqConfig(Config):
             (`ZMQ_CONFLATE`).
     """
 
-    high_water_mark: Annotated[int, Field(ge=1, le=1_000_000)] = HIGH_WATER_MARK
+    high_water_mark: Annotated[int, Field(ge=1, le=1_000_000), AlsoCalled("hwm")] = HIGH_WATER_MARK
     send_buffer_bytes: _Buffer = None
     receive_buffer_bytes: _Buffer = None
     conflate: Literal["none", "publisher", "subscriber", "both"] = "none"

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from dva_sim import config, resources
+from dva_sim import changing, resources
 from dva_sim.config import Document, Fail, load_yaml
 from dva_sim.errors import ConfigError
 from dva_sim.scenario.names import check_names, check_phone, locate_files
@@ -24,7 +24,7 @@ def load(name: str, base: Path | None = None) -> Document:
     Raises:
         ConfigError: not found or not YAML.
     """
-    return load_yaml(resources.find(name, FOLDER, base=base))
+    return load_yaml(resources.find(name, FOLDER, base=base, is_asked=base is None))
 
 
 def build(
@@ -39,7 +39,7 @@ def build(
     Raises:
         ConfigError: an unknown key, a wrong type, a value out of range, a missing profile.
     """
-    return config.build(Scenario, source, changes or {}, _complete, locate_files)
+    return changing.build(Scenario, source, changes or {}, _complete, locate_files)
 
 
 def _complete(scenario: Scenario, error: Fail) -> Scenario:

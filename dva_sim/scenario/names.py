@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from dva_sim import resources
 from dva_sim.config import Fail, Path_
 from dva_sim.errors import ConfigError
+from dva_sim.guesses import unknown
 
 if TYPE_CHECKING:
     from dva_sim.agents.tilt import PhoneProfile
@@ -50,7 +51,7 @@ def check_names(scenario: Scenario, error: Fail) -> None:
         for name in (given,) if isinstance(given, str) else given:
             if not resources.is_there(name, folder) and not Path(name).is_file():
                 key, known = ".".join(str(p) for p in path), resources.available(folder)
-                raise error(f"{key} {name!r} is unknown; known: {', '.join(sorted(known))}", path)
+                raise error(unknown(key, name, sorted(known)), path)
     check_strategy(scenario.operator.strategy, scenario.operator.options, error)
     check_policy(scenario.dispatch.policy, scenario.dispatch.options, error)
 

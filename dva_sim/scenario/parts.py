@@ -10,6 +10,7 @@ from dva_sim.agents.sensors import SensorConfig
 from dva_sim.agents.service import Service
 from dva_sim.config import Config
 from dva_sim.errors import ConfigError
+from dva_sim.key_hints import AlsoCalled
 from dva_sim.worlds.hazards import make_hazard
 
 Positive = Annotated[float, Field(gt=0)]
@@ -51,7 +52,7 @@ class RobotConfig(Config):
     """
 
     profile: str | Annotated[tuple[str, ...], Field(min_length=1)] = "servrobot"
-    count: Annotated[int, Field(ge=0, le=1000)] = 1
+    count: Annotated[int, Field(ge=0, le=1000), AlsoCalled("robots", "n_robots")] = 1
     processing_s: Service | None = None
     sensors: Annotated[tuple[SensorConfig, ...], Field(max_length=16)] | None = None
     charge: Annotated[float, Field(gt=0, le=1)] = 1.0
@@ -78,7 +79,7 @@ class GuardConfig(Config):
     """
 
     profile: str = "guard"
-    count: Annotated[int, Field(ge=0, le=200)] = 0
+    count: Annotated[int, Field(ge=0, le=200), AlsoCalled("guards", "n_guards")] = 0
     mobilisation_s: Positive | None = None
     way_m: Positive | None = None
 
@@ -87,7 +88,7 @@ class BystanderConfig(Config):
     """People who are there for other reasons: how many, and from which profile they are drawn."""
 
     profile: str = "bystanders"
-    count: Annotated[int, Field(ge=0, le=1000)] = 0
+    count: Annotated[int, Field(ge=0, le=1000), AlsoCalled("bystanders", "people")] = 0
 
 
 class PhoneConfig(BaseModel):
@@ -100,6 +101,13 @@ class PhoneConfig(BaseModel):
     model_config = ConfigDict(extra="allow", frozen=True, allow_inf_nan=False)
 
     profile: str = "default"
+
+    @classmethod
+    def further_keys(cls) -> type[BaseModel]:
+        """The model of all other keys that it may have."""
+        from dva_sim.agents.tilt import PhoneProfile
+
+        return PhoneProfile
 
     @property
     def changes(self) -> dict[str, Any]:
@@ -123,7 +131,7 @@ class OperatorConfig(Config):
     strategy: str = "adaptive"
     options: dict[str, Any] = Field(default_factory=dict)
     traits: dict[str, Positive] = Field(default_factory=dict)
-    count: Annotated[int, Field(ge=0, le=50)] = 1
+    count: Annotated[int, Field(ge=0, le=50), AlsoCalled("operators", "n_operators")] = 1
     span: Annotated[int, Field(ge=1, le=20)] = 1
     population: str = "operators"
     person: Annotated[int, Field(ge=0)] = 0
@@ -140,7 +148,7 @@ class CommandConfig(Config):
         window: How many requests may be unanswered at once under `pipelined`.
     """
 
-    rate_hz: Annotated[float, Field(gt=0, le=100)] = 10.0
+    rate_hz: Annotated[float, Field(gt=0, le=100), AlsoCalled("rate", "command_hz")] = 10.0
     timeout_s: Annotated[float, Field(gt=0, le=120)] | None = None
     attempts: Annotated[int, Field(ge=1, le=10)] = 3
     window: Annotated[int, Field(ge=2, le=1000)] = 8
@@ -168,10 +176,10 @@ class CameraConfig(Config):
         encode_s: From taking a frame to publishing it; one frame at a time.
     """
 
-    rate_hz: Annotated[float, Field(gt=0, le=60)] = 10.0
+    rate_hz: Annotated[float, Field(gt=0, le=60), AlsoCalled("fps", "frame_rate_hz")] = 10.0
     frame_bytes: Annotated[int, Field(ge=100, le=1_000_000)] = 12_000
     encode_s: Annotated[float, Field(ge=0, le=5)] = 0.0
-    field_of_view_deg: Annotated[float, Field(gt=10, le=360)] = 70.0
+    field_of_view_deg: Annotated[float, Field(gt=10, le=360), AlsoCalled("fov")] = 70.0
     range_m: Positive = 6.0
 
 

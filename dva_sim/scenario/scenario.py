@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from dva_sim.config import Config
+from dva_sim.key_hints import AlsoCalled
 from dva_sim.network.connecting import Depth, TransportKind, ZeromqConfig
 from dva_sim.network.link import LinkConfig
 from dva_sim.scenario.parts import (
@@ -45,7 +46,10 @@ class Scenario(Config):
     bystander: BystanderConfig = BystanderConfig()
     operator: OperatorConfig = OperatorConfig()
     control: Literal["direct", "coordinated", "supervisory"] = "direct"
-    pattern: Literal["req-rep", "pipelined", "pub-sub", "latest-wins"] = "latest-wins"
+    pattern: Annotated[
+        Literal["req-rep", "pipelined", "pub-sub", "latest-wins"],
+        AlsoCalled("messaging", "messaging_pattern", "protocol"),
+    ] = "latest-wins"
     phone: PhoneConfig = PhoneConfig()
     command: CommandConfig = CommandConfig()
     request: RequestConfig = RequestConfig()
@@ -58,7 +62,9 @@ class Scenario(Config):
     dispatch: DispatchConfig = DispatchConfig()
     access: tuple[AccessConfig, ...] = ()
     patrols: tuple[PatrolConfig, ...] = ()
-    horizon_s: Annotated[float, Field(gt=0, le=86_400)] = 300.0
+    horizon_s: Annotated[
+        float, Field(gt=0, le=86_400), AlsoCalled("duration_s", "time_limit_s", "length_s")
+    ] = 300.0
 
     @property
     def window(self) -> int | None:

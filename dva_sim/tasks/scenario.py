@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import Field, model_validator
 
-from dva_sim import config
+from dva_sim import changing
 from dva_sim.agents.tilt.accelerometer import load_part
 from dva_sim.agents.tilt.filters import load_filter
 from dva_sim.config import Config, Document, Fail, Path_
@@ -193,7 +193,9 @@ def build(
     Raises:
         ConfigError: an unknown key or name, a wrong type, a value out of range.
     """
-    return config.build(TaskScenario, source, changes or {}, _complete, lambda data, folders: None)
+    return changing.build(
+        TaskScenario, source, changes or {}, _complete, lambda data, folders: None
+    )
 
 
 def _complete(scenario: TaskScenario, error: Fail) -> TaskScenario:

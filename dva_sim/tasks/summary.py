@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from dva_sim.tasks.measures import fit_line, throughput
+from dva_sim.tasks.scenario import TaskScenario
 
 Row = dict[str, Any]
 
@@ -29,6 +30,8 @@ MEANS = (
     "delay_felt_s",
 )
 """Columns of the trials whose mean is a column of the run, as far as the task has them."""
+_DRIVEN = ("tunnel", "corner", "slalom", "course")
+_AIMED = ("pointing", *_DRIVEN)
 FARTHEST = ("tilt_max_rad", "deflection_max")
 SHARES = {"completed": "completed_share", "error": "error_share"}
 MEASURES = (
@@ -37,6 +40,33 @@ MEASURES = (
     *("plugin_failures", "simulated_s"),
 )
 """Numbers that a row of `run_row` may hold, and so what a study may ask for."""
+
+_OF_KINDS = {
+    "error_share": _AIMED,
+    "overshoots": ("pointing", "reach"),
+    "wall_crossings": _DRIVEN,
+    "stops": ("reach",),
+    "path_error_rms_m": _DRIVEN,
+    "steering_slope_s": _DRIVEN,
+    **dict.fromkeys(("tracking_error_rms_m", "crossover_rad_s", "phase_margin_deg"), ("tracking",)),
+    **dict.fromkeys(
+        ("throughput_bps", "effective_throughput_bps", "id_slope_s_per_bit"), ("pointing",)
+    ),
+}
+_OF_DEVICES = {
+    "tilt_max_rad": ("tilt_position", "tilt_velocity"),
+    "deflection_max": ("joystick",),
+}
+
+
+def measures_of(scenario: TaskScenario) -> tuple[str, ...]:
+    """Those of `MEASURES` that a run of a scenario holds, by its task and device."""
+    task, device = scenario.task.kind, scenario.device.kind
+    return tuple(
+        name
+        for name in MEASURES
+        if task in _OF_KINDS.get(name, (task,)) and device in _OF_DEVICES.get(name, (device,))
+    )
 
 
 def run_row(trials: Sequence[Mapping[str, Any]]) -> Row:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from dva_sim.config import Fail, Path_
 from dva_sim.errors import ConfigError
+from dva_sim.guesses import unknown
 from dva_sim.scenario import check_policy
 
 if TYPE_CHECKING:
@@ -55,8 +56,7 @@ def zone_names(scenario: TimedScenario, error: Fail) -> list[str]:
 def _known(names: Any, known: list[str], what: str, path: Path_, error: Fail) -> None:
     for name in names:
         if name not in known:
-            there = ", ".join(known) or "none"
-            raise error(f"{what} {name!r} is unknown; known: {there}", (*path, name))
+            raise error(unknown(what, name, known), (*path, name))
 
 
 def _check_places(scenario: TimedScenario, zones: list[str], error: Fail) -> None:
@@ -72,7 +72,7 @@ def _check_places(scenario: TimedScenario, zones: list[str], error: Fail) -> Non
     for place, path, names in places:
         if isinstance(place, str) and not _names_place(place, scenario, [*zones, *names]):
             known = ["random", *(["post", "robot_base"] if scenario.site else []), *names, *zones]
-            raise error(f"place {place!r} is unknown; known: {', '.join(known)}", path)
+            raise error(unknown("place", place, known), path)
 
 
 def _names_place(place: str, scenario: TimedScenario, names: list[str]) -> bool:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dva_sim.errors import ConfigError
+from dva_sim.guesses import unknown
 from dva_sim.protocol import messages as m
 from dva_sim.timed.scenario import Point, TimedScenario
 from dva_sim.worlds.geo import GeoFrame
@@ -113,7 +114,7 @@ class Terrain:
         """
         if name in self.zones:
             return self.centre(self.zones.index(name))
-        raise ConfigError(f"place {name!r} is unknown; zones: {', '.join(self.zones)}")
+        raise ConfigError(unknown("place", name, self.zones, "zones"))
 
     def centre(self, zone: int) -> Place:
         """A place that stands for a zone."""

@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
-from dva_sim import config
+from dva_sim import changing
 from dva_sim.config import Config, Document
 from dva_sim.scenario import locate_files
 from dva_sim.timed.laws import ZERO, Constant, Law
@@ -324,7 +324,7 @@ def build(
     Raises:
         ConfigError: an unknown key or name, a wrong type, a value out of range.
     """
-    return config.build(TimedScenario, source, changes or {}, check_names, locate_files)
+    return changing.build(TimedScenario, source, changes or {}, check_names, locate_files)
 
 
 def limit_of(value: float | None) -> float:

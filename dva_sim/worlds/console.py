@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from dva_sim import resources
-from dva_sim.config import load_yaml, parse_changes
+from dva_sim.changing import parse_changes
+from dva_sim.config import load_yaml
 from dva_sim.errors import ConfigError
 from dva_sim.worlds.site import Site, load_site, map_site
 
@@ -46,7 +47,7 @@ def export(name: str, folder: Path, changes: Sequence[str]) -> None:
 
 
 def _open(name: str, options: Mapping[str, Any]) -> Site:
-    path = resources.find(name, "worlds")
+    path = resources.find(name, "worlds", is_asked=True)
     if "image" not in load_yaml(path).data:
         return load_site(name, options)
     if options:

@@ -15,6 +15,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_valida
 
 from dva_sim.config import load_yaml, validate
 from dva_sim.errors import ConfigError
+from dva_sim.guesses import unknown
 from dva_sim.worlds.geo import GeoFrame
 from dva_sim.worlds.parts import DOOR_HEIGHT, QUALITIES, LinkQuality
 
@@ -193,7 +194,7 @@ def _feature(feature: Any, frame: GeoFrame, fail: Fail) -> Feature:
     properties, geometry = feature["properties"], feature["geometry"]
     kind = properties.get("kind")
     if kind not in KINDS:
-        raise fail(f"unknown kind {kind!r}; known: {', '.join(KINDS)}")
+        raise fail(unknown("kind", kind, KINDS))
     if geometry["type"] not in KINDS[kind].shapes:
         allowed = " or ".join(KINDS[kind].shapes)
         raise fail(f"a {kind} is drawn as {allowed}, not {geometry['type']}")

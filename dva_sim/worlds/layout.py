@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import itertools
 from collections import Counter
 from dataclasses import dataclass, field
@@ -13,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dva_sim.errors import ConfigError
+from dva_sim.guesses import hint
 from dva_sim.worlds.compartments import NOWHERE, Partition, of_floor, of_rooms
 from dva_sim.worlds.geo import GeoFrame, Pose
 from dva_sim.worlds.maps import FREE, OccupancyGrid
@@ -155,10 +155,8 @@ class Site:
             if room.name == name:
                 return room
         known = [room.name for room in self.rooms]
-        near = difflib.get_close_matches(name, known, n=1)
-        hint = f"did you mean {near[0]!r}? " if near else ""
-        there = ", ".join(known) or "none (a bare map names no rooms)"
-        raise ConfigError(f"site {self.name!r} has no room {name!r}; {hint}rooms: {there}")
+        told = hint(name, known, "rooms") if known else "a bare map names no rooms"
+        raise ConfigError(f"site {self.name!r} has no room {name!r}; {told}")
 
     def is_free(self, x: float, y: float, clearance: float) -> bool:
         """Whether a disc of radius `clearance` [m] fits at a point [m], to within a cell."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import json
 from collections.abc import Mapping
 from functools import lru_cache
@@ -14,6 +13,7 @@ from pydantic import Field, model_validator
 from dva_sim import resources
 from dva_sim.config import Config, Document, load_yaml, validate
 from dva_sim.errors import ConfigError
+from dva_sim.guesses import hint
 from dva_sim.worlds.bare_map import DEFAULT_FRAME, map_site
 from dva_sim.worlds.geo import GeoFrame, Pose
 from dva_sim.worlds.layout import FOOTPRINT, STANDING, Site
@@ -107,10 +107,7 @@ def _with_options(name: str, block: OfficeBlock, options: Mapping[str, Any]) -> 
     known = [key for key in type(block).model_fields if key != "kind"]
     for key in options:
         if key not in known:
-            near = difflib.get_close_matches(key, known, n=1)
-            hint = f"did you mean {near[0]!r}? " if near else ""
-            there = ", ".join(known)
-            raise ConfigError(f"site {name!r} has no option {key!r}; {hint}known: {there}")
+            raise ConfigError(f"site {name!r} has no option {key!r}; {hint(key, known)}")
     data = block.model_dump() | dict(options)
     return validate(OfficeBlock, data, lambda text, _: ConfigError(f"site {name!r}: {text}"))
 

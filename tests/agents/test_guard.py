@@ -66,6 +66,20 @@ def test_who_finds_no_way_says_so_and_waits(dva: PretendedDva, guard: GuardAgent
     assert guard.activity == "waiting"
 
 
+def test_who_cannot_get_past_what_is_in_the_way_says_so_in_the_story_too(
+    dva: PretendedDva, guard: GuardAgent
+) -> None:
+    dva.order(1, FAR)
+    dva.run_for(15.0)
+    walk = guard.walking._walk
+    assert walk is not None
+    walk.blocked()
+    dva.run_for(1.0)
+    assert dva.progress(1) == ["departed", "failed"]
+    told = [moment.what for moment in dva.stage.recorder.timeline]
+    assert "cannot get past what is in the way, and gives up" in told
+
+
 def test_only_the_dva_gives_orders(dva: PretendedDva, guard: GuardAgent) -> None:
     codes = []
     stranger = dva.stage.device("operator", 1)

@@ -58,8 +58,8 @@ def test_a_drive_beside_its_profile_is_found_from_anywhere(tmp_path, monkeypatch
         ({"corners_m": [[0.2, 0.1], [0.2, -0.1], [-0.2, 0]]}, "corners_m should go counter-clockw"),
         ({"corners_m": [[0.2, 0], [0.02, 0.02], [0, 0.2], [-0.2, -0.2]]}, "without dents"),
         ({"corners_m": [[0.2, 0.1], [0.1, 0.1], [0.1, 0.05], [0.2, 0.05]]}, "around 0, 0"),
-        ({"mass_kg": 0}, "mass_kg: input should be greater than 0, not 0"),
-        ({"battery": {"efficiency": 2}}, "battery.efficiency: input should be less than or equal"),
+        ({"mass_kg": 0}, "mass_kg: should be above 0, not 0"),
+        ({"battery": {"efficiency": 2}}, "battery.efficiency: should be at most"),
         ({"reverse": True}, "unknown key 'reverse'"),
     ],
 )  # fmt: skip

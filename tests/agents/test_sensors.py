@@ -140,7 +140,7 @@ def test_faults_by_chance_come_after_their_mean_time_on_average() -> None:
 @pytest.mark.parametrize(
     ("config", "told"),
     [
-        ({"name": "radar"}, "sensor 'radar' is not known; known: lidar, temperature"),
+        ({"name": "radar"}, "sensor 'radar' is unknown; known: lidar, temperature"),
         ({"name": "smoke", "rate_hz": 50}, "less than or equal to 20"),
         ({"name": "smoke", "noise": -1}, "greater than or equal to 0"),
         ({"name": "smoke", "faults": [{"kind": "lost"}]}, "either at_s or mean_time_s"),

@@ -50,14 +50,14 @@ def test_a_number_is_always_the_same() -> None:
     [
         ({"law": "gamma", "mean_s": 1}, "the gamma law needs cv"),
         ({"law": "exponential", "mean_s": 1, "cv": 1}, "the exponential law has no cv of its own"),
-        ({"law": "normal", "mean_s": 1}, "robot.processing_s.law: input should be 'constant', "),
-        ({"law": "constant", "mean_s": -1}, "robot.processing_s.mean_s: .* greater than 0"),
+        ({"law": "normal", "mean_s": 1}, "robot.processing_s.law: should be constant, "),
+        ({"law": "constant", "mean_s": -1}, "robot.processing_s.mean_s: .* above 0"),
         (
             {"law": "constant", "mean_s": 1, "c": 1},
             "unknown key 'robot.processing_s.c'",
         ),
-        ("long", "robot.processing_s: input should be a valid number"),
-        (-1, "robot.processing_s: input should be greater than or equal to 0"),
+        ("long", "robot.processing_s: should be a number"),
+        (-1, "robot.processing_s: should be at least 0"),
     ],
 )
 def test_a_law_that_cannot_be_is_refused(wrong: object, told: str) -> None:

@@ -13,7 +13,7 @@ import typer
 
 import dva_sim
 from dva_sim import cli
-from dva_sim.config import parse_changes
+from dva_sim.changing import parse_changes
 from dva_sim.errors import ConfigError
 from dva_sim.experiments.settings import pairs_of
 

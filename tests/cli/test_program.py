@@ -88,7 +88,7 @@ def test_without_a_command_the_help_is_shown(capsys):
 @pytest.mark.parametrize(
     ("words", "line"),
     [
-        (["rn"], "dva-sim: 'rn' is no command; did you mean 'run'?; see dva-sim --help"),
+        (["exprt"], "dva-sim: 'exprt' is no command; did you mean 'export'?"),
         (["run"], "dva-sim run needs STUDY: a study by name or path; see dva-sim run --help"),
         (["run", "x", "--jbos", "2"], "dva-sim run has no option '--jbos'; did you mean '--jobs'?"),
         (["run", "x", "--xyz"], "dva-sim run has no option '--xyz'; see dva-sim run --help"),
@@ -109,7 +109,7 @@ def test_without_a_command_the_help_is_shown(capsys):
         ),
         (
             ["site", "shwo"],
-            "dva-sim site: 'shwo' is no command; did you mean 'show'?; see dva-sim site --help",
+            "dva-sim site: 'shwo' is no command; did you mean 'show'?",
         ),
     ],
     ids=lambda value: " ".join(value)[:40] if isinstance(value, list) else "",

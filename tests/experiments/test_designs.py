@@ -110,7 +110,7 @@ def test_a_row_may_name_treatments(tmp_path):
         ("link.delay_s,link.delay_s\n0,1\n", "rows.csv:1:14: factor 'link.delay_s' stands twice"),
         ("link.delay_s,\n0,1\n", "rows.csv:1:14: a factor without a name"),
         ("link.delay_s;link.loss\n0;1\n", "rows.csv:1:1: cells are separated by commas"),
-        ("link.delay_s\n0\n-1\n", "rows.csv:3:1: link.delay_s: input should be greater than or"),
+        ("link.delay_s\n0\n-1\n", "rows.csv:3:1: link.delay_s: should be at least"),
         ("link.loss,link.dely_s\n0,1\n", "rows.csv:2:3: unknown key 'link.dely_s'; did you mean"),
         ("link.delay_s\n0\n1\n0\n", "rows.csv:4:1: row 3 is row 1 again"),
         ('link.delay_s\n"0\n', "rows.csv:2:1: is not CSV: unexpected end of data"),
@@ -143,11 +143,11 @@ def test_a_file_of_rows_in_another_encoding_is_told_with_line_and_column(tmp_pat
         ("{zip: [pattern, pattern]}", "study.yaml:14:25: 'pattern' stands twice"),
         ("{rows: [{link.loss: 0}, {link.los: 1}]}", "study.yaml:14:33: row should name the same"),
         ("{rows: [{link.loss: 0}, {link.loss: 0}]}", "study.yaml:14:33: row 2 is row 1 again"),
-        ("{rows: [{link.loss: 7}]}", "study.yaml:14:18: link.loss: input should be less than"),
+        ("{rows: [{link.loss: 7}]}", "study.yaml:14:18: link.loss: should be at most"),
         ("{sobl: 8}", "study.yaml:14:10: unknown key 'design.sobl'; did you mean 'sobol'?"),
         ("{sobol: 12, ranges: {link.loss: [0, 0.1]}}", "should be a power of 2, such as 8 or 16"),
         ("{sobol: 8, ranges: {link.loss: [0.1, 0]}}", "study.yaml:14:29: design.ranges.link.loss"),
-        ("{sobol: 8, ranges: {link.loss: [0, 2]}}", "study.yaml:14:29: link.loss: input should"),
+        ("{sobol: 8, ranges: {link.loss: [0, 2]}}", "study.yaml:14:29: link.loss: should"),
         ("{sobol: 8, ranges: {link.los: [0, 1]}}", "study.yaml:14:29: unknown key 'link.los'"),
         ("{sobol: 8, ranges: {pattern: [0, 1]}}", "study.yaml:6:3: 'pattern' is varied by the"),
         (
@@ -252,7 +252,7 @@ def test_rows_with_too_many_levels_for_a_grid_are_points(tmp_path):
 
 def test_what_the_design_varies_cannot_be_set_beside_it(tmp_path):
     told = complaint(tmp_path, ONLY_PATTERN + ROWS, "link.loss=0.2")
-    assert told == "--set: 'link.loss' is varied by the design; change 'design'"
+    assert told == "--set link.loss=0.2: 'link.loss' is varied by the design; change 'design'"
 
 
 def test_the_size_of_a_design_can_be_set(tmp_path):
@@ -308,7 +308,7 @@ def test_of_many_points_only_the_ends_of_the_ranges_are_rehearsed(tmp_path):
 def test_an_end_of_a_range_that_no_point_meets_must_be_valid_too(tmp_path):
     """Two points with seed 3 lie below 0.9, as the scenario wants it; others might not."""
     text = ONLY_PATTERN + "design: {sobol: 2, ranges: {link.loss: [0, 0.95]}}\n"
-    assert "study.yaml:14:29: link.loss: input should be less than" in complaint(tmp_path, text)
+    assert "study.yaml:14:29: link.loss: should be at most" in complaint(tmp_path, text)
 
 
 @pytest.mark.parametrize(

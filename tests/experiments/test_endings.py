@@ -123,7 +123,7 @@ def test_the_contrast_is_told_with_intervals_and_in_points():
     found, view = three_of_four_lost()
     (told,) = sentences(found, view, finding_of(view))
     told = told.replace("\N{NO-BREAK SPACE}", " ")
-    assert told.startswith("Throughout, by 100 s after the report: short: confirmed 25 % (")
+    assert told.startswith("In part drive, by 100 s after the report: short: confirmed 25 % (")
     assert "link lost 75 % (" in told
     assert "In the share confirmed short lies 50.0 percentage points below long (" in told
 
@@ -139,7 +139,7 @@ def test_the_table_has_a_row_for_each_level():
 def test_where_all_were_confirmed_a_line_says_so():
     found, view = endings([confirmed(p, line) for p in range(3) for line in LEVELS])
     assert found.is_right.all()
-    assert in_a_line(found) == "Every event was confirmed, in every cell."
+    assert in_a_line(found, "drive") == "In part drive every event was confirmed."
     assert table(found, view, "person").rows == []
 
 

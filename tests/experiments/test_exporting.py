@@ -76,7 +76,7 @@ def test_one_file_in_the_way_leaves_all_unwritten(results, tmp_path):
     ("name", "tables", "form", "problem"),
     [
         ("all", ["flights"], None, "no table 'flights'; tables: runs, tracks"),
-        ("all", [], "xls", "format 'xls' is unknown; known: csv, parquet"),
+        ("all", [], "xls", "--format 'xls' should be csv or parquet"),
         ("one.csv", ["runs", "tracks"], None, "give a folder for several"),
         ("one.csv", [], "parquet", "is one csv file"),
     ],

@@ -5,11 +5,13 @@ import pytest
 import synthetic_study
 from matplotlib.figure import Figure
 
+from dva_sim.experiments.answer import Finding
 from dva_sim.experiments.cadence import Cadence
 from dva_sim.experiments.effects import Factor, Part, View
 from dva_sim.experiments.figures.budget import delay_budget
 from dva_sim.experiments.figures.commands import command_rate
-from dva_sim.experiments.figures.effect import _band, _fit_to, differences
+from dva_sim.experiments.figures.contrast import contrast
+from dva_sim.experiments.figures.effect import _band, differences
 from dva_sim.experiments.figures.factorial import effects
 from dva_sim.experiments.figures.ground import Ways
 from dva_sim.experiments.figures.heat import heat_map
@@ -18,6 +20,7 @@ from dva_sim.experiments.figures.palette import ONE
 from dva_sim.experiments.figures.scatter import trend
 from dva_sim.experiments.figures.story import Events, fates, outcomes, responses
 from dva_sim.experiments.figures.style import (
+    fit_to,
     is_to_scale,
     log_axis,
     panel_grid,
@@ -151,7 +154,7 @@ def test_bands_end_where_nothing_is_possible_and_do_not_flatten_the_lines():
     _band(ax, band(few), ONE, 0.0, (0.0, 240.0))
     heights = ax.collections[0].get_paths()[0].vertices[:, 1]
     assert (heights.min(), heights.max()) == (0.0, 240.0)
-    assert "they are cut" in _fit_to(ax, few.ravel())
+    assert "are cut" in fit_to(ax, few.ravel())
     assert ax.get_ylim() == pytest.approx((32.5, 97.5))
 
 
@@ -160,7 +163,7 @@ def test_narrow_bands_are_shown_whole():
     many = np.linspace([40.0, 45.0], [60.0, 65.0], 24)
     _band(ax, band(many), ONE, 0.0, (0.0, 240.0))
     before = ax.get_ylim()
-    assert _fit_to(ax, many.ravel()) == ""
+    assert fit_to(ax, many.ravel()) == ""
     assert ax.get_ylim() == before
 
 
@@ -328,3 +331,58 @@ def test_the_trend_of_points_is_made_of_means_with_the_scatter_of_their_points()
 
 def test_eleven_points_are_too_few_for_a_trend():
     assert trend(np.arange(11.0), np.arange(11.0))[0].size == 0
+
+
+# --- the figure that answers -------------------------------------------------------------------
+
+
+def answered(over="link.delay_s", levels=(0.0, 0.5, 1.0), means=(0.0, 5.0, 9.0), **changes):
+    """A finding of 8 persons, with a band of 2 s on either side."""
+    mean = np.array(means)
+    found = Finding(
+        measure="drive_time_s",
+        in_excess=False,
+        factor="pattern",
+        first="req-rep",
+        second="latest-wins",
+        over=over,
+        levels=levels,
+        within={},
+        mean=mean,
+        low=mean - 2.0,
+        high=mean + 2.0,
+        persons=8,
+    )
+    return replace(found, **changes)
+
+
+def drawn_answer(found):
+    with styled():
+        return contrast(found, np.tile(found.mean, (found.persons, 1)))
+
+
+def test_the_figure_that_answers_shows_the_band_and_fills_what_differs_from_zero():
+    drawn = drawn_answer(answered())
+    ax = drawn.figure.axes[0]
+    marks = [line for line in ax.lines if line.get_marker() == "o"]
+    filled, hollow = (m.get_xdata().tolist() for m in marks)
+    assert (filled, hollow) == ([1, 2], [0])
+    assert [text.get_text() for text in ax.texts] == ["0", "+5.0", "+9.0"]
+    assert drawn.csv.decode().splitlines()[2] == "0.5,5,3,7"
+    assert drawn.caption.startswith("Above zero REQ/REP takes longer. Mark: mean of 8 persons")
+
+
+def test_a_contrast_that_runs_over_nothing_has_one_mark():
+    drawn = drawn_answer(answered("", (None,), (3.0,)))
+    assert [text.get_text() for text in drawn.figure.axes[0].texts] == ["+3.0"]
+    assert "band" not in drawn.caption
+
+
+def test_without_an_interval_no_figure_answers():
+    nothing = np.full(3, np.nan)
+    assert drawn_answer(answered(low=nothing, high=nothing)) is None
+
+
+def test_what_is_too_small_to_matter_is_grey_if_it_can_be_seen():
+    assert "Grey" in drawn_answer(answered(smallest_effect=2.0)).caption
+    assert "Grey" not in drawn_answer(answered(smallest_effect=0.01)).caption

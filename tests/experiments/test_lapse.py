@@ -47,7 +47,7 @@ def drawn(tmp_path_factory):
 def test_the_typical_run_is_the_median_and_the_worst_the_largest(drawn):
     assert drawn["typical"].title.startswith("Typical run: confirmation time 70.0")
     assert drawn["worst"].title.startswith("Worst run: confirmation time 95.0")
-    assert "person 2, trial 0; 67\N{NO-BREAK SPACE}% of all 3 runs" in drawn["worst"].caption
+    assert "person 2, trial 0); 67\N{NO-BREAK SPACE}% of all 3 runs" in drawn["worst"].caption
 
 
 def test_the_strip_ends_where_the_recorded_agents_were_last(drawn):

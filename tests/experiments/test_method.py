@@ -76,6 +76,6 @@ def test_without_claims_no_test_is_told(tmp_path):
 
 
 def test_with_fewer_than_six_persons_nothing_is_drawn_anew(tmp_path):
-    assert "With as few persons as here Student's stands alone" in " ".join(
+    assert "With as few persons as here it is Student's alone" in " ".join(
         remarks(reading(tmp_path))
     )

@@ -137,10 +137,28 @@ def test_the_answer_needs_persons_only_where_its_question_is_open():
     assert "0.50\N{NO-BREAK SPACE}s, the smallest that matters" in found[1].assumed
 
 
-def test_nothing_less_than_what_matters_is_counted_on():
+def test_an_effect_that_seems_not_to_matter_is_to_be_shown_small():
+    """Its band holds zero and what matters; more persons than it has must be needed."""
     declared = study()
     declared["answer"] = CONTRAST | {"smallest_effect_s": 1.5}
-    assert ["as found" in plan.assumed for plan in plans(declared, runs(mean_s=1.0))] == [False]
+    (plan,) = plans(declared, runs(mean_s=0.6), decided=())
+    assert plan.what.endswith("below 1.5\N{NO-BREAK SPACE}s, the smallest that matters")
+    assert "0.60\N{NO-BREAK SPACE}s, as found" in plan.assumed
+    assert plan.counts[0].persons > 8
+
+
+@pytest.mark.parametrize("mean_s", [-1.6, -0.9, 0.0, 0.3, 0.8, 1.2, 1.6])
+def test_where_the_question_is_open_more_persons_are_needed_than_there_are(mean_s):
+    declared = study()
+    declared["answer"] = CONTRAST | {"smallest_effect_s": 1.0}
+    found = plans(declared, runs(mean_s=mean_s), decided=())
+    assert found
+    assert min(persons_of(found)) > 8
+
+
+def test_an_answer_that_is_not_open_counts_in_a_pilot_only():
+    assert plans(study(), runs(mean_s=3.0), decided=()) == []
+    assert [plan.name for plan in plans(study(), runs(mean_s=3.0))] == ["answer"]
 
 
 def test_an_answer_and_a_claim_about_the_same_contrast_need_about_as_many():
@@ -160,13 +178,13 @@ def test_with_the_persons_that_it_has_a_study_would_reach_as_far_as_it_shows():
     for mean_s in (0.1, 1.0, 1.5):
         view = view_of(study(), runs(persons=12, mean_s=mean_s))
         finding = finding_of(view)
-        (test,) = _of_answer(view, is_alone=True)
+        (test,) = _of_answer(view, in_any_case=True)
         assert test.law.reach(12) == pytest.approx(finding.mean[0] - finding.low[0])
 
 
 def test_what_is_decided_needs_no_more_persons():
     claims = {name: {"direction": "above", "margin": 2.0} for name in ("one", "two")}
-    found = plans(study(hypotheses=claims), runs(), but={"one"})
+    found = plans(study(hypotheses=claims), runs(), decided={"one"})
     assert [plan.name for plan in found] == ["two"]
     assert found[0].counts[0].persons == persons_of(plans(study(hypotheses=claims), runs()))[1]
 

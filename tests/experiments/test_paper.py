@@ -3,7 +3,17 @@ import re
 import pytest
 from matplotlib.figure import Figure
 
-from dva_sim.experiments.blocks import Box, Heading, Items, Printed, Shown, Verbatim, Words
+from dva_sim.experiments.blocks import (
+    First,
+    Folded,
+    Heading,
+    Items,
+    Printed,
+    Shown,
+    Terms,
+    Verbatim,
+    Words,
+)
 from dva_sim.experiments.cells import CellTable
 from dva_sim.experiments.figures.numbers import Numbers
 from dva_sim.experiments.figures.style import finish
@@ -23,12 +33,13 @@ def blocks():
     rows = [[f"cell\n{n}", "1.0 (0.5 to 1.5)"] for n in range(80)]
     return [
         Words("Declared", "label"),
-        Box(("It costs 4.5 s.", "With an interval.")),
+        First("It costs 4.5 s.", drawn(), (("Persons", "24 simulated."),)),
         Heading("Figures"),
         Shown(drawn()),
         Items(("one", "two")),
         Printed(CellTable("drive", ["cell", "mean"], 1, rows, note="All of them.")),
-        Verbatim("Manifest", '{\n  "seed": 1\n}'),
+        Folded("Manifest", (Verbatim('{\n  "seed": 1\n}'),)),
+        Terms((("word-band", "band", "All levels at once."),)),
     ]
 
 

@@ -365,7 +365,7 @@ def test_the_picture_a_camera_takes_changes_as_the_robot_moves(drive):
     moments, started = Moments(drive), drive.recorder.drives[0].started
     first, later = moments.eye("robot-1", started), moments.eye("robot-1", started + 8)
     assert np.abs(first.astype(int) - later).mean() > 5
-    with pytest.raises(ConfigError, match="'robot-9' is not known; known: robot-1"):
+    with pytest.raises(ConfigError, match="'robot-9' is unknown; known: robot-1"):
         moments.eye("robot-9", 1.0)
 
 
@@ -447,7 +447,7 @@ def test_what_cannot_be_drawn_is_said_before_the_run(options, said):
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ({"camera": "robot-9"}, "robot 'robot-9' is not known; known: robot-1, robot-2"),
+        ({"camera": "robot-9"}, "robot 'robot-9' is unknown; known: robot-1, robot-2"),
         ({"at": "121"}, "--at 121 is not within the run, which lasts at most 120 s"),
         ({"at": "-1"}, "--at -1 is not within the run"),
         ({"at": "nan"}, "--at nan is not within the run"),

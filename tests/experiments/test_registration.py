@@ -269,7 +269,7 @@ def test_points_of_a_registered_design_follow_from_the_registration(tmp_path, de
 def test_a_range_with_an_end_that_is_not_valid_cannot_be_registered(tmp_path):
     design_ = "design: {sobol: 2, ranges: {link.loss: [0, 0.95]}}\n"
     path = write_study(tmp_path, CLAIMED + design_)
-    with pytest.raises(ConfigError, match=r"link\.loss: input should be less than"):
+    with pytest.raises(ConfigError, match=r"link\.loss: should be at most"):
         register(load_study(path))
     assert not beside(path).exists()
 

@@ -100,7 +100,7 @@ def test_a_setting_that_takes_the_contrast_away_leaves_no_repeats(tmp_path):
         ("sets: 3", "at: [0.5]", "0.5 is not a level of 'link.delay_s'; levels: 0, 0.25"),
         ("bands: bands", "bands: no-bands", "'no-bands.yaml' not found"),
         ("sets: 3", "set: 3", "unknown key 'robustness.set'; did you mean 'sets'?"),
-        ("persons: 2\n", "persons: 1\n", "robustness.persons: input should be greater"),
+        ("persons: 2\n", "persons: 1\n", "robustness.persons: should be at least"),
     ],
 )
 def test_repeats_that_cannot_be_meant_are_refused(tmp_path, old, new, told):

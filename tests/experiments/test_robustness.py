@@ -74,7 +74,7 @@ def test_repeats_at_delays_at_which_nobody_was_watched_are_told_and_drawn_hollow
     told = sentences(found)[-1].replace("\N{NO-BREAK SPACE}", " ")
     assert "In 1 of 3 (33 %) the delay of the loop is one at which nobody was watched" in told
     with styled():
-        assert "Hollow: an extrapolation" in repeats(view, found).caption
+        assert "Hollow: extrapolated" in repeats(view, found).caption
         assert "Hollow" not in repeats(*read(EFFECTS)).caption
 
 

@@ -164,7 +164,7 @@ def test_failed_runs_are_left_out(tmp_path):
         ),
         (
             "{half_width: 1, part: drove, measure: contacts, batch_persons: 2, most_persons: 9}",
-            "22:23: stop.part 'drove' is not a part; parts: drive, story",
+            "22:23: stop.part 'drove' is not a part; did you mean 'drive'?",
         ),
         (
             "{half_width: 1, part: drive, measure: time_s, batch_persons: 2, most_persons: 9}",

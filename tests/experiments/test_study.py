@@ -49,7 +49,7 @@ def test_a_wrong_reference_is_told_where_the_study_makes_it(tmp_path):
     [
         ("part: drive", "part: drove", "study:16:3"),
         ("factor: pattern", "factor: patern", "study:18:3"),
-        ("contrast: [req-rep", "contrast: [req-req", "study:18:3"),
+        ("contrast: [req-rep", "contrast: [req-req", "study:19:3"),
         ("contrast: [req-rep", "contrast: [latest-wins", "study:19:3"),
         ("over: link.delay_s", "over: link.loss", "study:20:3"),
         ("smallest", "within: {profile: default}\n  smallest", "study:21:12"),
@@ -65,15 +65,15 @@ def test_a_study_that_makes_no_sense_is_refused(tmp_path, old, new, place):
 @pytest.mark.parametrize(
     ("old", "new", "told"),
     [
-        ("persons: 3", "persons: true", "study:3:1: persons: input should be a valid integer, not"),
-        ("persons: 3", 'persons: "3"', "study:3:1: persons: input should be a valid integer, not"),
+        ("persons: 3", "persons: true", "study:3:1: persons: should be a whole number, not"),
+        ("persons: 3", 'persons: "3"', "study:3:1: persons: should be a whole number, not"),
         (
             "persons: 3",
             "persons: 3.0",
             "study:3:1: persons: should be a whole number, without a point",
         ),
-        ("fect_s: 2.0", 'fect_s: "2"', "study:21:3: answer.smallest_effect_s: input should be a"),
-        ("0.25]", ".nan]", "study:7:21: factors.link.delay_s.1: input should be a finite number"),
+        ("fect_s: 2.0", 'fect_s: "2"', "study:21:3: answer.smallest_effect_s: should be a"),
+        ("0.25]", ".nan]", "study:7:21: factors.link.delay_s.1: should be a finite number"),
         ("0.25]", "[1]]", "study:7:21: factors.link.delay_s.1: should be a number, text, or true"),
         ("[0, 0.25]", "[]", "study:7:3: factors.link.delay_s: should have at least 1 item"),
         ("[0, 0.25]", "0.25", "study:7:3: factors.link.delay_s: should be a list, not 0.25"),
@@ -121,7 +121,7 @@ def test_a_setting_may_go_into_a_mapping_that_the_file_leaves_out(
 def test_a_setting_may_begin_a_key_that_the_file_leaves_out(tmp_path):
     study = study_in(tmp_path, "answer.within.link.delay_s=0.25", "answer.over=null")
     assert study.answer.within == {"link.delay_s": 0.25}
-    told = "--set: missing key 'stop.batch_persons'"
+    told = "--set stop.half_width=1: missing key 'stop.batch_persons'"
     with pytest.raises(ConfigError, match=told):
         study_in(tmp_path, "stop.half_width=1", "stop.comparison=answer")
 
@@ -135,16 +135,19 @@ def test_a_setting_that_takes_the_contrast_away_leaves_no_declared_answer(tmp_pa
     ("setting", "told"),
     [
         ("persons", "--set 'persons' should be key=value"),
-        ("persons=none", "--set: persons: input should be a valid integer"),
-        ("parts.drve.replications=2", "--set: no 'drve' in the study"),
+        ("persons=none", "--set persons=none: should be a whole number"),
+        ("parts.drve.replications=2", "--set parts.drve.replications=2: no 'drve' in the study"),
         ("operator.person=3", "'operator.person' is set by the study"),
-        ("parts.drive.scenario=two.yaml", "--set: scenario 'two.yaml' not found"),
-        ("persons.a=3", "--set: 'persons' holds no keys, so no 'a'"),
+        (
+            "parts.drive.scenario=two.yaml",
+            "scenario=two.yaml: scenario 'two.yaml' not found",
+        ),
+        ("persons.a=3", "--set persons.a=3: 'persons' holds no keys, so no 'a'"),
         (
             "robot.procesing_s=1",
-            "--set: unknown key 'robot.procesing_s'; did you mean 'pro",
+            "--set robot.procesing_s=1: unknown key 'robot.procesing_s'; did you mean 'pro",
         ),
-        ("link.delay_s=-1", "--set: link.delay_s: input should be greater than or equal to 0"),
+        ("link.delay_s=-1", "--set link.delay_s=-1: should be at least 0"),
     ],
 )
 def test_a_setting_that_makes_no_sense_is_refused_in_one_line(tmp_path, setting, told):
@@ -323,8 +326,8 @@ def test_a_larger_version_can_be_changed_by_settings_too(tmp_path):
 @pytest.mark.parametrize(
     ("full", "told"),
     [
-        ("{persons: none}", "study:22:8: in the larger version: persons: input should be a valid"),
-        ("{person: 6}", "study:22:8: unknown key 'person'"),
+        ("{persons: none}", "study:22:8: in the larger version: persons: should be a whole number"),
+        ("{person: 6}", "study:22:8: in the larger version: unknown key 'person'"),
         ("{parts.drve.replications: 2}", "study:22:8: in the larger version: no 'drve' in the"),
         ("{pattern: [pub-sub]}", "study:22:8: in the larger version: 'req-rep' is not a level"),
     ],

@@ -73,7 +73,7 @@ def test_the_table_marks_the_cells_and_explains_the_mark():
         *("1.1\N{NO-BREAK SPACE}†", "1.1"),
         *("10.1\N{NO-BREAK SPACE}†", "10.1\N{NO-BREAK SPACE}†"),
     ]
-    assert table.note.startswith("† Extrapolated: beyond these delays")
+    assert "† Extrapolated: beyond these delays" in table.note
     assert "pursuit: 0 to 0.225 s, pointing" in table.note
 
 

@@ -68,7 +68,7 @@ def test_the_page_of_a_study_under_way_is_marked_partial_and_the_final_one_is_no
     stopped, tmp_path
 ):
     out = stopped(after=kit.RUNS - 5)
-    told = f"Partial: {kit.RUNS - 5} of {kit.RUNS} runs are done"
+    told = f'<p class="banner" role="status">Partial: {kit.RUNS - 5} of {kit.RUNS} runs are done'
     assert told in write_report(out).read_text(encoding="utf-8")
     assert status_of(load_so_far(out).manifest).kind == "exploratory"
     run_study(kit.study_in(tmp_path), out, jobs=1, episode=measured)

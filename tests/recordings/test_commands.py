@@ -66,7 +66,7 @@ def test_a_file_cut_short_is_told_and_so_is_what_is_missing(folder, tmp_path, ca
         (["replay", "{drive}", "--still", "a.png", "--at", "31"], "--at 31 is not within the run"),
         (
             ["replay", "{drive}", "--camera", "robot-9", "--still", "a.png"],
-            "'robot-9' is not known",
+            "'robot-9' is unknown",
         ),
         (["replay", "{drive}", "--ros2", "."], "is there already; give a new folder"),
         (["episode", "fire-drill", "--record", "run.bag"], "recording should end in .mcap"),

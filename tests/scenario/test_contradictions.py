@@ -7,7 +7,7 @@ from rich.console import Console
 
 from dva_sim import scenario as scenarios
 from dva_sim.checking.console import check
-from dva_sim.experiments import console
+from dva_sim.experiments import console, design
 from dva_sim.experiments.episode import contradictions_in
 from dva_sim.experiments.pictures import Wanted
 from dva_sim.experiments.study import load_study
@@ -118,7 +118,7 @@ def test_in_a_live_run_the_modelled_link_plays_no_part_and_that_is_said() -> Non
 
 def test_a_study_tells_each_kind_once_with_the_number_of_configurations() -> None:
     study = load_study("req-rep-vs-pub-sub", ["link.delay_s=[0, 3, 4]"], version="quick")
-    told = contradictions_in(study)
+    told = contradictions_in(design.cells(study))
     assert [one.split()[0] for one in told].count("robot.max_age_s") == 1
     assert any("in 4 of 11 configurations" in one for one in told)
 

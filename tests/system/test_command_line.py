@@ -123,7 +123,7 @@ def test_the_program_itself_ends_a_mistake_with_one_line_and_exit_code_2(tmp_pat
     [
         (["run", "req-rep-vs-pubsub"], "did you mean 'req-rep-vs-pub-sub'?"),
         (["run", "bad.yaml"], "bad.yaml:5:5: unknown key 'parts.drive.refrence'"),
-        (["run", "req-rep-vs-pub-sub", "--set", "link.delay_s=-1"], "greater than or equal to 0"),
+        (["run", "req-rep-vs-pub-sub", "--set", "link.delay_s=-1"], "at least 0"),
         (["run", "req-rep-vs-pub-sub", "--set", "link.delay_ms=1"], "did you mean 'delay_s'?"),
         (["run", "req-rep-vs-pub-sub", "--set", "link.trace_up=no.up"], "no.up: trace cannot be"),
         (["run", "req-rep-vs-pub-sub", "--set", "link.trace_up=bad.up"], "bad.up:2:1: should be"),

@@ -82,7 +82,7 @@ def test_a_mistake_in_a_file_has_its_line_and_column(tmp_path: Path) -> None:
     with pytest.raises(ConfigError) as problem:
         build(load_yaml(file))
     assert (problem.value.line, problem.value.column) == (4, 33)
-    assert "greater than 0" in str(problem.value)
+    assert "above 0" in str(problem.value)
 
 
 def test_a_wrong_policy_in_a_file_has_its_line(tmp_path: Path) -> None:

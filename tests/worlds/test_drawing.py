@@ -99,19 +99,17 @@ def test_wifi_is_a_word_numbers_or_both_and_the_later_covers_the_earlier(tmp_pat
 
 def mistakes():
     return {
-        "use: input should be 'restricted', 'charging' or 'assembly'": feature(
+        "use: should be restricted, charging or assembly": feature(
             "zone", "Polygon", square(1, 1, 1), use="secret"
         ),
         "should have a quality (good, fair, poor, none) or numbers": feature(
             "wifi", "Polygon", square(1, 1, 1)
         ),
-        "loss: input should be less than or equal to 1": feature(
-            "wifi", "Polygon", square(1, 1, 1), loss=3
-        ),
-        "ceiling_m: input should be greater than or equal to 1.5": feature(
+        "loss: should be at most 1": feature("wifi", "Polygon", square(1, 1, 1), loss=3),
+        "ceiling_m: should be at least 1.5": feature(
             "room", "Polygon", square(0, 4, 2), name="low", ceiling_m=0.4
         ),
-        "field_of_view_deg: input should be less than or equal to 360": feature(
+        "field_of_view_deg: should be at most 360": feature(
             "camera", "Point", [(1, 1)], field_of_view_deg=400
         ),
         "an exit is at least 0.5 m wide": feature("exit", "LineString", [(8, 1), (8, 1.2)]),

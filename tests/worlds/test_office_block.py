@@ -172,9 +172,9 @@ def test_a_block_of_two_hundred_by_eighty_metres_is_planned_from_end_to_end():
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"wdith_m": 80}, "no option 'wdith_m'; did you mean 'width_m'? known: seed, width_m"),
-        ({"width_m": 9}, "site 'office-block': width_m: input should be greater than or equal"),
-        ({"seed": "x"}, "site 'office-block': seed: input should be a valid integer"),
+        ({"wdith_m": 80}, "no option 'wdith_m'; did you mean 'width_m'?"),
+        ({"width_m": 9}, "site 'office-block': width_m: should be at least"),
+        ({"seed": "x"}, "site 'office-block': seed: should be a whole number"),
     ],
 )
 def test_an_option_that_does_not_fit_is_told(options, words):

@@ -18,6 +18,7 @@ from pydantic import Field
 
 from dva_sim.config import Config
 from dva_sim.errors import ConfigError
+from dva_sim.guesses import unknown
 from dva_sim.streams import Streams
 
 Positive = Annotated[float, Field(gt=0)]
@@ -95,8 +96,7 @@ class Population(Config):
         traits = {name: value for name, value in self if isinstance(value, Trait)}
         for name, median in medians.items():
             if name not in traits:
-                known = ", ".join(traits)
-                raise ConfigError(f"operator.traits {name!r} is unknown; known: {known}")
+                raise ConfigError(unknown("operator.traits", name, traits))
             if not median > 0:
                 raise ConfigError(f"operator.traits {name!r} is {median!r}; should be above 0")
         changed = {

@@ -178,8 +178,7 @@ def fates_in_time(shifts: Shifts) -> Drawn | None:
     key(figure, [box(FATES[fate]) for fate in _FATES], [_NAMES.get(f, f) for f in _FATES])
     caption = (
         "Cumulative incidence of each outcome (Aalen-Johansen), stacked: at every moment the "
-        "shares add up to one, and no outcome is taken for mere lack of patience. All events of "
-        f"the cohort, true and false; each is followed for {shifts.follow:g} s."
+        f"shares add up to one. All events, true and false, each followed for {shifts.follow:g} s."
     )
     return finish(figure, "fates", "What becomes of events, and when", caption, numbers)
 

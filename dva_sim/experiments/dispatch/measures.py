@@ -37,6 +37,7 @@ from dva_sim.experiments.dispatch.outcomes import (
 )
 from dva_sim.timed.ledger import OUTCOMES
 from dva_sim.timed.recording import TimedRecording, UnitRecord
+from dva_sim.timed.scenario import TimedScenario
 
 FOLLOW_S = 600.0
 FATES = ("confirmed", "refuted", "escalated", "expired")
@@ -56,6 +57,14 @@ MEASURES = (
     *("violations", "simulated_s"),
 )
 """Numbers that a row of `run_row` may hold, and so what a study may ask for."""
+_OF_CONTAINMENT = ("contained_share", "containment_mean_s")
+
+
+def measures_of(scenario: TimedScenario) -> tuple[str, ...]:
+    """Those of `MEASURES` that a run of a scenario holds: nothing is contained that need not be."""
+    gone = () if scenario.dispatch.containment else _OF_CONTAINMENT
+    return tuple(name for name in MEASURES if name not in gone)
+
 
 Row = dict[str, Any]
 Columns = dict[str, NDArray[Any]]

@@ -13,7 +13,7 @@ from dva_sim.experiments.cells import CellTable, Summary, cell_table
 from dva_sim.experiments.dispatch.percentiles import pooled
 from dva_sim.experiments.dispatch.shifts import BEST, POLICY, Shifts
 from dva_sim.experiments.effects import Factor, Setting
-from dva_sim.experiments.labels import capital, listing, number, percent
+from dva_sim.experiments.labels import listing, number, percent
 
 SUMMARIES: tuple[Summary, ...] = (
     ("on_scene_share", "on scene by T", np.mean, percent),
@@ -46,6 +46,7 @@ SUMMARIES: tuple[Summary, ...] = (
 )
 
 
+_MOST_NAMED = 3  # policies, before they are only counted
 PERCENTILES = (50, 90, 95)
 BOUND = "the best of fresh units that stand ready at every base and station"
 
@@ -60,7 +61,8 @@ def cells(shifts: Shifts) -> CellTable:
     table = cell_table(part, shifts.view.measure, SUMMARIES)
     if not shifts.events:
         return table
-    at = table.heads.index(next(head for _, head, _, _ in SUMMARIES if head in table.heads))
+    known = [table.heads.index(head) for _, head, _, _ in SUMMARIES if head in table.heads]
+    at = min(known, default=len(table.heads))
     rows = []
     for setting, row in zip(part.settings(), table.rows, strict=True):
         found = _percentiles(shifts, setting)
@@ -89,16 +91,20 @@ def answer_of(finding: Finding | None, shifts: Shifts) -> Answer:
     if finding is None:
         return Answer(
             "No contrast was declared that could answer the question; figures show what was run.",
-            _notes(shifts),
+            notes=_notes(shifts),
         )
+    found = answer(along_loads(finding, shifts))
+    price = {"In return": " ".join(_price(finding, shifts))} if shifts.can_spare else {}
+    notes = [*_notes(shifts), *found.notes]
+    return replace(found, depends=found.depends | price, notes=notes)
+
+
+def along_loads(finding: Finding, shifts: Shifts) -> Finding:
+    """The same along the load of people, where that is known, instead of the rate of alarms."""
     loads = [round(load, 2) for load in shifts.loads if load is not None]
     if len(loads) == len(shifts.stops):
         finding = replace(finding, over="load", levels=tuple(loads))
-    found = answer(replace(finding, cluster="shift"))
-    price = _price(finding, shifts)
-    first = capital(found.lead) if found.lead.startswith("no ") else found.lead  # not a name
-    lead = " ".join([first, *price])
-    return Answer(lead, [*_notes(shifts), *found.notes])
+    return replace(finding, cluster="shift")
 
 
 def _price(finding: Finding, shifts: Shifts) -> list[str]:
@@ -116,8 +122,8 @@ def _price(finding: Finding, shifts: Shifts) -> list[str]:
         for m, a, b, z, title in zip(mean, low, high, base, shifts.titles, strict=True)
     ]
     return [
-        f"Against {second} it changes the time that people stand in danger to find out what it is, "
-        f"per event, by {listing(parts)}."
+        f"Under {first} the time that people stand in danger to find out what it is changes, per "
+        f"event, by {listing(parts)}."
     ]
 
 
@@ -129,7 +135,7 @@ def _notes(shifts: Shifts) -> list[str]:
         notes.append(_progress(shifts))
     if shifts.loads[0] is not None:
         notes.append(
-            "Load is the use of the busiest kind of people, guards or operators, as seen under "
+            "Load is that of guards or operators, whoever is busier, as seen under "
             f"{_calibrated(shifts)}; the other policies meet the same alarms."
         )
     return notes
@@ -140,7 +146,7 @@ def _calibrated(shifts: Shifts) -> str:
 
 
 def _quickest(shifts: Shifts) -> str:
-    """Who has the least mean response at each load, and who cannot be told from it."""
+    """Who has the least mean response at each load, and which others may be as quick."""
     response = shifts.means("response_mean_s")
     sentences = []
     for stop, title in enumerate(shifts.titles):
@@ -150,13 +156,12 @@ def _quickest(shifts: Shifts) -> str:
         low = found.low.reshape(response.shape)[:, stop]
         equal = [shifts.policies[i] for i in candidates if i != best and not low[i] > 0]
         words = f"{shifts.policies[best]} ({number(response[best, stop])} s)"
-        words += (
-            f", not to be told from {listing(equal)}" if equal else ", seen ahead of all others"
-        )
+        others = listing(equal) if len(equal) <= _MOST_NAMED else f"{len(equal)} others"
+        words += f", not clearly ahead of {others}" if equal else ", ahead of all others"
         sentences.append(f"at {title} {words}" if title else words)
     return (
-        f"The least mean time to response has, {'; '.join(sentences)}. Which is least was seen in "
-        "the same shifts, which flatters it a little."
+        f"Quickest on the mean: {'; '.join(sentences)}. Which is quickest was seen in the same "
+        "shifts, which flatters it a little."
     )
 
 
@@ -179,9 +184,9 @@ def _contained(shifts: Shifts) -> str:
         words = [f"{percent(share[i, stop])} under {shifts.policies[i]}" for i in chosen]
         parts.append(f"at {title} {listing(words)}")
     return (
-        "The same guards look and contain, so one may be paid with the other. Of the true events, "
-        f"contained within {shifts.follow:g} s, the quickest to respond first, then who contains "
-        f"most: {'; '.join(parts)}."
+        "The same guards look and contain. Contained of the true events within "
+        f"{shifts.follow:g} s, by the quickest policy and by the one that contains most: "
+        f"{'; '.join(parts)}."
     )
 
 
@@ -255,6 +260,12 @@ def _rule(scenario: Mapping[str, Any], key: str, nothing: str) -> str:
     return f"{value:g} {key.rpartition('_')[2]}"
 
 
+_INTERVALS = (
+    "Intervals reach as far as Student's or the bootstrap-t over shifts; bands come from max-t "
+    "over a bootstrap of shifts. More shifts narrow them, but do not make the model truer."
+)
+
+
 def method(shifts: Shifts, correlation: float | None) -> list[str]:
     """How the numbers were made, as a list of remarks."""
     alike = ""
@@ -264,21 +275,18 @@ def method(shifts: Shifts, correlation: float | None) -> list[str]:
         )
     follow = f"{shifts.follow:g} s"
     return [
-        "The shift is the cluster: all intervals are taken over independent shifts. A shift meets "
-        "the same alarms, places, walking speeds and service times under every policy, and "
-        f"differences are taken within it (common random numbers).{alike}",
-        "The cohort are all alarms, true and false, first reported between the warm-up and one "
-        f"follow-up before the horizon; each is followed for T = {follow}, so that nothing is cut "
-        "off. Confirmed, cleared, escalated and expired compete: none is treated as a mere end of "
-        "watching (Aalen-Johansen).",
-        f"Times are restricted means: the mean of min(time, T), where never counts {follow}. So a "
-        "policy cannot gain by leaving the hard ones out. Response is until somebody is on scene; "
-        "an escalated event counts as never reached, though others may see to it.",
-        f"The bound is the response to each event by {BOUND}. It is none for who is out already "
-        "and near: how many events were reached sooner stands in the table.",
-        "Intervals of one entry reach as far as Student's or the bootstrap-t over shifts does; "
-        "bands hold all entries at once (max-t over a bootstrap of shifts). All are Monte Carlo "
-        "intervals, given the model.",
+        "Intervals are over independent shifts. A shift meets the same alarms, places, walking "
+        "speeds and service times under every policy, and differences are taken within it (common "
+        f"random numbers).{alike}",
+        "Counted are all alarms, true and false, first reported between the warm-up and one "
+        f"follow-up before the end; each is followed for T = {follow}. Confirmed, cleared, "
+        "escalated and expired compete (Aalen-Johansen).",
+        f"Times are restricted means: the mean of min(time, T), where never counts {follow}, so "
+        "that no policy gains by leaving hard ones out. Response is until somebody is on scene; an "
+        "escalated event counts as never reached.",
+        f"The bound is the response to each event by {BOUND}. Somebody who is out already and near "
+        "may be sooner: how often stands in the table.",
+        _INTERVALS,
         "Use, exposure and evenness are of the whole measured time; what the desk counted "
         "(redirected, relocated, overruled) of the whole run.",
         "Not modelled: bodies, cameras, the network and driving (responders are travel and service "

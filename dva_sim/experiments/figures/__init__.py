@@ -65,7 +65,7 @@ def draw_all(reading: Reading) -> list[Drawn]:
         ]
     note = _what_panels_are(view)
     there = [f for f in drawn if f is not None]
-    return [replace(f, caption=f.caption + note * (f.name in _OF_PANELS)) for f in there]
+    return [replace(f, reads=(*f.reads, note)) if f.name in _OF_PANELS else f for f in there]
 
 
 def _what_panels_are(view: View) -> str:
@@ -73,13 +73,10 @@ def _what_panels_are(view: View) -> str:
     if len(view.panels) < 2:
         return ""
     names = listing([factor_name(name) for name in view.panels[0]])
-    words = f" Panels: {names}."
+    words = f"panels, {names}"
     if len(view.shown) == len(view.panels):
         return words
-    return (
-        f"{words} Shown are {len(view.shown)} of {len(view.panels)} settings of the other factors; "
-        "the table holds them all."
-    )
+    return f"{words} ({len(view.shown)} of {len(view.panels)} settings; the tables hold them all)"
 
 
 def _cadences(view: View, scenario: Mapping[str, Any]) -> effect.CadenceOf:

@@ -50,11 +50,9 @@ def delay_budget(view: View) -> Drawn | None:
         numbers.add(view.setting(panel, level), told)
     stacks.close()
     caption = (
-        "Means over the time that commands were in force, from what a camera saw to the effect of "
-        "the command it led to: stacked, because a delay is a sum. Hatched: a value stands until "
-        "the next one replaces it, which counts once. Diamond: the same delay measured as a "
-        "whole, by the time of capture that travels with each command. From sampling to "
-        "processing it is the age of the command in force."
+        "From what the camera saw to the effect of the command it led to, stage by stage; means "
+        "over the time that commands were in force. Hatched stages: a value waits to be replaced "
+        "by the next. Diamond: the same delay measured as a whole."
     )
     return finish(stacks.figure, "delay_budget", "Where the delay comes from", caption, numbers)
 

@@ -50,9 +50,8 @@ def command_age(view: View) -> Drawn | None:
     label_panels(axes, view, axis_label("age_s", wrapped("Command age at application", 22)))
     legend(figure, view.line)
     caption = (
-        "From the moment a command is issued to its effect at the motors: mark, the median; thick, "
-        "the middle half; thin, 5 to 95 %. Quantiles within runs, averaged over runs; "
-        "logarithmic axis."
+        "From the making of a command to its effect at the motors: mark, the median; thick, the "
+        "middle half; thin, 5 to 95 % (averages over runs). The axis is logarithmic."
     )
     return finish(figure, "command_age", "Age of commands when they take effect", caption, numbers)
 
@@ -85,12 +84,11 @@ def command_rate(view: View, cadence_of: CadenceOf) -> Drawn | None:
         name_lines(axes, every, view.line)
     else:
         legend(figure, view.line)
-    caption = "Mean over runs. Commands that came too old or were overtaken are not counted."
+    caption = "Mean over runs, without commands that came too old or were overtaken."
     if any(cadence_of(panel) for panel in view.shown):
         caption += (
-            " Dashed: the closed form for lock-step messaging, min(1/T, 1/(2 d + P)), with T the "
-            "wanted period (where the app only sends what has changed, the shortest it allows), "
-            "d the one-way delay and P the processing time."
+            " Dashed: what REQ/REP allows by arithmetic, min(1/T, 1/(2 d + P)), with wanted period "
+            "T, one-way delay d and processing time P."
         )
     return finish(figure, "command_rate", "Commands applied per second", caption, numbers)
 

@@ -59,12 +59,11 @@ def distributions(view: View) -> Drawn:
     _spread(axes[0][0], present(raw))
     legend(figure, view.line)
     caption = (
-        "Each mark is one run, none left out; the bar is the median, the box the middle half. "
-        "At each place the columns stand in the order of the key."
-        f"{_hollow_words(confirmed)}{hatch_words(view)}"
+        "Each mark is one run; bar, the median; box, the middle half. Columns stand in the order "
+        f"of the key.{_hollow_words(confirmed)}"
     )
     title = f"{capital(measure_name(view.measure))} of all {len(view.part):,} runs"
-    return finish(figure, "distributions", title, caption, numbers)
+    return finish(figure, "distributions", title, caption, numbers, (hatch_words(view),))
 
 
 def _columns(view: View, values: Floats, ok: NDArray[np.bool_]) -> dict[str, Any]:

@@ -25,6 +25,7 @@ from dva_sim.experiments.figures.style import (
     axis_label,
     dodge,
     finish,
+    fit_to,
     has_lines,
     hatch_stops,
     hatch_words,
@@ -42,7 +43,6 @@ if TYPE_CHECKING:
 
 _WIDER = 1.2  # of a logarithmic axis, lest marks lie on its edges
 _STEP = 0.12  # between the bars of two lines, in stops
-_ROOM = 0.15  # share of what persons span that is left free beyond them, where bands are cut
 CadenceOf = Callable[[Setting], Cadence | None]
 
 
@@ -67,13 +67,11 @@ def differences(view: View, cadence_of: CadenceOf) -> Drawn | None:
         mark_boundary(ax, view.over, cadence_of(panel), text=True)
     zoomed = _zoom_on_small(axes, view.smallest_effect)
     _name(view, others, figure, axes, ends)
-    title = f"What the other levels cost against {name}: difference in {_what(view)}"
-    caption = (
-        f"Above zero, {name} has the lower value. Means of differences paired by person and trial; "
-        f"{_intervals_words(view)}.{cut}{zoomed}{_boundary_words(view, cadence_of)}"
-        f"{hatch_words(view)}"
-    )
-    return finish(figure, "differences", title, caption, numbers)
+    title = f"Difference against {name} in {_what(view)}"
+    boundary = _boundary_words(view, cadence_of)
+    caption = f"Above zero, {name} has the lower value.{zoomed}{boundary}"
+    reads = (_intervals_words(view), hatch_words(view), cut)
+    return finish(figure, "differences", title, caption, numbers, reads)
 
 
 def measure_levels(view: View) -> Drawn:
@@ -88,14 +86,14 @@ def measure_levels(view: View) -> Drawn:
     limits = (-view.widest, view.widest) if _in_excess(view) else view.possible
     figure, axes, ends, cut, numbers = _curves(view, view.lines, curve, label, limits)
     _name(view, view.lines, figure, axes, ends)
-    excess = "Zero is the reference run of the same person and trial. " if _in_excess(view) else ""
+    excess = "Zero is the reference run. " if _in_excess(view) else ""
     caption = (
-        f"Mean over persons; {_intervals_words(view)}. {excess}Intervals of two levels may "
-        "overlap although their paired difference is clear: persons differ more from each other "
-        f"than from themselves.{cut}{hatch_words(view)}"
+        f"Mean over persons. {excess}Two intervals may overlap although the difference, which is "
+        "taken within persons, is clear."
     )
+    reads = (_intervals_words(view), hatch_words(view), cut)
     title = f"{what} under each {factor_name(view.line.name)}" if view.line else what
-    return finish(figure, "levels", title, caption, numbers)
+    return finish(figure, "levels", title, caption, numbers, reads)
 
 
 def mark_boundary(ax: Axes, over: Factor | None, cadence: Cadence | None, text: bool) -> None:
@@ -155,7 +153,7 @@ def _curves(
         hatch_stops(ax, view.stops_outside(panel))
         every.append(ends)
     label_panels(axes, view, ylabel)
-    return figure, axes, every, _fit_to(axes[0], present(np.concatenate(seen))), numbers
+    return figure, axes, every, fit_to(axes[0], present(np.concatenate(seen))), numbers
 
 
 def _columns(measure: str, bands: Band) -> dict[str, Floats]:
@@ -170,29 +168,13 @@ def _columns(measure: str, bands: Band) -> dict[str, Floats]:
     return {with_unit(name, measure): values for name, values in edges.items()}
 
 
-def _fit_to(ax: Axes, values: Floats) -> str:
-    """Cut bands far beyond what any person did, lest they flatten all else; says if it did."""
-    bottom, top = ax.get_ylim()
-    if not len(values):
-        return ""
-    room = _ROOM * (float(np.ptp(values)) or abs(float(values[0])) or 1.0)
-    low, high = max(bottom, values.min() - room), min(top, values.max() + room)
-    ax.set_ylim(low, high)
-    if (low, high) == (bottom, top):
-        return ""
-    return (
-        " So few persons give wide bands and bars: where they go far beyond what any person did, "
-        "they are cut."
-    )
-
-
 def _zoom_on_small(axes: list[Axes], smallest: float | None) -> str:
     """Give small differences room, and mark those declared too small to matter."""
     if smallest is None:
         return ""
     for ax in axes:
         ax.axhspan(-smallest, smallest, color=FAINT, alpha=0.5, lw=0, zorder=0)
-    words = " Grey, differences declared too small to matter."
+    words = " Grey: declared too small to matter."
     bottom, top = axes[0].get_ylim()
     if max(-bottom, top) < 10 * smallest:
         return words
@@ -205,7 +187,7 @@ def _zoom_on_small(axes: list[Axes], smallest: float | None) -> str:
     axes[0].set_ylim(bottom, top)
     axes[0].yaxis.set_major_formatter("{x:g}")
     axes[0].minorticks_off()
-    return f"{words} The axis is linear near zero and logarithmic beyond."
+    return f"{words} Axis: linear near zero, logarithmic beyond."
 
 
 def _side_by_side(view: View, lines: tuple[Level, ...]) -> list[tuple[Level, float]]:
@@ -217,13 +199,9 @@ def _side_by_side(view: View, lines: tuple[Level, ...]) -> list[tuple[Level, flo
 
 def _intervals_words(view: View) -> str:
     if has_lines(view):
-        return (
-            "shaded, the 95 % band that covers all levels of a line at once; bars, the 95 % "
-            "interval of each level alone"
-        )
+        return "shaded, the 95 % band of a line; bars, the 95 % interval of each level alone"
     return (
-        "thin bars, the 95 % intervals that hold for all places of a mark at once; thick bars, "
-        "the 95 % interval of each alone"
+        "thin bars, the 95 % band of all places of a mark; thick bars, the interval of each alone"
     )
 
 
@@ -275,7 +253,6 @@ def _boundary_words(view: View, cadence_of: CadenceOf) -> str:
     if not any(c and over and place_of(over, c.boundary_s) is not None for c in cadences):
         return ""
     return (
-        " Dashed: the predicted boundary, where round trip and processing fill the wanted period "
-        "(2 d + P = T). To its right a request has to wait for the reply to the one before it, so "
+        " Dashed: from there on (2 d + P = T: round trip and processing fill the wanted period) "
         "REQ/REP can no longer send as often as wanted."
     )

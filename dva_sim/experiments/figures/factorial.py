@@ -116,10 +116,9 @@ def _caption(found: Sequence[Effect], shown: Sequence[Effect]) -> str:
     left_out = len(found) - len(shown)
     rest = f" {left_out} smaller interactions are in the figure's CSV only." if left_out else ""
     return (
-        "Dots, main effects: what a step from the first level to another changes, averaged over "
-        "all settings of the other factors. Diamonds, interactions: by how much the first step "
-        "changes more as the second step is taken too. Filled, told from zero; bars, 95 % "
-        f"intervals that hold for all effects at once.{rest}"
+        "Dots: what a step from the first level to another changes on average (main effect). "
+        "Diamonds: how much more it changes if the second step is taken too (interaction). "
+        f"Filled: differs from zero. Bars: 95 % band of all effects at once.{rest}"
     )
 
 

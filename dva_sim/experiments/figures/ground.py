@@ -58,8 +58,8 @@ def trajectories(view: View, tracks: Table, scenario: Mapping[str, Any]) -> Draw
     axes[0][0].set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     scale_bar(axes[-1][0], low)
     caption = (
-        f"The same person and trial everywhere{'; dashed, the reference drive' if aside else ''}. "
-        "Ring: where a way begins; dot: where it ends."
+        f"The same person and trial{'; dashed, the reference run' if aside else ''}. Ring: where "
+        "a way begins; dot: where it ends."
         f"{'' if site else ' The files of the site were not found, so it is left out.'}"
     )
     within = f" ({setting(view.panels[0])})" if view.panels[0] else ""

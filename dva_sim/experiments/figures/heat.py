@@ -90,7 +90,7 @@ def _caption(first: str, second: str, has_zero: bool) -> str:
     return (
         f"In each field the mean difference, paired by person and trial. {_ABOVE}: {first} lies "
         f"above {second}, {_BELOW}: below, by the 95 % band that covers all fields of a panel at "
-        f"once; without a mark it cannot be told from zero. {line}"
+        f"once; without a mark it does not differ from zero. {line}"
     )
 
 

@@ -53,10 +53,9 @@ def endings_in_time(endings: Endings, view: View) -> Drawn | None:
     key(figure, [box(FATES[way]) for way in endings.ways], [_named(w) for w in endings.ways])
     place = f" with {brief(view.panels[0])}" if view.panels[0] else ""
     caption = (
-        f"Share of the events{place} that had ended in each way by each moment: the ways rule each "
-        "other out, so they are stacked (cumulative incidence, Aalen-Johansen). Shares at the "
-        "right edge stand in the table, with intervals. Shown are places at which not all were "
-        "confirmed."
+        f"Share of the events of part {view.part.name}{place} that had ended in each way by each "
+        "moment (cumulative incidence, Aalen-Johansen), where not all were confirmed. The shares "
+        "at the right edge stand in the table, with intervals."
     )
     return finish(figure, "endings", "How it ended, and when", caption, numbers)
 

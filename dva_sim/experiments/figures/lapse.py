@@ -79,7 +79,8 @@ def time_lapse(
     scale_bar(rows[-1][0], low)
     _key(figure, list(moved), len(episode.incidents) > 0)
     title = f"{capital(which)} run: {_what(view, episode)}"
-    return finish(figure, f"time_lapse_{which}", title, _caption(view, episode, which), numbers)
+    name, caption = f"time_lapse_{which}", _caption(view, episode, which)
+    return finish(figure, name, title, caption, numbers, (_READS,))
 
 
 def _what(view: View, episode: Episode) -> str:
@@ -88,16 +89,18 @@ def _what(view: View, episode: Episode) -> str:
     return f"{measure_name(view.measure)} {value}{where}"
 
 
+_READS = "typical and worst run: six moments, the way so far, a nose where an agent heads"
+
+
 def _caption(view: View, episode: Episode, which: str) -> str:
     chosen = {
         "typical": "nearest to the median of all runs",
         "worst": "with the largest value",
     }[which]
     return (
-        f"Of the {episode.kept:,} runs of which the ways were kept, the one {chosen}: person "
-        f"{episode.person}, trial {episode.trial}; {percent(episode.rank)} of all "
-        f"{len(view.part):,} runs have a smaller value. Six moments from the first to the last; "
-        "line, the way so far; mark and nose, where an agent is and heads."
+        f"Of the {episode.kept:,} runs whose ways were kept, the one {chosen} (person "
+        f"{episode.person}, trial {episode.trial}); {percent(episode.rank)} of all "
+        f"{len(view.part):,} runs have a smaller value."
         f"{' Cross: an incident, once it has begun.' if episode.incidents else ''}"
     )
 

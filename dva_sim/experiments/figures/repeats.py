@@ -40,14 +40,13 @@ def repeats(view: View, robustness: Robustness) -> Drawn | None:
         ax.grid(axis="x")
         ax.grid(axis="y", visible=False)
     caption = (
-        "Each row is the contrast under one model of the persons, with its own 95 % interval, "
-        "sorted within a strategy; diamonds have the usual parameters, dots one of the other "
-        "sets. Line and blue band: the study's own result; black, its own model again, for "
-        "reference: it does not count. Grey, differences declared too small to matter. Repeats "
-        "have fewer persons than the study, so their intervals are wider."
+        "Each row: the difference under one model of the persons, with its own 95 % interval. "
+        "Diamonds have the usual parameters, dots another set. Line and blue band: the study's "
+        "own result; black: its own model again, which does not count. Grey: declared too small "
+        "to matter. Repeats have fewer persons, so their intervals are wider."
     )
     if any(repeat.is_beyond for stop in stops for repeat in stop.repeats):
-        caption += " Hollow: an extrapolation, at delays at which nobody was watched."
+        caption += " Hollow: extrapolated."
     title = f"The contrast in {measure_name(view.measure)} under other models of the persons"
     return finish(figure, "robustness", title, caption, _numbers(view, robustness))
 

@@ -63,6 +63,7 @@ class Events:
 
     def __init__(self, table: Table, part: str, view: View) -> None:
         rows = {key: np.asarray(values) for key, values in table.items()}
+        self.part = part
         here = (rows["part"] == part) & ~rows["is_reference"].astype(bool)
         self.rows = {key: values[here] for key, values in rows.items()}
         self._view = view
@@ -143,10 +144,11 @@ def responses(view: View, events: Events) -> Drawn | None:
     outer_labels(axes, shown, "Since detection [s]")
     legend(figure, view.line)
     caption = (
-        "Mark, the median; bar, the middle half. Only events that were reached or confirmed have "
-        f"such a time{_what_else_came(events)}."
+        "Mark, the median; bar, the middle half, of the events that were reached or "
+        f"confirmed{_what_else_came(events)}."
     )
-    return finish(figure, "story_times", "Response, by who responded", caption, numbers)
+    title = f"Part {events.part}: response, by who responded"
+    return finish(figure, "story_times", title, caption, numbers)
 
 
 def outcomes(view: View, events: Events) -> Drawn | None:
@@ -165,8 +167,9 @@ def outcomes(view: View, events: Events) -> Drawn | None:
     stacks.axes[0].set_xlim(0, 1)
     stacks.axes[0].set_xticks([0, 0.5, 1])
     stacks.axes[0].xaxis.set_major_formatter(lambda share, _: f"{100 * share:.0f} %")
-    caption = f"All {len(events):,} events, none left out: each has one of these outcomes."
-    return finish(stacks.figure, "story_outcomes", "What became of the events", caption, numbers)
+    caption = f"All {len(events):,} events of part {events.part}: each has one of these outcomes."
+    title = f"Part {events.part}: what became of the events"
+    return finish(stacks.figure, "story_outcomes", title, caption, numbers)
 
 
 def _what_else_came(events: Events) -> str:
@@ -174,7 +177,7 @@ def _what_else_came(events: Events) -> str:
     if (fate := events.one_fate()) is not None:
         name = _NAMES.get(fate, fate)
         return f"; all {len(events):,} were {name}" if len(events) > 1 else f"; it was {name}"
-    return ", so this is to be read beside the outcomes: a fast median may hide misses"
+    return ": a fast median may hide misses, which the next figure shows"
 
 
 def _quartiles(ax: Axes, offset: float, times: list[Floats], look: Look) -> None:

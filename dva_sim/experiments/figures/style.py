@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from dva_sim.experiments.effects import Factor, Setting, View
+from dva_sim.experiments.effects import Factor, Floats, Setting, View
 from dva_sim.experiments.figures.numbers import Numbers
 from dva_sim.experiments.figures.palette import FAINT as FAINT
 from dva_sim.experiments.figures.palette import INK as INK
@@ -34,6 +34,7 @@ _TITLE = 78  # characters of a title that the width holds
 _CROWDED = 45  # characters of ticks that fit beside each other in the width
 _DECADES = 5e3  # of the ends of a logarithmic axis, from which on 2 and 5 have no room
 _LEAST_TICK = 8  # characters of a tick's name in a line
+_ROOM = 0.15  # share of what persons span that is left free beyond them, where bands are cut
 _ROW_LABEL = 28  # characters that the height of a row holds
 WIDTH = 8.4  # [in]; on screen and on paper it is stretched or shrunk to the column
 
@@ -74,6 +75,7 @@ class Drawn:
         name: Its file name without an ending.
         title: What is seen.
         caption: How to read it.
+        reads: What else must be known to read it, in words that other figures share.
         svg: The figure as vectors.
         png: The same as pixels.
         csv: The numbers behind it; empty where none were written down.
@@ -87,6 +89,7 @@ class Drawn:
     png: bytes
     csv: bytes = b""
     figure: Figure | None = field(default=None, compare=False, repr=False)
+    reads: tuple[str, ...] = ()
 
 
 @contextmanager
@@ -112,7 +115,12 @@ def panels(
 
 
 def finish(
-    figure: Figure, name: str, title: str, caption: str, numbers: Numbers | None = None
+    figure: Figure,
+    name: str,
+    title: str,
+    caption: str,
+    numbers: Numbers | None = None,
+    reads: Sequence[str] = (),
 ) -> Drawn:
     """Render once to SVG and once to PNG, with nothing in them that changes from day to day."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -130,7 +138,8 @@ def finish(
     metadata = {"Date": None, "Creator": None}
     FigureCanvasSVG(figure).print_svg(svg, metadata=metadata)  # type: ignore[no-untyped-call]
     table = numbers.csv() if numbers else b""
-    return Drawn(name, title, caption, svg.getvalue(), png.getvalue(), table, figure)
+    told = tuple(filter(None, reads))
+    return Drawn(name, title, caption, svg.getvalue(), png.getvalue(), table, figure, told)
 
 
 def axis_label(name: str, text: str | None = None) -> str:
@@ -208,6 +217,19 @@ def log_axis(axes: Axes, which: Literal["x", "y"] = "y") -> None:
     axis.set_minor_locator(NullLocator())
 
 
+def fit_to(axes: Axes, values: Floats) -> str:
+    """Cut bands far beyond what any person did, lest they flatten all else; says if it did."""
+    bottom, top = axes.get_ylim()
+    if not len(values):
+        return ""
+    room = _ROOM * (float(np.ptp(values)) or abs(float(values[0])) or 1.0)
+    low, high = max(bottom, values.min() - room), min(top, values.max() + room)
+    axes.set_ylim(low, high)
+    if (low, high) == (bottom, top):
+        return ""
+    return "bands and bars that go far beyond what any person did are cut"
+
+
 def hatch_stops(axes: Axes, stops: Sequence[int]) -> None:
     """Mark stops that are extrapolations."""
     for stop in stops:
@@ -220,10 +242,7 @@ def hatch_words(view: View) -> str:
     """What the hatching means, if a panel has any."""
     if not any(view.stops_outside(panel) for panel in view.shown):
         return ""
-    return (
-        " Hatched: at least one line is an extrapolation there, beyond the delays at which people "
-        "were watched; the table marks each cell."
-    )
+    return "hatched, at least one line is extrapolated there (marked † in the tables)"
 
 
 def panel_grid(view: View, height: float) -> tuple[Figure, list[Axes]]:

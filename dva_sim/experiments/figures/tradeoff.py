@@ -72,8 +72,9 @@ def _caption(view: View) -> str:
     if has_lines(view) and view.over is not None:
         along = f", from one {factor_name(view.over.name)} to the next"
     return (
-        f"Down and to the left is better. Each mark is a cell, the mean over persons{along}; "
-        "crosses are 95 % intervals of each mean alone. Times in danger are summed over all people."
+        f"Down and to the left is better. Each mark is a configuration, the mean over "
+        f"persons{along}; crosses are 95 % intervals of each mean alone. Times in danger are "
+        "summed over all people."
     )
 
 

@@ -69,8 +69,10 @@ class Film:
 
     def frames(self) -> Iterator[NDArray[np.uint8]]:
         """Pictures in order, each of shape `(height, width, 3)`."""
-        for number in range(len(self)):
-            yield self.at(min(number / FPS * self.speed, self.duration))
+        moving = math.ceil(self.duration / self.speed * FPS)
+        for number in range(moving):
+            yield self.at(number / FPS * self.speed)
+        yield from [self.at(self.duration)] * (len(self) - moving)
 
     def at(self, time: float) -> NDArray[np.uint8]:
         """The picture at a moment of the run [s]."""
@@ -97,6 +99,7 @@ class _Eye:
 
     def __init__(self, ax: Axes, moments: Moments, step: float) -> None:
         self._moments, self._step = moments, step
+        self._shown: tuple[str, float] | None = None  # which robot's picture, and of when [s]
         self._image = ax.imshow(np.zeros((240, 320, 3), np.uint8), animated=True)
         self._title = ax.set_title(" ", fontsize=style.FONT, loc="left")
         self._title.set_animated(True)
@@ -117,6 +120,8 @@ class _Eye:
         else:
             robot, captured = glance.robot, glance.captured
             title = f"{glance.operator}'s screen, {time - captured:.1f} s old"
-        self._image.set_data(self._moments.eye(robot, captured))
+        if self._shown != (robot, captured):
+            self._image.set_data(self._moments.eye(robot, captured))
+            self._shown = robot, captured
         self._title.set_text(title)
         return [self._image, self._title]

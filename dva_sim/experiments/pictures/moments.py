@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from dva_sim.agents.bystander import DOWN
 from dva_sim.errors import ConfigError
+from dva_sim.guesses import unknown
 from dva_sim.recorder import DriveLog, TrackPoint
 from dva_sim.simulation import Playback
 from dva_sim.simulation.incidents import Incident
@@ -120,8 +121,7 @@ class Moments:
             ConfigError: no such robot.
         """
         if robot not in self.names(ROBOT):
-            known = ", ".join(self.names(ROBOT)) or "none"
-            raise ConfigError(f"robot {robot!r} is not known; known: {known}")
+            raise ConfigError(unknown("robot", robot, self.names(ROBOT)))
         size = width, height
         if size not in self._cameras:
             angle = math.radians(self.recording.scenario.camera.field_of_view_deg)

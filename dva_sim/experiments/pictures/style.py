@@ -54,7 +54,15 @@ LENGTHS = {ROBOT: 1.6, GUARD: 1.64, BYSTANDER: 1.64}  # of the marker box, twice
 
 FIRE, GAS, WATER, SMOKE = "#d1332e", "#b59a00", "#2a7fb8", "#55585e"
 HAZARDS = {"fire": FIRE, "gas_leak": GAS, "flood": WATER}
-SMALL = (*ROBOT_MODES.values(), *ACTIVITIES.values(), *HAZARDS.values(), GHOST)  # of small things
+SMALL = (
+    *ROBOT_MODES.values(),
+    *ACTIVITIES.values(),
+    *HAZARDS.values(),
+    GHOST,
+    AHEAD,
+    BEHIND,
+    FAILED,
+)
 MARKS = {"fire": "*", "gas_leak": "D", "flood": "v"}
 GAS_LEVELS = (0.1, 0.2, 0.5, 1.0)  # of the lower explosive limit
 HEAT_LEVELS = (1.0, 2.5, 10.0)  # [kW/m2]; skin bears 2.5 for long

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dva_sim.errors import ConfigError
+from dva_sim.guesses import unknown
 from dva_sim.scenario import Scenario
 from dva_sim.simulation import Playback
 
 MOVING, STANDING, DRAWN = (".gif", ".mp4"), (".png", ".jpg"), (".png", ".pdf", ".svg")
 MOST_PANELS = 24
-MOST_TOLD = 12  # robots by name in a message
 
 
 @dataclass(frozen=True)
@@ -91,9 +91,7 @@ class Wanted:
         """
         robots = [f"robot-{number}" for number in range(1, scenario.robot.count + 1)]
         if self.camera is not None and self.camera not in robots:
-            known = ", ".join(robots[:MOST_TOLD]) or "none"
-            more = ", ..." if len(robots) > MOST_TOLD else ""
-            raise ConfigError(f"robot {self.camera!r} is not known; known: {known}{more}")
+            raise ConfigError(f"--camera: {unknown('robot', self.camera, robots)}")
         for time in self.times:
             if not 0 <= time <= scenario.horizon_s:
                 lasts = f"which lasts at most {scenario.horizon_s:g} s"

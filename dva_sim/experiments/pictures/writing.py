@@ -90,8 +90,8 @@ def _steady(frames: Iterator[NDArray[np.uint8]]) -> Iterator[NDArray[np.uint8]]:
     shown = next(frames)
     yield shown
     for frame in frames:
-        differs = np.abs(frame.astype(np.int16) - shown).max(axis=2) >= ALIKE
-        shown = np.where(differs[:, :, None], frame, shown)
+        red, green, blue = np.moveaxis(np.abs(frame.astype(np.int16) - shown) >= ALIKE, 2, 0)
+        shown = np.where((red | green | blue)[:, :, None], frame, shown)
         yield shown
 
 

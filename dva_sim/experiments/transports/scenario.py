@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from dva_sim import config, tasks
+from dva_sim import changing, tasks
 from dva_sim.config import Config, Document, Fail
 from dva_sim.errors import ConfigError
 from dva_sim.network.transports import ContestConfig
@@ -79,7 +79,7 @@ def build(
     Raises:
         ConfigError: an unknown key or name, a wrong type, a value out of range.
     """
-    return config.build(
+    return changing.build(
         TransportScenario, source, changes or {}, _complete, lambda data, folders: None
     )
 

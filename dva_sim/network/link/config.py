@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from dva_sim.config import Config
+from dva_sim.key_hints import AlsoCalled
 from dva_sim.network.link.delays import Constant, DelayLaw
 from dva_sim.network.link.losses import Bursts
 from dva_sim.network.link.outages import Outage, Partition
@@ -64,15 +65,15 @@ class LinkConfig(Config):
         down: What is otherwise from the robot.
     """
 
-    delay_s: Seconds = 0.0
+    delay_s: Annotated[Seconds, AlsoCalled("latency", "latency_s")] = 0.0
     jitter_s: Seconds = 0.0
     delay_law: DelayLaw | None = None
     delay_log: str | None = None
     delay_log_share: Share = 0.5
     reorder: bool = False
-    loss: Loss = 0.0
+    loss: Annotated[Loss, AlsoCalled("packet_loss", "loss_rate", "loss_share")] = 0.0
     bursts: Bursts | None = None
-    rate_bps: Rate = 20e6
+    rate_bps: Annotated[Rate, AlsoCalled("bandwidth", "bandwidth_bps", "bitrate")] = 20e6
     queue_bytes: Room = 150_000
     queue_packets: Packets | None = None
     trace_up: str | None = None

@@ -7,6 +7,7 @@ from fnmatch import fnmatchcase
 from typing import Any
 
 from dva_sim.errors import ConfigError
+from dva_sim.guesses import hint
 from dva_sim.network.link.link import Link
 from dva_sim.network.link.outages import Gap, Partition
 
@@ -60,8 +61,8 @@ def check_partitions(partitions: Sequence[Partition], names: Collection[str]) ->
     for partition in partitions:
         for key, pattern in (("source", partition.source), ("destination", partition.destination)):
             if not any(fnmatchcase(name, pattern) for name in names):
-                known = ", ".join(sorted(names))
-                raise ConfigError(f"{key} {pattern!r} of a partition is nobody; known: {known}")
+                problem = f"{key} {pattern!r} of a partition is nobody"
+                raise ConfigError(f"{problem}; {hint(pattern, sorted(names))}")
 
 
 def part_links(

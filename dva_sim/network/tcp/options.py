@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from dva_sim.errors import ConfigError
+from dva_sim.guesses import unknown
 
 CONGESTION = ("cubic", "reno")
 
@@ -77,6 +78,4 @@ class TcpOptions:
 
     def __post_init__(self) -> None:
         if self.congestion not in CONGESTION:
-            raise ConfigError(
-                f"congestion control {self.congestion!r} is unknown; known: {', '.join(CONGESTION)}"
-            )
+            raise ConfigError(unknown("congestion control", self.congestion, CONGESTION))

@@ -6,6 +6,7 @@ import math
 from dataclasses import fields
 
 from dva_sim.errors import ConfigError
+from dva_sim.guesses import hint, unknown
 from dva_sim.worlds.hazards.base import Hazard, Point
 from dva_sim.worlds.hazards.fire import GROWTH_S, Fire, largest_peak
 from dva_sim.worlds.hazards.flood import Flood
@@ -42,12 +43,12 @@ def make_hazard(kind: str, position: Point, start: float, **settings: str | floa
             absurdly large, or a fire without the fuel to grow to its peak.
     """
     if kind not in KINDS:
-        raise ConfigError(f"hazard {kind!r} is not known; known: {', '.join(KINDS)}")
+        raise ConfigError(unknown("hazard", kind, KINDS))
     known = [field.name for field in fields(KINDS[kind]) if field.name not in ("position", "start")]
     for name, value in settings.items():
         if name not in known:
-            problem = f"a {kind} has no setting {name!r}; it has: {', '.join(known)}"
-            raise ConfigError(problem)
+            problem = f"a {kind} has no setting {name!r}"
+            raise ConfigError(f"{problem}; {hint(name, known, 'it has')}")
         _check(kind, name, value)
     hazard = KINDS[kind](position, start, **settings)  # type: ignore[arg-type]
     if isinstance(hazard, Fire) and hazard.peak > largest_peak(hazard.growth):
@@ -61,7 +62,7 @@ def _check(kind: str, name: str, value: str | float) -> None:
     choices = CHOICES.get(name)
     if choices is not None:
         if value not in choices:
-            raise ConfigError(f"{name} {value!r} is not known; known: {', '.join(choices)}")
+            raise ConfigError(unknown(name, value, choices))
     elif name in ANY_SIGN and isinstance(value, int | float) and math.isfinite(value):
         return
     elif not isinstance(value, int | float) or not 0.0 < value < math.inf:

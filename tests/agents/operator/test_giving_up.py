@@ -79,6 +79,15 @@ def test_commands_that_do_not_arrive_are_a_lost_link_after_three_attempts(
     assert tried <= 3 if pattern in ASKED else tried == 3
 
 
+def test_the_story_says_what_an_operator_believes_of_the_link_and_not_that_it_is_so() -> None:
+    dva = driving("latest-wins")
+    dva.field.robots[ROBOT].inbox._put = lambda *_: None  # type: ignore[method-assign]
+    lost_after(dva)
+    told = [moment.what for moment in dva.stage.recorder.timeline]
+    assert "takes the link for lost: the robot does not move" in told
+    assert not any("lost link" in what for what in told)
+
+
 @pytest.mark.parametrize("pattern", ASKED)
 def test_the_app_alerts_after_three_sends_of_2_s_without_an_answer(pattern: str) -> None:
     dva = driving(pattern, **{"command.timeout_s": 2.0})

@@ -68,7 +68,7 @@ def test_the_shipped_example_is_found_from_anywhere(folder):
         ("min_ate", {}, "policy 'min_ate' is unknown; known: auction, batch_optimal, "),
         ("oracle", {}, "policy 'oracle': it needs a plan made with knowledge of the future"),
         ("min_eta", {"pace": 1}, "policy 'min_eta' has no option 'pace'; it has none"),
-        ("preemptive", {"gain": 1}, "'gain'; known: margin, gain_s, ageing_per_s"),
+        ("preemptive", {"gain": 1}, "'gain'; did you mean 'gain_s'?"),
         ("preemptive", {"margin": 0}, "option 'margin' is 0; should be a number above 0"),
         ("preemptive", {"margin": True}, "option 'margin' is True; should be a number above 0"),
         ("priority_eta", {"ageing_per_s": "x"}, "'ageing_per_s' is 'x'; should be a number of at"),

@@ -1,10 +1,10 @@
-import html
 import itertools
 import re
 
 import numpy as np
 import pytest
 import synthetic_study
+from page_words import words
 from small_study import SHIFT
 
 from dva_sim.experiments.dispatch import measures
@@ -47,22 +47,17 @@ def report(tmp_path_factory):
     return write_report(synthetic_study.write(folder, tables, FACTS))
 
 
-def words(report):
-    page = re.sub(r"<style>.*?</style>", "", report.read_text(encoding="utf-8"), flags=re.S)
-    return " ".join(html.unescape(re.sub(r"<[^>]+>", " ", page)).split())
-
-
 def test_the_answer_names_both_sides_of_the_trade(report):
     text = words(report)
     assert re.search(r"at a load of 0\.\d+|at any load tried", text)
     assert "people stand in danger to find out what it is" in text
-    assert "over 3 simulated shifts" in text
+    assert "Shifts: 3 simulated, independent of each other." in text
     assert "simulated person" not in text
 
 
 def test_the_figures_of_dispatch_take_the_place_of_those_of_driving(report):
     page = report.read_text(encoding="utf-8")
-    names = ["trade", "stages", "fates", "way", "percentiles", "burden"]
+    names = ["answer", "trade", "stages", "fates", "way", "percentiles", "burden"]
     assert re.findall(r'<figure id="(\w+)"', page) == names
     assert {path.stem for path in (report.parent / "figures").glob("*.csv")} == set(names)
 
@@ -72,7 +67,7 @@ def test_conditions_and_method_are_those_of_shifts(report):
     assert "team 2 guards and 1 robot" in text
     assert "30 per hour times intensity, 30 % false" in text
     assert "escalated after waiting 120 s" in text
-    assert "The shift is the cluster" in text
+    assert "Intervals are over independent shifts" in text
     assert "wheel slip" not in text
 
 

@@ -174,7 +174,7 @@ def test_each_direction_may_have_its_own_delay() -> None:
         ({"delay_law": {"law": "empirical"}}, "needs either delays_s or file"),
         ({"delay_law": "normal"}, "delay_law: a law is a mapping, such as .*, not 'normal'"),
         ({"delay_law": {"law": "normal"}}, "missing key 'delay_law.sd_s'"),
-        ({"delay_law": {"law": "cauchy"}}, "'cauchy'.*'normal', 'gamma'"),
+        ({"delay_law": {"law": "cauchy"}}, "'cauchy'.*normal, gamma"),
         ({"delay_law": {"law": "gamma", "sd_s": 1, "sdd": 2}}, "unknown key 'delay_law.sdd'"),
         ({"up": {"delay": 1}}, "unknown key 'up.delay'; did you mean 'delay_s'"),
     ],

@@ -107,7 +107,7 @@ def test_a_partition_of_nobody_is_refused() -> None:
     [
         ("outages", {"from_s": 1}, "missing key 'outages.0.for_s'"),
         ("outages", {"from_s": 1, "for_s": 2, "every_s": 2}, "for_s 2 should be below every_s 2"),
-        ("outages", {"from_s": 1, "for_s": 2, "direction": "left"}, "'up', 'down' or 'both'"),
+        ("outages", {"from_s": 1, "for_s": 2, "direction": "left"}, "up, down or both"),
         ("partitions", {"from_s": 1, "for_s": 2, "to": "x"}, "unknown key 'partitions.0.to'"),
     ],
 )

@@ -102,5 +102,5 @@ def test_round_trips_that_few_exceed_are_known_of_both_directions(tmp_path: Any)
 
 
 def test_what_no_queue_can_be_is_refused() -> None:
-    with pytest.raises(ConfigError, match="queue_packets: input should be greater than or equal"):
+    with pytest.raises(ConfigError, match="queue_packets: should be at least"):
         validate(LinkConfig, {"queue_packets": 0})

@@ -34,7 +34,7 @@ def test_severity_lies_between_0_and_1(kind: str) -> None:
 
 def test_what_is_not_known_is_said_in_one_line() -> None:
     for kind, settings, message in (
-        ("quake", {}, "hazard 'quake' is not known; known: fire, gas_leak, flood"),
+        ("quake", {}, "hazard 'quake' is unknown; known: fire, gas_leak, flood"),
         ("fire", {"rate": 1.0}, "a fire has no setting 'rate'; it has: growth, peak"),
         ("fire", {"growth": "quick"}, "known: slow, medium, fast, ultrafast"),
         ("gas_leak", {"gas": "helium"}, "known: methane, propane, carbon_monoxide"),

@@ -10,6 +10,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from dva_sim.errors import ConfigError
 from dva_sim.experiments.validation.dispatch.exact import FORMULAS, Measures
+from dva_sim.guesses import unknown
 from dva_sim.timed import laws
 from dva_sim.timed.scenario import TimedScenario
 
@@ -35,7 +36,7 @@ def exact_values(
     if name is None:
         return {}, ""
     if name not in FORMULAS:
-        raise ConfigError(f"formula {name!r} is unknown; known: {', '.join(FORMULAS)}")
+        raise ConfigError(unknown("formula", name, FORMULAS))
     formula = FORMULAS[name]
     hints = get_type_hints(formula, include_extras=True)
     given = {}

@@ -17,6 +17,7 @@ from dva_sim.config import Config, Document, load_yaml, validate
 from dva_sim.errors import ConfigError
 from dva_sim.experiments.validation.dispatch.binding import exact_values
 from dva_sim.experiments.validation.dispatch.measures import check_name
+from dva_sim.guesses import unknown
 from dva_sim.timed import scenario as timed
 from dva_sim.timed.scenario import TimedScenario
 
@@ -141,7 +142,7 @@ def _exact(config: CaseConfig, scenario: TimedScenario) -> tuple[dict[str, float
     for measure, answer in (config.measures | config.loosely).items():
         if isinstance(answer, str):
             if answer not in known:
-                raise ConfigError(f"{answer!r} is not known; known: {', '.join(known) or 'none'}")
+                raise ConfigError(unknown("answer", answer, known))
             exact[measure] = known[answer]
         elif not config.source:
             raise ConfigError(f"measure {measure!r} is compared with a number: say its source")

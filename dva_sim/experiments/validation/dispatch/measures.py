@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from dva_sim.errors import ConfigError
 from dva_sim.experiments.validation.dispatch.sample import Floats, Sample, occupied
+from dva_sim.guesses import unknown
 from dva_sim.timed.scenario import TimedScenario
 
 Sums = tuple[Floats, Floats]  # tops and bottoms, one for each batch
@@ -111,7 +112,7 @@ def _check_detail(word: str, detail: str, scenario: TimedScenario) -> None:
 
 def _known(word: str, known: list[str], what: str) -> None:
     if word not in known:
-        raise ConfigError(f"{what} {word!r} is unknown; known: {', '.join(known)}")
+        raise ConfigError(unknown(what, word, known))
 
 
 # --- of each event ---------------------------------------------------------------------

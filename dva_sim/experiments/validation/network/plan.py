@@ -13,6 +13,7 @@ from dva_sim import resources
 from dva_sim.config import Config, load_yaml, validate
 from dva_sim.errors import ConfigError
 from dva_sim.experiments.validation.network.measured import FOLDER, SourceConfig
+from dva_sim.guesses import unknown
 from dva_sim.network.condition import CONDITION, Condition
 
 SHIPPED = "network"
@@ -94,9 +95,8 @@ def conditions_of(block: BlockConfig) -> list[Condition]:
     for link in block.links.values():
         for programs in block.programs.values():
             settings = {**block.settings, **link, **programs}
-            if unknown := settings.keys() - set(CONDITION):
-                known = ", ".join(CONDITION)
-                raise ConfigError(f"setting {min(unknown)!r} is unknown; known: {known}")
+            if odd := settings.keys() - set(CONDITION):
+                raise ConfigError(unknown("setting", min(odd), CONDITION))
             try:
                 found.append(Condition.from_row(settings))
             except TypeError:

@@ -17,6 +17,7 @@ from dva_sim.experiments.validation.network.kinds import (
 )
 from dva_sim.experiments.validation.network.operator import Asking, OnGrid, Program
 from dva_sim.experiments.validation.network.robot import Command, Robot
+from dva_sim.guesses import unknown
 from dva_sim.network.condition import COMMAND_BYTES, REPLY_BYTES, Condition
 from dva_sim.network.connecting import AnyConnection, Load, is_calm
 from dva_sim.network.datagrams import DatagramConnection
@@ -100,7 +101,7 @@ def options(without: Sequence[str]) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for name in without:
         if name not in WITHOUT:
-            raise ConfigError(f"mechanism {name!r} is unknown; known: {', '.join(WITHOUT)}")
+            raise ConfigError(unknown("mechanism", name, WITHOUT))
         found |= WITHOUT[name]
     return found
 

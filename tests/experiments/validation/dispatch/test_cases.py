@@ -71,7 +71,7 @@ def test_a_law_becomes_what_the_formula_wants(tmp_path):
     [
         ({"formula": "mm2"}, "formula 'mm2' is unknown; known: mmc"),
         ({"measures": "[stay]"}, "measure 'stay' is unknown"),
-        ({"measures": "[lost]"}, "'lost' is not known; known: utilisation"),
+        ({"measures": "[lost]"}, "'lost' is unknown; known: utilisation"),
         ({"measures": "{wait_s: 3.5}"}, "compared with a number: say its source"),
         ({"look": "3"}, "mean_service_s needs an exponential law, not constant"),
         ({"look": "{law: exponential, mean_s: 5}"}, "offered 1.25 of what they can do"),

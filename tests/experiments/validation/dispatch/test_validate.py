@@ -54,12 +54,12 @@ def test_a_right_core_passes_and_says_what_is_too_rough(tmp_path, capsys, only_o
 
 
 def test_a_full_run_that_is_too_rough_fails(tmp_path, only_one_identity):
-    assert validate("dispatch", None, a_file(tmp_path), quick=False, jobs=1, seed=1) == 1
+    assert validate("dispatch", None, a_file(tmp_path), quick=False, jobs=1, seed=1) == 4
 
 
 def test_a_wrong_answer_fails(tmp_path, capsys, only_one_identity):
     path = a_file(tmp_path, measures="{utilisation: 0.6}", source="wrong on purpose")
-    assert validate("dispatch", None, path, quick=True, jobs=1, seed=1) == 1
+    assert validate("dispatch", None, path, quick=True, jobs=1, seed=1) == 4
     assert "1 of" in capsys.readouterr().out
 
 
