@@ -105,7 +105,7 @@ def test_the_same_bytes_come_again_until_they_are_answered(world: World, window:
             echo(request)
 
     world.serve(ROBOT, third_time_lucky)
-    asker = Asker(world.network, BRIEF, window, attempts=50)
+    asker = Asker(world.network, BRIEF, window, attempts=1000)
     asker.ask(b"\x00\xff any bytes <&>")
     world.run_until(asker.all_over)
     assert asker.replies() == [b"re: \x00\xff any bytes <&>"]
@@ -173,7 +173,7 @@ def test_a_full_queue_refuses_at_once_and_what_waits_is_served(world: World, win
 def test_who_closes_hears_nothing_more(world: World, window: int) -> None:
     held: list[Request] = []
     world.serve(ROBOT, held.append)
-    asker = Asker(world.network, BRIEF, window, attempts=100)
+    asker = Asker(world.network, BRIEF, window, attempts=1000)
     asker.ask(*numbered(10))
     world.run_until(lambda: held)
     timeouts = asker.requester.timeouts
