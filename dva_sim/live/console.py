@@ -17,6 +17,7 @@ from dva_sim.live import process
 from dva_sim.live.options import PARTS, Options
 from dva_sim.live.process import Report, run_part
 from dva_sim.live.supervisor import Summary, Supervisor
+from dva_sim.loudness import detail, is_verbose
 from dva_sim.network.sockets import DEFAULT_PORT
 from dva_sim.scenario import contradictions
 
@@ -190,9 +191,10 @@ def _conclude(console: Console, board: Board, summary: Summary) -> None:
     console.print(board.table())
     _print(console, f"The run ended ({summary.why}): {board.state_of_events()}.")
     counters: dict[str, int] = {}
-    for report in summary.latest.values():
+    for part, report in summary.latest.items():
+        detail(f"  {part}: at most {1000 * report.lateness:.1f} ms late")
         for name, count in report.counters.items():
-            if "refused" in name or "not sent" in name or "form" in name:
+            if is_verbose() or "refused" in name or "not sent" in name or "form" in name:
                 counters[name] = counters.get(name, 0) + count
     for name, count in sorted(counters.items()):
         _print(console, f"  {name}: {count}")
