@@ -29,6 +29,7 @@ def shown(results: Results) -> Data:
         "folder": str(results.folder),
         "question": results.question,
         "status": {"kind": status.kind, "why": list(status.why)},
+        "partial": results.manifest.get("partial"),
         "answer": {
             "lead": results.answer.lead,
             "notes": list(results.answer.notes),
