@@ -29,6 +29,6 @@ _MEANINGS: Final = {
     ExitCode.MISTAKE: "a mistake in the call or in a file, or what cannot be read or written",
     ExitCode.RUNS_FAILED: "runs failed; the others are kept, and the same command tries again",
     ExitCode.GATE_FAILED: "a gate failed: `compare --fail-if` holds, or `validate` misses",
-    ExitCode.INTERRUPTED: "stopped by Ctrl-C; the finished runs are kept",
+    ExitCode.INTERRUPTED: "stopped by Ctrl-C; what is finished is kept (`live` ends with 0)",
     ExitCode.READER_GONE: "whoever read the output has gone, as in `| head`",
 }

@@ -34,6 +34,7 @@ class Plugins(Generic[T]):
         shipped: What we bring, by name.
         folder: Where files are looked for last: `agents/policies`.
         group: Entry points of installed packages: `dva_sim.policies`.
+        key: What names one in a configuration: `dispatch.policy`.
         needs: A method that a class must define, as it is written in a message.
         public: Where users import `base` from.
         hidden: Shipped names that a configuration cannot use.
@@ -44,6 +45,7 @@ class Plugins(Generic[T]):
     shipped: Mapping[str, Callable[..., T]]
     folder: str
     group: str
+    key: str
     needs: str
     public: str
     hidden: frozenset[str] = frozenset()
@@ -51,7 +53,16 @@ class Plugins(Generic[T]):
     def known(self) -> list[str]:
         """Names that a configuration can use: shipped and installed ones; files come on top."""
         shipped = self.shipped.keys() - self.hidden
-        return sorted(shipped | {entry.name for entry in entry_points(group=self.group)})
+        return sorted(shipped | {entry.name for entry in self.installed()})
+
+    def installed(self) -> list[EntryPoint]:
+        """What installed packages offer."""
+        return sorted(entry_points(group=self.group), key=lambda entry: entry.name)
+
+    def files(self) -> list[Path]:
+        """Files in `folder`, whose classes can be named without their path."""
+        found = [path for root in resources.roots() for path in (root / self.folder).glob("*.py")]
+        return sorted({path.resolve(): None for path in found})
 
     def find(self, name: str, base: Path | None = None) -> Callable[..., T]:
         """The class that a name means.
@@ -138,7 +149,7 @@ class Plugins(Generic[T]):
 
     def _installed(self, name: str) -> type[T]:
         """The class that an installed package offers under a name."""
-        offers = {entry.name: entry for entry in entry_points(group=self.group)}
+        offers = {entry.name: entry for entry in self.installed()}
         if name not in offers:
             problem = unknown(self.kind, name, self.known())
             more = "" if problem.endswith("?") else "; or a file: mine.py:Mine"

@@ -8,19 +8,62 @@ from typing import Annotated
 import typer
 from typer import Argument, Option
 
-from dva_sim.cli.options import Jobs
+from dva_sim.cli.completing import one_of
+from dva_sim.cli.options import Jobs, Json, Quiet, Verbose
+from dva_sim.cli.printing import print_json
 from dva_sim.cli.values import whole
+from dva_sim.loudness import loudness
+
+_LISTED = (
+    *("studies", "scenarios", "tasks", "sites", "robots", "phones", "accelerometers", "people"),
+    *("patterns", "policies", "operators", "filters", "mappings", "drives"),
+)
 
 
-def list_() -> None:
+def list_(
+    kind: Annotated[
+        str | None,
+        Argument(
+            metavar="KIND",
+            autocompletion=one_of(*_LISTED),
+            help="Only this kind, such as studies.",
+        ),
+    ] = None,
+    as_json: Json = False,
+) -> None:
     """Name all studies, scenarios, sites, agents and policies.
+
+    There is a line for each name, with what it is.
 
     Examples:
         dva-sim list  # all of them
+        dva-sim list scenarios  # of one kind
+        dva-sim list --json  # for other programs
     """
-    from dva_sim.experiments import console
+    from dva_sim.experiments import listing
 
-    console.list_all()
+    if as_json:
+        print_json(listing.as_json(kind))
+    else:
+        listing.tell(listing.lines(kind))
+
+
+def plugins(as_json: Json = False) -> None:
+    """Say what can be added to the program, and how.
+
+    Policies, operators, filters, mappings and drives are classes in a file of yours, or offered by
+    an installed package; it says which there are, and how one is named.
+
+    Examples:
+        dva-sim plugins  # all kinds
+        dva-sim plugins --json  # for other programs
+    """
+    from dva_sim.experiments import extending, listing
+
+    if as_json:
+        print_json(extending.as_json())
+    else:
+        listing.tell(extending.lines())
 
 
 def check(
@@ -57,7 +100,11 @@ def check(
 def schema(
     kind: Annotated[
         str,
-        Argument(metavar="KIND", help="message, study, scenario, cases, site or agent."),
+        Argument(
+            metavar="KIND",
+            autocompletion=one_of("message", "study", "scenario", "cases", "site", "agent"),
+            help="message, study, scenario, cases, site or agent.",
+        ),
     ],
 ) -> None:
     """Print the schema of a kind of file.
@@ -74,7 +121,12 @@ def schema(
 
 def validate(
     what: Annotated[
-        str, Argument(metavar="WHAT", help="dispatch, operators or network.")
+        str,
+        Argument(
+            metavar="WHAT",
+            autocompletion=one_of("dispatch", "operators", "network"),
+            help="dispatch, operators or network.",
+        ),
     ] = "dispatch",
     out: Annotated[
         Path | None,
@@ -99,6 +151,8 @@ def validate(
         Path | None,
         Option(metavar="FILE", help="Measure the whole design, or go on with it; network only."),
     ] = None,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
 ) -> None:
     """Compare the models with theory, people and sockets.
 
@@ -112,4 +166,6 @@ def validate(
     from dva_sim.experiments.validation import console
 
     sockets = console.Sockets(ablate, live, measure)
-    raise typer.Exit(console.validate(what, out, cases, quick, jobs, seed, strategy, sockets))
+    with loudness(quiet, verbose):
+        code = console.validate(what, out, cases, quick, jobs, seed, strategy, sockets)
+    raise typer.Exit(code)

@@ -7,12 +7,17 @@ from typing import Annotated
 
 from typer import Argument, Option
 
+from dva_sim.cli.completing import SCENARIOS, STUDIES
 from dva_sim.cli.values import whole
 
 MOST_JOBS = 1024
 
-StudyName = Annotated[str, Argument(metavar="STUDY", help="A study by name or path.")]
-ScenarioName = Annotated[str, Argument(metavar="SCENARIO", help="A scenario by name or path.")]
+StudyName = Annotated[
+    str, Argument(metavar="STUDY", autocompletion=STUDIES, help="A study by name or path.")
+]
+ScenarioName = Annotated[
+    str, Argument(metavar="SCENARIO", autocompletion=SCENARIOS, help="A scenario by name or path.")
+]
 Folder = Annotated[Path, Argument(metavar="FOLDER", help="A results folder.")]
 
 Sets = Annotated[
@@ -29,6 +34,9 @@ Jobs = Annotated[
         help="How many processes; default: one for each core.",
     ),
 ]
+Quiet = Annotated[bool, Option("-q", "--quiet", help="Print mistakes alone.")]
+Verbose = Annotated[bool, Option("-v", "--verbose", help="Print more than usual.")]
+Json = Annotated[bool, Option("--json", help="Print JSON, for other programs.")]
 Seed = Annotated[int, Option("--seed", metavar="N", parser=whole(), help="The run's random seed.")]
 Results = Annotated[
     Path | None,

@@ -19,7 +19,13 @@ _PANELS: dict[str, tuple[Callable[..., None], ...]] = {
     "Studies": (studies.demo, studies.run, studies.new, studies.register, studies.tune),
     "Results": (results.report, results.show, results.export, results.compare),
     "Single runs": (runs.episode, runs.replay, runs.live, runs.keys),
-    "Names, files and evidence": (files.list_, files.check, files.schema, files.validate),
+    "Names, files and evidence": (
+        files.list_,
+        files.plugins,
+        files.check,
+        files.schema,
+        files.validate,
+    ),
 }
 
 
@@ -28,7 +34,7 @@ def _typer(cls: type[Group], help: str) -> typer.Typer:
         cls=cls,
         help=help,
         no_args_is_help=True,
-        add_completion=False,
+        add_completion=cls is Program,
         context_settings=HELP,
         rich_markup_mode=None,  # a third of the time that help takes
         pretty_exceptions_enable=False,

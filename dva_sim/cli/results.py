@@ -8,13 +8,17 @@ from typing import Annotated
 import typer
 from typer import Argument, Option
 
-from dva_sim.cli.options import Folder
+from dva_sim.cli.options import Folder, Json, Quiet, Verbose
+from dva_sim.cli.printing import print_json
 from dva_sim.cli.values import whole
+from dva_sim.loudness import loudness
 
 
 def report(
     folder: Folder,
     pdf: Annotated[bool, Option("--pdf", help="As PDF too, for print.")] = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
 ) -> None:
     """Make the report of a results folder again.
 
@@ -24,10 +28,13 @@ def report(
     Examples:
         dva-sim report results/req-rep-vs-pub-sub --pdf  # and report.pdf for print
     """
+    from dva_sim.experiments.details import WRITTEN, tell_files
     from dva_sim.experiments.report import write_report
 
-    page = write_report(folder, pdf)
-    typer.echo(f"Report: {page}{' and report.pdf' if pdf else ''}")
+    with loudness(quiet, verbose):
+        page = write_report(folder, pdf)
+        tell_files(folder, *WRITTEN)
+        typer.echo(f"Report: {page}{' and report.pdf' if pdf else ''}")
 
 
 def show(
@@ -40,6 +47,7 @@ def show(
     columns: Annotated[
         bool, Option("--columns", help="Say what the columns mean, of one table or all.")
     ] = False,
+    as_json: Json = False,
 ) -> None:
     """Show a results folder in the terminal.
 
@@ -50,11 +58,22 @@ def show(
         dva-sim show small  # the answer and every cell
         dva-sim show small --table events --rows 5  # the first rows of a table
         dva-sim show small --columns  # what the columns of every table mean
+        dva-sim show small --json  # the same for other programs
     """
-    from dva_sim.experiments import showing_console
+    from dva_sim.experiments import results_json, showing_console
     from dva_sim.experiments.unfinished import load_so_far
 
-    showing_console.show(load_so_far(folder), table, columns, rows)
+    results = load_so_far(folder)
+    if not as_json:
+        showing_console.show(results, table, columns, rows)
+    elif columns:
+        print_json(results_json.columns(results, [] if table is None else [table]))
+    else:
+        print_json(
+            results_json.shown(results)
+            if table is None
+            else results_json.table(results, table, rows)
+        )
 
 
 def export(
@@ -105,6 +124,7 @@ def compare(
         list[str] | None,
         Option(metavar="CONDITION", help="Exit with 4 if it holds; may be given again."),
     ] = None,
+    as_json: Json = False,
 ) -> None:
     """Compare two results folders, run by run.
 
@@ -118,4 +138,6 @@ def compare(
     """
     from dva_sim.experiments import showing_console
 
-    raise typer.Exit(showing_console.compare(first, second, measure or [], by or [], fail_if or []))
+    asked = showing_console.Asked(measure or [], by or [], fail_if or [])
+    tell = print_json if as_json else None
+    raise typer.Exit(showing_console.compare(first, second, asked, tell))

@@ -8,19 +8,23 @@ from typing import Annotated
 import typer
 from typer import Argument, Option
 
+from dva_sim.cli.completing import one_of
 from dva_sim.cli.options import (
     At,
     Camera,
     Inset,
     Panels,
+    Quiet,
     ScenarioName,
     Seed,
     Sets,
     Still,
     Strip,
+    Verbose,
     Video,
 )
 from dva_sim.cli.values import number, whole
+from dva_sim.loudness import loudness
 
 _MOST_PORT = 64_999
 
@@ -44,6 +48,8 @@ def episode(
         Path | None,
         Option(metavar="FILE", help="Keep the run as a file: .mcap, for replay and viewers."),
     ] = None,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
 ) -> None:
     """Run one scenario and tell its story.
 
@@ -58,7 +64,7 @@ def episode(
     from dva_sim.experiments.pictures import Wanted
 
     pictures = Wanted(video, still, strip, at, panels, camera, inset)
-    with mistakes_of(scenario, set_ or [], seed):
+    with loudness(quiet, verbose), mistakes_of(scenario, set_ or [], seed):
         console.episode(scenario, seed, set_ or [], side_by_side, pictures, record)
 
 
@@ -74,6 +80,8 @@ def replay(
     ros2: Annotated[
         Path | None, Option(metavar="FOLDER", help="Write a ROS 2 bag; the folder is new.")
     ] = None,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
 ) -> None:
     """Tell and draw a recorded run from its file alone.
 
@@ -84,13 +92,19 @@ def replay(
     from dva_sim.experiments import replaying
     from dva_sim.experiments.pictures import Wanted
 
-    replaying.replay(file, Wanted(video, still, strip, at, panels, camera, inset), ros2)
+    with loudness(quiet, verbose):
+        replaying.replay(file, Wanted(video, still, strip, at, panels, camera, inset), ros2)
 
 
 def live(
     scenario: ScenarioName,
     only: Annotated[
-        str | None, Option(metavar="dva|world|operator", help="Run one part alone.")
+        str | None,
+        Option(
+            metavar="dva|world|operator",
+            autocompletion=one_of("dva", "world", "operator"),
+            help="Run one part alone.",
+        ),
     ] = None,
     which: Annotated[
         int,
@@ -103,7 +117,11 @@ def live(
     ] = 1,
     operators: Annotated[
         str,
-        Option(metavar="simulated|scripted", help="Who drives."),
+        Option(
+            metavar="simulated|scripted",
+            autocompletion=one_of("simulated", "scripted"),
+            help="Who drives.",
+        ),
     ] = "simulated",
     dva: Annotated[
         str | None,
@@ -141,6 +159,8 @@ def live(
     ] = None,
     seed: Seed = 1,
     set_: Sets = None,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
 ) -> None:
     """Run a scenario in real time, over sockets.
 
@@ -158,10 +178,11 @@ def live(
     options = Options(
         scenario, changes, seed, operators, host, dva, port, keys, record, state, seconds
     )
-    if only is None:
-        console.run_all(options)
-    else:
-        console.run_one(only, options, which)
+    with loudness(quiet, verbose):
+        if only is None:
+            console.run_all(options)
+        else:
+            console.run_one(only, options, which)
 
 
 def keys(

@@ -7,10 +7,16 @@ from typing import Annotated
 
 from typer import Argument, Option
 
+from dva_sim.cli.completing import SITES
 from dva_sim.cli.values import whole
 
 SiteName = Annotated[
-    str, Argument(metavar="SITE", help="A site by name or path, or a ROS map by path.")
+    str,
+    Argument(
+        metavar="SITE",
+        autocompletion=SITES,
+        help="A site by name or path, or a ROS map by path.",
+    ),
 ]
 SiteSets = Annotated[
     list[str] | None,

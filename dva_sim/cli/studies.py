@@ -8,8 +8,9 @@ from typing import Annotated
 import typer
 from typer import Option
 
-from dva_sim.cli.options import Jobs, Results, Sets, StudyName
+from dva_sim.cli.options import Jobs, Quiet, Results, Sets, StudyName, Verbose
 from dva_sim.cli.values import number, whole
+from dva_sim.loudness import loudness
 
 
 def demo(
@@ -64,6 +65,8 @@ def run(
         ),
     ] = None,
     dry_run: Annotated[bool, Option("--dry-run", help="Only say what would run.")] = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
 ) -> None:
     """Run a study, or go on with it, and write its report.
 
@@ -81,10 +84,12 @@ def run(
     changes = [*(set_ or []), *([f"seed={seed}"] if seed is not None else [])]
     variant = Variant.of(quick=quick, full=full, pilot=pilot)
     workers = running.Workers(jobs, scheduler, limit)
-    if dry_run:
-        running.plan(study, changes, out, workers, variant)
-        return
-    raise typer.Exit(running.run(study, changes, out, workers, variant))
+    with loudness(quiet, verbose):
+        if dry_run:
+            running.plan(study, changes, out, workers, variant)
+            return
+        code = running.run(study, changes, out, workers, variant)
+    raise typer.Exit(code)
 
 
 def new(
@@ -123,7 +128,13 @@ def register(
     typer.echo(write_down(load_study(study, version="full" if full else None), again))
 
 
-def tune(study: StudyName, out: Results = None, jobs: Jobs = None) -> None:
+def tune(
+    study: StudyName,
+    out: Results = None,
+    jobs: Jobs = None,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> None:
     """Choose the values that a study has tuned.
 
     They are tried on persons who take no part in the study, and kept beside it.
@@ -133,4 +144,6 @@ def tune(study: StudyName, out: Results = None, jobs: Jobs = None) -> None:
     """
     from dva_sim.experiments import running
 
-    raise typer.Exit(running.tune(study, out, jobs))
+    with loudness(quiet, verbose):
+        code = running.tune(study, out, jobs)
+    raise typer.Exit(code)

@@ -50,9 +50,8 @@ def tell(
     console.print(f"\n{escape(_changed(comparison))}", soft_wrap=True)
 
 
-def tell_verdicts(verdicts: Iterable[Verdict], console: Console) -> bool:
-    """Say of each condition where it holds; whether any does."""
-    failed = False
+def tell_verdicts(verdicts: Iterable[Verdict], console: Console) -> None:
+    """Say of each condition where it holds."""
     for _, group in groupby(verdicts, key=lambda verdict: verdict.gate.text):
         each = list(group)
         worst = [verdict for verdict in each if verdict.holds]
@@ -60,8 +59,6 @@ def tell_verdicts(verdicts: Iterable[Verdict], console: Console) -> bool:
         console.print(f"{word}: {escape(each[0].gate.text)}", soft_wrap=True)
         for verdict in worst or each:
             console.print(f"  {escape(_verdict(verdict))}", soft_wrap=True)
-        failed = failed or bool(worst)
-    return failed
 
 
 def _verdict(verdict: Verdict) -> str:

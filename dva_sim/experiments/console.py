@@ -11,9 +11,7 @@ from typing import Any
 
 from rich.console import Console
 from rich.markup import escape
-from rich.table import Table
 
-from dva_sim import resources
 from dva_sim import scenario as scenarios
 from dva_sim.changing import parse_changes
 from dva_sim.errors import ConfigError
@@ -72,7 +70,9 @@ def episode(
     if record is not None and not isinstance(scenario, Scenario):
         raise ConfigError(f"{name} is a {scenario.model} scenario: only full ones are recorded")
     if isinstance(scenario, TimedScenario | TransportScenario):
-        if pictures.any or side_by_side is not None:
+        if side_by_side is not None:
+            raise ConfigError(f"{name} is a {scenario.model} scenario: only full ones run twice")
+        if pictures.any:
             raise ConfigError(f"{name} is a {scenario.model} scenario: there is nothing to see")
         if isinstance(scenario, TransportScenario):
             told.tell(scenario, seed, where)
@@ -157,33 +157,3 @@ def _tell(
     telling.tell_story(recording, where)
     telling.tell_outcome(tables, f"simulated in {took:.2f} s", where)
     return recording, tables
-
-
-# --- names -----------------------------------------------------------------------------
-
-
-def list_all() -> None:
-    """Everything that can be named in a configuration."""
-    from dva_sim.agents.operator.strategies import known_strategies
-    from dva_sim.agents.tilt import known_filters, known_mappings
-    from dva_sim.core.dispatch import known_policies
-
-    from_files = {
-        "studies": "experiments",
-        "scenarios": "experiments/scenarios",
-        "tasks (tasks/NAME)": "experiments/scenarios/tasks",
-        "sites": "worlds",
-        "phones (phone.profile)": "agents/phones",
-        "accelerometers": "agents/accelerometers",
-        "robots": "agents/robots",
-        "people": "agents/people",
-    }
-    table = Table(box=None, pad_edge=False, show_header=False)
-    for title, folder in from_files.items():
-        table.add_row(title, ", ".join(sorted(resources.available(folder))))
-    table.add_row("patterns", ", ".join(PATTERNS))
-    table.add_row("operators", ", ".join(known_strategies()))
-    table.add_row("filters", ", ".join(known_filters()))
-    table.add_row("mappings", ", ".join(known_mappings()))
-    table.add_row("policies", ", ".join(known_policies()))
-    console.print(table)

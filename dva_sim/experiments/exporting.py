@@ -68,6 +68,13 @@ def _files(
         if form not in (None, ending) or len(tables) > 1:
             raise ConfigError(f"{out} is one {ending} file; give a folder for several, or another")
         return {out: _writer(results, tables[0] if tables else "runs", ending)}
+    if out.suffix and not out.is_dir():
+        allowed = either(f".{name}" for name in FORMATS)
+        raise ConfigError(f"{out} should end in {allowed}; a folder for all tables has no ending")
+    if out.is_file():
+        raise ConfigError(
+            f"{out} is a file; give a folder, or a name that ends in .csv or .parquet"
+        )
     names, ending = tables or results.tables, form or "csv"
     files = {out / f"{name}.{ending}": _writer(results, name, ending) for name in names}
     return files | {out / DICTIONARY: partial(_write_dictionary, results, names)}

@@ -14,16 +14,20 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn
 
+from dva_sim.errors import error_line
 from dva_sim.exit_codes import ExitCode
 from dva_sim.experiments.console import console, say, warn
 from dva_sim.experiments.design import Cell
 from dva_sim.experiments.designs import runs_of, size
+from dva_sim.experiments.details import WRITTEN, tell_cells, tell_files
 from dva_sim.experiments.planning import DryRun, dry_run
 from dva_sim.experiments.pool import Episode
 from dva_sim.experiments.results import Results
 from dva_sim.experiments.study import Study, load_study
 from dva_sim.experiments.versions import Variant
+from dva_sim.loudness import detail, is_verbose
 
+_FEW = 5  # failures that are told one by one
 _MANY = 500  # configurations, which take some seconds to check
 _MANY_RUNS = 100_000  # whose list takes seconds, too
 _LINE_S = 30.0  # between two lines of progress in a file
@@ -55,6 +59,7 @@ def run(
     try:
         study, folder = _loaded(name, pairs, out, variant)
         cells = _checked(study)
+        tell_cells(study, cells)
         before = _planned(study, folder, workers, cells)
         with _shown("running", before.runs) as show:
             run_study(
@@ -70,6 +75,8 @@ def run(
         failures = _told_failures(results) + _recorded(study, folder, workers)
         with console.status("Writing the report ..."):
             report = write_report(folder)
+        tell_files(folder, *WRITTEN)
+        detail(f"{results.machine.get('cpu_s', 0):.1f} s of CPU time in all runs")
     except KeyboardInterrupt as stopped:
         return _stopped(stopped)
     say(f"Report: {report}")
@@ -98,6 +105,9 @@ def tune(name: str, out: Path | None, jobs: int | None) -> ExitCode:
             tuned = try_all(study, folder, jobs=jobs, progress=show)
     except KeyboardInterrupt as stopped:
         return _stopped(stopped)
+    for seen in tuned.seen:
+        when = ", ".join(f"{name} {level}" for name, level in seen.when.items())
+        detail(f"  {when}, {tuned.tuning.key} {seen.value:g}: {seen.mean:.4g}")
     for choice in tuned.chosen:
         when = ", ".join(f"{name} {level}" for name, level in choice.when.items())
         say(f"{when}: {tuned.tuning.key} {choice.value:g}")
@@ -110,7 +120,9 @@ def plan(name: str, pairs: list[str], out: Path | None, workers: Workers, varian
     study, folder = _loaded(name, pairs, out, variant)
     from dva_sim.experiments.episode import run_job
 
-    say(escape(_time(_planned(study, folder, workers, _checked(study), run_job))))
+    cells = _checked(study)
+    tell_cells(study, cells)
+    say(escape(_time(_planned(study, folder, workers, cells, run_job))))
 
 
 def _loaded(name: str, pairs: list[str], out: Path | None, variant: Variant) -> tuple[Study, Path]:
@@ -180,11 +192,13 @@ def _counted(number: int, one: str, many: str | None = None) -> str:
 
 def _told_failures(results: Results) -> int:
     failures = results.failures
-    for f in failures[:5]:
+    for f in failures if is_verbose() else failures[:_FEW]:
         where = f"{f['part']}, cell {f['cell']}, person {f['person']}, trial {f['trial']}"
         say(f"[red]failed:[/red] {where}: {escape(str(f['error']).splitlines()[-1])}")
     if failures:
-        say(f"[red]{len(failures)} runs failed[/red]; the same command tries them again")
+        failed = _counted(len(failures), "run")
+        problem = f"{failed} failed; the same command tries again"
+        print(error_line(problem), file=sys.stderr)
     return len(failures)
 
 
@@ -200,8 +214,11 @@ def _recorded(study: Study, folder: Path, workers: Workers) -> int:
         problems = record_study(
             study, folder, jobs=workers.jobs, progress=show, limit_s=workers.limit_s
         )
-    for problem in problems[:5]:
+    for problem in problems if is_verbose() else problems[:_FEW]:
         say(f"[red]not recorded:[/red] {escape(problem)}")
+    if problems:
+        failed = _counted(len(problems), "run")
+        print(error_line(f"{failed} could not be recorded"), file=sys.stderr)
     return len(problems)
 
 

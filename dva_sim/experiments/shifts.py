@@ -10,6 +10,9 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from dva_sim.experiments.details import tell_measures
+from dva_sim.experiments.dispatch.measures import tables
+from dva_sim.loudness import is_verbose
 from dva_sim.timed import TimedRecording, TimedScenario, simulate_timed
 from dva_sim.timed.ledger import OUTCOMES
 
@@ -33,6 +36,8 @@ def tell(scenario: TimedScenario, seed: int, console: Console) -> None:
         f"{broken} rules broken",
         soft_wrap=True,
     )
+    if is_verbose() and scenario.keep == "events":
+        tell_measures(tables(recording)["runs"][0], "timed")
 
 
 def _table(recording: TimedRecording) -> Table:

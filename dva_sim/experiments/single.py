@@ -83,7 +83,8 @@ def episode(
         panels: Moments in a strip.
         camera: The still shows what this robot's camera sees.
         inset: Show in the film what a robot's camera sees.
-        side_by_side: Draw the same seed under two patterns; the episode is that of the first.
+        side_by_side: Run and draw the same seed under two patterns; the episode is that of the
+            first.
         record: Keep the run as a file: `.mcap`.
 
     Raises:

@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from dva_sim.experiments.details import tell_measures
 from dva_sim.experiments.models import Tables
 from dva_sim.experiments.verdicts import story
 from dva_sim.simulation import Playback
@@ -65,6 +66,7 @@ def tell_outcome(tables: Tables, how: str, console: Console) -> None:
         )
     for line in ("", *lines):
         console.print(line, soft_wrap=True)
+    tell_measures(row, "full")
 
 
 def _event(row: Row) -> str:

@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from dva_sim.experiments.details import tell_measures
 from dva_sim.experiments.figures.style import FAINT, INK, SOFT, panels, styled
 from dva_sim.experiments.labels import capital
 from dva_sim.tasks import TaskScenario, Trace, play, trace_of
@@ -68,6 +69,7 @@ def tell(scenario: TaskScenario, seed: int, console: Console) -> None:
         failures = row["plugin_failures"]
         console.print(f"{failures} times a strategy or filter of yours gave no answer")
     console.print(f"{row['simulated_s']:.0f} s simulated in {took:.2f} s", soft_wrap=True)
+    tell_measures(row, "task")
 
 
 def _count(trials: int) -> str:

@@ -13,9 +13,11 @@ from rich.table import Table
 from rich.text import Text
 
 from dva_sim.core.registry import DETECTOR
-from dva_sim.live.options import Options
+from dva_sim.live import process
+from dva_sim.live.options import PARTS, Options
 from dva_sim.live.process import Report, run_part
 from dva_sim.live.supervisor import Summary, Supervisor
+from dva_sim.loudness import detail, is_verbose
 from dva_sim.network.sockets import DEFAULT_PORT
 from dva_sim.scenario import contradictions
 
@@ -150,6 +152,9 @@ def run_one(part: str, options: Options, number: int) -> None:
     warn(console, options)
     if options.dva is None and (part != "dva" or not options.port):
         options = replace(options, dva=DEFAULT_DVA)
+    options.check()
+    if part in PARTS and part != "dva":
+        _print(console, f"Looking for the DVA at {options.dva} for {process.PATIENCE:g} s ...")
     with Live(console=console, refresh_per_second=4, transient=True) as screen:
 
         def say(report: Report) -> None:
@@ -186,9 +191,10 @@ def _conclude(console: Console, board: Board, summary: Summary) -> None:
     console.print(board.table())
     _print(console, f"The run ended ({summary.why}): {board.state_of_events()}.")
     counters: dict[str, int] = {}
-    for report in summary.latest.values():
+    for part, report in summary.latest.items():
+        detail(f"  {part}: at most {1000 * report.lateness:.1f} ms late")
         for name, count in report.counters.items():
-            if "refused" in name or "not sent" in name or "form" in name:
+            if is_verbose() or "refused" in name or "not sent" in name or "form" in name:
                 counters[name] = counters.get(name, 0) + count
     for name, count in sorted(counters.items()):
         _print(console, f"  {name}: {count}")

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from dva_sim.changing import parse_changes, set_by
+from dva_sim.changing import blame, parse_changes, set_by
 from dva_sim.errors import ConfigError
 from dva_sim.scenario import Scenario, build, load
 
@@ -72,6 +74,26 @@ class Options:
             )
         return scenario
 
+    def check(self) -> Scenario:
+        """The scenario as `read` gives it, with everything placed once.
+
+        Raises:
+            ConfigError: see `read`; or the site has no place for the team.
+        """
+        from dva_sim.simulation import rehearse
+
+        scenario, document = self.read(), load(self.scenario)
+
+        def make(changes: Mapping[str, Any]) -> None:
+            rehearse(build(document, changes), self.seed)
+
+        try:
+            rehearse(scenario, self.seed)
+        except ConfigError as error:
+            found = blame(error, parse_changes(self.changes), make, document)
+            raise set_by(self.changes, found) from None
+        return scenario
+
     def _built(self) -> Scenario:
         document, changes = load(self.scenario), parse_changes(self.changes)
         try:
@@ -82,5 +104,5 @@ class Options:
 
 def _is_address(text: str) -> bool:
     """Whether it is a host and a port; the next port must be one, too."""
-    found = re.fullmatch(r"[^:\s]+(?::([0-9]{1,5}))?", text)
-    return found is not None and (found[1] is None or 0 < int(found[1]) < 65_535)
+    found = re.fullmatch(r"[^:\s]+:([0-9]{1,5})", text)
+    return found is not None and 0 < int(found[1]) < 65_535

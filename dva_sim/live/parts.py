@@ -20,6 +20,7 @@ from dva_sim.core.events import Event
 from dva_sim.core.memory import Memory
 from dva_sim.core.permissions import LOW_BITS, Permissions
 from dva_sim.errors import ConfigError
+from dva_sim.guesses import either
 from dva_sim.live.options import PARTS, Options
 from dva_sim.simulation.control_room import add_dva, add_operator
 from dva_sim.simulation.field import Field
@@ -41,6 +42,9 @@ class Part(Protocol):
 
     def settled(self) -> bool:
         """Whether, as far as this part knows, nothing more will happen."""
+
+    def has_company(self) -> bool:
+        """Whether anybody has ever answered, or come, whom this part is nothing without."""
 
     def finish(self) -> None:
         """Leave everything in a safe state; a moment is left for last words."""
@@ -116,6 +120,10 @@ class DvaPart:
         book = self._agent.desk.book
         return [*book.closed.values(), *book.open.values()]
 
+    def has_company(self) -> bool:
+        """See `Part`: some device has registered."""
+        return bool(self._agent.desk.registry.entries)
+
     def finish(self) -> None:
         """See `Part`: nobody drives any longer by our permission."""
         self._agent.close()
@@ -183,6 +191,12 @@ class WorldPart:
         reported = self._stage.clock.now > max(detected, default=0.0) + 2.0
         return reported and all(r.controller.owner is None for r in self._field.robots.values())
 
+    def has_company(self) -> bool:
+        """See `Part`: the DVA has answered one of those who are out here."""
+        robots = [robot.device for robot in self._field.robots.values()]
+        devices = [*robots, *(guard.device for guard in self._field.guards)]
+        return any(device.round_trips for device in devices)
+
     def finish(self) -> None:
         """See `Part`."""
         for trace in self._traces:
@@ -219,6 +233,10 @@ class OperatorPart:
         """See `Part`."""
         return self._agent.activity in ("done", "waiting")
 
+    def has_company(self) -> bool:
+        """See `Part`: the DVA has answered."""
+        return bool(self._agent.device.round_trips)
+
     def finish(self) -> None:
         """See `Part`: a robot that is still driven is told to stop."""
         self._agent.put_down()
@@ -231,10 +249,11 @@ def make_part(name: str, stage: Stage, options: Options, number: int) -> Part:
         ConfigError: the scenario has no such operator, or no place for its team.
     """
     if name not in PARTS:
-        raise ConfigError(f"--only {name!r} should be {', '.join(PARTS)}")
+        raise ConfigError(f"--only {name!r} should be {either(PARTS)}")
     if name == "operator" and not 1 <= number <= stage.scenario.operator.count:
         count = stage.scenario.operator.count
-        raise ConfigError(f"operator {number}: the scenario has operators 1 to {count}")
+        has = f"the scenario has {count or 'no'} operator{'s' * (count != 1)}"
+        raise ConfigError(f"--number {number}: {has}")
     makers: dict[str, Callable[[], Part]] = {
         "dva": lambda: DvaPart(stage, options),
         "world": lambda: WorldPart(stage, options),

@@ -13,6 +13,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, TextIO
 
+from dva_sim.errors import RunsFailed
 from dva_sim.live.options import Options
 from dva_sim.live.parts import DvaPart, Part, make_part
 from dva_sim.network.keys import KeyRing
@@ -24,6 +25,11 @@ from dva_sim.simulation.stage import Stage
 
 REPORT_PERIOD = 1.0  # [s]
 LAST_WORDS = 0.5  # between the end and closing the sockets [s]
+PATIENCE = 30.0  # of a part that is alone, with a DVA that does not answer [s]
+
+
+class NobodyThere(RunsFailed):
+    """A part has waited in vain for those whom it is nothing without."""
 
 
 @dataclass
@@ -65,6 +71,8 @@ def run_part(
 ) -> None:
     """Be one part until the end of the run, Ctrl-C, SIGTERM, or the end of standard input.
 
+    One that is alone gives up if it has heard of nobody for `PATIENCE`, or a DVA until the end.
+
     Args:
         name: `dva`, `world` or `operator`.
         options: What to run and where.
@@ -76,6 +84,7 @@ def run_part(
     Raises:
         ConfigError: scenario, keys or part are not as they should be.
         NetworkError: a port is taken.
+        NobodyThere: this part stayed alone.
     """
     scenario = options.read()
     ring = None if options.keys is None else KeyRing(options.keys)
@@ -93,13 +102,32 @@ def run_part(
         part = make_part(name, stage, options, number)
         reporter = _Reporter(name, number, stage, part, network)
         clock.every(REPORT_PERIOD, lambda: say(reporter.report()))
-        with _ending(clock, supervised):
-            clock.run(scenario.horizon_s if options.duration is None else options.duration)
+        lasts = scenario.horizon_s if options.duration is None else options.duration
+        patience = lasts if name == "dva" else min(PATIENCE, lasts)
+        with _ending(clock, supervised) as ending:
+            if not supervised:
+                clock.run(patience)
+                _refuse_to_be_alone(name, part, network.address(DVA), patience, ending)
+            if not ending.is_asked:
+                clock.run(lasts)
             part.finish()
             clock.run(clock.now + LAST_WORDS)
         say(reporter.report())
     finally:
         network.close()
+
+
+def _refuse_to_be_alone(
+    name: str, part: Part, dva: str | None, waited: float, ending: _ending
+) -> None:
+    if ending.is_asked or part.has_company():
+        return
+    if name == "dva":
+        raise NobodyThere(f"no device joined the DVA at {dva} within {waited:g} s")
+    raise NobodyThere(
+        f"no DVA answered at {dva} within {waited:g} s; start it there with --only dva, or say "
+        "with --dva where it is"
+    )
 
 
 def _time_of_day(clock: LiveClock) -> tuple[float, bool]:
@@ -162,9 +190,10 @@ class _ending:  # noqa: N801 - reads as a statement
 
     def __init__(self, clock: LiveClock, supervised: bool) -> None:
         self._clock, self._supervised = clock, supervised
+        self.is_asked = False
         self._reader, self._writer = socket.socketpair()
 
-    def __enter__(self) -> None:
+    def __enter__(self) -> _ending:
         self._writer.setblocking(False)
         self._before = signal.set_wakeup_fd(self._writer.fileno())
         self._handlers = {
@@ -174,8 +203,10 @@ class _ending:  # noqa: N801 - reads as a statement
         self._clock.watch(self._reader.fileno(), self._stop)
         if self._supervised:
             self._clock.watch(sys.stdin.fileno(), self._stop)
+        return self
 
     def _stop(self) -> None:
+        self.is_asked = True
         self._clock.unwatch(self._reader.fileno())
         if self._supervised:
             self._clock.unwatch(sys.stdin.fileno())

@@ -78,7 +78,7 @@ class Supervisor:
             PartFailed: a part could not start, or ended by itself.
             ConfigError: the scenario cannot be run live.
         """
-        scenario = self._options.read()
+        scenario = self._options.check()
         limit = scenario.horizon_s if self._options.duration is None else self._options.duration
         before = {
             number: signal.signal(number, self._interrupt)

@@ -139,11 +139,10 @@ class SocketNetwork:
             except zmq.ZMQError as error:
                 with suppress(zmq.ZMQError):
                     router.unbind(_text(router.last_endpoint))
-                if port:
+                if port or error.errno != zmq.EADDRINUSE:
                     self._discard(router, publisher)
-                    raise NetworkError(
-                        f"cannot listen on {host}, ports {port} and {port + 1}: {error}"
-                    ) from None
+                    ports = f", ports {port} and {port + 1}" if port else ""
+                    raise NetworkError(f"cannot listen on {host}{ports}: {error}") from None
             else:
                 break
         else:

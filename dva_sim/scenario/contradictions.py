@@ -12,12 +12,14 @@ from dva_sim.agents.modes import LEASE_S
 from dva_sim.scenario.patience import (
     command_needs_s,
     command_timeout_s,
+    mean_processing_s,
     request_timeout_s,
     round_trip_s,
     start_needs_s,
 )
-from dva_sim.scenario.profiles import phone_profile
+from dva_sim.scenario.profiles import phone_profile, site_of
 from dva_sim.scenario.scenario import Scenario
+from dva_sim.worlds.hazards import DETECTS
 
 _BITS = 8
 _OVER_TRACE = ("rate_bps",)
@@ -65,6 +67,7 @@ def _of_link(scenario: Scenario) -> Iterator[str]:
             f"robot.max_age_s {scenario.robot.max_age_s:g} is not above {answer:g} s, the age of "
             f"every command {why}: the robot refuses all of them; give more"
         )
+    yield from _of_computer(scenario)
     if needs > LEASE_S:
         yield (
             f"a robot ends a drive that is {LEASE_S:g} s without a command, and {why} (link."
@@ -77,6 +80,17 @@ def _of_link(scenario: Scenario) -> Iterator[str]:
                 yield f"link.{key} has no effect where link.trace_up or trace_down gives the rate"
 
 
+def _of_computer(scenario: Scenario) -> Iterator[str]:
+    """A robot that needs longer for a command than the next one takes to come."""
+    takes, rate = mean_processing_s(scenario), scenario.command.rate_hz
+    if scenario.pattern == "pub-sub" and takes * rate > 1:
+        yield (
+            f"robot.processing_s {takes:g} is longer than the time between two commands "
+            f"(command.rate_hz {rate:g}), and under pub-sub each of them is obeyed: they queue, "
+            "and a stop is obeyed ever later"
+        )
+
+
 def _of_pictures(scenario: Scenario) -> Iterator[str]:
     camera, down = scenario.camera, scenario.link.toward("down")
     wanted = camera.rate_hz * camera.frame_bytes * _BITS
@@ -85,6 +99,11 @@ def _of_pictures(scenario: Scenario) -> Iterator[str]:
             f"the camera sends {wanted / 1e3:g} kbit/s (camera.rate_hz x frame_bytes) over a link "
             f"of {down.rate_bps / 1e3:g} kbit/s (link.rate_bps): pictures will come late or not "
             "at all"
+        )
+    if camera.encode_s * camera.rate_hz > 1:
+        yield (
+            f"camera.rate_hz {camera.rate_hz:g} cannot be reached with camera.encode_s "
+            f"{camera.encode_s:g}: one picture is encoded at a time"
         )
 
 
@@ -141,6 +160,7 @@ def _of_time(scenario: Scenario) -> Iterator[str]:
                 f"events.{number}.at_s {event.at_s:g} is not before horizon_s {end:g}: the event "
                 "will not happen"
             )
+    yield from _of_detectors(scenario)
     for kind in ("outages", "partitions"):
         for number, gap in enumerate(getattr(scenario.link, kind)):
             if gap.from_s >= end:
@@ -148,6 +168,18 @@ def _of_time(scenario: Scenario) -> Iterator[str]:
                     f"link.{kind}.{number}.from_s {gap.from_s:g} is not before horizon_s {end:g}: "
                     "it will not happen"
                 )
+
+
+def _of_detectors(scenario: Scenario) -> Iterator[str]:
+    """Events that nobody reports and no detector of the site can notice."""
+    unreported = [(n, event) for n, event in enumerate(scenario.events) if not event.reported]
+    there = {d.kind for d in site_of(scenario, seed=0).detectors} if unreported else set()
+    for number, event in unreported:
+        if there.isdisjoint(DETECTS[event.kind]):
+            yield (
+                f"events.{number}.reported is false, and the site has no detector for a "
+                f"{event.kind.replace('_', ' ')}: the DVA will not hear of it"
+            )
 
 
 def _moves_robots(scenario: Scenario) -> bool:

@@ -240,12 +240,13 @@ DRIVES: Final[dict[str, Callable[..., Drive]]] = {
     "three_way": ThreeWay,
 }
 
-_PLUGINS: Final = Plugins(
+PLUGINS: Final = Plugins(
     "drive",
     Drive,
     DRIVES,
     folder="agents/robots",
     group="dva_sim.drives",
+    key="drive",
     needs="accelerations(speed, turn_rate, now_speed, now_turn_rate, dt)",
     public="dva_sim.worlds.drives.Drive",
 )
@@ -253,7 +254,7 @@ _PLUGINS: Final = Plugins(
 
 def known_drives() -> list[str]:
     """Names that a profile can use: shipped and installed ones; files come on top."""
-    return _PLUGINS.known()
+    return PLUGINS.known()
 
 
 def load_drive(
@@ -272,12 +273,12 @@ def load_drive(
         ConfigError: there is none of that name, its file or package cannot be loaded, or it is
             not a drive; a bad option is told when it is made.
     """
-    factory, given = _PLUGINS.find(name, base), dict(options or {})
+    factory, given = PLUGINS.find(name, base), dict(options or {})
     if name in DRIVES and not given:
         return factory
 
     def make(spec: DriveSpec) -> Drive:
-        drive = _PLUGINS.make(name, factory, given, spec)
+        drive = PLUGINS.make(name, factory, given, spec)
         return drive if name in DRIVES else Guarded(drive)
 
     return make

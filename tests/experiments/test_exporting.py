@@ -79,6 +79,8 @@ def test_one_file_in_the_way_leaves_all_unwritten(results, tmp_path):
         ("all", [], "xls", "--format 'xls' should be csv or parquet"),
         ("one.csv", ["runs", "tracks"], None, "give a folder for several"),
         ("one.csv", [], "parquet", "is one csv file"),
+        ("x.xlsx", [], None, r"x\.xlsx should end in \.csv or \.parquet; a folder for all"),
+        ("x.json", ["runs"], "csv", r"x\.json should end in \.csv or \.parquet"),
     ],
 )
 def test_a_mistake_is_told_with_what_would_be_right(results, tmp_path, name, tables, form, problem):

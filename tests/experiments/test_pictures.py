@@ -474,3 +474,22 @@ def test_a_scene_fixed_at_a_moment_keeps_only_what_is_there_then(drill):
     children = figure.axes[0].get_children()
     assert not any(child.get_animated() for child in children)
     assert sum(not child.get_visible() for child in children) >= 3  # the hazards to come
+
+
+def test_what_is_told_below_a_map_is_no_wider_than_the_map(race):
+    run = replace(
+        race[0], endings=[Ending("confirmed", 19.0)] * 12, incidents=race[0].incidents * 12
+    )
+    other = replace(race[1], endings=[Ending("open", math.inf)] * 12, incidents=run.incidents)
+    run.recorder.tell(5.0, "operator-1", "tells at great length " * 5)
+    try:
+        for moment in (5.0, 20.0):
+            figure = still([run, other], moment)
+            lines = [t for ax in figure.axes[:2] for t in scene_lines(ax) if t.get_visible()]
+            shown = strip([run, other], [moment]).axes[:2]
+            lines += [t for ax in shown for t in scene_lines(ax) if t.get_visible()]
+            assert len(lines) == 4
+            for box in boxes_of(lines, figure.axes[0]):
+                assert box.x1 - box.x0 < figure.axes[0].bbox.width * 1.02
+    finally:
+        run.recorder.timeline.pop()

@@ -13,6 +13,7 @@ from dva_sim.errors import ConfigError
 from dva_sim.experiments.design import Job
 from dva_sim.experiments.report import write_report
 from dva_sim.experiments.results import Results
+from dva_sim.experiments.results_json import shown
 from dva_sim.experiments.runner import run_study
 from dva_sim.experiments.status import status_of
 from dva_sim.experiments.unfinished import load_so_far
@@ -73,6 +74,11 @@ def test_the_page_of_a_study_under_way_is_marked_partial_and_the_final_one_is_no
     assert status_of(load_so_far(out).manifest).kind == "exploratory"
     run_study(kit.study_in(tmp_path), out, jobs=1, episode=measured)
     assert "Partial:" not in write_report(out).read_text(encoding="utf-8")
+
+
+def test_as_data_it_says_how_much_is_there(stopped):
+    told = shown(load_so_far(stopped(after=kit.RUNS - 5)))
+    assert told["partial"] == {"done": kit.RUNS - 5, "of": kit.RUNS, "persons": told["persons"]}
 
 
 def test_looking_changes_nothing_in_the_folder(stopped, tmp_path):

@@ -83,6 +83,17 @@ def test_beyond_nine_seconds_of_round_trips_one_still_drives(delay_s: float) -> 
             "link.rate_bps has no effect",
             "trace_down gives the rate",
         ),
+        ({"camera__encode_s": 0.2}, "camera.rate_hz 10 cannot be reached", "camera.encode_s 0.2"),
+        (
+            {"pattern": "pub-sub", "robot__processing_s": 0.2},
+            "robot.processing_s 0.2 is longer",
+            "they queue",
+        ),
+        (
+            {"site__name": "hall", "events": [{"kind": "gas_leak"}]},
+            "events.0.reported is false",
+            "no detector for a gas leak",
+        ),
         ({"horizon_s": 5.0, "events": [{"kind": "fire", "at_s": 5}]}, "events.0.at_s 5", "not"),
         (
             {"link__outages": [{"from_s": 700, "for_s": 5}]},

@@ -229,12 +229,13 @@ FILTERS: Final[dict[str, Callable[..., Filter]]] = {
     "none": NoFilter,
 }
 
-_PLUGINS: Final = Plugins(
+PLUGINS: Final = Plugins(
     "filter",
     Filter,  # type: ignore[type-abstract]
     FILTERS,
     folder="agents/filters",
     group="dva_sim.filters",
+    key="phone.filter",
     needs="add(sample)",
     public="dva_sim.agents.tilt.Filter",
 )
@@ -242,7 +243,7 @@ _PLUGINS: Final = Plugins(
 
 def known_filters() -> list[str]:
     """Names that a phone can use: shipped and installed ones; files come on top."""
-    return _PLUGINS.known()
+    return PLUGINS.known()
 
 
 def load_filter(
@@ -261,12 +262,12 @@ def load_filter(
         ConfigError: there is none of that name, its file or package cannot be loaded, or it is
             not a filter; a bad option, `batch` or `age` is told when it is made.
     """
-    factory, given = _PLUGINS.find(name, base), dict(options or {})
+    factory, given = PLUGINS.find(name, base), dict(options or {})
 
     def make(period: float) -> Filter:
-        filter_ = _PLUGINS.make(name, factory, given, period)
+        filter_ = PLUGINS.make(name, factory, given, period)
         if name not in FILTERS:
-            _PLUGINS.ask(name, lambda: check_filter(filter_))
+            PLUGINS.ask(name, lambda: check_filter(filter_))
         return filter_
 
     return make

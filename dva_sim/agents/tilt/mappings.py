@@ -210,12 +210,13 @@ MAPPINGS: Final[dict[str, Callable[..., Mapping]]] = {
     "leaky": Leaky,
 }
 
-_PLUGINS: Final = Plugins(
+PLUGINS: Final = Plugins(
     "mapping",
     Mapping,  # type: ignore[type-abstract]
     MAPPINGS,
     folder="agents/mappings",
     group="dva_sim.mappings",
+    key="phone.mapping",
     needs="command(level, turn, dt)",
     public="dva_sim.agents.tilt.Mapping",
 )
@@ -223,7 +224,7 @@ _PLUGINS: Final = Plugins(
 
 def known_mappings() -> list[str]:
     """Names that a phone can use: shipped and installed ones; files come on top."""
-    return _PLUGINS.known()
+    return PLUGINS.known()
 
 
 def load_mapping(
@@ -242,5 +243,5 @@ def load_mapping(
         ConfigError: there is none of that name, its file or package cannot be loaded, or it is
             not a mapping; a bad option is told when it is made.
     """
-    factory, given = _PLUGINS.find(name, base), dict(options or {})
-    return lambda: _PLUGINS.make(name, factory, given)
+    factory, given = PLUGINS.find(name, base), dict(options or {})
+    return lambda: PLUGINS.make(name, factory, given)

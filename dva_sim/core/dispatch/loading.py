@@ -31,12 +31,13 @@ POLICIES: dict[str, Callable[..., Policy]] = {
     "random": RandomChoice,
 }
 
-_PLUGINS: Final = Plugins(
+PLUGINS: Final = Plugins(
     "policy",
     Policy,
     POLICIES,
     folder="agents/policies",
     group="dva_sim.policies",
+    key="dispatch.policy",
     needs="advise(situation, rng)",
     public="dva_sim.core.dispatch.Policy",
     hidden=frozenset({"oracle"}),  # that one needs to know the future
@@ -45,7 +46,7 @@ _PLUGINS: Final = Plugins(
 
 def known_policies() -> list[str]:
     """Names that a configuration can use: shipped and installed ones; files come on top."""
-    return _PLUGINS.known()
+    return PLUGINS.known()
 
 
 def load_policy(
@@ -64,4 +65,4 @@ def load_policy(
         ConfigError: there is none of that name, its file or package cannot be loaded, it is not
             a policy, or an option is unknown or bad. The line says what would be right.
     """
-    return _PLUGINS.make(name, _PLUGINS.find(name, base), options or {})
+    return PLUGINS.make(name, PLUGINS.find(name, base), options or {})

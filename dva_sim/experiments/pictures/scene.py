@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
+PLAIN, BOLD = 0.6, 0.68  # how wide a letter is on the average, at most [font sizes]
+
+
 class Scene:
     """A map that can show any moment of a run; a run that has ended stays as it was at its end.
 
@@ -50,7 +53,9 @@ class Scene:
         self._clock.set_animated(True)
         ax.set_title(title, fontsize=style.TITLE, fontweight="bold", loc="left", pad=2)
         self._told, self._ended = self._line(), self._line(_colour_of(verdict))
-        self._ended.set_text(verdict.told or " ")
+        self._ended.set(text=verdict.told, fontsize=style.FONT + 0.5)
+        if len(verdict.told) * BOLD * style.TITLE < self._across():
+            self._ended.set_fontsize(style.TITLE)
 
     def _draw_ground(self) -> tuple[Any, Any]:
         """The site; the limits of what is seen."""
@@ -93,9 +98,15 @@ class Scene:
         if self._verdict.text and time >= self._verdict.time:
             return ended
         timeline = self._moments.recording.recorder.timeline
-        self._told.set_text(_told(timeline, time) if self._outlook is None else self._outlook)
-        told: Artist = self._told
-        return told
+        told = _told(timeline, time) if self._outlook is None else self._outlook
+        self._told.set_text(_shortened(told, int(self._across() / (PLAIN * style.FONT))))
+        line: Artist = self._told
+        return line
+
+    def _across(self) -> float:
+        """Width of the map [points]."""
+        figure: Any = self._ax.figure
+        return float(self._ax.bbox.width * 72 / figure.dpi)
 
     def freeze(self, canvas: Any) -> None:
         """From now on draw what stands still as one sheet: the layout is final."""
@@ -147,3 +158,8 @@ def _told(timeline: Sequence[Moment], time: float) -> str:
     """The newest line of the story."""
     told = [m for m in timeline if m.time <= time and m.kind != "link"]
     return f"{told[-1].who} {told[-1].what}".replace("_", " ") if told else ""
+
+
+def _shortened(text: str, most: int) -> str:
+    """The text, or as many letters of it as there is room for."""
+    return text if len(text) <= most else f"{text[: most - 1].rstrip()}…"

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from rich.console import Console
 from rich.table import Table
 
+from dva_sim.experiments.details import tell_measures
 from dva_sim.experiments.transports.measures import Row
 from dva_sim.experiments.transports.run import simulate_transports
 from dva_sim.experiments.transports.scenario import TransportScenario
@@ -25,6 +26,7 @@ def tell(scenario: TransportScenario, seed: int, console: Console) -> None:
     for line in _lines(row):
         console.print(line, soft_wrap=True)
     console.print(f"{row['simulated_s']:.0f} s simulated in {took:.2f} s", soft_wrap=True)
+    tell_measures(row, "transports")
 
 
 def _flows(flows: list[Row]) -> Table:

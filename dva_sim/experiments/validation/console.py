@@ -9,6 +9,7 @@ from pathlib import Path
 from dva_sim.errors import ConfigError
 from dva_sim.exit_codes import ExitCode
 from dva_sim.experiments.validation.telling import say
+from dva_sim.loudness import detail
 
 WHAT = ("dispatch", "operators", "network")
 
@@ -56,6 +57,9 @@ def validate(
     """
     _refuse_foreign(what, cases, strategy, sockets)
     workers = jobs or os.cpu_count() or 1
+    detail(f"{what}, seed {seed}, {workers} processes{', quick' if quick else ''}")
+    for key, value in (("cases", cases), ("strategy", strategy), ("out", out)):
+        detail(f"  {key}: {'as shipped' if value is None else value}")
     try:
         if what == "dispatch":
             from dva_sim.experiments.validation.dispatch.console import validate_dispatch

@@ -29,12 +29,13 @@ STRATEGIES: Final[dict[str, Callable[..., Driver]]] = {
     "two_point": TwoPoint,
 }
 
-_PLUGINS: Final = Plugins[Driver](
+PLUGINS: Final = Plugins[Driver](
     "operator",
     Strategy,
     STRATEGIES,
     folder="agents/operators",
     group="dva_sim.operators",
+    key="operator.strategy",
     needs="drive(route, view, stop_before)",
     public="dva_sim.agents.operator.strategies.Strategy",
 )
@@ -42,7 +43,7 @@ _PLUGINS: Final = Plugins[Driver](
 
 def known_strategies() -> list[str]:
     """Names that a configuration can use: shipped and installed ones; files come on top."""
-    return _PLUGINS.known()
+    return PLUGINS.known()
 
 
 def load_strategy(
@@ -63,10 +64,10 @@ def load_strategy(
         ConfigError: there is none of that name, its file or package cannot be loaded, or it is
             not a strategy; a bad option is told when it is made.
     """
-    factory, given = _PLUGINS.find(name, base), dict(options or {})
+    factory, given = PLUGINS.find(name, base), dict(options or {})
 
     def make(person: Person, reach: Reach) -> Driver:
-        made = _PLUGINS.make(name, factory, given, person, reach)
+        made = PLUGINS.make(name, factory, given, person, reach)
         if name in STRATEGIES:
             return made
         if not isinstance(made, Strategy):  # its class may make something else of itself

@@ -1,0 +1,230 @@
+"""What commands print: lists that do not wrap, JSON alone for other programs, less and more."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+from small_study import cheap, study_in, unlucky
+
+from dva_sim.cli import call
+from dva_sim.cli.files import _LISTED
+from dva_sim.exit_codes import ExitCode
+from dva_sim.experiments import extending, listing
+from dva_sim.experiments.console import PATTERNS
+from dva_sim.experiments.planning import _Tried
+from dva_sim.experiments.runner import run_study
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture
+def say(capsys):
+    """Calls the program here: its exit code, its output, and its complaint."""
+
+    def run(*words):
+        code = call([str(word) for word in words])
+        said = capsys.readouterr()
+        return code, said.out, said.err
+
+    return run
+
+
+@pytest.fixture(scope="module")
+def folders(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("study")
+    study = study_in(folder)
+    episodes = {"right": runs_alone, "one failed": one_fails}
+    return [run_study(study, folder / n, jobs=1, episode=e) for n, e in episodes.items()]
+
+
+def runs_alone(job):
+    return {"runs": cheap(job)["runs"]}
+
+
+def one_fails(job):
+    return {"runs": unlucky(job)["runs"]}
+
+
+# --- list and plugins ------------------------------------------------------------------
+
+
+def test_a_list_has_a_line_for_each_name_with_what_it_is(say):
+    code, out, _ = say("list")
+    lines = out.splitlines()
+    assert code == 0
+    for line in ("fire-drill +Two robots, two guards", "min_eta +Oldest task", "latest-wins +Comm"):
+        assert any(re.match(f"  {line}", told) for told in lines)
+    everything = listing.everything()
+    assert len(lines) == sum(len(found) + 2 for found in everything.values()) - 1
+    assert all(entry.description for found in everything.values() for entry in found)
+
+
+def test_a_list_of_one_kind_or_none_that_there_is(say):
+    assert say("list", "sites")[1].splitlines()[0] == "sites"
+    assert "fire-drill" not in say("list", "sites")[1]
+    code, out, err = say("list", "scenario")
+    assert (code, out) == (2, "")
+    assert err == "error: there is no list of 'scenario'; did you mean 'scenarios'?\n"
+
+
+def test_a_terminal_cuts_what_it_has_no_room_for_and_a_pipe_does_not(monkeypatch, capsys):
+    monkeypatch.setenv("COLUMNS", "40")
+    listing.tell(["x" * 100])
+    assert capsys.readouterr().out == "x" * 100 + "\n"
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
+    listing.tell(["x" * 100, "y" * 40])
+    assert capsys.readouterr().out == "x" * 37 + "...\n" + "y" * 40 + "\n"
+
+
+def test_every_kind_that_is_listed_can_be_completed_and_every_pattern_is_told():
+    assert set(_LISTED) == listing.everything().keys()
+    assert listing.PATTERNS.keys() == set(PATTERNS)
+
+
+def test_plugins_are_told_by_kind_with_the_group_of_their_entry_points(say):
+    out = say("plugins")[1]
+    page = (ROOT / "agents" / "README.md").read_text(encoding="utf-8")
+    for several, plugins in extending.KINDS.items():
+        assert f"\n{several}\n" in f"\n{out}"
+        for told in (plugins.group, plugins.key, plugins.public, plugins.folder):
+            assert told in out
+            assert told in page
+    assert "dva-sim check policy mine.py:Mine" in out
+    assert "agents/policies/patrol.py" in out
+
+
+# --- JSON ------------------------------------------------------------------------------
+
+
+def test_lists_and_plugins_as_json_have_stable_keys(say):
+    _, out, err = say("list", "--json")
+    found = json.loads(out)
+    assert err == ""
+    assert list(found) == list(_LISTED)
+    entries = [entry for entries in found.values() for entry in entries]
+    assert {frozenset(entry) for entry in entries} == {frozenset({"name", "description", "file"})}
+    plugins = json.loads(say("plugins", "--json")[1])
+    keys = {"key", "entry_points", "class", "method", "shipped", "installed", "files"}
+    assert all(told.keys() == keys for told in plugins.values())
+
+
+def keys_on_the_page(call_):
+    """The keys that the page promises of a call, at any depth."""
+    page = (ROOT / "experiments" / "README.md").read_text(encoding="utf-8")
+    (row,) = [line for line in page.splitlines() if line.startswith(f"| `{call_}` |")]
+    return set(re.findall(r"`(\w+)`", row.split("|")[2]))
+
+
+def keys_in(data):
+    """All keys of JSON, but for names of factors, tables and columns of rows."""
+    if isinstance(data, list):
+        return set().union(*map(keys_in, data))
+    if not isinstance(data, dict):
+        return set()
+    own = {key: value for key, value in data.items() if key not in ("levels", "within", "data")}
+    return {*data, *keys_in(list(own.values()))}
+
+
+def test_results_as_json_have_the_keys_that_the_page_promises(say, folders):
+    results, failed = folders
+    shown = json.loads(say("show", results, "--json")[1])
+    assert keys_on_the_page("show FOLDER --json") <= keys_in(shown)
+    assert shown["runs"] == 42
+    assert {cell["part"] for cell in shown["cells"]} == {"drive", "story"}
+    assert shown["answer"]["finding"]["differences"][0].keys() == {"level", "mean", "low", "high"}
+
+    table = json.loads(say("show", results, "--table", "runs", "--rows", 3, "--json")[1])
+    assert table.keys() == keys_on_the_page("show FOLDER --table NAME --json") - {
+        *("name", "unit", "meaning"),
+    }
+    assert (table["rows"], len(table["data"])) == (42, 3)
+    assert list(table["data"][0]) == [column["name"] for column in table["columns"]]
+
+    columns = json.loads(say("show", results, "--columns", "--json")[1])
+    assert columns.keys() == {"folder", "tables"}
+    assert columns["tables"]["runs"][0]["name"] == "part"
+
+    compared = json.loads(say("compare", results, failed, "--json")[1])
+    assert keys_on_the_page("compare A B --json") - {"condition", "groups", "bound"} <= {
+        *keys_in(compared),
+    }
+    assert compared["b"]["failed"] == 1
+
+
+def test_a_gate_fails_in_json_as_it_does_in_words(say, folders):
+    results, _ = folders
+    code, out, err = say("compare", results, results, "--fail-if", "max(contacts) > 0", "--json")
+    (gate,) = json.loads(out)["gates"]
+    assert (code, err) == (ExitCode.GATE_FAILED, "")
+    assert (gate["condition"], gate["failed"]) == ("max(contacts) > 0", True)
+    assert gate["groups"][0].keys() == {"part", "levels", "a", "b", "bound", "failed"}
+
+
+def test_a_mistake_leaves_nothing_on_standard_output_for_a_program_to_trip_over(say, tmp_path):
+    code, out, err = say("show", tmp_path, "--json")
+    assert (code, out) == (2, "")
+    assert err.startswith("error: ")
+    assert err.count("\n") == 1
+
+
+# --- less and more ---------------------------------------------------------------------
+
+
+def test_an_episode_is_quiet_as_usual_or_tells_every_measure(say):
+    words = ("episode", "drive-to-event", "--set", "horizon_s=3")
+    assert say(*words, "-q") == (0, "", "")
+    usual, more = say(*words)[1], say(*words, "-v")[1]
+    assert "safety rules broken" in usual
+    assert len(more.splitlines()) > len(usual.splitlines()) + 40
+    assert re.search(r"\ntraffic_bytes +\d+ B +size of all messages on the network\n", more)
+
+
+def test_a_report_is_quiet_or_tells_its_files(say, folders):
+    results, _ = folders
+    assert say("report", results, "--quiet") == (0, "", "")
+    assert re.search(r"tables/runs\.parquet: [\d,]+ bytes\n", say("report", results, "-v")[1])
+
+
+def test_a_dry_run_tells_every_configuration_if_asked_to(say, tmp_path, monkeypatch):
+    monkeypatch.setattr("dva_sim.experiments.planning._tried", lambda *_: _Tried({}))
+    path = study_in(tmp_path).file
+    out = say("run", path, "--dry-run", "-v", "-o", tmp_path / "out")[1]
+    assert len(re.findall(r"^  (?:drive|story), (?:cell \d+|reference): ", out, re.M)) == 9
+    assert say("run", path, "--dry-run", "-q", "-o", tmp_path / "out") == (0, "", "")
+
+
+def test_runs_that_failed_are_told_on_standard_error_however_quiet(say, tmp_path, monkeypatch):
+    monkeypatch.setattr("dva_sim.experiments.episode.run_job", one_fails)
+    path = study_in(tmp_path).file
+    code, out, err = say("run", path, "-q", "-j", 1, "-o", tmp_path / "out")
+    assert (code, out) == (ExitCode.RUNS_FAILED, "")
+    assert err == "error: 1 run failed; the same command tries again\n"
+
+
+# --- completion ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("line", "found"),
+    [
+        ("dva-sim li", {"list", "live"}),
+        ("dva-sim run req", {"req-rep-vs-pub-sub"}),
+        ("dva-sim episode fire", {"fire-drill"}),
+        ("dva-sim episode tasks/fitts", {"tasks/fitts-lag", "tasks/fitts-tilt"}),
+        ("dva-sim site show ca", {"campus", "caparica"}),
+        ("dva-sim live fire-drill --only w", {"world"}),
+        ("dva-sim run --dry", {"--dry-run"}),
+        ("dva-sim list st", {"studies"}),
+    ],
+)
+def test_the_shell_completes_commands_options_and_names(monkeypatch, capsys, line, found):
+    monkeypatch.setenv("_DVA_SIM_COMPLETE", "complete_bash")
+    monkeypatch.setenv("COMP_WORDS", line)
+    monkeypatch.setenv("COMP_CWORD", str(len(line.split()) - 1))
+    with pytest.raises(SystemExit) as ended:
+        call([])
+    assert ended.value.code == 0
+    assert set(capsys.readouterr().out.split()) == found
