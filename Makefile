@@ -55,6 +55,7 @@ bench: $(BENCH)  ## the ratios that performance work is judged by
 
 clean:  ## remove the environment and all caches, keep results
 	@rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	@find dva_sim tests -name __pycache__ -prune -exec rm -rf {} +
 
 $(VENV):
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \

@@ -8,6 +8,7 @@ that it never waits for the leader, who reads them between its own tests.
 
 from __future__ import annotations
 
+import ctypes
 import json
 import os
 import signal
@@ -24,6 +25,7 @@ import pytest
 FIRST = ("live", "system")
 """Folders whose files are dear: the halves had better not meet there."""
 
+PR_SET_PDEATHSIG = 1  # prctl(2)
 LOOK_S = 0.05
 PATIENCE_S = 60.0  # with a helper that was told to stop
 GOOD = (pytest.ExitCode.OK, pytest.ExitCode.TESTS_FAILED, pytest.ExitCode.NO_TESTS_COLLECTED)
@@ -65,7 +67,7 @@ class Half:
 
     def _take(self, name: str) -> bool:
         try:
-            (self._folder / name.replace("/", "+")).touch(exist_ok=False)
+            (self._folder / f"{name.replace('/', '+')}.taken").touch(exist_ok=False)
         except FileExistsError:
             return False
         return True
@@ -77,6 +79,8 @@ class Helper(Half):
     def __init__(self, config: pytest.Config, folder: Path) -> None:
         super().__init__(folder, backwards=True)
         self._config, self._reports, self._leader = config, folder / "reports", os.getppid()
+        if sys.platform == "linux":
+            ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGINT)
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtest_protocol(self, item: pytest.Item) -> bool | None:
@@ -103,9 +107,7 @@ class Leader(Half):
         self._missing: set[str] = set()
         self._helper: subprocess.Popen[bytes]
 
-    @pytest.hookimpl(wrapper=True, trylast=True)
-    def pytest_runtestloop(self, session: pytest.Session) -> Iterator[None]:
-        self._missing = {item.nodeid for item in session.items}
+    def pytest_sessionstart(self) -> None:
         with (self._folder / "said").open("wb") as said:
             self._helper = subprocess.Popen(
                 [sys.executable, "-m", "pytest", *self._words()],
@@ -115,15 +117,19 @@ class Leader(Half):
                 stderr=subprocess.STDOUT,
                 start_new_session=True,  # Ctrl-C reaches it through its leader, once
             )
-        try:
-            done = yield
-            while self._is_at_work():
-                time.sleep(LOOK_S)
-            if self._missing:
-                pytest.exit(f"nobody ran {sorted(self._missing)}", returncode=3)
-        finally:
-            _end(self._helper)
+
+    @pytest.hookimpl(wrapper=True, trylast=True)
+    def pytest_runtestloop(self, session: pytest.Session) -> Iterator[None]:
+        self._missing = {item.nodeid for item in session.items}
+        done = yield
+        while self._is_at_work():
+            time.sleep(LOOK_S)
+        if self._missing and not (session.shouldfail or session.shouldstop):
+            pytest.exit(f"nobody ran {sorted(self._missing)}", returncode=3)
         return done
+
+    def pytest_sessionfinish(self) -> None:
+        _end(self._helper)
 
     def _words(self) -> list[str]:
         """Of the command that started this process, for the helper."""
