@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from textwrap import wrap
 
 import numpy as np
 from numpy.typing import NDArray
@@ -106,6 +107,12 @@ class Answer:
     lead: str
     depends: dict[str, str] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+
+    def __repr__(self) -> str:
+        """To be read: the answer in lines, and how much more there is to know."""
+        lines = wrap(self.lead, 100)
+        more = f"notes: {len(self.notes)}" if self.notes else ""
+        return "\n".join([*lines, more] if more else lines)
 
 
 def answer(finding: Finding) -> Answer:

@@ -215,6 +215,11 @@ class Comparison:
         runs = sum(len(self._rows(0, "runs", "seed", group).runs) for group in groups)
         return sum(len(self._shared(group)) for group in groups), runs
 
+    def __repr__(self) -> str:
+        folders = " with ".join(str(side.folder) for side in self.sides)
+        cells = f"{len(self.matched.pairs)} cells in both"
+        return f"Comparison of {folders}: {cells}; frame(measure, by), judge(fail_if), changed()"
+
     def _repr_html_(self) -> str:
         return self.frame()._repr_html_()
 

@@ -44,6 +44,12 @@ class Verdict:
     bound: float
     missing: tuple[float, float]
 
+    def __repr__(self) -> str:
+        word = "failed" if self.holds else "passed"
+        where = ", ".join([self.part, *(f"{name} {level}" for name, level in self.levels)])
+        numbers = f"A {self.first:.5g}, B {self.second:.5g}, bound {self.bound:.5g}"
+        return f"Verdict({word}: {self.gate.text}; {where}: {numbers})"
+
     @property
     def holds(self) -> bool:
         """Whether the condition holds, so that the comparison fails."""

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dva_sim.guesses import listed
+
 if TYPE_CHECKING:
     from duckdb import DuckDBPyRelation
 
@@ -50,7 +52,7 @@ class Frame(dict[str, Array]):
         return connection.table("rows")
 
     def __repr__(self) -> str:
-        return f"Frame of {self.rows} rows: {', '.join(self)}"
+        return f"Frame of {self.rows} rows, {len(self)} columns: {listed(self)}"
 
     def _repr_html_(self) -> str:
         heads = "".join(f"<th>{escape(name)}</th>" for name in self)

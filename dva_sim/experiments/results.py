@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from html import escape
 from pathlib import Path
+from textwrap import shorten
 from typing import TYPE_CHECKING, Any
 
 from dva_sim.errors import ConfigError
@@ -234,6 +235,18 @@ class Results:
     def _seen(self) -> set[str]:
         """Tables that were found as written."""
         return set()
+
+    def __repr__(self) -> str:
+        """What it is and what to ask it for, without any table being read."""
+        runs, cells = self.manifest.get("runs", 0), len(self.manifest.get("cells", ()))
+        failed = f", {len(self.failures)} failed" if self.failures else ""
+        return "\n".join(
+            (
+                f"Results in {self.folder}: {runs} runs in {cells} configurations{failed}",
+                shorten(self.question, 100, placeholder=" ..."),
+                f"answer, failures, machine, report(), tables {', '.join(self.tables) or 'none'}",
+            )
+        )
 
     def _repr_html_(self) -> str:
         """What a notebook shows: question, answer, and how many runs stand behind it."""

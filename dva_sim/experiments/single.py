@@ -15,6 +15,7 @@ from dva_sim.experiments.frames import Frame, frame_of, plain
 from dva_sim.experiments.models import AnyScenario, Tables, model_of, tables_of
 from dva_sim.experiments.opening import mistakes_of
 from dva_sim.experiments.settings import Settings, pairs_of
+from dva_sim.guesses import listed
 from dva_sim.scenario import Scenario, contradictions
 
 if TYPE_CHECKING:
@@ -44,6 +45,14 @@ class Episode:
     def measures(self) -> dict[str, Any]:
         """The one row of the table of runs."""
         return {name: values.tolist()[0] for name, values in self.tables["runs"].items()}
+
+    def __repr__(self) -> str:
+        """What came out of it, and what to ask it for."""
+        told = {name: plain(value) for name, value in self.measures.items()}
+        some = listed(f"{name} {value}" for name, value in told.items() if value)
+        tables = ", ".join(f"{name} ({table.rows})" for name, table in self.tables.items())
+        head = f"Episode of a {self.scenario.model} scenario, seed {self.seed}"
+        return "\n".join((head, f"measures: {some}", f"tables: {tables}"))
 
     def _repr_html_(self) -> str:
         told = describe("runs", list(self.measures), [self.scenario.model], [])

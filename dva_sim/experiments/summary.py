@@ -54,6 +54,9 @@ class Reading:
         self.manifest, self.study = results.manifest, results.study
         self._tables: dict[str, Table] = {}
 
+    def __repr__(self) -> str:
+        return f"Reading of {self.results.folder}"
+
     def table(self, name: str) -> Table:
         """Columns of a table; nothing where the study has no such table."""
         if name not in self._tables:
