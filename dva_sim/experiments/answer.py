@@ -276,10 +276,7 @@ def _what_misses_count(f: Finding) -> str:
     if f.measure not in ("drive_time_s", "confirmation_mean_s"):
         return "Such a run counts with what was measured until it ended."
     horizon = f" ({quantity(f.horizon, 's')})" if f.horizon is not None else ""
-    return (
-        f"Such a run counts with all the time it was given{horizon}, which says less than that "
-        "the event was missed."
-    )
+    return f"Such a run counts with all the time it was given{horizon}."
 
 
 def _what_is_measured(f: Finding) -> str:

@@ -220,8 +220,8 @@ def _figures(reading: Reading, drawn: Sequence[Drawn]) -> Iterator[Block]:
         return
     yield Heading("Figures")
     reads = dict.fromkeys(chain.from_iterable(figure.reads for figure in drawn))
-    told = [f"Of part {reading.view.part.name}, unless the title names another one", *reads]
-    yield Words(f"{'; '.join(told)}.")
+    part = f"All are of part {reading.view.part.name} unless the title names another one."
+    yield Words(" ".join([part, *reads]))
     yield from map(Shown, drawn)
 
 

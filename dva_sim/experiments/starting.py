@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 
 from dva_sim.errors import ConfigError, DvaSimError
@@ -34,8 +35,21 @@ def write_study(name: str) -> Path:
 
 
 def told(path: Path) -> str:
-    """What can be done with a new study."""
-    steps = [
-        f"dva-sim {step}" for step in (f"check {path}", f"run {path} --dry-run", f"run {path}")
-    ]
-    return "\n  ".join([f"Wrote {path}. It runs as it stands:", *steps])
+    """What to do next with a new study."""
+    steps = (
+        ("check", "finds mistakes"),
+        ("run --dry-run", "how many runs that is, and how long they take"),
+        ("register", "fixes its hypotheses, so that the run confirms or refutes them"),
+        ("run", "makes the runs and the report"),
+    )
+    commands = [" ".join(["dva-sim", *_with_file(step, path)]) for step, _ in steps]
+    width = max(map(len, commands))
+    lines = [f"  {c:{width}}  # {why}" for c, (_, why) in zip(commands, steps, strict=True)]
+    ready = f"Wrote {path}. It works as it stands; its comments say what can be changed. Next:"
+    return "\n".join([ready, *lines])
+
+
+def _with_file(step: str, path: Path) -> list[str]:
+    """The words of a command, the file behind the first."""
+    verb, *options = step.split()
+    return [verb, shlex.quote(str(path)), *options]

@@ -73,10 +73,10 @@ def _what_panels_are(view: View) -> str:
     if len(view.panels) < 2:
         return ""
     names = listing([factor_name(name) for name in view.panels[0]])
-    words = f"panels, {names}"
+    words = f"Panels: {names}"
     if len(view.shown) == len(view.panels):
-        return words
-    return f"{words} ({len(view.shown)} of {len(view.panels)} settings; the tables hold them all)"
+        return f"{words}."
+    return f"{words} ({len(view.shown)} of {len(view.panels)} settings; the tables hold them all)."
 
 
 def _cadences(view: View, scenario: Mapping[str, Any]) -> effect.CadenceOf:

@@ -199,9 +199,9 @@ def _side_by_side(view: View, lines: tuple[Level, ...]) -> list[tuple[Level, flo
 
 def _intervals_words(view: View) -> str:
     if has_lines(view):
-        return "shaded, the 95 % band of a line; bars, the 95 % interval of each level alone"
+        return "Shaded: the 95 % band of a line. Bars: the 95 % interval of each level alone."
     return (
-        "thin bars, the 95 % band of all places of a mark; thick bars, the interval of each alone"
+        "Thin bars: the 95 % band of all places of a mark. Thick bars: the interval of each alone."
     )
 
 

@@ -89,7 +89,9 @@ def _what(view: View, episode: Episode) -> str:
     return f"{measure_name(view.measure)} {value}{where}"
 
 
-_READS = "typical and worst run: six moments, the way so far, a nose where an agent heads"
+_READS = (
+    "Typical and worst run: six moments with the way so far; a nose shows where an agent heads."
+)
 
 
 def _caption(view: View, episode: Episode, which: str) -> str:

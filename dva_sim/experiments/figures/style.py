@@ -75,7 +75,7 @@ class Drawn:
         name: Its file name without an ending.
         title: What is seen.
         caption: How to read it.
-        reads: What else must be known to read it, in words that other figures share.
+        reads: What else must be known to read it, in sentences that other figures share.
         svg: The figure as vectors.
         png: The same as pixels.
         csv: The numbers behind it; empty where none were written down.
@@ -227,7 +227,7 @@ def fit_to(axes: Axes, values: Floats) -> str:
     axes.set_ylim(low, high)
     if (low, high) == (bottom, top):
         return ""
-    return "bands and bars that go far beyond what any person did are cut"
+    return "Bands and bars that go far beyond what any person did are cut."
 
 
 def hatch_stops(axes: Axes, stops: Sequence[int]) -> None:
@@ -242,7 +242,7 @@ def hatch_words(view: View) -> str:
     """What the hatching means, if a panel has any."""
     if not any(view.stops_outside(panel) for panel in view.shown):
         return ""
-    return "hatched, at least one line is extrapolated there (marked † in the tables)"
+    return "Hatched: at least one line is extrapolated there (marked † in the tables)."
 
 
 def panel_grid(view: View, height: float) -> tuple[Figure, list[Axes]]:
