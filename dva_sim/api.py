@@ -1,8 +1,8 @@
 """What the command line does, for programs and notebooks: `import dva_sim; dva_sim.run(...)`.
 
 Commands and options have the same names, and the results are the same bytes; a limit in seconds
-is `limit_s`, and `--dry-run` a function. Only `show` prints; mistakes are `DvaSimError`. A script
-needs no `if __name__ == "__main__"` around it.
+is `limit_s`, and `--dry-run` a function. Only `show` prints, so nothing is quiet, verbose or JSON;
+mistakes are `DvaSimError`. A script needs no `if __name__ == "__main__"` around it.
 """
 
 from __future__ import annotations

@@ -59,11 +59,15 @@ class ConfigError(DvaSimError):
 
 
 ERROR = "error: "
+_LONGEST = 160  # characters of a word
 
 
 def error_line(problem: object) -> str:
     """A mistake as the command line says it: one line, whatever a name or a file in it holds."""
-    text = " ".join(str(problem).split())
+    words = (
+        word if len(word) <= _LONGEST else f"{word[:_LONGEST]}..." for word in str(problem).split()
+    )
+    text = " ".join(words)
     return ERROR + "".join(
         c if c.isprintable() else c.encode("unicode_escape").decode() for c in text
     )

@@ -14,7 +14,7 @@ from dva_sim.checking.messages import READ_BYTES, check_message
 from dva_sim.checking.promises import said
 from dva_sim.checking.schemas import schema_text
 from dva_sim.checking.trials import TRIALS, Trial
-from dva_sim.errors import ConfigError
+from dva_sim.errors import ConfigError, error_line
 from dva_sim.exit_codes import ExitCode
 
 STDIN: Final = "-"
@@ -99,7 +99,7 @@ def _check_one(name: str) -> ExitCode:
     try:
         verdict = _judge(name)
     except NotReadError as error:
-        _say(f"{name}: {error}")
+        print(error_line(f"{name}: {error}"), file=sys.stderr)
         return NOT_READ
     for problem in verdict.problems[:_SHOWN]:
         where = _near(problem.file) if problem.file else name

@@ -44,6 +44,8 @@ def export(
         ConfigError: no such table or format, or a file that is there already.
         DvaSimError: the disk is full or refuses to be written.
     """
+    if not str(out).isprintable():
+        raise ConfigError(f"{str(out)!r} cannot be the name of a file that others read")
     files = _files(results, out, tables, form)
     there = [path for path in files if path.exists()]
     if there and not overwrite:

@@ -41,7 +41,7 @@ def write_bag(playback: Playback, folder: Path) -> None:
         DvaSimError: the bag cannot be written.
     """
     try:
-        from rosbags.rosbag2 import StoragePlugin, Writer
+        from rosbags.rosbag2 import StoragePlugin, Writer, WriterError
         from rosbags.typesys import Stores, get_typestore
     except ImportError:
         raise ConfigError("ROS 2 bags need rosbags: pip install 'dva-sim[ros2]'") from None
@@ -58,8 +58,9 @@ def write_bag(playback: Playback, folder: Path) -> None:
                     connections[topic] = bag.add_connection(topic, kind, typestore=store)
                 data = store.serialize_cdr(message, kind)
                 bag.write(connections[topic], messages.nanoseconds(time), data)
-    except OSError as error:
-        raise DvaSimError(f"{folder} cannot be written: {error.strerror or error}") from None
+    except (OSError, WriterError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise DvaSimError(f"{folder} cannot be written: {reason}") from None
 
 
 def _entries(playback: Playback, types: Any) -> Iterator[Entry]:

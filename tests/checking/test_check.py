@@ -39,7 +39,8 @@ def check(here, capsys):
         for name, text in texts.items():
             (here / name.replace("__", ".")).write_text(text)
         code = console.check(names or [name.replace("__", ".") for name in texts])
-        return code, capsys.readouterr().out.splitlines()
+        said = capsys.readouterr()
+        return code, [*said.err.splitlines(), *said.out.splitlines()]
 
     return run
 
@@ -210,24 +211,24 @@ def test_what_is_no_file_gives_exit_code_2_and_the_rest_is_still_checked(check, 
     code, lines = check("lost.yaml", "folder.xml", "pipe.xml", str(GOOD), "x" * 5000)
     assert code == 2
     assert lines[:3] == [
-        "lost.yaml: is not there",
-        "folder.xml: is a folder; give the files in it",
-        "pipe.xml: is not a file; a message may come through -",
+        "error: lost.yaml: is not there",
+        "error: folder.xml: is a folder; give the files in it",
+        "error: pipe.xml: is not a file; a message may come through -",
     ]
-    assert lines[3] == f"{GOOD}: message: valid"
+    assert lines[4] == f"{GOOD}: message: valid"
     assert lines[5] == "5 files: 1 valid, 4 not read"
 
 
 @pytest.mark.skipif(not Path("/proc/self/mem").exists(), reason="needs a file that gives an error")
 def test_an_unreadable_file_is_told(check):
-    assert check("/proc/self/mem")[1][0].startswith("/proc/self/mem: cannot be read: ")
+    assert check("/proc/self/mem")[1][0].startswith("error: /proc/self/mem: cannot be read: ")
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")
 def test_a_forbidden_file_is_told(check, here):
     (here / "secret.xml").touch(mode=0)
     code, lines = check("secret.xml")
-    assert (code, lines[0]) == (2, "secret.xml: cannot be read: Permission denied")
+    assert (code, lines[0]) == (2, "error: secret.xml: cannot be read: Permission denied")
 
 
 def test_one_line_stays_one_line_whatever_the_file_holds(check, here):
