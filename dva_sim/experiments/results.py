@@ -68,7 +68,7 @@ class Results:
         path = Path(folder) / MANIFEST
         try:
             manifest = json.loads(path.read_text(encoding="utf-8"))
-        except FileNotFoundError:
+        except (FileNotFoundError, NotADirectoryError):
             raise ConfigError(_not_results(Path(folder))) from None
         except (OSError, ValueError) as error:
             raise ConfigError(f"cannot be read as a manifest: {error}", path) from None

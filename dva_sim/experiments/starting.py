@@ -20,10 +20,13 @@ def write_study(name: str) -> Path:
         Its file.
 
     Raises:
-        ConfigError: there is such a file already.
+        ConfigError: there is such a file already, or it has no name.
         DvaSimError: it cannot be written.
     """
-    path = Path(name if name.endswith((".yaml", ".yml")) else f"{name}.yaml")
+    plain = name.removesuffix(".yaml").removesuffix(".yml")
+    if not Path(plain).name.strip("."):
+        raise ConfigError(f"{name!r} is no name for a study; give one such as 'mine'")
+    path = Path(name if name != plain else f"{name}.yaml")
     try:
         with path.open("x", encoding="utf-8", newline="\n") as file:
             file.write(TEMPLATE.read_text(encoding="utf-8"))

@@ -58,7 +58,7 @@ def test_what_can_be_done_next_is_told_in_the_order_of_doing_it(tmp_path):
     ]
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 def test_it_answers_its_question(fresh, tmp_path):
     """So it did with 12 other seeds, 201 to 212, that had no part in choosing its size."""
     folder = run_study(load_study(fresh), tmp_path / "results", jobs=1)
@@ -76,3 +76,11 @@ def test_nothing_is_overwritten(fresh):
         write_study("mine.yaml")
     with pytest.raises(DvaSimError, match="cannot be written: No such file or directory"):
         write_study("nowhere/mine")
+
+
+@pytest.mark.parametrize("name", ["", ".", "..", ".yaml"])
+def test_a_study_without_a_name_is_not_written(tmp_path, monkeypatch, name):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ConfigError, match="is no name for a study"):
+        write_study(name)
+    assert list(tmp_path.iterdir()) == []

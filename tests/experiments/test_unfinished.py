@@ -118,6 +118,12 @@ def test_an_unfinished_study_of_an_older_version_is_refused_in_one_line(tmp_path
         load_so_far(tmp_path)
 
 
+def test_a_file_is_no_results_folder(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(ConfigError, match="is not a folder; give the folder"):
+        load_so_far(tmp_path / "file")
+
+
 def test_a_finished_folder_is_read_as_it_is(tmp_path):
     out = run_study(kit.study_in(tmp_path), tmp_path / "out", jobs=1, episode=measured)
     assert load_so_far(out).manifest == json.loads((out / "manifest.json").read_text())
