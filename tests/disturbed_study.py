@@ -32,7 +32,7 @@ KILLS_EACH = 40
 KILLS_A_STUDY = 10
 PAIRS = 10
 SEED = 1
-STEP_KB = 96
+STEP_KB = 16
 
 
 def run(out: Path, study: Any) -> None:

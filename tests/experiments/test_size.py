@@ -48,7 +48,7 @@ def test_what_takes_a_while_is_told(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(running, "_MANY", 1)
     monkeypatch.setattr(running, "_MANY_RUNS", 1)
     path = str(write_study(tmp_path))
-    running.plan(path, [], tmp_path / "out", running.Workers(), running.Version())
+    running.plan(path, [], tmp_path / "out", running.Workers(), running.Variant())
     lines = capsys.readouterr().out.splitlines()
     assert lines[1] == "Checking every configuration before the first run ..."
     assert lines[-4].startswith("9/9 configurations")

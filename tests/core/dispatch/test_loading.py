@@ -65,7 +65,7 @@ def test_the_shipped_example_is_found_from_anywhere(folder):
 @pytest.mark.parametrize(
     ("name", "options", "said"),
     [
-        ("min_ate", {}, "policy 'min_ate' is unknown; known: auction, batch_optimal, "),
+        ("min_ate", {}, "policy 'min_ate' is unknown; did you mean 'min_eta'?"),
         ("oracle", {}, "policy 'oracle': it needs a plan made with knowledge of the future"),
         ("min_eta", {"pace": 1}, "policy 'min_eta' has no option 'pace'; it has none"),
         ("preemptive", {"gain": 1}, "'gain'; did you mean 'gain_s'?"),

@@ -82,7 +82,7 @@ def test_what_does_not_belong_together_is_refused(what, options, words):
 def test_what_is_written_is_the_same_bytes_each_time(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(console, "QUICK_PERSONS", 3)
     for name in ("one", "two"):
-        assert validate("operators", tmp_path / name, quick=True, jobs=2, strategy="oracle") == 1
+        assert validate("operators", tmp_path / name, quick=True, jobs=2, strategy="oracle") == 4
     assert "negative" not in capsys.readouterr().err
     files = sorted(p.relative_to(tmp_path / "one") for p in (tmp_path / "one").rglob("*.*"))
     assert {f.name for f in files} >= {
