@@ -24,7 +24,7 @@ from dva_sim.experiments.labels import (
 
 Floats = NDArray[np.float64]
 
-_TAKEN = ("drive_time_s", "movement_time_s")  # times that a level takes
+_TAKEN = ("drive_time_s", "movement_time_s", "confirmation_mean_s", "response_mean_s")
 _LEAST = 0.01  # that is not printed as zero
 
 
@@ -137,8 +137,13 @@ def _effect(f: Finding) -> str:
 
 
 def _size(f: Finding, stop: int) -> str:
-    """`A takes 4.5 s longer than B at a one-way delay of 1 s (95 % band 3.0 to 6.0 s)`."""
-    ends = f"{number(f.low[stop])} to {quantity(f.high[stop], f.unit)}"
+    """`A takes 4.5 s longer than B at a one-way delay of 1 s (95 % band 3.0 to 6.0 s)`.
+
+    Of `4.5 s less` the band is told as `3.0 to 6.0 s`, too.
+    """
+    side = -1 if f.mean[stop] < 0 else 1
+    low, high = sorted((side * float(f.low[stop]), side * float(f.high[stop])))
+    ends = f"{number(low)} to {quantity(high, f.unit)}"
     comparison = f"{_comparison(f, f.mean[stop])}{_after(at(f, [stop]))}"
     return f"{comparison} (95 % {_interval_name(f)} {ends})"
 

@@ -181,7 +181,8 @@ def _beyond(view: View, finding: Finding) -> str:
     outside = view.stops_outside(view.panels[0], view.contrast)
     if not outside or view.over is None:
         return ""
-    where = capital(places(finding, np.array(outside)))
+    is_everywhere = len(outside) == len(view.stops)
+    where = "Throughout" if is_everywhere else capital(places(finding, np.array(outside)))
     return (
         f"{where}, on one side or both, no published experiment covers the delay from picture "
         "to effect: extrapolated."

@@ -205,9 +205,10 @@ def finding_of(view: View) -> Finding | None:
 
 def possible_values(measure: str, scenario: Mapping[str, Any]) -> tuple[float, float]:
     """The least and the greatest value that a measure can take in a run of a scenario."""
-    if measure in ("drive_time_s", "confirmed") or measure.endswith("_share"):
-        horizon = scenario.get("horizon_s", math.inf)
-        return 0.0, float(horizon) if measure == "drive_time_s" else 1.0
+    if measure == "confirmed" or measure.endswith("_share"):
+        return 0.0, 1.0
+    if measure in ("drive_time_s", "confirmation_mean_s", "response_mean_s"):
+        return 0.0, float(scenario.get("horizon_s", math.inf))
     return (0.0 if unit_of(measure) in _NEVER_NEGATIVE else -math.inf), math.inf
 
 

@@ -109,7 +109,7 @@ def _claims(reading: Reading) -> Iterator[Block]:
     status = status_of(reading.manifest)
     hypotheses = reading.judgement.tested
     if hypotheses:
-        yield Heading(f"{_whose_claims(status)}, beside what came out")
+        yield Heading(_whose_claims(status))
         yield Printed(hypothesis_table(hypotheses), is_words=True)
     if status.registration:
         yield Heading("Registration")
@@ -120,7 +120,7 @@ def _claims(reading: Reading) -> Iterator[Block]:
         )
     predictions = judge_all(reading.study, reading.view)
     if predictions:
-        yield Heading("Predictions, written down before the run")
+        yield Heading("Predictions made before the run")
         yield Printed(_prediction_table(predictions), is_words=True)
 
 

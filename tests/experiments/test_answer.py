@@ -101,6 +101,7 @@ def test_one_wide_level_does_not_blur_what_the_others_rule_out():
 def test_the_opposite_direction_is_told_as_it_is():
     text = lead(finding([0, 0, 0, 0, 0, -4.0]))
     assert "REQ/REP takes 4.0 s less than latest-wins PUB/SUB" in text
+    assert "at a one-way delay of 1 s (95 % band 3.0 to 5.0 s)" in text
     assert "It differs from zero only there" in text
 
 

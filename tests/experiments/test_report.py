@@ -193,7 +193,7 @@ def test_a_registered_study_is_called_confirmatory_and_its_hypotheses_stand_besi
     assert "Confirmatory: run as registered beforehand" in text
     assert "persons x trials 8 x 1 8 x 1 hypothesis waits above 2.0 s ✓ held: " in text
     assert "hash 1234567812345678 earlier" in text
-    assert "Registered hypotheses, beside what came out" in text
+    assert "Registered hypotheses" in text
     assert "waits: It waits. REQ/REP minus latest-wins PUB/SUB" in text
     assert "✓ held" in text
 

@@ -22,7 +22,7 @@ NAME = "answer"
 _SIZE = (5.8, 3.5)  # [in]: small, so that its text stays legible beside words and on a phone
 _FONT = 10.5
 _MOST_LABELS = 8
-_ROOM = 0.06  # of the width, for the figures beside the last mark
+_ROOM = 0.05  # of the width, for the figures beside the outer marks
 _LEAST_SHARE = 0.02  # of the height, below which what is too small to matter is not drawn
 
 
@@ -50,7 +50,8 @@ def _drawn(finding: Finding, differences: Floats) -> Drawn:
     _marks(ax, finding, over)
     stops_axis(ax, over)
     left, right = ax.get_xlim()
-    ax.set_xlim(left, right + _ROOM * (right - left))
+    room = _ROOM * (right - left)
+    ax.set_xlim(left - room, right + room)
     cut = fit_to(ax, present(np.append(differences, 0.0)))
     grey = _too_small(ax, finding)
     _values(ax, finding)
