@@ -118,7 +118,7 @@ KINDS = {
     *("distributions", "differences", "levels", "heat_map", "factorial_effects", "robustness"),
     *("delay_budget", "command_age", "command_rate", "tradeoff", "trajectories", "story_times"),
     *("time_lapse_typical", "time_lapse_worst", "story_outcomes", "endings", "scatter", "sobol"),
-    *("trade", "stages", "fates", "way", "percentiles", "burden", "brought", "taken"),
+    *("trade", "stages", "fates", "way", "percentiles", "burden", "brought", "taken", "answer"),
 }
 
 
