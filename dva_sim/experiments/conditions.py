@@ -70,7 +70,7 @@ _CONDITIONS = {
     "operators": "operator.count",
     "bystanders": "bystander.count",
     "dispatch policy": "dispatch.policy",
-    "horizon of a run": "horizon_s",
+    "longest time of a run": "horizon_s",
 }
 _WAYS = {"otherwise towards the robot": "link.up", "otherwise from the robot": "link.down"}
 _NOWHERE = "–"

@@ -176,11 +176,11 @@ def _of_claims(
         side = -1 if claim.direction == "below" else 1
         ends = {-1: found.high - mean, 1: mean - found.low}
         law = _law(pairs, max(ends.values()) if is_same else ends[side], level)
-        distance = claim.margin if is_same else side * mean - claim.margin
+        distance = claim.margin - abs(mean) if is_same else side * mean - claim.margin
         what = f"{_sides(contrast, at)}: {_CLAIMS[claim.direction]}{quantity(claim.margin, unit)}"
-        assumed = "none at all" if is_same else f"{quantity(mean, unit)}, as found"
+        assumed = f"{quantity(mean, unit)}, as found"
         if law is not None:
-            other = claim.margin if is_same else math.inf
+            other = claim.margin + abs(mean) if is_same else math.inf
             yield _Test(name, what, assumed, law, distance, other)
 
 

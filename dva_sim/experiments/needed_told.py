@@ -104,6 +104,7 @@ def _assumes(found: Sequence[Plan], cluster: str) -> str:
     return (
         f"Power: the chance that a study of that size shows it. All by one law: the interval shown "
         f"here, narrowed by more {cluster}s with as many runs of each (noncentral t). In brackets, "
-        f"what else would fit (95 %), since the spread is known from {known} {cluster}s only. What "
-        "few of them found is often too large: rather count on the smallest that matters."
+        f"what else would fit (95 %), since the spread is known from {known} {cluster}s only. A "
+        "difference found in few of them is often too large: rather count on the smallest that "
+        "matters."
     )

@@ -241,9 +241,8 @@ def _what_was_repeated(r: Robustness) -> str:
     trials = "one trial" if r.trials == 1 else f"{r.trials} trials"
     return (
         f"Repeated{under} with the usual parameters and {others} within the bands that "
-        f"calibration leaves open ({r.persons} persons, {trials} of each; the same "
-        "persons and luck as above, so that only the model differs). The study's own model is "
-        "no evidence for itself and does not count."
+        f"calibration leaves open ({r.persons} persons, {trials} each, with the same random "
+        "numbers as above, so that only the model differs). The study's own model does not count."
     )
 
 
@@ -268,8 +267,8 @@ def _beyond(stop: Stop) -> str:
     if not beyond:
         return ""
     return (
-        f" In {_of(beyond, len(stop.others))} the delay of the loop is one at which nobody was "
-        "watched who steers that way: extrapolations."
+        f" {_of(beyond, len(stop.others))} are extrapolated: no published experiment covers that "
+        "delay and way of steering."
     )
 
 

@@ -223,9 +223,10 @@ class Reading:
     @property
     def _decided(self) -> set[str]:
         """Hypotheses and comparisons that need no more persons."""
-        tested, compared = self.judgement.tested, self.judgement.compared
-        shown = {c.name for c in compared if c.adjusted <= 1 - statistics.LEVEL}
-        return {t.name for t in tested if t.verdict != "open"} | shown
+        told, shown = self.judgement.tested, 1 - statistics.LEVEL
+        at_last = {c.name: c.adjusted <= shown for c in self.judgement.compared}  # as planned
+        decided = {name for name, is_shown in at_last.items() if is_shown}
+        return decided | {claim.name for claim in told if claim.verdict != "open"}
 
     @cached_property
     def cells(self) -> list[CellTable]:

@@ -5,6 +5,7 @@ import pytest
 import synthetic_study
 from scipy import stats
 
+from dva_sim.experiments.contrasts import judged
 from dva_sim.experiments.needed import _of_answer, plans
 from dva_sim.experiments.needed_told import few_that_weigh, plan_lines, plan_table
 from dva_sim.experiments.reading import finding_of, view_of
@@ -70,15 +71,33 @@ def test_two_claims_of_a_family_share_the_five_percent():
     assert found[0].counts[0].persons == fewest(0.8, 1.0, 0.025, stretched(0.025)) > 27
 
 
-def test_sameness_takes_two_tests_and_counts_on_no_difference():
+def test_sameness_takes_two_tests_one_at_each_end_of_the_margin():
     one_sided = stretched(0.05)
 
     def both(n, distance_s, alpha):
-        return 2 * one_sided(n, distance_s, alpha) - 1
+        return one_sided(n, 1.0 - distance_s, alpha) + one_sided(n, 1.0 + distance_s, alpha) - 1
 
-    (plan,) = plans(study(hypotheses={"same": {"direction": "same", "margin": 1.0}}), runs())
-    assert plan.assumed == "none at all"
-    assert plan.counts[0].persons == pytest.approx(fewest(0.8, 1.0, 0.05, both), abs=1)
+    claims = {"same": {"direction": "same", "margin": 1.0}}
+    (plan,) = plans(study(hypotheses=claims), runs(mean_s=0.25), decided={"answer"})
+    assert plan.assumed.endswith("as found")
+    assert plan.counts[0].persons == pytest.approx(fewest(0.8, 0.25, 0.05, both), abs=1)
+
+
+@pytest.mark.parametrize(
+    ("claim", "means"),
+    [
+        ({"direction": "above", "margin": 2.0}, (2.2, 2.6, 3.0)),
+        ({"direction": "below", "margin": 2.0}, (-2.2, -2.6, -3.0)),
+        ({"direction": "same", "margin": 2.0}, (-1.0, 0.9, 1.5)),
+    ],
+)
+def test_a_claim_that_is_open_needs_more_persons_than_there_are(claim, means):
+    declared = study(hypotheses={"claim": claim})
+    for mean_s in means:
+        (tested,) = judged(declared, runs(mean_s=mean_s)).tested
+        assert tested.verdict == "open"
+        found = plans(declared, runs(mean_s=mean_s), decided={"answer"})
+        assert min(persons_of(found)) > 8
 
 
 def test_no_number_of_persons_shows_what_is_not_so():

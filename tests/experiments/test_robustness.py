@@ -72,7 +72,7 @@ def test_repeats_at_delays_at_which_nobody_was_watched_are_told_and_drawn_hollow
         ("adaptive", False),
     }
     told = sentences(found)[-1].replace("\N{NO-BREAK SPACE}", " ")
-    assert "In 1 of 3 (33 %) the delay of the loop is one at which nobody was watched" in told
+    assert "1 of 3 (33 %) are extrapolated: no published experiment covers that delay" in told
     with styled():
         assert "Hollow: extrapolated" in repeats(view, found).caption
         assert "Hollow" not in repeats(*read(EFFECTS)).caption
@@ -81,7 +81,7 @@ def test_repeats_at_delays_at_which_nobody_was_watched_are_told_and_drawn_hollow
 def test_the_sentences_give_shares_and_reach():
     _, found = read(EFFECTS)
     what, told = (s.replace("\N{NO-BREAK SPACE}", " ") for s in sentences(found))
-    assert "(4 persons, 2 trials of each" in what
+    assert "(4 persons, 2 trials each" in what
     assert told == (
         "At one-way delay 1 s the sign holds in 2 of 3 (67 %) repeats, in 2 of them with its "
         "whole interval; in 1 of 3 (33 %) the effect exceeds the smallest that matters, in 1 it "
