@@ -118,8 +118,12 @@ def test_a_test_that_hangs_ends_the_run_with_a_traceback(tmp_path: Path) -> None
     assert "in test_m" in done.stdout + done.stderr
 
 
-WAIT = """
+WAITS = """
+from pathlib import Path
+import patience
+def test_{own}():
     try:
+        Path("{own}").touch()
         patience.becomes(lambda: False)
     finally:
         Path("{own} over").touch()
@@ -128,7 +132,7 @@ WAIT = """
 
 def interrupted(folder: Path, how: signal.Signals) -> tuple[int, str]:
     """What the leader ends with, and says, if it is sent a signal while both are at work."""
-    files = {name: text + WAIT.format(own=name) for name, text in BOTH.items()}
+    files = {name: WAITS.format(own=name) for name in BOTH}
     with subprocess.Popen(
         pytest_on(folder, files),
         cwd=folder,
