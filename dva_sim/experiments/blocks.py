@@ -11,7 +11,7 @@ from dva_sim.experiments.cells import CellTable
 if TYPE_CHECKING:
     from dva_sim.experiments.figures.style import Drawn
 
-Kind = Literal["plain", "note", "warning", "label", "banner"]
+Kind = Literal["plain", "note", "warning", "label", "caution", "banner"]
 
 
 @dataclass(frozen=True)

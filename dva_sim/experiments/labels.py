@@ -175,6 +175,11 @@ def percent(share: float) -> str:
     return f"{text.removesuffix('.0')}\N{NO-BREAK SPACE}%"
 
 
+def measure_of(measure: str, part: str) -> str:
+    """A measure in the part of the study that it was taken in."""
+    return f"{measure_name(measure)} of part {part}"
+
+
 def level_name(factor: str, level: Level | Mapping[str, Any], short: bool = False) -> str:
     """One level with its unit: 0.05 of `link.delay_s` is `50 ms`; a class without its file.
 

@@ -17,7 +17,7 @@ import numpy as np
 from dva_sim.experiments.asking import ANSWER, Contrast, Hypothesis
 from dva_sim.experiments.contrasts import Pairs, claims_of, contrasts_of, pairs_of, places_of
 from dva_sim.experiments.effects import Floats, Setting, Table, View
-from dva_sim.experiments.labels import level_name, measure_name, quantity, setting, unit_of
+from dva_sim.experiments.labels import level_name, measure_of, quantity, setting, unit_of
 from dva_sim.experiments.reading import view_of
 from dva_sim.experiments.statistics import (
     LEVEL,
@@ -260,18 +260,20 @@ def _capped(persons: float) -> float:
 
 
 def _sides(contrast: Contrast, at: Setting) -> str:
-    return _told(contrast.factor, contrast.contrast, contrast.measure, at)
+    measure = measure_of(contrast.measure, contrast.part)
+    return _told(contrast.factor, contrast.contrast, measure, at)
 
 
 def _sides_of(view: View, stop: int) -> str:
     assert view.line is not None
     assert view.contrast is not None
     at = dict(view.panels[0]) | view.at_stop(stop)
-    return _told(view.line.name, view.contrast, view.measure, at)
+    measure = measure_of(view.measure, view.part.name)
+    return _told(view.line.name, view.contrast, measure, at)
 
 
 def _told(factor: str, levels: tuple[Any, Any], measure: str, at: Setting) -> str:
     """`A minus B in driving time, at delay 1 s`."""
     first, second = (level_name(factor, level) for level in levels)
     where = f", {setting(at)}" if at else ""
-    return f"{first} minus {second} in {measure_name(measure)}{where}"
+    return f"{first} minus {second} in {measure}{where}"

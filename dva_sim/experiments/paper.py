@@ -46,6 +46,7 @@ _KINDS: dict[Kind, Face] = {
     "note": SMALL,
     "warning": Face(9, "bold", colour=WARNING),
     "label": Face(9, "bold"),
+    "caution": Face(9, "bold", colour=WARNING),
     "banner": Face(10.5, "bold", colour=WARNING),
 }
 _MONO = Face(5.5, family="DejaVu Sans Mono")

@@ -17,7 +17,7 @@ import numpy as np
 
 from dva_sim.experiments.asking import TUNING, Level, Prediction, Range
 from dva_sim.experiments.effects import Setting, View
-from dva_sim.experiments.labels import level_name, measure_name, number, quantity, setting, unit_of
+from dva_sim.experiments.labels import level_name, measure_of, number, quantity, setting, unit_of
 from dva_sim.experiments.reading import interval_of
 from dva_sim.experiments.statistics import Interval
 
@@ -91,7 +91,7 @@ def _judge(prediction: Prediction, view: View | None) -> Judged:
     factor, (first, second), where = asked
     unit = unit_of(view.measure)
     names = f"{level_name(factor, first)} minus {level_name(factor, second)}"
-    expected = f"{names} in {measure_name(view.measure)}, {setting(where)}: "
+    expected = f"{names} in {measure_of(view.measure, view.part.name)}, {setting(where)}: "
     expected += _SIDES[prediction.direction] + _range_words(prediction.expected, unit)
     if factor == TUNING and _chose_what_was(view, (first, second), where):
         return Judged(text, expected, _SAME_RUNS, "not judged")

@@ -92,7 +92,7 @@ def _status(reading: Reading) -> Iterator[Block]:
         yield Words(reading.results.partial, "banner")
     status = status_of(reading.manifest)
     yield Words(size_of(reading), "note")
-    yield Words(_KINDS[status.kind], "label")
+    yield Words(_KINDS[status.kind], "caution" if status.kind == "exploratory" else "label")
     if status.why:
         yield Words(f"Why: {'; '.join(status.why)}.", "note")
     for warning in reading.warnings:

@@ -20,6 +20,7 @@ from dva_sim.experiments.dispatch.shifts import Shifts, is_dispatch
 from dva_sim.experiments.effects import Part, Table, View, as_floats
 from dva_sim.experiments.endings import Endings, horizon_of, with_endings
 from dva_sim.experiments.episodes_kept import Episode, Tables, typical_and_worst
+from dva_sim.experiments.labels import listing
 from dva_sim.experiments.needed import Plan, plans
 from dva_sim.experiments.needed_told import few_that_weigh
 from dva_sim.experiments.reading import (
@@ -269,12 +270,19 @@ class Reading:
             errors = dict.fromkeys(str(failure.get("error")) for failure in failures)
             shown = "; ".join(list(errors)[:_MOST_ERRORS])
             found.append(f"Runs that failed and are missing below: {len(failures)} ({shown}).")
-        runs = self.runs
-        broken = int((as_floats(runs["violations"]) > 0).sum()) if "violations" in runs else 0
-        if broken:
-            found.append(f"Safety invariants were broken in {broken} runs.")
+        if broken := _broken(self.runs):
+            found.append(f"Safety rules were broken in {broken}.")
         if tuning := tuning_warning(self.manifest):
             found.append(tuning)
         if self.manifest.get("versions", {}).get("dirty"):
             found.append("The program that made the runs had changes that were not committed.")
         return found
+
+
+def _broken(runs: Table) -> str:
+    """`2 runs of part drive and 1 run of part story`; empty where all rules were kept."""
+    if "violations" not in runs:
+        return ""
+    parts = np.asarray(runs["part"])[as_floats(runs["violations"]) > 0].tolist()
+    counts = {part: parts.count(part) for part in dict.fromkeys(parts)}
+    return listing([f"{n} run{'s' * (n > 1)} of part {part}" for part, n in counts.items()])

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dva_sim.experiments.cells import CellTable
 from dva_sim.experiments.contrasts import Compared, Judgement, Tested, Verdict
 from dva_sim.experiments.effects import Setting
-from dva_sim.experiments.labels import level_name, measure_name, number, quantity, setting, unit_of
+from dva_sim.experiments.labels import level_name, measure_of, number, quantity, setting, unit_of
 from dva_sim.experiments.statistics import LEVEL, Interval
 
 # A mark beside the word: neither needs a colour.
@@ -52,7 +52,7 @@ def comparison_table(found: Judgement) -> CellTable:
     rows = [
         [
             f"{c.name}: {_sides(c)}",
-            measure_name(c.contrast.measure),
+            measure_of(c.contrast.measure, c.contrast.part),
             _place(c.at),
             _interval(c.difference, c.contrast.measure),
             _bare(c.size.average) if c.size else "–",
@@ -94,7 +94,7 @@ def _claim(tested: Tested) -> str:
     """`A minus B in driving time, at delay 1 s: above 2 s`."""
     first, second = (level_name(tested.contrast.factor, x) for x in tested.contrast.contrast)
     where = f", {setting(tested.at)}" if tested.at else ""
-    measure = measure_name(tested.contrast.measure)
+    measure = measure_of(tested.contrast.measure, tested.contrast.part)
     return f"{first} minus {second} in {measure}{where}: {bound_of(tested)}"
 
 

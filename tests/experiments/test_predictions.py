@@ -61,7 +61,7 @@ def test_a_prediction_can_speak_of_another_place_and_another_contrast():
     found = judged(small, other)
     assert [f.verdict for f in found] == ["held", "held"]
     assert found[1].expected.startswith(
-        "dissertation minus default in driving time to confirmation, "
+        "dissertation minus default in driving time to confirmation of part drive, "
         "one-way delay 1\N{NO-BREAK SPACE}s, messaging pattern latest-wins PUB/SUB: above zero"
     )
 

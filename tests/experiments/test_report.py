@@ -73,9 +73,9 @@ def test_the_report_says_how_many_events_were_missed(report):
 def test_predictions_stand_beside_what_was_found(report):
     text = words(report)
     assert re.search(
-        r"Waiting costs\. REQ/REP minus latest-wins PUB/SUB in driving time to confirmation, "
-        r"profile default, one-way delay 1 s: above zero, 20.0 to 40.0 s [\d.]+ s \([\d.]+ to "
-        r"[\d.]+ s\) (held|open|did not hold)",
+        r"Waiting costs\. REQ/REP minus latest-wins PUB/SUB in driving time to confirmation of "
+        r"part drive, profile default, one-way delay 1 s: above zero, 20.0 to 40.0 s [\d.]+ s "
+        r"\([\d.]+ to [\d.]+ s\) (held|open|did not hold)",
         text,
     )
     assert "Nobody will notice. not judged" in text
@@ -223,7 +223,7 @@ def test_a_poor_study_is_reported_for_what_it_is(tmp_path):
     assert "Why: changed on the command line: replications=1, robot.count=1." in text
     assert "Too few persons to answer" in text
     assert "Runs that failed and are missing below: 1 (robot-1 left the world)" in text
-    assert "Safety invariants were broken in 1 runs" in text
+    assert "Safety rules were broken in 1 run of part drive." in text
     assert "6 of 36 configurations have no run" in text
 
 
