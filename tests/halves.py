@@ -22,10 +22,8 @@ from typing import Any
 
 import pytest
 
-FIRST = ("live", "system", "core")
-"""Folders whose files are dear: the halves had better not meet there. And `core`, since what
-counts calls there must not come after `dask` has been at work in the same process.
-"""
+FIRST = ("live", "system")
+"""Folders whose files are dear: the halves had better not meet there."""
 
 PR_SET_PDEATHSIG = 1  # prctl(2)
 LOOK_S = 0.05
@@ -127,7 +125,7 @@ class Leader(Half):
         while self._is_at_work():
             time.sleep(LOOK_S)
         if self._missing and not (session.shouldfail or session.shouldstop):
-            pytest.exit(f"nobody ran {sorted(self._missing)}", returncode=3)
+            pytest.exit(f"nobody ran {sorted(self._missing)}\n{self._said()}", returncode=3)
         return done
 
     def pytest_sessionfinish(self) -> None:
@@ -151,9 +149,12 @@ class Leader(Half):
         if self._read < self._reports.stat().st_size:
             self._tell_its_reports()
         if code is not None and code not in GOOD:
-            said = (self._folder / "said").read_text(encoding="utf-8", errors="replace")
-            pytest.exit(f"the second process ended with {code}:\n{said}", returncode=3)
+            pytest.exit(f"the second process ended with {code}:\n{self._said()}", returncode=3)
         return code is None
+
+    def _said(self) -> str:
+        """What the helper printed; of a test that hung, where."""
+        return (self._folder / "said").read_text(encoding="utf-8", errors="replace")
 
     def _tell_its_reports(self) -> None:
         hook = self._config.hook

@@ -68,13 +68,15 @@ def _by_signal(seconds: float) -> Iterator[None]:
 def _by_thread(seconds: float) -> Iterator[None]:
     """Signals reach the main thread only; another thread has to be told by a third."""
     told, over = threading.get_ident(), threading.Event()
-    lock = threading.Lock()
+    lock, raised = threading.Lock(), False
 
     def insist() -> None:
+        nonlocal raised
         pause = seconds
         while not over.wait(pause):
             with lock:
                 if not over.is_set():
+                    raised = True
                     _raise_in(told)
             pause = INSIST
 
@@ -88,10 +90,17 @@ def _by_thread(seconds: float) -> Iterator[None]:
         while not over.is_set():
             with suppress(RunTooLong), lock:  # it may come as late as here
                 over.set()
-                _raise_in(told, None)
+                if raised:
+                    _raise_in(told)  # in place of one that may still be under way
+                    while True:  # until it comes
+                        pass
 
 
-def _raise_in(thread: int, error: type[BaseException] | None = RunTooLong) -> None:
-    """At the next step of Python code there; with None, nothing any more."""
-    what = None if error is None else ctypes.py_object(error)
+def _raise_in(thread: int) -> None:
+    """At the next step of Python code there.
+
+    It has to come, and is not taken back: taken back, it leaves the interpreter looking for it for
+    ever, and a profiler or debugger there never gets past its first step (CPython 3.11).
+    """
+    what = ctypes.py_object(RunTooLong)
     ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), what)

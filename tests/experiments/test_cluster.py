@@ -11,6 +11,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+import patience
 import pytest
 import small_study as kit
 from dask_cluster import DaskCluster
@@ -194,6 +195,43 @@ def test_a_run_in_a_thread_of_a_worker_has_its_limit_too() -> None:
         with pytest.raises(RunTooLong, match=r"took more than its 0\.05 s"):
             executor.submit(stalls).result()
         assert executor.submit(is_quick).result() == "done"
+
+
+LOOKED_AT = """
+import sys, threading, time
+from dva_sim.experiments.limit import RunTooLong, limited
+
+def stalls():
+    try:
+        with limited(0.05, may_exit=False):
+            while True:
+                time.monotonic()
+    except RunTooLong:
+        pass
+
+def is_quick():
+    with limited(60.0, may_exit=False):
+        len("done")
+
+def looked_at():
+    return 1
+
+seen = []
+for run in (is_quick, stalls):
+    thread = threading.Thread(target=run)
+    thread.start()
+    thread.join()
+    sys.setprofile(lambda *what: seen.append(what[1]))
+    looked_at()
+    sys.setprofile(None)
+print(seen.count("call"))
+"""
+
+
+def test_after_a_limit_in_a_thread_a_profiler_still_gets_on() -> None:
+    """In a process of its own: it would not come back, and nothing after it either."""
+    done = patience.run([sys.executable, "-c", LOOKED_AT], capture_output=True, text=True)
+    assert done.stdout.strip() == "2", done.stderr
 
 
 def test_a_run_that_takes_the_limit_for_its_own_is_told_again(tmp_path: Path) -> None:
