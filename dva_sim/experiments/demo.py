@@ -32,7 +32,7 @@ _INTRODUCTION: Final = """\
 An operator drives a robot to a fire by tilting a phone. Commands go to the robot by REQ/REP, which
 waits for an answer to each, or by PUB/SUB, of which the robot obeys the newest ("latest-wins").
 What does that change if the network is late? First one drive, with one second of delay each way;
-then the small version of the study that asks it: about a minute on two cores, 100 s of CPU time.
+then the small version of the study that asks it: about a minute on two cores, 70 s of CPU time.
 """
 
 
@@ -99,4 +99,4 @@ def _tell(out: Path, took_s: float) -> None:
     cpu_s = sum(os.times()[:4]) + Results.load(out).machine.get("cpu_s", 0.0)
     say(f"Took {took_s:.0f} s, and about {cpu_s:.0f} s of CPU time with those of the results.")
     say(f"In the terminal: dva-sim show {out}")
-    say(f"The study at its published size, ten times as long: dva-sim run {STUDY}")
+    say(f"The study at its published size takes ten minutes: dva-sim run {STUDY}")
