@@ -139,7 +139,7 @@ class Plugins(Generic[T]):
         for root in resources.roots():
             folders += [root, root / self.folder]
         for folder in folders:
-            if (folder / file).is_file():
+            if resources.is_file(folder / file):
                 return (folder / file).resolve()
         near = ", ".join(dict.fromkeys(str(folder) for folder in [base or Path.cwd(), Path.cwd()]))
         problem = f"file {file!r} not found; looked in {near} and {self.folder}"

@@ -64,7 +64,7 @@ def available(folder: str, pattern: str = "*.yaml") -> dict[str, Path]:
 
 def is_there(name: str, folder: str) -> bool:
     """Whether there is a file of that name, without reading whole folders."""
-    return any(_is_file(root.joinpath(folder, f"{name}.yaml")) for root in roots())
+    return any(is_file(root.joinpath(folder, f"{name}.yaml")) for root in roots())
 
 
 def find(
@@ -87,7 +87,7 @@ def find(
         ConfigError: nothing of that name; the message says what was meant, or what there is.
     """
     for candidate in _candidates(name, folder, suffix, base):
-        if _is_file(candidate):
+        if is_file(candidate):
             return candidate
     problem = _Missing(name, folder, sorted(available(folder, f"*{suffix}")), is_asked)
     raise ConfigError(problem.is_folder() or problem.is_other() or problem.is_nothing())
@@ -110,7 +110,7 @@ class _Missing(NamedTuple):
         path = Path(self.name)
         if not self.name or not _is_there(path.is_dir):
             return ""
-        if _is_file(path / _RESULTS):
+        if is_file(path / _RESULTS):
             return f"{self.name!r} is a results folder, not a {self.kind}; try: dva-sim show {path}"
         return f"{self.name!r} is a folder; give the file of a {self.kind}, or its name"
 
@@ -138,7 +138,8 @@ class _Missing(NamedTuple):
         return f"; try: {kind.command} {name}" if kind.command and self.is_asked else ""
 
 
-def _is_file(path: Path) -> bool:
+def is_file(path: Path) -> bool:
+    """Whether there is such a file; what nothing can be called is none."""
     return _is_there(path.is_file)
 
 

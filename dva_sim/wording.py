@@ -22,6 +22,7 @@ _KINDS = {
     "bool_type": "true or false",
     "none_required": "null",
 }
+_PLAIN = ("bool", "int", "float", "str")
 _STRUCTURES = {
     "tuple_type": "a list",
     "list_type": "a list",
@@ -47,9 +48,17 @@ def first_mistake(
         data: Plain data.
         found: The errors of pydantic, at least one.
     """
-    paths = [tuple(p for p in e["loc"] if not _is_tag(p, data, e["loc"])) for e in found]
+    paths = [_path(e, data) for e in found]
     told = [e for e, path in zip(found, paths, strict=True) if path == paths[0]]
     return _explain(model, told, paths[0]), paths[0]
+
+
+def _path(problem: Any, data: Mapping[str, Any]) -> Path:
+    """The path of a key, without what names one of several kinds that a value may be of."""
+    loc = problem["loc"]
+    if loc and loc[-1] in _PLAIN and problem["type"].endswith("_type"):
+        loc = loc[:-1]
+    return tuple(part for part in loc if not _is_tag(part, data, loc))
 
 
 def _is_tag(part: str | int, data: Any, loc: Sequence[str | int]) -> bool:

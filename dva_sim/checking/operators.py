@@ -176,7 +176,7 @@ class _Trial:
             self._drive(person, ROBOTS[1], "a corner", 0.0, seconds=20.0, strategy=beside)
             again = self._drive(person, ROBOTS[0], route, 1.0, seconds)
             if again != alone:
-                yield "remembers what another one did, or has luck of its own", f"on {route}"
+                yield "remembers what another one did, or draws random numbers", f"on {route}"
 
     def _blind(self) -> Iterator[Case]:
         """Nothing is answered otherwise before the picture shows why."""

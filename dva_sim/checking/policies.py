@@ -92,7 +92,7 @@ def _broken(
         yield from _twice(advice)
         yield from _forbidden(policy, situation, advice)
         if repr(advice) != repr(other.advice):
-            yield "advises differently with the same history and luck", ""
+            yield "advises differently with the same history and random seed", ""
 
 
 def _misshapen(policy: Policy, situation: Situation, advice: Sequence[Any]) -> Iterator[Case]:

@@ -148,7 +148,7 @@ class _FilterTrial:
                     yield "changes when it is asked, though it has no batch", f"sample {number}"
         if alone != beside:
             place = next(n for n, (a, b) in enumerate(zip(alone, beside, strict=True)) if a != b)
-            yield "shares memory with other copies, or has luck", f"value {place + 1}"
+            yield "shares memory with other copies, or draws random numbers", f"value {place + 1}"
 
     def _constant(self) -> Iterator[Case]:
         """What stands comes through, whatever was before."""
@@ -233,7 +233,10 @@ class _MappingTrial:
             other.command(*reading, PERIOD)
         fresh = self.make()
         if [fresh.command(*reading, PERIOD) for reading in readings] != alone:
-            yield "shares memory with other copies, or has luck", "a new copy answers differently"
+            yield (
+                "shares memory with other copies, or draws random numbers",
+                "a new copy answers differently",
+            )
         other.begin()
         if [other.command(*reading, PERIOD) for reading in readings] != alone:
             yield "remembers the drive before", "after begin() it answers differently"

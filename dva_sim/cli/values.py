@@ -9,6 +9,7 @@ from collections.abc import Callable
 import typer
 
 MOST_SEED = 2**63 - 1
+_NUMBER = re.compile(r"[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)(e[+-]?[0-9]+)?", re.IGNORECASE)
 
 
 def whole(least: int = 0, most: int = MOST_SEED) -> Callable[[int | str], int]:
@@ -27,10 +28,7 @@ def number(above: float = 0.0) -> Callable[[float | str], float]:
     """Reads numbers above `above`."""
 
     def read(text: float | str) -> float:
-        try:
-            value = float(text) if str(text).isascii() else math.nan
-        except ValueError:
-            value = math.nan
+        value = float(text) if _NUMBER.fullmatch(str(text)) else math.nan
         if math.isfinite(value) and value > above:
             return value
         raise typer.BadParameter(f"{str(text)!r} should be a number above {above:g}")

@@ -102,7 +102,7 @@ def _cells(comparison: Comparison) -> list[str]:
 def _luck(comparison: Comparison) -> str:
     pairs, runs = comparison.paired
     if not pairs:
-        return "No run of both has the same luck: persons are compared with other persons"
+        return "No run of both has the same random seed: persons are compared with other persons"
     share = "all" if pairs == runs else f"{pairs} of {runs}"
     return f"Compared in pairs of the same person, trial and seed: {share} runs of A"
 

@@ -37,7 +37,7 @@ DESIGN: Meanings = {
     "config": "hash of the scenario as run, but for the person",
     "is_reference": "whether the others are measured against this run",
     "person": "simulated person, or with the timed model independent run; the cluster",
-    "trial": "of the person; the same luck in every cell",
+    "trial": "of the person; the same random numbers in every cell",
     "seed": "of the run; the same for this person and trial in every cell",
     "parameters": "set of the persons' parameters in a repeat, 0 for the usual ones",
 }

@@ -158,7 +158,10 @@ def _faults_of_tuning(study: Study) -> Iterator[Fault]:
     if tuning is None:
         return
     if tuning.seed == study.seed:
-        yield "tuning needs a seed of its own: other persons, other luck", ("tuning", "seed")
+        yield (
+            "tuning needs a random seed of its own, for other persons than the study's",
+            ("tuning", "seed"),
+        )
     if tuning.part not in study.parts:
         told = hint(tuning.part, study.parts, "parts")
         yield f"tuning.part {tuning.part!r} is not a part; {told}", ("tuning", "part")

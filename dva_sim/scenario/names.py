@@ -33,7 +33,7 @@ def locate_files(data: dict[str, Any], folders: Sequence[Path]) -> None:
         holder = data.get(part)
         named = holder.get(key) if isinstance(holder, dict) else None
         file, colon, wanted = named.rpartition(":") if isinstance(named, str) else ("", "", "")
-        beside = [folder / file for folder in folders if colon and (folder / file).is_file()]
+        beside = [folder / file for folder in folders if colon and resources.is_file(folder / file)]
         if beside and isinstance(holder, dict):
             holder[key] = f"{beside[0]}:{wanted}"
 
@@ -49,7 +49,7 @@ def check_names(scenario: Scenario, error: Fail) -> None:
     }
     for path, (given, folder) in choices.items():
         for name in (given,) if isinstance(given, str) else given:
-            if not resources.is_there(name, folder) and not Path(name).is_file():
+            if not resources.is_there(name, folder) and not resources.is_file(Path(name)):
                 key, known = ".".join(str(p) for p in path), resources.available(folder)
                 raise error(unknown(key, name, sorted(known)), path)
     check_strategy(scenario.operator.strategy, scenario.operator.options, error)

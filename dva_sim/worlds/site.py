@@ -98,7 +98,7 @@ def _plan(
         given = ", ".join(options)
         raise ConfigError(f"site {config.name!r} is drawn and takes no options; given: {given}")
     file = document.file.parent / str(config.plan)
-    if not file.is_file():
+    if not resources.is_file(file):
         raise document.error(f"plan {config.plan!r} not found", ("plan",))
     return read_plan(file, frame, config.ceiling_m)
 

@@ -112,7 +112,7 @@ class Raising(NoFilter):
         (Eager, "leaves the range of its input: level "),
         (Biased, "is not zero before the first sample: level 0.1, 0 deg/s"),
         (Sum, "does not come to what stands for ten minutes: "),
-        (Shared, "shares memory with other copies, or has luck: value 1"),
+        (Shared, "shares memory with other copies, or draws random numbers: value 1"),
         (Forgetful, "changes when it is asked, though it has no batch: sample 1"),
         (Older, "is not as old as it says: 0.0 samples behind a rising input; age says 3.0"),
         (Undated, "is not as old as it says: 0.0 samples behind a rising input; age is nan"),

@@ -166,7 +166,7 @@ def test_a_measure_that_no_run_has_is_refused(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "told"),
     [
-        ("seed: 7001", "seed: 3", "tuning needs a seed of its own"),
+        ("seed: 7001", "seed: 3", "tuning needs a random seed of its own"),
         ("by: [pattern]", "by: [profile]", "'profile' is not a factor"),
         ("at: {link.delay_s: 0.25}", "at: {link.delay_s: 1}", "1 is not a level"),
         ("[untuned, tuned]", "[untuned, better]", "'better' is not a level of 'tuning'"),

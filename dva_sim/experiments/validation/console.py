@@ -56,6 +56,8 @@ def validate(
             mistake in the files.
     """
     _refuse_foreign(what, cases, strategy, sockets)
+    if out is not None and out.exists() and not out.is_dir():
+        raise ConfigError(f"--out {out} is a file; give a folder")
     workers = jobs or os.cpu_count() or 1
     detail(f"{what}, seed {seed}, {workers} processes{', quick' if quick else ''}")
     for key, value in (("cases", cases), ("strategy", strategy), ("out", out)):

@@ -174,14 +174,14 @@ def _number(text: str, what: str, path: str, line: int) -> float:
 def _found(path: str) -> Path:
     """A file by its path, or one that is shipped by its name."""
     shipped = (root / "experiments/traces" / path for root in resources.roots())
-    return next((file for file in (Path(path), *shipped) if file.is_file()), Path(path))
+    return next((file for file in (Path(path), *shipped) if resources.is_file(file)), Path(path))
 
 
 def _lines(path: str, what: str) -> Iterator[tuple[int, str]]:
     """Number and text of each line that is not empty."""
     try:
         lines = _found(path).read_text(encoding="ascii").split("\n")
-    except (OSError, UnicodeDecodeError) as error:
+    except (OSError, ValueError) as error:  # such as text that is none, or a name that is none
         reason = error.strerror if isinstance(error, OSError) else "is not text"
         raise ConfigError(f"{what} cannot be read: {reason}", path) from error
     for number, line in enumerate(lines, start=1):
