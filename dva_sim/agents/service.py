@@ -27,7 +27,7 @@ class ServiceLaw(Config):
 
     law: Literal["constant", "exponential", "lognormal", "gamma"]
     mean_s: Annotated[float, Field(gt=0, le=10)]
-    cv: Annotated[float, Field(gt=0, le=10)] | None = None
+    cv: Annotated[float, Field(ge=0.001, le=10)] | None = None
     first_s: Annotated[float, Field(ge=0, le=60)] | None = None
 
     @model_validator(mode="after")

@@ -255,7 +255,23 @@ def runs_of(study: Study) -> int:
     trials = [part.replications or study.replications for part in study.parts.values()]
     has_reference = [part.reference is not None for part in study.parts.values()]
     each = sum((cells + more) * count for more, count in zip(has_reference, trials, strict=True))
-    return each * study.most_persons
+    return each * study.most_persons + _runs_of_repeats(study)
+
+
+def cells_of_repeats(study: Study) -> int:
+    """How many cells the repeats of the answer have."""
+    robustness, answer = study.robustness, study.answer
+    if robustness is None or answer is None or answer.over is None:
+        return 0
+    levels = len(robustness.at or (None,)) * len(answer.contrast)
+    return max(1, len(robustness.strategies)) * (robustness.sets + 1) * levels
+
+
+def _runs_of_repeats(study: Study) -> int:
+    if study.robustness is None:
+        return 0
+    persons = min(study.robustness.persons, study.persons)
+    return cells_of_repeats(study) * persons * study.robustness.replications
 
 
 def together(study: Study) -> set[str]:

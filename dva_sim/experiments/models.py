@@ -75,7 +75,7 @@ def model_of(document: Document) -> Model:
         ConfigError: there is no such model.
     """
     name = document.data.get("model", "full")
-    if name not in MODELS:
+    if not isinstance(name, str) or name not in MODELS:
         raise document.error(unknown("model", name, MODELS), ("model",))
     return MODELS[name]
 

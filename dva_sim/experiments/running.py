@@ -18,7 +18,7 @@ from dva_sim.errors import error_line
 from dva_sim.exit_codes import ExitCode
 from dva_sim.experiments.console import console, say, warn
 from dva_sim.experiments.design import Cell
-from dva_sim.experiments.designs import runs_of, size
+from dva_sim.experiments.designs import cells_of_repeats, runs_of, size
 from dva_sim.experiments.details import WRITTEN, tell_cells, tell_files
 from dva_sim.experiments.planning import DryRun, dry_run
 from dva_sim.experiments.pool import Episode
@@ -135,7 +135,7 @@ def _checked(study: Study) -> list[Cell]:
     """Find mistakes before the first run; where that takes a while, it is told."""
     from dva_sim.experiments.episode import contradictions_in, rehearse_all
 
-    count = size(study) * len(study.parts)
+    count = size(study) * len(study.parts) + cells_of_repeats(study)
     if count < _MANY:
         cells = rehearse_all(study)
     else:

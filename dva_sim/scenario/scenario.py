@@ -63,7 +63,7 @@ class Scenario(Config):
     access: tuple[AccessConfig, ...] = ()
     patrols: tuple[PatrolConfig, ...] = ()
     horizon_s: Annotated[
-        float, Field(gt=0, le=86_400), AlsoCalled("duration_s", "time_limit_s", "length_s")
+        float, Field(ge=0.001, le=86_400), AlsoCalled("duration_s", "time_limit_s", "length_s")
     ] = 300.0
 
     @property

@@ -15,7 +15,7 @@ from pydantic import Field, model_validator
 
 from dva_sim.config import Config
 
-Positive = Annotated[float, Field(gt=0)]
+Positive = Annotated[float, Field(gt=0, le=1000)]  # nobody does a task that is longer
 NonNegative = Annotated[float, Field(ge=0)]
 Several = Annotated[tuple[Positive, ...], Field(min_length=1, max_length=50)]
 Values = Positive | Several

@@ -54,7 +54,7 @@ def test_an_unknown_key_is_told_with_the_one_that_was_meant(data, told):
         ({"horizon_s": "5 m"}, "horizon_s: should be a number, not '5 m'"),
         ({"link": {"delay_s": math.nan}}, "link.delay_s: should be a finite number, not nan"),
         ({"link": {"loss": 7}}, "link.loss: should be at most 0.9, not 7"),
-        ({"horizon_s": 0}, "horizon_s: should be above 0, not 0"),
+        ({"robot": {"charge": 0}}, "robot.charge: should be above 0, not 0"),
         ({"horizon_s": None}, "horizon_s: should be a number, not null"),
         ({"robot": {"count": "3"}}, "robot.count: should be a whole number, not '3'"),
         ({"robot": {"count": 3.0}}, "should be a whole number, without a point, not 3.0"),

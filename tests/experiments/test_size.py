@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from small_study import STUDY, study_in, write_study
+from small_study import REPEATED, STUDY, study_in, write_study
 
 from dva_sim.errors import ConfigError
 from dva_sim.experiments import design, running
@@ -37,8 +37,9 @@ def test_a_pilot_and_a_stopping_rule_and_a_tuning_are_no_way_round_it(tmp_path):
         tuning_study(study_in(tmp_path, text=STUDY + tuning))
 
 
-def test_the_number_of_runs_is_known_without_their_list(tmp_path):
-    study = study_in(tmp_path)
+@pytest.mark.parametrize("text", [STUDY, REPEATED])
+def test_the_number_of_runs_is_known_without_their_list(tmp_path, text):
+    study = study_in(tmp_path, text=text)
     assert runs_of(study) == len(design.jobs(study))
 
 

@@ -30,7 +30,7 @@ class Bursts(Config):
         Technical Journal 42 (1963).
     """
 
-    mean_s: Annotated[float, Field(gt=0, le=1e5)] | None = None
+    mean_s: Annotated[float, Field(ge=0.001, le=1e5)] | None = None
     mean_packets: Annotated[float, Field(ge=1, le=1e6)] | None = None
     loss: Annotated[float, Field(gt=0, le=1)] = 1.0
 
