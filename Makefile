@@ -9,7 +9,7 @@ BENCH := $(VENV)/.bench
 DEMO := results/demo
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo published test test-all test-contract test-system test-soak check bench clean
+.PHONY: help setup demo published test test-all test-contract test-system test-soak check same-bytes bench clean
 
 # Two processes share the tests. Compiled files are kept whatever a shell says: without them each
 # run compiles all tests again, for half a minute.
@@ -49,6 +49,9 @@ check: $(DEV)  ## lint, format, types, import contracts
 	@$(BIN)/ruff format --check .
 	@$(BIN)/mypy
 	@$(BIN)/lint-imports --no-logo 2>/dev/null || $(BIN)/lint-imports
+
+same-bytes: $(DEV)  ## whether results are those of another version: make same-bytes AGAINST=COMMIT
+	@$(BIN)/python tests/same_bytes.py --against $(or $(AGAINST),HEAD)
 
 bench: $(BENCH)  ## the ratios that performance work is judged by
 	@$(BIN)/python -m pytest tests/benchmarks --benchmark-only --benchmark-disable-gc -p no:cacheprovider -s

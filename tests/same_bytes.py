@@ -1,0 +1,97 @@
+"""Whether two versions of the program make the same results, byte for byte.
+
+    python tests/same_bytes.py                      print this version's digests, a line for each run
+    python tests/same_bytes.py --against COMMIT     run that version as well; exit 1 if they differ
+
+Of every shipped study the first, the middle and the last configuration of each part are run, and
+two runs are written as recordings. Each version runs its own copy of this file, so COMMIT must
+have one; `make same-bytes AGAINST=COMMIT` does this with the environment of the project.
+"""
+
+import argparse
+import hashlib
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+
+import dva_sim
+from dva_sim.experiments.design import cells, jobs
+from dva_sim.experiments.episode import run_job
+from dva_sim.experiments.study import load_study
+
+ROOT = Path(__file__).parent.parent
+RECORDED = ("drive-to-event", "fire-drill")
+
+
+def chosen_jobs(study):
+    """The first run of three configurations of each part."""
+    first = [j for j in jobs(study, cells(study)) if j.person == 0 and j.trial == 0]
+    for part in dict.fromkeys(job.part for job in first):
+        of_part = [job for job in first if job.part == part]
+        for index in sorted({0, len(of_part) // 2, len(of_part) - 1}):
+            yield index, of_part[index]
+
+
+def digest_of_run(name, index, job):
+    """One line: which run, its configuration and seed, and the hash of all rows of its tables."""
+    rows = json.dumps(run_job(job), sort_keys=True, default=str).encode()
+    sha = hashlib.sha256(rows).hexdigest()
+    return f"{name} {job.part} {index}: config {job.config}, seed {job.seed}, tables {sha}"
+
+
+def digest_of_recording(name):
+    """One line: the hash of a scenario's recording."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "run.mcap"
+        dva_sim.episode(name, seed=1, record=file)
+        return f"{name}: recording {hashlib.sha256(file.read_bytes()).hexdigest()}"
+
+
+def digests():
+    """All lines, as they are made."""
+    with ProcessPoolExecutor(mp_context=get_context("forkserver")) as pool:
+        told = [pool.submit(digest_of_recording, name) for name in RECORDED]
+        for file in sorted((ROOT / "experiments").glob("*.yaml")):
+            runs = chosen_jobs(load_study(file))
+            told += [pool.submit(digest_of_run, file.stem, *run) for run in runs]
+        for line in told:
+            yield line.result()
+
+
+def told_by(root):
+    """The lines that the version in a folder prints."""
+    environment = os.environ | {"PYTHONPATH": str(root), "PYTHONHASHSEED": "0"}
+    program = [sys.executable, str(root / "tests/same_bytes.py")]
+    return subprocess.check_output(program, env=environment, text=True, cwd=root).splitlines()
+
+
+def compare(commit):
+    """Tell every line that differs; the exit code."""
+    with tempfile.TemporaryDirectory() as folder:
+        other = Path(folder) / "other"
+        git = ["git", "-C", str(ROOT), "worktree"]
+        subprocess.check_call([*git, "add", "--quiet", "--detach", str(other), commit])
+        try:
+            theirs, ours = told_by(other), told_by(ROOT)
+        finally:
+            subprocess.check_call([*git, "remove", "--force", str(other)])
+    different = [line for line in theirs if line not in ours]
+    for line in different:
+        print(f"not the same as in {commit}: {line.split(':')[0]}")
+    print(f"{len(theirs) - len(different)} of {len(theirs)} runs have the same bytes in {commit}")
+    return 1 if different or not theirs else 0
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--against", metavar="COMMIT")
+    asked = parser.parse_args()
+    if asked.against:
+        sys.exit(compare(asked.against))
+    for line in digests():
+        print(line, flush=True)
