@@ -1,4 +1,6 @@
-"""What the command line does, for programs and notebooks: `import dva_sim; dva_sim.run(...)`.
+"""Single runs for programs and notebooks, played now or read from a recording.
+
+What the command line does, for programs and notebooks: `import dva_sim; dva_sim.run(...)`.
 
 Commands and options have the same names, and the results are the same bytes; a limit in seconds
 is `limit_s`, and `--dry-run` a function. Only `show` prints, so nothing is quiet, verbose or JSON;
@@ -10,26 +12,193 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dva_sim.errors import RunsFailed
-from dva_sim.experiments.comparing import Comparison as Comparison
-from dva_sim.experiments.results import Results as Results
-from dva_sim.experiments.settings import Settings, pairs_of
-from dva_sim.experiments.single import Episode as Episode
-from dva_sim.experiments.single import episode as episode
-from dva_sim.experiments.single import replay as replay
-from dva_sim.experiments.versions import Variant
+from dva_sim.experiments.analysis.compare import Comparison as Comparison
+from dva_sim.experiments.results.data_dictionary import describe
+from dva_sim.experiments.results.results import Frame, frame_of, plain
+from dva_sim.experiments.results.results import Results as Results
+from dva_sim.experiments.study.documents import mistakes_of
+from dva_sim.experiments.study.overrides import Settings, pairs_of
+from dva_sim.experiments.study.study import Variant
+from dva_sim.kernel.errors import RunsFailed
+from dva_sim.kernel.key_changes import parse_changes
+from dva_sim.kernel.suggestions import listed
+from dva_sim.simulation import scenario as scenarios
+from dva_sim.simulation.models import AnyScenario, Tables, model_of, tables_of
+from dva_sim.simulation.scenario import Scenario, contradictions
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from dva_sim.experiments.design import Cell
-    from dva_sim.experiments.planning import DryRun
-    from dva_sim.experiments.registration import Registration
-    from dva_sim.experiments.study import Study
-    from dva_sim.experiments.tuned import Tuned
+    from dva_sim.experiments.execution.dry_run import DryRun
+    from dva_sim.experiments.study.cell_grid import Cell
+    from dva_sim.experiments.study.registration import Registration
+    from dva_sim.experiments.study.study import Study
+    from dva_sim.experiments.study.tuned_values import Tuned
+    from dva_sim.recordings.pictures import Wanted
+
+
+@dataclass(frozen=True)
+class Episode:
+    """One run of one scenario.
+
+    Attributes:
+        scenario: As it was run.
+        seed: Of its luck.
+        tables: Its rows as columns, by table: `runs`, `events`, ...
+    """
+
+    scenario: AnyScenario
+    seed: int
+    tables: dict[str, Frame]
+
+    @property
+    def warnings(self) -> list[str]:
+        """What in the scenario does not go together, each in a sentence."""
+        return contradictions(self.scenario) if isinstance(self.scenario, Scenario) else []
+
+    @property
+    def measures(self) -> dict[str, Any]:
+        """The one row of the table of runs."""
+        return {name: values.tolist()[0] for name, values in self.tables["runs"].items()}
+
+    def __repr__(self) -> str:
+        """What came out of it, and what to ask it for."""
+        told = {name: plain(value) for name, value in self.measures.items()}
+        some = listed(f"{name} {value}" for name, value in told.items() if value)
+        tables = ", ".join(f"{name} ({table.rows})" for name, table in self.tables.items())
+        head = f"Episode of a {self.scenario.model} scenario, seed {self.seed}"
+        return "\n".join((head, f"measures: {some}", f"tables: {tables}"))
+
+    def _repr_html_(self) -> str:
+        told = describe("runs", list(self.measures), [self.scenario.model], [])
+        rows = [
+            f"<tr><td>{escape(c.name)}</td><td>{escape(plain(self.measures[c.name]))}</td>"
+            f"<td>{escape(c.meaning)}</td></tr>"
+            for c in told
+        ]
+        return f"<table>{''.join(rows)}</table>"
+
+
+def episode(
+    scenario: str | Path,
+    seed: int = 1,
+    *,
+    set: Settings = (),
+    video: str | Path | None = None,
+    still: str | Path | None = None,
+    strip: str | Path | None = None,
+    at: float | str | Sequence[float] | None = None,
+    panels: int = 6,
+    camera: str | None = None,
+    inset: bool = False,
+    side_by_side: str | Sequence[str] | None = None,
+    record: str | Path | None = None,
+) -> Episode:
+    """Run one scenario once, and draw or keep it if asked to.
+
+    Args:
+        scenario: By name or path.
+        seed: Of its luck.
+        set: Keys to change, as a mapping or as `key=value` pairs.
+        video: Write a film: `.gif` or `.mp4`.
+        still: Write one moment: `.png`, `.pdf` or `.svg`.
+        strip: Write several moments in one figure, likewise.
+        at: Moment of the still, or moments of the strip [s].
+        panels: Moments in a strip.
+        camera: The still shows what this robot's camera sees.
+        inset: Show in the film what a robot's camera sees.
+        side_by_side: Run and draw the same seed under two patterns; the episode is that of the
+            first.
+        record: Keep the run as a file: `.mcap`.
+
+    Raises:
+        ConfigError: there is none, it is not valid with these changes, or it cannot be drawn so.
+    """
+    wanted = _wanted(video, still, strip, at, panels, camera, inset)
+    sides = None if side_by_side is None else _joined(side_by_side)
+    kept, pairs = None if record is None else Path(record), pairs_of(set)
+    with mistakes_of(str(scenario), pairs, seed):
+        built, tables = _played(str(scenario), pairs, seed, wanted, sides, kept)
+    return Episode(built, seed, {name: frame_of(rows) for name, rows in tables.items()})
+
+
+def _played(
+    scenario: str,
+    pairs: list[str],
+    seed: int,
+    wanted: Wanted,
+    sides: str | None,
+    kept: Path | None,
+) -> tuple[AnyScenario, Tables]:
+    """The scenario as it was run, and its rows by table."""
+    from dva_sim.cli import episode_output
+    from dva_sim.simulation.full.measures import track_rows
+
+    document = scenarios.load(scenario)
+    model = model_of(document)
+    built = model.build(document, parse_changes(pairs))
+    run = None
+    if wanted.any or sides is not None or kept is not None:
+        run = episode_output.episode(
+            scenario, seed, pairs, sides, wanted, kept, episode_output.nowhere()
+        )
+    if run is None:
+        return built, model.tables(built, seed, with_tracks=True)
+    return run.scenario, tables_of(run) | {"tracks": track_rows(run)}
+
+
+def replay(
+    file: str | Path,
+    *,
+    video: str | Path | None = None,
+    still: str | Path | None = None,
+    strip: str | Path | None = None,
+    at: float | str | Sequence[float] | None = None,
+    panels: int = 6,
+    camera: str | None = None,
+    inset: bool = False,
+    ros2: str | Path | None = None,
+) -> Episode:
+    """A recorded run from its file alone, drawn or taken to ROS 2 if asked to; see `episode`.
+
+    Raises:
+        ConfigError: not a recording, or what is asked for is not in it.
+    """
+    from dva_sim.cli import episode_output
+
+    wanted = _wanted(video, still, strip, at, panels, camera, inset)
+    bag = None if ros2 is None else Path(ros2)
+    opened = episode_output.replay(Path(file), wanted, bag, episode_output.nowhere())
+    run, tables = opened.playback, opened.tables or {}
+    return Episode(run.scenario, run.seed, {name: frame_of(rows) for name, rows in tables.items()})
+
+
+def _wanted(
+    video: str | Path | None,
+    still: str | Path | None,
+    strip: str | Path | None,
+    at: float | str | Sequence[float] | None,
+    panels: int,
+    camera: str | None,
+    inset: bool,
+) -> Wanted:
+    from dva_sim.recordings.pictures import Wanted
+
+    film, moment, moments = (None if p is None else Path(p) for p in (video, still, strip))
+    times = None if at is None else _joined(at)
+    return Wanted(film, moment, moments, times, panels, camera, inset)
+
+
+def _joined(words: object) -> str:
+    """One word or number, or several, as on the command line."""
+    several = words if isinstance(words, list | tuple) else [words]
+    return ",".join(map(str, several))
+
 
 Folder = Results | str | Path
 
@@ -73,8 +242,8 @@ def run(
             kept as recordings and could not.
         KeyboardInterrupt: the finished runs are kept, and the same call goes on.
     """
-    from dva_sim.experiments.recording import record_study
-    from dva_sim.experiments.runner import run_study
+    from dva_sim.experiments.execution.kept_recordings import record_study
+    from dva_sim.experiments.execution.runner import run_study
 
     variant = Variant.of(quick=quick, full=full, pilot=pilot)
     asked, folder, cells = _asked(study, out, pairs_of(set, seed), variant)
@@ -106,8 +275,8 @@ def dry_run(
     Raises:
         DvaSimError: a mistake in what was asked for.
     """
-    from dva_sim.experiments.episode import run_job
-    from dva_sim.experiments.planning import dry_run as planned
+    from dva_sim.experiments.execution.dry_run import dry_run as planned
+    from dva_sim.experiments.execution.job import run_job
 
     variant = Variant.of(quick=quick, full=full, pilot=pilot)
     asked, folder, cells = _asked(study, out, pairs_of(set, seed), variant)
@@ -118,8 +287,8 @@ def _asked(
     study: str | Path, out: str | Path | None, pairs: list[str], variant: Variant
 ) -> tuple[Study, Path, list[Cell]]:
     """A study without mistakes, the folder of its results, and its configurations."""
-    from dva_sim.experiments.episode import rehearse_all
-    from dva_sim.experiments.study import load_study
+    from dva_sim.experiments.execution.job import rehearse_all
+    from dva_sim.experiments.study.study import load_study
 
     asked = load_study(study, pairs, version=variant.version, pilot=variant.pilot)
     folder = Path(out) if out is not None else variant.folder(str(study))
@@ -132,7 +301,7 @@ def new(name: str | Path) -> Path:
     Raises:
         DvaSimError: there is such a file, or it cannot be written.
     """
-    from dva_sim.experiments.starting import write_study
+    from dva_sim.experiments.study.new_study import write_study
 
     return write_study(str(name))
 
@@ -148,9 +317,9 @@ def register(study: str | Path, *, full: bool = False, again: bool = False) -> R
     Raises:
         DvaSimError: nothing to register, a size left open, or a registration that is there.
     """
-    from dva_sim.experiments.registration import register as write_down
-    from dva_sim.experiments.registration import registration_of
-    from dva_sim.experiments.study import load_study
+    from dva_sim.experiments.study.registration import register as write_down
+    from dva_sim.experiments.study.registration import registration_of
+    from dva_sim.experiments.study.study import load_study
 
     asked = load_study(study, version="full" if full else None)
     write_down(asked, again)
@@ -171,10 +340,10 @@ def tune(
     Raises:
         DvaSimError: the study tunes nothing, or runs failed.
     """
-    from dva_sim.experiments.running import folder_of_tuning
-    from dva_sim.experiments.study import load_study
-    from dva_sim.experiments.tuned import save_tuned
-    from dva_sim.experiments.tuning import tune as try_all
+    from dva_sim.cli.study_output import folder_of_tuning
+    from dva_sim.experiments.analysis.tuning import tune as try_all
+    from dva_sim.experiments.study.study import load_study
+    from dva_sim.experiments.study.tuned_values import save_tuned
 
     asked = load_study(study)
     folder = Path(out) if out is not None else folder_of_tuning(str(study))
@@ -190,7 +359,7 @@ def report(folder: Folder, *, pdf: bool = False) -> Path:
     Raises:
         DvaSimError: no results there, or a disk that cannot be written.
     """
-    from dva_sim.experiments.report import write_report
+    from dva_sim.experiments.report.report import write_report
 
     return write_report(folder.folder if isinstance(folder, Results) else Path(folder), pdf)
 
@@ -205,9 +374,9 @@ def show(
     Raises:
         ConfigError: no results there, or no such table.
     """
-    from dva_sim.experiments import showing_console
+    from dva_sim.cli import results_output
 
-    showing_console.show(_so_far(folder), table, columns, rows)
+    results_output.show(_so_far(folder), table, columns, rows)
 
 
 def export(
@@ -230,7 +399,7 @@ def export(
     Raises:
         DvaSimError: no such table or format, a file that is there, or one that cannot be written.
     """
-    from dva_sim.experiments.exporting import export as write
+    from dva_sim.experiments.results.export import export as write
 
     tables = [table] if isinstance(table, str) else table
     return write(_results(folder), Path(out), tables, format, overwrite)
@@ -257,7 +426,7 @@ def compare(first: Folder, second: Folder) -> Comparison:
 
 
 def _so_far(folder: Folder) -> Results:
-    from dva_sim.experiments.unfinished import load_so_far
+    from dva_sim.experiments.execution.partial_results import load_so_far
 
     return folder if isinstance(folder, Results) else load_so_far(folder)
 

@@ -9,8 +9,8 @@ finite source.
 
 import sys
 
-from dva_sim.experiments.fan_out import need_of, settled_per_person
-from dva_sim.experiments.results import Results
+from dva_sim.experiments.analysis.fan_out import need_of, settled_per_person
+from dva_sim.experiments.results.results import Results
 
 WARM_UP_S = 100.0
 

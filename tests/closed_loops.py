@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dva_sim.agents.camera import Observation
 from dva_sim.agents.operator.person import Person, Population, median_person
 from dva_sim.agents.operator.strategies import (
     Intent,
@@ -20,7 +19,8 @@ from dva_sim.agents.operator.strategies import (
     Strategy,
     View,
 )
-from dva_sim.agents.steering import Route
+from dva_sim.agents.robot.camera import Observation
+from dva_sim.agents.route_following import Route
 
 ROBOT = Reach(speed=0.5, turn_rate=math.pi / 6)
 CURSOR = Reach(speed=0.5, turn_rate=1.0)

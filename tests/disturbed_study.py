@@ -22,11 +22,11 @@ from typing import Any
 
 import small_study as kit
 
-from dva_sim.errors import DvaSimError
-from dva_sim.experiments import runner
-from dva_sim.experiments.design import Job
-from dva_sim.experiments.report import write_report
-from dva_sim.experiments.runner import run_study
+from dva_sim.experiments.execution import runner
+from dva_sim.experiments.execution.runner import run_study
+from dva_sim.experiments.report.report import write_report
+from dva_sim.experiments.study.cell_grid import Job
+from dva_sim.kernel.errors import DvaSimError
 
 KILLS_EACH = 40
 KILLS_A_STUDY = 10

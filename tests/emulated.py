@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 from patience import PATIENCE_S, becomes
 
-from dva_sim.emulator.cell import Job
-from dva_sim.emulator.running import EmulatorError, run_job
+from dva_sim.validation.network.emulator.cell import Job
+from dva_sim.validation.network.emulator.running import EmulatorError, run_job
 
 
 @cache

@@ -7,16 +7,18 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cache
 
-from dva_sim.agents.camera import HazardSpot, Observation, View
-from dva_sim.agents.errands import Errand
-from dva_sim.agents.local_loops import Surrounded
-from dva_sim.agents.manoeuvres import Seen
-from dva_sim.agents.missions import PERIOD, Pilot, Step
-from dva_sim.clock import Clock
+from dva_sim.agents.robot.camera import HazardSpot, Observation, View
+from dva_sim.agents.robot.local_loops import Surrounded
+from dva_sim.agents.robot.manoeuvres import Seen
+from dva_sim.agents.robot.missions import PERIOD, Errand, Pilot, Step
+from dva_sim.kernel.clock import Clock
+from dva_sim.worlds.drives import DriveSpec
 from dva_sim.worlds.geo import Pose
-from dva_sim.worlds.physics import DriveSpec, PersonBody, RobotBody, World
+from dva_sim.worlds.layout import Site
+from dva_sim.worlds.physics import PersonBody, World
 from dva_sim.worlds.planning import Planner
-from dva_sim.worlds.site import Site, load_site
+from dva_sim.worlds.robot_body import RobotBody
+from dva_sim.worlds.site import load_site
 
 Point = tuple[float, float]
 CAMERA_ANGLE, CAMERA_RANGE = math.radians(70.0), 6.0

@@ -8,15 +8,14 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.core.access import Access
+from dva_sim.core.assignments import Rules
 from dva_sim.core.dispatch import MinEta, Policy
+from dva_sim.core.dva import Desk
 from dva_sim.core.events import Event, State
-from dva_sim.core.ground import Ground, Start
-from dva_sim.core.permissions import Permissions
-from dva_sim.core.rules import Rules
-from dva_sim.core.send import Send
-from dva_sim.core.service import Desk
+from dva_sim.core.outbox import Send
+from dva_sim.core.permissions import Access, Permissions
 from dva_sim.core.sessions import Sessions
+from dva_sim.core.travel_times import Ground, Start
 from dva_sim.protocol import messages as m
 
 Floats = NDArray[np.float64]

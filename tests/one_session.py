@@ -10,24 +10,23 @@ from typing import NamedTuple
 
 from patience import PATIENCE_S
 
-from dva_sim import scenario as scenarios
-from dva_sim.agents.commands import topic_of
-from dva_sim.agents.modes import Decision, RobotController
-from dva_sim.agents.operator.script import Ask, Pause, Script, ScriptedOperator, drill
-from dva_sim.agents.trace import Trace
-from dva_sim.clock import Clock
+from dva_sim.agents.operator.command_sender import topic_of
+from dva_sim.agents.operator.scripted import Ask, Pause, Script, ScriptedOperator, drill
+from dva_sim.agents.robot.controller import Decision, RobotController
+from dva_sim.agents.robot.decision_log import Trace
+from dva_sim.kernel.clock import Clock
+from dva_sim.kernel.recorder import Recorder
+from dva_sim.kernel.streams import Streams
 from dva_sim.network.link import ConstantRate, Link, LinkConfig
 from dva_sim.network.patterns import Requester, Transport
 from dva_sim.network.realtime import LiveClock
 from dva_sim.network.sockets import SocketNetwork
 from dva_sim.network.virtual import VirtualNetwork
 from dva_sim.protocol import messages as m
-from dva_sim.recorder import Recorder
-from dva_sim.simulation.control_room import add_dva
-from dva_sim.simulation.field import Field
-from dva_sim.simulation.names import id_of
-from dva_sim.simulation.stage import Stage
-from dva_sim.streams import Streams
+from dva_sim.simulation import scenario as scenarios
+from dva_sim.simulation.full.control_room import add_dva
+from dva_sim.simulation.full.field import Field
+from dva_sim.simulation.full.stage import Stage, id_of
 
 ROBOT, OPERATOR = id_of("robot", 1), id_of("operator", 1)
 STEP = 0.02  # between two looks at whether it is over [s]

@@ -5,26 +5,24 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from dva_sim import scenario as scenarios
-from dva_sim.agents.camera import no_smoke
-from dva_sim.agents.exposure import Air, clean_air
-from dva_sim.agents.guard import GuardAgent
-from dva_sim.agents.legs import RADIUS
-from dva_sim.agents.operator.agent import OperatorAgent
-from dva_sim.agents.people import Walker
-from dva_sim.agents.walking import Walking
-from dva_sim.clock import Clock
+from dva_sim.agents.operator.operator import OperatorAgent
+from dva_sim.agents.people.exposure import Air, clean_air
+from dva_sim.agents.people.guard import GuardAgent
+from dva_sim.agents.people.locomotion import RADIUS
+from dva_sim.agents.people.profiles import Walker
+from dva_sim.agents.people.walking import Walking
+from dva_sim.agents.robot.camera import no_smoke
+from dva_sim.kernel.clock import Clock
+from dva_sim.kernel.recorder import Recorder
+from dva_sim.kernel.streams import Streams
 from dva_sim.network.link import ConstantRate, Link, LinkConfig
 from dva_sim.network.virtual import VirtualNetwork
 from dva_sim.protocol import messages as m
-from dva_sim.recorder import Recorder
-from dva_sim.simulation.control_room import add_operator
-from dva_sim.simulation.field import Field
-from dva_sim.simulation.machines import Machines
-from dva_sim.simulation.names import id_of
-from dva_sim.simulation.stage import Stage
-from dva_sim.simulation.starts import Starts
-from dva_sim.streams import Streams
+from dva_sim.simulation import scenario as scenarios
+from dva_sim.simulation.full.control_room import add_operator
+from dva_sim.simulation.full.field import Field
+from dva_sim.simulation.full.robots import Machines, Starts
+from dva_sim.simulation.full.stage import Stage, id_of
 from dva_sim.worlds.geo import Pose
 
 GUARD, ROBOT, OTHER_ROBOT = id_of("guard", 1), id_of("robot", 1), id_of("robot", 2)

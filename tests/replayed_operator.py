@@ -9,12 +9,12 @@ from typing import Any
 
 import pytest
 
-from dva_sim.agents.camera import Observation
 from dva_sim.agents.operator.drive import Drive
-from dva_sim.agents.operator.work import Work
+from dva_sim.agents.operator.supervision import Work
+from dva_sim.agents.robot.camera import Observation
 from dva_sim.agents.tilt import Phone, TiltCommand
-from dva_sim.scenario import Scenario
-from dva_sim.simulation import Recording, control_room, simulate
+from dva_sim.simulation.full import Recording, control_room, simulate
+from dva_sim.simulation.scenario import Scenario
 
 
 class Tape:

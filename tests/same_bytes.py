@@ -1,6 +1,6 @@
 """Whether two versions of the program make the same results, byte for byte.
 
-    python tests/same_bytes.py                      print this version's digests, a line for each run
+    python tests/same_bytes.py                      print a line for each run of this version
     python tests/same_bytes.py --against COMMIT     run that version as well; exit 1 if they differ
 
 Of every shipped study the first, the middle and the last configuration of each part are run, and
@@ -20,9 +20,9 @@ from multiprocessing import get_context
 from pathlib import Path
 
 import dva_sim
-from dva_sim.experiments.design import cells, jobs
-from dva_sim.experiments.episode import run_job
-from dva_sim.experiments.study import load_study
+from dva_sim.experiments.execution.job import run_job
+from dva_sim.experiments.study.cell_grid import cells, jobs
+from dva_sim.experiments.study.study import load_study
 
 ROOT = Path(__file__).parent.parent
 RECORDED = ("drive-to-event", "fire-drill")

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 
-from dva_sim.clock import Clock
+from dva_sim.kernel.clock import Clock
 from dva_sim.network.tcp import TcpConnection, TcpEndpoint, TcpOptions
 
 EXACT = TcpOptions(tick=0.0)  # timers that ring when they are due

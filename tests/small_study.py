@@ -11,11 +11,11 @@ import threading
 import time
 from pathlib import Path
 
-from dva_sim.experiments.design import Job
-from dva_sim.experiments.journal import Tables
-from dva_sim.experiments.results import Results
-from dva_sim.experiments.runner import run_study
-from dva_sim.experiments.study import Study, load_study
+from dva_sim.experiments.execution.checkpoint import Tables
+from dva_sim.experiments.execution.runner import run_study
+from dva_sim.experiments.results.results import Results
+from dva_sim.experiments.study.cell_grid import Job
+from dva_sim.experiments.study.study import Study, load_study
 
 STUDY = """\
 question: Which is quicker?

@@ -16,8 +16,10 @@ import zmq
 from patience import PATIENCE_S
 
 from dva_sim.agents.device import Device
-from dva_sim.clock import Clock
-from dva_sim.network.connecting import Connector
+from dva_sim.kernel.clock import Clock
+from dva_sim.kernel.recorder import Recorder
+from dva_sim.kernel.streams import Streams
+from dva_sim.network.connections import Connector
 from dva_sim.network.keys import KeyRing
 from dva_sim.network.link import ConstantRate, Link, LinkConfig
 from dva_sim.network.patterns import (
@@ -32,8 +34,6 @@ from dva_sim.network.patterns import (
 from dva_sim.network.realtime import LiveClock
 from dva_sim.network.sockets import NetworkError, SocketNetwork
 from dva_sim.network.virtual import VirtualNetwork
-from dva_sim.recorder import Recorder
-from dva_sim.streams import Streams
 from dva_sim.worlds.geo import GeoFrame
 
 DVA, ROBOT, PHONE, TABLET = (f"02:00:00:00:00:0{i}" for i in range(1, 5))

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from office import DVA, crow, east
 
-from dva_sim.core.access import Access, AccessRule
+from dva_sim.core.assignments import Rules
 from dva_sim.core.dispatch import (
     POLICIES,
     Advice,
@@ -21,14 +21,13 @@ from dva_sim.core.dispatch import (
     Relocation,
     Situation,
 )
+from dva_sim.core.dva import Desk
 from dva_sim.core.events import ACT_STEPS, STEPS, Event, State
-from dva_sim.core.ground import Ground, Station
-from dva_sim.core.memory import Memory
-from dva_sim.core.permissions import Permissions
-from dva_sim.core.rules import Rules
-from dva_sim.core.send import Send
-from dva_sim.core.service import Desk
+from dva_sim.core.outbox import Send
+from dva_sim.core.permissions import Access, AccessRule, Permissions
 from dva_sim.core.sessions import Sessions
+from dva_sim.core.store import Memory
+from dva_sim.core.travel_times import Ground, Station
 from dva_sim.protocol import messages as m
 
 KINDS = {"Guard": 3, "Robot": 2, "TeleOp": 2, "Sensor": 2}

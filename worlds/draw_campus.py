@@ -9,9 +9,9 @@ from typing import Any
 
 from shapely import LineString, Point, Polygon, box, difference, get_parts, union_all
 
-from dva_sim.config import load_yaml
-from dva_sim.worlds.drawing import Feature, write_features
+from dva_sim.kernel.config import load_yaml
 from dva_sim.worlds.geo import GeoFrame
+from dva_sim.worlds.geojson import Feature, write_features
 
 HERE = Path(__file__).parent
 WIDTH, DEPTH = 120.0, 90.0

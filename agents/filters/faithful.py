@@ -6,7 +6,7 @@
 import math
 
 from dva_sim.agents.tilt import Filter
-from dva_sim.errors import ConfigError
+from dva_sim.kernel.errors import ConfigError
 
 
 class Faithful(Filter):

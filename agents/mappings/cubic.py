@@ -8,7 +8,7 @@ import math
 from dva_sim.agents.tilt import Mapping
 from dva_sim.agents.tilt.calibration import MAX_TURN_DEG
 from dva_sim.agents.tilt.mappings import limited
-from dva_sim.errors import ConfigError
+from dva_sim.kernel.errors import ConfigError
 
 
 class Cubic(Mapping):

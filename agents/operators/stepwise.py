@@ -5,8 +5,8 @@
 
 from dva_sim.agents.operator.person import Person
 from dva_sim.agents.operator.strategies import Intent, Reach, Strategy, View, gain_at
-from dva_sim.agents.steering import Route
-from dva_sim.errors import ConfigError
+from dva_sim.agents.route_following import Route
+from dva_sim.kernel.errors import ConfigError
 
 
 class Stepwise(Strategy):

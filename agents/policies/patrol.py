@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from dva_sim.core.dispatch import Advice, Assignment, MinEta, Relocation, Situation
-from dva_sim.errors import ConfigError
+from dva_sim.kernel.errors import ConfigError
 
 
 class Patrol(MinEta):

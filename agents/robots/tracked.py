@@ -3,7 +3,7 @@
 `dva-sim check robot tracked` tells whether it keeps what every drive promises.
 """
 
-from dva_sim.errors import ConfigError
+from dva_sim.kernel.errors import ConfigError
 from dva_sim.worlds.drives import Differential, DriveSpec
 
 

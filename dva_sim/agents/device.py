@@ -6,13 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import islice
 
-from dva_sim.clock import Clock
+from dva_sim.kernel.clock import Clock
+from dva_sim.kernel.recorder import Recorder
 from dva_sim.network.patterns import Request, Requester, Transport
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode, encode
 from dva_sim.protocol.errors import ProtocolError
 from dva_sim.protocol.exchange import NOON, Outbox, ReplyCache, key_of
-from dva_sim.recorder import Recorder
 from dva_sim.worlds.geo import GeoFrame
 
 HEARTBEAT = "heartbeat|"  # topics; the bar ends each, so that none begins another

@@ -9,10 +9,9 @@ import typer
 from typer import Argument, Option
 
 from dva_sim.cli.completing import one_of
-from dva_sim.cli.options import Jobs, Json, Quiet, Verbose
-from dva_sim.cli.printing import print_json
-from dva_sim.cli.values import whole
-from dva_sim.loudness import loudness
+from dva_sim.cli.mistakes import print_json
+from dva_sim.cli.options import Jobs, Json, Quiet, Verbose, whole
+from dva_sim.kernel.verbosity import loudness
 
 _LISTED = (
     *("studies", "scenarios", "tasks", "sites", "robots", "phones", "accelerometers", "people"),
@@ -40,12 +39,12 @@ def list_(
         dva-sim list scenarios  # of one kind
         dva-sim list --json  # for other programs
     """
-    from dva_sim.experiments import listing
+    from dva_sim.cli import names
 
     if as_json:
-        print_json(listing.as_json(kind))
+        print_json(names.as_json(kind))
     else:
-        listing.tell(listing.lines(kind))
+        names.tell(names.lines(kind))
 
 
 def plugins(as_json: Json = False) -> None:
@@ -58,12 +57,12 @@ def plugins(as_json: Json = False) -> None:
         dva-sim plugins  # all kinds
         dva-sim plugins --json  # for other programs
     """
-    from dva_sim.experiments import extending, listing
+    from dva_sim.cli import names, plugin_names
 
     if as_json:
-        print_json(extending.as_json())
+        print_json(plugin_names.as_json())
     else:
-        listing.tell(extending.lines())
+        names.tell(plugin_names.lines())
 
 
 def check(
@@ -92,9 +91,9 @@ def check(
         dva-sim check policy agents/policies/patrol.py:Patrol  # does it keep its promises?
         dva-sim check link  # does the emulated link do what it is told?
     """
-    from dva_sim.checking import console
+    from dva_sim.cli import check_output
 
-    raise typer.Exit(console.check(files, set_ or []))
+    raise typer.Exit(check_output.check(files, set_ or []))
 
 
 def schema(
@@ -114,9 +113,9 @@ def schema(
     Examples:
         dva-sim schema scenario > scenario.schema.json  # for an editor
     """
-    from dva_sim.checking import console
+    from dva_sim.cli import check_output
 
-    console.print_schema(kind)
+    check_output.print_schema(kind)
 
 
 def validate(
@@ -163,9 +162,11 @@ def validate(
         dva-sim validate operators -o evidence  # against published experiments
         dva-sim validate network --live --quick  # against sockets of this machine
     """
-    from dva_sim.experiments.validation import console
 
-    sockets = console.Sockets(ablate, live, measure)
+    from dva_sim.cli.validate import Sockets
+    from dva_sim.cli.validate import validate as run
+
+    sockets = Sockets(ablate, live, measure)
     with loudness(quiet, verbose):
-        code = console.validate(what, out, cases, quick, jobs, seed, strategy, sockets)
+        code = run(what, out, cases, quick, jobs, seed, strategy, sockets)
     raise typer.Exit(code)

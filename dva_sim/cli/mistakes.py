@@ -1,13 +1,17 @@
-"""Mistakes in the words of a call, each in one line that says what would be right."""
+"""Mistakes in the words of a call, each in one line that says what would be right.
+
+What other programs read: JSON on standard output, and nothing else there.
+"""
 
 from __future__ import annotations
 
+import math
 import re
 from typing import Any
 
 import typer
 
-from dva_sim.guesses import hint
+from dva_sim.kernel.suggestions import hint
 
 UsageError: type[Exception] = typer.BadParameter.__mro__[1]
 """What the parser of the command line raises, whichever library it is from."""
@@ -51,3 +55,23 @@ def _options(error: Any, more: str) -> str:
     known = [opt for param in error.ctx.command.get_params(error.ctx) for opt in param.opts]
     near = hint(error.option_name, [opt for opt in known if opt.startswith("--")])
     return near if near.startswith("did you") else more
+
+
+def print_json(data: Any) -> None:
+    """Print as JSON; what is no number is null."""
+    import json
+
+    typer.echo(json.dumps(_plain(data), indent=2, ensure_ascii=False, allow_nan=False))
+
+
+def _plain(value: Any) -> Any:
+    """As JSON can hold it: what is missing or infinite is null, and arrays are lists."""
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, dict):
+        return {str(key): _plain(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(inner) for inner in value]
+    if hasattr(value, "tolist"):  # of numpy
+        return _plain(value.tolist())
+    return value

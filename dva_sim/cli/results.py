@@ -8,10 +8,9 @@ from typing import Annotated
 import typer
 from typer import Argument, Option
 
-from dva_sim.cli.options import Folder, Json, Quiet, Verbose
-from dva_sim.cli.printing import print_json
-from dva_sim.cli.values import whole
-from dva_sim.loudness import loudness
+from dva_sim.cli.mistakes import print_json
+from dva_sim.cli.options import Folder, Json, Quiet, Verbose, whole
+from dva_sim.kernel.verbosity import loudness
 
 
 def report(
@@ -28,8 +27,8 @@ def report(
     Examples:
         dva-sim report results/req-rep-vs-pub-sub --pdf  # and report.pdf for print
     """
-    from dva_sim.experiments.details import WRITTEN, tell_files
-    from dva_sim.experiments.report import write_report
+    from dva_sim.cli.verbose_details import WRITTEN, tell_files
+    from dva_sim.experiments.report.report import write_report
 
     with loudness(quiet, verbose):
         page = write_report(folder, pdf)
@@ -60,12 +59,12 @@ def show(
         dva-sim show small --columns  # what the columns of every table mean
         dva-sim show small --json  # the same for other programs
     """
-    from dva_sim.experiments import results_json, showing_console
-    from dva_sim.experiments.unfinished import load_so_far
+    from dva_sim.cli import results_json, results_output
+    from dva_sim.experiments.execution.partial_results import load_so_far
 
     results = load_so_far(folder)
     if not as_json:
-        showing_console.show(results, table, columns, rows)
+        results_output.show(results, table, columns, rows)
     elif columns:
         print_json(results_json.columns(results, [] if table is None else [table]))
     else:
@@ -101,9 +100,9 @@ def export(
         dva-sim export small -o small.csv  # one row for each run
         dva-sim export small -o tables --format parquet  # every table
     """
-    from dva_sim.experiments import showing_console
+    from dva_sim.cli import results_output
 
-    showing_console.export(folder, out, table or [], form, overwrite)
+    results_output.export(folder, out, table or [], form, overwrite)
 
 
 def compare(
@@ -136,8 +135,8 @@ def compare(
         dva-sim compare a b --fail-if 'mean(drive_time_s) per cell > +0.5 s'  # B minus A
         dva-sim compare a b --fail-if 'share(confirmed) < 95 %'  # of B alone
     """
-    from dva_sim.experiments import showing_console
+    from dva_sim.cli import results_output
 
-    asked = showing_console.Asked(measure or [], by or [], fail_if or [])
+    asked = results_output.Asked(measure or [], by or [], fail_if or [])
     tell = print_json if as_json else None
-    raise typer.Exit(showing_console.compare(first, second, asked, tell))
+    raise typer.Exit(results_output.compare(first, second, asked, tell))

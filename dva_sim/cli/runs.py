@@ -22,9 +22,10 @@ from dva_sim.cli.options import (
     Strip,
     Verbose,
     Video,
+    number,
+    whole,
 )
-from dva_sim.cli.values import number, whole
-from dva_sim.loudness import loudness
+from dva_sim.kernel.verbosity import loudness
 
 _MOST_PORT = 64_999
 
@@ -59,13 +60,13 @@ def episode(
         dva-sim episode evacuation --strip fire.png  # several moments in one figure
         dva-sim episode fire-drill --record drill.mcap  # for `dva-sim replay` and viewers
     """
-    from dva_sim.experiments import console
-    from dva_sim.experiments.opening import mistakes_of
-    from dva_sim.experiments.pictures import Wanted
+    from dva_sim.cli import episode_output
+    from dva_sim.experiments.study.documents import mistakes_of
+    from dva_sim.recordings.pictures import Wanted
 
     pictures = Wanted(video, still, strip, at, panels, camera, inset)
     with loudness(quiet, verbose), mistakes_of(scenario, set_ or [], seed):
-        console.episode(scenario, seed, set_ or [], side_by_side, pictures, record)
+        episode_output.episode(scenario, seed, set_ or [], side_by_side, pictures, record)
 
 
 def replay(
@@ -89,11 +90,11 @@ def replay(
         dva-sim replay drill.mcap --strip drill.png  # several moments in one figure
         dva-sim replay drill.mcap --ros2 bag  # for the tools of ROS 2
     """
-    from dva_sim.experiments import replaying
-    from dva_sim.experiments.pictures import Wanted
+    from dva_sim.cli import episode_output
+    from dva_sim.recordings.pictures import Wanted
 
     with loudness(quiet, verbose):
-        replaying.replay(file, Wanted(video, still, strip, at, panels, camera, inset), ros2)
+        episode_output.replay(file, Wanted(video, still, strip, at, panels, camera, inset), ros2)
 
 
 def live(
@@ -171,7 +172,7 @@ def live(
         dva-sim live drive-to-event --operators scripted  # fixed commands, an emergency
         dva-sim live drive-to-event --only dva --dva 192.168.1.10:5600  # one part here
     """
-    from dva_sim.live import console
+    from dva_sim.cli import live_output
     from dva_sim.live.options import Options
 
     changes = tuple(set_ or ())
@@ -180,9 +181,9 @@ def live(
     )
     with loudness(quiet, verbose):
         if only is None:
-            console.run_all(options)
+            live_output.run_all(options)
         else:
-            console.run_one(only, options, which)
+            live_output.run_one(only, options, which)
 
 
 def keys(
@@ -199,6 +200,6 @@ def keys(
         dva-sim keys keys drive-to-event  # for each device of the scenario
         dva-sim keys keys dva robot-1 operator-1  # for these devices
     """
-    from dva_sim.live.keys import make_keys
+    from dva_sim.cli.live_output import make_keys
 
     typer.echo(make_keys(folder, names))

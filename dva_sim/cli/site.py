@@ -8,7 +8,7 @@ from typing import Annotated
 from typer import Argument, Option
 
 from dva_sim.cli.completing import SITES
-from dva_sim.cli.values import whole
+from dva_sim.cli.options import whole
 
 SiteName = Annotated[
     str,
@@ -42,9 +42,9 @@ def show(
         dva-sim site show campus --coverage  # writes campus.png
         dva-sim site show office-block --set seed=7 -o block.png  # a generated site
     """
-    from dva_sim.worlds import console
+    from dva_sim.cli import site_output
 
-    console.show(name, out, set_ or [], coverage, width)
+    site_output.show(name, out, set_ or [], coverage, width)
 
 
 def export(
@@ -57,6 +57,6 @@ def export(
     Examples:
         dva-sim site export caparica -o mine  # into the folder mine
     """
-    from dva_sim.worlds import console
+    from dva_sim.cli import site_output
 
-    console.export(name, out, set_ or [])
+    site_output.export(name, out, set_ or [])

@@ -8,9 +8,8 @@ from typing import Annotated
 import typer
 from typer import Option
 
-from dva_sim.cli.options import Jobs, Quiet, Results, Sets, StudyName, Verbose
-from dva_sim.cli.values import number, whole
-from dva_sim.loudness import loudness
+from dva_sim.cli.options import Jobs, Quiet, Results, Sets, StudyName, Verbose, number, whole
+from dva_sim.kernel.verbosity import loudness
 
 
 def demo(
@@ -28,7 +27,7 @@ def demo(
     Examples:
         dva-sim demo -o first  # into a folder of your own, in place of results/demo
     """
-    from dva_sim.experiments.demo import demo as show_it
+    from dva_sim.cli.demo import demo as show_it
 
     raise typer.Exit(show_it(out, jobs))
 
@@ -78,17 +77,17 @@ def run(
         dva-sim run req-rep-vs-pub-sub --set persons=4 -j 2 -o small  # smaller, two processes
         dva-sim run mine.yaml --set 'link.delay_s=[0, 0.5]'  # other levels of a factor
     """
-    from dva_sim.experiments import running
-    from dva_sim.experiments.versions import Variant
+    from dva_sim.cli import study_output
+    from dva_sim.experiments.study.study import Variant
 
     changes = [*(set_ or []), *([f"seed={seed}"] if seed is not None else [])]
     variant = Variant.of(quick=quick, full=full, pilot=pilot)
-    workers = running.Workers(jobs, scheduler, limit)
+    workers = study_output.Workers(jobs, scheduler, limit)
     with loudness(quiet, verbose):
         if dry_run:
-            running.plan(study, changes, out, workers, variant)
+            study_output.plan(study, changes, out, workers, variant)
             return
-        code = running.run(study, changes, out, workers, variant)
+        code = study_output.run(study, changes, out, workers, variant)
     raise typer.Exit(code)
 
 
@@ -102,7 +101,7 @@ def new(
     Examples:
         dva-sim new mine  # writes mine.yaml here
     """
-    from dva_sim.experiments.starting import told, write_study
+    from dva_sim.experiments.study.new_study import told, write_study
 
     typer.echo(told(write_study(name)))
 
@@ -122,8 +121,8 @@ def register(
     Examples:
         dva-sim register mine.yaml  # writes mine.registration.yaml beside it
     """
-    from dva_sim.experiments.registration import register as write_down
-    from dva_sim.experiments.study import load_study
+    from dva_sim.experiments.study.registration import register as write_down
+    from dva_sim.experiments.study.study import load_study
 
     typer.echo(write_down(load_study(study, version="full" if full else None), again))
 
@@ -142,8 +141,8 @@ def tune(
     Examples:
         dva-sim tune filters  # writes tuned/filters.yaml beside it
     """
-    from dva_sim.experiments import running
+    from dva_sim.cli import study_output
 
     with loudness(quiet, verbose):
-        code = running.tune(study, out, jobs)
+        code = study_output.tune(study, out, jobs)
     raise typer.Exit(code)

@@ -6,11 +6,10 @@ import math
 from collections import Counter
 from dataclasses import dataclass, field
 
-from dva_sim.core.engaged import Engaged
+from dva_sim.core.assignments import Engaged, Rules
 from dva_sim.core.events import NEXT, Event, EventBook, State
+from dva_sim.core.outbox import Send
 from dva_sim.core.registry import Registry
-from dva_sim.core.rules import Rules
-from dva_sim.core.send import Send
 from dva_sim.core.sessions import Sessions
 from dva_sim.protocol import messages as m
 

@@ -1,10 +1,17 @@
-"""Who may act on which robot: one holder at a time, each with a session as fencing token."""
+"""Who may act on which robot: one holder at a time, each with a session as fencing token.
+
+Who may ask for what: the rules of access, apart from who holds what at the moment.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import TypeVar
+from typing import Literal, TypeVar
+
+from dva_sim.core.registry import OPERATOR
+from dva_sim.protocol.messages import Device
 
 K = TypeVar("K")
 
@@ -130,3 +137,72 @@ def _take(grants: dict[K, Grant], holder: str, robot: str | None) -> list[Grant]
 def _drop_session(grants: dict[K, Grant], session: int) -> None:
     for key in [key for key, grant in grants.items() if grant.session == session]:
         del grants[key]
+
+
+Level = Literal["teleoperation", "missions", "both", "sensors"]
+LEVELS: tuple[Level, ...] = ("teleoperation", "missions", "both", "sensors")
+_INCLUDES = {"both": {"teleoperation", "missions"}}
+
+
+@dataclass(frozen=True)
+class AccessRule:
+    """What some devices may do with some robots, for a time.
+
+    Attributes:
+        holders: Labels of the devices it is about; empty: all.
+        robots: Labels of the robots it is about; empty: all.
+        levels: What they may ask for.
+        sensors: Which sensors they may read; None: all.
+        since: From when on [s].
+        until: Up to when [s]; what is still held then is taken back.
+    """
+
+    holders: frozenset[str] = frozenset()
+    robots: frozenset[str] = frozenset()
+    levels: frozenset[str] = frozenset(LEVELS)
+    sensors: frozenset[str] | None = None
+    since: float = 0.0
+    until: float = math.inf
+
+    @property
+    def includes(self) -> frozenset[str]:
+        """The levels, where `both` stands for the two that it is made of."""
+        return self.levels.union(*(_INCLUDES.get(level, ()) for level in self.levels))
+
+    def is_about(self, holder: Device, robot: Device, now: float) -> bool:
+        """Whether it says something about these two now."""
+        right = not self.holders or holder.label in self.holders
+        return right and (not self.robots or robot.label in self.robots) and self._holds(now)
+
+    def _holds(self, now: float) -> bool:
+        return self.since <= now < self.until
+
+
+@dataclass(frozen=True)
+class Access:
+    """The rules: what no rule allows is refused. Only operators drive, whatever they say.
+
+    Attributes:
+        rules: Any one that allows something suffices.
+    """
+
+    rules: Sequence[AccessRule] = field(default_factory=lambda: (AccessRule(),))
+
+    def allows(self, holder: Device, robot: Device, level: str, now: float) -> bool:
+        """Whether a device may have a level of permission on a robot."""
+        if level != "sensors" and holder.device_type != OPERATOR:
+            return False
+        wanted = _INCLUDES.get(level, {level})
+        rules = (r for r in self.rules if r.is_about(holder, robot, now))
+        return any(wanted <= r.includes for r in rules)
+
+    def sensors(
+        self, holder: Device, robot: Device, wanted: Sequence[str], now: float
+    ) -> tuple[str, ...]:
+        """Those of the wanted sensors that a device may read."""
+        rules = [r for r in self.rules if r.is_about(holder, robot, now)]
+        return tuple(s for s in wanted if any(r.sensors is None or s in r.sensors for r in rules))
+
+    def next_end(self, now: float) -> float:
+        """When the next rule ceases to hold [s]."""
+        return min((r.until for r in self.rules if r.until > now), default=math.inf)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from dva_sim.core.outbox import Send
 from dva_sim.core.permissions import Grant, Permissions
-from dva_sim.core.send import Send
 from dva_sim.protocol import messages as m
 
 MOST_UNTOLD = 1000

@@ -6,7 +6,7 @@ import json
 import sys
 from pathlib import Path
 
-from dva_sim.errors import DvaSimError, error_line
+from dva_sim.kernel.errors import DvaSimError, error_line
 from dva_sim.live.options import PATHS, Options
 from dva_sim.live.process import Teller, run_part
 

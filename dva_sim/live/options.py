@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from dva_sim.changing import blame, parse_changes, set_by
-from dva_sim.errors import ConfigError
-from dva_sim.scenario import Scenario, build, load
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.key_changes import blame, parse_changes, set_by
+from dva_sim.simulation.scenario import Scenario, build, load
 
 PARTS = ("dva", "world", "operator")
 PATHS = ("keys", "record", "state")  # options that name files
@@ -80,7 +80,7 @@ class Options:
         Raises:
             ConfigError: see `read`; or the site has no place for the team.
         """
-        from dva_sim.simulation import rehearse
+        from dva_sim.simulation.full import rehearse
 
         scenario, document = self.read(), load(self.scenario)
 

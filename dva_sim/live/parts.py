@@ -12,19 +12,19 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Protocol
 
-from dva_sim.agents.operator.agent import OperatorAgent
-from dva_sim.agents.operator.script import ScriptedOperator, drill
-from dva_sim.agents.robot import RobotAgent
-from dva_sim.agents.trace import Trace
+from dva_sim.agents.operator.operator import OperatorAgent
+from dva_sim.agents.operator.scripted import ScriptedOperator, drill
+from dva_sim.agents.robot.decision_log import Trace
+from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.core.events import Event
-from dva_sim.core.memory import Memory
 from dva_sim.core.permissions import LOW_BITS, Permissions
-from dva_sim.errors import ConfigError
-from dva_sim.guesses import either
+from dva_sim.core.store import Memory
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.suggestions import either
 from dva_sim.live.options import PARTS, Options
-from dva_sim.simulation.control_room import add_dva, add_operator
-from dva_sim.simulation.field import Field
-from dva_sim.simulation.stage import Stage
+from dva_sim.simulation.full.control_room import add_dva, add_operator
+from dva_sim.simulation.full.field import Field
+from dva_sim.simulation.full.stage import Stage
 
 SESSION_EPOCH = 1_735_689_600  # 2025-01-01, UTC [s]
 SESSIONS_PER_SECOND = 4  # enough room in 32 bits for 34 years

@@ -13,15 +13,14 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, TextIO
 
-from dva_sim.errors import RunsFailed
+from dva_sim.kernel.errors import RunsFailed
+from dva_sim.kernel.recorder import Recorder
 from dva_sim.live.options import Options
 from dva_sim.live.parts import DvaPart, Part, make_part
 from dva_sim.network.keys import KeyRing
 from dva_sim.network.realtime import LiveClock
 from dva_sim.network.sockets import SocketNetwork, split_address
-from dva_sim.recorder import Recorder
-from dva_sim.simulation.names import DVA, id_of
-from dva_sim.simulation.stage import Stage
+from dva_sim.simulation.full.stage import DVA, Stage, id_of
 
 REPORT_PERIOD = 1.0  # [s]
 LAST_WORDS = 0.5  # between the end and closing the sockets [s]

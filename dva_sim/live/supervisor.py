@@ -14,11 +14,10 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import IO
 
-from dva_sim.errors import ERROR, DvaSimError, RunsFailed
-from dva_sim.exit_codes import ExitCode
+from dva_sim.kernel.errors import ERROR, DvaSimError, ExitCode, RunsFailed
 from dva_sim.live.options import PATHS, Options
 from dva_sim.live.process import Report
-from dva_sim.scenario import Scenario
+from dva_sim.simulation.scenario import Scenario
 
 SPEAK_WITHIN = 60.0  # for a part to speak, from its start and after each time [s]
 END_WITHIN = 5.0  # for a part to end by itself once it is asked to [s]

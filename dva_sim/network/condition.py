@@ -13,8 +13,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, get_type_hints
 
-from dva_sim.errors import ConfigError
-from dva_sim.guesses import unknown
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.suggestions import unknown
 
 COMMAND_BYTES = 400
 REPLY_BYTES = 200

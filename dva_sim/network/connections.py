@@ -1,193 +1,260 @@
-"""Single sockets: what each kind of ZeroMQ socket does for the patterns."""
+"""Datagrams, as over UDP: no connection, no order, nothing is sent again.
+
+A message that does not fit into one packet travels in fragments, and is lost if one of them is.
+
+References:
+    RFC 768 (UDP), RFC 791 (fragments).
+
+Which kind of connection joins two nodes: ZeroMQ at one of two depths, or datagrams.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import suppress
-from typing import TYPE_CHECKING, Any, Final
+from dataclasses import dataclass
+from typing import Annotated, Any, Final, Literal
 
-import zmq
+from pydantic import Field
 
-from dva_sim.network.connecting import ZeromqConfig
-from dva_sim.network.patterns import OnReply
-from dva_sim.network.security import Socket
+from dva_sim.kernel.clock import Clock
+from dva_sim.kernel.config import AlsoCalled, Config
+from dva_sim.network.link import Link
+from dva_sim.network.stream import Connection
+from dva_sim.network.tcp import TcpOptions
+from dva_sim.network.zmtp import HIGH_WATER_MARK, ZmtpConnection, ZmtpOptions
 
-if TYPE_CHECKING:
-    from dva_sim.network.sockets import SocketNetwork
+UDP_HEADER, IP_HEADER = 8, 20  # [B]
+FRAGMENT = 1480  # payload of a full IPv4 packet on Ethernet [B]
 
-DRAIN: Final = 64  # messages read from one socket before others have their turn
-
-# As plain numbers: the arithmetic of pyzmq's enumerations costs more than a system call.
-NOBLOCK: Final = int(zmq.NOBLOCK)
-MORE: Final = int(zmq.NOBLOCK | zmq.SNDMORE)
-EVENTS: Final = int(zmq.EVENTS)
-POLLIN: Final = int(zmq.POLLIN)
+Deliver = Callable[[Any], object]
 
 
-def options_of(zeromq: ZeromqConfig) -> dict[int, int]:
-    """Socket options by number; what the kernel is to choose is left out."""
-    options = {
-        zmq.SNDHWM: zeromq.high_water_mark,
-        zmq.RCVHWM: zeromq.high_water_mark,
-        zmq.SNDBUF: zeromq.send_buffer_bytes,
-        zmq.RCVBUF: zeromq.receive_buffer_bytes,
-    }
-    return {int(option): value for option, value in options.items() if value is not None}
+class DatagramEnd:
+    """One end: what it sends travels over `link` and is taken by `deliver` there.
+
+    Attributes:
+        closed: Whether what arrives here is thrown away, and nothing is sent.
+    """
+
+    other: DatagramEnd
+
+    def __init__(self, clock: Clock, link: Link, deliver: Deliver) -> None:
+        self._clock, self._link, self._deliver = clock, link, deliver
+        self.closed = False
+
+    def send(self, payload: Any, size: int) -> bool:
+        """Send a message of `size` bytes [B]; False if the socket is closed."""
+        if self.closed:
+            return False
+        now, total = self._clock.now, size + UDP_HEADER
+        packets = -(-total // FRAGMENT)
+        arrival = self._link.carry_train(now, packets, total + packets * IP_HEADER)
+        if arrival is None:
+            arrival = self._offer_each(now, total)
+        if arrival is not None:
+            self._clock.call_at(arrival, self.other.take, payload)
+        return True
+
+    def take(self, payload: Any) -> None:
+        """A message has arrived."""
+        if not self.closed:
+            self._deliver(payload)
+
+    def pause(self) -> None:
+        """Nobody waits: what a program cannot take is for it to drop."""
+
+    def resume(self) -> None:
+        """See `pause`."""
+
+    def backlog_bytes(self, now: float) -> float:
+        """Bytes that wait before the link [B]."""
+        return self._link.backlog_bytes(now)
+
+    def _offer_each(self, now: float, total: int) -> float | None:
+        """Send fragment by fragment: when the last arrives [s], None if one is lost."""
+        last, whole = 0.0, True
+        while total > 0:
+            part = min(total, FRAGMENT)
+            total -= part
+            arrival = self._link.carry(now, part + IP_HEADER)
+            if arrival is None:
+                whole = False
+            else:
+                last = max(last, arrival)
+        return last if whole else None
 
 
-def has_more(socket: Socket) -> bool:
-    """Whether something can be read: asking costs a third of trying in vain."""
-    return bool(socket.getsockopt(EVENTS) & POLLIN)  # type: ignore[operator]
+class DatagramConnection:
+    """Two sockets that know each other: no handshake, and no promise.
 
+    Args:
+        clock: The run's clock.
+        out: The link from the opener.
+        back: The link to the opener.
+        at_peer: Takes what the opener sends.
+        at_opener: Takes what the peer sends.
+    """
 
-def next_of(socket: Socket) -> list[bytes] | None:
-    """The next message; None if all are read, or the last one has led to closing the socket."""
-    return None if socket.closed or not has_more(socket) else receive(socket)
+    depth: Final = "datagram"
+    keeps: Final = False
 
+    def __init__(
+        self, clock: Clock, out: Link, back: Link, at_peer: Deliver, at_opener: Deliver
+    ) -> None:
+        self.opener = DatagramEnd(clock, out, at_opener)
+        self.peer = DatagramEnd(clock, back, at_peer)
+        self.opener.other, self.peer.other = self.peer, self.opener
 
-def receive(socket: Socket) -> list[bytes] | None:
-    """A message, if there is one: what a REQ socket had may be the copy of a reply."""
-    try:
-        return socket.recv_multipart(NOBLOCK)
-    except zmq.Again:
-        return None
-
-
-class PublisherSocket:
-    """An XPUB socket, and what its subscribers want."""
-
-    def __init__(self, socket: Socket) -> None:
-        self.socket = socket
-        self._topics: set[str] = set()
-
-    def wanted(self, topic: str) -> bool:
-        """Whether anybody has subscribed to a topic."""
-        self.hear()
-        return any(topic.startswith(known) for known in self._topics)
-
-    def hear(self) -> None:
-        """Who came or went: XPUB tells of the first subscriber and of the last for a topic."""
-        with suppress(zmq.Again):
-            while has_more(self.socket):
-                said = self.socket.recv(NOBLOCK)
-                topic = said[1:].decode(errors="replace")
-                if said[:1] == b"\x01" and len(self._topics) < 10_000:
-                    self._topics.add(topic)
-                elif said[:1] == b"\x00":
-                    self._topics.discard(topic)
-
-
-class SocketWire:
-    """One connection to the service of a peer, as far as REQ and DEALER agree."""
-
-    kind: int
-
-    def __init__(self, network: SocketNetwork, node: str, peer: str, on_reply: OnReply) -> None:
-        self._network, self._on_reply = network, on_reply
-        self._socket = network.client(self.kind, node, peer)
-        self._configure()
-        network.clock.watch(self._socket, self._replies)
-
-    def _configure(self) -> None:
-        """Set the options of this kind of socket."""
-
-    def send(self, tag: int, data: bytes) -> None:
-        """See `Wire`."""
-        raise NotImplementedError
+    def open(
+        self, then: Callable[[], object], accepted: Callable[[], object] | None = None
+    ) -> None:
+        """Both may send at once."""
+        then()
+        if accepted is not None:
+            accepted()
 
     def close(self) -> None:
-        """See `Wire`."""
-        self._network.close_client(self._socket)
+        """The opener closes its socket: what it has sent still arrives, no answer does."""
+        self.opener.closed = True
 
-    def _replies(self) -> None:
-        for _ in range(DRAIN):
-            frames = next_of(self._socket)
-            if frames is None:
-                return
-            self._reply(frames)
-
-    def _reply(self, frames: list[bytes]) -> None:
-        raise NotImplementedError
+    def drop(self) -> None:
+        """Both are closed."""
+        self.opener.closed = self.peer.closed = True
 
 
-class ReqWire(SocketWire):
-    """A REQ socket: libzmq itself keeps requests and replies in step."""
+TransportKind = Literal["zeromq", "datagrams"]
+Depth = Literal["auto", "message", "segment"]
+AnyConnection = Connection | ZmtpConnection | DatagramConnection
 
-    kind = zmq.REQ
+BUSY = 0.8  # share of a link's rate up to which nothing piles up before it; assumed
 
-    def _configure(self) -> None:
-        # A doubled reply must not be taken for the answer to the next request.
-        self._socket.setsockopt(zmq.REQ_CORRELATE, 1)
-        self._tag = 0
-
-    def send(self, tag: int, data: bytes) -> None:
-        """See `Wire`; the last one sent must have been answered."""
-        self._tag = tag
-        self._network.send(self._socket, [data])
-
-    def _replies(self) -> None:
-        """There is one at most: asking whether there are more would delay every command."""
-        frames = receive(self._socket)
-        if frames is not None:
-            self._reply(frames)
-
-    def _reply(self, frames: list[bytes]) -> None:
-        if len(frames) == 1:
-            self._on_reply(self._tag, frames[0])
+_Buffer = Annotated[int, Field(ge=2_048, le=100_000_000)] | None
 
 
-class DealerWire(SocketWire):
-    """A DEALER socket: the tag travels in front of the request, and comes back."""
+class ZeromqConfig(Config):
+    """What is set on every ZeroMQ socket.
 
-    kind = zmq.DEALER
+    Attributes:
+        high_water_mark: Messages that a pipe holds, at both ends.
+        send_buffer_bytes: Of TCP (`ZMQ_SNDBUF`); left out: as large as the kernel finds fit.
+        receive_buffer_bytes: Of TCP (`ZMQ_RCVBUF`); left out: likewise.
+        conflate: Which end keeps only the newest of what is published and waits there
+            (`ZMQ_CONFLATE`).
+    """
 
-    def send(self, tag: int, data: bytes) -> None:
-        """See `Wire`."""
-        self._network.send(self._socket, [tag.to_bytes(8, "big"), b"", data])
+    high_water_mark: Annotated[int, Field(ge=1, le=1_000_000), AlsoCalled("hwm")] = HIGH_WATER_MARK
+    send_buffer_bytes: _Buffer = None
+    receive_buffer_bytes: _Buffer = None
+    conflate: Literal["none", "publisher", "subscriber", "both"] = "none"
 
-    def _reply(self, frames: list[bytes]) -> None:
-        if len(frames) == 3 and len(frames[0]) == 8 and not frames[1]:
-            self._on_reply(int.from_bytes(frames[0], "big"), frames[2])
+    @property
+    def conflates_sender(self) -> bool:
+        """Whether publishers keep only the newest message for each subscriber."""
+        return self.conflate in ("publisher", "both")
+
+    @property
+    def conflates_receiver(self) -> bool:
+        """Whether subscribers keep only the newest message."""
+        return self.conflate in ("subscriber", "both")
+
+    @property
+    def is_bounded(self) -> bool:
+        """Whether something may be full, or replaced, before it usually is."""
+        buffers = self.send_buffer_bytes, self.receive_buffer_bytes
+        set_by_hand = self.high_water_mark != HIGH_WATER_MARK or buffers != (None, None)
+        return set_by_hand or self.conflates_sender
 
 
-class SocketSubscription:
-    """A SUB socket; see `Subscription`."""
+@dataclass(frozen=True)
+class Load:
+    """What one direction of a link is offered at most.
+
+    Attributes:
+        rate_bps: In the long run, with all headers [bit/s].
+        burst: At once [B].
+    """
+
+    rate_bps: float = 0.0
+    burst: int = 0
+
+
+class Connector:
+    """Makes the connections of a network.
+
+    With depth `auto` a connection is modelled message by message where that is exact, and
+    segment by segment where anything might be lost, come out of turn or pile up; see
+    `is_calm`.
+
+    Args:
+        transport: `zeromq` or `datagrams`.
+        depth: `message`, `segment`, or `auto`; datagrams have but one.
+        zeromq: Options of the sockets.
+        load: What a link is offered.
+
+    Attributes:
+        deepest: The depth of the connections so far: `message`, `segment` as soon as one needed
+            it, or `datagram`.
+    """
 
     def __init__(
         self,
-        network: SocketNetwork,
-        node: str,
-        publisher: str,
-        topic: str,
-        handler: Callable[[Any], object],
+        transport: TransportKind = "zeromq",
+        depth: Depth = "auto",
+        zeromq: ZeromqConfig | None = None,
+        load: Load | None = None,
     ) -> None:
-        self._network, self._handler = network, handler
-        self._socket = network.client(zmq.SUB, node, publisher)
-        self._socket.subscribe(topic)
-        self._paused = False
-        network.clock.watch(self._socket, self._hear)
+        self._transport, self._depth = transport, depth
+        self._zeromq, self._load = zeromq or ZeromqConfig(), load or Load()
+        self.deepest = "datagram" if transport == "datagrams" else "message"
 
-    def close(self) -> None:
-        """See `Subscription`."""
-        self._network.close_client(self._socket)
+    def connect(
+        self,
+        clock: Clock,
+        links: tuple[Link, Link],
+        at_peer: Deliver,
+        at_opener: Deliver,
+        publishes: bool = False,
+    ) -> AnyConnection:
+        """A connection that is still to be opened.
 
-    def pause(self) -> None:
-        """See `Subscription`: what is not read waits in the socket."""
-        self._paused = True
-        self._network.clock.unwatch(self._socket)
+        Args:
+            clock: The run's clock.
+            links: From the opener, and to it.
+            at_peer: Takes what the opener sends.
+            at_opener: Takes what the peer sends.
+            publishes: Whether the peer publishes to the opener.
+        """
+        ends = clock, *links, at_peer, at_opener
+        depth = self.depth(*links)
+        if depth == "datagram":
+            return DatagramConnection(*ends)
+        if depth == "message":
+            return Connection(*ends)
+        self.deepest = depth
+        conflate = publishes and self._zeromq.conflates_sender
+        return ZmtpConnection(*ends, self._options(), self._options(conflate))
 
-    def resume(self) -> None:
-        """See `Subscription`."""
-        if self._paused and not self._socket.closed:
-            self._paused = False
-            self._network.clock.watch(self._socket, self._hear)
+    def depth(self, out: Link, back: Link) -> str:
+        """How a connection over two links is modelled."""
+        if self._transport == "datagrams":
+            return "datagram"
+        if self._depth != "auto":
+            return self._depth
+        calm = is_calm(out, self._load) and is_calm(back, self._load)
+        return "message" if calm and not self._zeromq.is_bounded else "segment"
 
-    def _hear(self) -> None:
-        for _ in range(DRAIN):
-            frames = None if self._paused else next_of(self._socket)
-            if frames is None:
-                return
-            if len(frames) == 2:
-                self._handler(frames[1])
-            else:
-                self._network.counters["publications of another form"] += 1
+    def _options(self, conflate: bool = False) -> ZmtpOptions:
+        zeromq = self._zeromq
+        tcp = TcpOptions(zeromq.send_buffer_bytes, zeromq.receive_buffer_bytes)
+        return ZmtpOptions(zeromq.high_water_mark, conflate, tcp)
+
+
+def is_calm(link: Link, load: Load) -> bool:
+    """Whether messages over a link fare as their segments would under TCP.
+
+    Nothing may get lost, late by chance or out of turn by itself; the rate must be known and
+    not be used up by more than four fifths; and twice the largest burst must fit into the queue.
+    """
+    if not link.is_ideal() or link.rate_bps is None:
+        return False
+    return load.rate_bps <= BUSY * link.rate_bps and 2 * load.burst <= link.room

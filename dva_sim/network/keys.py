@@ -16,7 +16,7 @@ from pathlib import Path
 import zmq
 from zmq.utils import z85
 
-from dva_sim.errors import ConfigError
+from dva_sim.kernel.errors import ConfigError
 
 _ID = re.compile(r"[A-Za-z0-9][A-Za-z0-9:._-]{0,63}")
 _KEY_LENGTH = 40  # 32 bytes in the letters of Z85

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
-from dva_sim.clock import Clock
+from dva_sim.kernel.clock import Clock
 
 QUEUE_LIMIT = 1000  # requests waiting at one requester
 ROUND_TRIPS_KEPT = 100_000

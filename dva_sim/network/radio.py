@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Protocol
 
+from dva_sim.kernel.streams import Streams
 from dva_sim.network.link import (
     ConstantRate,
     Direction,
@@ -15,7 +16,6 @@ from dva_sim.network.link import (
     make_serialiser,
 )
 from dva_sim.network.link.delays import Wobble
-from dva_sim.streams import Streams
 
 
 class Reception(Protocol):

@@ -13,7 +13,7 @@ from typing import Any
 
 import zmq
 
-from dva_sim.clock import US, Clock
+from dva_sim.kernel.clock import US, Clock
 
 AT_ONCE = 500  # events that are late, before messages have their turn
 LONGEST_WAIT = 60_000  # of one poll [ms]

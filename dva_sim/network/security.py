@@ -1,4 +1,16 @@
-"""Sockets with keys, and a clear word at both ends when two do not come together.
+"""Ask what listens at an endpoint whether it wants keys, by the greeting of ZMTP 3 (RFC 37).
+
+When one end has keys and the other has none, each hangs up as soon as it sees that. The quicker
+one knows why, and the slower one may be cut off before it has read a word. This greets slowly:
+it waits until it has heard the other end before it names its own mechanism, and never hangs up
+first on a stranger. So both ends come to know.
+
+Why two ends did not come together, in words, as far as either end can know.
+
+What libzmq reports of a failed handshake says less at one end than at the other, and not the
+same each time.
+
+Sockets with keys, and a clear word at both ends when two do not come together.
 
 Without keys a socket is only watched. With keys a socket that binds is a CURVE server with its
 device's own key, and one that connects knows the key of the device it wants to reach; who asks
@@ -14,20 +26,170 @@ import struct
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from enum import StrEnum
 
 import zmq
 from zmq.utils import z85
 
-from dva_sim.network.greeting import Greeting
 from dva_sim.network.keys import KeyRing
-from dva_sim.network.refusals import (
-    HANDSHAKE_LIMIT,
-    Reason,
-    Refusal,
-    at_client,
-    at_mismatch,
-    at_server,
-)
+
+_SIGNATURE = b"\xff" + bytes(7) + b"\x01\x7f"
+_VERSION = b"\x03\x00"
+_MECHANISM = slice(12, 32)  # where it stands in a greeting, filled up with zeros
+_LENGTH = 64
+
+
+class Greeting:
+    """A greeting under way.
+
+    Args:
+        context: Where its socket lives.
+        endpoint: Whom to greet.
+        mechanism: What this end speaks: `NULL` or `CURVE`.
+
+    Attributes:
+        socket: To be polled; `read` takes what has arrived.
+        theirs: What the other end speaks, once it is known.
+        done: Whether there is nothing more to wait for.
+    """
+
+    def __init__(
+        self, context: zmq.Context[zmq.Socket[bytes]], endpoint: str, mechanism: str
+    ) -> None:
+        self.mechanism = mechanism
+        self.theirs: str | None = None
+        self.done = False
+        self._heard = b""
+        self._is_open = False
+        self.socket = context.socket(zmq.STREAM)
+        self.socket.setsockopt(zmq.LINGER, 0)
+        self.socket.setsockopt(zmq.RECONNECT_IVL, -1)
+        self.socket.connect(endpoint)
+
+    def read(self) -> None:
+        """Take what has arrived, and go on."""
+        while not self.done:
+            try:
+                who, data = self.socket.recv_multipart(zmq.NOBLOCK)
+            except zmq.Again:
+                return
+            if data:
+                self._hear(who, data)
+            elif self._is_open:  # an empty message tells of an end, too
+                self.done = True
+            else:
+                self._is_open = True
+                self._say(who, _SIGNATURE + _VERSION)
+
+    def _hear(self, who: bytes, data: bytes) -> None:
+        if self.theirs is not None:
+            return
+        self._heard += data
+        if len(self._heard) < _MECHANISM.stop:
+            return
+        self.theirs = self._heard[_MECHANISM].rstrip(b"\0").decode("ascii", "replace")
+        if self.theirs == self.mechanism:
+            self.done = True
+        else:
+            rest = self.mechanism.encode().ljust(20, b"\0")
+            self._say(who, rest.ljust(_LENGTH - _MECHANISM.start, b"\0"))
+
+    def _say(self, who: bytes, data: bytes) -> None:
+        try:
+            self.socket.send_multipart([who, data], zmq.NOBLOCK)
+        except zmq.ZMQError:  # the other end has gone meanwhile
+            self.done = True
+
+
+HANDSHAKE_LIMIT = 10_000  # for the other end to answer, whose loop may be busy [ms]
+
+
+class Reason(StrEnum):
+    """Why two ends did not come together; the same word at both, as far as an end can know."""
+
+    UNKNOWN_KEY = "unknown key"
+    WRONG_SERVER_KEY = "wrong server key"
+    PLAIN_CLIENT = "client without keys"
+    PLAIN_SERVER = "server without keys"
+    SILENT = "no answer"
+    CLOSED = "closed"
+    NOT_UNDERSTOOD = "not understood"
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """Two ends that did not come together, as seen from one.
+
+    Attributes:
+        device: Whose socket has noticed.
+        peer: The device it wanted to reach; None at a server, which cannot know.
+        endpoint: Where the server is bound; empty where that is not known.
+        reason: Why.
+        why: The same for people.
+    """
+
+    device: str
+    peer: str | None
+    endpoint: str
+    reason: Reason
+    why: str
+
+    def __str__(self) -> str:
+        if self.peer is None:
+            place = f" at {self.endpoint}" if self.endpoint else ""
+            return f"{self.device}{place} refused a connection: {self.why}"
+        return f"{self.device}: handshake with {self.peer} at {self.endpoint} failed: {self.why}"
+
+    @property
+    def gave_up(self) -> bool:
+        """Whether ZeroMQ makes no further attempt; see `Security.retry`."""
+        final = {Reason.UNKNOWN_KEY, Reason.PLAIN_CLIENT, Reason.PLAIN_SERVER}
+        return self.peer is not None and self.reason in final
+
+
+def at_server(has_keys: bool, device: str, code: int) -> tuple[Reason, str]:
+    """What a server makes of a code that libzmq gives for a failed handshake."""
+    if code == zmq.PROTOCOL_ERROR_ZMTP_MECHANISM_MISMATCH:
+        if not has_keys:
+            return Reason.PLAIN_SERVER, "the other end has keys switched on, this one has not"
+        return Reason.PLAIN_CLIENT, "the other end has no keys, this one wants them"
+    if code == zmq.PROTOCOL_ERROR_ZMTP_CRYPTOGRAPHIC:
+        return Reason.WRONG_SERVER_KEY, f"the other end has a wrong public key of {device}"
+    return Reason.NOT_UNDERSTOOD, "the other end shakes hands in a way not understood"
+
+
+def at_client(has_keys: bool, device: str, peer: str, event: int, code: int) -> tuple[Reason, str]:
+    """What a client makes of a failed handshake: the event, and its code."""
+    if event == zmq.EVENT_HANDSHAKE_FAILED_AUTH:
+        return Reason.UNKNOWN_KEY, f"{peer} does not know the key of {device}"
+    if event == zmq.EVENT_HANDSHAKE_FAILED_NO_DETAIL:
+        return _at_hang_up(has_keys, peer, code)
+    if code == zmq.PROTOCOL_ERROR_ZMTP_MECHANISM_MISMATCH:
+        return at_mismatch(has_keys, peer)
+    if code == zmq.PROTOCOL_ERROR_ZMTP_CRYPTOGRAPHIC:
+        return Reason.WRONG_SERVER_KEY, f"what answers does not have the key of {peer}"
+    return Reason.NOT_UNDERSTOOD, "what answers shakes hands in a way not understood"
+
+
+def at_mismatch(has_keys: bool, peer: str) -> tuple[Reason, str]:
+    """One end has keys and the other has none."""
+    if not has_keys:
+        return Reason.PLAIN_CLIENT, f"{peer} wants keys, this end has none"
+    return Reason.PLAIN_SERVER, f"{peer} has no keys switched on, this end has"
+
+
+def _at_hang_up(has_keys: bool, peer: str, code: int) -> tuple[Reason, str]:
+    """A server does not say that it cannot read a greeting: it hangs up."""
+    if code == errno.EAGAIN:
+        limit = HANDSHAKE_LIMIT // 1000
+        return Reason.SILENT, f"no answer within {limit} s: is it {peer} who listens there?"
+    if not has_keys:
+        return Reason.CLOSED, f"it hung up: is it {peer} who listens there?"
+    return (
+        Reason.WRONG_SERVER_KEY,
+        f"it hung up, most likely because the public key of {peer} here is not the one it has",
+    )
+
 
 # Pause before connecting again, up to twice as long by chance. It doubles while nobody listens,
 # but not while somebody listens and hangs up, so the first one is what limits that storm.

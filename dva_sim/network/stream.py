@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Final
 
-from dva_sim.clock import Clock
+from dva_sim.kernel.clock import Clock
 from dva_sim.network.link import Link
 
 MSS = 1448  # payload of a full Ethernet segment with TCP time stamps [B]

@@ -6,8 +6,8 @@ from collections import defaultdict, deque
 from collections.abc import Callable
 from typing import Any
 
-from dva_sim.clock import Clock
-from dva_sim.network.connecting import AnyConnection, Connector
+from dva_sim.kernel.clock import Clock
+from dva_sim.network.connections import AnyConnection, Connector
 from dva_sim.network.link import Link
 from dva_sim.network.patterns import OnReply, Request, Service
 from dva_sim.network.zmtp import ZmtpConnection

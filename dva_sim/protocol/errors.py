@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dva_sim.errors import DvaSimError
+from dva_sim.kernel.errors import DvaSimError
 
 
 class ProtocolError(DvaSimError):

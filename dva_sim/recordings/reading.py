@@ -1,4 +1,7 @@
-"""An MCAP file of a run, read back: enough to tell its story and draw it, without simulating."""
+"""An MCAP file of a run, read back: enough to tell its story and draw it, without simulating.
+
+What figures take from a recording: the site, who was where when, hazards, what was told.
+"""
 
 from __future__ import annotations
 
@@ -11,18 +14,21 @@ from math import inf, nan
 from pathlib import Path
 from typing import IO, Any
 
+import numpy as np
 import pydantic
+from numpy.typing import NDArray
 
-from dva_sim.errors import ConfigError
-from dva_sim.recorder import DriveLog, Moment, Recorder, Sent, Shown, TrackPoint
-from dva_sim.recordings import bodies, messages, sites, story
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.recorder import DriveLog, Moment, Recorder, Sent, Shown, TrackPoint
+from dva_sim.recordings import channels, messages, writing
 from dva_sim.recordings.messages import XML
 from dva_sim.recordings.writing import ABOUT, DIGEST, FORMAT, RUN, SCENARIO, SITE, TABLES, digest
-from dva_sim.scenario import Scenario
-from dva_sim.simulation import Ending, Playback
-from dva_sim.simulation.incidents import Incident
+from dva_sim.simulation.full import Ending, Playback
+from dva_sim.simulation.full.hazards import Incident
+from dva_sim.simulation.scenario import Scenario
 from dva_sim.worlds.hazards import Surroundings
-from dva_sim.worlds.hazards.making import KINDS
+from dva_sim.worlds.hazards.registry import KINDS
+from dva_sim.worlds.layout import Site
 
 LARGEST = 2**31  # of one record [B]; what claims to be larger is damaged
 CUT = "is damaged, or was cut short before anything of the run"
@@ -160,15 +166,13 @@ class _Raw:
 
 
 # --- from what was said to what can be shown -------------------------------------------
-
-
 def _opened(raw: _Raw) -> Opened:
     run = json.loads(raw.files[RUN])
     if run["format"] > FORMAT:
         raise ValueError(f"its form {run['format']} is later than {FORMAT}")
     scenario = Scenario.model_validate(json.loads(raw.files[SCENARIO]))
     files = {n.removeprefix(SITE): d for n, d in raw.files.items() if n.startswith(SITE)}
-    site = sites.unpack(files, scenario, run["seed"])
+    site = writing.unpack(files, scenario, run["seed"])
     incidents = [_incident(entry) for entry in run["incidents"]]
     contained = {int(number): time for number, time in run["contained_s"].items()}
     playback = Playback(
@@ -223,17 +227,17 @@ def _recorder(raw: _Raw, run: Mapping[str, Any]) -> Recorder:
     recorder = Recorder(keep_traffic=True)
     recorder.timeline = [
         Moment(time, log["name"], log["message"], log["kind"])
-        for time, log in raw.said[story.STORY]
+        for time, log in raw.said[channels.STORY]
     ]
     end = raw.time if raw.is_cut else inf
     for topic in raw.said:
         name, _, what = topic[1:].partition("/")
-        if what == bodies.POSE:
-            modes = raw.said.get(f"/{name}/{bodies.ACTIVITY}", [])
+        if what == channels.POSE:
+            modes = raw.said.get(f"/{name}/{channels.ACTIVITY}", [])
             recorder.tracks[name] = _track(raw.said[topic], modes, run["sampled_s"], end)
     robots = {run["labels"][robot]: robot for robot in run["radii_m"]}
     for name, robot in robots.items():
-        seen = raw.said.get(f"/{name}/{bodies.SEEN}")
+        seen = raw.said.get(f"/{name}/{channels.SEEN}")
         if seen:
             recorder.views[robot] = [_point(time, content, "seen") for time, content in seen]
     recorder.traffic = sorted(_traffic(raw, run), key=lambda sent: sent.time)
@@ -260,7 +264,7 @@ def _track(
         track += _left_out(track[-1], here.time, period) if track else ()
         track.append(here)
     # Whoever was there shortly before the file was cut is there up to its end.
-    if end - track[-1].time <= bodies.ALIVE_S:
+    if end - track[-1].time <= channels.ALIVE_S:
         track += [*_left_out(track[-1], end, period), track[-1]._replace(time=end)]
     return track
 
@@ -271,12 +275,12 @@ def _left_out(before: TrackPoint, until: float, period: float) -> Iterator[Track
 
 
 def _traffic(raw: _Raw, run: Mapping[str, Any]) -> Iterator[Sent]:
-    ids = {name: device for device, name in story.names_of(run["labels"]).items()}
+    ids = {name: device for device, name in channels.names_of(run["labels"]).items()}
     for topic, said in raw.said.items():
         if topic in raw.ends:
             ends = raw.ends[topic]["source"], raw.ends[topic]["destination"]
             yield from (Sent(time, *ends, len(data), data) for time, data in said)
-        elif topic.endswith(f"/{story.CAMERA}"):
+        elif topic.endswith(f"/{channels.CAMERA}"):
             source = ids[topic.split("/")[1]]
             for time, frame in said:
                 yield Sent(time, source, ids[frame["to"]], frame["size_bytes"], frame)
@@ -296,9 +300,59 @@ def _drives(raw: _Raw, run: Mapping[str, Any]) -> list[DriveLog]:
         for entry in run["drives"]
     ]
     for topic, said in raw.said.items():
-        for time, shown in said if topic.endswith(f"/{story.SCREEN}") else ():
+        for time, shown in said if topic.endswith(f"/{channels.SCREEN}") else ():
             drives[shown["drive"]].frames.append(Shown(shown["captured_s"], time, 0))
-        for time, made in said if topic.endswith(f"/{story.COMMANDS}") else ():
+        for time, made in said if topic.endswith(f"/{channels.COMMANDS}") else ():
             command = time, made["speed_m_s"], made["turn_rate_rad_s"]
             drives[made["drive"]].commands.append(command)
     return drives
+
+
+Columns = dict[str, NDArray[Any]]
+
+
+@dataclass(frozen=True)
+class Lapse:
+    """A run as a figure needs it.
+
+    Attributes:
+        site: Where it took place.
+        tracks: A row for each sampled moment of everybody: `agent`, `t_s`, `x_m`, `y_m`,
+            `heading_rad`, `mode`; in order of time for each agent.
+        told: A row for each line of the story: `t_s`, `who`, `what`, `kind`.
+        incidents: The hazards, with those that were reported and not there.
+        contained: When incidents were dealt with [s], by their place in `incidents`.
+        duration: How long the run lasted, or the file goes [s].
+    """
+
+    site: Site
+    tracks: Columns
+    told: Columns
+    incidents: tuple[Incident, ...]
+    contained: dict[int, float]
+    duration: float
+
+
+def read_lapse(path: Path) -> Lapse:
+    """What a figure needs of a recording.
+
+    Raises:
+        ConfigError: no such file, or not a recording.
+    """
+    playback = read_recording(path).playback
+    recorder = playback.recorder
+    rows = [(name, *point) for name, track in recorder.tracks.items() for point in track]
+    told = [(m.time, m.who, m.what, m.kind) for m in recorder.timeline]
+    return Lapse(
+        playback.site,
+        _columns(rows, "agent", "t_s", "x_m", "y_m", "heading_rad", "mode"),
+        _columns(told, "t_s", "who", "what", "kind"),
+        tuple(playback.incidents),
+        playback.contained,
+        playback.duration,
+    )
+
+
+def _columns(rows: list[tuple[Any, ...]], *names: str) -> Columns:
+    columns = list(zip(*rows, strict=True)) or [()] * len(names)
+    return {name: np.array(column) for name, column in zip(names, columns, strict=True)}

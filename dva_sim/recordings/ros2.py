@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from dva_sim.errors import ConfigError, DvaSimError
-from dva_sim.recorder import Moment, TrackPoint
+from dva_sim.kernel.errors import ConfigError, DvaSimError
+from dva_sim.kernel.recorder import Moment, TrackPoint
 from dva_sim.recordings import messages
-from dva_sim.simulation import Playback
+from dva_sim.simulation.full import Playback
 from dva_sim.worlds.maps import UNKNOWN, OccupancyGrid
 
 LEVELS = {"safety": 30, "mode": 10, "link": 10}  # warning, and what is for finding mistakes

@@ -1,24 +1,89 @@
-"""A run as an MCAP file: the same run makes the same bytes, and a file is whole or not there."""
+"""The site of a recording: put into files that go with it, and made from them again.
+
+A run as an MCAP file: the same run makes the same bytes, and a file is whole or not there.
+"""
 
 from __future__ import annotations
 
 import dataclasses
 import hashlib
+import io
 import json
 import math
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import IO, Any
 
-from dva_sim import __version__, resources
-from dva_sim.errors import DvaSimError
-from dva_sim.recordings import bodies, fields, messages, scene, sites, story
-from dva_sim.recordings.messages import XML, Message
-from dva_sim.recordings.schemas import SCHEMAS
-from dva_sim.simulation import Playback
-from dva_sim.simulation.run import FILM_PERIOD
+import numpy as np
+
+from dva_sim import __version__
+from dva_sim.kernel import resources
+from dva_sim.kernel.errors import DvaSimError
+from dva_sim.recordings import channels, messages
+from dva_sim.recordings.messages import SCHEMAS, XML, Message
+from dva_sim.simulation.full import Playback
+from dva_sim.simulation.full.run import FILM_PERIOD
+from dva_sim.simulation.scenario import Scenario, site_of
+from dva_sim.worlds.layout import Site
+from dva_sim.worlds.maps import FREE, OCCUPIED, UNKNOWN, UNKNOWN_SHADE
+from dva_sim.worlds.site_export import write_site
+
+SHADES = {FREE: 254, OCCUPIED: 0, UNKNOWN: UNKNOWN_SHADE}
+NO_SITE = "its site is missing"
+
+
+def pack(site: Site) -> dict[str, bytes]:
+    """The files of a site by name: YAML and GeoJSON of a plan, YAML and PNG of a bare map."""
+    if not site.rooms:
+        return _map_files(site)
+    with TemporaryDirectory() as folder:
+        write_site(site, Path(folder))
+        return {path.name: path.read_bytes() for path in sorted(Path(folder).iterdir())}
+
+
+def unpack(files: Mapping[str, bytes], scenario: Scenario, seed: int) -> Site:
+    """The site again, whatever has become of its own files since.
+
+    Args:
+        files: From `pack`.
+        scenario: What was run; of a bare map it tells how many bases there are ...
+        seed: ... and this places them.
+
+    Raises:
+        ConfigError: the files do not hold a site.
+        ValueError: there is none.
+    """
+    name = next((name for name in files if name.endswith(".yaml")), None)
+    if name is None:
+        raise ValueError(NO_SITE)
+    with TemporaryDirectory() as folder:
+        for each, data in files.items():
+            (Path(folder) / Path(each).name).write_bytes(data)
+        path = str(Path(folder) / Path(name).name)
+        key = "name" if scenario.site.map is None else "map"
+        named = scenario.site.model_copy(update={key: path, "options": {}})
+        return site_of(scenario.model_copy(update={"site": named}), seed)
+
+
+def _map_files(site: Site) -> dict[str, bytes]:
+    """A bare map in ROS map_server form, each cell as it was read."""
+    from PIL import Image
+
+    grid, shades = site.grid, np.zeros(256, np.uint8)
+    for cell, shade in SHADES.items():
+        shades[cell] = shade
+    picture = io.BytesIO()
+    Image.fromarray(shades[grid.cells[::-1]]).save(picture, "PNG")
+    text = (
+        f"image: {site.name}.png\nmode: trinary\nresolution: {grid.resolution!r}\n"
+        f"origin: [{grid.origin.x!r}, {grid.origin.y!r}, {grid.origin.heading!r}]\n"
+        "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
+    )
+    return {f"{site.name}.yaml": text.encode(), f"{site.name}.png": picture.getvalue()}
+
 
 FORMAT = 1  # of what is attached; a reader refuses a later one
 ABOUT, DIGEST = "dva-sim", "digest"  # name of the metadata, and of one entry of it
@@ -75,20 +140,20 @@ def whole_file(path: Path) -> Iterator[IO[bytes]]:
 
 def every_message(playback: Playback) -> Iterator[Message]:
     """All messages of a recording, grouped by what they tell, not by time."""
-    yield from scene.ground(playback)
-    yield from bodies.activities(playback)
-    yield from scene.bodies(playback)
-    yield from scene.hazards(playback)
-    yield from scene.states(playback)
-    yield from fields.grids(playback)
-    yield from bodies.poses(playback)
-    yield from bodies.beliefs(playback)
-    yield from bodies.fixes(playback)
-    yield from story.told(playback)
-    yield from story.commanded(playback)
-    yield from story.said(playback)
-    yield from story.applied(playback)
-    yield from story.shown(playback)
+    yield from channels.ground(playback)
+    yield from channels.activities(playback)
+    yield from channels.bodies(playback)
+    yield from channels.hazards(playback)
+    yield from channels.states(playback)
+    yield from channels.grids(playback)
+    yield from channels.poses(playback)
+    yield from channels.beliefs(playback)
+    yield from channels.fixes(playback)
+    yield from channels.told(playback)
+    yield from channels.commanded(playback)
+    yield from channels.said(playback)
+    yield from channels.applied(playback)
+    yield from channels.shown(playback)
 
 
 def _write(playback: Playback, file: IO[bytes], tables: Tables | None, about: Any) -> None:
@@ -96,7 +161,7 @@ def _write(playback: Playback, file: IO[bytes], tables: Tables | None, about: An
 
     writer: Any = Writer(file, chunk_size=CHUNK, enable_data_crcs=True)
     writer.start(profile="", library=f"dva-sim {__version__}")
-    files = sites.pack(playback.site)
+    files = pack(playback.site)
     attached = {SCENARIO: _json(playback.scenario.model_dump(mode="json"))}
     attached[RUN] = _json(facts(playback))
     attached |= {} if tables is None else {TABLES: _json(_plain(tables))}
@@ -138,7 +203,7 @@ class _Channels:
 
     def __init__(self, writer: Any, playback: Playback) -> None:
         self._writer = writer
-        self._ids = {name: device for device, name in story.names_of(playback.labels).items()}
+        self._ids = {name: device for device, name in channels.names_of(playback.labels).items()}
         self._schemas: dict[str, int] = {}
         self._channels: dict[str, int] = {}
         self._counts: dict[int, int] = {}
@@ -173,8 +238,6 @@ class _Channels:
 
 
 # --- what goes with it -----------------------------------------------------------------
-
-
 def digest(files: Mapping[str, bytes]) -> str:
     """Of all that goes with the messages, by which damage is found."""
     whole = hashlib.sha256()

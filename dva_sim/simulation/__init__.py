@@ -1,6 +1,1 @@
-"""From a scenario and a seed to what happened."""
-
-from dva_sim.simulation.recording import Ending, Playback, Recording
-from dva_sim.simulation.run import rehearse, simulate
-
-__all__ = ["Ending", "Playback", "Recording", "rehearse", "simulate"]
+"""The models of a run, side by side: full, shift, task and transport."""

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dva_sim.worlds.maps import OccupancyGrid, cells_inside, segments
-from dva_sim.worlds.parts import CEILING, Compartment, Lookup, Opening, Room
+from dva_sim.worlds.site_parts import CEILING, Compartment, Lookup, Opening, Room
 
 Floats = NDArray[np.float64]
 Labels = NDArray[np.int16]

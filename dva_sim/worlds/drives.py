@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from dva_sim.errors import ConfigError
-from dva_sim.plugins import Guard, Plugins
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.plugins import Guard, Plugins
 
 LONGEST_TICK: Final = 0.04  # that profiles are made for [s]
 CREEP: Final = 0.01  # below this a car stands, and its steering turns nothing [m/s]

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.errors import ConfigError
-from dva_sim.guesses import hint
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.suggestions import hint
 from dva_sim.worlds.compartments import NOWHERE, Partition, of_floor, of_rooms
 from dva_sim.worlds.geo import GeoFrame, Pose
 from dva_sim.worlds.maps import FREE, OccupancyGrid
-from dva_sim.worlds.parts import (
+from dva_sim.worlds.site_parts import (
     CEILING,
     DOOR_HEIGHT,
     BaseStation,

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from dva_sim.config import Config, Document, load_yaml, validate
+from dva_sim.kernel.config import Config, Document, load_yaml, validate
 from dva_sim.worlds.geo import Pose
 
 FREE, OCCUPIED, UNKNOWN = 0, 100, 255

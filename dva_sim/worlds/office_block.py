@@ -1,18 +1,366 @@
-"""Office blocks of any size from a seed: the same seed and size give the same house to the bit."""
+"""How an office block is cut up: corridors, cross corridors, a lobby, and cells along them.
+
+What rooms of an office block are for, and what stands in them.
+
+Office blocks of any size from a seed: the same seed and size give the same house to the bit.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from typing import Annotated, Any, Literal
+import itertools
+import string
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
 
-from dva_sim.config import Config
-from dva_sim.streams import Streams
-from dva_sim.worlds.drawing import Feature
-from dva_sim.worlds.office_plan import Box, Cell, Layout, lay_out, tenths
-from dva_sim.worlds.office_rooms import CONTROL, STAIRS, Use, assign, stands
+from dva_sim.kernel.config import Config
+from dva_sim.kernel.streams import Streams
+from dva_sim.worlds.geojson import Feature
+
+STOREY = 14.5  # wanted depth of a corridor with the rooms on both its sides [m]
+CORRIDOR = (2.0, 2.6)  # width [m]
+LOBBY = (6.0, 8.0)  # width [m]
+CROSSING_EVERY = 40.0  # along the corridors [m]
+LEAST_CELL = 2.8  # width of the narrowest room [m]
+WISHES = ((3.0, 3.9), (4.8, 6.5), (7.0, 9.5))  # widths that rooms would like to have [m]
+ODDS = (0.55, 0.30, 0.15)  # of these
+
+
+class Cell(NamedTuple):
+    """A rectangle [m] that becomes a room.
+
+    Attributes:
+        x1: West [m].
+        y1: South [m].
+        x2: East [m].
+        y2: North [m].
+        wing: Number of its corridor, from 0 in the south.
+        door_north: The corridor lies north of it, else south.
+        facade: The wall opposite to the door is an outer wall.
+    """
+
+    x1: float
+    y1: float
+    x2: float
+    y2: float
+    wing: int
+    door_north: bool
+    facade: bool
+
+    @property
+    def width(self) -> float:
+        """Along the corridor [m]."""
+        return self.x2 - self.x1
+
+    @property
+    def depth(self) -> float:
+        """Away from the corridor [m]."""
+        return self.y2 - self.y1
+
+    @property
+    def area(self) -> float:
+        """Of its floor [m^2]."""
+        return self.width * self.depth
+
+    @property
+    def door_y(self) -> float:
+        """Of the wall at the corridor [m]."""
+        return self.y2 if self.door_north else self.y1
+
+    def box(self, left: float, right: float, near: float, far: float) -> Box:
+        """A rectangle in it, by its gaps [m] to the sides, to the corridor and opposite."""
+        south, north = (far, near) if self.door_north else (near, far)
+        ends = self.x1 + left, self.y1 + south, self.x2 - right, self.y2 - north
+        return tenths(ends[0]), tenths(ends[1]), tenths(ends[2]), tenths(ends[3])
+
+
+Box = tuple[float, float, float, float]  # x1, y1, x2, y2 [m]
+
+
+@dataclass(frozen=True)
+class Layout:
+    """An office block before its rooms have names.
+
+    Attributes:
+        width: West to east [m].
+        depth: South to north [m].
+        corridors: From facade to facade, one for each wing.
+        crossings: Pieces of cross corridors between two wings, south to north in each.
+        lobby: Between the southern facade and the first corridor.
+        cells: All other rooms.
+    """
+
+    width: float
+    depth: float
+    corridors: tuple[Box, ...]
+    crossings: tuple[tuple[Box, ...], ...]
+    lobby: Box
+    cells: tuple[Cell, ...]
+
+
+def tenths(value: float) -> float:
+    """Walls lie on a lattice of 0.1 m."""
+    return round(float(value), 1)
+
+
+def lay_out(width: float, depth: float, rng: np.random.Generator) -> Layout:
+    """Cut up a rectangle.
+
+    Args:
+        width: West to east [m], at least 24.
+        depth: South to north [m], at least 12.
+        rng: Source of luck.
+    """
+    width, depth = tenths(width), tenths(depth)
+    wings = max(1, int(depth / STOREY + 0.65))
+    edges = [tenths(depth * wing / wings) for wing in range(wings + 1)]
+    corridors = []
+    for south, north in itertools.pairwise(edges):
+        wide = tenths(rng.uniform(*CORRIDOR))
+        low = tenths((south + north - wide) / 2)
+        corridors.append((0.0, low, width, tenths(low + wide)))
+    crossings = _crossings(corridors, width, rng) if wings > 1 else ()
+    lobby = _lobby(corridors[0], width, rng)
+    cells = tuple(_cells(edges, corridors, crossings, lobby, rng))
+    return Layout(width, depth, tuple(corridors), crossings, lobby, cells)
+
+
+def _crossings(
+    corridors: list[Box], width: float, rng: np.random.Generator
+) -> tuple[tuple[Box, ...], ...]:
+    """Cross corridors evenly along the others, each a few metres off."""
+    count = max(1, round(width / CROSSING_EVERY))
+    found = []
+    for number in range(count):
+        wide = tenths(rng.uniform(*CORRIDOR))
+        middle = width * (number + 0.5) / count + rng.uniform(-0.1, 0.1) * width / count
+        x1 = tenths(middle - wide / 2)
+        found.append(
+            tuple(
+                (x1, south[3], tenths(x1 + wide), north[1])
+                for south, north in itertools.pairwise(corridors)
+            )
+        )
+    return tuple(found)
+
+
+def _lobby(corridor: Box, width: float, rng: np.random.Generator) -> Box:
+    wide = tenths(rng.uniform(*LOBBY))
+    x1 = tenths(rng.uniform(0.4, 0.6) * width - wide / 2)
+    return x1, 0.0, tenths(x1 + wide), corridor[1]
+
+
+def _cells(
+    edges: list[float],
+    corridors: list[Box],
+    crossings: tuple[tuple[Box, ...], ...],
+    lobby: Box,
+    rng: np.random.Generator,
+) -> Iterator[Cell]:
+    """Rooms south and north of each corridor, from west to east."""
+    last = len(corridors) - 1
+    across = [(pieces[0][0], pieces[0][2]) for pieces in crossings]
+    for wing, (_, low, width, high) in enumerate(corridors):
+        for y1, y2, door_north in ((edges[wing], low, True), (high, edges[wing + 1], False)):
+            facade = wing == (0 if door_north else last)
+            gaps = across if not facade else [(lobby[0], lobby[2])] if door_north else []
+            bounds = [0.0, *(x for gap in gaps for x in gap), width]
+            for start, end in zip(bounds[::2], bounds[1::2], strict=True):
+                cuts = _cuts(start, end, rng)
+                for x1, x2 in itertools.pairwise(cuts):
+                    yield Cell(x1, y1, x2, y2, wing, door_north, facade)
+
+
+def _cuts(start: float, end: float, rng: np.random.Generator) -> list[float]:
+    """Where partitions stand: rooms as wide as drawn from `WISHES`, made to fit."""
+    length, wishes = end - start, list[float]()
+    while sum(wishes) < length:
+        wishes.append(rng.uniform(*WISHES[rng.choice(len(WISHES), p=ODDS)]))
+    if sum(wishes) - length > wishes[-1] / 2 or len(wishes) * (LEAST_CELL + 0.1) > length:
+        wishes = wishes[:-1] or wishes
+    spare = np.array(wishes) - LEAST_CELL
+    widths = LEAST_CELL + 0.1 + (length - (LEAST_CELL + 0.1) * len(spare)) * spare / spare.sum()
+    return [tenths(start + reach) for reach in (0.0, *np.cumsum(widths))]
+
+
+STAIRS_EVERY = 40.0  # along a facade [m]
+BASE_GAP, BASE_WALL = 1.2, 0.7  # between robot bases, and to the walls [m]
+APPROACH = 1.6  # free floor behind the door of a robot bay [m]
+
+
+class Use(NamedTuple):
+    """What a room is for.
+
+    Attributes:
+        name: As people call it.
+        door: Width of its door [m].
+        detectors: Kinds of those in it.
+        furniture: Rectangles that stand in a cell.
+    """
+
+    name: str
+    door: float
+    detectors: tuple[str, ...]
+    furniture: Callable[[Cell], Iterator[Box]]
+
+
+def _nothing(_: Cell) -> Iterator[Box]:
+    yield from ()
+
+
+def _desk(cell: Cell) -> Iterator[Box]:
+    """One desk or two at the window."""
+    side = tenths((cell.width - min(cell.width - 1.2, 3.2)) / 2)
+    yield cell.box(side, side, cell.depth - 0.8, 0.0)
+
+
+def _table(cell: Cell) -> Iterator[Box]:
+    """Something large in the middle that one can walk around."""
+    if cell.width >= 3.4 and cell.depth >= 3.4:
+        yield cell.box(1.2, 1.2, 1.2, 1.2)
+
+
+def _counter(cell: Cell) -> Iterator[Box]:
+    yield cell.box(0.0, 0.0, cell.depth - 0.7, 0.0)
+
+
+def _cubicles(cell: Cell) -> Iterator[Box]:
+    yield cell.box(0.0, 0.0, cell.depth - 1.5, 0.0)
+
+
+def _flight(cell: Cell) -> Iterator[Box]:
+    """A flight of stairs along one side; past it lies the way out."""
+    yield cell.box(0.0, cell.width - 1.3, 1.6, 0.9)
+
+
+def _rows(size: float, aisle: float) -> Callable[[Cell], Iterator[Box]]:
+    """Rows away from the door: benches, racks, shelves, islands of desks."""
+
+    def rows(cell: Cell) -> Iterator[Box]:
+        count = int((cell.width - aisle) / (size + aisle))
+        if cell.depth < 3.6 or count < 1:
+            yield from _desk(cell)
+            return
+        gap = (cell.width - count * size) / (count + 1)
+        for number in range(count):
+            left = tenths(gap + number * (size + gap))
+            yield cell.box(left, cell.width - left - size, 1.4, 1.0)
+
+    return rows
+
+
+ROBOT_BAY = Use("Robot bay", 1.4, ("smoke",), _nothing)
+CONTROL = Use("Control room", 1.1, ("smoke",), _nothing)
+STAIRS = Use("Stairs", 1.2, ("smoke",), _flight)
+SINGLE = (  # one of each in every block, if it has the rooms; the first are the most needed
+    Use("Server room", 1.1, ("smoke", "water"), _rows(1.0, 1.2)),
+    Use("Toilets", 1.0, ("water",), _cubicles),
+    Use("Plant room", 1.4, ("smoke", "gas", "co", "water"), _table),
+    Use("Kitchen", 1.1, ("heat", "gas", "water"), _counter),
+    Use("Archive", 1.1, ("smoke",), _rows(0.6, 1.1)),
+    Use("Workshop", 1.4, ("smoke", "co"), _table),
+)
+SMALL = (Use("Office", 1.0, ("smoke",), _desk), Use("Copy room", 1.0, ("smoke",), _counter))
+MEDIUM = (
+    Use("Team office", 1.1, ("smoke",), _rows(1.6, 1.1)),
+    Use("Meeting room", 1.1, ("smoke",), _table),
+)
+LARGE = (
+    Use("Laboratory", 1.4, ("smoke", "gas", "water"), _rows(0.9, 1.3)),
+    Use("Open office", 1.2, ("smoke",), _rows(1.6, 1.2)),
+    Use("Seminar room", 1.2, ("smoke",), _rows(0.6, 1.0)),
+)
+COPY_ROOM_EVERY = 9
+MOST_BAYS = 4
+MEDIUM_FROM, LARGE_FROM = 20.0, 36.0  # [m^2]
+
+
+def assign(layout: Layout, bases: int) -> list[tuple[Cell, Use, str]]:
+    """A use and a name for every cell, in the order of the cells.
+
+    Stairs stand at the facades, as they lead out; robots get the largest rooms near the
+    lobby; one of each of `SINGLE` is spread over the house; all others go by their size.
+    """
+    left, uses = list(layout.cells), dict[Cell, tuple[Use, str]]()
+    for use, name, wish in _needs(layout):
+        if use is not ROBOT_BAY or sum(_capacity(c, *uses[c]) for c in uses) < bases:
+            cell = min(left, key=wish, default=None)
+            if cell is not None:
+                left.remove(cell)
+                uses[cell] = use, name
+    most = max(Counter(cell.wing for cell in left).values(), default=0)
+    hundred = 100 if most < 100 else 1000  # no corridor's numbers run into the next one's
+    numbers = [itertools.count(hundred * (wing + 1) + 1) for wing in range(len(layout.corridors))]
+    return [
+        (cell, *(uses.get(cell) or _by_size(cell, numbers[cell.wing]))) for cell in layout.cells
+    ]
+
+
+def _needs(layout: Layout) -> Iterator[tuple[Use, str, Callable[[Cell], float]]]:
+    """What a house needs: a use, a name, and what makes a cell unfit for it."""
+    for number in range(1, MOST_BAYS + 1):
+        name = ROBOT_BAY.name if number == 1 else f"{ROBOT_BAY.name} {number}"
+        yield ROBOT_BAY, name, lambda cell: cell.wing - cell.area / 1000
+    yield CONTROL, CONTROL.name, lambda cell: cell.wing + abs(cell.area - 30) / 1000
+    for letter, stairwell in zip(string.ascii_uppercase, _stairwells(layout), strict=False):
+        yield STAIRS, f"{STAIRS.name} {letter}", partial(_unfit_for_stairs, *stairwell)
+    for number, use in enumerate(SINGLE):
+        x = layout.width * (0.15 + 0.7 * (number * 0.618 % 1))
+        yield use, use.name, partial(_unfit_for_one, x)
+
+
+def _capacity(cell: Cell, use: Use, _: str) -> int:
+    return len(stands(cell)) if use is ROBOT_BAY else 0
+
+
+def _unfit_for_stairs(north: bool, x: float, cell: Cell) -> float:
+    elsewhere = not cell.facade or cell.door_north == north
+    return 1000 * elsewhere + abs((cell.x1 + cell.x2) / 2 - x) + 3 * cell.width
+
+
+def _unfit_for_one(x: float, cell: Cell) -> float:
+    return abs((cell.x1 + cell.x2) / 2 - x) + abs(cell.area - 22) / 2
+
+
+def _stairwells(layout: Layout) -> Iterator[tuple[bool, float]]:
+    """At which facade, and where along it [m]; the lobby is the southern one of small houses."""
+    count = max(1, round(layout.width / STAIRS_EVERY))
+    for number in range(count):
+        yield True, layout.width * (number + 0.5) / count
+    for number in range(count - 1):
+        yield False, layout.width * (number + 1) / count
+
+
+def _by_size(cell: Cell, numbers: Iterator[int]) -> tuple[Use, str]:
+    """Any other room; its number tells the corridor."""
+    number = next(numbers)
+    if cell.area >= LARGE_FROM:
+        use = LARGE[number % len(LARGE)]
+    elif cell.area >= MEDIUM_FROM:
+        use = MEDIUM[number % len(MEDIUM)]
+    else:
+        use = SMALL[number % COPY_ROOM_EVERY == 0]
+    return use, f"{use.name} {number}"
+
+
+def stands(bay: Cell) -> list[tuple[float, float]]:
+    """Where robots stand in a bay [m]: rows from the wall opposite to its door."""
+    columns = 1 + int((bay.width - 2 * BASE_WALL) / BASE_GAP + 1e-6)
+    rows = 1 + int((bay.depth - BASE_WALL - APPROACH) / BASE_GAP + 1e-6)
+    inwards = 1.0 if bay.door_north else -1.0
+    back = bay.y1 if bay.door_north else bay.y2
+    first = (bay.x1 + bay.x2 - (columns - 1) * BASE_GAP) / 2
+    return [
+        (tenths(first + column * BASE_GAP), tenths(back + inwards * (BASE_WALL + row * BASE_GAP)))
+        for row in range(rows)
+        for column in range(columns)
+    ]
+
 
 POST_ROOM = 0.5  # of a guard post from the walls [m]
 DETECTOR_EVERY = 8.0  # along corridors [m]
@@ -81,8 +429,6 @@ def _point(x: float, y: float) -> Any:
 
 
 # --- corridors, walls and ways out -----------------------------------------------------
-
-
 def _ways(layout: Layout) -> Iterator[Feature]:
     """Outer walls, corridors, cross corridors and the lobby; rooms bring their own walls."""
     yield _feature("wall", _box((0.0, 0.0, layout.width, layout.depth)).exterior)
@@ -112,8 +458,6 @@ def _exits(layout: Layout, rooms: Iterable[tuple[Cell, Use, str]]) -> Iterator[F
 
 
 # --- rooms -----------------------------------------------------------------------------
-
-
 def _rooms(rooms: Iterable[tuple[Cell, Use, str]], rng: np.random.Generator) -> Iterator[Feature]:
     for cell, use, name in rooms:
         outline = _box((cell.x1, cell.y1, cell.x2, cell.y2))
@@ -142,8 +486,6 @@ def _clear_of_the_door(cell: Cell) -> float:
 
 
 # --- who and what is in the house ------------------------------------------------------
-
-
 def _people_and_robots(
     block: OfficeBlock, layout: Layout, rooms: list[tuple[Cell, Use, str]]
 ) -> Iterator[Feature]:

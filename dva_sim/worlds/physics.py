@@ -1,23 +1,114 @@
-"""Moving bodies seen from above: robots and people that push, slip and stop (pymunk, no gravity).
+"""A person's body: legs push it towards the velocity that is wanted.
+
+Moving bodies seen from above: robots and people that push, slip and stop (pymunk, no gravity).
 
 What a robot's motors do is in `drives`, what its wheels hold in `robot_body`, how people walk in
 `person_body`, what counts as a contact or a jam in `contacts`.
+
+A bare hall with walls as one likes: where drives are tried and physics is tested.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from typing import Final
 
+import numpy as np
 import pymunk
 
-from dva_sim.errors import ConfigError
-from dva_sim.worlds.bodies import ELASTICITY, FRICTION, PERSON, ROBOT, WALL, Body
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.worlds.bodies import (
+    AT_REST,
+    ELASTICITY,
+    FRICTION,
+    PERSON,
+    ROBOT,
+    WALL,
+    Asked,
+    Body,
+    Timing,
+    set_force,
+    set_velocity,
+)
 from dva_sim.worlds.drives import DriveSpec as DriveSpec
-from dva_sim.worlds.geo import Pose
-from dva_sim.worlds.maps import FREE
-from dva_sim.worlds.person_body import PersonBody as PersonBody
+from dva_sim.worlds.geo import GeoFrame, Pose
+from dva_sim.worlds.layout import Site
+from dva_sim.worlds.maps import FREE, rasterise
 from dva_sim.worlds.robot_body import RobotBody as RobotBody
-from dva_sim.worlds.site import Site
+
+RELAXATION: Final = 0.5  # of a person's velocity towards the wanted one [s]
+MOST_PUSH: Final = 3.0  # force of a person's legs by mass [m/s^2]; assumed
+
+
+class PersonBody(Body):
+    """A person seen from above, a disc that walks any way; made by `World.add_person`.
+
+    Legs push towards the wanted velocity as in the model of social forces, with bounded force;
+    whom to keep clear of is for the walker to decide.
+
+    References:
+        D. Helbing, P. Molnar: Social force model for pedestrian dynamics. Physical Review E
+        51(5), 1995: relaxation time 0.5 s.
+    """
+
+    kind = PERSON
+
+    def __init__(self, world: Timing, name: str, pose: Pose, radius: float, mass: float) -> None:
+        body = pymunk.Body(mass, math.inf)
+        body.position = pose.x, pose.y
+        shape = pymunk.Circle(body, radius)
+        # Who brushes past a wall or somebody else is not held back.
+        shape.friction, shape.elasticity, shape.collision_type = 0.0, 0.0, self.kind
+        super().__init__(world, name, body, shape)
+        self.radius, self._mass, self._circle = radius, mass, shape
+        self._asked = Asked((0.0, 0.0))
+
+    def walk(self, vx: float, vy: float) -> None:
+        """Want to walk with this velocity [m/s] from the next tick on, until told otherwise.
+
+        Raises:
+            ValueError: it is not finite.
+        """
+        if not (math.isfinite(vx) and math.isfinite(vy)):
+            raise ValueError(f"{self.name} cannot walk at {vx} m/s, {vy} m/s")
+        self._asked.put(self._world.next_tick(), (vx, vy))
+        self._world.wake(self)
+
+    def take_up(self, radius: float) -> None:
+        """Be so wide from now on [m]: who turns sideways fits through a narrower gap."""
+        self.radius = radius
+        self._circle.unsafe_set_radius(radius)
+
+    def push(self, tick: int, dt: float) -> bool:
+        """Apply the force of the legs for one tick; False if the person stands and shall stand."""
+        wx, wy = self._asked.at(tick)
+        vx, vy = self.velocity
+        if wx == wy == 0.0 and abs(vx) + abs(vy) < AT_REST:
+            set_velocity(self._raw, (0.0, 0.0))
+            return bool(self._asked.coming)
+        ax, ay = (wx - vx) / RELAXATION, (wy - vy) / RELAXATION
+        asked = math.hypot(ax, ay)
+        share = self._mass * min(1.0, MOST_PUSH / asked) if asked > 0.0 else 0.0
+        set_force(self._raw, (ax * share, ay * share))
+        return True
+
+    def meets(self, other: Body | None, now: float) -> None:
+        """It begins to touch somebody, or a wall (None)."""
+        if other is not None and other.kind == ROBOT:
+            self._touch.begin(now)
+
+    def parts(self, other: Body | None, now: float) -> None:
+        """It touches somebody, or a wall (None), no longer."""
+        if other is not None and other.kind == ROBOT:
+            self._touch.end(now)
+
+    def feels(self, other: Body | None, impulse: float) -> None:
+        """A contact with somebody, or a wall (None), has stopped or pushed it [N s]."""
+        self._world.wake(self)
+        if other is not None and other.kind == ROBOT:
+            self.impulse += impulse
+
 
 US = 1_000_000
 SLOP = 0.005  # overlap that a contact may keep; pymunk's default is for pixels [m]
@@ -181,3 +272,33 @@ def _wall(space: pymunk.Space, x1: float, y1: float, x2: float, y2: float) -> py
     wall.friction, wall.elasticity, wall.collision_type = FRICTION, ELASTICITY, WALL
     wall.filter = pymunk.ShapeFilter(categories=_FIXED)
     return wall
+
+
+CAMPUS: Final = GeoFrame(38.6612, -9.2058)  # Monte de Caparica
+Segment = tuple[float, float, float, float]
+
+
+def hall(width: float, depth: float, walls: Sequence[Segment] = ()) -> Site:
+    """A hall with a corner at 0, 0, and walls in it [m], thin as all walls are."""
+    import shapely
+
+    border = [
+        (0, 0, width, 0),
+        (width, 0, width, depth),
+        (width, depth, 0, depth),
+        (0, depth, 0, 0),
+    ]
+    lines = np.array([*border, *walls], float)
+    return Site(
+        name="hall",
+        frame=CAMPUS,
+        walls=lines,
+        rooms=(),
+        doors=np.empty((0, 4)),
+        robot_bases=(),
+        guard_posts=(),
+        operator_desks=(),
+        detectors=(),
+        extent=(0.0, 0.0, width, depth),
+        grid=rasterise(shapely.box(0, 0, width, depth), lines, 0.1),
+    )

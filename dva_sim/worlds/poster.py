@@ -6,8 +6,8 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dva_sim.errors import ConfigError
-from dva_sim.worlds.site import Site
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.worlds.layout import Site
 from dva_sim.worlds.view import COVERAGE, EXIT, GRASS, INK, PAVING, ZONES, draw_site, limits
 from dva_sim.worlds.view_marks import CAMERA, DETECTORS, STATION, mast
 

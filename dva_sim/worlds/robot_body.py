@@ -16,7 +16,9 @@ from dva_sim.worlds.bodies import (
     ROBOT,
     Asked,
     Body,
+    Contacts,
     G,
+    Jam,
     Timing,
     get_angle,
     get_position,
@@ -27,7 +29,6 @@ from dva_sim.worlds.bodies import (
     set_torque,
     set_velocity,
 )
-from dva_sim.worlds.contacts import Contacts, Jam
 from dva_sim.worlds.drives import DriveSpec
 from dva_sim.worlds.geo import Pose
 
@@ -129,7 +130,7 @@ class RobotBody(Body):
 
     @property
     def jammed(self) -> bool:
-        """Whether it is stuck, by the rules of `dva_sim.worlds.contacts`."""
+        """Whether it is stuck, by the rules of `dva_sim.worlds.bodies`."""
         return self._jam.holds(*self.pose())
 
     @property

@@ -38,16 +38,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.experiments.repeats import latin_hypercube
-from dva_sim.experiments.validation.operators.experiments import EXPERIMENTS
-from dva_sim.experiments.validation.operators.playing import Setting, play_experiments
-from dva_sim.experiments.validation.operators.targets import (
+from dva_sim.experiments.analysis.published_operators import (
     Line,
     lines_of,
     load_split,
     load_targets,
 )
-from dva_sim.streams import Streams
+from dva_sim.experiments.study.robustness_grid import latin_hypercube
+from dva_sim.kernel.streams import Streams
+from dva_sim.validation.operators.experiments import EXPERIMENTS
+from dva_sim.validation.operators.play import Setting, play_experiments
 
 HERE = Path(__file__).parent
 PEOPLE = HERE.parents[1] / "agents/people"

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dva_sim.agents.avoidance import CREEP, SOCIAL, Avoidance, Blocked, Lane, pace_among
-from dva_sim.agents.nearby import KEEP_ROBOT, PERSONAL, Nearby
-from dva_sim.agents.steering import Route
+from dva_sim.agents.robot.avoidance import CREEP, SOCIAL, Avoidance, Blocked, Lane, pace_among
+from dva_sim.agents.robot.collision_guard import KEEP_ROBOT, PERSONAL, Nearby
+from dva_sim.agents.route_following import Route
 
 HALF = 1.2  # of the corridor [m]
 ROUTE = Route(np.array([[0.0, 0.0], [20.0, 0.0]]))

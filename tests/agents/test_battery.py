@@ -2,11 +2,10 @@ import math
 
 import pytest
 
-from dva_sim.agents.battery import Battery, BatteryProfile
-from dva_sim.agents.profile import load_robot
+from dva_sim.agents.robot.battery import Battery, BatteryProfile
+from dva_sim.agents.robot.profile import load_robot
 from dva_sim.worlds.geo import Pose
-from dva_sim.worlds.hall import hall
-from dva_sim.worlds.physics import World
+from dva_sim.worlds.physics import World, hall
 
 PROFILE = BatteryProfile(
     capacity_wh=100.0, idle_w=50.0, rolling_resistance=0.02, efficiency=0.5, charging_w=200.0

@@ -10,17 +10,16 @@ import numpy as np
 import pytest
 from halls import People, hall, two_rooms
 
-from dva_sim.agents import way_out
-from dva_sim.agents.bystander import BystanderAgent, nothing_seen
-from dva_sim.agents.escape import UNTENABLE, choose_escape, is_untenable, refuges_of
-from dva_sim.agents.exposure import PERIOD, clean_air
 from dva_sim.agents.operator.person import Trait
-from dva_sim.agents.people import BystanderProfile, Occupant
-from dva_sim.agents.way_out import AT_LATEST, THROUGH
-from dva_sim.agents.workplaces import APART, draw_places
-from dva_sim.config import load_yaml, validate
-from dva_sim.resources import find
-from dva_sim.streams import Streams
+from dva_sim.agents.people import evacuation
+from dva_sim.agents.people.bystander import APART, BystanderAgent, draw_places, nothing_seen
+from dva_sim.agents.people.escape import UNTENABLE, choose_escape, is_untenable, refuges_of
+from dva_sim.agents.people.evacuation import AT_LATEST, THROUGH
+from dva_sim.agents.people.exposure import PERIOD, clean_air
+from dva_sim.agents.people.profiles import BystanderProfile, Occupant
+from dva_sim.kernel.config import load_yaml, validate
+from dva_sim.kernel.resources import find
+from dva_sim.kernel.streams import Streams
 from dva_sim.worlds.hazards import CLEAR, Surroundings, make_hazard, pace_in_smoke, pace_in_water
 from dva_sim.worlds.planning import Planner
 from dva_sim.worlds.site import load_site
@@ -309,7 +308,7 @@ def test_who_has_no_way_left_stands_still_and_leaves_when_there_is_one_again():
 
 def test_who_is_trapped_looks_for_a_way_after_2_4_8_and_then_every_16_seconds(monkeypatch):
     building, tries = Building(), []
-    monkeypatch.setattr(way_out, "choose_escape", lambda *_: tries.append(building.clock.now))
+    monkeypatch.setattr(evacuation, "choose_escape", lambda *_: tries.append(building.clock.now))
     one = building.bystander((10.0, 1.5), premovement=1.0)
     one.alarm(0.0)
     building.pass_time(70.0)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dva_sim.agents.camera import CLEAR, Frame, HazardSpot, Observation, SeenHazard, View
+from dva_sim.agents.robot.camera import CLEAR, Frame, HazardSpot, Observation, SeenHazard, View
 
 FIRE = SeenHazard("fire", 4.0, 5.0, 1.5, 0.6, 1.0)
 FRAME = Frame(Observation(86_320, 1.0, 2.0, 0.5, 0.4, -0.1, (FIRE,), 2.5), 12.5)

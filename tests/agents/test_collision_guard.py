@@ -11,8 +11,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from searching import search
 
-from dva_sim.agents.collision_guard import KEEP_WALL, TIME_TO_CONTACT, CollisionGuard
-from dva_sim.agents.nearby import PERSONAL, Nearby
+from dva_sim.agents.robot.collision_guard import (
+    KEEP_WALL,
+    PERSONAL,
+    TIME_TO_CONTACT,
+    CollisionGuard,
+    Nearby,
+)
 
 RADIUS, DECELERATION = 0.30, 1.0
 TOP = 0.5

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from dva_sim.agents.commands import PublishedCommands, topic_of
+from dva_sim.agents.operator.command_sender import PublishedCommands, topic_of
 from dva_sim.agents.operator.person import Population, draw_person
 from dva_sim.agents.tilt import Phone, PhoneProfile
-from dva_sim.clock import Clock
+from dva_sim.kernel.clock import Clock
+from dva_sim.kernel.recorder import DriveLog, Recorder
+from dva_sim.kernel.streams import Streams
 from dva_sim.network.link import ConstantRate, Link, LinkConfig
 from dva_sim.network.virtual import VirtualNetwork
 from dva_sim.protocol.codec import decode
 from dva_sim.protocol.exchange import Outbox
 from dva_sim.protocol.messages import SetTeleOp
-from dva_sim.recorder import DriveLog, Recorder
-from dva_sim.streams import Streams
 
 PHONE, ROBOT = "02:00:00:03:00:01", "02:00:00:01:00:01"
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from dva_sim import scenario as scenarios
 from dva_sim.agents.device import Device
 from dva_sim.network.patterns import Request
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode, encode
-from dva_sim.simulation.names import DVA, id_of
-from dva_sim.simulation.run import Run
+from dva_sim.simulation import scenario as scenarios
+from dva_sim.simulation.full.run import Run
+from dva_sim.simulation.full.stage import DVA, id_of
 
 ME, ROBOT, THIEF = id_of("operator", 1), id_of("robot", 1), "02:00:00:03:00:66"
 

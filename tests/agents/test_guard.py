@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from pretended_dva import GUARD, POST, WALKER, PretendedDva
 
-from dva_sim.agents.duty import AWARD_WITHIN, MOST_ANNOUNCED, GuardDuty
-from dva_sim.agents.guard import STAND_BY_FOR, STAND_OFF, GuardAgent
-from dva_sim.agents.people import GuardProfile, Walker
-from dva_sim.config import load_yaml, validate
+from dva_sim.agents.people.guard import STAND_BY_FOR, STAND_OFF, GuardAgent
+from dva_sim.agents.people.guard_protocol import AWARD_WITHIN, MOST_ANNOUNCED, GuardDuty
+from dva_sim.agents.people.profiles import GuardProfile, Walker
+from dva_sim.kernel.config import load_yaml, validate
+from dva_sim.kernel.resources import find
 from dva_sim.protocol import messages as m
-from dva_sim.resources import find
 from dva_sim.worlds.hazards import CLEAR, KINDS, Conditions, make_hazard
 
 FAR, FARTHER, NEAR = (21.4, 12.0), (31.4, 12.0), (6.4, 12.0)  # 20, 30 and 5 m from the post [m]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from dva_sim.agents.inbox import LIMIT, Inbox, Letter
-from dva_sim.clock import Clock
+from dva_sim.agents.robot.command_queue import LIMIT, Inbox, Letter
+from dva_sim.kernel.clock import Clock
 from dva_sim.network.patterns import Request
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import encode

@@ -13,14 +13,13 @@ import numpy as np
 import pytest
 from fleet import Fleet, Robot, caparica
 
-from dva_sim.agents.camera import HazardSpot
-from dva_sim.agents.errands import Errand
-from dva_sim.agents.inspection import INSPECT_FOR, LOOK_FROM
-from dva_sim.agents.missions import GIVE_UP_AFTER, MOST_JAMS, NEAR, RESERVE
-from dva_sim.agents.nearby import PERSONAL
-from dva_sim.agents.profile import RobotProfile
+from dva_sim.agents.robot.camera import HazardSpot
+from dva_sim.agents.robot.collision_guard import PERSONAL
+from dva_sim.agents.robot.manoeuvres import INSPECT_FOR, LOOK_FROM
+from dva_sim.agents.robot.missions import GIVE_UP_AFTER, MOST_JAMS, NEAR, RESERVE, Errand
+from dva_sim.agents.robot.profile import RobotProfile
 from dva_sim.protocol import messages as m
-from dva_sim.worlds.site import Site
+from dva_sim.worlds.layout import Site
 
 WEST, EAST = (6.0, 12.0), (20.0, 12.0)
 SOUTH_OF_DOOR, NORTH_OF_DOOR = (33.15, 16.0), (33.15, 20.5)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
-from dva_sim.agents.modes import LEASE_S, STAND, Decision, Limits, Mode, RobotController
+from dva_sim.agents.robot.controller import LEASE_S, STAND, Decision, Limits, Mode, RobotController
 from dva_sim.protocol import messages as m
 
 DVA, ROBOT, ANA, RUI = (f"02:00:00:00:00:0{i}" for i in range(1, 5))

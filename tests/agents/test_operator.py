@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from pretended_dva import OPERATOR, OTHER_ROBOT, ROBOT, PretendedDva
 
-from dva_sim.agents.modes import Mode
-from dva_sim.agents.operator.agent import STANDSTILL, OperatorAgent
+from dva_sim.agents.operator.operator import STANDSTILL, OperatorAgent
+from dva_sim.agents.robot.controller import Mode
 from dva_sim.protocol import messages as m
 
 EAST, WEST = (30.0, 12.0), (4.0, 12.0)  # both ends of the main corridor [m]

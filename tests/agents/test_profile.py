@@ -4,10 +4,10 @@ import math
 
 import pytest
 
-from dva_sim.agents.profile import RobotProfile, load_robot
-from dva_sim.agents.service import ServiceLaw
-from dva_sim.config import validate
-from dva_sim.errors import ConfigError
+from dva_sim.agents.robot.command_queue import ServiceLaw
+from dva_sim.agents.robot.profile import RobotProfile, load_robot
+from dva_sim.kernel.config import validate
+from dva_sim.kernel.errors import ConfigError
 from dva_sim.worlds.drives import DriveSpec
 
 

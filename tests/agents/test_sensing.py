@@ -6,12 +6,19 @@ from collections.abc import Callable
 
 import pytest
 
-from dva_sim import scenario as scenarios
-from dva_sim.agents.sensing import FASTEST, LEASE, MOST, SensorDesk, SensorPort, topic_of_sensor
+from dva_sim.agents.robot.sensors import (
+    FASTEST,
+    LEASE,
+    MOST,
+    SensorDesk,
+    SensorPort,
+    topic_of_sensor,
+)
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode
-from dva_sim.simulation.names import id_of
-from dva_sim.simulation.run import Run
+from dva_sim.simulation import scenario as scenarios
+from dva_sim.simulation.full.run import Run
+from dva_sim.simulation.full.stage import id_of
 
 ROBOT, READER, OTHER = id_of("robot", 1), id_of("operator", 1), "02:00:00:03:00:77"
 

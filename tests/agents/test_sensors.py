@@ -10,7 +10,7 @@ import pytest
 from fleet import EMPTY, Fleet
 from pydantic import ValidationError
 
-from dva_sim.agents.sensors import (
+from dva_sim.agents.robot.sensors import (
     BLOCK,
     KINDS,
     FaultConfig,
@@ -20,8 +20,8 @@ from dva_sim.agents.sensors import (
     make_ports,
     sources_of,
 )
-from dva_sim.errors import ConfigError
-from dva_sim.streams import Streams
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.streams import Streams
 from dva_sim.worlds.hazards import Conditions
 from dva_sim.worlds.lidar import Lidar
 

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dva_sim import scenario as scenarios
-from dva_sim.agents.service import ServiceLaw, mean_of, service_times
-from dva_sim.errors import ConfigError
+from dva_sim.agents.robot.command_queue import ServiceLaw, mean_of, service_times
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.simulation import scenario as scenarios
 
 
 def draws(count: int = 40_000, **law: Any) -> np.ndarray:

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from dva_sim.agents.steering import Route
+from dva_sim.agents.route_following import Route
 
 
 def waves(piece: float) -> Route:

@@ -11,10 +11,20 @@ import pytest
 from elsewhere import told_here_and_elsewhere
 from halls import People, gap, hall, two_rooms
 
-from dva_sim.agents.doorways import Courtesy, Door, beside, doors_on, middles_of
-from dva_sim.agents.legs import RADIUS, FreeBody, OpenGround
-from dva_sim.agents.manners import BERTH, RELAXATION, Mover, is_clear, velocity
-from dva_sim.agents.walking import (
+from dva_sim.agents.people.locomotion import RADIUS, FreeBody, OpenGround
+from dva_sim.agents.people.pedestrian_avoidance import (
+    BERTH,
+    RELAXATION,
+    Courtesy,
+    Door,
+    Mover,
+    beside,
+    doors_on,
+    is_clear,
+    middles_of,
+    velocity,
+)
+from dva_sim.agents.people.walking import (
     ARRIVED,
     FASTEST,
     GIVE_UP,
@@ -23,9 +33,9 @@ from dva_sim.agents.walking import (
     Walking,
     draw_speed,
 )
-from dva_sim.clock import Clock
+from dva_sim.kernel.clock import Clock
+from dva_sim.worlds.drives import DriveSpec
 from dva_sim.worlds.geo import Pose
-from dva_sim.worlds.physics import DriveSpec
 from dva_sim.worlds.planning import Planner
 
 CORRIDOR = 2.4  # width [m]

@@ -6,7 +6,7 @@ import pytest
 from small_study import cheap, study_in
 
 import dva_sim
-from dva_sim.experiments.runner import run_study
+from dva_sim.experiments.execution.runner import run_study
 
 LINES, CHARACTERS = 8, 800  # a screen of 80 x 24 has room for more than twice as many
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dva_sim.worlds.camera_picture import Camera, Figure, Smoke, Spot, encode
+from dva_sim.worlds.camera import Camera, Figure, Smoke, Spot, encode
 from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.hazards import Raster
 from dva_sim.worlds.site import load_site

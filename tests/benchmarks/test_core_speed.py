@@ -13,7 +13,7 @@ import pytest
 from benchmarks.goals import goal
 from office import DVA, Office, east
 
-from dva_sim.core.rules import Rules
+from dva_sim.core.assignments import Rules
 from dva_sim.protocol import messages as m
 
 SIZES = 100, 1_000, 10_000

@@ -16,15 +16,16 @@ import pytest
 from benchmarks.goals import goal
 from replayed_operator import replay, taped
 
-from dva_sim import scenario as scenarios
-from dva_sim.agents.camera import Observation
 from dva_sim.agents.operator.person import Population, draw_person
 from dva_sim.agents.operator.strategies import Pursuit, Reach, View
-from dva_sim.agents.steering import Route
-from dva_sim.simulation import simulate
-from dva_sim.simulation.field import PHYSICS_TICK
-from dva_sim.simulation.stage import planner_of
-from dva_sim.worlds.physics import DriveSpec, World
+from dva_sim.agents.robot.camera import Observation
+from dva_sim.agents.route_following import Route
+from dva_sim.simulation import scenario as scenarios
+from dva_sim.simulation.full import simulate
+from dva_sim.simulation.full.field import PHYSICS_TICK
+from dva_sim.simulation.full.stage import planner_of
+from dva_sim.worlds.drives import DriveSpec
+from dva_sim.worlds.physics import World
 from dva_sim.worlds.site import load_site
 
 # Goal: 3.5. It is 5 to 9: what remains is spread over a thousand small steps of each simulated

@@ -12,15 +12,14 @@ import pytest
 import zmq
 from benchmarks.goals import goal
 
-from dva_sim import scenario as scenarios
 from dva_sim.agents.device import Device
+from dva_sim.kernel.recorder import Recorder
 from dva_sim.network.realtime import LiveClock
 from dva_sim.network.sockets import SocketNetwork
 from dva_sim.protocol import messages as m
-from dva_sim.recorder import Recorder
-from dva_sim.simulation.field import Field
-from dva_sim.simulation.names import DVA, id_of
-from dva_sim.simulation.stage import Stage
+from dva_sim.simulation import scenario as scenarios
+from dva_sim.simulation.full.field import Field
+from dva_sim.simulation.full.stage import DVA, Stage, id_of
 
 ROBOT, OPERATOR = id_of("robot", 1), id_of("operator", 1)
 SESSION = 1425

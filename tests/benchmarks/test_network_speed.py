@@ -17,12 +17,12 @@ import pytest
 import simpy
 from benchmarks.goals import goal
 
-from dva_sim.clock import Clock
-from dva_sim.network.connecting import Connector
+from dva_sim.kernel.clock import Clock
+from dva_sim.kernel.streams import Streams
+from dva_sim.network.connections import Connector
 from dva_sim.network.link import ConstantRate, Link, LinkConfig
 from dva_sim.network.patterns import Request, Requester
 from dva_sim.network.virtual import VirtualNetwork
-from dva_sim.streams import Streams
 
 MESSAGES, AT_ONCE, ROUNDS = 20_000, 100, 7
 MOST_SHARE = 0.4

@@ -7,7 +7,7 @@ import time
 import synthetic_study
 from benchmarks.goals import goal
 
-from dva_sim.experiments.report import write_report
+from dva_sim.experiments.report.report import write_report
 
 PERSONS = 24
 MANY, FEW = 12, 1  # trials of each person

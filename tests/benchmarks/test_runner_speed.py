@@ -19,8 +19,8 @@ import pytest
 import small_study as kit
 from benchmarks.goals import goal
 
-from dva_sim.experiments import places
-from dva_sim.experiments.runner import run_study
+from dva_sim.experiments.execution import executors
+from dva_sim.experiments.execution.runner import run_study
 
 STAT = Path("/proc/stat")
 TESTS = Path(kit.__file__).parent
@@ -40,7 +40,7 @@ print(json.dumps([total[-1], before, peak()]))
 
 
 def load() -> str:
-    return f"load {os.getloadavg()[0]:.1f} on {places.cores()} cores"
+    return f"load {os.getloadavg()[0]:.1f} on {executors.cores()} cores"
 
 
 def test_the_runner_costs_little_beside_runs_of_a_tenth_of_a_second(
@@ -85,7 +85,7 @@ def test_two_processes_are_nearly_twice_as_fast_as_one(tmp_path: Path, benchmark
     What else they did is all CPU time that the machine has spent but for that of the runs
     themselves, so the start of the processes and the parent's work are in it, too.
     """
-    if places.cores() < 2:
+    if executors.cores() < 2:
         pytest.skip("needs two cores")
     study, took, beside = kit.study_in(tmp_path, "persons=30"), {}, {}
     for jobs in (1, 2):

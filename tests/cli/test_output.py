@@ -9,13 +9,12 @@ from pathlib import Path
 import pytest
 from small_study import cheap, study_in, unlucky
 
-from dva_sim.cli import call
+from dva_sim.cli import call, names, plugin_names
+from dva_sim.cli.episode_output import PATTERNS
 from dva_sim.cli.files import _LISTED
-from dva_sim.exit_codes import ExitCode
-from dva_sim.experiments import extending, listing
-from dva_sim.experiments.console import PATTERNS
-from dva_sim.experiments.planning import _Tried
-from dva_sim.experiments.runner import run_study
+from dva_sim.experiments.execution.dry_run import _Tried
+from dva_sim.experiments.execution.runner import run_study
+from dva_sim.kernel.errors import ExitCode
 
 ROOT = Path(__file__).parents[2]
 
@@ -57,7 +56,7 @@ def test_a_list_has_a_line_for_each_name_with_what_it_is(say):
     assert code == 0
     for line in ("fire-drill +Two robots, two guards", "min_eta +Oldest task", "latest-wins +Comm"):
         assert any(re.match(f"  {line}", told) for told in lines)
-    everything = listing.everything()
+    everything = names.everything()
     assert len(lines) == sum(len(found) + 2 for found in everything.values()) - 1
     assert all(entry.description for found in everything.values() for entry in found)
 
@@ -72,22 +71,22 @@ def test_a_list_of_one_kind_or_none_that_there_is(say):
 
 def test_a_terminal_cuts_what_it_has_no_room_for_and_a_pipe_does_not(monkeypatch, capsys):
     monkeypatch.setenv("COLUMNS", "40")
-    listing.tell(["x" * 100])
+    names.tell(["x" * 100])
     assert capsys.readouterr().out == "x" * 100 + "\n"
     monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
-    listing.tell(["x" * 100, "y" * 40])
+    names.tell(["x" * 100, "y" * 40])
     assert capsys.readouterr().out == "x" * 37 + "...\n" + "y" * 40 + "\n"
 
 
 def test_every_kind_that_is_listed_can_be_completed_and_every_pattern_is_told():
-    assert set(_LISTED) == listing.everything().keys()
-    assert listing.PATTERNS.keys() == set(PATTERNS)
+    assert set(_LISTED) == names.everything().keys()
+    assert names.PATTERNS.keys() == set(PATTERNS)
 
 
 def test_plugins_are_told_by_kind_with_the_group_of_their_entry_points(say):
     out = say("plugins")[1]
     page = (ROOT / "agents" / "README.md").read_text(encoding="utf-8")
-    for several, plugins in extending.KINDS.items():
+    for several, plugins in plugin_names.KINDS.items():
         assert f"\n{several}\n" in f"\n{out}"
         for told in (plugins.group, plugins.key, plugins.public, plugins.folder):
             assert told in out
@@ -189,7 +188,7 @@ def test_a_report_is_quiet_or_tells_its_files(say, folders):
 
 
 def test_a_dry_run_tells_every_configuration_if_asked_to(say, tmp_path, monkeypatch):
-    monkeypatch.setattr("dva_sim.experiments.planning._tried", lambda *_: _Tried({}))
+    monkeypatch.setattr("dva_sim.experiments.execution.dry_run._tried", lambda *_: _Tried({}))
     path = study_in(tmp_path).file
     out = say("run", path, "--dry-run", "-v", "-o", tmp_path / "out")[1]
     assert len(re.findall(r"^  (?:drive|story), (?:cell \d+|reference): ", out, re.M)) == 9
@@ -197,7 +196,7 @@ def test_a_dry_run_tells_every_configuration_if_asked_to(say, tmp_path, monkeypa
 
 
 def test_runs_that_failed_are_told_on_standard_error_however_quiet(say, tmp_path, monkeypatch):
-    monkeypatch.setattr("dva_sim.experiments.episode.run_job", one_fails)
+    monkeypatch.setattr("dva_sim.experiments.execution.job.run_job", one_fails)
     path = study_in(tmp_path).file
     code, out, err = say("run", path, "-q", "-j", 1, "-o", tmp_path / "out")
     assert (code, out) == (ExitCode.RUNS_FAILED, "")

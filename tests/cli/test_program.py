@@ -14,9 +14,8 @@ from typer.main import get_command
 
 from dva_sim import __version__
 from dva_sim.cli import app, call
-from dva_sim.cli.layout import Group
-from dva_sim.errors import ConfigError, RunsFailed
-from dva_sim.exit_codes import ExitCode
+from dva_sim.cli.program import Group
+from dva_sim.kernel.errors import ConfigError, ExitCode, RunsFailed
 
 COMMANDS = [c.name or c.callback.__name__.rstrip("_") for c in app.registered_commands]
 PATHS = [[name] for name in COMMANDS] + [["site"], ["site", "show"], ["site", "export"]]
@@ -136,7 +135,7 @@ def test_what_goes_wrong_ends_in_one_line_and_its_code(monkeypatch, capsys, rais
     def fail(_):
         raise raised
 
-    monkeypatch.setattr("dva_sim.checking.console.print_schema", fail)
+    monkeypatch.setattr("dva_sim.cli.check_output.print_schema", fail)
     assert call(["schema", "site"]) == code
     assert capsys.readouterr().err == f"{line}\n"
 

@@ -22,8 +22,8 @@ from transports import (
 )
 
 from dva_sim.agents import device
-from dva_sim.agents.commands import topic_of
-from dva_sim.agents.modes import Limits, Mode, RobotController
+from dva_sim.agents.operator.command_sender import topic_of
+from dva_sim.agents.robot.controller import Limits, Mode, RobotController
 from dva_sim.network.patterns import Request, Requester
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode

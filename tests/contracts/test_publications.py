@@ -25,7 +25,7 @@ from transports import (
     numbered,
 )
 
-from dva_sim.agents.inbox import Inbox, Letter
+from dva_sim.agents.robot.command_queue import Inbox, Letter
 from dva_sim.network.patterns import Request
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import encode

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from office import DETECTOR, GUARD, OPERATOR, OTHER_GUARD, ROBOT, Office, east
 
+from dva_sim.core.assignments import Rules
 from dva_sim.core.dispatch import Advice, Assignment, HazardTeam, Policy, Situation
 from dva_sim.core.events import State
-from dva_sim.core.rules import Rules
-from dva_sim.core.send import Send
+from dva_sim.core.outbox import Send
 from dva_sim.protocol import messages as m
 
 RULES = Rules(containment=True, escalate_after=60.0)

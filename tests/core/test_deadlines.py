@@ -15,9 +15,9 @@ from office import (
     Office,
 )
 
+from dva_sim.core.assignments import Rules
 from dva_sim.core.events import State
-from dva_sim.core.rules import Rules
-from dva_sim.core.send import Send
+from dva_sim.core.outbox import Send
 from dva_sim.protocol import messages as m
 
 MAX_ATTEMPTS = 4

@@ -20,18 +20,11 @@ from office import (
     east,
 )
 
-from dva_sim.core.dispatch import (
-    Advice,
-    Announcement,
-    Assignment,
-    Policy,
-    Relocation,
-    Situation,
-)
+from dva_sim.core.assignments import Rules
+from dva_sim.core.dispatch import Advice, Announcement, Assignment, Policy, Relocation, Situation
 from dva_sim.core.events import State
-from dva_sim.core.ground import Ground, Station
-from dva_sim.core.rules import Rules
-from dva_sim.core.send import Send
+from dva_sim.core.outbox import Send
+from dva_sim.core.travel_times import Ground, Station
 from dva_sim.protocol import messages as m
 
 

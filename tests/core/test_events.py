@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from office import DETECTOR, GUARD, HERE, OPERATOR, OTHER_DETECTOR, ROBOT, Office, east
 
+from dva_sim.core.assignments import Rules
 from dva_sim.core.events import KEPT_CLOSED, MOST_SOURCES, EventBook, State
-from dva_sim.core.rules import Rules
 from dva_sim.protocol import messages as m
 
 

@@ -21,13 +21,13 @@ from office import (
 )
 from walks import Walk, snapshot
 
-from dva_sim.core.access import Access, AccessRule
+from dva_sim.core.assignments import Rules
+from dva_sim.core.dva import Desk
 from dva_sim.core.events import State
-from dva_sim.core.memory import Memory
-from dva_sim.core.rules import Rules
-from dva_sim.core.send import Send
-from dva_sim.core.service import Desk
-from dva_sim.errors import ConfigError
+from dva_sim.core.outbox import Send
+from dva_sim.core.permissions import Access, AccessRule
+from dva_sim.core.store import Memory
+from dva_sim.kernel.errors import ConfigError
 from dva_sim.protocol import messages as m
 
 RULES = Rules(containment=True, escalate_after=60.0)
@@ -216,7 +216,7 @@ SAYS_WHAT_IT_KEPT = """
 import sys
 sys.path.insert(0, sys.argv[2])
 from office import Office
-from dva_sim.core.memory import Memory
+from dva_sim.core.store import Memory
 office, memory = Office(), Memory(sys.argv[1])
 while True:
     office.fire(20.0 * (office.desk.book.total + 1), source=sys.argv[3])
@@ -331,7 +331,7 @@ def test_a_memory_of_another_format_is_refused(file: Path, value: int) -> None:
 def test_a_file_that_another_holds_cannot_be_opened(
     file: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("dva_sim.core.memory.OPEN_WITHIN", 0.01)
+    monkeypatch.setattr("dva_sim.core.store.OPEN_WITHIN", 0.01)
     other = sqlite3.connect(file, isolation_level=None)
     other.execute("BEGIN EXCLUSIVE")
     assert refusal(file) == "cannot be used as the DVA's memory: database is locked"

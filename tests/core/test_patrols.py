@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from office import DVA, GUARD, OPERATOR, ROBOT, Office, crow, east
 
-from dva_sim.core.patrols import REST, Patrols
+from dva_sim.core.dispatcher import REST, Patrols
+from dva_sim.core.dva import Desk
+from dva_sim.core.outbox import Send
 from dva_sim.core.permissions import Permissions
-from dva_sim.core.send import Send
-from dva_sim.core.service import Desk
 from dva_sim.core.sessions import Sessions
 from dva_sim.protocol import messages as m
 

@@ -16,9 +16,9 @@ from office import (
     Office,
 )
 
-from dva_sim.core.access import Access, AccessRule
 from dva_sim.core.events import State
-from dva_sim.core.send import Send
+from dva_sim.core.outbox import Send
+from dva_sim.core.permissions import Access, AccessRule
 from dva_sim.protocol import messages as m
 
 ASK = m.PermissionRequest(ROBOT, "teleoperation")

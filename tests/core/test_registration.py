@@ -7,8 +7,8 @@ import math
 import pytest
 from office import ADDRESS, DETECTOR, DVA, GUARD, OPERATOR, ROBOT, Office
 
+from dva_sim.core.outbox import Send
 from dva_sim.core.registry import Registry
-from dva_sim.core.send import Send
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import MAX_BYTES, encode
 

@@ -9,8 +9,8 @@ import pytest
 from office import GUARD, OPERATOR, ROBOT, Office, east
 
 from dva_sim.core.dispatch import Advice, Coverage, MinEta, Policy, Relocation, Situation
-from dva_sim.core.ground import Ground, Station
-from dva_sim.core.send import Send
+from dva_sim.core.outbox import Send
+from dva_sim.core.travel_times import Ground, Station
 from dva_sim.protocol import messages as m
 
 THERE = m.Relocation(east(90))

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from office import GUARD, OPERATOR, OTHER_OPERATOR, OTHER_ROBOT, ROBOT, Office
 
+from dva_sim.core.assignments import Rules
 from dva_sim.core.events import State
-from dva_sim.core.rules import Rules
 from dva_sim.protocol import messages as m
 
 THIRD_ROBOT = "02:00:00:01:00:03"

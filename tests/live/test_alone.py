@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from dva_sim.cli import call
-from dva_sim.errors import RunsFailed
+from dva_sim.kernel.errors import RunsFailed
 from dva_sim.live import process
 from dva_sim.live.options import Options
 from dva_sim.live.process import NobodyThere, run_part

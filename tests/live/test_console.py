@@ -4,7 +4,7 @@ from io import StringIO
 
 from rich.console import Console
 
-from dva_sim.live.console import Board, InOrder
+from dva_sim.cli.live_output import Board, InOrder
 from dva_sim.live.process import Report
 
 

@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 from programs import Program, Programs
 
-from dva_sim.errors import ConfigError
-from dva_sim.live.keys import make_keys
+from dva_sim.cli.live_output import make_keys
+from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.keys import KeyRing
-from dva_sim.simulation.names import DVA, id_of
+from dva_sim.simulation.full.stage import DVA, id_of
 
 ROBOT, OPERATOR, DETECTOR = (id_of(kind, 1) for kind in ("robot", "operator", "detector"))
 

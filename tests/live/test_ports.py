@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from itertools import islice
 
-from dva_sim import scenario as scenarios
 from dva_sim.live.supervisor import _ports
+from dva_sim.simulation import scenario as scenarios
 
 
 def test_each_device_has_two_ports_in_a_row_and_no_two_share_one() -> None:

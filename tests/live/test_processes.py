@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from programs import Programs, wait_until
 
-from dva_sim.agents.trace import replay
+from dva_sim.agents.robot.decision_log import replay
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode
 

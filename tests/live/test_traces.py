@@ -12,13 +12,13 @@ from typing import Any
 import pytest
 from one_session import ROBOT, over_sockets, pipelined
 
-from dva_sim import scenario as scenarios
-from dva_sim.agents.modes import LEASE_S, Limits, RobotController
-from dva_sim.agents.trace import LEASE_ENDS, MISSION_ENDS, Trace, replay
-from dva_sim.errors import ConfigError
+from dva_sim.agents.robot.controller import LEASE_S, Limits, RobotController
+from dva_sim.agents.robot.decision_log import LEASE_ENDS, MISSION_ENDS, Trace, replay
+from dva_sim.kernel.errors import ConfigError
 from dva_sim.protocol import messages as m
-from dva_sim.simulation.names import DVA, id_of
-from dva_sim.simulation.run import Run
+from dva_sim.simulation import scenario as scenarios
+from dva_sim.simulation.full.run import Run
+from dva_sim.simulation.full.stage import DVA, id_of
 
 PHONE = id_of("operator", 1)
 LATER = {"events": [{"kind": "fire", "at_s": 500}], "horizon_s": 600}

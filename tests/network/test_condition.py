@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from dva_sim.errors import ConfigError
+from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.condition import CONDITION, EMULATOR_RESULTS, RESULTS, Condition
 
 REFERENCE = Path(__file__).parents[2].parent / "shared" / "targets" / "network.csv"

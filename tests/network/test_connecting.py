@@ -6,13 +6,13 @@ from typing import Any
 
 import pytest
 
-from dva_sim import scenario as scenarios
-from dva_sim.errors import ConfigError
-from dva_sim.network.connecting import Connector, Load, ZeromqConfig, is_calm
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.streams import Streams
+from dva_sim.network.connections import Connector, Load, ZeromqConfig, is_calm
 from dva_sim.network.link import ConstantRate, Link, LinkConfig
-from dva_sim.simulation import simulate
-from dva_sim.simulation.offered import load_of
-from dva_sim.streams import Streams
+from dva_sim.simulation import scenario as scenarios
+from dva_sim.simulation.full import simulate
+from dva_sim.simulation.full.run import load_of
 
 LOAD = Load(rate_bps=1e6, burst=20_000)
 

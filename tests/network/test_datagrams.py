@@ -6,13 +6,12 @@ from typing import Any
 
 import pytest
 
-from dva_sim.clock import Clock
-from dva_sim.network.connecting import Connector
-from dva_sim.network.datagrams import DatagramConnection
+from dva_sim.kernel.clock import Clock
+from dva_sim.kernel.streams import Streams
+from dva_sim.network.connections import Connector, DatagramConnection
 from dva_sim.network.link import Link, LinkConfig, make_serialiser
 from dva_sim.network.patterns import Request, Requester
 from dva_sim.network.virtual import VirtualNetwork
-from dva_sim.streams import Streams
 
 
 def links(seed: int = 1, **config: Any) -> tuple[Link, Link]:

@@ -11,7 +11,7 @@ import pytest
 import zmq
 import zmq.auth
 
-from dva_sim.errors import ConfigError
+from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.keys import KeyRing, create_keys
 
 ROBOT, GUARD = "02:00:00:01:00:01", "02:00:00:02:00:01"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from dva_sim.network.pipes import Pipe, ReceivePipe
+from dva_sim.network.zmtp import Pipe, ReceivePipe
 
 
 @pytest.mark.parametrize(("mark", "low"), [(1, 1), (2, 1), (3, 2), (10, 5), (1000, 500)])

@@ -7,11 +7,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from dva_sim.clock import Clock
+from dva_sim.kernel.clock import Clock
+from dva_sim.kernel.streams import Streams
 from dva_sim.network.link import Link, LinkConfig
 from dva_sim.network.radio import make_link
 from dva_sim.network.stream import Stream
-from dva_sim.streams import Streams
 
 
 class Quality(NamedTuple):

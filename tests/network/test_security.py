@@ -13,11 +13,10 @@ import pytest
 import zmq
 from patience import PATIENCE_S
 
-from dva_sim.errors import ConfigError
+from dva_sim.kernel.errors import ConfigError
 from dva_sim.network import security as module
 from dva_sim.network.keys import KeyRing, create_keys
-from dva_sim.network.refusals import Reason, Refusal
-from dva_sim.network.security import Security, user_of
+from dva_sim.network.security import Reason, Refusal, Security, user_of
 
 ROBOT, OPERATOR = "02:00:00:01:00:01", "02:00:00:03:00:01"
 NULL_GREETING = b"\xff" + bytes(8) + b"\x7f\x03\x00NULL" + bytes(48)

@@ -8,9 +8,9 @@ import pytest
 import zmq
 from patience import PATIENCE_S
 
-from dva_sim.errors import ConfigError
+from dva_sim.kernel.errors import ConfigError
 from dva_sim.live.options import Options
-from dva_sim.network.connecting import ZeromqConfig
+from dva_sim.network.connections import ZeromqConfig
 from dva_sim.network.realtime import LiveClock
 from dva_sim.network.sockets import SocketNetwork
 

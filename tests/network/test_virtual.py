@@ -7,13 +7,13 @@ from typing import Any, Literal
 
 import pytest
 
-from dva_sim.agents.inbox import Inbox, Letter
-from dva_sim.clock import Clock
-from dva_sim.network.connecting import Connector, ZeromqConfig
+from dva_sim.agents.robot.command_queue import Inbox, Letter
+from dva_sim.kernel.clock import Clock
+from dva_sim.kernel.streams import Streams
+from dva_sim.network.connections import Connector, ZeromqConfig
 from dva_sim.network.link import Link, LinkConfig, make_serialiser
 from dva_sim.network.patterns import Request, Requester
 from dva_sim.network.virtual import RECONNECT, VirtualNetwork
-from dva_sim.streams import Streams
 
 Depth = Literal["message", "segment"]
 DEPTHS = pytest.mark.parametrize("depth", ["message", "segment"])

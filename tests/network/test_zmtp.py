@@ -7,12 +7,11 @@ from typing import Any
 
 import pytest
 
-from dva_sim.clock import Clock
+from dva_sim.kernel.clock import Clock
+from dva_sim.kernel.streams import Streams
 from dva_sim.network.link import Link, LinkConfig, make_serialiser
-from dva_sim.network.pipes import ReceivePipe
 from dva_sim.network.tcp import TcpOptions
-from dva_sim.network.zmtp import BATCH, ZmtpConnection, ZmtpOptions, framed
-from dva_sim.streams import Streams
+from dva_sim.network.zmtp import BATCH, ReceivePipe, ZmtpConnection, ZmtpOptions, framed
 
 SMALL_BUFFER = TcpOptions(send_buffer=4096)
 

@@ -12,8 +12,15 @@ from message_strategies import BODIES, ROBOT, TABLET, message, with_header
 from searching import search
 
 from dva_sim.protocol import messages as m
-from dva_sim.protocol.canonical import MAX_SESSION, MAX_TICK, MAX_UINT32, read_canonical
-from dva_sim.protocol.codec import _read_validated, decode, encode
+from dva_sim.protocol.codec import (
+    MAX_SESSION,
+    MAX_TICK,
+    MAX_UINT32,
+    _read_validated,
+    decode,
+    encode,
+    read_canonical,
+)
 from dva_sim.protocol.errors import ProtocolError
 
 STATUS = m.RobotStatus("Teleoperation", m.Position(38.66, -9.2), 1.57, 0.5, -0.25, 86320)

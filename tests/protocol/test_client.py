@@ -8,14 +8,13 @@ from pathlib import Path
 import pytest
 from patience import PATIENCE_S
 
-from dva_sim import scenario as scenarios
+from dva_sim.kernel.recorder import Recorder
 from dva_sim.network.realtime import LiveClock
 from dva_sim.network.sockets import SocketNetwork
-from dva_sim.recorder import Recorder
-from dva_sim.simulation.control_room import add_dva
-from dva_sim.simulation.field import Field
-from dva_sim.simulation.names import id_of
-from dva_sim.simulation.stage import Stage
+from dva_sim.simulation import scenario as scenarios
+from dva_sim.simulation.full.control_room import add_dva
+from dva_sim.simulation.full.field import Field
+from dva_sim.simulation.full.stage import Stage, id_of
 
 SPECIFICATION = Path(__file__).parents[2] / "protocol" / "README.md"
 ROBOT = id_of("robot", 1)

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 from recordings.runs import drill, drive, evacuation
 
-from dva_sim.experiments.models import tables_of
 from dva_sim.recordings import write_recording
+from dva_sim.simulation.models import tables_of
 
 
 @pytest.fixture(scope="session")

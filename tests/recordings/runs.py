@@ -2,8 +2,8 @@
 
 from functools import cache
 
-from dva_sim import scenario as scenarios
-from dva_sim.simulation import Recording, simulate
+from dva_sim.simulation import scenario as scenarios
+from dva_sim.simulation.full import Recording, simulate
 
 
 @cache

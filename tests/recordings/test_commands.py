@@ -38,7 +38,7 @@ def test_pictures_come_from_the_file_alone(folder, tmp_path, capsys, monkeypatch
     def never(*_):
         raise AssertionError("simulated again")
 
-    monkeypatch.setattr("dva_sim.simulation.run.Run.__init__", never)
+    monkeypatch.setattr("dva_sim.simulation.full.run.Run.__init__", never)
     wanted = ["--still", "a.png", "--strip", "b.png", "--at", "20"]
     monkeypatch.chdir(tmp_path)
     out = said(capsys, "replay", folder / "drive.mcap", *wanted).out

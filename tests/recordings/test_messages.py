@@ -9,13 +9,12 @@ import jsonschema
 import pytest
 from recordings.runs import drill, drive, evacuation
 
+from dva_sim.kernel.recorder import TrackPoint
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode
-from dva_sim.recorder import TrackPoint
 from dva_sim.recordings import messages
-from dva_sim.recordings.bodies import sparse
-from dva_sim.recordings.messages import XML
-from dva_sim.recordings.schemas import SCHEMAS
+from dva_sim.recordings.channels import sparse
+from dva_sim.recordings.messages import SCHEMAS, XML
 from dva_sim.recordings.writing import every_message
 
 EVERYDAY = {

@@ -10,13 +10,13 @@ from PIL import Image
 from recordings.runs import drill, drive, evacuation, run_of
 
 from dva_sim import __version__
-from dva_sim import scenario as scenarios
-from dva_sim.errors import ConfigError, DvaSimError
-from dva_sim.experiments.models import tables_of
-from dva_sim.experiments.pictures.stills import still
+from dva_sim.kernel.errors import ConfigError, DvaSimError
 from dva_sim.recordings import read_recording, write_recording, writing
-from dva_sim.recordings.lapse import read_lapse
-from dva_sim.simulation import simulate
+from dva_sim.recordings.pictures.stills import still
+from dva_sim.recordings.reading import read_lapse
+from dva_sim.simulation import scenario as scenarios
+from dva_sim.simulation.full import simulate
+from dva_sim.simulation.models import tables_of
 
 RUNS = {"drive": drive, "drill": drill, "evacuation": evacuation}
 

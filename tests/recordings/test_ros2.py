@@ -7,7 +7,7 @@ from recordings.runs import drill, drive
 from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_typestore
 
-from dva_sim.errors import ConfigError
+from dva_sim.kernel.errors import ConfigError
 from dva_sim.recordings import read_recording
 from dva_sim.recordings.ros2 import write_bag
 

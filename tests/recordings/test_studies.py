@@ -9,17 +9,17 @@ from pathlib import Path
 
 import pytest
 
-from dva_sim.errors import ConfigError
-from dva_sim.experiments import design
-from dva_sim.experiments.recording import (
+from dva_sim.experiments.execution.kept_recordings import (
     chosen,
     name_of,
     place_of,
     record_study,
     refuse_what_cannot_be_recorded,
 )
-from dva_sim.experiments.runner import run_study
-from dva_sim.experiments.study import load_study
+from dva_sim.experiments.execution.runner import run_study
+from dva_sim.experiments.study import cell_grid
+from dva_sim.experiments.study.study import load_study
+from dva_sim.kernel.errors import ConfigError
 from dva_sim.recordings import read_recording
 
 STUDY = """\
@@ -60,7 +60,7 @@ def names(study, values):
     """Names of the files, where the runs came to some values, in the order of the design."""
     rows = {
         place_of(job): {study.answer.measure: value}
-        for job, value in zip(design.jobs(study), values, strict=True)
+        for job, value in zip(cell_grid.jobs(study), values, strict=True)
     }
     return [name_of(job) for job in chosen(study, rows)]
 
@@ -88,7 +88,7 @@ def test_where_more_is_better_the_smallest_is_the_worst(tmp_path):
 def test_all_are_all_that_were_run(tmp_path):
     study = study_in(tmp_path, "all")
     assert len(names(study, TIMES)) == 12
-    run = {place_of(job): {} for job in design.jobs(study)[:5]}
+    run = {place_of(job): {} for job in cell_grid.jobs(study)[:5]}
     assert [name_of(job) for job in chosen(study, run)][-1] == "drive-0-0-0.mcap"
 
 
@@ -153,14 +153,14 @@ def test_another_choice_needs_no_other_runs(kept, tmp_path):
 def test_a_run_that_is_not_what_the_study_has_is_not_kept(kept, monkeypatch):
     """As after a change of the program: the table says 3 s, the run would last 2 s."""
     study, out = kept
-    every = design.jobs(study)
+    every = cell_grid.jobs(study)
     shorter = [
         replace(job, scenario=job.scenario.model_copy(update={"horizon_s": 2.0})) for job in every
     ]
     before = recordings(out)
     path = out / "recordings" / next(iter(before))
     path.unlink()
-    monkeypatch.setattr(design, "jobs", lambda study: shorter)
+    monkeypatch.setattr(cell_grid, "jobs", lambda study: shorter)
     (problem,) = record_study(study, out, jobs=1)
     assert problem.startswith(f"DvaSimError: {path.name}: the run is not what the study has")
     assert not path.exists()

@@ -55,7 +55,13 @@ def bytes_of(folder: Path) -> dict[str, bytes]:
 
 
 HEAVY = {"matplotlib", "scipy", "numpy", "pymunk", "duckdb", "lxml", "shapely", "PIL", "pandas"}
-HEAVY |= {"rich", "distributed", "dask", "multiprocessing", "dva_sim.config"}  # of the models
+HEAVY |= {
+    "rich",
+    "distributed",
+    "dask",
+    "multiprocessing",
+    "dva_sim.kernel.config",
+}  # of the models
 
 
 @pytest.mark.parametrize(

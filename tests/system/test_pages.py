@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from dva_sim.agents.operator.strategies import load_strategy
-from dva_sim.checking.operators import try_operator
+from dva_sim.testing.operators import try_operator
 
 PAGES = Path(__file__).parents[2]
 

@@ -21,8 +21,8 @@ from typer.testing import CliRunner
 
 import dva_sim
 from dva_sim.cli import app
-from dva_sim.experiments import planning
-from dva_sim.experiments.runner import run_study
+from dva_sim.experiments.execution import dry_run
+from dva_sim.experiments.execution.runner import run_study
 
 HOME = Path(__file__).parents[2]
 PAGE = (HOME / "README.md").read_text(encoding="utf-8")
@@ -438,7 +438,7 @@ def test_one_sees_what_the_page_says(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "200")
-    monkeypatch.setattr(planning, "PROBE_S", 0.0)  # a few runs suffice to plan by
+    monkeypatch.setattr(dry_run, "PROBE_S", 0.0)  # a few runs suffice to plan by
     for folder in ("agents", "worlds"):
         Path(folder).symlink_to(HOME / folder)
     expected = EXPECTED[command]

@@ -7,15 +7,15 @@ import math
 import pymunk
 import pytest
 
-from dva_sim import scenario as scenarios
-from dva_sim.agents.robot import FRAME, MISSION, RobotAgent
-from dva_sim.agents.sensing import topic_of_sensor
+from dva_sim.agents.robot.robot import FRAME, MISSION, RobotAgent
+from dva_sim.agents.robot.sensors import topic_of_sensor
 from dva_sim.network.patterns import Request
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode, encode
-from dva_sim.simulation.names import DVA, id_of
-from dva_sim.simulation.run import Run
-from dva_sim.simulation.watch import broken_rules
+from dva_sim.simulation import scenario as scenarios
+from dva_sim.simulation.full.run import Run
+from dva_sim.simulation.full.safety_checks import broken_rules
+from dva_sim.simulation.full.stage import DVA, id_of
 from dva_sim.worlds.lidar import Lidar
 
 ROBOT = id_of("robot", 1)

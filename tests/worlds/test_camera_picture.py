@@ -7,12 +7,13 @@ import pytest
 import shapely
 from PIL import Image
 
-from dva_sim.worlds.camera_picture import Camera, Figure, Smoke, Spot, encode
+from dva_sim.worlds.camera import Camera, Figure, Smoke, Spot, encode
 from dva_sim.worlds.geo import GeoFrame, Pose
 from dva_sim.worlds.hazards import Raster
+from dva_sim.worlds.layout import Site
 from dva_sim.worlds.maps import rasterise
-from dva_sim.worlds.parts import Exit, Room
-from dva_sim.worlds.site import Site, load_site
+from dva_sim.worlds.site import load_site
+from dva_sim.worlds.site_parts import Exit, Room
 
 EAST = 0.0
 FOCAL = 160 / math.tan(math.radians(35))  # pixels: 320 across show 70 degrees

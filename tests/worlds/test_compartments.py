@@ -6,8 +6,8 @@ import pytest
 from dva_sim.worlds.compartments import of_floor, of_rooms
 from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.maps import FREE, OCCUPIED, OccupancyGrid, rasterise
-from dva_sim.worlds.parts import Room
 from dva_sim.worlds.site import load_site, map_site
+from dva_sim.worlds.site_parts import Room
 
 MAPS = Path(__file__).parents[1] / "data"
 

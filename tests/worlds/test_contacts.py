@@ -4,12 +4,11 @@ import math
 
 import pytest
 
-from dva_sim.agents.profile import load_robot
-from dva_sim.worlds.contacts import JAM_TIME, Contacts
+from dva_sim.agents.robot.profile import load_robot
+from dva_sim.worlds.bodies import JAM_TIME, Contacts
 from dva_sim.worlds.drives import DriveSpec
 from dva_sim.worlds.geo import Pose
-from dva_sim.worlds.hall import hall
-from dva_sim.worlds.physics import World
+from dva_sim.worlds.physics import World, hall
 
 DT = 0.04
 CAR = load_robot("pibot").drive_spec()

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from drawn_site import TWO_ROOMS, feature, square, write_site
 
-from dva_sim.errors import ConfigError
-from dva_sim.worlds.drawing import write_features
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.worlds.geojson import write_features
 from dva_sim.worlds.maps import FREE
-from dva_sim.worlds.parts import QUALITIES
 from dva_sim.worlds.planning import Planner
 from dva_sim.worlds.site import load_site
+from dva_sim.worlds.site_parts import QUALITIES
 
 WORLDS = Path(__file__).parents[2] / "worlds"
 

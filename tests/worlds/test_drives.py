@@ -4,8 +4,8 @@ import math
 import numpy as np
 import pytest
 
-from dva_sim.agents.profile import load_robot
-from dva_sim.errors import ConfigError
+from dva_sim.agents.robot.profile import load_robot
+from dva_sim.kernel.errors import ConfigError
 from dva_sim.worlds.drives import (
     Differential,
     DriveSpec,
@@ -15,8 +15,7 @@ from dva_sim.worlds.drives import (
     load_drive,
 )
 from dva_sim.worlds.geo import Pose
-from dva_sim.worlds.hall import hall
-from dva_sim.worlds.physics import World
+from dva_sim.worlds.physics import World, hall
 
 DT = 0.02
 CAR = DriveSpec(

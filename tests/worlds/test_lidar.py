@@ -8,9 +8,8 @@ from shapely.affinity import rotate, translate
 
 from dva_sim.worlds.drives import DriveSpec
 from dva_sim.worlds.geo import Pose
-from dva_sim.worlds.hall import hall
 from dva_sim.worlds.lidar import Lidar
-from dva_sim.worlds.physics import World
+from dva_sim.worlds.physics import World, hall
 from dva_sim.worlds.site import load_site
 
 BOX = ((0.21, 0.10), (-0.21, 0.10), (-0.21, -0.10), (0.21, -0.10))

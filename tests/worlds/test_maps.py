@@ -7,7 +7,7 @@ import shapely
 from data.make_maps import hall, racks, ragged
 from PIL import Image
 
-from dva_sim.errors import ConfigError
+from dva_sim.kernel.errors import ConfigError
 from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.maps import FREE, OCCUPIED, UNKNOWN, OccupancyGrid, load_ros_map, outline
 from dva_sim.worlds.site import map_site

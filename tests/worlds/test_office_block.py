@@ -8,11 +8,9 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from searching import search
 
-from dva_sim.errors import ConfigError
+from dva_sim.kernel.errors import ConfigError
 from dva_sim.worlds.maps import FREE
-from dva_sim.worlds.office_block import OfficeBlock, office_block
-from dva_sim.worlds.office_plan import lay_out
-from dva_sim.worlds.office_rooms import assign
+from dva_sim.worlds.office_block import OfficeBlock, assign, lay_out, office_block
 from dva_sim.worlds.planning import Planner
 from dva_sim.worlds.site import load_site
 

@@ -4,9 +4,10 @@ import math
 
 import pytest
 
-from dva_sim.errors import ConfigError
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.worlds.drives import DriveSpec
 from dva_sim.worlds.geo import Pose
-from dva_sim.worlds.physics import DriveSpec, World
+from dva_sim.worlds.physics import World
 from dva_sim.worlds.site import load_site
 
 DT = 0.04

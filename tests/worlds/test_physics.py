@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from elsewhere import told_here_and_elsewhere
 
-from dva_sim.errors import ConfigError
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.worlds.drives import DriveSpec
 from dva_sim.worlds.geo import Pose
-from dva_sim.worlds.physics import DriveSpec, World
+from dva_sim.worlds.physics import World
 from dva_sim.worlds.site import load_site
 
 SPEC = DriveSpec()
@@ -205,7 +206,7 @@ def test_a_robot_cannot_be_placed_in_a_wall_or_in_another_robot(world):
 
 DRIVE = """
 import math
-from dva_sim.agents.profile import load_robot
+from dva_sim.agents.robot.profile import load_robot
 from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.physics import DriveSpec, World
 from dva_sim.worlds.site import load_site

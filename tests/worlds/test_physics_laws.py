@@ -9,14 +9,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from searching import search
 
-from dva_sim.agents.profile import load_robot
-from dva_sim.errors import ConfigError
-from dva_sim.simulation.field import PHYSICS_TICK
-from dva_sim.simulation.machines import WET_GRIP
+from dva_sim.agents.robot.profile import load_robot
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.simulation.full.field import PHYSICS_TICK
+from dva_sim.simulation.full.robots import WET_GRIP
 from dva_sim.worlds.drives import LONGEST_TICK, DriveSpec
 from dva_sim.worlds.geo import Pose
-from dva_sim.worlds.hall import hall
-from dva_sim.worlds.physics import World
+from dva_sim.worlds.physics import World, hall
 
 DT, G, MASS = 0.02, 9.81, 60.0
 SPEC = DriveSpec()

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from dva_sim.worlds.geo import GeoFrame, Pose
+from dva_sim.worlds.layout import Site
+from dva_sim.worlds.line_of_sight import Sight
 from dva_sim.worlds.maps import UNKNOWN, OccupancyGrid, rasterise
 from dva_sim.worlds.planning import Disc, Planner
-from dva_sim.worlds.sight import Sight
-from dva_sim.worlds.site import Site, load_site, map_site
+from dva_sim.worlds.site import load_site, map_site
 
 MAPS = Path(__file__).parents[1] / "data"
 

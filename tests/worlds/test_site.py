@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from drawn_site import TWO_ROOMS, feature, square, write_site
 
-from dva_sim.errors import ConfigError
+from dva_sim.kernel.errors import ConfigError
 from dva_sim.worlds.planning import Planner
 from dva_sim.worlds.site import load_site
 

@@ -12,8 +12,7 @@ import pytest
 
 from dva_sim.worlds.drives import DriveSpec
 from dva_sim.worlds.geo import Pose
-from dva_sim.worlds.hall import hall
-from dva_sim.worlds.physics import SLOP, World
+from dva_sim.worlds.physics import SLOP, World, hall
 
 DT, SPEC = 0.04, DriveSpec()
 SITE = hall(9.0, 9.0, [(3.0, 0.0, 3.0, 6.0), (6.0, 9.0, 6.0, 3.0), (4.0, 4.0, 5.0, 4.5)])

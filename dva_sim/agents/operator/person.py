@@ -16,10 +16,10 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from dva_sim.config import Config
-from dva_sim.errors import ConfigError
-from dva_sim.guesses import unknown
-from dva_sim.streams import Streams
+from dva_sim.kernel.config import Config
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.streams import Streams
+from dva_sim.kernel.suggestions import unknown
 
 Positive = Annotated[float, Field(gt=0)]
 Spread = Annotated[float, Field(ge=0, le=1)]

@@ -11,8 +11,8 @@ from typing import Annotated, Final
 import numpy as np
 from pydantic import Field, model_validator
 
-from dva_sim import resources
-from dva_sim.config import Config, load_yaml, validate
+from dva_sim.kernel import resources
+from dva_sim.kernel.config import Config, load_yaml, validate
 
 GRAVITY: Final = 9.80665  # [m/s^2]
 TICK: Final = 2.0**-12  # of the clock that tells when a sample is taken [s]

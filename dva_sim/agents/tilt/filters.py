@@ -14,8 +14,8 @@ from numbers import Real
 from pathlib import Path
 from typing import Any, Final
 
-from dva_sim.errors import ConfigError
-from dva_sim.plugins import Plugins
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.plugins import Plugins
 
 Sample = tuple[float, float]  # speed level, turn [deg/s]
 BATCH: Final = 20  # slots of the dissertation's buffer

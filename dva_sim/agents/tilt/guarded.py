@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dva_sim.agents.tilt.filters import Filter, Sample, check_filter, is_age
 from dva_sim.agents.tilt.mappings import Mapping, Pair, limited
-from dva_sim.plugins import FAILURES, Guard, said
+from dva_sim.kernel.plugins import FAILURES, Guard, said
 
 STAND: Pair = (0.0, 0.0)
 

@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from dva_sim.agents.tilt.calibration import LEVELS, MAX_TURN_DEG
-from dva_sim.errors import ConfigError
-from dva_sim.plugins import Plugins
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.plugins import Plugins
 
 Pair = tuple[float, float]  # speed level, turn [deg/s]
 

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from dva_sim.agents.tilt.accelerometer import GRAVITY, NonNegative, Positive, Triple
-from dva_sim.config import Config
+from dva_sim.kernel.config import Config
 
 
 class PhoneProfile(Config):

@@ -8,14 +8,7 @@ import numpy as np
 
 from dva_sim.core.dispatch import options
 from dva_sim.core.dispatch.greedy import Free, serve, waiting
-from dva_sim.core.dispatch.situation import (
-    Advice,
-    Cover,
-    Floats,
-    Policy,
-    Relocation,
-    Situation,
-)
+from dva_sim.core.dispatch.situation import Advice, Cover, Floats, Policy, Relocation, Situation
 
 _UNREACHED = 3600.0  # what a zone counts that nobody covers [s]
 

@@ -14,7 +14,7 @@ from dva_sim.core.dispatch.oracle import Oracle
 from dva_sim.core.dispatch.situation import Policy
 from dva_sim.core.dispatch.team import HazardTeam
 from dva_sim.core.dispatch.urgency import Preemptive, PriorityEta
-from dva_sim.plugins import Plugins
+from dva_sim.kernel.plugins import Plugins
 
 POLICIES: dict[str, Callable[..., Policy]] = {
     "auction": Auction,

@@ -6,7 +6,7 @@ import math
 from collections.abc import Collection, Iterable
 from typing import Any
 
-from dva_sim.errors import ConfigError
+from dva_sim.kernel.errors import ConfigError
 
 
 def at_least(name: str, value: Any, bound: float) -> float:

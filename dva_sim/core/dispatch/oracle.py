@@ -9,7 +9,7 @@ import numpy as np
 
 from dva_sim.core.dispatch.greedy import Free, waiting
 from dva_sim.core.dispatch.situation import Advice, Assignment, Floats, Policy, Situation
-from dva_sim.errors import ConfigError
+from dva_sim.kernel.errors import ConfigError
 
 _AT_ONCE = 1e-6  # [s] times nearer than this are the same
 _INF = float("inf")

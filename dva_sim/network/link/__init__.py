@@ -1,12 +1,17 @@
 """One direction of a link: delay, jitter, loss, rate, queue, recorded weather, outages."""
 
 from dva_sim.network.link.config import Direction, LinkConfig, Way
-from dva_sim.network.link.link import Link, make_serialiser
-from dva_sim.network.link.outages import Gap, Outage, Partition
-from dva_sim.network.link.partitions import PartedLink, check_partitions, part_links
+from dva_sim.network.link.link import (
+    Link,
+    PartedLink,
+    check_partitions,
+    make_serialiser,
+    part_links,
+)
+from dva_sim.network.link.losses import Gap, Outage, Partition
 from dva_sim.network.link.rates import ConstantRate, PacketQueue, Serialiser, TraceRate
-from dva_sim.network.link.recordings import read_delay_log, read_trace
-from dva_sim.network.link.weather import Weather
+from dva_sim.network.link.recorded import read_delay_log, read_trace
+from dva_sim.network.link.time_noise import Weather
 
 __all__ = [
     "ConstantRate",

@@ -6,13 +6,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
-from dva_sim.config import Config
-from dva_sim.key_hints import AlsoCalled
+from dva_sim.kernel.config import AlsoCalled, Config
 from dva_sim.network.link.delays import Constant, DelayLaw
-from dva_sim.network.link.losses import Bursts
-from dva_sim.network.link.outages import Outage, Partition
-from dva_sim.network.link.recordings import read_delay_log
-from dva_sim.network.link.replay import moments_of
+from dva_sim.network.link.losses import Bursts, Outage, Partition
+from dva_sim.network.link.recorded import moments_of, read_delay_log
 
 Direction = Literal["up", "down"]
 Seconds = Annotated[float, Field(ge=0, le=30)]

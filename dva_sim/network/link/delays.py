@@ -14,10 +14,10 @@ from typing import Annotated, Any, Literal, Protocol
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from dva_sim.config import Config
-from dva_sim.network.link.recordings import read_delays
-from dva_sim.network.link.weather import Luck, SlowWeather, Weather, normal_quantile
-from dva_sim.streams import Streams
+from dva_sim.kernel.config import Config
+from dva_sim.kernel.streams import Streams
+from dva_sim.network.link.recorded import read_delays
+from dva_sim.network.link.time_noise import Luck, SlowWeather, Weather, normal_quantile
 
 Quantile = Callable[[float], float]
 Seconds = Annotated[float, Field(ge=0, le=30)]

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from dva_sim.errors import ConfigError
-from dva_sim.guesses import unknown
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.suggestions import unknown
 
 CONGESTION = ("cubic", "reno")
 

@@ -7,7 +7,7 @@ References:
 
 from __future__ import annotations
 
-from dva_sim.network.tcp.memory import PACKET_COST
+from dva_sim.network.tcp.send_buffer import PACKET_COST
 
 
 class Sent:

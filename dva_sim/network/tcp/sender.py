@@ -10,14 +10,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from math import inf
 
-from dva_sim.clock import Clock
-from dva_sim.network.tcp.alarm import PROBE, REORDER, WINDOW, Alarm
+from dva_sim.kernel.clock import Clock
 from dva_sim.network.tcp.congestion import HyStart, make_window
-from dva_sim.network.tcp.memory import SendBuffer
 from dva_sim.network.tcp.options import TcpOptions
 from dva_sim.network.tcp.recovery import OPEN, Recovery
-from dva_sim.network.tcp.round_trip import RoundTrip
+from dva_sim.network.tcp.retransmission_timer import PROBE, REORDER, WINDOW, Alarm, RoundTrip
 from dva_sim.network.tcp.scoreboard import Gain, Scoreboard, Sent
+from dva_sim.network.tcp.send_buffer import SendBuffer
 
 Emit = Callable[[int, int, float], object]
 Blocks = tuple[tuple[int, int], ...]

@@ -12,6 +12,6 @@ Of none of the four could the law be read, only abstracts and what others say of
 known, what is missing and what was left out stands with each, in `config` and `laws`.
 """
 
-from dva_sim.network.transports.contest import Contest, ContestConfig, Fates, play
+from dva_sim.network.transports.competition import Contest, ContestConfig, Fates, play
 
 __all__ = ["Contest", "ContestConfig", "Fates", "play"]

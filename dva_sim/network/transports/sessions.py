@@ -4,24 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from dva_sim.clock import Clock
+from dva_sim.kernel.clock import Clock
 from dva_sim.network.link import Link
 from dva_sim.network.tcp import TcpOptions
-from dva_sim.network.transports.bottleneck import Bottleneck
+from dva_sim.network.transports.bottleneck import Bottleneck, TcpTransport
 from dva_sim.network.transports.config import (
     Btp,
+    Ends,
     Irtp,
+    Message,
     Rtnp,
     Tcp,
+    Transport,
     TransportConfig,
     Trinomial,
     Zeromq,
 )
-from dva_sim.network.transports.datagrams import IP_UDP, Assembly, Part, Sender, parts_of
-from dva_sim.network.transports.feedback import Echo
-from dva_sim.network.transports.laws import Aimd, Law, LeastRoundTrip, ThreeTerms
-from dva_sim.network.transports.messages import Ends, Message, Transport
-from dva_sim.network.transports.streams import TcpTransport
+from dva_sim.network.transports.datagrams import IP_UDP, Assembly, Echo, Part, Sender, parts_of
+from dva_sim.network.transports.rate_control import Aimd, Law, LeastRoundTrip, ThreeTerms
 from dva_sim.network.zmtp import ZmtpConnection, ZmtpOptions, framed
 
 NAME = "teleoperation"

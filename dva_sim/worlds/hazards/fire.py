@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from dva_sim.worlds.hazards.base import Point
+from dva_sim.worlds.hazards.field import Point
 
 FULL_GROWTH_KW = 1055.0  # heat release that defines the growth classes [kW]
 GROWTH_S = {"slow": 600.0, "medium": 300.0, "fast": 150.0, "ultrafast": 75.0}

@@ -1,11 +1,39 @@
-"""Floods: how much water comes, and how deep it would stand in a room."""
+"""Floods: how much water comes, and how deep it would stand in a room.
+
+Water in the rooms of a building: they fill, and doors let it through like weirs.
+
+Each space has one level. What flows through a door follows a broad-crested weir, held back by
+the water on the other side (Villemonte); outdoors it is gone. No water is lost on the way.
+
+Left out: waves, slopes, drains, water under shut doors.
+
+References:
+    V. T. Chow, Open-Channel Hydraulics, New York 1959: broad-crested weirs.
+    J. R. Villemonte, Engineering News-Record 139 (1947) 866: submerged weirs.
+
+What a flood does to a site: water on its floors.
+"""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
-from dva_sim.worlds.hazards.base import LARGEST, Point
+import numpy as np
+from numpy.typing import NDArray
+
+from dva_sim.worlds.hazards.building import NOWHERE, Building, Spaces
+from dva_sim.worlds.hazards.field import (
+    CLEAR,
+    LARGEST,
+    PACES,
+    Conditions,
+    Course,
+    March,
+    Places,
+    Point,
+)
 
 INFLOW = 2e-3  # a burst pipe [m^3/s]; assumed
 FILM = 5e-3  # depth of water that spreads on a level floor [m]; about twice the capillary length
@@ -56,3 +84,124 @@ class Flood:
     def severity(self, time: float) -> float:
         """See `Hazard`: the water that has come."""
         return min(1.0, self.volume(time) / FULL_VOLUME)
+
+
+Floats = NDArray[np.float64]
+
+EASY = 0.25  # share of the way to the same level that one step may cover
+
+
+class Filling:
+    """Water that comes in one space of a building.
+
+    Args:
+        spaces: The building.
+        room: Index of the space that it comes in.
+        inflow: [m^3/s]
+        sill: Height of the thresholds [m].
+    """
+
+    def __init__(self, spaces: Spaces, room: int, inflow: float, sill: float = SILL) -> None:
+        self._spaces, self._room, self._inflow = spaces, room, inflow
+        self._sill = np.where(spaces.top < spaces.ceiling[spaces.a], sill, 0.0)
+        areas = np.r_[spaces.area, np.inf]
+        a, b = areas[spaces.a], areas[spaces.b]
+        self._levels = 1.0 / (1.0 / a + 1.0 / b)  # volume per difference of levels [m^2]
+
+    def dry(self) -> Floats:
+        """The water in each space and, last, what has run out [m^3]."""
+        return np.zeros(self._spaces.count + 1)
+
+    def step(self, state: Floats, age: float, dt: float) -> Floats:
+        """The state `dt` [s] later."""
+        new = self.step_without_inflow(state, age, dt)
+        new[self._room] += self._inflow * dt
+        return new
+
+    def step_without_inflow(self, state: Floats, age: float, dt: float) -> Floats:
+        """The same once the water is shut off."""
+        spaces = self._spaces
+        depth = np.append(state[:-1] / spaces.area, 0.0)
+        a, b = depth[spaces.a], depth[spaces.b]
+        flow = np.sign(a - b) * over_weir(
+            np.maximum(a, b) - self._sill, np.minimum(a, b) - self._sill, spaces.width
+        )
+        most = EASY * self._levels * np.abs(a - b) / dt
+        moved = np.clip(flow, -most, most) * dt
+        return np.asarray(
+            state
+            - np.bincount(spaces.a, moved, len(state))
+            + np.bincount(spaces.b, moved, len(state))
+        )
+
+
+def over_weir(above: Floats, below: Floats, width: Floats) -> Floats:
+    """Water that flows over a broad crest [m^3/s].
+
+    Args:
+        above: Water over the crest on the higher side [m]; none where negative.
+        below: On the lower side [m].
+        width: Of the crest [m].
+    """
+    head = np.maximum(above, 0.0)
+    drowned = np.clip(below / np.maximum(head, 1e-12), 0.0, 1.0)
+    return np.asarray(WEIR * width * head**1.5 * (1.0 - drowned**1.5) ** 0.385)
+
+
+@lru_cache(maxsize=64)
+def _water(building: Building, inflow: float, room: int) -> tuple[Filling, March]:
+    filling = Filling(building.spaces, room, inflow)
+    return filling, March(filling.dry(), filling.step)
+
+
+class FloodField:
+    """Water on the floors: one level in each space; where it comes, first a spreading film.
+
+    Args:
+        building: Where.
+        flood: What flows.
+    """
+
+    def __init__(self, building: Building, flood: Flood) -> None:
+        self.until = math.inf
+        self._building, self._flood = building, flood
+        self._room = building.space_at(*flood.position)
+        self._course: Course | None = None
+
+    def at(self, x: float, y: float, time: float) -> Conditions:
+        """See `HazardField`."""
+        space = self._building.space_at(x, y)
+        if space == NOWHERE or self._room == NOWHERE or time <= self._flood.start:
+            return CLEAR
+        before, after, weight = self._states(time)
+        volume = float(before[space]) * (1.0 - weight) + float(after[space]) * weight
+        level = volume / float(self._building.spaces.area[space])
+        if space == self._room and level < FILM:
+            wet = math.dist((x, y), self._flood.position) < math.sqrt(volume / (math.pi * FILM))
+            level = FILM if wet else 0.0
+        return Conditions(water=level)
+
+    def picture(self, what: str, places: Places, time: float) -> Floats | None:
+        """See `HazardField`."""
+        if what != "water":
+            return None
+        if self._room == NOWHERE or time <= self._flood.start:
+            return np.zeros(places.spaces.shape)
+        before, after, weight = self._states(time)
+        state = before + weight * (after - before)
+        level = np.append(state[:-1] / self._building.spaces.area, 0.0)
+        depth = level[places.spaces]
+        if level[self._room] < FILM:
+            here = places.spaces == self._room
+            x, y = self._flood.position
+            away = np.hypot(places.points[..., 0] - x, places.points[..., 1] - y)
+            wet = away < math.sqrt(state[self._room] / (math.pi * FILM))
+            depth = np.where(here, np.where(wet, FILM, 0.0), depth)
+        return np.asarray(depth)
+
+    def _states(self, time: float) -> tuple[Floats, Floats, float]:
+        flood = self._flood
+        if self._course is None:
+            filling, march = _water(self._building, flood.inflow, self._room)
+            self._course = Course(march, filling.step_without_inflow, PACES)
+        return self._course.around(time - flood.start, max(0.0, self.until - flood.start))

@@ -10,16 +10,23 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.worlds.hazards.base import AMBIENT, CLEAR, Conditions, Hazard, Point
 from dva_sim.worlds.hazards.building import building_of
-from dva_sim.worlds.hazards.course import HazardField, Places
-from dva_sim.worlds.hazards.dispersion import mesh_in
-from dva_sim.worlds.hazards.fields import field_of
+from dva_sim.worlds.hazards.field import (
+    AMBIENT,
+    CLEAR,
+    Conditions,
+    Hazard,
+    HazardField,
+    Places,
+    Point,
+)
 from dva_sim.worlds.hazards.fire_field import FireField
 from dva_sim.worlds.hazards.flood import Flood
-from dva_sim.worlds.hazards.leak_field import LeakField
+from dva_sim.worlds.hazards.gas_dispersion import mesh_in
+from dva_sim.worlds.hazards.gas_leak_field import LeakField
+from dva_sim.worlds.hazards.registry import field_of
 from dva_sim.worlds.layout import Site
-from dva_sim.worlds.sight import Sight
+from dva_sim.worlds.line_of_sight import Sight
 
 UNITS = {"smoke": "1/m", "layer": "1/m", "gas": "1", "water": "m", "heat": "kW/m2"}
 RAY = 0.25  # between the points of a line of sight [m]

@@ -8,8 +8,8 @@ from itertools import pairwise
 import pytest
 
 from dva_sim.agents.operator.attention import GLANCE, Attention, next_screen
-from dva_sim.clock import Clock
-from dva_sim.recorder import DriveLog
+from dva_sim.kernel.clock import Clock
+from dva_sim.kernel.recorder import DriveLog
 
 
 @dataclass

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dva_sim.agents.operator.delay import DelayEstimate
+from dva_sim.agents.operator.delay_estimation import DelayEstimate
 
 
 def learn(

@@ -15,7 +15,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from dva_sim.agents.operator.evidence import Evidence, clearness, worth
+from dva_sim.agents.operator.inspection import Evidence, clearness, worth
 
 SENSITIVITY, LOOK = 4.5, 1.5  # of the person in the middle of the population
 

@@ -8,7 +8,7 @@ import pytest
 from pretended_dva import ROBOT, PretendedDva
 
 from dva_sim.agents.operator.drive import ATTEMPTS
-from dva_sim.agents.operator.work import BLIND_AFTER
+from dva_sim.agents.operator.supervision import BLIND_AFTER
 
 EAST = (30.0, 12.0)  # the end of the main corridor [m]
 ASKED = ("req-rep", "pipelined")

@@ -8,8 +8,6 @@ from pathlib import Path
 import pytest
 from closed_loops import CURSOR, ROBOT, drive, person, way
 
-from dva_sim import scenario as scenarios
-from dva_sim.agents.camera import Observation
 from dva_sim.agents.operator.strategies import (
     Guarded,
     Oracle,
@@ -22,9 +20,10 @@ from dva_sim.agents.operator.strategies import (
     known_strategies,
     load_strategy,
 )
-from dva_sim.errors import ConfigError
-from dva_sim.experiments import metrics
-from dva_sim.simulation import simulate
+from dva_sim.agents.robot.camera import Observation
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.simulation import scenario as scenarios
+from dva_sim.simulation.full import measures, simulate
 
 HEAD = "from dva_sim.agents.operator.strategies import Intent, Strategy\n\n"
 
@@ -184,6 +183,6 @@ def test_a_run_tells_how_often_its_operator_waited_and_how_long_it_steered_so(
     """At a link delay of a second each way, adaptive persons come to move and wait."""
     changes = {"operator.strategy": strategy, "link.delay_s": 1.0}
     run = simulate(scenarios.build(scenarios.load("drive-to-event"), changes), 1)
-    row = metrics.run_row(run)
+    row = measures.run_row(run)
     assert least <= row["move_waits"] <= most
     assert row["move_and_wait_share"] == pytest.approx(share, abs=0.1)

@@ -9,9 +9,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dva_sim.agents.camera import CLEAR, Observation, SeenHazard
-from dva_sim.agents.operator.looking import Looking
+from dva_sim.agents.operator.inspection import Looking
 from dva_sim.agents.operator.person import Population, median_person
+from dva_sim.agents.robot.camera import CLEAR, Observation, SeenHazard
 from dva_sim.worlds.planning import Planner
 
 PLACE = (10.0, 5.0)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dva_sim.agents.operator.person import Population, Trait, draw_person, median_person
-from dva_sim.errors import ConfigError
+from dva_sim.kernel.errors import ConfigError
 
 
 def test_a_person_is_always_the_same_one_and_another_one_differs_in_every_trait() -> None:

@@ -23,7 +23,7 @@ from dva_sim.agents.operator.strategies import (
     TwoPoint,
     View,
 )
-from dva_sim.agents.steering import Route
+from dva_sim.agents.route_following import Route
 
 FREE = 1e9  # a margin that holds nobody back
 LIMITLESS = Reach(speed=1e6, turn_rate=1e6)

@@ -10,9 +10,9 @@ import pytest
 
 from dva_sim.agents.tilt import Accelerometer, AccelerometerPart, load_part
 from dva_sim.agents.tilt.accelerometer import GRAVITY
-from dva_sim.config import validate
-from dva_sim.errors import ConfigError
-from dva_sim.resources import available
+from dva_sim.kernel.config import validate
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.resources import available
 
 MG = GRAVITY / 1000
 

@@ -16,7 +16,7 @@ from dva_sim.agents.tilt.filters import (
     load_filter,
 )
 from dva_sim.agents.tilt.guarded import GuardedFilter
-from dva_sim.errors import ConfigError
+from dva_sim.kernel.errors import ConfigError
 
 PERIOD = 1 / 34
 SAMPLES_IN_200_MS = 7  # at 34 Hz

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from dva_sim.agents.tilt.mappings import Mapping, known_mappings, load_mapping
-from dva_sim.errors import ConfigError
+from dva_sim.kernel.errors import ConfigError
 
 DT = 1 / 34
 

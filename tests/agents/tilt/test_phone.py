@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from dva_sim.agents.tilt import Phone, PhoneProfile, TiltCommand
-from dva_sim.config import validate
-from dva_sim.errors import ConfigError
+from dva_sim.kernel.config import validate
+from dva_sim.kernel.errors import ConfigError
 
 QUIET: dict[str, Any] = {
     "accelerometer": "perfect",

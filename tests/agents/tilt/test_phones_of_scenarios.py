@@ -7,11 +7,10 @@ from typing import Any
 
 import pytest
 
-from dva_sim import scenario as scenarios
-from dva_sim.config import load_yaml
-from dva_sim.errors import ConfigError
-from dva_sim.experiments import metrics
-from dva_sim.simulation import simulate
+from dva_sim.kernel.config import load_yaml
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.simulation import scenario as scenarios
+from dva_sim.simulation.full import measures, simulate
 
 FILTER = """
 from dva_sim.agents.tilt import Filter
@@ -118,9 +117,9 @@ def test_a_stage_that_fails_is_told_at_once_and_counted_in_the_row_of_its_run(
     begun = run.recorder.drives[0].started
     assert begun is not None
     assert begun <= told[0].time < begun + 3.0
-    assert metrics.run_row(run)["plugin_failures"] > 100
+    assert measures.run_row(run)["plugin_failures"] > 100
 
 
 def test_in_a_run_of_shipped_parts_no_plugin_fails() -> None:
     run = simulate(scenarios.build(scenarios.load("drive-to-event"), {"horizon_s": 60}), 1)
-    assert metrics.run_row(run)["plugin_failures"] == 0
+    assert measures.run_row(run)["plugin_failures"] == 0

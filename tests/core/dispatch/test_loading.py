@@ -5,9 +5,9 @@ from importlib.metadata import EntryPoint, EntryPoints
 import pytest
 from small_situations import RNG, situation
 
-from dva_sim import plugins
 from dva_sim.core.dispatch import POLICIES, MinEta, Policy, known_policies, load_policy
-from dva_sim.errors import ConfigError
+from dva_sim.kernel import plugins
+from dva_sim.kernel.errors import ConfigError
 
 MINE = """
 from dataclasses import dataclass

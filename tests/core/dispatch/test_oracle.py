@@ -10,7 +10,7 @@ from searching import search
 from small_situations import INF, look, pairs, situation
 
 from dva_sim.core.dispatch import Instance, MinEta, Oracle, Policy, solve
-from dva_sim.errors import ConfigError
+from dva_sim.kernel.errors import ConfigError
 
 
 def instance(release, arrival, busy):

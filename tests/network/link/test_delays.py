@@ -10,11 +10,11 @@ import pytest
 from numpy.typing import NDArray
 from scipy import stats
 
-from dva_sim.config import validate
-from dva_sim.errors import ConfigError
+from dva_sim.kernel.config import validate
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.streams import Streams
 from dva_sim.network.link import Link, LinkConfig
 from dva_sim.network.radio import make_link
-from dva_sim.streams import Streams
 
 N = 20_000
 FAST = 1e12  # [bit/s]: a packet's own length costs no time

@@ -8,10 +8,10 @@ from typing import Any
 
 import pytest
 
-from dva_sim import scenario as scenarios
-from dva_sim.config import load_yaml
-from dva_sim.errors import ConfigError
-from dva_sim.simulation import Recording, rehearse, simulate
+from dva_sim.kernel.config import load_yaml
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.simulation import scenario as scenarios
+from dva_sim.simulation.full import Recording, rehearse, simulate
 
 
 def run(**link: Any) -> Recording:

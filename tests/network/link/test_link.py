@@ -7,16 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dva_sim.errors import ConfigError
-from dva_sim.network.link import (
-    ConstantRate,
-    Link,
-    LinkConfig,
-    TraceRate,
-    read_trace,
-)
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.streams import Streams
+from dva_sim.network.link import ConstantRate, Link, LinkConfig, TraceRate, read_trace
 from dva_sim.network.radio import make_link
-from dva_sim.streams import Streams
 
 
 def link(**config: float) -> Link:

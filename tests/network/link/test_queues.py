@@ -6,11 +6,11 @@ from typing import Any
 
 import pytest
 
-from dva_sim.config import validate
-from dva_sim.errors import ConfigError
+from dva_sim.kernel.config import validate
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.streams import Streams
 from dva_sim.network.link import Link, LinkConfig
 from dva_sim.network.radio import make_link
-from dva_sim.streams import Streams
 
 
 def link(direction: Any = "up", **config: Any) -> Link:

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dva_sim.errors import ConfigError
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.streams import Streams
 from dva_sim.network.link import Link, LinkConfig, read_delay_log, read_trace
 from dva_sim.network.radio import make_link
-from dva_sim.streams import Streams
 
 TRACES = Path(__file__).parents[3] / "experiments" / "traces"
 PING = """\

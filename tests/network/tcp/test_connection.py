@@ -3,8 +3,8 @@
 import pytest
 from scripted_tcp import EXACT, Pair, ScriptedLink, options
 
-from dva_sim.clock import Clock
-from dva_sim.errors import ConfigError
+from dva_sim.kernel.clock import Clock
+from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.tcp import TcpConnection, TcpOptions
 
 

@@ -3,7 +3,7 @@
 import pytest
 from scripted_tcp import Pair, keep_writing, options
 
-from dva_sim.clock import Clock
+from dva_sim.kernel.clock import Clock
 from dva_sim.network.tcp.sender import Sender
 
 

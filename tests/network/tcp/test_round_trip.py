@@ -1,7 +1,7 @@
 import pytest
 
 from dva_sim.network.tcp.options import TcpOptions
-from dva_sim.network.tcp.round_trip import RoundTrip
+from dva_sim.network.tcp.retransmission_timer import RoundTrip
 
 
 def after(*samples, tick=0.0, **changes):

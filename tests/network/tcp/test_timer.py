@@ -1,7 +1,7 @@
 import pytest
 
-from dva_sim.clock import Clock
-from dva_sim.network.tcp.timer import Timer, next_on_grid
+from dva_sim.kernel.clock import Clock
+from dva_sim.network.tcp.retransmission_timer import Timer, next_on_grid
 
 
 def rung(*deadlines, tick=0.0):

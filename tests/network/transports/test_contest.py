@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dva_sim.config import validate
+from dva_sim.kernel.config import validate
 from dva_sim.network.transports import Contest, ContestConfig, play
 
 KINDS: dict[str, dict[str, Any]] = {

@@ -6,8 +6,7 @@ import math
 
 import pytest
 
-from dva_sim.network.transports.feedback import Echoes, Feedback, RoundTrips
-from dva_sim.network.transports.pacing import Pace
+from dva_sim.network.transports.datagrams import Echoes, Feedback, Pace, RoundTrips
 
 
 def test_the_first_sample_of_200_ms_gives_a_time_out_of_a_second_the_least_there_is():

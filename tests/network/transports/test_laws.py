@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from dva_sim.network.transports.laws import Aimd, LeastRoundTrip, ThreeTerms
+from dva_sim.network.transports.rate_control import Aimd, LeastRoundTrip, ThreeTerms
 
 R = 0.1  # round trip [s]
 

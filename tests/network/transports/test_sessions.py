@@ -6,12 +6,11 @@ from typing import Any
 
 import pytest
 
-from dva_sim.clock import Clock
+from dva_sim.kernel.clock import Clock
+from dva_sim.kernel.streams import Streams
 from dva_sim.network.transports.bottleneck import Bottleneck, BottleneckConfig
-from dva_sim.network.transports.config import Btp, Irtp, Rtnp, Trinomial, Udp
-from dva_sim.network.transports.messages import Message
+from dva_sim.network.transports.config import Btp, Irtp, Message, Rtnp, Trinomial, Udp
 from dva_sim.network.transports.sessions import ends_at, open_session
-from dva_sim.streams import Streams
 
 TRINOMIAL = Trinomial(kind="trinomial", header_bytes=12, linear=0.2, square=0.0, decrease=0.125)
 IRTP = Irtp(kind="irtp", header_bytes=12, increase=1.0, decrease=0.5)

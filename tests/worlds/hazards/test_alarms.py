@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from dva_sim.worlds.hazards import Fire, detection_time, first_detection, make_hazard
-from dva_sim.worlds.hazards.alarms import (
+from dva_sim.worlds.hazards.detectors import (
     CoAlarm,
     heat_in_jet,
     jet_lag,
@@ -19,7 +19,8 @@ from dva_sim.worlds.hazards.alarms import (
     jet_warmth,
     smoke_in_jet,
 )
-from dva_sim.worlds.site import Detector, load_site
+from dva_sim.worlds.site import load_site
+from dva_sim.worlds.site_parts import Detector
 
 TARGETS = Path(__file__).parents[4] / "shared" / "targets" / "operator.json"
 BANDS = {30.0: (120.0, math.inf), 50.0: (60.0, 90.0), 100.0: (10.0, 40.0), 300.0: (0.0, 3.0)}

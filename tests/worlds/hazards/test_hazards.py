@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from dva_sim.errors import ConfigError
+from dva_sim.kernel.errors import ConfigError
 from dva_sim.worlds.hazards import GROWTH_S, KINDS, Fire, Flood, make_hazard
 
 HOURS = range(0, 7200, 10)  # two hours [s]

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dva_sim.worlds.hazards.plumes import CLASSES, plume, puff, sigma_y, sigma_z
+from dva_sim.worlds.hazards.gas_dispersion import CLASSES, plume, puff, sigma_y, sigma_z
 
 TARGETS = Path(__file__).parents[4] / "shared" / "targets" / "operator.json"
 AT_1_KM = {"A": 213.0, "B": 156.0, "C": 104.0, "D": 68.0, "E": 50.5, "F": 34.0}  # Martin [m]

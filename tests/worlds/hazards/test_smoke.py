@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from dva_sim.worlds.hazards import smoke as model
+from dva_sim.worlds.hazards import fire_field as model
 from dva_sim.worlds.hazards.building import Spaces
+from dva_sim.worlds.hazards.field import March
 from dva_sim.worlds.hazards.fire import CO_YIELD, SOOT_YIELD, Fire
-from dva_sim.worlds.hazards.march import March
-from dva_sim.worlds.hazards.smoke import CO, KELVIN, SOOT, Smoke, plume, volumes
+from dva_sim.worlds.hazards.fire_field import CO, KELVIN, SOOT, Smoke, plume, volumes
 
 
 class Steady(Fire):

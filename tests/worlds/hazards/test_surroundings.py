@@ -7,11 +7,12 @@ import math
 import numpy as np
 import pytest
 
-from dva_sim.worlds.hazards import CLEAR, Hazard, Surroundings, leak_field, make_hazard
+from dva_sim.worlds.hazards import CLEAR, Hazard, Surroundings, gas_leak_field, make_hazard
 from dva_sim.worlds.hazards.building import building_of
-from dva_sim.worlds.hazards.leak import GasLeak
-from dva_sim.worlds.hazards.leak_field import LeakField
-from dva_sim.worlds.site import Site, load_site
+from dva_sim.worlds.hazards.gas_leak import GasLeak
+from dva_sim.worlds.hazards.gas_leak_field import LeakField
+from dva_sim.worlds.layout import Site
+from dva_sim.worlds.site import load_site
 
 LAB = (19.0, 22.5)  # in the chemistry lab; its door opens on the north corridor
 BESIDE, CORRIDOR, OFFICE = (21.5, 22.5), (13.1, 22.0), (19.0, 15.6)
@@ -183,7 +184,7 @@ def test_a_large_house_gives_a_detector_the_same_gas_from_the_leak_as_to_the_lea
     assert isinstance(leak, GasLeak)
     field = LeakField(building_of(site), leak)
     small = field.seen_from(*CORRIDOR)
-    monkeypatch.setattr(leak_field, "LARGE_MESH", 0)
+    monkeypatch.setattr(gas_leak_field, "LARGE_MESH", 0)
     large = field.seen_from(*CORRIDOR)
     for age in (60.0, 300.0, 1500.0):
         assert large(age) == pytest.approx(small(age), rel=1e-9)

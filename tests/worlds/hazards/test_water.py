@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from dva_sim.worlds.hazards.building import Spaces
-from dva_sim.worlds.hazards.filling import Filling, over_weir
-from dva_sim.worlds.hazards.march import March
+from dva_sim.worlds.hazards.field import March
+from dva_sim.worlds.hazards.flood import Filling, over_weir
 
 
 def rooms(areas: list[float], doors: list[tuple[int, int, float]]) -> Spaces:

@@ -2,6 +2,7 @@
 
 from dva_sim.agents.operator.strategies.adaptive import Adaptive
 from dva_sim.agents.operator.strategies.base import (
+    Guarded,
     Intent,
     PathView,
     PointView,
@@ -10,7 +11,6 @@ from dva_sim.agents.operator.strategies.base import (
     View,
 )
 from dva_sim.agents.operator.strategies.cursor import SHORTEST, Sighting, Velocity, gain_at
-from dva_sim.agents.operator.strategies.guarded import Guarded
 from dva_sim.agents.operator.strategies.loading import (
     Driver,
     known_strategies,
@@ -18,8 +18,7 @@ from dva_sim.agents.operator.strategies.loading import (
     try_strategy,
 )
 from dva_sim.agents.operator.strategies.move_and_wait import MoveAndWait
-from dva_sim.agents.operator.strategies.oracle import Oracle, Truth
-from dva_sim.agents.operator.strategies.predictor import Predictor
+from dva_sim.agents.operator.strategies.predictor import Oracle, Predictor, Truth
 from dva_sim.agents.operator.strategies.pursuit import Pursuit
 from dva_sim.agents.operator.strategies.two_point import TwoPoint
 

@@ -20,10 +20,9 @@ from dva_sim.agents.operator.strategies.base import (
     View,
 )
 from dva_sim.agents.operator.strategies.cursor import SHORTEST, Velocity, fastest, gain_at
-from dva_sim.agents.operator.strategies.move_and_wait import MoveAndWait
-from dva_sim.agents.operator.strategies.moves import SHORT
+from dva_sim.agents.operator.strategies.move_and_wait import SHORT, MoveAndWait
 from dva_sim.agents.operator.strategies.pursuit import FARTHEST_LOOK
-from dva_sim.agents.steering import Route
+from dva_sim.agents.route_following import Route
 
 BETTER = 0.8  # one changes to what takes less than this share of the time; assumed
 GAP = 1.0  # a longer time between two frames is not counted as driving [s]

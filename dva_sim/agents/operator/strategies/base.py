@@ -3,6 +3,8 @@
 A strategy is how a kind of person turns what it sees into what it wants. It sees frames that are
 late by perception and judged with an error, and what the person takes the delay to be; there is no
 way from any of these to the true state.
+
+A strategy of a user, kept within what can be done whatever it answers.
 """
 
 from __future__ import annotations
@@ -11,10 +13,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from dva_sim.agents.camera import Observation
 from dva_sim.agents.operator.person import Person
-from dva_sim.agents.operator.strategies.cursor import Sighting, Velocity, through, towards
-from dva_sim.agents.steering import Route
+from dva_sim.agents.operator.strategies.cursor import Sighting, Velocity, slowed, through, towards
+from dva_sim.agents.robot.camera import Observation
+from dva_sim.agents.route_following import Route
+from dva_sim.kernel.plugins import FAILURES, Guard, said
 
 
 class View(NamedTuple):
@@ -131,3 +134,39 @@ class Strategy:
     def _most(self) -> float:
         """As fast as the person cares to go [m/s]."""
         return self.person.pace * self.reach.speed
+
+
+class Guarded(Guard, Strategy):
+    """A strategy of a user: what raises or answers no two finite numbers is counted, and stands.
+
+    Attributes:
+        strategy: The user's own.
+    """
+
+    def __init__(self, strategy: Strategy) -> None:
+        super().__init__(strategy.person, strategy.reach)
+        self.strategy = strategy
+
+    def drive(self, route: Route, view: View, stop_before: float) -> Intent:
+        """Within the limits of the robot; it stands where there is no answer."""
+        speed, turn = self._answer(self.strategy.drive, route, view, stop_before) or (0.0, 0.0)
+        most = self.reach.turn_rate
+        return Intent(min(max(speed, 0.0), self.reach.speed), min(max(turn, -most), most))
+
+    def point(self, view: PointView) -> Velocity:
+        """No faster than the cursor can."""
+        got = self._answer(self.strategy.point, view) or (0.0, 0.0)
+        return slowed(*got, self.reach.speed)
+
+    def follow(self, view: PathView) -> Velocity:
+        """No faster than the cursor can."""
+        got = self._answer(self.strategy.follow, view) or (0.0, 0.0)
+        return slowed(*got, self.reach.speed)
+
+    def workload(self) -> Mapping[str, float]:
+        """What the user's counts, if it can tell."""
+        try:
+            return {str(name): float(value) for name, value in self.strategy.workload().items()}
+        except FAILURES as error:
+            self._count(said(error))
+            return {}

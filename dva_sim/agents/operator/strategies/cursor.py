@@ -14,7 +14,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from dva_sim.agents.operator.person import Person
-from dva_sim.agents.steering import Route
+from dva_sim.agents.route_following import Route
 
 Velocity = tuple[float, float]
 

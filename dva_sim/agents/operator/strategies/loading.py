@@ -8,15 +8,13 @@ from typing import Any, Final
 
 from dva_sim.agents.operator.person import Person, Population, median_person
 from dva_sim.agents.operator.strategies.adaptive import Adaptive
-from dva_sim.agents.operator.strategies.base import Reach, Strategy
-from dva_sim.agents.operator.strategies.guarded import Guarded
+from dva_sim.agents.operator.strategies.base import Guarded, Reach, Strategy
 from dva_sim.agents.operator.strategies.move_and_wait import MoveAndWait
-from dva_sim.agents.operator.strategies.oracle import Oracle
-from dva_sim.agents.operator.strategies.predictor import Predictor
+from dva_sim.agents.operator.strategies.predictor import Oracle, Predictor
 from dva_sim.agents.operator.strategies.pursuit import Pursuit
 from dva_sim.agents.operator.strategies.two_point import TwoPoint
-from dva_sim.errors import ConfigError
-from dva_sim.plugins import Plugins
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.plugins import Plugins
 
 Driver = Strategy | Oracle
 

@@ -13,7 +13,7 @@ import math
 from dva_sim.agents.operator.person import Person
 from dva_sim.agents.operator.strategies.base import Intent, Reach, Strategy, View
 from dva_sim.agents.operator.strategies.cursor import SHORTEST, gain_at
-from dva_sim.agents.steering import Ahead, Route
+from dva_sim.agents.route_following import Ahead, Route
 
 NEAREST_LOOK, FARTHEST_LOOK = 0.8, 1.8  # look-ahead inside a building [m]
 TURN_FROM, TURN_UNTIL = 0.9, 0.25  # bearing at which one stops to turn, and drives on [rad]

@@ -27,7 +27,7 @@ from dva_sim.agents.operator.person import Person
 from dva_sim.agents.operator.strategies.base import Intent, Reach, View
 from dva_sim.agents.operator.strategies.cursor import gain_at
 from dva_sim.agents.operator.strategies.pursuit import Pursuit
-from dva_sim.agents.steering import Ahead, Route, wrap
+from dva_sim.agents.route_following import Ahead, Route, wrap
 
 FAR, NEAR, INTEGRAL = 16.0, 4.0, 3.0  # gains as published, the last one in 1/s
 NEAR_TIME, FAR_TIME = 0.37, 0.93  # to the points, on the road [s]

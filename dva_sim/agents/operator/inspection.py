@@ -1,0 +1,199 @@
+"""How a person becomes sure that something is there: evidence builds up, look by look.
+
+Each look at a picture says a little for or against, with noise. What speaks for it adds up; what
+speaks against it takes that away again, but not below nothing: who has long seen nothing is not
+harder to convince. From a level on, the criterion, the person is sure. It may be wrong: noise
+alone gets there too, the rarer the higher the criterion and the clearer the pictures.
+
+References:
+    R. Ratcliff, G. McKoon: The diffusion decision model: theory and data for two-choice decision
+    tasks. Neural Computation 20 (2008) 873-922.
+    E. S. Page: Continuous inspection schemes. Biometrika 41 (1954) 100-115 (a sum that is never
+    below nothing).
+    D. M. Green, J. A. Swets: Signal Detection Theory and Psychophysics. Wiley, 1966.
+    A. Nuthmann: Fixation durations in scene viewing. Psychonomic Bulletin & Review 24 (2017)
+    370-392 (the eyes move about three times a second).
+
+What an operator makes of the pictures from the place of an event, whoever drives the robot.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+
+from dva_sim.agents.operator.person import Person
+from dva_sim.agents.robot.camera import CLEAR, SEEN_THROUGH, Observation, SeenHazard
+from dva_sim.worlds.planning import Planner
+
+STILL = 1.0 / 3.0  # a picture that does not change tells something for one fixation [s]
+HALF_SEEN = 0.03  # what fills this angle looks half like what it is [rad]; assumed
+
+
+def clearness(angle: float) -> float:
+    """How much something looks like what it is, from 0 to 1, by the angle that it fills [rad]."""
+    return float(1.0 - 2.0 ** (-angle / HALF_SEEN))
+
+
+def worth(gap: float) -> float:
+    """What the pictures of the last `gap` [s] are worth, in time looked at a moving one [s].
+
+    So evidence comes as fast as fresh pictures do, up to three a second.
+    """
+    return min(gap, STILL)
+
+
+class Evidence:
+    """What speaks for an event, as one person weighs it.
+
+    In a clear picture the level drifts by `sensitivity / 2` a second towards the criterion if the
+    event fills the picture, and away from it if it is not there; the noise has a variance of 1 a
+    second. In a picture of contrast `c` the drift is `c^1.5` of that and the variance `c`: a
+    person discounts what is unclear, but less than would keep the errors as rare (assumed).
+
+    Args:
+        sensitivity: Of the person: how well a second in plain view tells an event from none, in
+            standard deviations [1/sqrt(s)].
+        look: How long an event in plain view is looked at until the person is sure [s]; the
+            criterion is what that adds up to.
+        luck: Standard normal numbers, one for each look.
+
+    Attributes:
+        level: Of the evidence.
+        criterion: From this level on, the person is sure.
+    """
+
+    def __init__(self, sensitivity: float, look: float, luck: Iterator[float]) -> None:
+        self._sensitivity, self._luck = sensitivity, luck
+        self.criterion = 0.5 * sensitivity * look
+        self.level = 0.0
+
+    @property
+    def sure(self) -> bool:
+        """Whether the person says that it is there."""
+        return self.level >= self.criterion
+
+    @property
+    def leans(self) -> bool:
+        """Whether the person is more than half convinced."""
+        return self.level >= 0.5 * self.criterion
+
+    def weigh(self, duration: float, clear: float, contrast: float) -> None:
+        """Look for some time [s].
+
+        Args:
+            duration: What the look is worth.
+            clear: How much what is seen looks like the event, from 0 (not at all) to 1.
+            contrast: Share of the contrast that smoke leaves.
+        """
+        weight = math.sqrt(contrast)
+        drift = weight * contrast * self._sensitivity * (clear - 0.5)
+        noise = weight * math.sqrt(duration) * next(self._luck)
+        self.level = max(0.0, self.level + drift * duration + noise)
+
+
+AT_PLACE = 1.5  # nearer than this one is at the place [m]
+MATCH_WITHIN = 4.0  # a hazard so near the reported place is the one reported [m]
+NEARER_AFTER = 5.0  # who could not see the place for so long looks from nearer [s]; assumed
+
+Found = tuple[str, str]
+
+
+class Looking:
+    """Looks for one event until it is confirmed, refuted or given up.
+
+    A person confirms when the evidence is strong enough, and refutes after having looked at the
+    place for long enough without being more than half convinced. Who cannot see the place for
+    smoke refutes nothing: it waits, and in the end gives up.
+
+    Args:
+        kind: Of the event.
+        place: Where it is said to be [m].
+        planner: The person knows the building.
+        person: Who looks.
+        luck: Standard normal numbers, one for each look.
+        arrived: Called once, when the event or its place is before the robot.
+    """
+
+    def __init__(
+        self,
+        kind: str,
+        place: tuple[float, float],
+        planner: Planner,
+        person: Person,
+        luck: Iterator[float],
+        arrived: Callable[[], object],
+    ) -> None:
+        self._kind, self._place, self._planner, self._person = kind, place, planner, person
+        self._evidence = Evidence(person.sensitivity, person.confirm_look, luck)
+        self._tell_arrived, self._arrived = arrived, False
+        self._last: float | None = None
+        self._searched = self._blind = 0.0
+        self.at_place = False
+
+    @property
+    def wants_nearer(self) -> bool:
+        """Whether the place could not be seen for some time."""
+        return self._blind > NEARER_AFTER
+
+    def look(self, now: float, seen: Observation) -> Found | None:
+        """A picture is perceived at `now` [s]: the outcome and why, once there is one."""
+        gap = math.inf if self._last is None else now - self._last
+        self._last = now
+        event = self._event_in(seen)
+        if event is not None:
+            self._arrive()
+            self._evidence.weigh(worth(gap), clearness(event.angle), event.contrast)
+        was_there, self.at_place = self.at_place, self.has_place_before_it(seen, AT_PLACE)
+        found = self._search(gap if was_there else 0.0, seen, event is None)
+        return ("confirmed", "") if self._evidence.sure else found
+
+    def look_away(self) -> None:
+        """The person looks at something else: what is not seen counts for nothing."""
+        self._last, self.at_place = None, False
+
+    def has_place_before_it(self, seen: Observation, within: float) -> bool:
+        """Whether the place is near [m], and by the map no wall stands between."""
+        here = seen.x, seen.y
+        near = math.dist(here, self._place) < within
+        return near and self._planner.line_of_sight(here, self._place)
+
+    def _event_in(self, seen: Observation) -> SeenHazard | None:
+        """The event, if it is in the picture."""
+        near = (h for h in seen.hazards if math.dist((h.x, h.y), self._place) < MATCH_WITHIN)
+        return next((h for h in near if h.kind == self._kind), None)
+
+    def _search(self, gap: float, seen: Observation, nothing: bool) -> Found | None:
+        """At the place: look around for a while, if anything can be seen, then say so.
+
+        Args:
+            gap: How long the person has been looking since the last picture [s].
+            seen: The picture.
+            nothing: Whether the event is not in it.
+        """
+        if not self.at_place:
+            return None
+        self._arrive()
+        contrast = self._contrast_at_place(seen)
+        if nothing and contrast <= math.exp(-SEEN_THROUGH):
+            self._blind += gap
+            too_long = self._blind > self._person.patience
+            return ("gave up", "nothing can be seen") if too_long else None
+        if nothing:
+            self._evidence.weigh(worth(gap), 0.0, contrast)
+        self._searched += gap
+        if self._searched > self._person.search and not self._evidence.leans:
+            return "refuted", "nothing there"
+        return None
+
+    def _contrast_at_place(self, seen: Observation) -> float:
+        """Share of its contrast that the smoke before the place leaves."""
+        if seen.visibility >= CLEAR:
+            return 1.0
+        distance = math.dist((seen.x, seen.y), self._place)
+        return math.exp(-SEEN_THROUGH * distance / seen.visibility)
+
+    def _arrive(self) -> None:
+        if not self._arrived:
+            self._arrived = True
+            self._tell_arrived()

@@ -1,0 +1,229 @@
+"""An operator at work: takes an order, gets permission, drives or supervises, reports, is free.
+
+An operator has so many orders in hand at once, one robot for each. The newest order holds: it takes
+the place of an older one of the same robot, or of the oldest where the hands are full; a robot
+that was on its way is stopped first. Robots that do missions are watched all at once; of those that
+are driven, all but one stand until it is their turn.
+"""
+
+from __future__ import annotations
+
+from dva_sim.agents.operator.attention import DriverSeat
+from dva_sim.agents.operator.drive import Drive
+from dva_sim.agents.operator.supervision import Work
+from dva_sim.agents.robot.camera import CAMERA_SCHEME
+from dva_sim.kernel.recorder import DriveLog
+from dva_sim.protocol import messages as m
+
+ASK_AGAIN = 2.0  # when the robot is held by somebody else [s]
+START_TRIES = 20
+START_AGAIN = 1.0  # when the grant may still be on its way to the robot [s]
+STANDSTILL = 1.5  # after a stop, a robot certainly stands; before, it would refuse to start [s]
+TOLD = {"lost link": "takes the link for lost"}  # what a drive's end looks like to the operator
+REDIRECTED, RECALLED = BY_DVA = "redirected", "recalled"  # how a drive ends by the DVA's word
+
+
+class OperatorAgent:
+    """A person with a phone in the control room.
+
+    Args:
+        seat: Who it is, and what is at hand.
+        kind: How it has robots look at events: `Drive` them, or `Supervise` their missions.
+        span: How many orders it has in hand at most.
+
+    Attributes:
+        works: What is under way, also while it is wound up, by robot.
+    """
+
+    def __init__(self, seat: DriverSeat, kind: type[Work] = Drive, span: int = 1) -> None:
+        self.device, self._seat, self._kind, self._span = seat.device, seat, kind, span
+        self.works: dict[str, Work] = {}
+        self._waiting: list[tuple[float, m.Order]] = []  # since when [s]; oldest first
+        self.device.serve(self._on_request)
+
+    @property
+    def activity(self) -> str:
+        """What the person is doing, in words."""
+        return ", ".join(map(self._doing, self.works.values())) or "waiting"
+
+    def _doing(self, work: Work) -> str:
+        verb = "reads of" if work.log.started is None else work.verb
+        return f"{verb} {self.device.label_of(work.robot)}"
+
+    def put_down(self) -> None:
+        """Leave: what is going on ends here, and the robots are told to stop."""
+        self._waiting.clear()
+        for work in list(self.works.values()):
+            work.end("gave up", "the operator leaves")
+
+    def _on_request(self, message: m.Message) -> m.Reply:
+        if message.source != self.device.dva:
+            return m.Reply(message.message_id, m.NOT_PERMITTED, "only the DVA gives orders")
+        match message.body:
+            case m.PermissionRevocation() as body:
+                self._on_revocation(body)
+            case m.Order(device=str(), task="confirm") as order:
+                self._on_order(order)
+            case m.OrderProgress(event_id=event, state="done"):
+                self._on_recall(event)
+            case _:
+                return m.Reply(message.message_id, m.NOT_SUPPORTED, "an operator drives robots")
+        return m.Reply(message.message_id, m.OK, "")
+
+    def _on_revocation(self, body: m.PermissionRevocation) -> None:
+        """The robot is no longer ours to drive; it has been told, too."""
+        work = self.works.get(body.device)
+        if work is not None and work.session == body.session:
+            work.end("gave up", "the permission was revoked")
+
+    # --- what there is to do -----------------------------------------------------------
+
+    @property
+    def _orders(self) -> list[m.Order]:
+        """Those in hand that the DVA has not taken back."""
+        begun = [w.order for w in self.works.values() if w.log.outcome not in BY_DVA]
+        return begun + [order for _, order in self._waiting]
+
+    def _on_order(self, order: m.Order) -> None:
+        if (order.event_id, order.device) in {(o.event_id, o.device) for o in self._orders}:
+            return  # the DVA says again what it has said before
+        self._make_room(order)
+        self._waiting.append((self.device.clock.now, order))
+        self._go_on()
+
+    def _make_room(self, order: m.Order) -> None:
+        """Put down what a new order takes the place of, if anything."""
+        going_on = [w for w in self.works.values() if not w.over]
+        in_hand = [(w.log.ordered, w.order) for w in going_on] + self._waiting
+        same = [old for old in in_hand if old[1].device == order.device]
+        if same or len(in_hand) >= self._span:
+            _, replaced = min(same or in_hand, key=lambda old: old[0])
+            self._drop(replaced, REDIRECTED)
+
+    def _drop(self, order: m.Order, outcome: str) -> None:
+        self._waiting = [old for old in self._waiting if old[1] is not order]
+        for work in list(self.works.values()):
+            if work.order is order:
+                work.end(outcome)
+
+    def _on_recall(self, event_id: int) -> None:
+        """The DVA says that an order is over."""
+        for order in self._orders:
+            if order.event_id == event_id:
+                self._drop(order, RECALLED)
+
+    def _go_on(self) -> None:
+        """Take up what waits, as far as there are hands; each robot does one thing at a time."""
+        most = self._kind.at_once or self._span
+        for since, order in list(self._waiting):
+            if len(self.works) < most and order.device not in self.works:
+                self._waiting.remove((since, order))
+                self._take_up(order, since)
+
+    def _take_up(self, order: m.Order, ordered: float) -> None:
+        assert order.device is not None
+        device = self.device
+        log = DriveLog(order.device, device.id_tag, order.event_id, ordered)
+        log.taken_up = device.clock.now
+        device.recorder.drive_ordered(log)
+        drive = self.works[order.device] = self._kind(self._seat, order, log, self._finish)
+        robot = device.label_of(order.device)
+        device.tell(f"shall {drive.wish} {robot} to event {order.event_id}", "order")
+        device.clock.call_after(self._seat.person.reading, self._ask_permission, drive)
+
+    def _ask_permission(self, drive: Work) -> None:
+        if drive.over:
+            return
+
+        def answered(reply: m.Reply) -> None:
+            if drive.over:
+                if isinstance(reply.content, m.Permission):
+                    self._give_back(drive.robot, reply.content.session)
+            elif isinstance(reply.content, m.Permission):
+                drive.session = reply.content.session
+                self._turn_on_picture(drive)
+                self._start(drive)
+            elif reply.code == m.BUSY:
+                self.device.clock.call_after(ASK_AGAIN, self._ask_permission, drive)
+            else:
+                drive.end("gave up", reply.text)
+
+        body = m.PermissionRequest(drive.robot, drive.level)
+        unreachable = lambda: drive.end("lost link", "the DVA does not answer")  # noqa: E731
+        self.device.ask(self.device.dva, body, answered, unreachable)
+
+    def _turn_on_picture(self, drive: Work) -> None:
+        """Ask the robot where its camera is, and watch it."""
+
+        def answered(reply: m.Reply) -> None:
+            if drive.over:
+                return
+            url = reply.content.camera_url if isinstance(reply.content, m.SensorInfo) else ""
+            if not url.startswith(CAMERA_SCHEME):
+                drive.end("gave up", f"no camera to watch at {url!r}")
+                return
+            topic = url.rpartition("/")[2]
+            drive.picture = self.device.network.subscribe(
+                self.device.id_tag, drive.robot, topic, drive.on_frame
+            )
+
+        self.device.ask(drive.robot, m.GetSensorInfo(), answered, session=drive.session)
+
+    def _start(self, drive: Work, tries: int = 1) -> None:
+        def answered(reply: m.Reply) -> None:
+            if drive.over:
+                return
+            if reply.code == m.OK:
+                self.device.progress(drive.order.event_id, "departed")
+                self.device.tell(f"{drive.verb} {self.device.label_of(drive.robot)}", "drive")
+                drive.begin()
+            elif tries < START_TRIES and reply.code in (m.BUSY, m.NOT_PERMITTED, m.BAD_SESSION):
+                self.device.clock.call_after(START_AGAIN, self._start, drive, tries + 1)
+            else:
+                drive.end("gave up", reply.text)
+
+        if not drive.over:
+            body = drive.beginning()
+            self.device.ask(drive.robot, body, answered, drive.link_lost, drive.session)
+
+    def _finish(self, drive: Work, outcome: str, why: str) -> None:
+        """A drive is over: stop the robot, tell the DVA, be free again."""
+        device, order = self.device, drive.order
+        device.tell(f"{TOLD.get(outcome, outcome)}{': ' + why if why else ''}", "drive")
+        found, by_dva = outcome in ("confirmed", "refuted"), outcome in BY_DVA
+        if found:
+            body = m.EventReport(order.event_id, order.kind, order.position, 0.5, 0.95, outcome)
+            device.ask(device.dva, body)
+
+        def give_back(_: object = None) -> None:
+            if by_dva:
+                self._give_back(drive.robot, drive.session)
+            else:
+                device.progress(order.event_id, "done" if found else "failed")
+            self._be_free(drive)
+
+        if outcome == "lost link":
+            # Whatever still gets through shall stop the robot; nobody waits for the answer.
+            device.ask(drive.robot, m.Emergency(), session=drive.session)
+            give_back()
+        elif drive.log.started is None and not (drive.session and by_dva):
+            give_back()
+        else:
+            device.ask(drive.robot, drive.ending(), give_back, give_back, drive.session)
+
+    def _give_back(self, robot: str, session: int) -> None:
+        """A permission is needed no longer, unless what is next is of the same robot."""
+        if session and robot not in {order.device for order in self._orders}:
+            body = m.PermissionRevocation(robot, self.device.id_tag, session)
+            self.device.ask(self.device.dva, body)
+
+    def _be_free(self, drive: Work) -> None:
+        """The robot was told to stop: what is next?"""
+        if self._waiting and drive.session:
+            self.device.clock.call_after(STANDSTILL, self._put_away, drive)
+        else:
+            self._put_away(drive)  # nothing moves
+
+    def _put_away(self, drive: Work) -> None:
+        del self.works[drive.robot]
+        self._go_on()

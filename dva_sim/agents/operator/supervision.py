@@ -1,0 +1,196 @@
+"""What an operator does about one order with one robot, from the permission to the outcome.
+
+Supervisory control: the operator gives the goal, the robot acts, the operator judges.
+
+References:
+    T. B. Sheridan: Telerobotics, Automation, and Human Supervisory Control. MIT Press, 1992.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import ClassVar
+
+from dva_sim.agents.operator.attention import DriverSeat
+from dva_sim.agents.operator.inspection import Looking
+from dva_sim.agents.robot.camera import Frame, Observation
+from dva_sim.agents.robot.manoeuvres import IN_VIEW
+from dva_sim.kernel.recorder import DriveLog, Shown
+from dva_sim.network.patterns import Subscription
+from dva_sim.protocol import messages as m
+
+BLIND_AFTER = 20.0  # [s]; without a frame for so long the link counts as lost
+
+
+class Work:
+    """One order to look at an event through a robot, in whatever way it is controlled.
+
+    Args:
+        seat: Who works, with what.
+        order: Where to, and why.
+        log: What is measured of it.
+        on_end: Told once how it ended: the work, the outcome, and why.
+
+    Attributes:
+        at_once: How many of its kind one person does at once; None: as many as it may.
+        level: Of the permission that it needs.
+        verb: What the person does with the robot, in words.
+        wish: What the person shall do with it, in words.
+        session: Of the permission; 0 before there is one.
+        picture: The robot's camera, once it is watched.
+        over: Whether it has ended.
+        waits_since: From when on the robot has waited for a judgement [s]; None: it does not.
+    """
+
+    at_once: ClassVar[int | None] = None
+    level: ClassVar[str]
+    verb: ClassVar[str]
+    wish: ClassVar[str]
+
+    def __init__(
+        self,
+        seat: DriverSeat,
+        order: m.Order,
+        log: DriveLog,
+        on_end: Callable[[Work, str, str], object],
+    ) -> None:
+        self._seat, self._device, self._clock = seat, seat.device, seat.device.clock
+        self.order, self.log, self.robot, self._on_end = order, log, log.robot, on_end
+        self.session = 0
+        self.picture: Subscription | None = None
+        self.over = False
+        self.waits_since: float | None = None
+        place = order.position
+        self._goal = seat.device.frame.to_xy(place.latitude, place.longitude)
+        self._last_frame = self._clock.now
+        self._looking = Looking(
+            *(order.kind, self._goal, seat.planner, seat.person),
+            *(seat.luck(order.event_id), self._arrive),
+        )
+
+    def beginning(self) -> m.Body:
+        """What to ask the robot for."""
+        raise NotImplementedError
+
+    def ending(self) -> m.Body:
+        """What to tell the robot when it is over."""
+        raise NotImplementedError
+
+    def begin(self) -> None:
+        """The robot has agreed: from now on there is something to look at."""
+        self.log.started = self._last_frame = self._clock.now
+        self._clock.every(1.0, self._watch_picture)
+        self._seat.attention.begin(self)
+
+    def look_away(self) -> None:
+        """The person looks at another screen."""
+        self._looking.look_away()
+
+    def on_frame(self, shown: Frame | bytes) -> None:
+        """A frame is on the screen."""
+        frame = shown if isinstance(shown, Frame) else Frame.unpack(shown)
+        if frame is None:
+            self._device.recorder.counters["refused: no picture"] += 1
+            return
+        now = self._clock.now
+        self._last_frame = now
+        self.log.frames.append(Shown(frame.captured, now, frame.observation.tick))
+        self._see(frame.observation)
+
+    def link_lost(self) -> None:
+        """Three sends without an answer, or no picture: the app alerts."""
+        self.end("lost link", "no answer and no picture")
+
+    def end(self, outcome: str, why: str = "") -> None:
+        """Put everything down; said once."""
+        if self.over:
+            return
+        self.over = True
+        self.log.ended, self.log.outcome = self._clock.now, outcome
+        self._put_down()
+        self._seat.attention.end(self)
+        if self.picture is not None:
+            self.picture.close()
+        self._on_end(self, outcome, why)
+
+    def _see(self, observation: Observation) -> None:
+        """Look at a frame."""
+        raise NotImplementedError
+
+    def _put_down(self) -> None:
+        """Whatever is in the hand."""
+
+    def _arrive(self) -> None:
+        self._device.progress(self.order.event_id, "arrived")
+
+    def _watch_picture(self) -> bool:
+        """No picture for too long: the link is lost, whatever the pattern."""
+        if not self.over and self._clock.now - self._last_frame > max(
+            BLIND_AFTER, self._device.timeout
+        ):
+            self.link_lost()
+        return not self.over
+
+
+ASK_PERIOD = 2.0  # how often the operator asks how the mission stands [s]
+
+
+class Supervise(Work):
+    """One inspection that a robot makes by itself, watched through its camera.
+
+    The same pictures, perceived as late and judged with the same errors, decide as in `Drive`:
+    only who steers differs.
+    """
+
+    level, verb, wish = "missions", "watches", "send"
+
+    def beginning(self) -> m.Body:
+        """What to ask the robot for."""
+        return m.Inspect(self.order.event_id, self.order.kind, self.order.position)
+
+    def ending(self) -> m.Body:
+        """What to tell the robot when it is over."""
+        return m.CancelMission()
+
+    def begin(self) -> None:
+        """The robot is on its way: watch the picture, and ask now and then how it stands."""
+        super().begin()
+        self._clock.call_after(ASK_PERIOD, self._ask)
+
+    def _see(self, observation: Observation) -> None:
+        """A frame is on the screen; who looks at that perceives it a little later."""
+        if self._seat.attention.looks_at(self):
+            delay = self._seat.person.perceptual_delay
+            self._clock.call_after(delay, self._perceive, observation)
+
+    def _perceive(self, observation: Observation) -> None:
+        if self.over:
+            return
+        now, judged = self._clock.now, self._seat.judge(observation)
+        self._device.recorder.view(now, self.robot, judged.x, judged.y, judged.heading)
+        found = self._looking.look(now, judged)
+        if found is not None:
+            self.end(*found)
+
+    def _ask(self) -> None:
+        """How does the mission stand? The next time is when this was answered."""
+        if self.over:
+            return
+
+        def answered(reply: m.Reply) -> None:
+            status = reply.content
+            if self.over or not isinstance(status, m.MissionStatus):
+                return
+            if status.mission_state in ("done", "failed"):
+                self.end("gave up", f"the robot: {status.reason or status.mission_state}")
+                return
+            self._note(status)
+            self._clock.call_after(ASK_PERIOD, self._ask)
+
+        body = m.GetMissionStatus()
+        self._device.ask(self.robot, body, answered, self.link_lost, self.session)
+
+    def _note(self, status: m.MissionStatus) -> None:
+        """A robot that says what is in view is there, and waits for the judgement."""
+        if self.waits_since is None and status.reason.endswith(IN_VIEW):
+            self.waits_since = self.log.waits_from = self._clock.now

@@ -1,0 +1,1 @@
+"""People on foot: guards who deal with events, bystanders who leave, and how both walk."""

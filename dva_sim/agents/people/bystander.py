@@ -1,0 +1,249 @@
+"""Bystanders: people who work at a site, and leave it when the alarm sounds or danger shows.
+
+What one does, as its `activity` tells:
+
+- **working** at a place, or **walking** to another one, if it is one of those who move around.
+- **alarmed**: it has heard the alarm, or noticed smoke, heat, water or flames itself, and gets
+  ready to leave for its pre-movement time, whichever came first. Air that nobody endures, or a
+  fire that can be felt, ends that time at once.
+- **evacuating** to the nearest refuge by the way there, not through what nobody endures; if the
+  way ahead becomes so, it chooses again, and so it does when it is blocked for good. Where no
+  way is left it stands still, and looks for one again.
+- **safe**: out.
+- **incapacitated**: it stays where it is, for everybody else to walk around.
+
+Bystanders have no device: nobody is told of them but the recorder.
+
+Where people work: places drawn in the rooms of a site.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+from typing import Final
+
+import numpy as np
+
+from dva_sim.agents.device import do_nothing
+from dva_sim.agents.people.evacuation import OnFoot, WayOut
+from dva_sim.agents.people.exposure import Air, Exposure, clean_air
+from dva_sim.agents.people.profiles import Occupant
+from dva_sim.agents.people.walking import Walking
+from dva_sim.kernel.clock import Clock
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.worlds.hazards import Conditions
+from dva_sim.worlds.layout import Site
+from dva_sim.worlds.planning import Planner
+from dva_sim.worlds.site_parts import Room
+
+WORKING, WALKING, ALARMED = "working", "walking", "alarmed"
+EVACUATING, SAFE, DOWN = "evacuating", "safe", "incapacitated"
+
+NOTICED: Final = Conditions(
+    temperature=40.0,
+    heat_flux=0.5,
+    extinction=0.1,
+    co=math.inf,
+    gas=math.inf,
+    water=0.02,
+    explosive=0.2,
+)
+"""From any of it on people notice that something is wrong; assumed, but for gas: it is given a
+smell that is noticed at a fifth of its lower explosive limit. Carbon monoxide has none."""
+TOO_NEAR: Final = 1.0  # who feels a fire so hot waits for nothing [kW/m^2]; assumed
+
+Point = tuple[float, float]
+
+
+def nothing_seen(x: float, y: float, time: float) -> bool:
+    """The eyes of who has no hazard to see."""
+    return False
+
+
+class BystanderAgent(OnFoot):
+    """One bystander.
+
+    Args:
+        name: As in `bystander-1`.
+        clock: The run's.
+        occupant: Who it is.
+        walking: Its legs.
+        planner: It knows the building.
+        places: Where it works; it begins at the first [m].
+        refuges: Where it is safe [m].
+        luck: Decides where it walks while nothing is wrong, and when.
+        air: What it is like at a place [m] and time [s].
+        sees: Whether flames can be seen from a place [m] at a time [s].
+        leaves: Called when it is out: its body goes.
+        tell: Told in words what happens to it.
+
+    Attributes:
+        activity: What it does now.
+        leaves_at: When it sets out to leave [s]; infinite until it is alarmed.
+        out_at: When it was out [s]; infinite until then.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        clock: Clock,
+        occupant: Occupant,
+        walking: Walking,
+        planner: Planner,
+        places: Sequence[Point],
+        refuges: Sequence[Point],
+        luck: np.random.Generator,
+        air: Air = clean_air,
+        sees: Callable[[float, float, float], bool] = nothing_seen,
+        leaves: Callable[[], object] = do_nothing,
+        tell: Callable[[str], object] = do_nothing,
+    ) -> None:
+        super().__init__(walking, Exposure(clock, walking, air))
+        self.name, self._clock, self._occupant = name, clock, occupant
+        self._way_out = WayOut(clock, planner, walking, self.exposure, lambda: refuges)
+        self._places, self._luck = places, luck
+        self._sees, self._leaves, self._tell = sees, leaves, tell
+        self.activity = WORKING
+        self.leaves_at = self.out_at = math.inf
+
+    def start(self) -> None:
+        """Begin to work, and to notice what is wrong."""
+        self.exposure.start(self._felt)
+        if self._occupant.moves:
+            self._stay()
+
+    # --- while nothing is wrong --------------------------------------------------------
+
+    def _stay(self) -> None:
+        if self.activity in (WORKING, WALKING):
+            self.activity = WORKING
+            self._clock.call_after(self._occupant.stay.draw(self._luck), self._change_place)
+
+    def _change_place(self) -> None:
+        if self.activity != WORKING:
+            return
+        place = self._places[int(self._luck.integers(len(self._places)))]
+        self.activity = WALKING
+        if not self.walking.go(place, self._stay, self._stay):
+            self._stay()
+
+    # --- alarm -------------------------------------------------------------------------
+
+    def alarm(self, now: float) -> None:
+        """The alarm sounds; who has left, or is about to, does not mind."""
+        self._leave_at(now + self._occupant.premovement)
+
+    def _leave_at(self, time: float) -> None:
+        """Set out to leave at `time` [s], if not sooner."""
+        if self.activity in (EVACUATING, SAFE, DOWN) or time >= self.leaves_at:
+            return
+        if self.activity != ALARMED:
+            self.walking.stop()
+            self.activity = ALARMED
+        self.leaves_at = time
+        self._clock.call_at(time, self._evacuate)
+
+    def _felt(self) -> None:
+        """Half a second more in this air."""
+        now = self._clock.now
+        if self.dose.incapacitated:
+            self._collapse()
+        elif self.activity == EVACUATING:
+            self._way_out.look_ahead()
+        elif self.exposure.is_too_much or self.exposure.conditions.heat_flux >= TOO_NEAR:
+            self._leave_at(now)
+        elif self.activity != ALARMED and self._notices(now):
+            self._tell("notices danger")
+            self._leave_at(now + self._occupant.premovement)
+
+    def _notices(self, now: float) -> bool:
+        felt = zip(self.exposure.conditions, NOTICED, strict=True)
+        return any(is_ >= least for is_, least in felt) or self._sees(*self.walking.place, now)
+
+    def _collapse(self) -> None:
+        self.exposure.end()
+        self._way_out.end()
+        self.activity = DOWN
+        self._tell("is incapacitated")
+
+    # --- the way out -------------------------------------------------------------------
+
+    def _evacuate(self) -> None:
+        if self.activity == ALARMED:
+            self.activity = EVACUATING
+            self._tell("leaves")
+            self._way_out.leave(self._is_out)
+
+    def _is_out(self) -> None:
+        self.activity, self.out_at = SAFE, self._clock.now
+        self.exposure.end()
+        self._tell("is out")
+        self._leaves()
+
+
+ELBOW_ROOM: Final = 0.3  # radius that must fit where somebody works [m]
+APART: Final = 0.8  # nobody begins nearer to somebody else [m]
+PASSAGE: Final = 3.5  # a room so many times as long as wide is a corridor, where nobody works
+TRIES: Final = 100
+
+
+def draw_places(
+    site: Site, rng: np.random.Generator, count: int, taken: Sequence[Point] = ()
+) -> list[Point]:
+    """Places of one person [m]: rooms by their area, anywhere in them.
+
+    Args:
+        site: Where; on a bare map, which has no rooms, anywhere.
+        rng: Source of luck.
+        count: How many.
+        taken: The first place is not near any of these [m].
+
+    Raises:
+        ConfigError: there is no such place.
+    """
+    rooms, areas = _workrooms(site)
+    for _ in range(TRIES):
+        first = _draw(site, rng, rooms, areas)
+        if all(math.dist(first, other) >= APART for other in taken):
+            break
+    else:
+        raise ConfigError(f"site {site.name!r} has no room for {len(taken) + 1} people")
+    return [first, *(_draw(site, rng, rooms, areas) for _ in range(count - 1))]
+
+
+def _draw(site: Site, rng: np.random.Generator, rooms: list[str], areas: list[float]) -> Point:
+    room = str(rng.choice(rooms, p=areas)) if rooms else None
+    return site.sample_free(rng, ELBOW_ROOM, room)
+
+
+@lru_cache(maxsize=16)
+def _workrooms(site: Site) -> tuple[list[str], list[float]]:
+    """Rooms where people work, and the share of each in their area."""
+    rooms = [room for room in site.rooms if not room.outdoor and not _is_passage(room)]
+    rooms = [room for room in rooms if _has_place(site, room.name)]
+    areas = np.array([_sides(room)[0] * _sides(room)[1] for room in rooms])
+    return [room.name for room in rooms], (areas / areas.sum()).tolist() if rooms else []
+
+
+def _is_passage(room: Room) -> bool:
+    short, long = _sides(room)
+    return long >= PASSAGE * short
+
+
+def _sides(room: Room) -> tuple[float, float]:
+    """The shorter and the longer side of the smallest rectangle around a room [m]."""
+    import shapely
+
+    corners = shapely.get_coordinates(shapely.oriented_envelope(shapely.Polygon(room.polygon)))
+    one, other = np.hypot(*np.diff(corners[:3], axis=0).T).tolist()
+    return min(one, other), max(one, other)
+
+
+def _has_place(site: Site, room: str) -> bool:
+    try:
+        site.sample_free(np.random.default_rng(0), ELBOW_ROOM, room)
+    except ConfigError:
+        return False
+    return True

@@ -1,0 +1,302 @@
+"""Guards: people who walk to an event, look at it, deal with it, and get out of what is too much.
+
+A guard **withdraws** as soon as what is around it is untenable, what is right ahead of it deadly,
+or its dose is `HURT`: whatever it was on, it tells `failed`, and goes to its post or the nearest
+exit by a way that is not untenable, looking ahead as bystanders do. But who was sent to look, and
+has the place in sight, has seen enough: it confirms first. Until the guard is there it takes no
+orders; with such a dose it never takes one again. One who is incapacitated stays where it is, and
+its device answers that it lies down.
+
+What is **contained** is contained from afar: a fire with a hand-held extinguisher, a leak or a
+burst pipe by its valve, which is taken to be no nearer than the air allows to go.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from functools import partial
+from itertools import takewhile
+
+from dva_sim.agents.device import STATUS, Device, do_nothing
+from dva_sim.agents.people.evacuation import OnFoot, WayOut
+from dva_sim.agents.people.exposure import Air, Exposure, clean_air
+from dva_sim.agents.people.guard_protocol import Errand, GuardDuty
+from dva_sim.agents.people.profiles import Walker
+from dva_sim.agents.people.walking import Walking
+from dva_sim.agents.robot.camera import SEEN_THROUGH, no_smoke
+from dva_sim.protocol import messages as m
+from dva_sim.worlds.planning import Planner
+
+STATUS_PERIOD, FIRST_STATUS = 2.0, 0.5  # of where a guard is [s]
+AT_MOST = 2.0  # from where a guard sees what there is, if nothing stands between [m]
+NEAR_ENOUGH = {"fire": 3.0}  # the stream of a hand-held extinguisher carries so far; assumed [m]
+HAVE_VALVES = "gas_leak", "flood"
+KEEPS_OFF = 5.0  # who shuts a valve keeps so far from what nobody endures [m]
+HERE = 1.0  # who is so near a place stands at it [m]
+STAND_OFF = 10.0
+"""Who stands by waits so far from the place [m]: no hazard of the default settings is dangerous
+beyond 7 m (a greater one, set in a scenario, may be), one step may lead a metre too far, and a
+place is reported a metre or two wrong."""
+STAND_BY_FOR = 900.0  # who stands by gives up if the DVA says nothing for so long [s]
+MOST = 1e6  # no bid is longer [s]
+LOOKS_AHEAD = 1.5  # on an errand, for what nobody survives; about a second's walk [m]
+IN_SIGHT = 10.0  # from where who is driven back has seen what there is [m]
+CONFIRMED, REFUTED, CONTAINED = "confirmed", "refuted", "contained"
+
+Point = tuple[float, float]
+
+
+class GuardAgent(OnFoot):
+    """A guard on duty: walks, looks, works and tells; what it is on is decided by `GuardDuty`.
+
+    Args:
+        device: Identity and ways to talk.
+        walker: How this guard walks and works.
+        planner: The guard knows the building.
+        walking: Its legs; where they stand first is its post.
+        is_there: Whether something of a kind really is near a place [m].
+        contain: Told of what kind is dealt with near a place [m].
+        air: What it is like at a place [m] and time [s].
+        refuges: Ways out, where it is safe whatever the air there [m].
+        smoke: Optical depth of the smoke between two places now.
+    """
+
+    def __init__(
+        self,
+        device: Device,
+        walker: Walker,
+        planner: Planner,
+        walking: Walking,
+        is_there: Callable[[str, float, float], bool],
+        contain: Callable[[str, float, float], object] = do_nothing,
+        air: Air = clean_air,
+        refuges: Sequence[Point] = (),
+        smoke: Callable[[Point, Point], float] = no_smoke,
+    ) -> None:
+        super().__init__(walking, Exposure(device.clock, walking, air))
+        self.device, self._walker, self._planner = device, walker, planner
+        self._post, self._refuges = walking.place, refuges
+        self._way_out = WayOut(device.clock, planner, walking, self.exposure, self._safe_places)
+        self.activity = "waiting"
+        self._is_there, self._contain, self._smoke = is_there, contain, smoke
+        self._duty = GuardDuty(device.dva, walker.mobilisation, self._stands_at)
+        self.exposure.start(self._felt)
+        device.serve(self._on_request)
+
+    def start(self) -> None:
+        """Begin to tell where one is."""
+        clock = self.device.clock
+        clock.every(STATUS_PERIOD, self._publish_status, start=clock.now + FIRST_STATUS)
+
+    def _publish_status(self) -> None:
+        position = m.Position(*self.device.frame.to_latlon(*self.walking.place))
+        self.device.publish(STATUS, m.PersonStatus(self.activity, position))
+
+    # --- what the DVA says -------------------------------------------------------------
+
+    def _on_request(self, message: m.Message) -> m.Reply:
+        answer = self._duty.handle(message, self.device.clock.now)
+        if answer.changed:
+            self._take_up(self._duty.errand)
+        if answer.bid_on is not None:
+            self.device.clock.call_after(0.0, self._bid, answer.bid_on)
+        return m.Reply(message.message_id, answer.code, answer.text)
+
+    def _take_up(self, errand: Errand | None) -> None:
+        """Begin another errand; the steps of an older one come to nothing by themselves."""
+        if errand is None:
+            self.walking.stop()
+            self.activity = "waiting"
+            self.device.tell("is told that the order is over", "order")
+            return
+        if errand.order is not None:
+            self.device.tell(_in_words(errand.order), "order")
+        if self._duty.ready_at > self.device.clock.now:
+            self.activity = "getting ready"
+        self.device.clock.call_at(self._duty.ready_at, self._depart, errand)
+
+    def _bid(self, announced: m.TaskAnnouncement) -> None:
+        """Offer to go, by what only this guard knows: its pace, and where it stands now."""
+        if self._duty.order is not None:
+            return
+        way = self._planner.distance(self.walking.place, self._xy(announced.position))
+        under_way = self._duty.errand is not None and self._duty.ready_at <= self.device.clock.now
+        ready = 0.0 if under_way else self._walker.usual_mobilisation
+        arrival = ready + way / self._walker.speed
+        if arrival <= MOST:
+            self.device.ask(self.device.dva, m.TaskBid(announced.event_id, arrival))
+
+    # --- the way -----------------------------------------------------------------------
+
+    def _depart(self, errand: Errand) -> None:
+        if errand is not self._duty.errand:
+            return
+        goal, is_far_enough = self._goal(errand)
+        arrived, blocked = partial(self._arrive, errand), self._cannot_pass
+        self.activity = "walking"
+        if not self.walking.go(goal, arrived, blocked, is_far_enough):
+            self.device.tell("finds no way there", "event")
+            self._finish("failed")
+        elif errand.order is not None:
+            self.device.progress(errand.order.event_id, "departed")
+
+    def _cannot_pass(self) -> None:
+        self.device.tell("cannot get past what is in the way, and gives up", "event")
+        self._finish("failed")
+
+    def _goal(self, errand: Errand) -> tuple[Point, Callable[[Point], bool]]:
+        """Where the way leads to, and from where on it need not be gone to its end."""
+        place = self._xy(errand.place)
+        if errand.order is None:
+            return place, lambda at: False
+        if errand.order.task != "stand_by":
+            return place, partial(self._is_near_enough, errand.order, place)
+        if math.dist(self.walking.place, place) < STAND_OFF:
+            return self._post, lambda at: math.dist(at, place) >= STAND_OFF  # too near: back off
+        return place, lambda at: math.dist(at, place) <= STAND_OFF
+
+    def _stands_at(self, place: m.Position) -> bool:
+        return math.dist(self.walking.place, self._xy(place)) < HERE
+
+    def _is_near_enough(self, order: m.Order, place: Point, at: Point) -> bool:
+        """Whether what is to be looked at, or dealt with, can be so from here."""
+        has_valve = order.task == "contain" and order.kind in HAVE_VALVES
+        ahead = self.walking.places_ahead(1.0, KEEPS_OFF) if has_valve else []
+        return any(map(self.exposure.is_bad, ahead)) or self._is_in_reach(order, place, at)
+
+    def _is_in_reach(self, order: m.Order, place: Point, at: Point) -> bool:
+        return self._sees(order.kind, at, place, NEAR_ENOUGH.get(order.kind, AT_MOST))
+
+    def _sees(self, kind: str, at: Point, place: Point, within: float) -> bool:
+        """Whether a place is so near [m], and neither wall nor thick smoke between.
+
+        As for cameras, smoke hides no fire: who stands before thick smoke has found one.
+        """
+        if math.dist(at, place) > within or not self._planner.line_of_sight(at, place):
+            return False
+        return kind == "fire" or self._smoke(at, place) < SEEN_THROUGH
+
+    # --- what is done there ------------------------------------------------------------
+
+    def _arrive(self, errand: Errand) -> None:
+        order, clock = errand.order, self.device.clock
+        if order is None:
+            self._post = self.walking.place
+            self._finish()
+        elif order.task == "stand_by":
+            self.activity = "standing by"
+            clock.call_after(STAND_BY_FOR, self._give_up, errand)
+        else:
+            self.device.progress(order.event_id, "arrived")
+            if order.task == "contain" and self._is_there(order.kind, *self._xy(order.position)):
+                self._begin_to_contain(errand)
+            else:
+                self.activity = "looking"
+                clock.call_after(self._walker.look, self._looked, errand)
+
+    def _give_up(self, errand: Errand) -> None:
+        """Nobody needs who has stood by for so long."""
+        if errand is self._duty.errand:
+            self._finish("failed")
+
+    def _looked(self, errand: Errand) -> None:
+        order = errand.order
+        if errand is not self._duty.errand or order is None:
+            return
+        if not self._is_there(order.kind, *self._xy(order.position)):
+            self._report(order, REFUTED)
+        elif order.task == "confirm":
+            self._report(order, CONFIRMED)
+        else:
+            self._begin_to_contain(errand)
+
+    def _begin_to_contain(self, errand: Errand) -> None:
+        walker, order = self._walker, errand.order
+        is_fire = order is not None and order.kind == "fire"
+        takes = walker.extinguish if is_fire else walker.contain
+        self.activity = "containing"
+        self.device.clock.call_after(takes, self._contained, errand)
+
+    def _contained(self, errand: Errand) -> None:
+        order = errand.order
+        if errand is self._duty.errand and order is not None:
+            self._contain(order.kind, *self._xy(order.position))
+            self._report(order, CONTAINED)
+
+    def _report(self, order: m.Order, finding: str) -> None:
+        body = m.EventReport(order.event_id, order.kind, order.position, 0.5, 0.99, finding)
+        self.device.ask(self.device.dva, body)
+        self.device.tell(f"{finding} event {order.event_id}", "event")
+        self._finish("done", at_event=True)
+
+    def _finish(self, state: str | None = None, at_event: bool = False) -> None:
+        order = self._duty.order
+        if order is not None and state is not None:
+            self.device.progress(order.event_id, state)
+        self._duty.is_over(at_event)
+        self.activity = "waiting"
+
+    # --- what is too much --------------------------------------------------------------
+
+    def _felt(self) -> None:
+        """Half a second more in this air."""
+        if self.dose.incapacitated:
+            self.exposure.end()
+            self._give_back("lies down")
+            self._way_out.end()
+            self.activity = "incapacitated"
+            self.device.tell("is incapacitated", "safety")
+        elif not self._duty.unfit and (self.exposure.is_too_much or self._is_deadly_ahead()):
+            self._give_back("withdraws from danger")
+            self.activity = "withdrawing"
+            self.device.tell("withdraws", "safety")
+            self._way_out.leave(self._is_safe)
+        elif self.activity == "withdrawing":
+            self._way_out.look_ahead()
+
+    def _is_deadly_ahead(self) -> bool:
+        """Whether an errand leads on into what nobody survives, before it is near enough."""
+        if self.activity != "walking":
+            return False
+        ahead = takewhile(self._goes_on_from, self.walking.places_ahead(0.5, LOOKS_AHEAD))
+        return any(map(self.exposure.is_deadly, ahead))
+
+    def _goes_on_from(self, at: Point) -> bool:
+        """Whether a place [m] is not near enough yet to what the guard is sent to."""
+        order = self._duty.order
+        return order is None or not self._is_in_reach(order, self._xy(order.position), at)
+
+    def _give_back(self, unfit: str) -> None:
+        """Be of no more use, for that reason, to whatever the guard was on."""
+        order, self._duty.unfit = self._duty.order, unfit
+        if order is None:
+            self._finish()
+        elif order.task == "confirm" and self._has_seen(order):
+            self._report(order, CONFIRMED)
+        else:
+            self._finish("failed")
+
+    def _has_seen(self, order: m.Order) -> bool:
+        at, place = self.walking.place, self._xy(order.position)
+        return self._sees(order.kind, at, place, IN_SIGHT) and self._is_there(order.kind, *place)
+
+    def _safe_places(self) -> list[Point]:
+        """Where to withdraw to: its post, unless it is bad there, and the ways out."""
+        post = [] if self.exposure.is_bad(self._post) else [self._post]
+        return [*post, *(place for place in self._refuges if place != self._post)]
+
+    def _is_safe(self) -> None:
+        """At a refuge: fit for service again, unless hurt; who is at an exit steps out."""
+        if any(math.dist(self.walking.place, place) < HERE for place in self._refuges):
+            self.exposure.step_out()
+        self._duty.unfit = "is hurt" if self.exposure.is_hurt else ""
+        self.activity = "hurt" if self.exposure.is_hurt else "waiting"
+
+    def _xy(self, place: m.Position) -> Point:
+        return self.device.frame.to_xy(place.latitude, place.longitude)
+
+
+def _in_words(order: m.Order) -> str:
+    purpose = {"contain": " to contain it", "stand_by": " to stand by"}.get(order.task, "")
+    return f"is sent to event {order.event_id}{purpose}"

@@ -1,0 +1,316 @@
+"""Walking: a planned way, a body on it, and what to do when somebody is in the way.
+
+Guards and bystanders walk alike. A way is planned on the map; five times a second, or half as
+often where nobody is near, the walker looks where it is and chooses the velocity that its legs
+push towards:
+
+- **Nobody near**: straight to the point a little ahead on the way.
+- **Somebody near**: by the two rules of `manners`: step aside, to the right rather than the
+  left, and slow down.
+- **In doors** one gives way, by the rules of `doorways`.
+- **Held up by a robot**, one turns sideways and squeezes past, if there is a gap.
+- **Blocked**: who has come no nearer for some seconds looks for a way around whoever stands
+  there, again and again at longer intervals; who has come no nearer for `GIVE_UP` says so, and
+  it is for the agent to decide what then. So nobody is stuck for ever.
+- **At a crowded place** one is there as soon as others keep one from coming nearer.
+
+Who stands costs nothing: there is no step until somebody walks.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+
+from dva_sim.agents.people.locomotion import RADIUS, SIDEWAYS, Body, Ground, Legs
+from dva_sim.agents.people.pedestrian_avoidance import (
+    REACH,
+    Courtesy,
+    Floats,
+    Mover,
+    Point,
+    beside,
+    doors_on,
+    is_clear,
+    middles_of,
+    past,
+    velocity,
+)
+from dva_sim.agents.route_following import Ahead, Route
+from dva_sim.kernel.clock import Clock
+from dva_sim.worlds.planning import Disc, Planner
+from dva_sim.worlds.robot_body import RobotBody
+
+STEP: Final = 0.2  # between looks at the way [s]
+CALM: Final = 0.4  # the same while nobody is near and the end is not [s]
+LOOK_AHEAD: Final = 0.8  # on the way [m]
+LOOK_PAST: Final = 2.5  # on the way, where others are and no wall is between [m]
+ASTRAY: Final = 1.0  # who was pushed so far off the way takes another [m] ...
+PLANS_EVERY: Final = 1.0  # ... no more often than this [s]
+ARRIVED: Final = 0.15  # so near to its end one is there [m]
+BRAKING: Final = 1.0  # the end is approached at the distance left, by this [s]
+CROWDED: Final = 1.5  # who is held up so near to the end is there [m]
+MOST_SEEN: Final = 8  # of those near, the nearest count
+
+NEARER: Final = 0.25  # less is no progress [m]
+TIRED: Final = 4.0  # of no progress; then one looks for another way [s]
+GIVE_UP: Final = 60.0  # of no progress; then one gives up [s]
+BESIDE: Final = 0.8  # so near one squeezes past [m]
+SIDEWAYS_SPEED: Final = 0.5  # of who squeezes past; assumed [m/s]
+STANDING: Final = 0.1  # slower than this is in the way [m/s]
+
+SLOWEST, FASTEST = 0.6, 2.2  # walking [m/s]
+
+
+def draw_speed(mean: float, sd: float, rng: np.random.Generator) -> float:
+    """One person's free walking speed: normal over persons [m/s], no slower or faster than walks.
+
+    References:
+        1.34 m/s, SD 0.26: U. Weidmann, Transporttechnik der Fussgaenger, ETH Zuerich, 1993.
+    """
+    return float(np.clip(rng.normal(mean, sd), SLOWEST, FASTEST))
+
+
+@dataclass(eq=False)
+class Walk:
+    """One walk of one person.
+
+    Attributes:
+        goal: Where to [m].
+        arrived: Called at its end.
+        blocked: Called when it is given up.
+        is_far_enough: From where on it need not be gone to its end.
+        avoid: Places to go around.
+    """
+
+    goal: Point
+    arrived: Callable[[], object]
+    blocked: Callable[[], object]
+    is_far_enough: Callable[[Point], bool]
+    route: Route
+    courtesy: Courtesy
+    avoid: tuple[Disc, ...]
+    gone: float = 0.0  # along the way [m]
+    least: float = math.inf  # of what was left of the way, so far [m]
+    nearer_at: float = 0.0  # when it last became less [s]
+    looks_around: float = 0.0  # when another way is looked for [s]
+    planned: float = 0.0  # when its way was chosen [s]
+    robots: set[Disc] = field(default_factory=set)  # that stood in the way
+
+
+class Walking:
+    """A person's legs and manners.
+
+    Args:
+        clock: The run's.
+        planner: The person knows the building.
+        ground: Where others are.
+        body: Its own.
+        speed: Of free walking [m/s].
+        doors: Ends of the doors, shape `(n, 4)` [m].
+
+    Attributes:
+        heading: Where the person looks [rad].
+        pace: Share of the free speed that smoke and water leave.
+    """
+
+    def __init__(
+        self,
+        clock: Clock,
+        planner: Planner,
+        ground: Ground,
+        body: Legs,
+        speed: float,
+        doors: Floats,
+    ) -> None:
+        self._clock, self._planner, self._ground = clock, planner, ground
+        self.body, self.speed = body, speed
+        self.heading, self.pace = 0.0, 1.0
+        self._doors = middles_of(doors)
+        self._walk: Walk | None = None
+        self._reach = REACH  # less in a crowd
+
+    @property
+    def place(self) -> Point:
+        """Where the person is now [m]."""
+        self._ground.advance_to(self._clock.now)
+        return self.body.x, self.body.y
+
+    @property
+    def walks(self) -> bool:
+        """Whether it is on its way."""
+        return self._walk is not None
+
+    def go(
+        self,
+        goal: Point,
+        arrived: Callable[[], object],
+        blocked: Callable[[], object],
+        is_far_enough: Callable[[Point], bool] = lambda at: False,
+        avoid: Sequence[Disc] = (),
+    ) -> bool:
+        """Walk somewhere; what was under way before is forgotten.
+
+        Args:
+            goal: Where to [m].
+            arrived: Called there.
+            blocked: Called if somebody is in the way for good.
+            is_far_enough: From where on the way need not be gone to its end.
+            avoid: Places to go around.
+
+        Returns:
+            Whether there is a way.
+        """
+        points = self._planner.path(self.place, goal, avoid)
+        if points is None:
+            self.stop()
+            return False
+        now = self._clock.now
+        courtesy = Courtesy(doors_on(points, self._doors))
+        route, keep_off = Route(points), tuple(avoid)
+        walk = Walk(goal, arrived, blocked, is_far_enough, route, courtesy, keep_off)
+        walk.nearer_at, walk.looks_around = now, now + TIRED
+        self._walk = walk
+        self._clock.call_after(0.0, self._step, walk)
+        return True
+
+    def places_ahead(self, every: float, reach: float) -> list[Point]:
+        """Places that it will come to next on its way, so far apart and up to so far off [m]."""
+        if self._walk is None:
+            return []
+        route, gone = self._walk.route, self._walk.gone
+        count = int(min(reach, route.length - gone) / every)
+        return [route.point_at(gone + every * k) for k in range(1, count + 1)]
+
+    def stop(self) -> None:
+        """Stand still."""
+        self._walk = None
+        self.body.walk(0.0, 0.0)
+
+    # --- one step ----------------------------------------------------------------------
+
+    def _step(self, walk: Walk) -> None:
+        if walk is not self._walk:
+            return
+        x, y = here = self.place
+        ahead = walk.route.ahead(x, y, 0.0, LOOK_AHEAD)
+        walk.gone = walk.route.length - ahead.remaining
+        if ahead.remaining <= ARRIVED or walk.is_far_enough(here) or self._is_held_up(walk, ahead):
+            self.stop()
+            walk.arrived()
+        elif self._clock.now - walk.nearer_at > GIVE_UP:
+            self.stop()
+            walk.blocked()
+        else:
+            if ahead.offset > ASTRAY and self._clock.now >= walk.planned + PLANS_EVERY:
+                self._plan(walk, ())
+                ahead = walk.route.ahead(x, y, 0.0, LOOK_AHEAD)
+            calm = not self._push_on(walk, ahead) and ahead.remaining > CROWDED
+            self._clock.call_after(CALM if calm else STEP, self._step, walk)
+
+    def _is_held_up(self, walk: Walk, ahead: Ahead) -> bool:
+        """Whether others keep one from coming nearer to an end that is near; notes progress."""
+        now = self._clock.now
+        if ahead.remaining < walk.least - NEARER:
+            walk.least, walk.nearer_at, walk.looks_around = ahead.remaining, now, now + TIRED
+        return ahead.remaining < CROWDED and now - walk.nearer_at > TIRED
+
+    def _push_on(self, walk: Walk, ahead: Ahead) -> bool:
+        """Want a velocity for the next step; whether somebody is near."""
+        speed = min(self.speed * self.pace, ahead.remaining / BRAKING)
+        near = self._others()
+        if near and self._clock.now >= walk.looks_around:
+            self._look_around(walk, near)
+        heading, slot = ahead.bearing, self._slot(walk, near)
+        if slot is not None:
+            heading = math.atan2(slot[1] - self.body.y, slot[0] - self.body.x)
+            vx, vy = SIDEWAYS_SPEED * math.cos(heading), SIDEWAYS_SPEED * math.sin(heading)
+        elif near:
+            heading, vx, vy = self._among(walk, ahead, speed, near)
+        else:
+            vx, vy = speed * math.cos(heading), speed * math.sin(heading)
+        self.heading = heading
+        self.body.walk(vx, vy)
+        return bool(near)
+
+    def _among(
+        self, walk: Walk, ahead: Ahead, speed: float, near: Sequence[Body]
+    ) -> tuple[float, float, float]:
+        """Where to look [rad] and how to walk [m/s] among others."""
+        body, heading = self.body, ahead.bearing
+        me = Mover(body.x, body.y, *body.velocity, body.radius)
+        movers = [Mover(o.x, o.y, *o.velocity, o.radius) for o in near]
+        door = walk.courtesy.waits_for(body, walk.gone, near, self._clock.now)
+        if door is not None:
+            x, y = beside(door, body, self._planner.room_at)
+            heading = math.atan2(y - me.y, x - me.x)
+            speed = min(speed, math.dist((x, y), (me.x, me.y)) / BRAKING)
+        elif is_clear(me, heading, speed, movers):
+            return heading, speed * math.cos(heading), speed * math.sin(heading)
+        else:
+            heading = self._past_others(walk, ahead)
+        return heading, *velocity(me, heading, speed, movers, self._planner.room_at)
+
+    def _past_others(self, walk: Walk, ahead: Ahead) -> float:
+        """Where to, seen from farther off: who steps aside does not want back at once [rad]."""
+        x, y = self.body.x, self.body.y
+        far = walk.route.point_at(walk.gone + LOOK_PAST)
+        if not self._planner.line_of_sight((x, y), far):
+            return ahead.bearing
+        return math.atan2(far[1] - y, far[0] - x)
+
+    def _others(self) -> list[Body]:
+        """Who is near."""
+        body = self.body
+        around = self._ground.neighbours(body.x, body.y, self._reach)
+        self._reach = 0.5 * REACH if len(around) > 2 * MOST_SEEN else REACH
+        return [other for other, _ in around if other is not body][:MOST_SEEN]
+
+    # --- in the way --------------------------------------------------------------------
+
+    def _slot(self, walk: Walk, near: Sequence[Body]) -> Point | None:
+        """Where to squeeze past a robot that holds one up; sideways until it is passed."""
+        body, squeezes = self.body, self.body.radius == SIDEWAYS
+        robots = (o for o in near if isinstance(o, RobotBody))
+        robot = next((r for r in robots if _gap(r, body) < BESIDE), None)
+        tired = self._clock.now - walk.nearer_at > TIRED
+        if robot is None or not (tired or squeezes):
+            if squeezes:
+                body.take_up(RADIUS)
+            return None
+        (ax, ay), (bx, by) = (walk.route.point_at(walk.gone + k) for k in (0.0, LOOK_PAST))
+        length = math.hypot(bx - ax, by - ay)
+        along = (bx - ax) / length, (by - ay) / length
+        if (robot.x - body.x) * along[0] + (robot.y - body.y) * along[1] < -robot.radius:
+            body.take_up(RADIUS)
+            return None
+        body.take_up(SIDEWAYS)
+        return past(robot, along, body, self._planner.room_at)
+
+    def _look_around(self, walk: Walk, near: Sequence[Body]) -> None:
+        """Look for a way around who stands there; longer and longer pauses between."""
+        now = self._clock.now
+        walk.looks_around = now + max(TIRED, now - walk.nearer_at)
+        standing = [o for o in near if math.hypot(*o.velocity) < STANDING]
+        walk.robots.update(Disc(o.x, o.y, o.radius) for o in standing if isinstance(o, RobotBody))
+        in_way = sorted(walk.robots | {Disc(o.x, o.y, o.radius) for o in standing})
+        if in_way and self._plan(walk, in_way):
+            walk.least = walk.route.length
+
+    def _plan(self, walk: Walk, avoid: Sequence[Disc]) -> bool:
+        """Take another way, from where one is now; whether there is one."""
+        points = self._planner.path(self.place, walk.goal, (*walk.avoid, *avoid))
+        if points is None:
+            return False
+        walk.route, walk.courtesy = Route(points), Courtesy(doors_on(points, self._doors))
+        walk.planned, walk.gone = self._clock.now, 0.0
+        return True
+
+
+def _gap(one: Body, other: Body) -> float:
+    """Between two bodies [m]."""
+    return math.dist((one.x, one.y), (other.x, other.y)) - one.radius - other.radius

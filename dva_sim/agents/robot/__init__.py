@@ -1,0 +1,1 @@
+"""The robot: its controller, what waits for it, its sensors, and how it drives by itself."""

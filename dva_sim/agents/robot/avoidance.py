@@ -1,0 +1,246 @@
+"""Getting past people and other robots: which lane to drive in, who goes first, where to wait.
+
+A lane is the planned way shifted sideways for as long as somebody is there. Everybody keeps to
+the right where both sides are as good, so that two who meet do not dodge to the same side.
+
+Who goes first where only one fits through: people before robots; who stands in the narrow part
+already; then the robot of the lower number. The other one steps aside.
+
+References:
+    E. T. Hall: The Hidden Dimension. Doubleday, 1966: personal distance begins at 0.45 m (18
+    inches), its far phase ends at 1.2 m (4 feet).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dva_sim.agents.robot.collision_guard import PERSONAL, Nearby
+from dva_sim.agents.route_following import Route
+
+Floats = NDArray[np.float64]
+Point = tuple[float, float]
+
+SOCIAL = 1.2  # gap to people from which on a robot drives at full speed [m] (Hall)
+SQUEEZE = 0.20  # gap to people who stand in the way and do not go [m]; assumed
+CREEP = 0.15  # speed beside somebody [m/s]; assumed
+LANE_ROOM = 0.06  # gap to walls in a lane other than the planned one [m]; assumed
+
+AHEAD = 4.0  # how far ahead lanes are looked at [m]
+STEP = 0.2  # between the points of a lane [m]
+RAMP = 1.2  # way on which a lane goes over to the side [m]
+HOLDS = (1.6, 2.8, 4.0)  # where a lane goes back to the middle [m]
+SIDES = (0.0, -0.25, 0.25, -0.5, 0.5, -0.7, 0.7, -0.82, 0.82, -1.0, 1.0)  # to the left [m]
+LANE_SPARE = 0.02  # gap in a lane on top of the one to be kept [m]
+TO_THE_LEFT = 0.2  # how much worse a lane on the left is [m]
+CHANGE = 0.3  # how much worse it is to change one's mind, by the way between the lanes
+PACE = 0.4  # speed that one's own way is timed by [m/s]
+FORESEEN = 6.0  # how long others are expected to go on as they do [s]
+NARROW = 0.35  # a gap to the wall smaller than this lets nobody pass [m]
+REFUGE = 3.0  # how far to look for a place to step aside to [m]
+SPARE = 0.15  # gap left to who passes a robot that has stepped aside [m]
+
+
+# One lane of each side and each place where it goes back; the planned way is the first.
+_LANES = np.array([(side, hold) for side in SIDES for hold in (HOLDS if side else HOLDS[:1])])
+_SIDES, _HOLDS = _LANES.T
+
+
+class Lane(NamedTuple):
+    """A way past those who are near: its points `(n, 2)` [m], and how far to the left [m]."""
+
+    points: Floats
+    side: float
+
+
+class Blocked(NamedTuple):
+    """No lane is free.
+
+    Attributes:
+        by: Who is in the way.
+        distance: How far it is until there [m].
+        gap: The smallest gap to anybody on that lane [m].
+        lane: The lane that leaves the others most room.
+    """
+
+    by: Nearby
+    distance: float
+    gap: float
+    lane: Lane
+
+
+@dataclass(frozen=True)
+class Avoidance:
+    """Finds ways past others.
+
+    Attributes:
+        name: Of this robot.
+        radius: Its own [m].
+        room_at: Distance to the nearest wall at points `(n, 2)` [m].
+    """
+
+    name: str
+    radius: float
+    room_at: Callable[[Floats], Floats]
+
+    def yields_to(self, here: Point, other: Nearby) -> bool:
+        """Whether the other one goes first."""
+        if other.kind == "person":
+            return True
+        room = self.room_at(np.array([here, (other.x, other.y)]))
+        mine, others = room - (self.radius, other.radius) < NARROW
+        if mine != others:
+            return bool(others)
+        return _number(other.name) < _number(self.name)
+
+    def lane(
+        self, route: Route, along: float, here: Point, others: Sequence[Nearby], last: float
+    ) -> Lane | Blocked:
+        """The best free lane ahead, or who is in the way.
+
+        Args:
+            route: The planned way.
+            along: How far one has come on it [m].
+            here: Where one is [m].
+            others: Who is near.
+            last: The side that was chosen before [m].
+        """
+        way = np.arange(0.0, min(AHEAD, route.length - along) + STEP, STEP)
+        base = np.array([route.point_at(along + s) for s in way.tolist()])
+        left = _to_the_left(base)
+        offset = float((np.array(here) - base[0]) @ left[0])
+        if last == 0.0:  # then nothing is better than the planned way
+            points = base + _shifts(way, offset, _SIDES[:1], _HOLDS[:1])[..., None] * left
+            if self._are_free(points, way, here, others)[1].all():
+                return Lane(points[0], 0.0)
+        points = base + _shifts(way, offset, _SIDES, _HOLDS)[..., None] * left
+        walls = self._keeps_to_walls(points, base)
+        gaps, free = self._are_free(points, way, here, others)
+        keep = _keeps(others)
+        cost = np.abs(_SIDES) + TO_THE_LEFT * (_SIDES > 0.0) + CHANGE * np.abs(_SIDES - last)
+        choices = np.flatnonzero((walls & free).all(axis=1))
+        if len(choices):
+            best = int(choices[np.argmin(cost[choices])])
+            return Lane(points[best], float(_SIDES[best]))
+        lack = np.maximum(keep - gaps, 0.0).max(axis=(0, 2))
+        choices = np.flatnonzero(walls.all(axis=1))
+        best = int(choices[np.argmin((lack + 0.05 * cost)[choices])])
+        lane = Lane(points[best], float(_SIDES[best]))
+        return _blocked(others, gaps[:, best], keep[:, 0], way, lane)
+
+    def _keeps_to_walls(self, points: Floats, base: Floats) -> NDArray[np.bool_]:
+        """Where lanes `(k, n, 2)` have room; the planned way has as much as there is."""
+        room = self.room_at(points.reshape(-1, 2)).reshape(points.shape[:2])
+        needed = np.minimum(self.radius + LANE_ROOM, np.maximum(self.room_at(base), self.radius))
+        needed = np.minimum(needed, room[:, :1] + STEP)  # who is too near already may get away
+        kept = room >= needed - 1e-9
+        kept[0] = True
+        return kept
+
+    def _are_free(
+        self, points: Floats, way: Floats, here: Point, others: Sequence[Nearby]
+    ) -> tuple[Floats, NDArray[np.bool_]]:
+        """Gaps to everybody, `(others, k, n)` [m], and where they suffice, `(k, n)`.
+
+        A gap that is too small already may grow.
+        """
+        gaps = np.stack([self._gaps(points, way, here, other) for other in others])
+        enough = gaps >= np.minimum(_keeps(others), gaps[..., :1] - 0.01)
+        return gaps, np.asarray(enough.all(axis=0))
+
+    def _gaps(self, points: Floats, way: Floats, here: Point, other: Nearby) -> Floats:
+        """Gap between surfaces along lanes `(k, n, 2)` [m].
+
+        Who goes first is expected to go on as it does; who does not, to stay where it is.
+        """
+        time = np.minimum(way / PACE, FORESEEN) * self.yields_to(here, other)
+        x, y = other.x + other.vx * time, other.y + other.vy * time
+        gap = np.hypot(points[..., 0] - x, points[..., 1] - y)
+        return np.asarray(gap - self.radius - other.radius)
+
+    def refuge(self, here: Point, route: Floats, others: Sequence[Nearby]) -> Point | None:
+        """The nearest place beside the way where one is in nobody's way; None if there is none.
+
+        Args:
+            here: Where one is [m].
+            route: The way to leave free, shape `(n, 2)` [m].
+            others: Who is near.
+        """
+        rings = np.arange(0.4, REFUGE + 0.1, 0.2)
+        angles = np.arange(24) * (2.0 * math.pi / 24)
+        spokes = np.stack([np.cos(angles), np.sin(angles)], 1)
+        places = (np.array(here) + rings[:, None, None] * spokes).reshape(-1, 2)
+        widest = max(other.radius for other in others)
+        off = _gap_to(places, route) - self.radius - widest
+        good = (off >= SPARE) & (self.room_at(places) >= self.radius + 0.02)
+        for place in places[good]:  # nearest first
+            if self._can_reach(np.array(here), place, others):
+                return float(place[0]), float(place[1])
+        return None
+
+    def _can_reach(self, here: Floats, place: Floats, others: Sequence[Nearby]) -> bool:
+        """Whether the straight way keeps off walls and others."""
+        line = np.linspace(here, place, 2 + int(math.dist(here, place) / 0.1))
+        room = self.room_at(line) - self.radius
+        if (room < min(0.02, float(room[0]) - 0.01)).any():
+            return False
+        for other in others:
+            gap = np.hypot(*(line - (other.x, other.y)).T) - self.radius - other.radius
+            if (gap < min(other.keep, float(gap[0]) - 0.01)).any():
+                return False
+        return True
+
+
+def _blocked(
+    others: Sequence[Nearby], gaps: Floats, keep: Floats, way: Floats, lane: Lane
+) -> Blocked:
+    """Who is in the way first on a lane: gaps `(others, n)` and what to keep `(others, 1)`."""
+    tight = gaps < keep
+    at = np.where(tight.any(axis=1), way[tight.argmax(axis=1)], math.inf)
+    order = np.lexsort((gaps.min(axis=1), at))
+    first = int(order[0])
+    return Blocked(others[first], min(float(at[first]), AHEAD), float(gaps.min()), lane)
+
+
+def pace_among(people: Sequence[Nearby], here: Point, radius: float, speed: float) -> float:
+    """The speed that suits the nearest person: slower from `SOCIAL` on, crawling at `PERSONAL`."""
+    gaps = [math.dist(here, (p.x, p.y)) - radius - p.radius for p in people if p.kind == "person"]
+    share = (min(gaps, default=SOCIAL) - PERSONAL) / (SOCIAL - PERSONAL)
+    return min(speed, CREEP + max(share, 0.0) * max(speed - CREEP, 0.0))
+
+
+def _number(name: str) -> tuple[int, str]:
+    """Orders names such that robot-2 comes before robot-10."""
+    return len(name), name
+
+
+def _to_the_left(points: Floats) -> Floats:
+    """Unit vectors to the left of a line, shape `(n, 2)`."""
+    ahead = np.gradient(points, axis=0) if len(points) > 1 else np.array([[1.0, 0.0]])
+    length = np.maximum(np.hypot(ahead[:, 0], ahead[:, 1]), 1e-9)[:, None]
+    return np.asarray(np.stack([-ahead[:, 1], ahead[:, 0]], 1) / length)
+
+
+def _shifts(way: Floats, offset: float, sides: Floats, holds: Floats) -> Floats:
+    """How far to the left lanes run, from where one is to the side, and back: `(k, n)` [m]."""
+    out = np.minimum(way / RAMP, 1.0)
+    back = np.minimum(np.maximum((way - holds[:, None]) / RAMP, 0.0), 1.0)
+    side = sides[:, None]
+    return np.asarray(offset + (side - offset) * out - side * back)
+
+
+def _keeps(others: Sequence[Nearby]) -> Floats:
+    """What a lane has to keep to each, shape `(others, 1, 1)` [m]."""
+    return np.array([other.keep + LANE_SPARE for other in others])[:, None, None]
+
+
+def _gap_to(places: Floats, line: Floats) -> Floats:
+    """Distance of places `(k, 2)` to the points of a line `(n, 2)` [m]."""
+    difference = places[:, None] - line[None]
+    return np.asarray(np.hypot(difference[..., 0], difference[..., 1]).min(axis=1))

@@ -1,0 +1,80 @@
+"""A robot's battery: what driving and waiting take, what the base gives back."""
+
+from __future__ import annotations
+
+from typing import Annotated, Final
+
+from pydantic import Field
+
+from dva_sim.kernel.config import Config
+
+G: Final = 9.81  # [m/s^2]
+JOULES: Final = 3600.0  # in a watt-hour
+
+
+class BatteryProfile(Config):
+    """What a battery holds and what draws on it; the shipped numbers are assumed.
+
+    Attributes:
+        idle_w: What computer, sensors and radio draw, driving or not.
+        rolling_resistance: Force against rolling by weight.
+        efficiency: Share of the energy taken that reaches the floor.
+        charging_w: What the base gives, besides what is drawn meanwhile.
+
+    References:
+        J. Y. Wong: Theory of Ground Vehicles, 4th ed., Wiley 2008, chapter 1: rolling resistance
+        of car tyres on concrete 0.013. Small wheels roll worse: 0.02 is assumed.
+    """
+
+    capacity_wh: Annotated[float, Field(gt=0)] = 480.0
+    idle_w: Annotated[float, Field(ge=0)] = 60.0
+    rolling_resistance: Annotated[float, Field(ge=0, lt=1)] = 0.02
+    efficiency: Annotated[float, Field(gt=0, le=1)] = 0.7
+    charging_w: Annotated[float, Field(ge=0)] = 120.0
+
+
+class Battery:
+    """The charge of one robot, kept by counters that only grow, so it may be asked seldom.
+
+    Args:
+        profile: What it holds and what draws on it.
+        mass: Of the robot [kg].
+        share: Of the capacity that it begins with.
+
+    Attributes:
+        energy: What it holds [J].
+    """
+
+    def __init__(self, profile: BatteryProfile, mass: float, share: float = 1.0) -> None:
+        self.profile, self._weight = profile, mass * G
+        self._full = profile.capacity_wh * JOULES
+        self.energy = share * self._full
+        self._time = self._distance = self._work = 0.0
+
+    @property
+    def share(self) -> float:
+        """Of the capacity, 0 to 1."""
+        return self.energy / self._full
+
+    @property
+    def empty(self) -> bool:
+        """Whether nothing is left: its robot has no power until it has been charged."""
+        return self.energy <= 0.0
+
+    def advance(self, time: float, distance: float, work: float, at_base: bool) -> None:
+        """Account for what has happened since the last time.
+
+        Braking gives nothing back, and what is empty draws nothing.
+
+        Args:
+            time: Now [s].
+            distance: Driven altogether [m].
+            work: Done by the motors altogether, besides rolling [J].
+            at_base: Whether the robot has stood at a base all that time, and was charged.
+        """
+        spent, rolled, worked = time - self._time, distance - self._distance, work - self._work
+        self._time, self._distance, self._work = time, distance, work
+        profile = self.profile
+        driving = (profile.rolling_resistance * self._weight * rolled + worked) / profile.efficiency
+        gained = profile.charging_w * spent if at_base else -profile.idle_w * spent
+        self.energy = min(max(self.energy + gained - driving, 0.0), self._full)

@@ -1,0 +1,181 @@
+"""Who is near a robot, as far as its sensors can know.
+
+A local loop at the robot that slows before contact: coordinated control.
+
+It never makes a robot faster and never turns it: who drives stays in charge of where to go, and
+can always turn away on the spot. It knows the plan of the site and who is near, and nothing else.
+
+References:
+    T. B. Sheridan: Telerobotics, Automation, and Human Supervisory Control. MIT Press, 1992
+    (direct, coordinated and supervisory control); T. Fong, C. Thorpe, C. Baur: A Safeguarded
+    Teleoperation Controller. IEEE International Conference on Advanced Robotics, 2001.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dva_sim.worlds.physics import PersonBody, World
+from dva_sim.worlds.robot_body import RobotBody
+
+Point = tuple[float, float]
+
+PERSONAL = 0.45  # where personal distance begins: 18 inches [m] (Hall, see `avoidance`)
+KEEP_ROBOT = 0.10  # gap to other robots [m]; assumed
+
+
+class Nearby(NamedTuple):
+    """Somebody in sight and within reach of the robot's sensors.
+
+    Attributes:
+        kind: `robot` or `person`.
+        name: Robots know each other by name; of people it only tells one from the other.
+        x: Where [m].
+        y: The same to the north [m].
+        vx: How fast it goes east [m/s].
+        vy: The same to the north [m/s].
+        radius: Of the circle around it [m].
+        keep: Gap between surfaces that a moving robot keeps to it [m].
+    """
+
+    kind: str
+    name: str
+    x: float
+    y: float
+    vx: float
+    vy: float
+    radius: float
+    keep: float
+
+
+def who_is_near(
+    world: World, body: RobotBody, within: float, sees: Callable[[Point, Point], bool]
+) -> tuple[Nearby, ...]:
+    """Everybody in sight, the nearest first; tracked, so that velocities are known.
+
+    Args:
+        world: As of now.
+        body: Whose sensors look.
+        within: Their reach [m].
+        sees: Whether nothing stands between two places.
+    """
+    here = body.x, body.y
+    found = []
+    for other, _ in world.neighbours(*here, within):
+        if other is not body and sees(here, (other.x, other.y)):
+            person = isinstance(other, PersonBody)
+            kind, keep = ("person", PERSONAL) if person else ("robot", KEEP_ROBOT)
+            found.append(
+                Nearby(kind, other.name, other.x, other.y, *other.velocity, other.radius, keep)
+            )
+    return tuple(found)
+
+
+Floats = NDArray[np.float64]
+
+KEEP_WALL = 0.01  # kept to walls; the grid is on the safe side by up to a cell [m]; assumed
+TIME_TO_CONTACT = 1.0  # speed is scaled so that contact is at least so far off [s]; assumed
+REACTION = 0.35  # until brakes answer: a period of the loop, and the motors' lag [s]; assumed
+STEP = 0.05  # between the samples of an arc [m]
+AWAY = 0.005  # a gap that shrinks by less does not shrink [m]
+SLOWEST = 1e-3  # slower than this is not at all [m/s]
+ROUNDS = 4  # a slower robot turns more sharply: its arc is looked at again so often
+
+
+@dataclass(frozen=True)
+class CollisionGuard:
+    """Scales speed by the clearance ahead along the commanded arc.
+
+    Attributes:
+        radius: Of the robot [m].
+        deceleration: That its brakes hold [m/s^2].
+        room_at: Distance to the nearest wall at points `(n, 2)` [m].
+    """
+
+    radius: float
+    deceleration: float
+    room_at: Callable[[Floats], Floats]
+
+    def limit(
+        self,
+        pose: tuple[float, float, float],
+        speed: float,
+        turn_rate: float,
+        others: Sequence[Nearby] = (),
+    ) -> float:
+        """The speed at which the robot can still stop before contact; never above `speed`.
+
+        Args:
+            pose: Position and heading [m, rad].
+            speed: Asked for [m/s].
+            turn_rate: Asked for; it stays as it is [rad/s].
+            others: Who is near.
+        """
+        for _ in range(ROUNDS):
+            if not speed > SLOWEST:
+                return 0.0
+            reach = max(speed * TIME_TO_CONTACT, self.stopping_distance(speed)) + STEP
+            allowed = self._speed_for(self.free_way(pose, speed, turn_rate, others, reach))
+            if allowed >= speed:
+                return speed
+            speed = allowed
+        return 0.0
+
+    def stopping_distance(self, speed: float) -> float:
+        """From asking for a stop to standing [m]."""
+        return speed * REACTION + speed**2 / (2.0 * self.deceleration)
+
+    def _speed_for(self, free: float) -> float:
+        """The highest speed at which both the brakes and the time to contact suffice [m/s]."""
+        late = self.deceleration * REACTION
+        braking = math.sqrt(late**2 + 2.0 * self.deceleration * free) - late
+        return min(braking, free / TIME_TO_CONTACT)
+
+    def free_way(
+        self,
+        pose: tuple[float, float, float],
+        speed: float,
+        turn_rate: float,
+        others: Sequence[Nearby],
+        reach: float,
+    ) -> float:
+        """How far the robot gets along an arc before it is too near to something [m].
+
+        A gap counts only while it shrinks: what is too near already may be driven away from.
+
+        Args:
+            pose: Position and heading [m, rad].
+            speed: Above 0 [m/s].
+            turn_rate: [rad/s]
+            others: Who is near, where they are now.
+            reach: Look no farther than that [m].
+        """
+        way = np.arange(0.0, reach + STEP, STEP)
+        points = _arc(pose, turn_rate / speed, way)
+        gaps = [(self.room_at(points) - self.radius, KEEP_WALL)]
+        for other in others:
+            gap = np.hypot(points[:, 0] - other.x, points[:, 1] - other.y)
+            gaps.append((gap - self.radius - other.radius, other.keep))
+        stops = [_first(gap < min(keep, float(gap[0]) - AWAY)) for gap, keep in gaps]
+        first = min(stops)
+        return reach if first >= len(way) else float(max(way[first] - STEP, 0.0))
+
+
+def _first(found: NDArray[np.bool_]) -> int:
+    """Place of the first true value; the length if there is none."""
+    at = int(found.argmax())
+    return at if found[at] else len(found)
+
+
+def _arc(pose: tuple[float, float, float], curvature: float, way: Floats) -> Floats:
+    """Points `(n, 2)` along an arc that begins at a pose; `curvature` [1/m], `way` `(n,)` [m]."""
+    x, y, heading = pose
+    half = 0.5 * curvature * way
+    chord = way * np.sinc(half / math.pi)
+    return np.stack([x + chord * np.cos(heading + half), y + chord * np.sin(heading + half)], 1)

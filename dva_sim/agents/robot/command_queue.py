@@ -1,0 +1,219 @@
+"""A robot's computer: one message at a time, each taking its processing time.
+
+How long a robot's computer takes for a message: always the same, or by a law of chance.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping
+from typing import Annotated, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Discriminator, Field, Tag, model_validator
+
+from dva_sim.kernel.clock import Clock
+from dva_sim.kernel.config import Config
+from dva_sim.network.patterns import Answer, Request
+from dva_sim.network.zmtp import Flow
+from dva_sim.protocol.codec import decode
+from dva_sim.protocol.errors import ProtocolError
+from dva_sim.protocol.messages import Emergency
+
+LIMIT = 1000  # ZeroMQ's default high-water mark, in messages
+
+
+class Letter(NamedTuple):
+    """A message that has arrived.
+
+    Attributes:
+        data: Its bytes.
+        arrived: When [s].
+        answer: Takes the reply; None if nobody waits for one.
+        sender: Whose key it came by, if keys are used.
+    """
+
+    data: bytes
+    arrived: float
+    answer: Answer | None
+    sender: str | None
+
+
+class Inbox:
+    """First come, first served within a class; emergencies before control before commands.
+
+    Args:
+        clock: The run's clock.
+        service: Gives the time that the next message takes [s].
+        handle: Takes each letter when its processing is done.
+        latest_wins: Keep only the newest waiting command, as a subscriber that drains its
+            socket before it works does.
+        limit: How many messages of a class may wait.
+
+    Attributes:
+        flow: Where published commands come from, if it can be told to wait: then a full inbox
+            takes nothing more until half of it is done. What cannot wait is dropped.
+    """
+
+    def __init__(
+        self,
+        clock: Clock,
+        service: Callable[[], float],
+        handle: Callable[[Letter], object],
+        latest_wins: bool,
+        limit: int = LIMIT,
+    ) -> None:
+        self._clock, self._service, self._handle = clock, service, handle
+        self._latest_wins, self._limit = latest_wins, limit
+        self.flow: Flow | None = None
+        self._paused = False
+        self._emergencies: deque[Letter] = deque()
+        self._control: deque[Letter] = deque()
+        self._commands: deque[Letter] = deque()
+        self._busy = False
+        self.longest = self.superseded = self.overflowed = 0
+
+    def request(self, request: Request) -> None:
+        """A request has arrived; somebody waits for the answer.
+
+        Only what calls itself an emergency is validated here, so that nothing else overtakes;
+        the rest is when its turn comes.
+        """
+        data = request.data
+        queue = self._control
+        if b"<EmergencyMsg" in data and _is_emergency(data):
+            queue = self._emergencies
+        elif b"<SetTeleOp>" in data:
+            queue = self._commands
+        self._put(queue, Letter(data, self._clock.now, request.answer, request.sender))
+
+    def published(self, data: bytes) -> None:
+        """A command has arrived that nobody waits to be answered."""
+        if self._latest_wins:
+            self.superseded += self.forget_published()
+        self._put(self._commands, Letter(data, self._clock.now, None, None))
+        if self.flow is not None and len(self._commands) >= self._limit:
+            self._paused = True
+            self.flow.pause()
+
+    def forget_published(self) -> int:
+        """Drop the published commands that wait: how many those were."""
+        before = len(self._commands)
+        if before:
+            asked = [letter for letter in self._commands if letter.answer is not None]
+            self._commands = deque(asked)
+        return before - len(self._commands)
+
+    def _put(self, queue: deque[Letter], letter: Letter) -> None:
+        if len(queue) >= self._limit:
+            self.overflowed += 1
+            return
+        queue.append(letter)
+        if len(queue) > self.longest:
+            self.longest = len(queue)
+        if not self._busy:
+            self._work()
+
+    def _work(self) -> None:
+        """Take the next letter; where processing takes no time, all of them."""
+        while queue := self._emergencies or self._control or self._commands:
+            self._busy = True
+            letter = queue.popleft()
+            if self._paused:
+                self._take_more()
+            duration = self._service()
+            if duration > 0.0:
+                self._clock.call_after(duration, self._done, letter)
+                return
+            self._handle(letter)
+        self._busy = False
+
+    def _take_more(self) -> None:
+        """Let published commands come again once half of the inbox is done."""
+        if self.flow is not None and len(self._commands) <= self._limit // 2:
+            self._paused = False
+            self.flow.resume()
+
+    def _done(self, letter: Letter) -> None:
+        self._handle(letter)
+        self._work()
+
+
+def _is_emergency(data: bytes) -> bool:
+    try:
+        return isinstance(decode(data).body, Emergency)
+    except ProtocolError:
+        return False
+
+
+BLOCK = 256  # draws made at once
+
+
+class ServiceLaw(Config):
+    """A law of service times.
+
+    Attributes:
+        law: `constant`, `exponential`, `lognormal` or `gamma`.
+        mean_s: Of all messages but the first.
+        cv: Standard deviation over mean; of a lognormal or gamma law only.
+        first_s: What the first message takes (a cold start); left out: as the others.
+    """
+
+    law: Literal["constant", "exponential", "lognormal", "gamma"]
+    mean_s: Annotated[float, Field(gt=0, le=10)]
+    cv: Annotated[float, Field(ge=0.001, le=10)] | None = None
+    first_s: Annotated[float, Field(ge=0, le=60)] | None = None
+
+    @model_validator(mode="after")
+    def _spread(self) -> ServiceLaw:
+        spreads = self.law in ("lognormal", "gamma")
+        if spreads and self.cv is None:
+            raise ValueError(f"the {self.law} law needs cv")
+        if not spreads and self.cv is not None:
+            raise ValueError(f"the {self.law} law has no cv of its own")
+        return self
+
+    def sample(self, rng: np.random.Generator, count: int) -> NDArray[np.float64]:
+        """That many draws [s], shape `(count,)`."""
+        if self.law == "exponential":
+            return self.mean_s * rng.standard_exponential(count)
+        if self.cv is None:
+            return np.full(count, self.mean_s)
+        if self.law == "gamma":
+            shape = self.cv**-2
+            return self.mean_s / shape * rng.standard_gamma(shape, count)
+        spread = math.sqrt(math.log1p(self.cv**2))
+        draws = np.exp(spread * rng.standard_normal(count) - 0.5 * spread**2)
+        return np.asarray(self.mean_s * draws)
+
+
+def _form(value: object) -> str:
+    return "a law" if isinstance(value, Mapping | ServiceLaw) else "seconds"
+
+
+Service = Annotated[
+    Annotated[float, Field(ge=0, le=10), Tag("seconds")] | Annotated[ServiceLaw, Tag("a law")],
+    Discriminator(_form),
+]
+"""In a configuration file: a number of seconds, or a law."""
+
+
+def mean_of(service: float | ServiceLaw) -> float:
+    """Mean service time of all messages but the first [s]."""
+    return service.mean_s if isinstance(service, ServiceLaw) else service
+
+
+def service_times(service: float | ServiceLaw, rng: np.random.Generator) -> Callable[[], float]:
+    """What gives the service time of each message [s], one after the other."""
+    if isinstance(service, ServiceLaw):
+        return _draws(service, rng).__next__
+    return lambda: service
+
+
+def _draws(law: ServiceLaw, rng: np.random.Generator) -> Iterator[float]:
+    if law.first_s is not None:
+        yield law.first_s
+    while True:
+        yield from law.sample(rng, BLOCK).tolist()

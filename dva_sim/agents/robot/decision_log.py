@@ -1,0 +1,148 @@
+"""What a robot's controller was told and what it decided: kept as lines of JSON, and replayed."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from dva_sim.agents.robot.controller import Decision, Limits, RobotController, SetPoint
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.protocol import messages as m
+from dva_sim.protocol.codec import decode, encode
+from dva_sim.protocol.errors import ProtocolError
+
+LEASE_ENDS, MISSION_ENDS = "lease ends", "mission ends"
+
+
+class Trace:
+    """Writes what one controller decides; each line is on disk before the next decision.
+
+    Args:
+        path: The file; its folder must be there.
+        controller: Whose decisions these will be.
+    """
+
+    def __init__(self, path: Path, controller: RobotController) -> None:
+        self._file = path.open("w", encoding="utf-8", buffering=1)
+        start = {
+            "robot": controller.id_tag,
+            "dva": controller.dva,
+            "limits": asdict(controller.limits),
+            "camera_url": controller.camera_url,
+            "sensors": [asdict(sensor) for sensor in controller.sensors],
+            "clock_offset": controller.clock_offset,
+        }
+        self._write(start)
+
+    def decided(
+        self, message: m.Message, arrived: float, now: float, moving: bool, decision: Decision
+    ) -> None:
+        """A message was decided on; arguments as of `RobotController.handle`."""
+        told = {"arrived": arrived, "now": now, "moving": moving}
+        self._write({"message": encode(message).decode(), **told, **_as_data(decision)})
+
+    def happened(self, what: str, now: float) -> None:
+        """Time or the world changed the mode: `LEASE_ENDS` or `MISSION_ENDS`."""
+        self._write({"happened": what, "now": now})
+
+    def close(self) -> None:
+        """Nothing more will be decided."""
+        self._file.close()
+
+    def _write(self, data: dict[str, Any]) -> None:
+        self._file.write(json.dumps(data) + "\n")
+
+
+def _as_data(decision: Decision) -> dict[str, Any]:
+    point = decision.set_point
+    return {
+        "code": decision.code,
+        "text": decision.text,
+        "set_point": None if point is None else list(point),
+    }
+
+
+def replay(path: Path) -> Iterator[tuple[m.Message, Decision, Decision]]:
+    """Ask a fresh controller the same again.
+
+    Yields:
+        Each message, what was decided then, and what is decided now (reply contents left out).
+
+    Raises:
+        ConfigError: the file cannot be read or is no trace, or its last line is not whole.
+    """
+    try:
+        lines = path.read_bytes().splitlines()
+    except OSError as error:
+        raise ConfigError(f"cannot be read: {error.strerror}", path) from error
+    controller: RobotController | None = None
+    for number, line in enumerate(lines or [b""], 1):
+        try:
+            entry = json.loads(line)
+            if controller is None:
+                controller, asked = _controller(entry), None
+            else:
+                asked = _again(controller, entry)
+        except _BROKEN as error:
+            problem = f"is no line of a robot's trace: {_in_words(error)}"
+            raise ConfigError(problem, path, number) from error
+        if asked is not None:
+            yield asked
+
+
+_BROKEN = ValueError, KeyError, TypeError, RecursionError, ProtocolError
+
+
+def _in_words(error: Exception) -> str:
+    if isinstance(error, KeyError):
+        return f"{error} is missing"
+    return error.msg if isinstance(error, json.JSONDecodeError) else str(error)
+
+
+def _controller(start: dict[str, Any]) -> RobotController:
+    return RobotController(
+        start["robot"],
+        start["dva"],
+        Limits(**start["limits"]),
+        camera_url=start["camera_url"],
+        sensors=tuple(m.Sensor(**sensor) for sensor in start["sensors"]),
+        clock_offset=start["clock_offset"],
+    )
+
+
+def _again(
+    controller: RobotController, entry: dict[str, Any]
+) -> tuple[m.Message, Decision, Decision] | None:
+    """Let it happen once more; a message, and what is decided about it then and now."""
+    if "message" in entry:
+        return _ask_again(controller, entry)
+    now, happened = _value(entry, "now", float, int), _value(entry, "happened", str)
+    if happened == LEASE_ENDS:
+        controller.expire(now)
+    elif happened == MISSION_ENDS:
+        controller.mission_stands("done", 0, "")
+    else:
+        raise ValueError(f"{happened!r} does not happen to a robot")
+    return None
+
+
+def _ask_again(
+    controller: RobotController, entry: dict[str, Any]
+) -> tuple[m.Message, Decision, Decision]:
+    message = decode(_value(entry, "message", str).encode())
+    arrived, time = (_value(entry, name, float, int) for name in ("arrived", "now"))
+    code, text = _value(entry, "code", int), _value(entry, "text", str)
+    point = _value(entry, "set_point", list, type(None))
+    then = Decision(code, text, None if point is None else SetPoint(*point))
+    now = controller.handle(message, arrived, time, _value(entry, "moving", bool))
+    return message, then, now._replace(content=None)
+
+
+def _value(entry: dict[str, Any], name: str, *types: type) -> Any:
+    value = entry[name]
+    if not isinstance(value, types):
+        raise TypeError(f"{name} is {value!r}")
+    return value

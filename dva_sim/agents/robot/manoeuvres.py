@@ -1,0 +1,248 @@
+"""Short things that a robot on a mission does between two pieces of its way.
+
+Looking at the place of an event: from where, which way, and for how long.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dva_sim.agents.operator.strategies import Intent
+from dva_sim.agents.robot.camera import Observation, SeenHazard
+from dva_sim.agents.robot.collision_guard import CollisionGuard, Nearby
+from dva_sim.agents.route_following import wrap
+
+Floats = NDArray[np.float64]
+Point = tuple[float, float]
+
+STAND = Intent(0.0, 0.0)
+GAIN = 2.0  # of turning towards a heading [1/s]
+FACING = 0.1  # nearer than this one faces it [rad]
+SLOWLY = 0.25  # speed of manoeuvres [m/s]; assumed
+GET_AWAY = 0.5  # way driven after a jam before planning anew [m]; assumed
+HEADINGS = 16  # looked at for a way out
+TRIED = 0.5  # a heading so near one that did not help is not tried again [rad]
+THERE = 0.15  # a place beside the way is reached from here [m]
+FREE_FOR = 1.0  # the way must be free for so long before a robot goes on [s]; assumed
+LONGEST_RECOVERY, LONGEST_ASIDE = 12.0, 30.0  # [s]; assumed
+STILL, NOBODY_MOVES = 0.05, 4.0  # who stands [m/s] for so long will not pass [s]; assumed
+PASSED = 0.10  # gap left between the way and who has passed [m]
+
+
+class Seen(NamedTuple):
+    """What a robot knows at a moment, by its sensors and its map.
+
+    Attributes:
+        now: [s]
+        view: Where it is, and what is in its picture.
+        nearby: Who is in sight and within reach.
+        jammed: Whether it drives against something and does not move.
+        charge: Share of its battery's charge that is left.
+    """
+
+    now: float
+    view: Observation
+    nearby: tuple[Nearby, ...] = ()
+    jammed: bool = False
+    charge: float = 1.0
+
+    @property
+    def here(self) -> Point:
+        """Where it is [m]."""
+        return self.view.x, self.view.y
+
+
+def turn_to(view: Observation, heading: float, most: float) -> Intent:
+    """Turn on the spot towards a heading, no faster than `most` [rad/s]."""
+    error = wrap(heading - view.heading)
+    return Intent(0.0, min(max(GAIN * error, -most), most))
+
+
+class Manoeuvre:
+    """Something that ends by itself.
+
+    Attributes:
+        state: Of the mission meanwhile.
+        reason: In words.
+    """
+
+    state: str
+    reason: str
+
+    def step(self, seen: Seen) -> Intent | None:
+        """What to do now; None when it is over."""
+        raise NotImplementedError
+
+
+class Recovery(Manoeuvre):
+    """Out of a jam: turn on the spot to where the way is free, and drive off a little.
+
+    Args:
+        seen: The moment of the jam.
+        guard: Knows what is free.
+        most_turn: Highest turn rate [rad/s].
+        tried: Headings that did not help [rad].
+    """
+
+    state, reason = "replanning", "jammed"
+
+    def __init__(
+        self, seen: Seen, guard: CollisionGuard, most_turn: float, tried: Sequence[float]
+    ) -> None:
+        self._guard, self._turn, self._until = guard, most_turn, seen.now + LONGEST_RECOVERY
+        self._start, self._turned = seen.here, False
+        self.heading = self._way_out(seen, tried)
+
+    def _way_out(self, seen: Seen, tried: Sequence[float]) -> float:
+        """The freest heading; the less to turn, the better where several are free."""
+
+        def worth(heading: float) -> float:
+            pose = (*seen.here, heading)
+            free = self._guard.free_way(pose, SLOWLY, 0.0, seen.nearby, 2 * GET_AWAY)
+            again = any(abs(wrap(heading - other)) < TRIED for other in tried)
+            return free - 0.1 * abs(wrap(heading - seen.view.heading)) - 5.0 * again
+
+        turns = [2.0 * math.pi * number / HEADINGS for number in range(1, HEADINGS)]
+        return max((seen.view.heading + turn for turn in turns), key=worth)
+
+    def step(self, seen: Seen) -> Intent | None:
+        """Turn, then drive; over when far enough away, or when it takes too long."""
+        if seen.now > self._until or math.dist(seen.here, self._start) > GET_AWAY:
+            return None
+        self._turned = self._turned or abs(wrap(self.heading - seen.view.heading)) < FACING
+        turn = turn_to(seen.view, self.heading, self._turn)
+        return Intent(SLOWLY, turn.turn_rate) if self._turned else turn
+
+
+class Aside(Manoeuvre):
+    """Out of the way: drive to a place beside it and wait until the others have passed.
+
+    Args:
+        seen: The moment it begins.
+        place: Where to wait [m].
+        way: What to leave free, shape `(n, 2)` [m].
+        radius: Of the robot [m].
+        most_turn: Highest turn rate [rad/s].
+    """
+
+    state, reason = "waiting", "somebody is in the way"
+
+    def __init__(
+        self, seen: Seen, place: Point, way: Floats, radius: float, most_turn: float
+    ) -> None:
+        self._place, self._way, self._radius = place, way, radius
+        self._turn, self._until = most_turn, seen.now + LONGEST_ASIDE
+        self._arrived, self._free_since, self._moved = False, math.inf, seen.now
+
+    def step(self, seen: Seen) -> Intent | None:
+        """Drive there, stand, and go on when the way has been free for a moment."""
+        self._free_since = min(self._free_since, seen.now) if self._is_free(seen) else math.inf
+        if any(math.hypot(other.vx, other.vy) > STILL for other in seen.nearby):
+            self._moved = seen.now
+        stays = self._arrived and seen.now - self._moved > NOBODY_MOVES
+        if seen.now - self._free_since >= FREE_FOR or seen.now > self._until or stays:
+            return None
+        self._arrived = self._arrived or math.dist(seen.here, self._place) < THERE
+        if self._arrived:
+            return Intent(0.0, 0.0)
+        x, y = self._place
+        bearing = math.atan2(y - seen.view.y, x - seen.view.x)
+        turn = turn_to(seen.view, bearing, self._turn)
+        return turn if abs(wrap(bearing - seen.view.heading)) > 0.3 else turn._replace(speed=SLOWLY)
+
+    def _is_free(self, seen: Seen) -> bool:
+        """Whether nobody is on the way ahead, or will be in a moment."""
+        for other in seen.nearby:
+            for ahead in (0.0, 1.0, 2.0):
+                x, y = other.x + ahead * other.vx, other.y + ahead * other.vy
+                gap = float(np.hypot(*(self._way - (x, y)).T).min())
+                if gap < self._radius + other.radius + PASSED:
+                    return False
+        return True
+
+
+IN_VIEW = "in view"  # so ends what a robot says while it looks at a place
+LOOK_FROM = 4.0  # an event in view no farther than this is looked at from here [m]; assumed
+KEEP_OFF = 1.2  # from here the place is looked at, whatever is in view [m]
+MATCH_WITHIN = 4.0  # a hazard so near the place is the one to look at [m]
+FIRST_LOOK = 3.0  # with nothing in view for so long, it looks all around [s]; assumed
+LOOK_AROUND = 0.4  # turn rate meanwhile [rad/s]; assumed
+INSPECT_FOR = 120.0  # an inspection that nobody ends is done after this [s]; assumed
+
+
+class Inspection:
+    """Looks at one place.
+
+    Args:
+        event: Kind of the event.
+        place: Where it is said to be [m].
+        sees: Whether nothing stands between two places.
+        most_turn: Highest turn rate [rad/s].
+    """
+
+    def __init__(
+        self,
+        event: str,
+        place: Point,
+        sees: Callable[[Point, Point], bool],
+        most_turn: float,
+    ) -> None:
+        self._event, self._place, self._sees, self._most = event, place, sees, most_turn
+        self._since = self._nothing_since = math.inf
+        self._turned, self._heading = 0.0, 0.0
+
+    def begins(self, seen: Seen) -> bool:
+        """Whether the robot is where it can look from; from then on it is."""
+        if self._since == math.inf and self._is_at_view(seen):
+            self._since = seen.now
+        return self._since < math.inf
+
+    def is_over(self, seen: Seen) -> bool:
+        """Whether it has looked for long enough."""
+        return seen.now - self._since > INSPECT_FOR
+
+    def finding(self, seen: Seen) -> str:
+        """What is in view, in words."""
+        what = self._event.replace("_", " ") if self._in_view(seen) else "nothing"
+        return f"{what} {IN_VIEW}"
+
+    def step(self, seen: Seen) -> Intent:
+        """Face the event; with nothing in view, first its place, then all around, once."""
+        event = self._in_view(seen)
+        if event is not None:
+            self._nothing_since = math.inf
+            return self._face(seen, (event.x, event.y))
+        self._nothing_since = min(self._nothing_since, seen.now)
+        if seen.now - self._nothing_since < FIRST_LOOK:
+            self._heading = seen.view.heading
+            return self._face(seen, self._place)
+        self._turned += abs(seen.view.heading - self._heading)
+        self._heading = seen.view.heading
+        return STAND if self._turned > 2.0 * math.pi else Intent(0.0, LOOK_AROUND)
+
+    def _is_at_view(self, seen: Seen) -> bool:
+        event = self._in_view(seen)
+        if event is not None and event.distance <= LOOK_FROM:
+            return True
+        near = math.dist(seen.here, self._place) < KEEP_OFF
+        return near and self._sees(seen.here, self._place)
+
+    def _in_view(self, seen: Seen) -> SeenHazard | None:
+        """The event, if it is in the picture."""
+        found = [
+            h
+            for h in seen.view.hazards
+            if h.kind == self._event and math.dist((h.x, h.y), self._place) < MATCH_WITHIN
+        ]
+        return min(found, key=lambda h: h.distance, default=None)
+
+    def _face(self, seen: Seen, place: Point) -> Intent:
+        bearing = math.atan2(place[1] - seen.view.y, place[0] - seen.view.x)
+        if abs(wrap(bearing - seen.view.heading)) < FACING:
+            return STAND
+        return turn_to(seen.view, bearing, self._most)

@@ -1,0 +1,336 @@
+"""What a robot is sent to do, in metres, and how it drives when nobody else does.
+
+Missions: how a robot gets somewhere by itself, and what it does about who is in the way.
+
+Pure: it is told what the robot knows at a moment, and says how to move and how the mission stands.
+The rules, in the order in which they are asked:
+
+1. A battery that is nearly empty ends any mission but the way home.
+2. Who is jammed turns to where it is free, drives off a little, and takes another way; after
+   `MOST_JAMS` times without having reached a place in between, the mission fails.
+3. Past people and other robots it goes in a free lane (`avoidance`), slower beside people.
+4. Where no lane is free it stops short. Who has to let the other one go first steps aside until the
+   other has passed. Who is still blocked after `AROUND_AFTER` looks for a way around everybody in
+   sight, now and then; beside people who do not move it squeezes past after `SQUEEZE_AFTER`;
+   after `GIVE_UP_AFTER` there is no way.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from dva_sim.agents.operator.person import Population, median_person
+from dva_sim.agents.operator.strategies import Intent, Pursuit, Reach, View
+from dva_sim.agents.robot.avoidance import SQUEEZE, Avoidance, Blocked, pace_among
+from dva_sim.agents.robot.collision_guard import CollisionGuard, Nearby
+from dva_sim.agents.robot.controller import Mission
+from dva_sim.agents.robot.manoeuvres import STAND, Aside, Inspection, Manoeuvre, Recovery, Seen
+from dva_sim.agents.route_following import Route
+from dva_sim.protocol import messages as m
+from dva_sim.worlds.planning import Disc, Planner
+
+Point = tuple[float, float]
+
+# The robot's own loop has no delay to speak of: a brisk, steady driver.
+AUTOPILOT = replace(median_person(Population()), crossover=2.0, pace=1.0)
+
+
+@dataclass(frozen=True)
+class Errand:
+    """A mission in metres.
+
+    Attributes:
+        goals: Places of a lap, in order [m].
+        laps: How many; 0: without end.
+        event: Kind of the event to be looked at, if there is one.
+        home: Whether it is the way home.
+    """
+
+    goals: tuple[Point, ...]
+    laps: int = 1
+    event: str | None = None
+    home: bool = False
+
+    @classmethod
+    def of(cls, mission: Mission, to_xy: Callable[[float, float], Point], base: Point) -> Errand:
+        """The errand that a message asks for; `base` is the robot's own [m]."""
+        match mission:
+            case m.Inspect():
+                place = to_xy(mission.position.latitude, mission.position.longitude)
+                return cls((place,), event=mission.kind)
+            case m.ReturnToBase():
+                return cls((base,), home=True)
+        goals = tuple(to_xy(p.latitude, p.longitude) for p in mission.waypoints)
+        return cls(goals, mission.laps if isinstance(mission, m.Patrol) else 1)
+
+
+PERIOD = 0.1  # of the robot's own loop [s]
+NEAR = 0.3  # a waypoint counts as reached from here [m]
+CLOSE_BY = 1.8  # and from here if somebody stands on it [m]
+RESERVE = 0.05  # charge below which a robot only goes home; assumed
+MOST_JAMS = 3  # recoveries between two waypoints; assumed
+NO_PROGRESS = 15.0  # on the way without getting on for so long is a jam, too [s]; assumed
+STOP_SHORT = 1.0  # way left free before who is in the way [m]; assumed
+STILL = 0.05  # who is slower stands [m/s]
+SAY_AFTER = 0.5  # [s]; assumed, as all of these
+ASIDE_AFTER = 1.0  # [s]
+AROUND_AFTER, AROUND_AGAIN = 4.0, 6.0  # [s]
+AROUND = 0.08  # a way around somebody keeps so much more [m]
+SQUEEZE_AFTER = 10.0  # [s]
+GIVE_UP_AFTER = 60.0  # [s]
+
+
+class Step(NamedTuple):
+    """What follows: how to move, and how the mission stands, as in `MissionStatus`."""
+
+    intent: Intent
+    state: str
+    left: int
+    reason: str = ""
+
+
+class Pilot:
+    """Drives one mission.
+
+    Args:
+        errand: Where to.
+        planner: The robot's map.
+        guard: Keeps it from driving into anything; knows its radius.
+        name: Of the robot.
+        reach: Its top speed and highest turn rate.
+        turning_radius: Of its sharpest curve [m]; 0: it turns on the spot.
+    """
+
+    def __init__(
+        self,
+        errand: Errand,
+        planner: Planner,
+        guard: CollisionGuard,
+        name: str,
+        reach: Reach,
+        turning_radius: float = 0.0,
+    ) -> None:
+        self._errand, self._planner, self._guard, self._reach = errand, planner, guard, reach
+        self._radius, self._sharpest = guard.radius, turning_radius
+        self._avoidance = Avoidance(name, guard.radius, planner.room_at)
+        self._driver = Pursuit(AUTOPILOT, reach)
+        self._inspection = self._make_inspection()
+        self._reached = 0  # waypoints so far
+        self._squeezing = False
+        self._begin_leg()
+
+    def _make_inspection(self) -> Inspection | None:
+        event, place = self._errand.event, self._errand.goals[0]
+        if event is None:
+            return None
+        return Inspection(event, place, self._planner.line_of_sight, self._reach.turn_rate)
+
+    def _begin_leg(self) -> None:
+        self._route: Route | None = None
+        self._manoeuvre: Manoeuvre | None = None
+        self._closed: list[Disc] = []
+        self._tried: list[float] = []
+        self._side, self._jams = 0.0, 0
+        self._blocked_since, self._looked_around = math.inf, -math.inf
+        self._left_aside: str | None = None
+        self._moved = -math.inf  # when who is in the way was last seen to move [s]
+        self._progress = (math.inf, math.inf)  # the shortest way left [m], and since when [s]
+
+    def step(self, seen: Seen) -> Step:
+        """What to do now."""
+        if seen.charge < RESERVE and not self._errand.home:
+            return self._end("failed", "battery")
+        seen = self._with_patience(seen)
+        if seen.jammed and not isinstance(self._manoeuvre, Recovery):
+            return self._jam(seen)
+        if self._manoeuvre is not None:
+            return self._go_on_with(self._manoeuvre, seen)
+        if self._inspection is not None and self._inspection.begins(seen):
+            return self._look(seen, self._inspection)
+        return self._travel(seen)
+
+    # --- words -------------------------------------------------------------------------
+
+    @property
+    def _goal(self) -> Point:
+        return self._errand.goals[self._reached % len(self._errand.goals)]
+
+    @property
+    def _left(self) -> int:
+        """Places of the present lap still to be visited."""
+        return len(self._errand.goals) - self._reached % len(self._errand.goals)
+
+    def _end(self, state: str, reason: str = "") -> Step:
+        return Step(STAND, state, 0 if state == "done" else self._left, reason)
+
+    def _move(self, seen: Seen, intent: Intent, state: str, reason: str = "") -> Step:
+        """Go, but never into anything, and gently beside people."""
+        pose = (*seen.here, seen.view.heading)
+        speed = pace_among(seen.nearby, seen.here, self._radius, intent.speed)
+        speed = self._guard.limit(pose, speed, intent.turn_rate, seen.nearby)
+        return Step(Intent(speed, intent.turn_rate), state, self._left, reason)
+
+    # --- on the way --------------------------------------------------------------------
+
+    def _travel(self, seen: Seen) -> Step:
+        route = self._route or self._plan(seen)
+        if route is None:
+            return self._end("failed", "no way")
+        left = route.ahead(seen.view.x, seen.view.y, seen.view.heading, 0.5).remaining
+        if left < NEAR:
+            return self._arrive()
+        if self._gets_nowhere(seen, left):
+            return self._jam(seen)
+        if not seen.nearby:
+            self._blocked_since = math.inf
+            return self._move(seen, self._drive(route, seen), "under_way")
+        along = route.length - left
+        lane = self._avoidance.lane(route, along, seen.here, seen.nearby, self._side)
+        if isinstance(lane, Blocked):
+            return self._wait(seen, route, along, lane)
+        self._side, self._blocked_since = lane.side, math.inf
+        return self._move(seen, self._drive(Route(lane.points), seen), "under_way")
+
+    def _drive(self, route: Route, seen: Seen) -> Intent:
+        """Along a way; a car drives its sharpest curve where others turn on the spot."""
+        speed, turn_rate = self._driver.drive(route, View(seen.now, seen.view, PERIOD), NEAR)
+        return Intent(
+            max(speed, min(abs(turn_rate) * self._sharpest, self._reach.speed)), turn_rate
+        )
+
+    def _plan(self, seen: Seen) -> Route | None:
+        points = self._planner.path(seen.here, self._goal, self._closed)
+        if points is None and self._closed:
+            self._closed = []
+            points = self._planner.path(seen.here, self._goal)
+        self._route = None if points is None else Route(points)
+        self._progress = math.inf, math.inf
+        return self._route
+
+    def _arrive(self) -> Step:
+        self._reached += 1
+        laps, goals = self._errand.laps, len(self._errand.goals)
+        if laps and self._reached >= laps * goals:
+            return self._end("done")
+        self._begin_leg()
+        return Step(STAND, "under_way", self._left)
+
+    def _gets_nowhere(self, seen: Seen, left: float) -> bool:
+        best, since = self._progress
+        if left < best - 0.1 or self._blocked_since < math.inf:
+            self._progress = min(left, best), seen.now
+            return False
+        return seen.now - since > NO_PROGRESS
+
+    def _look(self, seen: Seen, inspection: Inspection) -> Step:
+        """Face the event and wait for somebody who says what next."""
+        finding = inspection.finding(seen)
+        if inspection.is_over(seen):
+            return self._end("done", finding)
+        return self._move(seen, inspection.step(seen), "waiting", finding)
+
+    # --- in the way --------------------------------------------------------------------
+
+    def _with_patience(self, seen: Seen) -> Seen:
+        """Who has waited for long goes nearer to people, until none is in sight."""
+        waited = seen.now - self._blocked_since > SQUEEZE_AFTER
+        people = any(o.kind == "person" for o in seen.nearby)
+        self._squeezing = people and (self._squeezing or waited)
+        if not self._squeezing:
+            return seen
+        closer = tuple(o._replace(keep=min(o.keep, SQUEEZE)) for o in seen.nearby)
+        return seen._replace(nearby=closer)
+
+    def _wait(self, seen: Seen, route: Route, along: float, blocked: Blocked) -> Step:
+        """Stop short; then step aside, or look for a way around, or give up."""
+        self._blocked_since = min(self._blocked_since, seen.now)
+        waited = seen.now - self._blocked_since
+        if math.hypot(blocked.by.vx, blocked.by.vy) > STILL:
+            self._moved = seen.now
+        if waited > GIVE_UP_AFTER:
+            return self._end("failed", "no way")
+        if waited > SAY_AFTER and self._is_taken(route.length - along, blocked.by):
+            return self._arrive()
+        crowded, person = blocked.gap < SQUEEZE, blocked.by.kind == "person"
+        if waited > ASIDE_AFTER and crowded and not person and self._lets_pass(seen, blocked.by):
+            aside = self._step_aside(seen, route, along, blocked.by)
+            if aside is not None:
+                return aside
+        stands = seen.now - max(self._moved, self._blocked_since) > AROUND_AFTER
+        if stands and seen.now - self._looked_around > AROUND_AGAIN:
+            around = self._way_around(seen)
+            if around is not None:
+                return around
+        intent = self._drive(Route(blocked.lane.points), seen)
+        # People are walked past if there is room at all: turning aside takes longer than they do.
+        apart = math.dist(seen.here, (blocked.by.x, blocked.by.y)) if person else blocked.distance
+        short = max(apart - STOP_SHORT, 0.0) / 2.0 if crowded else math.inf
+        speed = min(intent.speed, short)
+        turn = intent.turn_rate * (speed / intent.speed if intent.speed else 1.0)
+        if waited < SAY_AFTER:
+            return self._move(seen, Intent(speed, turn), "under_way")
+        what = "a person" if person else "a robot"
+        return self._move(seen, Intent(speed, turn), "waiting", f"{what} is in the way")
+
+    def _is_taken(self, left: float, other: Nearby) -> bool:
+        """Whether somebody stands where one wants to go, and one is as near as can be."""
+        stands = math.hypot(other.vx, other.vy) < STILL
+        gap = math.dist((other.x, other.y), self._goal) - other.radius
+        return stands and left < CLOSE_BY and gap < self._radius + other.keep
+
+    def _lets_pass(self, seen: Seen, other: Nearby) -> bool:
+        """Whether to step aside: once for each who goes first and does not go away."""
+        x, y = seen.here
+        apart = math.dist(seen.here, (other.x, other.y))
+        goes_away = (other.vx * (other.x - x) + other.vy * (other.y - y)) > 0.05 * apart
+        first = self._avoidance.yields_to(seen.here, other)
+        can = self._sharpest == 0.0 and self._left_aside != other.name
+        return can and first and not goes_away
+
+    def _step_aside(self, seen: Seen, route: Route, along: float, other: Nearby) -> Step | None:
+        way = np.array([route.point_at(along + s) for s in np.arange(-1.0, 6.0, 0.2).tolist()])
+        place = self._avoidance.refuge(seen.here, way, seen.nearby)
+        self._left_aside = other.name
+        if place is None:
+            return None
+        self._manoeuvre = Aside(seen, place, way, self._radius, self._reach.turn_rate)
+        return self._go_on_with(self._manoeuvre, seen)
+
+    def _way_around(self, seen: Seen) -> Step | None:
+        """Plan anew with everybody in sight as part of the map."""
+        self._looked_around, before = seen.now, self._closed
+        self._closed = [Disc(o.x, o.y, o.radius + o.keep + AROUND) for o in seen.nearby]
+        points = self._planner.path(seen.here, self._goal, self._closed)
+        if points is None:
+            self._closed = before
+            return None
+        self._route = Route(points)
+        self._progress = math.inf, math.inf
+        return Step(STAND, "replanning", self._left, "the way is closed")
+
+    # --- jams --------------------------------------------------------------------------
+
+    def _jam(self, seen: Seen) -> Step:
+        self._jams += 1
+        if self._jams > MOST_JAMS:
+            return self._end("failed", "jammed")
+        heading = seen.view.heading
+        nose = self._radius + 0.1
+        x, y = seen.view.x + nose * math.cos(heading), seen.view.y + nose * math.sin(heading)
+        self._closed.append(Disc(x, y, 0.1))
+        recovery = Recovery(seen, self._guard, self._reach.turn_rate, [heading, *self._tried])
+        self._tried.append(recovery.heading)
+        self._manoeuvre = recovery
+        return self._go_on_with(recovery, seen)
+
+    def _go_on_with(self, manoeuvre: Manoeuvre, seen: Seen) -> Step:
+        intent = manoeuvre.step(seen)
+        if intent is None:
+            self._manoeuvre, self._route = None, None
+            return Step(STAND, "under_way", self._left)
+        return self._move(seen, intent, manoeuvre.state, manoeuvre.reason)

@@ -1,0 +1,298 @@
+"""A robot on site: body, computer, camera, heartbeat."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from dva_sim.agents.device import STATUS, Device
+from dva_sim.agents.operator.command_sender import topic_of
+from dva_sim.agents.robot.camera import Frame, HazardSpot, Observation, View
+from dva_sim.agents.robot.command_queue import LIMIT, Inbox, Letter
+from dva_sim.agents.robot.controller import ENDS, Decision, Mode, RobotController, SetPoint
+from dva_sim.agents.robot.decision_log import LEASE_ENDS, MISSION_ENDS, Trace
+from dva_sim.agents.robot.local_loops import GuardedDrive, MissionLoop, Surrounded
+from dva_sim.agents.robot.sensors import SensorDesk, SensorPort
+from dva_sim.kernel.recorder import DriveLog
+from dva_sim.network.patterns import Subscription
+from dva_sim.protocol import messages as m
+from dva_sim.worlds.physics import World
+from dva_sim.worlds.planning import Planner
+from dva_sim.worlds.robot_body import RobotBody
+
+FRAME = "frame|"  # topic of the camera
+MISSION = "mission|"  # topic of how missions stand
+PUBLISHED = ("pub-sub", "latest-wins")  # patterns in which nobody answers a command
+STATUS_PERIOD = 1.0  # [s]
+EXPECTED_SPEED = 0.35  # of a teleoperated robot, by which it bids, as the DVA expects it [m/s]
+EXPECTED_READY = 4.0  # until its operator begins to drive, as the DVA expects it [s]
+LONGEST_BID = 1e6  # [s]
+STANDING = 0.02  # below this the wheels count as still [m/s, rad/s]
+
+
+@dataclass(frozen=True)
+class RobotSetup:
+    """How a robot is connected.
+
+    Attributes:
+        pattern: How SetTeleOp reaches it.
+        service: Gives the time that the next message takes its computer [s].
+        frame_rate: Of the camera [1/s].
+        frame_bytes: Size of a frame [B].
+        view: What the camera sees.
+        hazards: What is there to be seen, at a time [s].
+        sensors: What it measures, by name.
+        guarded: Whether a collision guard slows whoever drives it (coordinated control).
+        encode: From taking a frame to publishing it [s]; one frame at a time.
+        charge: Share of the battery's charge that is left.
+        conflates: Whether its socket keeps only the newest published command.
+        limit: How many messages of a class may wait for its computer.
+    """
+
+    pattern: str
+    service: Callable[[], float]
+    frame_rate: float
+    frame_bytes: int
+    view: View
+    hazards: Callable[[float], list[HazardSpot]]
+    sensors: Mapping[str, SensorPort] = field(default_factory=dict)
+    guarded: bool = False
+    encode: float = 0.0
+    charge: Callable[[], float] = lambda: 1.0
+    conflates: bool = False
+    limit: int = LIMIT
+
+
+class RobotAgent:
+    """A robot: obeys its controller, moves its body, publishes frames, status, heartbeats.
+
+    Args:
+        device: Identity and ways to talk.
+        controller: What decides.
+        world: The physics that it is part of.
+        body: Its own body there.
+        planner: Its map, for missions.
+        setup: Pattern, processing time, camera.
+        drive_of: The log of a robot's newest drive, if it had any.
+
+    Attributes:
+        applied: Commands that took effect.
+        refused: Messages that were refused.
+        picture_age: How old the picture behind the last command was when it took effect [s],
+            by the robot's own clock.
+        trace: Told each decision, if there is one.
+    """
+
+    def __init__(
+        self,
+        device: Device,
+        controller: RobotController,
+        world: World,
+        body: RobotBody,
+        planner: Planner,
+        setup: RobotSetup,
+        drive_of: Callable[[str], DriveLog | None],
+    ) -> None:
+        self.device, self.controller = device, controller
+        self.body, self._world, self._planner, self._setup = body, world, planner, setup
+        self._drive_of = drive_of
+        self.applied = self.refused = 0
+        self.picture_age: float | None = None
+        self.trace: Trace | None = None
+        self.inbox = Inbox(
+            device.clock,
+            setup.service,
+            self._handle,
+            setup.pattern == "latest-wins" or setup.conflates,
+            setup.limit,
+        )
+        self._sensing = SensorDesk(device, setup.sensors, controller.tick)
+        controller.sensors = tuple(m.Sensor(n, port.unit) for n, port in setup.sensors.items())
+        self._commands: Subscription | None = None
+        self._encoding = False
+        around = Surrounded(device.clock, world, body, planner)
+        self._guarded = GuardedDrive(around, controller) if setup.guarded else None
+        self._missions = MissionLoop(
+            around, controller, self.observe, setup.charge, self._mission_news
+        )
+        device.network.serve(device.id_tag, self.inbox.request)
+
+    def start(self) -> None:
+        """Begin to publish frames, status and mode changes."""
+        clock = self.device.clock
+        clock.every(1.0 / self._setup.frame_rate, self._take_frame)
+        clock.every(STATUS_PERIOD, self._publish_status)
+
+    def observe(self) -> Observation:
+        """What the camera sees now."""
+        now = self.device.clock.now
+        self._world.advance_to(now)
+        pose = self.body.pose()
+        view, at = self._setup.view, (pose.x, pose.y, pose.heading)
+        hazards, visibility = view.look(*at, self._setup.hazards(now)), view.visibility(*at)
+        speed, turn_rate = self.body.speed, self.body.turn_rate
+        tick = self.controller.tick(now)
+        return Observation(tick, *at, speed, turn_rate, hazards, visibility)
+
+    def power(self, on: bool) -> None:
+        """Give motors, computer and radio power, or none: then it brakes, and is silent."""
+        if on is not self.body.powered:
+            self.body.powered, self.device.silent = on, not on
+            self.device.tell("has power again" if on else "has no power left: it is silent", "link")
+
+    # --- messages ----------------------------------------------------------------------
+
+    def _handle(self, letter: Letter) -> None:
+        """A letter's processing is done."""
+        if self.device.silent:
+            return
+        if letter.answer is None:
+            owner = self.controller.owner
+            message = self.device.read(letter.data, owner)
+            if message is None:
+                return
+            if message.destination == self.device.id_tag:
+                self._decide(message, letter.arrived)
+            else:
+                self.device.recorder.counters["refused: to another device"] += 1
+            return
+
+        def decide(message: m.Message) -> m.Reply:
+            decision = self._decide(message, letter.arrived)
+            return m.Reply(message.message_id, decision.code, decision.text, decision.content)
+
+        letter.answer(self.device.answer(letter.data, decide, letter.sender))
+
+    def _decide(self, message: m.Message, arrived: float) -> Decision:
+        now = self.device.clock.now
+        self._world.advance_to(now)
+        before, mission = self.controller.mode, self.controller.mission_status
+        moving = abs(self.body.speed) > STANDING or abs(self.body.turn_rate) > STANDING
+        decision = self.controller.handle(message, arrived, now, moving)
+        if self.trace is not None:
+            self.trace.decided(message, arrived, now, moving, decision)
+        if decision.set_point is not None:
+            self._move(decision.set_point)
+        if decision.code == m.OK:
+            decision = self._follow_up(message, decision)
+        if decision.code != m.OK:
+            self.refused += 1
+            name = m.CODE_NAMES[decision.code]
+            self.device.recorder.counters[f"robot refused: {name}"] += 1
+        elif isinstance(message.body, m.SetTeleOp):
+            self._log_command(message, arrived, now, decision.set_point)
+        if self.controller.mode is not before:
+            self._mode_changed(message.source)
+        if self.controller.mission_status is not mission:
+            self._publish_mission()
+        return decision
+
+    def _follow_up(self, message: m.Message, decision: Decision) -> Decision:
+        """What a decision means to others than the motors."""
+        match message.body:
+            case m.DevSub() as wish:
+                return Decision(*self._sensing.subscribe(message.source, wish))
+            case m.TaskAnnouncement() as announced if self.controller.free:
+                self.device.clock.call_after(0.0, self._bid, announced)
+            case m.PermissionGrant(holder=holder, address=str(address)):
+                self.device.network.introduce(holder, address)
+            case m.PermissionRevocation(holder=holder):
+                if not self.controller.may_read(holder):
+                    self._sensing.end(holder)
+        return decision
+
+    def _bid(self, announced: m.TaskAnnouncement) -> None:
+        """Offer to be driven there, by the robot's own map."""
+        place, pose = announced.position, self.body.pose()
+        goal = self.device.frame.to_xy(place.latitude, place.longitude)
+        way = self._planner.distance((pose.x, pose.y), goal)
+        arrival = EXPECTED_READY + way / EXPECTED_SPEED
+        if arrival <= LONGEST_BID:
+            self.device.ask(self.device.dva, m.TaskBid(announced.event_id, arrival))
+
+    def _log_command(
+        self, message: m.Message, arrived: float, now: float, set_point: SetPoint | None
+    ) -> None:
+        assert isinstance(message.body, m.SetTeleOp)
+        self.applied += 1
+        if message.body.seen_tick is not None:
+            self.picture_age = (self.controller.tick(now) - message.body.seen_tick) / 1000
+        drive = self._drive_of(self.device.id_tag)
+        if drive is not None and set_point is not None:
+            self.device.recorder.command_applied(
+                drive, message.source, message.message_id, arrived, now, set_point.until
+            )
+
+    def _move(self, set_point: SetPoint) -> None:
+        if self._guarded is not None and self.controller.mode is Mode.TELEOPERATION:
+            self._guarded.take(set_point)
+            return
+        self.body.drive(set_point.speed, set_point.turn_rate, set_point.until)
+
+    def _mode_changed(self, source: str) -> None:
+        mode = self.controller.mode
+        if not self.device.silent:
+            self.device.tell(f"is now in mode {mode}", "mode")
+        if self._commands is not None:
+            self._commands.close()
+            self._commands = self.inbox.flow = None
+            self.inbox.forget_published()
+        if mode is Mode.TELEOPERATION and self._setup.pattern in PUBLISHED:
+            me = self.device.id_tag
+            self._commands = self.inbox.flow = self.device.network.subscribe(
+                me, source, topic_of(me), self.inbox.published
+            )
+        if self.controller.mission is not None:
+            self._missions.begin(self.controller.mission, self.device.frame)
+
+    # --- what it does by itself --------------------------------------------------------
+
+    def _take_frame(self) -> None:
+        """Film for whoever watches; a frame is left out while the last one still waits."""
+        network, me, size = self.device.network, self.device.id_tag, self._setup.frame_bytes
+        if self.device.silent or self._encoding or not network.ready(me, FRAME, size):
+            return
+        frame = Frame(self.observe(), self.device.clock.now)
+        if self._setup.encode > 0.0:
+            self._encoding = True
+            self.device.clock.call_after(self._setup.encode, self._encoded, frame)
+        else:
+            network.publish(me, FRAME, frame, size)
+
+    def _encoded(self, frame: Frame) -> None:
+        self._encoding = False
+        size = self._setup.frame_bytes
+        if not self.device.silent:
+            self.device.network.publish(self.device.id_tag, FRAME, frame, size)
+
+    def _publish_status(self) -> None:
+        now = self.device.clock.now
+        self._world.advance_to(now)
+        if self.controller.expire(now):
+            if self.trace is not None:
+                self.trace.happened(LEASE_ENDS, now)
+            self._mode_changed("")
+        pose = self.body.pose()
+        body = m.RobotStatus(
+            self.controller.mode.value,
+            m.Position(*self.device.frame.to_latlon(pose.x, pose.y)),
+            pose.heading,
+            self.body.speed,
+            self.body.turn_rate,
+            self.controller.tick(now),
+        )
+        self.device.publish(STATUS, body)
+
+    def _publish_mission(self) -> None:
+        self.device.publish(MISSION, self.controller.mission_status)
+
+    def _mission_news(self) -> None:
+        """The mission stands otherwise than before; it may be over."""
+        status = self.controller.mission_status
+        self._publish_mission()
+        if status.mission_state in ENDS:
+            why = f": {status.reason}" if status.reason else ""
+            self.device.tell(f"mission {status.mission_state}{why}", "mode")
+            if self.trace is not None:
+                self.trace.happened(MISSION_ENDS, self.device.clock.now)
+            self._mode_changed("")

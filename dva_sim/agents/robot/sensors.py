@@ -1,0 +1,389 @@
+"""Sensors of a robot, and who has subscribed to them how often.
+
+Sensors of a robot: what they make of what is there, and how they fail.
+
+A sensor samples at its own rate, whoever listens. Between the world and the value that is
+published stand, in this order: a first-order lag, noise, the ends of its range, and its
+resolution. The noise of a sample is keyed by the sensor and the number of the sample: that
+somebody reads one sensor, or reads it more often, changes no other value. A sensor with a lag is
+switched on by whoever subscribes first, shows what is there at once, and follows from then on.
+
+A sensor that is *lost* gives nothing from then on; one that is *stuck* gives its last values
+for ever.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Annotated, Literal, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, field_validator, model_validator
+
+from dva_sim.agents.device import Device
+from dva_sim.kernel.config import Config
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.suggestions import unknown
+from dva_sim.protocol import messages as m
+from dva_sim.protocol.errors import ProtocolError
+from dva_sim.worlds.hazards import Conditions
+from dva_sim.worlds.lidar import Lidar
+from dva_sim.worlds.physics import World
+from dva_sim.worlds.robot_body import RobotBody
+
+LEASE = 60.0  # a subscription that is not renewed ends by itself after this [s]
+MOST = 64  # subscriptions at one robot
+FASTEST, SLOWEST = 20.0, 0.02  # values that a robot gives [Hz]
+
+
+@dataclass(frozen=True)
+class SensorPort:
+    """A sensor.
+
+    Attributes:
+        unit: Of its values.
+        read: Its values at a time [s]: 1 to 360, or none if it is lost.
+        fastest: How often it gives values at most [Hz].
+        lags: Whether a value depends on those before: then it samples while anybody listens,
+            however seldom.
+    """
+
+    unit: str
+    read: Callable[[float], tuple[float, ...]]
+    fastest: float = FASTEST
+    lags: bool = False
+
+
+def topic_of_sensor(sensor: str, subscriber: str) -> str:
+    """Topic of the values of a sensor for one subscriber."""
+    return f"sensor/{sensor}/{subscriber}|"
+
+
+@dataclass
+class _Subscribed:
+    """One subscription: how often [s], until when [s], and when the next value is due [s]."""
+
+    period: float
+    until: float
+    due: float
+
+
+class SensorDesk:
+    """Publishes the values of a robot's sensors to those who subscribed.
+
+    Args:
+        device: The robot.
+        sensors: What it has, by name.
+        tick: The robot's own clock [ms], at a time [s].
+    """
+
+    def __init__(
+        self, device: Device, sensors: Mapping[str, SensorPort], tick: Callable[[float], int]
+    ) -> None:
+        self._device, self._sensors, self._tick_of = device, sensors, tick
+        self._subscribed: dict[tuple[str, str], _Subscribed] = {}
+        self._ticking = False
+
+    def subscribe(self, subscriber: str, wish: m.DevSub) -> tuple[int, str]:
+        """Begin, renew, change or end a subscription: reply code, and why."""
+        key = wish.sensor, subscriber
+        now = self._device.clock.now
+        if wish.frequency == 0.0:
+            self._subscribed.pop(key, None)
+            return m.OK, ""
+        fastest = min(self._sensors[wish.sensor].fastest, FASTEST)
+        if not SLOWEST <= wish.frequency <= fastest:
+            return m.NOT_SUPPORTED, f"a value is given {SLOWEST:g} to {fastest:g} times a second"
+        self._forget_who_vanished(now)
+        known = self._subscribed.get(key)
+        if known is None and len(self._subscribed) >= MOST:
+            return m.BUSY, f"{MOST} subscriptions are all that this robot serves"
+        period = 1.0 / wish.frequency
+        due = now if known is None else min(known.due, now + period)
+        self._subscribed[key] = _Subscribed(period, now + LEASE, due)
+        if not self._ticking:
+            self._ticking = True
+            self._device.clock.every(1.0 / FASTEST, self._tick)
+        return m.OK, ""
+
+    def end(self, subscriber: str) -> None:
+        """End all subscriptions of one device."""
+        for key in [key for key in self._subscribed if key[1] == subscriber]:
+            del self._subscribed[key]
+
+    def _forget_who_vanished(self, now: float) -> None:
+        for key in [key for key, held in self._subscribed.items() if held.until < now]:
+            del self._subscribed[key]
+
+    def _tick(self) -> bool:
+        """Publish what is due. One timer for all: nobody can fill the clock with wishes."""
+        now = self._device.clock.now
+        self._forget_who_vanished(now)
+        for sensor in dict.fromkeys(sensor for sensor, _ in self._subscribed):
+            if self._sensors[sensor].lags:
+                self._sensors[sensor].read(now)
+        for (sensor, subscriber), held in self._subscribed.items():
+            if now >= held.due - 1e-9:
+                held.due = max(held.due + held.period, now)
+                self._publish(sensor, subscriber, now)
+        self._ticking = bool(self._subscribed)
+        return self._ticking
+
+    def _publish(self, sensor: str, subscriber: str, now: float) -> None:
+        port = self._sensors[sensor]
+        values = port.read(now)
+        if not values:
+            return
+        body = m.SensorValue(sensor, values, port.unit, self._tick_of(now))
+        try:
+            self._device.publish(topic_of_sensor(sensor, subscriber), body)
+        except ProtocolError:
+            self._device.recorder.counters["sensor values that no message holds"] += 1
+
+
+Floats = NDArray[np.float64]
+Values = tuple[float, ...]
+Source = Callable[[float], Values]
+Luck = Callable[[str], np.random.Generator]
+
+BLOCK = 64  # samples whose noise is drawn at once
+NonNegative = Annotated[float, Field(ge=0)]
+Positive = Annotated[float, Field(gt=0)]
+
+
+class Kind(NamedTuple):
+    """A kind of sensor, as it is unless a scenario says otherwise; the numbers are assumed.
+
+    Attributes:
+        unit: Of its values.
+        noise: Standard deviation.
+        resolution: Smallest step.
+        low: Least value that it shows.
+        high: Greatest value that it shows.
+        lag: Time constant [s].
+    """
+
+    unit: str
+    noise: float
+    resolution: float
+    low: float
+    high: float
+    lag: float = 0.0
+
+
+KINDS = {
+    "lidar": Kind("m", 0.02, 0.001, 0.0, 99.999),
+    "temperature": Kind("degC", 0.3, 0.1, -40.0, 1000.0, lag=5.0),
+    "smoke": Kind("1/m", 0.01, 0.001, 0.0, 20.0, lag=2.0),
+    "gas": Kind("1", 0.0005, 0.0001, 0.0, 1.0, lag=10.0),
+    "heat_flux": Kind("kW/m2", 0.02, 0.01, 0.0, 200.0, lag=0.5),
+    "water": Kind("m", 0.005, 0.001, 0.0, 10.0),
+    "battery": Kind("1", 0.002, 0.001, 0.0, 1.0),
+}
+
+
+class FaultConfig(Config):
+    """One way in which a sensor fails, at a time or by chance.
+
+    Attributes:
+        kind: `lost`: no values from then on. `stuck`: the last values for ever.
+        at_s: When.
+        mean_time_s: Mean of the time until then, which is exponential.
+    """
+
+    kind: Literal["lost", "stuck"]
+    at_s: NonNegative | None = None
+    mean_time_s: Positive | None = None
+
+    @model_validator(mode="after")
+    def _one_of_them(self) -> FaultConfig:
+        if (self.at_s is None) == (self.mean_time_s is None):
+            raise ValueError("a fault needs either at_s or mean_time_s")
+        return self
+
+    def time(self, luck: np.random.Generator) -> float:
+        """When it happens [s]."""
+        if self.mean_time_s is not None:
+            return float(luck.exponential(self.mean_time_s))
+        return self.at_s or 0.0
+
+
+class SensorConfig(Config):
+    """A sensor that a robot carries; what is left out is as usual for its kind (`KINDS`).
+
+    Attributes:
+        name: Of the kind.
+        rate_hz: How often it samples, and so gives values at most.
+        noise: Standard deviation, in the unit of its values.
+        resolution: Smallest step of its values.
+        low: Least value that it shows.
+        high: Greatest value that it shows.
+        lag_s: Time constant.
+        faults: How it fails; the first one that happens stays.
+    """
+
+    name: str
+    rate_hz: Annotated[float, Field(gt=0, le=FASTEST)] = 10.0
+    noise: NonNegative | None = None
+    resolution: Positive | None = None
+    low: float | None = None
+    high: float | None = None
+    lag_s: NonNegative | None = None
+    faults: tuple[FaultConfig, ...] = ()
+
+    @field_validator("name")
+    @classmethod
+    def _is_known(cls, name: str) -> str:
+        if name not in KINDS:
+            raise ValueError(unknown("sensor", name, KINDS))
+        return name
+
+    @model_validator(mode="after")
+    def _low_is_below_high(self) -> SensorConfig:
+        kind = self.as_kind()
+        if kind.low >= kind.high:
+            raise ValueError(f"low {kind.low:g} of {self.name} is not below high {kind.high:g}")
+        return self
+
+    def as_kind(self) -> Kind:
+        """The kind of sensor with what is said here."""
+        usual = KINDS[self.name]
+        said = (self.noise, self.resolution, self.low, self.high, self.lag_s)
+        pairs = zip(said, usual[1:], strict=True)
+        return Kind(usual.unit, *(other if own is None else own for own, other in pairs))
+
+
+class Sensor:
+    """One sensor of one robot.
+
+    Args:
+        config: What it is like.
+        source: What is there, at a time [s].
+        luck: Streams of its own, by what they are for.
+    """
+
+    def __init__(self, config: SensorConfig, source: Source, luck: Luck) -> None:
+        self.kind, self._rate = config.as_kind(), config.rate_hz
+        self._source, self._luck = source, luck
+        times = {fault.kind: math.inf for fault in config.faults}
+        for number, fault in enumerate(config.faults):
+            when = fault.time(luck(f"fault {number}"))
+            times[fault.kind] = min(times[fault.kind], when)
+        self._lost_at, self._stuck_at = times.get("lost", math.inf), times.get("stuck", math.inf)
+        self._sample, self._shown = -1, Values()
+        self._lagged, self._time = np.empty(0), -math.inf
+        self._noise: tuple[int, Floats] = -1, np.empty(0)
+
+    def read(self, now: float) -> Values:
+        """Its newest sample; nothing if it is lost.
+
+        Args:
+            now: Time [s], never less than before.
+        """
+        if now >= self._lost_at:
+            return ()
+        sample = math.floor(now * self._rate + 1e-6)
+        if sample == self._sample or (now >= self._stuck_at and self._shown):
+            return self._shown
+        self._sample = sample
+        shown = self._follow(np.array(self._source(now)), now)
+        if self.kind.noise > 0.0:
+            shown = shown + self.kind.noise * self._normals(sample, len(shown))
+        self._shown = self._as_shown(shown)
+        return self._shown
+
+    def _follow(self, truth: Floats, now: float) -> Floats:
+        """The lag: exact where what is there has been the same since the last sample."""
+        if self.kind.lag <= 0.0:
+            return truth
+        if len(self._lagged) != len(truth):
+            self._lagged = truth
+        share = math.exp(-(now - self._time) / self.kind.lag)
+        self._lagged, self._time = truth + share * (self._lagged - truth), now
+        return self._lagged
+
+    def _normals(self, sample: int, count: int) -> Floats:
+        """Standard normal numbers of one sample, shape `(count,)`."""
+        block, place = divmod(sample, BLOCK)
+        if self._noise[0] != block or self._noise[1].shape[1] != count:
+            self._noise = block, self._luck(f"noise {block}").normal(size=(BLOCK, count))
+        return np.asarray(self._noise[1][place])
+
+    def _as_shown(self, values: Floats) -> Values:
+        kind = self.kind
+        digits = max(0, math.ceil(-math.log10(kind.resolution)))
+        stepped = np.round(np.clip(values, kind.low, kind.high) / kind.resolution)
+        return tuple((stepped * kind.resolution).round(digits).tolist())
+
+
+class Around(Protocol):
+    """What it is like at a place: the hazards of a run."""
+
+    def at(self, x: float, y: float, time: float) -> Conditions:
+        """The conditions at a point [m] and time [s]."""
+
+
+def sources_of(
+    world: World, body: RobotBody, around: Around, lidar: Lidar, charge: Callable[[], float]
+) -> dict[str, Source]:
+    """What each kind of sensor of a robot measures, where the robot is.
+
+    Args:
+        world: The physics.
+        body: The robot's own.
+        around: The hazards.
+        lidar: Casts rays; asked only when somebody listens.
+        charge: Share of the battery's charge that is left.
+    """
+
+    def in_air(what: Callable[[Conditions], float]) -> Source:
+        def source(now: float) -> Values:
+            world.advance_to(now)
+            return (what(around.at(body.x, body.y, now)),)
+
+        return source
+
+    def ranges(now: float) -> Values:
+        world.advance_to(now)
+        return tuple(lidar.read(body).tolist())
+
+    return {
+        "lidar": ranges,
+        "temperature": in_air(lambda c: c.temperature),
+        "smoke": in_air(lambda c: c.extinction),
+        "gas": in_air(lambda c: c.gas),
+        "heat_flux": in_air(lambda c: c.heat_flux),
+        "water": in_air(lambda c: c.water),
+        "battery": lambda now: (charge(),),
+    }
+
+
+def make_ports(
+    configs: Iterable[SensorConfig], sources: Mapping[str, Source], luck: Luck
+) -> dict[str, SensorPort]:
+    """The sensors of a robot, ready to be subscribed to.
+
+    Args:
+        configs: Which there are.
+        sources: What each measures, by name.
+        luck: A new stream from its beginning, by name; the same name gives the same stream.
+
+    Raises:
+        ConfigError: two sensors of one name.
+    """
+    ports: dict[str, SensorPort] = {}
+    for config in configs:
+        name = config.name
+        if name in ports:
+            raise ConfigError(f"sensor {name!r} is there twice")
+        sensor = Sensor(config, sources[name], _own(luck, name))
+        lags = sensor.kind.lag > 0.0
+        ports[name] = SensorPort(sensor.kind.unit, sensor.read, config.rate_hz, lags)
+    return ports
+
+
+def _own(luck: Luck, name: str) -> Luck:
+    return lambda what: luck(f"{name}/{what}")

@@ -1,0 +1,204 @@
+"""What `show` and `compare` tell, as plain data for other programs; the keys stay as they are.
+
+Missing numbers are nan here, and null once printed. Levels are by factor, as in the study.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from dva_sim.experiments.analysis.answer import Finding
+from dva_sim.experiments.analysis.compare import Comparison, Verdict
+from dva_sim.experiments.analysis.compare_rows import Difference, Levels
+from dva_sim.experiments.analysis.layout import interval_of, layout_of
+from dva_sim.experiments.analysis.paired_effects import Part
+from dva_sim.experiments.results.results import Results
+from dva_sim.experiments.study.status import status_of
+from dva_sim.kernel.units import unit_of
+
+Data = dict[str, Any]
+
+
+def shown(results: Results) -> Data:
+    """The answer, what it rests on, and every cell."""
+    status, reading, study = status_of(results.manifest), results.reading, results.study
+    return {
+        "folder": str(results.folder),
+        "question": results.question,
+        "status": {"kind": status.kind, "why": list(status.why)},
+        "partial": results.manifest.get("partial"),
+        "answer": {
+            "lead": results.answer.lead,
+            "notes": list(results.answer.notes),
+            "finding": _finding(reading.finding),
+        },
+        "warnings": list(reading.warnings),
+        "runs": results.runs.rows,
+        "failed": len(results.failures),
+        "persons": reading.persons,
+        "replications": study.get("replications"),
+        "seed": study.get("seed"),
+        "cells": list(_cells(results)),
+        "tables": results.tables,
+        "program": _program(results),
+    }
+
+
+def table(results: Results, name: str, most: int) -> Data:
+    """The first rows of a table, and what its columns mean.
+
+    Raises:
+        ConfigError: no such table.
+    """
+    frame = results.table(name)
+    columns = {key: values[:most].tolist() for key, values in frame.items()}
+    return {
+        "folder": str(results.folder),
+        "table": name,
+        "rows": frame.rows,
+        "columns": _columns(results, name),
+        "data": [
+            dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)
+        ],
+    }
+
+
+def columns(results: Results, tables: Sequence[str]) -> Data:
+    """What the columns of some tables mean, or of all.
+
+    Raises:
+        ConfigError: no such table.
+    """
+    told = {name: _columns(results, name) for name in tables or results.tables}
+    return {"folder": str(results.folder), "tables": told}
+
+
+def compared(
+    comparison: Comparison,
+    measures: Sequence[str],
+    by: Sequence[str],
+    verdicts: Sequence[Verdict],
+) -> Data:
+    """How two results differ, and what a gate makes of it; differences are B minus A.
+
+    Raises:
+        ConfigError: no such measure or factor.
+    """
+    matched, (pairs, runs) = comparison.matched, comparison.paired
+    wanted: Sequence[str | None] = measures or [None]
+    return {
+        "a": _side(comparison.sides[0]),
+        "b": _side(comparison.sides[1]),
+        "cells": {
+            "both": len(matched.pairs),
+            "only_a": [_place(part, levels) for part, levels in matched.only_first],
+            "only_b": [_place(part, levels) for part, levels in matched.only_second],
+        },
+        "runs_a": runs,
+        "pairs": pairs,
+        "measures": [_measure(comparison, measure, by) for measure in wanted],
+        "changed": comparison.changed()[0] if pairs else [],
+        "gates": [_gate(text, verdicts) for text in dict.fromkeys(v.gate.text for v in verdicts)],
+    }
+
+
+def _finding(found: Finding | None) -> Data | None:
+    if found is None:
+        return None
+    numbers = zip(found.levels, found.mean, found.low, found.high, strict=True)
+    return {
+        "measure": found.measure,
+        "unit": found.unit,
+        "factor": found.factor,
+        "first": found.first,
+        "second": found.second,
+        "over": found.over,
+        "within": dict(found.within),
+        "in_excess_of_reference": found.in_excess,
+        "differences": [
+            {"level": level, "mean": float(mean), "low": float(low), "high": float(high)}
+            for level, mean, low, high in numbers
+        ],
+    }
+
+
+def _cells(results: Results) -> Iterator[Data]:
+    """Every cell with its mean of the answer's measure, over persons, and its 95 % interval."""
+    view = results.reading.view
+    if view is None:
+        return
+    runs, factors = layout_of(results.study, results.reading.runs, are_points_trials=False)
+    for name in dict.fromkeys(str(part) for part in runs["part"]):
+        part = Part(runs, name, factors)
+        made, grid = part.grid("seed"), part.grid(view.measure)
+        for setting in part.settings():
+            count = int((part.where(made, setting) == part.where(made, setting)).sum())
+            found = interval_of(part.where(grid, setting))
+            mean, low, high = (found.mean, found.low, found.high) if found else (None,) * 3
+            numbers = {"runs": count, "measure": view.measure, "mean": mean, "low": low}
+            yield _place(name, tuple(setting.items())) | numbers | {"high": high}
+
+
+def _columns(results: Results, name: str) -> list[Data]:
+    return [
+        {"name": column.name, "unit": column.unit, "meaning": column.meaning}
+        for column in results.columns(name)
+    ]
+
+
+def _program(results: Results) -> Data:
+    versions = results.manifest.get("versions", {})
+    return {"version": versions.get("dva-sim"), "commit": versions.get("commit")}
+
+
+def _side(results: Results) -> Data:
+    return {
+        "folder": str(results.folder),
+        "question": results.question,
+        "set": list(results.manifest.get("set", ())),
+        "failed": len(results.failures),
+        "program": _program(results),
+    }
+
+
+def _measure(comparison: Comparison, measure: str | None, by: Sequence[str]) -> Data:
+    name, column = comparison.find(measure)
+    rows = comparison.differences(f"{name}.{column}", by)
+    return {
+        "table": name,
+        "measure": column,
+        "unit": unit_of(column),
+        "differences": [_difference(row) for row in rows],
+    }
+
+
+def _difference(row: Difference) -> Data:
+    return _place(row.part, row.levels) | {
+        "runs_a": row.runs[0],
+        "runs_b": row.runs[1],
+        "median_a": row.medians[0],
+        "median_b": row.medians[1],
+        "mean": row.interval.mean,
+        "low": row.interval.low,
+        "high": row.interval.high,
+        "is_paired": row.is_paired,
+        "is_identical": row.is_identical,
+    }
+
+
+def _gate(text: str, verdicts: Sequence[Verdict]) -> Data:
+    own = [verdict for verdict in verdicts if verdict.gate.text == text]
+    return {
+        "condition": text,
+        "failed": any(verdict.holds for verdict in own),
+        "groups": [
+            _place(v.part, v.levels)
+            | {"a": v.first, "b": v.second, "bound": v.bound, "failed": v.holds}
+            for v in own
+        ],
+    }
+
+
+def _place(part: str, levels: Levels) -> Data:
+    return {"part": part, "levels": dict(levels)}

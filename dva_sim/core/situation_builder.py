@@ -1,0 +1,271 @@
+"""The lookout: gathers what is known at one moment for the policy that has to decide."""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+
+from dva_sim.core.auctions import Auctions
+from dva_sim.core.dispatch.situation import Cover, Policy, Responder, Situation, Task
+from dva_sim.core.events import Event, State
+from dva_sim.core.orders import Orders
+from dva_sim.core.registry import GUARD, OPERATOR, ROBOT, Entry
+from dva_sim.core.travel_times import Floats, Ground, Start, Travel
+from dva_sim.protocol import messages as m
+
+CONSIDERED = 1000  # tasks that one decision looks at, those detected longest ago
+SAME_PLACE = 3e-5  # a few metres [deg]
+LATE, SETTLED = 2.0, 180.0  # within twice its time and so long [s] who was sent to wait is there
+KINDS: dict[str, Literal["guard", "robot"]] = {GUARD: "guard", ROBOT: "robot"}
+
+_place = operator.attrgetter("place")
+
+
+@dataclass
+class Team:
+    """Who can go: the entries behind `Situation.responders`, and the operators' free hands."""
+
+    entries: list[Entry]
+    engaged: list[Event | None]
+    operators: list[Entry]
+
+    def idle(self) -> set[str]:
+        """Ids of those who do nothing."""
+        pairs = zip(self.entries, self.engaged, strict=True)
+        return {entry.device.id_tag for entry, event in pairs if event is None}
+
+    def starts(self) -> list[Start]:
+        """From where they would set out."""
+        return [
+            Start(e.device.id_tag, KINDS[e.device.device_type], e.position, a is not None)
+            for e, a in zip(self.entries, self.engaged, strict=True)
+            if e.position is not None
+        ]
+
+
+@dataclass
+class View:
+    """What a policy is shown, and the desk's own things behind it, in the same places."""
+
+    situation: Situation
+    events: list[Event]
+    team: Team
+
+
+@dataclass
+class Lookout:
+    """Knows who can go, what there is to do, and how far it is.
+
+    Attributes:
+        policy: What it wants to see, it is shown.
+        travel: How far it is from whom to where.
+        orders: Who is at what.
+        ground: What is known of the place.
+        auctions: Who has bid what.
+    """
+
+    policy: Policy
+    travel: Travel
+    orders: Orders
+    ground: Ground
+    auctions: Auctions
+    _bound_for: dict[str, tuple[int, float]] = field(default_factory=dict)  # station, until
+
+    def look(self, now: float) -> View | None:
+        """What there is to decide; None if there is nothing, or nobody to send."""
+        if not self.orders.book.open and not self.policy.relocates:
+            return None
+        events = self._tasks()
+        if not events and not self.policy.relocates:
+            return None
+        team = self._team(now)
+        if not team.entries:
+            return None
+        self.auctions.forget_useless(team.idle())
+        return View(self._situation(events, team, now), events, team)
+
+    # --- who is on the way to wait somewhere ---------------------------------------------
+
+    def sends_to_wait(self, guard: str, station: int, eta: float, now: float) -> None:
+        """A guard is on its way to a station; it counts as given up when it is very late."""
+        self._bound_for[guard] = station, now + LATE * eta + SETTLED
+
+    def forget_move(self, guard: str) -> None:
+        """A guard goes elsewhere, did not take a relocation, or has forgotten it."""
+        self._bound_for.pop(guard, None)
+
+    # --- what there is to do, and who can ------------------------------------------------
+
+    def _tasks(self) -> list[Event]:
+        """Events that somebody could do something about, detected longest ago first."""
+        book, rules = self.orders.book, self.orders.rules
+        if not (rules.containment or self.policy.preempts):
+            found = list(book.waiting.values())
+        else:
+            found = [e for e in book.open.values() if self._is_task(e)]
+        found.sort(key=operator.attrgetter("number"))
+        return found[:CONSIDERED]
+
+    def _is_task(self, event: Event) -> bool:
+        if event.waits_for is not None:
+            return not self._finder_is_there(event)
+        if event.needs_containment and event.actor is None:
+            return True
+        return self.policy.preempts and self._is_under_way(event)
+
+    def _finder_is_there(self, event: Event) -> bool:
+        """Whether a guard has just confirmed it and is about to be free to deal with it."""
+        finder = event.responder
+        if event.state is not State.CONFIRMED or event.operator is not None or finder is None:
+            return False
+        return self.orders.engaged.is_at(finder, event)
+
+    def _is_under_way(self, event: Event) -> bool:
+        """Whether its responder has heard of it and is not there yet."""
+        if event.state is not State.ASSIGNED or not event.taken_up or event.responder is None:
+            return False
+        return self.orders.registry.entries[event.responder].position is not None
+
+    def _team(self, now: float) -> Team:
+        registry = self.orders.registry
+        entries = self._free(registry.located(GUARD), now)
+        robots = self._free(registry.located(ROBOT), now)
+        operators = self._hands(registry.of_type(OPERATOR), now) if robots else []
+        if operators:
+            entries += robots
+        engaged: list[Event | None] = [None] * len(entries)
+        if self.policy.preempts:
+            for event in filter(self._is_under_way, self.orders.book.open.values()):
+                entries.append(self.orders.registry.entries[event.responder or ""])
+                engaged.append(event)
+        return Team(entries, engaged, operators)
+
+    def _free(self, entries: Iterable[Entry], now: float) -> list[Entry]:
+        """Those who may be given an order, in order of registration."""
+        is_held, engaged = self.orders.sessions.is_held, self.orders.engaged
+        free = [
+            e
+            for e in entries
+            if not e.silent and e.free_from <= now
+            if e.device.id_tag not in engaged and not is_held(e.device.id_tag)
+        ]
+        return sorted(free, key=_place)
+
+    def _hands(self, operators: Iterable[Entry], now: float) -> list[Entry]:
+        """Operators who may be given a robot, each as often as it may; the least busy first."""
+        span, count = self.orders.rules.operator_span, self.orders.engaged.count
+        hands = [
+            (in_hand, e.place, e)
+            for e in operators
+            if not e.silent and e.free_from <= now
+            for in_hand in range(count(e.device.id_tag), span)
+        ]
+        return [entry for _, _, entry in sorted(hands, key=operator.itemgetter(0, 1))]
+
+    def _situation(self, events: list[Event], team: Team, now: float) -> Situation:
+        rows = {id(e): row for row, e in enumerate(events)}
+        columns = {id(e): c for c, e in enumerate(team.engaged) if e is not None}
+        tasks = tuple(self._task(e, columns.get(id(e))) for e in events)
+        responders = tuple(
+            Responder(e.device.id_tag, KINDS[e.device.device_type], rows.get(id(a)) if a else None)
+            for e, a in zip(team.entries, team.engaged, strict=True)
+        )
+        distance, eta = self._ways(events, tasks, team)
+        names = [r.device for r in responders]
+        preference = self.ground.preference
+        ranks = [preference(e.position, names) for e in events] if preference and events else []
+        bids = self.auctions.bids(events, names, now) if self.policy.auctions else np.empty((0, 0))
+        return Situation(
+            now,
+            tasks,
+            responders,
+            _sealed(distance),
+            _sealed(eta),
+            _sealed(np.array(ranks, dtype=np.float64) if ranks else np.empty((0, 0))),
+            _sealed(bids),
+            len(team.operators),
+            self._cover(team, now) if self.policy.relocates else None,
+        )
+
+    def _task(self, event: Event, engaged: int | None) -> Task:
+        # While somebody is under way to look, what is left to give is standing by.
+        confirm = event.state is State.PENDING or engaged is not None
+        return Task(
+            event.number,
+            event.kind,
+            "confirm" if confirm else "contain",
+            confirm or event.state is State.CONFIRMED,
+            event.severity,
+            event.confidence,
+            event.times["detected"],
+            event.waiting_since,
+            engaged,
+            self.auctions.stage(event.number),
+        )
+
+    def _ways(
+        self, events: list[Event], tasks: Sequence[Task], team: Team
+    ) -> tuple[Floats, Floats]:
+        starts = team.starts()
+        goals = [e.position for e in events]
+        distance, eta = (ways.copy() for ways in self.travel(starts, goals))
+        robots = np.array([s.kind == "robot" for s in starts])
+        for row, (event, task) in enumerate(zip(events, tasks, strict=True)):
+            if task.stage == "contain":
+                distance[row, robots] = eta[row, robots] = np.inf
+            if event.failed:
+                _leave_out_who_failed(event, starts, distance[row], eta[row])
+        return distance, eta
+
+    def _cover(self, team: Team, now: float) -> Cover | None:
+        """Where idle guards could wait, and where they are on their way to already."""
+        ground = self.ground
+        if not ground.stations:
+            return None
+        starts = [replace(start, under_way=True) for start in team.starts()]  # there is no hurry
+        eta = self.travel(starts, [s.position for s in ground.stations])[1].T.copy()
+        idle_guard = [
+            start.kind == "guard" and engaged is None
+            for start, engaged in zip(starts, team.engaged, strict=True)
+        ]
+        eta[~np.array(idle_guard)] = np.inf
+        bound_for = tuple(self._station_ahead(start, now) for start in starts)
+        names = tuple(s.name for s in ground.stations)
+        reach, demand = _sealed(ground.reach), _sealed(ground.demand)
+        return Cover(names, _sealed(eta), reach, demand, bound_for)
+
+    def _station_ahead(self, start: Start, now: float) -> int | None:
+        """Where a guard is on its way to; None once it is there, or much too late."""
+        station, until = self._bound_for.get(start.device, (None, math.inf))
+        if station is None:
+            return None
+        if now <= until and not same_place(self.ground.stations[station].position, start.position):
+            return station
+        self.forget_move(start.device)
+        return None
+
+
+def same_place(a: m.Position, b: m.Position) -> bool:
+    """Within a few metres."""
+    return abs(a.latitude - b.latitude) + abs(a.longitude - b.longitude) < SAME_PLACE
+
+
+def _sealed(array: Floats) -> Floats:
+    """The same array, which a policy cannot change."""
+    view = array.view()
+    view.flags.writeable = False
+    return view
+
+
+def _leave_out_who_failed(
+    event: Event, starts: Sequence[Start], distance: Floats, eta: Floats
+) -> None:
+    """A responder that gave an event back goes again only if nobody else can."""
+    failed = np.array([s.device in event.failed for s in starts], dtype=bool)
+    if np.isfinite(distance[~failed]).any():
+        distance[failed] = eta[failed] = np.inf

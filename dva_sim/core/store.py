@@ -1,0 +1,278 @@
+"""What survives the DVA: events, devices and permissions, in a SQLite file.
+
+Detectors report an event once and a holder is granted a robot once, so neither can be rebuilt
+by asking around; hence a file. What comes by itself within seconds is not kept: positions,
+modes, signs of life, auctions. Each change is kept before anything is said because of it, so
+that a DVA that was killed never promised what its next life does not know. After the kill of
+the process nothing is lost; after a power failure the last moments may be.
+"""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+from collections import deque
+from collections.abc import Iterable
+from dataclasses import fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from dva_sim.core.events import KEPT_CLOSED, Event, State
+from dva_sim.core.permissions import Grant
+from dva_sim.core.registry import Entry
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.protocol.messages import Device, PermissionRevocation, Position
+
+if TYPE_CHECKING:
+    from dva_sim.core.dva import Desk
+
+
+FORMAT = 1
+OPEN_WITHIN = 1.0  # that long somebody else may have the file to itself when it is opened [s]
+WRITE_WITHIN_MS = 50  # and when something is written; the DVA stands still meanwhile
+_TABLES = f"""
+BEGIN IMMEDIATE;
+CREATE TABLE IF NOT EXISTS about (name TEXT PRIMARY KEY, value INTEGER NOT NULL);
+CREATE TABLE IF NOT EXISTS events (number INTEGER PRIMARY KEY, open INTEGER, data TEXT NOT NULL);
+CREATE TABLE IF NOT EXISTS devices (id TEXT PRIMARY KEY, data TEXT NOT NULL);
+CREATE TABLE IF NOT EXISTS grants (session TEXT PRIMARY KEY, data TEXT NOT NULL);
+CREATE TABLE IF NOT EXISTS untold (session TEXT PRIMARY KEY, data TEXT NOT NULL);
+INSERT OR IGNORE INTO about VALUES ('format', {FORMAT});
+COMMIT;
+"""
+_PLAIN: tuple[str, ...] = (
+    *("number", "kind", "severity", "needs_containment", "reports", "sources"),
+    *("responder", "operator", "actor", "taken_up", "act_taken_up", "attempts", "preemptions"),
+)
+
+
+class Memory:
+    """The file that a DVA writes down what it must not forget in.
+
+    Args:
+        file: Made if it does not exist.
+        epoch: Added to the desk's time, so that times of different lives agree [s].
+
+    Raises:
+        ConfigError: the file cannot be opened, or is something else.
+    """
+
+    def __init__(self, file: Path | str, epoch: float = 0.0) -> None:
+        self.epoch = epoch
+        self._sessions: dict[str, dict[str, str]] = {"grants": {}, "untold": {}}
+        self._session_changes = 0
+        self._events: dict[int, Event] = {}
+        self._devices: dict[str, Entry] = {}
+        self._path = file
+        try:
+            self._file = sqlite3.connect(file, isolation_level=None, timeout=OPEN_WITHIN)
+        except sqlite3.Error as error:
+            raise self._useless(error) from None
+        try:
+            self._open()
+        except BaseException:
+            self._file.close()
+            raise
+
+    def _open(self) -> None:
+        """See that it is a memory; a file that is something else stays as it is."""
+        try:
+            (tables,) = self._file.execute("SELECT count(*) FROM sqlite_master").fetchone()
+            is_ours = not tables or self._about("format") == FORMAT
+        except (sqlite3.OperationalError, ValueError) as error:
+            if "no such" not in str(error):
+                raise self._useless(error) from None
+            is_ours = False
+        except sqlite3.Error as error:
+            raise self._useless(error) from None
+        if not is_ours:
+            raise ConfigError(f"is not a DVA's memory of format {FORMAT}", self._path)
+        try:
+            self._file.execute("PRAGMA journal_mode=WAL")
+            self._file.execute("PRAGMA synchronous=NORMAL")
+            self._file.executescript(_TABLES)
+            self._file.execute(f"PRAGMA busy_timeout={WRITE_WITHIN_MS}")
+        except sqlite3.Error as error:
+            raise self._useless(error) from None
+
+    def _useless(self, error: Exception) -> ConfigError:
+        return ConfigError(f"cannot be used as the DVA's memory: {error}", self._path)
+
+    def close(self) -> None:
+        """Put the file away."""
+        self._file.close()
+
+    # --- to the file -------------------------------------------------------------------
+
+    def keep(self, desk: Desk, changed: Iterable[Event], now: float) -> str | None:
+        """Write down what has changed; what went wrong, in words, or None.
+
+        What cannot be written, to a full disk for example, is tried again with the next change.
+        """
+        self._events |= {event.number: event for event in changed}
+        self._devices |= {entry.device.id_tag: entry for entry in desk.registry.changes()}
+        changes = _session_changes(desk)
+        if not (self._events or self._devices or changes != self._session_changes):
+            return None
+        sessions = self._sessions if changes == self._session_changes else _of_sessions(desk)
+        try:
+            self._file.execute("BEGIN IMMEDIATE")
+            self._write(desk, sessions)
+            self._file.execute("COMMIT")
+        except sqlite3.Error as error:
+            if self._file.in_transaction:
+                self._file.execute("ROLLBACK")
+            return f"cannot keep its memory: {error}"
+        self._events, self._devices, self._sessions = {}, {}, sessions
+        self._session_changes = changes
+        return None
+
+    def _write(self, desk: Desk, sessions: dict[str, dict[str, str]]) -> None:
+        put = self._file.executemany
+        events = (
+            (e.number, e.open, json.dumps(_of_event(e, desk, self.epoch)))
+            for e in self._events.values()
+        )
+        put("INSERT OR REPLACE INTO events VALUES (?, ?, ?)", events)
+        devices = ((i, json.dumps(_of_entry(e))) for i, e in self._devices.items())
+        put(_PUT_DEVICE, devices)
+        for table, now in sessions.items():
+            before = self._sessions[table]
+            put(
+                f"DELETE FROM {table} WHERE session = ?", ((s,) for s in before.keys() - now.keys())
+            )
+            new = now.items() - before.items()
+            put(f"INSERT OR REPLACE INTO {table} VALUES (?, ?)", sorted(new))
+        count = desk.sessions.permissions.count
+        put("INSERT OR REPLACE INTO about VALUES (?, ?)", [("sessions", count)])
+
+    # --- from the file -----------------------------------------------------------------
+
+    def recall(self, desk: Desk, now: float) -> bool:
+        """Tell a new desk what an earlier one knew; whether there was anything.
+
+        Devices count as heard just now: each has its time-out to show that it is there.
+
+        Raises:
+            ConfigError: what the file holds makes no sense.
+        """
+        try:
+            found = self._recall(desk, now)
+        except (sqlite3.Error, ValueError, KeyError, TypeError) as error:
+            raise self._useless(error) from None
+        desk.check_access(now)
+        return found
+
+    def _recall(self, desk: Desk, now: float) -> bool:
+        for (data,) in self._file.execute("SELECT data FROM devices ORDER BY rowid"):
+            desk.registry.add(_entry(json.loads(data), now))
+        found = bool(desk.registry.entries)
+        for state, count in self._counts().items():
+            desk.book.counts[state] += count
+        for (data,) in self._file.execute(_RECENT, (KEPT_CLOSED,)):
+            found = True
+            kept = json.loads(data)
+            event = _event(kept, self.epoch)
+            desk.book.restore(event)
+            for name in kept["engaged"]:
+                desk.orders.engaged.begin(name, event)
+        desk.book.total = sum(desk.book.counts.values())
+        self._recall_sessions(desk)
+        desk.registry.changes()
+        desk.book.changes()
+        return found
+
+    def _counts(self) -> dict[State, int]:
+        rows = self._file.execute(
+            "SELECT json_extract(data, '$.state'), count(*) FROM events GROUP BY 1"
+        )
+        return {State(state): count for state, count in rows}
+
+    def _recall_sessions(self, desk: Desk) -> None:
+        permissions = desk.sessions.permissions
+        for table, kept in self._sessions.items():
+            kept |= self._file.execute(f"SELECT session, data FROM {table} ORDER BY rowid")
+        for data in self._sessions["grants"].values():
+            permissions.restore(_grant(json.loads(data)))
+        for data in self._sessions["untold"].values():
+            desk.sessions.tell_robot(PermissionRevocation(*json.loads(data)))
+        self._session_changes = _session_changes(desk)
+        permissions.count = max(permissions.count, self._about("sessions"))
+
+    def _about(self, name: str) -> int:
+        row = self._file.execute("SELECT value FROM about WHERE name = ?", (name,)).fetchone()
+        return int(row[0]) if row else 0
+
+
+# Renewed in its place: the order of registration is to last.
+_PUT_DEVICE = """
+INSERT INTO devices VALUES (?, ?) ON CONFLICT (id) DO UPDATE SET data = excluded.data
+"""
+_RECENT = """
+SELECT data FROM (
+  SELECT number, data FROM events WHERE open
+  UNION SELECT * FROM (SELECT number, data FROM events WHERE NOT open ORDER BY number DESC LIMIT ?)
+) ORDER BY number
+"""
+
+
+def _of_event(event: Event, desk: Desk, epoch: float) -> dict[str, Any]:
+    engaged = desk.orders.engaged
+    people = (event.responder, event.operator, event.actor)
+    return {name: getattr(event, name) for name in _PLAIN} | {
+        "state": event.state.value,
+        "position": [event.position.latitude, event.position.longitude],
+        "waiting_since": event.waiting_since + epoch,
+        "times": {step: time + epoch for step, time in event.times.items()},
+        "failed": sorted(event.failed),
+        "sent": sorted(event.sent),
+        "engaged": [name for name in people if name and engaged.is_at(name, event)],
+    }
+
+
+def _event(kept: dict[str, Any], epoch: float) -> Event:
+    return Event(
+        **{name: kept[name] for name in _PLAIN},
+        position=Position(*kept["position"]),
+        state=State(kept["state"]),
+        waiting_since=kept["waiting_since"] - epoch,
+        times={step: time - epoch for step, time in kept["times"].items()},
+        failed=set(kept["failed"]),
+        sent=set(kept["sent"]),
+    )
+
+
+def _session_changes(desk: Desk) -> int:
+    return desk.sessions.permissions.changes + desk.sessions.changes
+
+
+def _of_sessions(desk: Desk) -> dict[str, dict[str, str]]:
+    """What holds, and which robots have not heard of what is over, by session."""
+    grants = desk.sessions.permissions.all()
+    untold = [(s, send.body) for s, send in desk.sessions.untold.items()]
+    return {
+        "grants": {str(g.session): json.dumps(_plain(g)) for g in grants},
+        "untold": {
+            str(session): json.dumps(_plain(body))
+            for session, body in untold
+            if isinstance(body, PermissionRevocation)
+        },
+    }
+
+
+def _plain(value: Device | Grant | PermissionRevocation) -> list[Any]:
+    return [getattr(value, field.name) for field in fields(value)]
+
+
+def _grant(kept: list[Any]) -> Grant:
+    robot, holder, level, session, sensors, address = kept
+    return Grant(robot, holder, level, session, tuple(sensors), address)
+
+
+def _of_entry(entry: Entry) -> dict[str, Any]:
+    return {"device": _plain(entry.device), "registrations": list(entry.registrations)}
+
+
+def _entry(kept: dict[str, Any], now: float) -> Entry:
+    said = deque(((i, t) for i, t in kept["registrations"]), maxlen=8)
+    return Entry(Device(*kept["device"]), now, registrations=said)

@@ -1,0 +1,208 @@
+"""How it ended by a fixed time: confirmed, or in one of the ways that rule a confirmation out.
+
+Only what comes first counts, so the ways compete and their shares add up to one. What was still
+open when nobody looked any more is cut off; it is not taken for an ending.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dva_sim.experiments.analysis.paired_effects import (
+    Floats,
+    Setting,
+    Table,
+    View,
+    as_floats,
+    codes_of,
+)
+from dva_sim.experiments.analysis.statistics import (
+    Interval,
+    cumulative_incidence,
+    paired_difference,
+    share_interval,
+)
+from dva_sim.experiments.study.schema import Level
+
+CONFIRMED, CLEARED, NOTHING = "confirmed", "cleared", "nothing"
+RIGHT = (CONFIRMED, CLEARED)
+WAYS = (
+    *RIGHT,
+    *("refuted", "false alarm confirmed", "link lost", "given up", "escalated", "expired"),
+    *("never reported", NOTHING),
+)
+"""All ways, the best first; `cleared` is a false alarm that was refuted."""
+_OF_EVENTS = {"contained": CONFIRMED, "open": NOTHING, "undetected": "never reported"}
+_OF_DRIVES = {"lost link": "link lost", "gave up": "given up"}  # why the DVA escalated
+
+
+@dataclass(frozen=True)
+class Ended:
+    """What had become of the events of one line at one stop.
+
+    Attributes:
+        line: Level of the factor that is compared.
+        stop: Level of the factor along which it is followed.
+        events: How many events it rests on.
+        shares: Share of each way by the horizon, in the order of `Endings.ways`.
+    """
+
+    line: Level
+    stop: Level
+    events: int
+    shares: dict[str, Interval]
+
+
+class Endings:
+    """The events of the part that the answer speaks of, each with how and when it ended.
+
+    Args:
+        view: Names the factors and their levels.
+        events: Columns of the table `events`.
+        runs: Columns of the table `runs`.
+        horizon: Until when an ending counts, since the report [s].
+    """
+
+    def __init__(self, view: View, events: Table, runs: Table, horizon: float) -> None:
+        here = np.asarray(events["part"]) == view.part.name
+        here &= ~np.asarray(events["is_reference"]).astype(bool)
+        rows = {name: np.asarray(values)[here] for name, values in events.items()}
+        self.horizon = horizon
+        self.way, self.time = _first(rows, _how_drives_ended(rows, runs, view.part.name))
+        self._view, self._person = view, rows["person"]
+        self._codes = {f.name: codes_of(rows, f) for f in view.part.factors if f.name in rows}
+
+    def __len__(self) -> int:
+        return len(self.way)
+
+    @cached_property
+    def is_right(self) -> NDArray[np.bool_]:
+        """Whether each was confirmed in time, or cleared if it was a false alarm `(n,)`."""
+        return np.isin(self.way, RIGHT) & (self.time <= self.horizon)
+
+    @cached_property
+    def ways(self) -> tuple[str, ...]:
+        """Those that occur; `nothing` in any case."""
+        late = self.time > self.horizon
+        return tuple(w for w in WAYS if w == NOTHING or np.any((self.way == w) & ~late))
+
+    def under(self, line: Level, stop: Level, panel: Setting | None = None) -> NDArray[np.bool_]:
+        """Which events happened under these levels, and else as the answer has it `(n,)`."""
+        view = self._view
+        wanted: Setting = dict(view.panels[0] if panel is None else panel)
+        wanted |= {f.name: v for f, v in ((view.line, line), (view.over, stop)) if f}
+        mask = np.ones(len(self), dtype=bool)
+        for factor in view.part.factors:
+            if factor.name in self._codes:
+                code = factor.levels.index(wanted[factor.name])
+                mask &= self._codes[factor.name] == code
+        return mask
+
+    def at(self, line: Level, stop: Level, panel: Setting | None = None) -> Ended:
+        """Shares by the horizon, each with its 95 % interval over persons."""
+        mask = self.under(line, stop, panel)
+        way, time, person = self.way[mask], self.time[mask], self._person[mask]
+        causes = list(np.where(way == NOTHING, "", way))
+        found = cumulative_incidence(time, causes, self.horizon, person)
+        never = share_interval(np.zeros(len(person)), person)
+        shares = {w: found.causes.get(w, never) for w in self.ways} | {NOTHING: found.nothing}
+        return Ended(line, stop, len(person), shares)
+
+    def difference(self, first: Level, second: Level, stop: Level) -> Interval:
+        """Share confirmed by the horizon: first minus second, paired by person."""
+        sides = [self._confirmed_by_person(level, stop) for level in (first, second)]
+        both = sorted(set(sides[0]) & set(sides[1]))
+        return paired_difference([sides[0][p] for p in both], [sides[1][p] for p in both], both)
+
+    def _confirmed_by_person(self, line: Level, stop: Level) -> dict[int, float]:
+        mask = self.under(line, stop)
+        done = (self.way == CONFIRMED) & (self.time <= self.horizon)
+        return {
+            int(person): float(done[mask & (self._person == person)].mean())
+            for person in np.unique(self._person[mask])
+        }
+
+
+def with_endings(runs: Table, events: Table) -> Table:
+    """Runs with `confirmed` as the share of their true events that were, whoever was sent.
+
+    The table itself tells of drives alone. `outcome` says of a run without any how its event
+    ended, if it had but one.
+    """
+    is_true = np.asarray(events["is_true"]).astype(bool)
+    times, words = as_floats(np.asarray(events["confirmation_s"])), np.asarray(events["outcome"])
+    met: dict[tuple[Any, ...], list[bool]] = defaultdict(list)
+    how: dict[tuple[Any, ...], list[str]] = defaultdict(list)
+    for key, real, time, word in zip(_keys(events), is_true, times, words, strict=True):
+        if real:
+            met[key].append(bool(np.isfinite(time)))
+            how[key].append(_OF_RUNS.get(str(word), str(word)))
+    keys = _keys(runs)
+    share = [float(np.mean(met[key])) if key in met else math.nan for key in keys]
+    told = np.asarray(runs.get("outcome", np.full(len(keys), None)), dtype=object)
+    outcome = [
+        how[key][0] if not isinstance(word, str) and len(how[key]) == 1 else word
+        for key, word in zip(keys, told, strict=True)
+    ]
+    return dict(runs) | {
+        "confirmed": np.array(share),
+        "outcome": np.array(outcome, dtype=object),
+    }
+
+
+_OF_RUNS = {"contained": CONFIRMED, "open": "timeout"}
+
+
+def _keys(table: Table) -> list[tuple[Any, ...]]:
+    """Which run each row is of."""
+    names = ("part", "cell", "person", "trial", "is_reference")
+    return list(zip(*(np.asarray(table[name]).tolist() for name in names), strict=True))
+
+
+def horizon_of(view: View, scenario: Mapping[str, Any]) -> float:
+    """Until when an ending counts [s]: as long as events are followed, or a run lasts."""
+    if view.part.has("follow_s"):
+        return float(np.nanmax(as_floats(view.part.treated["follow_s"])))
+    return float(scenario.get("horizon_s", math.inf))
+
+
+def _first(rows: Table, drives: NDArray[np.str_]) -> tuple[NDArray[np.str_], Floats]:
+    """What each event met first, and when since its report [s]."""
+    outcome = rows["outcome"].astype(str)
+    way = np.array([_OF_EVENTS.get(word, word) for word in outcome], dtype="U24")
+    way = np.where((way == "escalated") & (drives != ""), drives, way)
+    confirmed_at, closed_at = as_floats(rows["confirmation_s"]), as_floats(rows["closing_s"])
+    confirmed = np.isfinite(confirmed_at)
+    way = np.where(confirmed, CONFIRMED, way)
+    if "is_true" in rows:
+        is_false = ~rows["is_true"].astype(bool)
+        way = np.where(is_false & (way == "refuted"), CLEARED, way)
+        way = np.where(is_false & confirmed, "false alarm confirmed", way)
+    time = np.where(confirmed, confirmed_at, closed_at)
+    time = np.where(way == NOTHING, as_floats(rows["watched_s"]), time)
+    return way, np.where(way == "never reported", 0.0, time)
+
+
+def _how_drives_ended(rows: Table, runs: Table, part: str) -> NDArray[np.str_]:
+    """Why an event was escalated, by the last drive to it; empty where a run has several events.
+
+    A run tells of the drives to its first driven event only.
+    """
+    nothing = np.full(len(rows["part"]), "", dtype="U24")
+    if "outcome" not in runs:
+        return nothing
+    keys = np.stack([rows[name] for name in ("cell", "person", "trial")], axis=1)
+    if len(np.unique(keys, axis=0)) < len(keys):
+        return nothing
+    here = np.asarray(runs["part"]) == part
+    columns = (np.asarray(runs[name])[here] for name in ("cell", "person", "trial", "outcome"))
+    known = {tuple(key): _OF_DRIVES.get(str(word), "") for *key, word in zip(*columns, strict=True)}
+    return np.array([known.get(tuple(key), "") for key in keys.tolist()], dtype="U24")

@@ -1,0 +1,230 @@
+"""The conditions of a study: what was the same for everything that is compared."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from operator import itemgetter
+from typing import Any, NamedTuple
+
+from dva_sim.experiments.analysis.paired_effects import Factor
+from dva_sim.experiments.study.labels import factor_name, level_name
+from dva_sim.experiments.study.schema import POINT
+from dva_sim.simulation.scenario import TRIPS_OF_A_START, time_out_s
+
+_VARIED = "varied"
+_CONDITIONS = {
+    "processing time of a command at the robot": "robot.processing_s",
+    "time-out of a request": "command.timeout_s",
+    "attempts": "command.attempts",
+    "watchdog of the robot": "robot.watchdog_s",
+    "age limit of a command": "robot.max_age_s",
+    "messaging pattern": "pattern",
+    "transport": "transport",
+    "high-water mark": "zeromq.high_water_mark",
+    "kept of what waits": "zeromq.conflate",
+    "send buffer": "zeromq.send_buffer_bytes",
+    "receive buffer": "zeromq.receive_buffer_bytes",
+    "wanted command rate": "command.rate_hz",
+    "one-way delay": "link.delay_s",
+    "jitter (half-width)": "link.jitter_s",
+    "packet loss, each way": "link.loss",
+    "link rate": "link.rate_bps",
+    "queue before the link": "link.queue_bytes",
+    "law of the delay": "link.delay_law",
+    "recorded delays": "link.delay_log",
+    "packets may overtake": "link.reorder",
+    "bursts of losses": "link.bursts",
+    "queue before the link, in packets": "link.queue_packets",
+    "outages": "link.outages",
+    "partitions": "link.partitions",
+    "recorded link, towards the robot": "link.trace_up",
+    "recorded link, from the robot": "link.trace_down",
+    "rate of the shared link": "bottleneck.rate_bps",
+    "its queue": "bottleneck.queue_bytes",
+    "its one-way delay": "bottleneck.delay_s",
+    "commands per second": "commands.rate_hz",
+    "size of a command": "commands.bytes",
+    "pictures per second": "pictures.rate_hz",
+    "size of a picture": "pictures.bytes",
+    "way that is driven": "drive.task.kind",
+    "camera rate": "camera.rate_hz",
+    "size of a frame": "camera.frame_bytes",
+    "field of view": "camera.field_of_view_deg",
+    "task": "task.kind",
+    "device": "device.kind",
+    "frames per second": "frames.rate_hz",
+    "delay of commands": "link.up.delay_s",
+    "delay of frames": "link.down.delay_s",
+    "share of the correction that the machine makes": "automation",
+    "phone": "phone.profile",
+    "filter": "phone.filter",
+    "mapping": "phone.mapping",
+    "gain of the phone": "phone.mapping_options.gain",
+    "sending": "phone.send",
+    "operator strategy": "operator.strategy",
+    "control": "control",
+    "robot": "robot.profile",
+    "robots": "robot.count",
+    "guards": "guard.count",
+    "operators": "operator.count",
+    "bystanders": "bystander.count",
+    "dispatch policy": "dispatch.policy",
+    "longest time of a run": "horizon_s",
+}
+_WAYS = {"otherwise towards the robot": "link.up", "otherwise from the robot": "link.down"}
+_NOWHERE = "–"
+_OF_WAITING = (
+    *("command.timeout_s", "robot.processing_s"),
+    *("link.delay_s", "link.up.delay_s", "link.down.delay_s"),
+)
+
+
+def conditions(
+    scenarios: Mapping[str, Mapping[str, Any]], factors: Sequence[Factor], also: Sequence[str] = ()
+) -> list[tuple[str, list[str]]]:
+    """Each condition with its value in every part, and `varied` where it is a factor.
+
+    Args:
+        scenarios: Those of the parts.
+        factors: The keys that vary.
+        also: Further keys that matter here, such as those a study has changed.
+    """
+    if not scenarios:
+        return []
+    varied = {factor.name for factor in factors}
+    sites = [_site(s) for s in scenarios.values()]
+    rows = [("site", sites)] if any(site != _NOWHERE for site in sites) else []
+    of_robots = all(get(s, "model") != "task" for s in scenarios.values())
+    stated = _CONDITIONS | (_WAYS if of_robots else {})
+    stated |= {factor_name(k): k for k in also if k not in _CONDITIONS.values()}
+    for name, key in stated.items():
+        values = [_stated(get(s, key)) for s in scenarios.values()]
+        if key in varied:
+            rows.append((name, [_VARIED] * len(values)))
+        elif any(v is not None for v in values):
+            rows.append((name, [_text(key, v) for v in values]))
+    return rows
+
+
+def get(scenario: Mapping[str, Any], key: str) -> Any:
+    """The value at a dotted key; None where there is none."""
+    value: Any = scenario
+    for name in key.split("."):
+        value = value.get(name) if isinstance(value, Mapping) else None
+    return value
+
+
+def timeout_remark(scenarios: Mapping[str, Mapping[str, Any]], study: Mapping[str, Any]) -> str:
+    """Whether a request that is sent again has time for its reply, condition by condition.
+
+    Args:
+        scenarios: Those of the parts.
+        study: Its factors, treatments and the ends of its ranges say which conditions there are.
+    """
+    played = itertools.product(scenarios.values(), _changes(study))
+    known = list(filter(None, (_waiting(*pair) for pair in played)))
+    if not known:
+        return ""
+    what = "four round trips and the processing time"
+    short = sorted({(w.timeout, w.round_trip) for w in known if w.timeout <= w.needed})
+    if not short:
+        most = level_name("command.timeout_s", max(w.needed for w in known))
+        return f"The time-out is above {what} in every condition ({most} at most)."
+    where = "; ".join(
+        f"{level_name('command.timeout_s', timeout)} with round trips of "
+        + ", ".join(level_name("link.delay_s", trip) for _, trip in group)
+        for timeout, group in itertools.groupby(short, itemgetter(0))
+    )
+    rest = "" if all(w.timeout <= w.needed for w in known) else " In all others it is above."
+    return (
+        f"The time-out is not above {what} in these conditions: {where}. There a request that is "
+        f"sent again, over a new connection, does not get its reply in time.{rest}"
+    )
+
+
+class _Waiting(NamedTuple):
+    """How long a request waits, and how long it would have to [s]."""
+
+    timeout: float
+    round_trip: float
+    needed: float
+
+
+def _waiting(scenario: Mapping[str, Any], changes: Mapping[str, Any]) -> _Waiting | None:
+    """Of one condition; None where there are no requests."""
+
+    def base(key: str) -> Any:
+        return get(scenario, key)
+
+    def of(key: str) -> Any:
+        return changes[key] if key in changes else base(key)
+
+    timeout, processing, delay = (
+        of(key) for key in ("command.timeout_s", "robot.processing_s", "link.delay_s")
+    )
+    if timeout is None or processing is None or delay is None:
+        return None
+    trip, needed = _needed(of)
+    if "command.timeout_s" not in changes and timeout == _usual(base):
+        timeout = time_out_s(needed)  # nobody gave one, so it follows the link
+    return _Waiting(float(timeout), trip, needed)
+
+
+def _usual(of: Callable[[str], Any]) -> float | None:
+    """The time-out where nobody gives one [s]; None where that cannot be known."""
+    known = of("link.delay_s") is not None and of("robot.processing_s") is not None
+    return time_out_s(_needed(of)[1]) if known else None
+
+
+def _needed(of: Callable[[str], Any]) -> tuple[float, float]:
+    """The round trip, and what the first answer over a new connection takes [s]."""
+    delay, processing = of("link.delay_s"), of("robot.processing_s")
+    ways = (of(f"link.{way}.delay_s") for way in ("up", "down"))
+    trip = float(sum(delay if way is None else way for way in ways))
+    mean = processing["mean_s"] if isinstance(processing, Mapping) else processing
+    return trip, TRIPS_OF_A_START * trip + float(mean)
+
+
+def _changes(study: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+    """What each combination of levels, and of the ends of ranges, changes in a scenario."""
+    named = study.get("treatments", {})
+    factors = [
+        [named[name][str(level)] if name in named else {name: level} for level in levels]
+        for name, levels in study.get("factors", {}).items()
+        if name != POINT
+    ]
+    ranges = (study.get("design") or {}).get("ranges") or {}
+    ends = [
+        [{key: range_[end]} for end in ("low", "high")]
+        for key, range_ in ranges.items()
+        if key in _OF_WAITING
+    ]
+    for levels in itertools.product(*factors, *ends):
+        yield {key: value for level in levels for key, value in level.items()}
+
+
+def _stated(value: Any) -> Any:
+    """None for what goes without saying: that there is none of something."""
+    return None if value is False or value == [] else value
+
+
+def _site(scenario: Mapping[str, Any]) -> str:
+    chosen = get(scenario, "site.map") or get(scenario, "site.name")
+    return str(chosen).rpartition("/")[2] if chosen else _NOWHERE
+
+
+def _text(key: str, value: Any) -> str:
+    if value is None:
+        return "–"
+    if key.endswith(".rate_bps"):
+        return f"{value / 1e6:g} Mbit/s"
+    if key.endswith(("_bytes", ".bytes")):
+        return f"{value / 1000:g} kB"
+    if isinstance(value, Mapping):
+        return ", ".join(f"{k} {v}" for k, v in value.items() if v is not None) or _NOWHERE
+    if isinstance(value, list | tuple):
+        return ", ".join(_text(key, item) for item in value)
+    if isinstance(value, str):
+        return value.rpartition("/")[2]
+    return level_name(key, value)

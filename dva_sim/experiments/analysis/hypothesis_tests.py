@@ -1,0 +1,247 @@
+"""Named comparisons and hypotheses as they came out: each contrast with interval, size and test.
+
+Levels of factors that a contrast does not name are averaged within each person. A hypothesis holds
+when its own test says so after Holm's adjustment within its family; it does not hold when the test
+of the opposite does; all else is open.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+
+from dva_sim.experiments.analysis.layout import layout_of
+from dva_sim.experiments.analysis.paired_effects import Floats, Part, Setting, Table
+from dva_sim.experiments.analysis.statistics import (
+    LEVEL,
+    EffectSize,
+    Interval,
+    effect_size,
+    equivalence,
+    holm,
+    one_sided_test,
+    pair_correlation,
+    paired_difference,
+    permutation_test,
+)
+from dva_sim.experiments.study.schema import ANSWER, POINT, Contrast, Hypothesis, Level
+
+Verdict = Literal["held", "did not hold", "open", "not run"]
+_ALPHA = 1 - LEVEL
+
+
+class Pairs(NamedTuple):
+    """Both sides of a contrast, run by run `(n,)`, and whose run it was."""
+
+    first: Floats
+    second: Floats
+    person: Floats
+
+
+@dataclass(frozen=True)
+class Compared:
+    """One contrast at one place.
+
+    Attributes:
+        name: Of the comparison.
+        contrast: What was declared.
+        at: Levels at which it was taken.
+        difference: First minus second, with its own 95 % interval; None if not run.
+        size: The same in standard deviations.
+        correlation: Of the two sides, run by run.
+        p: Of the test that labels could be swapped.
+        adjusted: The same by Holm within the family.
+    """
+
+    name: str
+    contrast: Contrast
+    at: Setting
+    difference: Interval | None = None
+    size: EffectSize | None = None
+    correlation: float = math.nan
+    p: float = math.nan
+    adjusted: float = math.nan
+
+
+@dataclass(frozen=True)
+class Tested:
+    """A hypothesis beside what came out.
+
+    Attributes:
+        name: Of the hypothesis.
+        hypothesis: As declared.
+        contrast: What it is about.
+        at: Where.
+        difference: As measured, with its 95 % interval; None if not run.
+        p: Of its own test: one-sided, or of equivalence within the margin.
+        adjusted: The same by Holm within the family.
+        p_against: Of the test that it is the other way round, or beyond the margin.
+        against: The same by Holm among these of the family.
+        verdict: Whether it held.
+    """
+
+    name: str
+    hypothesis: Hypothesis
+    contrast: Contrast
+    at: Setting
+    difference: Interval | None = None
+    p: float = math.nan
+    adjusted: float = math.nan
+    p_against: float = math.nan
+    against: float = math.nan
+    verdict: Verdict = "not run"
+
+
+class Judgement(NamedTuple):
+    """All comparisons and hypotheses of a study, as they came out."""
+
+    compared: list[Compared]
+    tested: list[Tested]
+
+
+def judged(study: Mapping[str, Any], runs: Table) -> Judgement:
+    """Every comparison and every hypothesis, as the manifest has them, and what came out.
+
+    All tests of a family share its chance of a false alarm, comparisons and hypotheses alike;
+    what speaks against hypotheses is adjusted among its own.
+    """
+    compared, tested = _compare_all(study, runs), _test_all(study, runs)
+    claimed = [t.contrast.family for t in tested]
+    families = [*(c.contrast.family for c in compared), *claimed]
+    adjusted = holm([*(c.p for c in compared), *(t.p for t in tested)], families)
+    against = holm([t.p_against for t in tested], claimed)
+    of_claims = zip(tested, adjusted[len(compared) :], against, strict=True)
+    verdicts = [replace(t, adjusted=float(p), against=float(q)) for t, p, q in of_claims]
+    return Judgement(
+        [replace(c, adjusted=float(p)) for c, p in zip(compared, adjusted, strict=False)],
+        [replace(t, verdict=verdict_of(t)) for t in verdicts],
+    )
+
+
+def _compare_all(study: Mapping[str, Any], runs: Table) -> list[Compared]:
+    """Every named comparison at every level that it runs over."""
+    return [
+        _compared(study, runs, name, contrast, at)
+        for name, contrast in contrasts_of(study).items()
+        if name != ANSWER
+        for at in places_of(study, contrast)
+    ]
+
+
+def _test_all(study: Mapping[str, Any], runs: Table) -> list[Tested]:
+    named = contrasts_of(study)
+    return [
+        _tested(study, runs, name, claim, named[claim.comparison])
+        for name, claim in claims_of(study).items()
+    ]
+
+
+def verdict_of(tested: Tested) -> Verdict:
+    """Whether a hypothesis held, by its own test and by that of the opposite, both adjusted."""
+    if tested.difference is None:
+        return "not run"
+    if tested.adjusted <= _ALPHA:
+        return "held"
+    return "did not hold" if tested.against <= _ALPHA else "open"
+
+
+def pairs_of(
+    study: Mapping[str, Any], runs: Table, contrast: Contrast, at: Setting
+) -> Pairs | None:
+    """Both sides of a contrast at one place; None where it was not run."""
+    table, factors = layout_of(study, runs)
+    part = Part(table, contrast.part, factors)
+    known = {f.name: f.levels for f in part.factors}
+    wanted = dict(at) | {contrast.factor: contrast.contrast[0]}
+    there = all(name in known and level in known[name] for name, level in wanted.items())
+    if not there or contrast.contrast[1] not in known[contrast.factor]:
+        return None
+    in_excess = part.has_reference(contrast.measure)
+    grid = part.excess(contrast.measure) if in_excess else part.grid(contrast.measure)
+    sides = [part.where(grid, dict(at) | {contrast.factor: level}) for level in contrast.contrast]
+    person = np.broadcast_to(part.persons[:, np.newaxis], sides[0].shape)
+    return Pairs(sides[0].ravel(), sides[1].ravel(), person.ravel())
+
+
+def contrasts_of(study: Mapping[str, Any]) -> dict[str, Contrast]:
+    """The answer's contrast and the named ones."""
+    named: dict[str, Contrast] = {}
+    if study.get("answer"):
+        named[ANSWER] = Contrast.model_validate(study["answer"])
+    for name, declared in (study.get("comparisons") or {}).items():
+        named[name] = Contrast.model_validate(declared)
+    return named
+
+
+def claims_of(study: Mapping[str, Any]) -> dict[str, Hypothesis]:
+    """The hypotheses, but for those about a contrast that is not declared."""
+    declared = (study.get("hypotheses") or {}).items()
+    claims = {name: Hypothesis.model_validate(claim) for name, claim in declared}
+    named = contrasts_of(study)
+    return {name: claim for name, claim in claims.items() if claim.comparison in named}
+
+
+def places_of(study: Mapping[str, Any], contrast: Contrast) -> list[Setting]:
+    """Each level that a contrast runs over, or the one place it is taken at."""
+    stops = _stops(study, contrast)
+    if not stops:
+        return [dict(contrast.within)]
+    return [dict(contrast.within) | {str(contrast.over): level} for level in stops]
+
+
+def _stops(study: Mapping[str, Any], contrast: Contrast) -> Sequence[Level]:
+    """The levels that a contrast runs over; none over points in ranges, which are like trials."""
+    levels: Sequence[Level] = study.get("factors", {}).get(contrast.over, ())
+    return levels if contrast.over != POINT else ()
+
+
+def _compared(
+    study: Mapping[str, Any], runs: Table, name: str, contrast: Contrast, at: Setting
+) -> Compared:
+    pairs = pairs_of(study, runs, contrast, at)
+    found = paired_difference(*pairs) if pairs is not None else None
+    if pairs is None or found is None or not found.n_persons:
+        return Compared(name, contrast, at)
+    return Compared(
+        name,
+        contrast,
+        at,
+        found,
+        effect_size(*pairs),
+        pair_correlation(pairs.first, pairs.second),
+        permutation_test(*pairs).p,
+    )
+
+
+def _tested(
+    study: Mapping[str, Any], runs: Table, name: str, claim: Hypothesis, contrast: Contrast
+) -> Tested:
+    at = places_of(study, contrast)[-1] | claim.at
+    pairs = pairs_of(study, runs, contrast, at)
+    found = paired_difference(*pairs) if pairs is not None else None
+    if pairs is None or found is None or not found.n_persons:
+        return Tested(name, claim, contrast, at)
+    p, against = _p(claim, pairs), _p_against(claim, pairs)
+    return Tested(name, claim, contrast, at, found, p=p, p_against=against)
+
+
+def _p(claim: Hypothesis, pairs: Pairs) -> float:
+    """Of the claim's own test."""
+    if claim.direction == "same":
+        return equivalence(*pairs, claim.margin).p
+    margin = claim.margin if claim.direction == "above" else -claim.margin
+    return one_sided_test(*pairs, margin, claim.direction)
+
+
+def _p_against(claim: Hypothesis, pairs: Pairs) -> float:
+    """Of the opposite: on the other side of the margin, or beyond either end of it."""
+    if claim.direction == "above":
+        return one_sided_test(*pairs, claim.margin, "below")
+    below = one_sided_test(*pairs, -claim.margin, "below") if claim.direction == "same" else 1.0
+    bound = claim.margin if claim.direction == "same" else -claim.margin
+    above = one_sided_test(*pairs, bound, "above")
+    return min(1.0, 2 * min(above, below)) if claim.direction == "same" else above

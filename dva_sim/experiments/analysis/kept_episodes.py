@@ -1,0 +1,169 @@
+"""Which runs can be watched again, and which of them are the typical and the worst."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dva_sim.experiments.analysis.paired_effects import (
+    Floats,
+    Setting,
+    Table,
+    as_floats,
+    plain_level,
+)
+
+RECORDINGS = "recordings"
+
+
+class Tables(NamedTuple):
+    """What is known of the runs.
+
+    Attributes:
+        runs: All of them.
+        tracks: Who was where, of some.
+        names: Columns that name a cell: its factors.
+    """
+
+    runs: Table
+    tracks: Table
+    names: Sequence[str]
+
+
+class Incident(NamedTuple):
+    """What happened, when [s] and where [m]."""
+
+    kind: str
+    start: float
+    x: float
+    y: float
+
+
+@dataclass(frozen=True)
+class Episode:
+    """One run that was kept.
+
+    Attributes:
+        setting: Levels of its cell.
+        person: Who drove.
+        trial: Which trial of that person.
+        value: Its measure.
+        moments: Columns `agent`, `t_s`, `x_m`, `y_m`, `heading_rad`, `mode`: who was where, when.
+        incidents: Kind, start [s] and place [m] of each, where a recording tells them.
+        kept: How many runs were kept, of which it is one.
+        rank: What share of all runs had a smaller value.
+    """
+
+    setting: Setting
+    person: int
+    trial: int
+    value: float
+    moments: Table
+    incidents: tuple[Incident, ...]
+    kept: int
+    rank: float
+
+
+def typical_and_worst(
+    folder: Path, part: str, measure: str, tables: Tables
+) -> tuple[Episode, Episode] | None:
+    """Of the runs kept, the one nearest to the median of all and the one with the largest value.
+
+    A recording is preferred where the study kept some; else the tracks of the table are taken.
+    None where nothing was kept.
+
+    Args:
+        folder: Of the results.
+        part: Whose runs.
+        measure: By which they are judged.
+        tables: The runs, their tracks, and the columns that name a cell.
+    """
+    here = np.asarray(tables.runs["part"]) == part
+    here &= ~np.asarray(tables.runs["is_reference"]).astype(bool)
+    runs = {name: np.asarray(values)[here] for name, values in tables.runs.items()}
+    values = as_floats(runs[measure]) if measure in runs else np.full(here.sum(), np.nan)
+    files = _recorded(folder / RECORDINGS, part, runs)
+    rows = np.array(sorted(files)) if files else _tracked(tables.tracks, part, runs)
+    rows = rows[np.isfinite(values[rows])] if len(rows) else rows
+    if not len(rows):
+        return None
+    every = values[np.isfinite(values)]
+    chosen = np.argmin(abs(values[rows] - np.median(every))), np.argmax(values[rows])
+    episodes = []
+    for row in (int(rows[at]) for at in chosen):
+        moments, incidents = _seen(files, tables.tracks, part, runs, row)
+        where = {name: plain_level(runs[name][row]) for name in tables.names}
+        who = int(runs["person"][row]), int(runs["trial"][row])
+        rank = float((every < values[row]).mean())
+        value = float(values[row])
+        episodes.append(Episode(where, *who, value, moments, incidents, len(rows), rank))
+    return episodes[0], episodes[1]
+
+
+def _key(runs: Table, row: int) -> tuple[int, int, int]:
+    return int(runs["cell"][row]), int(runs["person"][row]), int(runs["trial"][row])
+
+
+def _recorded(folder: Path, part: str, runs: Table) -> dict[int, Path]:
+    """The recording of each run that has one, by the run's row."""
+    if not folder.is_dir() or "cell" not in runs:
+        return {}
+    there = {path.name: path for path in folder.glob(f"{part}-*.mcap")}
+    names = {
+        row: "-".join(map(str, (part, *_key(runs, row)))) for row in range(len(runs["person"]))
+    }
+    return {row: there[f"{n}.mcap"] for row, n in names.items() if f"{n}.mcap" in there}
+
+
+def _tracked(tracks: Table, part: str, runs: Table) -> NDArray[np.intp]:
+    """Rows of the runs whose tracks are in the table."""
+    if not tracks or "cell" not in runs:
+        return np.array([], dtype=np.intp)
+    here = np.asarray(tracks["part"]) == part
+    columns = [np.asarray(tracks[name])[here].tolist() for name in ("cell", "person", "trial")]
+    known = set(zip(*columns, strict=True))
+    rows = range(len(runs["person"]))
+    return np.array([row for row in rows if _key(runs, row) in known], dtype=np.intp)
+
+
+def _seen(
+    files: Mapping[int, Path], tracks: Table, part: str, runs: Table, row: int
+) -> tuple[Table, tuple[Incident, ...]]:
+    """Who was where and what happened, from the recording or else from the table."""
+    if row in files:
+        from dva_sim.recordings.reading import read_lapse
+
+        lapse = read_lapse(files[row])
+        places = [(i, i.hazard.position) for i in lapse.incidents]
+        found = (Incident(i.kind, float(i.start), float(x), float(y)) for i, (x, y) in places)
+        return lapse.tracks, tuple(found)
+    cell, person, trial = _key(runs, row)
+    mine = np.asarray(tracks["part"]) == part
+    for name, value in (("cell", cell), ("person", person), ("trial", trial)):
+        mine &= np.asarray(tracks[name]) == value
+    return {name: np.asarray(values)[mine] for name, values in tracks.items()}, ()
+
+
+def agents_of(moments: Table) -> list[str]:
+    """Whose ways are known, in order."""
+    return sorted({str(name) for name in moments["agent"]})
+
+
+def way_of(moments: Table, agent: str) -> tuple[Floats, Floats]:
+    """Times `(n,)` [s] and places with headings `(n, 3)` of one agent, in order of time."""
+    mine = np.asarray(moments["agent"]).astype(str) == agent
+    times = as_floats(np.asarray(moments["t_s"])[mine])
+    columns = [as_floats(np.asarray(moments[k])[mine]) for k in ("x_m", "y_m", "heading_rad")]
+    order = np.argsort(times, kind="stable")
+    return times[order], np.column_stack(columns)[order]
+
+
+def instants(moments: Table, count: int) -> Sequence[float]:
+    """Times [s] spread evenly from the first moment to the last."""
+    times = as_floats(np.asarray(moments["t_s"]))
+    return [float(t) for t in np.linspace(times.min(), times.max(), count)]

@@ -1,0 +1,280 @@
+"""How a report reads a study: which runs, which contrast, and what was found."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from dva_sim.experiments.analysis.answer import Finding, Missed
+from dva_sim.experiments.analysis.paired_effects import (
+    Factor,
+    Floats,
+    Part,
+    Table,
+    View,
+    as_floats,
+    person_means,
+    plain_level,
+    present,
+)
+from dva_sim.experiments.analysis.statistics import Interval, band
+from dva_sim.experiments.study.labels import brief
+from dva_sim.experiments.study.schema import POINT, TUNING, Level
+from dva_sim.kernel.units import unit_of
+
+_NEVER_NEGATIVE = ("s", "m", "Hz", "bit/s", "N s")
+ROW = "row"  # name of the factor whose levels are the rows of a list
+_KEYS = {"part", "cell", "config", "is_reference", "person", "trial", "seed"}
+
+
+def factors_of(study: Mapping[str, Any]) -> list[Factor]:
+    """The declared factors, in order."""
+    return [Factor(name, tuple(levels)) for name, levels in study.get("factors", {}).items()]
+
+
+def layout_of(
+    study: Mapping[str, Any], runs: Table, are_points_trials: bool = True
+) -> tuple[Table, list[Factor]]:
+    """The runs with the factors by which they are laid out as a grid.
+
+    In the full grid these are the factors declared. Factors whose levels are taken together are
+    one, that of which the answer speaks or the first. Points in ranges are like trials: a person
+    meets them all, and what is compared is compared at each. Rows that leave most of their grid
+    empty are one factor, unless the answer needs the others.
+
+    Args:
+        study: As the manifest has it.
+        runs: The table of runs.
+        are_points_trials: Otherwise the point is a factor of its own.
+    """
+    factors, design = factors_of(study), study.get("design") or {}
+    if together := design.get("zip"):
+        kept = _spoken_of(study, together)
+        return runs, [f for f in factors if f.name not in together or f.name == kept]
+    if POINT in study.get("factors", {}) and POINT in runs and are_points_trials:
+        return _as_trials(runs), [f for f in factors if f.name != POINT]
+    if names := row_names(study, runs):
+        return with_rows(runs, names), [Factor(ROW, tuple(names.values()))]
+    return runs, factors
+
+
+def points_of(study: Mapping[str, Any], runs: Table) -> list[str]:
+    """Continuous factors: columns of numbers that tell where in its ranges each run lies."""
+    if POINT not in study.get("factors", {}) or POINT not in runs:
+        return []
+    design = list(runs)[: list(runs).index("is_reference")]
+    names = [n for n in design if n not in _KEYS and n not in study["factors"]]
+    return [n for n in names if np.isfinite(as_floats(runs[n])).any()]
+
+
+def _spoken_of(study: Mapping[str, Any], together: Sequence[str]) -> str:
+    """Which of the factors taken together stands for them."""
+    declared = study.get("answer") or {}
+    named = [declared.get("factor"), declared.get("over"), *(declared.get("within") or {})]
+    return next((name for name in named if name in together), together[0])
+
+
+def _as_trials(runs: Table) -> Table:
+    """Each point and trial as a trial of its own; a reference run is that of every point."""
+    aside = np.asarray(runs["is_reference"]).astype(bool)
+    points = np.unique(as_floats(runs[POINT])[~aside]).astype(int)
+    own, shared = np.flatnonzero(~aside), np.flatnonzero(aside)
+    rows = np.concatenate([own, np.tile(shared, len(points))])
+    point = np.concatenate([as_floats(runs[POINT])[own].astype(int), points.repeat(len(shared))])
+    trial = np.asarray(runs["trial"])[rows]
+    count = int(trial.max(initial=0)) + 1
+    return {key: np.asarray(v)[rows] for key, v in runs.items()} | {"trial": point * count + trial}
+
+
+def _is_sparse(runs: Table, factors: Sequence[Factor]) -> bool:
+    """Whether fewer than half of the cells of the grid were run."""
+    treated = ~np.asarray(runs["is_reference"]).astype(bool)
+    ran = len(np.unique(np.asarray(runs["cell"])[treated])) if "cell" in runs else 0
+    return 2 * ran < math.prod(len(f.levels) for f in factors)
+
+
+def row_names(study: Mapping[str, Any], runs: Table) -> dict[int, str]:
+    """What each cell of a list is called, by what it sets; nothing where factors are told apart."""
+    factors = factors_of(study)
+    listed = bool(study.get("design")) and not study.get("answer") and "cell" in runs
+    if not listed or POINT in study["factors"] or not _is_sparse(runs, factors):
+        return {}
+    cells, first = np.unique(np.asarray(runs["cell"]), return_index=True)
+    return {
+        int(cell): brief({f.name: plain_level(runs[f.name][at]) for f in factors})
+        for cell, at in zip(cells, first, strict=True)
+        if cell >= 0
+    }
+
+
+def with_rows(table: Table, names: Mapping[int, str]) -> Table:
+    """A table with a column that says which row of the list each of its rows belongs to."""
+    column = np.array([names.get(int(cell), "") for cell in table["cell"]], dtype=object)
+    return dict(table) | {ROW: column}
+
+
+def keys_of(study: Mapping[str, Any]) -> list[Factor]:
+    """The scenario keys that vary, with their levels: treatments by what they change.
+
+    Of a range these are its ends.
+    """
+    ranges = (study.get("design") or {}).get("ranges") or {}
+    keys: dict[str, list[Level]] = {key: [r["low"], r["high"]] for key, r in ranges.items()}
+    for factor, levels in study.get("factors", {}).items():
+        named = study.get("treatments", {}).get(factor)
+        if factor == POINT:
+            continue
+        if factor == TUNING:
+            keys[study["tuning"]["key"]] = list(study["tuning"]["levels"])
+        elif named is None:
+            keys[factor] = list(levels)
+        else:
+            for level in levels:
+                for key, value in named[level].items():
+                    keys.setdefault(key, []).append(value)
+    return [Factor(key, _distinct(levels)) for key, levels in keys.items()]
+
+
+def _distinct(levels: Sequence[Any]) -> tuple[Any, ...]:
+    """Each level once; a treatment may set a whole block, such as a law."""
+    return tuple(level for i, level in enumerate(levels) if level not in levels[:i])
+
+
+def view_of(study: Mapping[str, Any], runs: Table) -> View | None:
+    """The view that the declared answer asks for, or a sensible one without it.
+
+    Returns None where there is no run to look at.
+    """
+    declared = study.get("answer") or {}
+    parts = list(dict.fromkeys(str(p) for p in runs["part"]))
+    name = declared.get("part") if declared.get("part") in parts else next(iter(parts), None)
+    table, factors = layout_of(study, runs)
+    part = Part(table, name, factors) if name else None
+    if part is None or not len(part):
+        return None
+    over = _factor(part, declared.get("over"))
+    line = _factor(part, declared.get("factor"))
+    if over is None and not (line and "over" in declared):
+        over = _longest_numeric([f for f in part.factors if f is not line])
+    line = line or _other(part.factors, over)
+    within = {k: v for k, v in (declared.get("within") or {}).items() if _factor(part, k)}
+    measure = declared.get("measure") or _first_measure(part)
+    return View(
+        part=part,
+        measure=measure,
+        line=line,
+        over=over,
+        contrast=_contrast(declared, line),
+        within=within,
+        averages_points=POINT in study.get("factors", {}),
+        smallest_effect=declared.get(f"smallest_effect_{measure.rpartition('_')[2]}")
+        or declared.get("smallest_effect"),
+    )
+
+
+def finding_of(view: View) -> Finding | None:
+    """The declared contrast, measured; None where no contrast was declared or run."""
+    if view.contrast is None or view.line is None:
+        return None
+    panel = view.panels[0]
+    found = band(view.difference(panel, *view.contrast))
+    return Finding(
+        measure=view.measure,
+        in_excess=view.part.has_reference(view.measure),
+        factor=view.line.name,
+        first=view.contrast[0],
+        second=view.contrast[1],
+        over=view.over.name if view.over else "",
+        levels=view.stops,
+        within=panel,
+        mean=found.mean,
+        low=np.maximum(found.low, -view.widest),
+        high=np.minimum(found.high, view.widest),
+        persons=found.n_persons,
+        smallest_effect=view.smallest_effect,
+        missed=_missed(view),
+        horizon=_horizon(view),
+        widest=view.widest,
+        all_confirmed=_all_confirmed(view),
+        everywhere="on average over the ranges" if view.averages_points else "",
+        part=view.part.name,
+    )
+
+
+def possible_values(measure: str, scenario: Mapping[str, Any]) -> tuple[float, float]:
+    """The least and the greatest value that a measure can take in a run of a scenario."""
+    if measure == "confirmed" or measure.endswith("_share"):
+        return 0.0, 1.0
+    if measure in ("drive_time_s", "confirmation_mean_s", "response_mean_s"):
+        return 0.0, float(scenario.get("horizon_s", math.inf))
+    return (0.0 if unit_of(measure) in _NEVER_NEGATIVE else -math.inf), math.inf
+
+
+def interval_of(values: Floats) -> Interval | None:
+    """Mean over persons of `(persons, trials)`, with persons drawn anew for its 95 % interval.
+
+    The interval of persons who are all alike is that one value. None where nobody has a value.
+    """
+    found = band(person_means(values[np.newaxis]))
+    mean, low, high = (float(x[0]) for x in (found.mean, found.low, found.high))
+    if not np.isfinite(mean):
+        return None
+    if found.n_persons > 1 and not np.isfinite(low):
+        low = high = mean
+    return Interval(mean, low, high, found.n_persons)
+
+
+def _missed(view: View) -> tuple[Missed, ...]:
+    """Runs without confirmation at the last stop, for every line."""
+    if not view.part.has("confirmed"):
+        return ()
+    grid = view.part.grid("confirmed")
+    found = []
+    for level in view.lines:
+        seen = present(view.curve(grid, view.panels[0], level)[-1])
+        found.append(Missed(level, int((seen < 1).sum()), len(seen)))
+    return tuple(found)
+
+
+def _all_confirmed(view: View) -> bool:
+    """Whether no run of any cell ended without a confirmation."""
+    return view.part.has("confirmed") and bool((present(view.part.grid("confirmed")) == 1).all())
+
+
+def _horizon(view: View) -> float | None:
+    """What missed runs count with, if it is one and the same time."""
+    if not view.part.has("confirmed") or unit_of(view.measure) != "s":
+        return None
+    missed = as_floats(view.part.treated["confirmed"]) == 0
+    counted = np.unique(present(view.part.values(view.measure)[missed]))
+    return float(counted[0]) if len(counted) == 1 else None
+
+
+def _factor(part: Part, name: str | None) -> Factor | None:
+    return next((f for f in part.factors if f.name == name), None)
+
+
+def _longest_numeric(factors: Sequence[Factor]) -> Factor | None:
+    numeric = [f for f in factors if f.is_numeric and len(f.levels) > 1]
+    return max(numeric, key=lambda f: len(f.levels), default=None) or next(iter(factors), None)
+
+
+def _other(factors: Sequence[Factor], over: Factor | None) -> Factor | None:
+    return next((f for f in factors if f is not over), None)
+
+
+def _first_measure(part: Part) -> str:
+    names = [c for c in part.treated if c not in _KEYS and part.has(c)]
+    factors = {f.name for f in part.factors}
+    measures = [c for c in names if c not in factors]
+    return "drive_time_s" if "drive_time_s" in measures else next(iter(measures), "seed")
+
+
+def _contrast(declared: Mapping[str, Any], line: Factor | None) -> tuple[Level, Level] | None:
+    levels = tuple(declared.get("contrast") or ())
+    if line is None or len(levels) != 2 or not set(levels) <= set(line.levels):
+        return None
+    return levels[0], levels[1]

@@ -1,0 +1,192 @@
+"""What was predicted, beside what was found: whether it held is said by rule, not by taste.
+
+A direction holds when the 95 % interval lies on that side of zero, and fails when it lies on the
+other side or rules out every effect that matters. `same` holds when the interval lies within the
+smallest effect that matters, and fails when it lies wholly outside. A range holds when it
+contains the mean, and fails when the interval does not touch it. All else is open. Nothing is
+judged where tuning has chosen the value there was, so that both sides are the same runs.
+
+What arithmetic predicts of lock-step messaging: its rate, and from which delay on it binds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from dva_sim.experiments.analysis.layout import interval_of
+from dva_sim.experiments.analysis.paired_effects import Setting, View
+from dva_sim.experiments.analysis.statistics import Interval
+from dva_sim.experiments.study.labels import level_name, measure_of, number, quantity, setting
+from dva_sim.experiments.study.schema import TUNING, Level, Prediction, Range
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.units import unit_of
+
+Verdict = Literal["held", "did not hold", "open", "not judged"]
+_SAME_RUNS = "the same runs: tuning chose the value it had"
+_NAMES = ("cell", "config", TUNING)  # columns of a run that tell nothing of how it went
+_SIDES = {"above": "above zero", "below": "below zero", "same": "the same"}
+
+
+@dataclass(frozen=True)
+class Judged:
+    """One prediction and what became of it.
+
+    Attributes:
+        text: As it was written down.
+        expected: What it says of a contrast; empty if it does not.
+        found: The same as measured; empty if not run.
+        verdict: Whether it held.
+    """
+
+    text: str
+    expected: str
+    found: str
+    verdict: Verdict
+
+
+def judge_all(study: Mapping[str, Any], view: View | None) -> list[Judged]:
+    """Every prediction of a study, as its manifest holds it."""
+    found = [Prediction.model_validate(p) for p in study.get("predictions") or ()]
+    return [_judge(prediction, view) for prediction in found]
+
+
+def verdict_of(
+    direction: str | None, expected: Range | None, smallest: float | None, found: Interval
+) -> Verdict:
+    """Whether a prediction held, by the interval of what was found."""
+    verdicts = [_of_direction(direction, smallest, found)]
+    if expected is not None:
+        verdicts.append(_of_range(expected, found))
+    if "did not hold" in verdicts:
+        return "did not hold"
+    return "held" if all(v == "held" for v in verdicts) else "open"
+
+
+def _of_direction(direction: str | None, smallest: float | None, found: Interval) -> Verdict:
+    low, high = (found.low, found.high) if direction != "below" else (-found.high, -found.low)
+    matters = smallest or 0.0
+    if direction == "same":
+        if -matters <= low and high <= matters:
+            return "held"
+        return "did not hold" if low > matters or high < -matters else "open"
+    if low > 0:
+        return "held"
+    return "did not hold" if high <= 0 or high < matters else "open"
+
+
+def _of_range(expected: Range, found: Interval) -> Verdict:
+    if expected[0] <= found.mean <= expected[1]:
+        return "held"
+    apart = found.low > expected[1] or found.high < expected[0]
+    return "did not hold" if apart else "open"
+
+
+def _judge(prediction: Prediction, view: View | None) -> Judged:
+    text = prediction.text
+    if prediction.direction is None:
+        return Judged(text, "", "", "not judged")
+    asked = _asked(prediction, view) if view is not None else None
+    if view is None or asked is None:
+        return Judged(text, "", "not run", "not judged")
+    factor, (first, second), where = asked
+    unit = unit_of(view.measure)
+    names = f"{level_name(factor, first)} minus {level_name(factor, second)}"
+    expected = f"{names} in {measure_of(view.measure, view.part.name)}, {setting(where)}: "
+    expected += _SIDES[prediction.direction] + _range_words(prediction.expected, unit)
+    if factor == TUNING and _chose_what_was(view, (first, second), where):
+        return Judged(text, expected, _SAME_RUNS, "not judged")
+    found = _measured(view, factor, (first, second), where)
+    if found is None:
+        return Judged(text, expected, "not run", "not judged")
+    verdict = verdict_of(prediction.direction, prediction.expected, view.smallest_effect, found)
+    low, high = max(found.low, -view.widest), min(found.high, view.widest)
+    words = f"{quantity(found.mean, unit)} ({number(low)} to {quantity(high, unit)})"
+    return Judged(text, expected, words, verdict)
+
+
+def _range_words(expected: Range | None, unit: str) -> str:
+    return f", {number(expected[0])} to {quantity(expected[1], unit)}" if expected else ""
+
+
+def _asked(prediction: Prediction, view: View) -> tuple[str, tuple[Level, Level], Setting] | None:
+    """Factor, levels and place of the contrast; None where they were not run."""
+    if view.line is None:
+        return None
+    factor = prediction.factor or view.line.name
+    contrast = prediction.contrast or view.contrast
+    where = dict(view.panels[0]) | ({view.over.name: view.stops[-1]} if view.over else {})
+    where |= prediction.at
+    levels = {f.name: f.levels for f in view.part.factors}
+    if factor != view.line.name and view.contrast is not None:
+        where.setdefault(view.line.name, view.contrast[1])
+    where.pop(factor, None)
+    wanted: list[tuple[str, Sequence[Level]]] = [(name, (level,)) for name, level in where.items()]
+    if contrast is None or factor not in levels:
+        return None
+    wanted.append((factor, contrast))
+    ran = all(name in levels and set(some) <= set(levels[name]) for name, some in wanted)
+    return (factor, contrast, where) if ran else None
+
+
+def _chose_what_was(view: View, contrast: tuple[Level, Level], where: Setting) -> bool:
+    """Whether tuned and untuned runs are the same in all that was measured of them."""
+    columns = [view.part.grid(name) for name in view.part.treated if name not in _NAMES]
+    pairs = [[view.part.where(c, where | {TUNING: level}) for level in contrast] for c in columns]
+    return all(np.array_equal(first, second, equal_nan=True) for first, second in pairs)
+
+
+def _measured(
+    view: View, factor: str, contrast: tuple[Level, Level], where: Setting
+) -> Interval | None:
+    """The paired difference at one place."""
+    first, second = (view.part.where(view.values, where | {factor: level}) for level in contrast)
+    found = interval_of(first - second)
+    return found if found is not None and found.n_persons > 1 else None
+
+
+@dataclass(frozen=True)
+class Cadence:
+    """How often the phone wants to send, and how long a robot needs for one command.
+
+    Attributes:
+        period_s: Wanted time between two commands; the shortest, where it is not constant.
+        processing_s: Time a robot needs for one command, on average.
+    """
+
+    period_s: float
+    processing_s: float
+
+    @property
+    def boundary_s(self) -> float:
+        """One-way delay at which round trip and processing fill the wanted period.
+
+        Beyond it a request waits for the reply to the one before: 2 d + P = T.
+        """
+        return (self.period_s - self.processing_s) / 2
+
+    def lock_step_rate(self, delay_s: float) -> float:
+        """Commands per second that request/reply can apply at a one-way delay [Hz]."""
+        return 1.0 / max(self.period_s, 2 * delay_s + self.processing_s)
+
+
+def cadence(scenario: Mapping[str, Any], changes: Mapping[str, Level]) -> Cadence | None:
+    """The cadence of a scenario under some levels; None where its profile is not to be had.
+
+    A phone that looks only when its batch is full or its time is up wants no more than that.
+    """
+    from dva_sim.agents.robot.command_queue import mean_of
+    from dva_sim.simulation.scenario import build, phone_profile
+
+    try:
+        resolved = build(scenario, changes)
+        phone = phone_profile(resolved)
+    except ConfigError:
+        return None
+    period = 1.0 / resolved.command.rate_hz
+    if phone.send == "on_change":
+        period = min(phone.max_delay_s, 20 / phone.sample_rate_hz)
+    return Cadence(period, mean_of(resolved.robot.processing_s or 0.0))

@@ -1,0 +1,390 @@
+"""What operators are compared with, and which of it may be fitted to: two files, read together.
+
+Which delays published data cover; beyond them, what operators do is an extrapolation.
+
+Which cells lie beyond the delays at which people were watched: extrapolations, marked so.
+
+What counts is the delay of the loop as measured in the cell without the person's own share, not
+the delay of the link: that is what published experiments report. Marked are cells and repeats
+whose runs tell that delay (`loop_delay_mean_s`), which is those of scenarios with robots. Tasks do
+not tell it, so that nothing of theirs is marked, however long their links are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from dva_sim.experiments.analysis.conditions import get
+from dva_sim.experiments.analysis.paired_effects import Floats, Part, nan_mean
+from dva_sim.experiments.study.schema import STRATEGY
+from dva_sim.kernel import resources
+from dva_sim.kernel.config import Config, load_yaml, validate
+from dva_sim.kernel.errors import ConfigError
+
+FOLDER = "experiments/validation"
+TARGETS, SPLIT = "operators", "operators-split"
+
+Kind = Literal["exact", "fitted", "held-out", "remembered", "beside"]
+Share = Annotated[float, Field(ge=0, le=1)]
+
+
+class LineConfig(Config):
+    """One number to compare with.
+
+    Attributes:
+        what: What it is, in words.
+        unit: Empty for a plain number.
+        target: As published, if a single number was.
+        low: What passes begins here; left out, anywhere below `high`.
+        high: What passes ends here.
+        above: The whole Monte Carlo interval has to lie above this, where the sign is what counts.
+        below: The same the other way round.
+        beside: Shown beside what is compared, never counted: it has a target and no band.
+    """
+
+    what: str
+    unit: str = ""
+    target: float | None = None
+    low: float | None = None
+    high: float | None = None
+    above: float | None = None
+    below: float | None = None
+    beside: bool = False
+
+    @model_validator(mode="after")
+    def _in_order(self) -> LineConfig:
+        limits = (self.low, self.high, self.above, self.below)
+        if self.beside:
+            if self.target is None or limits.count(None) < len(limits):
+                raise ValueError("a line beside the others has a target and no band")
+            return self
+        if self.low is None and self.high is None:
+            raise ValueError("a line needs low or high, or anything would pass")
+        if self.low is not None and self.high is not None and self.low > self.high:
+            raise ValueError("low should not be above high")
+        return self
+
+
+class CheckConfig(Config):
+    """One published result.
+
+    Attributes:
+        metric: What was measured.
+        tag: How sure its numbers are; the file says what the letters mean.
+        source: The publication, or the derivation.
+        lines: Its numbers, by name; each is a verdict of its own.
+    """
+
+    metric: str
+    tag: str
+    source: str
+    lines: Annotated[dict[str, LineConfig], Field(min_length=1)]
+
+
+class SupportConfig(Config):
+    """Which delays published data cover.
+
+    Attributes:
+        strategies: Whom they speak of.
+        low_s: From.
+        high_s: To.
+        why: Whose data.
+    """
+
+    strategies: tuple[str, ...]
+    low_s: Annotated[float, Field(ge=0)]
+    high_s: Annotated[float, Field(gt=0)]
+    why: str
+
+
+class TargetFile(Config):
+    """The file of targets.
+
+    Attributes:
+        description: What it is.
+        tags: What the letters of a tag mean.
+        checks: Published results by their short name.
+        support: Delays that published data cover.
+    """
+
+    description: str = ""
+    tags: dict[str, str]
+    checks: Annotated[dict[str, CheckConfig], Field(min_length=1)]
+    support: dict[str, SupportConfig]
+
+    @model_validator(mode="after")
+    def _known_tags(self) -> TargetFile:
+        for name, check in self.checks.items():
+            for letter in check.tag.split(","):
+                if letter not in self.tags:
+                    known = ", ".join(self.tags)
+                    raise ValueError(f"tag {letter!r} of {name} is unknown; known: {known}")
+        return self
+
+
+class RuleConfig(Config):
+    """When a validation passes: shares of the lines that must pass."""
+
+    exact: Share
+    held_out: Share
+
+
+class SplitFile(Config):
+    """Which checks may be fitted to: lists of checks by publication.
+
+    Attributes:
+        description: What it is.
+        rule: When the whole passes.
+        strategy: How the persons of every task drive unless asked otherwise.
+        strategy_why: Why that one.
+        exact: Answers that nobody measured on persons.
+        fit: May influence parameters; shown, never counted.
+        held_out: May influence nothing; counted.
+        memory: Nobody has seen their source; shown, never counted.
+    """
+
+    description: str = ""
+    rule: RuleConfig
+    strategy: str
+    strategy_why: str = ""
+    exact: dict[str, tuple[str, ...]]
+    fit: dict[str, tuple[str, ...]]
+    held_out: dict[str, tuple[str, ...]]
+    memory: dict[str, tuple[str, ...]]
+
+    def kinds(self) -> dict[str, Kind]:
+        """The kind of each check.
+
+        Raises:
+            ConfigError: a check that is assigned twice.
+        """
+        return {check: kind for check, (kind, _) in self.places().items()}
+
+    def places(self) -> dict[str, tuple[Kind, str]]:
+        """The kind of each check, and the publication that it belongs to.
+
+        Raises:
+            ConfigError: a check that is assigned twice.
+        """
+        places: dict[str, tuple[Kind, str]] = {}
+        groups: tuple[tuple[Kind, dict[str, tuple[str, ...]]], ...] = (
+            ("exact", self.exact),
+            ("fitted", self.fit),
+            ("held-out", self.held_out),
+            ("remembered", self.memory),
+        )
+        for kind, publications in groups:
+            for check, name in ((c, name) for name, own in publications.items() for c in own):
+                if check in places:
+                    raise ConfigError(f"check {check!r} is assigned twice")
+                places[check] = kind, name
+        return places
+
+
+@dataclass(frozen=True)
+class Line:
+    """One line to judge.
+
+    Attributes:
+        check: Short name of the published result.
+        name: Of the line within it.
+        metric: What the publication measured.
+        what: What this line is.
+        source: Where its numbers come from.
+        tag: How sure they are.
+        kind: Whether it counts.
+        publication: As the split groups checks.
+        unit: Empty for a plain number.
+        target: As published, if a single number was.
+        low: What passes begins here; None: anywhere below `high`.
+        high: What passes ends here; None: anywhere above `low`.
+        above: The whole interval lies above this; None: it need not.
+        below: The whole interval lies below this; None: it need not.
+    """
+
+    check: str
+    name: str
+    metric: str
+    what: str
+    source: str
+    tag: str
+    kind: Kind
+    publication: str
+    unit: str
+    target: float | None
+    low: float | None
+    high: float | None
+    above: float | None = None
+    below: float | None = None
+
+    @property
+    def id(self) -> str:
+        """`check/name`."""
+        return f"{self.check}/{self.name}"
+
+    @property
+    def has_band(self) -> bool:
+        """Whether there is anything to judge it by."""
+        return self.low is not None or self.high is not None
+
+    def holds(self, value: float) -> bool:
+        """Whether a value lies in the band; nan never does."""
+        above = self.low is None or value >= self.low
+        return self.has_band and above and (self.high is None or value <= self.high)
+
+    def is_sure(self, low: float, high: float) -> bool:
+        """Whether an interval lies on the side that is asked for, if one is."""
+        above = self.above is None or low > self.above
+        return above and (self.below is None or high < self.below)
+
+
+def load_targets(name: str = TARGETS) -> TargetFile:
+    """The targets, by name or path.
+
+    Raises:
+        ConfigError: no such file, or a mistake in it, with its place.
+    """
+    document = load_yaml(resources.find(name, FOLDER))
+    return validate(TargetFile, document.data, document.error)
+
+
+def load_split(name: str = SPLIT) -> SplitFile:
+    """The split, by name or path.
+
+    Raises:
+        ConfigError: no such file, or a mistake in it, with its place.
+    """
+    document = load_yaml(resources.find(name, FOLDER))
+    split = validate(SplitFile, document.data, document.error)
+    try:
+        split.kinds()
+    except ConfigError as error:
+        raise document.error(str(error)) from None
+    return split
+
+
+def lines_of(targets: TargetFile, split: SplitFile) -> list[Line]:
+    """All lines with their kind, in the order of the file of targets.
+
+    Raises:
+        ConfigError: a check that is not assigned, or is not there; a tag M that would count.
+    """
+    places = split.places()
+    _complete(targets.checks, split.kinds())
+    return [
+        Line(
+            check=check,
+            name=name,
+            metric=config.metric,
+            what=line.what,
+            source=" ".join(config.source.split()),
+            tag=config.tag,
+            kind="beside" if line.beside else places[check][0],
+            publication=places[check][1],
+            unit=line.unit,
+            target=line.target,
+            low=line.low,
+            high=line.high,
+            above=line.above,
+            below=line.below,
+        )
+        for check, config in targets.checks.items()
+        for name, line in config.lines.items()
+    ]
+
+
+def _complete(checks: Mapping[str, CheckConfig], kinds: Mapping[str, Kind]) -> None:
+    if missing := [name for name in checks if name not in kinds]:
+        raise ConfigError(f"the split does not say what {', '.join(missing)} is for")
+    if unknown := [name for name in kinds if name not in checks]:
+        raise ConfigError(f"the split names {', '.join(unknown)}, which are no checks")
+    for name, check in checks.items():
+        if "M" in check.tag.split(",") and kinds[name] != "remembered":
+            raise ConfigError(f"{name} is known from memory: it cannot be {kinds[name]}")
+
+
+@cache
+def supports_of(strategy: str) -> tuple[SupportConfig, ...]:
+    """What is known of a strategy, from short delays on; nothing if no published data speak of it.
+
+    The delay is that of everything but the person: filter, sampling, link, computers, frames.
+    Pointing was watched at lags of up to 0.225 s (MacKenzie & Ware 1993), an excavator at 1.5 s;
+    nobody was watched in between.
+    """
+    found = [s for s in load_targets().support.values() if strategy in s.strategies]
+    return tuple(sorted(found, key=lambda support: support.low_s))
+
+
+def ranges(strategy: str) -> tuple[tuple[float, float], ...]:
+    """From which to which delays of the loop people were watched [s]."""
+    return tuple((support.low_s, support.high_s) for support in supports_of(strategy))
+
+
+LOOP = "loop_delay_mean_s"
+PERSONAL = ("delay_human_s", "delay_hand_s")
+
+Marks = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Support:
+    """The delays of a part's cells, and which of them no published data cover.
+
+    Attributes:
+        delays: Of the loop without the person, for each cell `(levels of factor 1, ...)` [s]; nan
+            where nobody drives.
+        outside: Which of them lie outside.
+        words: What is covered, for each strategy.
+    """
+
+    delays: Floats
+    outside: Marks
+    words: str
+
+
+def support_of_part(part: Part, scenario: Mapping[str, Any]) -> Support | None:
+    """What published data cover of a part; None where nobody's loop has a delay.
+
+    Args:
+        part: The runs.
+        scenario: The part's before any factor changed it, for the strategy.
+    """
+    strategies = _strategies(part, scenario)
+    if not part.has(LOOP) or not strategies:
+        return None
+    runs = part.grid(LOOP)
+    for column in PERSONAL:
+        runs = runs - np.nan_to_num(part.grid(column))
+    delays = nan_mean(runs.reshape(*runs.shape[:-2], -1), axis=-1)
+    outside = np.isfinite(delays)
+    for name in strategies:
+        for low, high in ranges(name):
+            outside &= ~(_has(part, name) & (delays >= low) & (delays <= high))
+    return Support(delays, outside, "; ".join(map(_told, strategies)))
+
+
+def _strategies(part: Part, scenario: Mapping[str, Any]) -> tuple[str, ...]:
+    factor = next((f for f in part.factors if f.name == STRATEGY), None)
+    names = factor.levels if factor else (get(scenario, STRATEGY),)
+    return tuple(str(name) for name in names if name is not None)
+
+
+def _has(part: Part, strategy: str) -> Marks:
+    """Which cells are driven by a strategy."""
+    has = [setting.get(STRATEGY, strategy) == strategy for setting in part.settings()]
+    return np.array(has).reshape([len(f.levels) for f in part.factors])
+
+
+def _told(strategy: str) -> str:
+    told = [
+        f"{known.low_s:g} to {known.high_s:g} s, {' '.join(known.why.split())}"
+        for known in supports_of(strategy)
+    ]
+    return f"{strategy}: {', and '.join(told) or 'no published data'}"

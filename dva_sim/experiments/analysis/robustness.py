@@ -1,0 +1,287 @@
+"""Whether a conclusion survives other models of the persons: the contrast of every repeat."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from dva_sim.experiments.analysis.answer import Finding
+from dva_sim.experiments.analysis.conditions import get
+from dva_sim.experiments.analysis.layout import interval_of
+from dva_sim.experiments.analysis.paired_effects import Factor, Part, Table, View
+from dva_sim.experiments.analysis.published_operators import support_of_part
+from dva_sim.experiments.study.labels import (
+    factor_name,
+    level_name,
+    listing,
+    number,
+    percent,
+    quantity,
+)
+from dva_sim.experiments.study.robustness_grid import PARAMETERS
+from dva_sim.experiments.study.schema import REPEATS, STRATEGY, Level
+from dva_sim.kernel.units import unit_of
+
+
+@dataclass(frozen=True)
+class Repeat:
+    """The contrast under one model of the persons, at one stop.
+
+    Attributes:
+        strategy: Of the operators; empty where it was not varied.
+        parameters: Which set; 0 is the usual one.
+        mean: First minus second.
+        low: Lower end of its own 95 % interval.
+        high: Upper end.
+        is_own: Whether it is the study's own model, and so no evidence for or against it.
+        is_beyond: Whether people were not watched with that strategy at the delays it was run at.
+    """
+
+    strategy: str
+    parameters: int
+    mean: float
+    low: float
+    high: float
+    is_own: bool = False
+    is_beyond: bool = False
+
+
+@dataclass(frozen=True)
+class Stop:
+    """All repeats at one level of the factor that the answer runs over.
+
+    Attributes:
+        level: That level.
+        found: The study's own result there.
+        low: Lower edge of its band.
+        high: Upper edge.
+        repeats: With a result; those without are left out.
+        smallest: Smallest effect that matters.
+    """
+
+    level: Level
+    found: float
+    low: float
+    high: float
+    repeats: tuple[Repeat, ...]
+    smallest: float | None
+
+    @property
+    def others(self) -> list[Repeat]:
+        """Those that count: under another model than the study's own."""
+        return [r for r in self.repeats if not r.is_own]
+
+    @property
+    def same_sign(self) -> int:
+        """In how many of the others the effect has the sign of the study's own."""
+        return sum(r.mean * self.found > 0 for r in self.others)
+
+    @property
+    def clear(self) -> int:
+        """In how many of them the whole interval has it."""
+        return sum(r.low > 0 if self.found > 0 else r.high < 0 for r in self.others)
+
+    @property
+    def relevant(self) -> int:
+        """In how many the effect has that sign and exceeds the smallest that matters."""
+        sign, least = np.sign(self.found), self.smallest or 0.0
+        return sum(bool(sign * r.mean > least) for r in self.others)
+
+    @property
+    def negligible(self) -> int:
+        """In how many the effect, either way, is below the smallest that matters."""
+        least = self.smallest or 0.0
+        return sum(abs(r.mean) <= least for r in self.others)
+
+
+@dataclass(frozen=True)
+class Robustness:
+    """The answer's contrast under every model it was repeated with.
+
+    Attributes:
+        stops: By level of the factor that the answer runs over.
+        over: That factor.
+        measure: What is compared.
+        strategies: Tried; none where the scenario's own was kept.
+        sets: How many sets of parameters besides the usual one.
+        persons: In each repeat.
+        trials: Of each.
+    """
+
+    stops: tuple[Stop, ...]
+    over: str
+    measure: str
+    strategies: tuple[str, ...]
+    sets: int
+    persons: int
+    trials: int
+
+    @property
+    def unit(self) -> str:
+        """Unit of what is compared."""
+        return unit_of(self.measure)
+
+
+def robustness_of(
+    study: Mapping[str, Any],
+    table: Table,
+    view: View,
+    finding: Finding,
+    scenario: Mapping[str, Any],
+) -> Robustness | None:
+    """Read the table of repeats; None where none were declared.
+
+    Args:
+        study: As the manifest holds it.
+        table: Of the repeats.
+        view: How the study is read.
+        finding: The study's own result.
+        scenario: Of the answer's part before any factor changed it, for the study's own strategy.
+    """
+    declared = study.get("robustness")
+    if not declared or view.over is None or view.line is None or view.contrast is None:
+        return None
+    strategies = tuple(declared["strategies"])
+    at = tuple(declared["at"] or view.stops[-1:])
+    factors = [
+        *([Factor(STRATEGY, strategies)] if strategies else []),
+        Factor(PARAMETERS, tuple(range(int(declared["sets"]) + 1))),
+        Factor(view.line.name, view.contrast),
+        Factor(view.over.name, at),
+    ]
+    part = Part(table, REPEATS, factors)
+    read = _Reading(part, finding, scenario)
+    stops = tuple(_stop(read, view, level) for level in at)
+    return Robustness(
+        stops=stops,
+        over=view.over.name,
+        measure=view.measure,
+        strategies=strategies,
+        sets=int(declared["sets"]),
+        persons=len(part.persons),
+        trials=len(part.trials),
+    )
+
+
+class _Reading:
+    """The repeats of a study, and what is known of each besides its effect."""
+
+    def __init__(self, part: Part, finding: Finding, scenario: Mapping[str, Any]) -> None:
+        self.part, self.finding = part, finding
+        self._own, support = get(scenario, STRATEGY), support_of_part(part, scenario)
+        self._outside = None if support is None else support.outside.astype(float)
+
+    def is_own(self, where: dict[str, Level]) -> bool:
+        """Whether that is the model of the study itself."""
+        return where[PARAMETERS] == 0 and where.get(STRATEGY, self._own) == self._own
+
+    def is_beyond(self, where: dict[str, Level]) -> bool:
+        """Whether either side of the contrast is an extrapolation."""
+        if self._outside is None:
+            return False
+        sides = (self.finding.first, self.finding.second)
+        return any(
+            self.part.where(self._outside, where | {self.finding.factor: side}) > 0
+            for side in sides
+        )
+
+
+def _stop(read: _Reading, view: View, level: Level) -> Stop:
+    assert view.over is not None
+    finding, at = read.finding, view.stops.index(level)
+    repeats = [
+        repeat
+        for model in read.part.settings(but=(str(finding.factor), view.over.name))
+        if (repeat := _repeat(read, model | {view.over.name: level})) is not None
+    ]
+    return Stop(
+        level=level,
+        found=float(finding.mean[at]),
+        low=float(finding.low[at]),
+        high=float(finding.high[at]),
+        repeats=tuple(repeats),
+        smallest=finding.smallest_effect,
+    )
+
+
+def _repeat(read: _Reading, where: dict[str, Level]) -> Repeat | None:
+    """The paired difference under one model; the reference run drops out of it."""
+    part, finding = read.part, read.finding
+    grid = part.grid(finding.measure)
+    first, second = (
+        part.where(grid, where | {finding.factor: level})
+        for level in (finding.first, finding.second)
+    )
+    found = interval_of(first - second)
+    if found is None:
+        return None
+    return Repeat(
+        strategy=str(where.get(STRATEGY, "")),
+        parameters=int(str(where[PARAMETERS])),
+        mean=found.mean,
+        low=found.low,
+        high=found.high,
+        is_own=read.is_own(where),
+        is_beyond=read.is_beyond(where),
+    )
+
+
+def sentences(robustness: Robustness) -> list[str]:
+    """In how many repeats the conclusion holds, and how far effects reach."""
+    return [_what_was_repeated(robustness), *(_told(robustness, s) for s in robustness.stops)]
+
+
+def _what_was_repeated(r: Robustness) -> str:
+    strategies = [level_name(STRATEGY, name) for name in r.strategies]
+    under = f" under each of {listing(strategies)}," if strategies else ""
+    others = "one other set" if r.sets == 1 else f"{r.sets} other sets"
+    trials = "one trial" if r.trials == 1 else f"{r.trials} trials"
+    return (
+        f"Repeated{under} with the usual parameters and {others} within the bands that "
+        f"calibration leaves open ({r.persons} persons, {trials} each, with the same random "
+        "numbers as above, so that only the model differs). The study's own model does not count."
+    )
+
+
+def _told(r: Robustness, stop: Stop) -> str:
+    count = len(stop.others)
+    where = f"At {factor_name(r.over)} {level_name(r.over, stop.level)}"
+    if not count:
+        return f"{where} no repeat under another model is complete."
+    unit, means = unit_of(r.measure), [x.mean for x in stop.others]
+    told = f"{where} the sign holds in {_of(stop.same_sign, count)} repeats"
+    told += f", in {stop.clear} of them with its whole interval"
+    if stop.smallest is not None:
+        told += f"; in {_of(stop.relevant, count)} the effect exceeds the smallest that matters"
+        told += f", in {stop.negligible} it is below that either way"
+    reach = f"{number(min(means))} to {quantity(max(means), unit)}"
+    return f"{told}. Effects run from {reach}.{_where_it_fails(r, stop)}{_beyond(stop)}"
+
+
+def _beyond(stop: Stop) -> str:
+    """How many of them are extrapolations."""
+    beyond = sum(r.is_beyond for r in stop.others)
+    if not beyond:
+        return ""
+    return (
+        f" {_of(beyond, len(stop.others))} are extrapolated: no published experiment covers that "
+        "delay and way of steering."
+    )
+
+
+def _where_it_fails(r: Robustness, stop: Stop) -> str:
+    """Under which strategies the sign is another."""
+    failed = []
+    for name in r.strategies:
+        means = [x.mean for x in stop.others if x.strategy == name]
+        others = sum(not mean * stop.found > 0 for mean in means)
+        if others:
+            failed.append(f"{level_name(STRATEGY, name)} ({others} of {len(means)})")
+    return f" The sign is another under {listing(failed)}." if failed else ""
+
+
+def _of(part: int, whole: int) -> str:
+    return f"{part} of {whole} ({percent(part / whole)})"

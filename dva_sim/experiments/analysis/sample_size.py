@@ -1,0 +1,286 @@
+"""How many persons a study needs to show what it claims, counted from a pilot or an earlier one.
+
+Every number follows one law (`statistics.planning`): the interval or band that the report shows,
+narrowed as persons are added.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from dva_sim.experiments.analysis.hypothesis_tests import (
+    Pairs,
+    claims_of,
+    contrasts_of,
+    pairs_of,
+    places_of,
+)
+from dva_sim.experiments.analysis.layout import view_of
+from dva_sim.experiments.analysis.paired_effects import Floats, Setting, Table, View
+from dva_sim.experiments.analysis.statistics import (
+    LEVEL,
+    MOST_PERSONS,
+    Band,
+    Interval,
+    Law,
+    band,
+    law_of,
+    mean_interval,
+)
+from dva_sim.experiments.study.labels import level_name, measure_of, quantity, setting
+from dva_sim.experiments.study.schema import ANSWER, Contrast, Hypothesis
+from dva_sim.kernel.units import unit_of
+
+POWERS = (0.8, 0.9)
+_ALPHA = 1 - LEVEL
+
+
+class Count(NamedTuple):
+    """How many persons are needed, and what else would fit the spread as known: its 95 % interval.
+
+    Infinite beyond `MOST_PERSONS`.
+    """
+
+    persons: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a study would need to show one thing.
+
+    Attributes:
+        name: Of the hypothesis or comparison.
+        what: Which claim, in words.
+        assumed: The true difference that is counted on, in words.
+        known_from: Persons from whom the spread is known.
+        counts: For each of `POWERS`; none where the claim is not true under what is assumed.
+    """
+
+    name: str
+    what: str
+    assumed: str
+    known_from: int
+    counts: tuple[Count, ...]
+
+
+class _Test(NamedTuple):
+    """A claim as it would be tested: on two sides if it is that an effect is small."""
+
+    name: str
+    what: str
+    assumed: str
+    law: Law
+    distance: float  # of the true difference from the nearest bound that is tested
+    other: float = math.inf  # its distance from the bound on the other side, if there is one
+    least: int = 2  # persons without whom the test cannot come out
+
+
+def plans(
+    study: Mapping[str, Any], runs: Table, decided: Collection[str] | None = None
+) -> list[Plan]:
+    """What each hypothesis and each other comparison would need, and the answer where it is open.
+
+    Args:
+        study: As the manifest has it.
+        runs: The table of runs.
+        decided: Names of hypotheses and comparisons that are left out because they need no more.
+            None for a pilot, where nothing is left out; without any claim not even an answer
+            that is not open.
+    """
+    claims, named = claims_of(study), contrasts_of(study)
+    claimed = {claim.comparison for claim in claims.values()}
+    others = {k: c for k, c in named.items() if k not in claimed and k != ANSWER}
+    family = _families(study, claims, named)
+    in_any_case = decided is None and not claims and not others
+    tests = [
+        *_of_answer(view_of(study, runs), in_any_case),
+        *_of_claims(study, runs, claims, named, family),
+        *_of_comparisons(study, runs, others, family),
+    ]
+    return [_plan(test) for test in tests if test.name not in (decided or ())]
+
+
+def _families(
+    study: Mapping[str, Any], claims: Mapping[str, Hypothesis], named: Mapping[str, Contrast]
+) -> Counter[str]:
+    """How many tests share a chance of 5 %: all hypotheses and comparisons of a family."""
+    tests = Counter(named[claim.comparison].family for claim in claims.values())
+    for name, contrast in named.items():
+        if name != ANSWER:
+            tests[contrast.family] += len(places_of(study, contrast))
+    return tests
+
+
+def _of_answer(view: View | None, in_any_case: bool) -> list[_Test]:
+    """What would settle the answer's question where it is open, at the level that needs most."""
+    if view is None or view.contrast is None or view.line is None:
+        return []
+    differences = view.difference(view.panels[0], *view.contrast)
+    found = band(differences)
+    holds_zero = (found.low <= 0) & (found.high >= 0)
+    bounds = np.maximum(-found.low, found.high)
+    is_open = holds_zero & (bounds > (view.smallest_effect or 0.0)) & np.isfinite(found.critical)
+    if not is_open.any() and in_any_case:
+        is_open = np.isfinite(found.critical)
+    tests = [list(_to_settle(view, found, differences, int(i))) for i in np.flatnonzero(is_open)]
+    return max(filter(None, tests), key=lambda some: _plan(some[0]).counts[0].persons, default=[])
+
+
+def _to_settle(view: View, found: Band, differences: Floats, stop: int) -> Iterator[_Test]:
+    """An effect that seems not to matter is to be shown small, any other not to be zero."""
+    mean, smallest = float(found.mean[stop]), view.smallest_effect
+    reach = mean - float(found.low[stop]), float(found.high[stop]) - mean
+    sides, unit = _sides_of(view, stop), unit_of(view.measure)
+    each = 1 - _ALPHA / int(np.isfinite(found.critical).sum())
+
+    def law(reach: float) -> Law:
+        known = law_of(differences[:, stop], np.arange(len(differences)), reach, each)
+        assert known is not None  # there is a band
+        return known
+
+    if smallest is not None and abs(mean) < smallest:
+        assumed = f"{quantity(abs(mean), unit)}, as found"
+        what = f"{sides}: below {quantity(smallest, unit)}, the smallest that matters"
+        bounds = smallest - abs(mean), smallest + abs(mean)
+        yield _Test(ANSWER, what, assumed, law(max(reach)), *bounds)
+        return
+    for effect, why in _assumed(abs(mean), smallest):
+        assumed = f"{quantity(effect, unit)}, {why}"
+        yield _Test(ANSWER, f"{sides}: not zero", assumed, law(reach[mean < 0]), effect)
+
+
+def _assumed(found: float, smallest: float | None) -> Iterator[tuple[float, str]]:
+    """True differences that one may count on: that found, if it matters, and the smallest."""
+    if found > (smallest or 0.0):
+        yield found, "as found"
+    if smallest is not None:
+        yield smallest, "the smallest that matters"
+
+
+def _of_claims(
+    study: Mapping[str, Any],
+    runs: Table,
+    claims: Mapping[str, Hypothesis],
+    named: Mapping[str, Contrast],
+    family: Counter[str],
+) -> Iterator[_Test]:
+    for name, claim in claims.items():
+        contrast = named[claim.comparison]
+        at = places_of(study, contrast)[-1] | claim.at
+        level = 1 - 2 * _ALPHA / family[contrast.family]  # one-sided
+        if (pairs := pairs_of(study, runs, contrast, at)) is None:
+            continue
+        found, unit = _interval(pairs, level), unit_of(contrast.measure)
+        mean, is_same = found.mean, claim.direction == "same"
+        side = -1 if claim.direction == "below" else 1
+        ends = {-1: found.high - mean, 1: mean - found.low}
+        law = _law(pairs, max(ends.values()) if is_same else ends[side], level)
+        distance = claim.margin - abs(mean) if is_same else side * mean - claim.margin
+        what = f"{_sides(contrast, at)}: {_CLAIMS[claim.direction]}{quantity(claim.margin, unit)}"
+        assumed = f"{quantity(mean, unit)}, as found"
+        if law is not None:
+            other = claim.margin + abs(mean) if is_same else math.inf
+            yield _Test(name, what, assumed, law, distance, other)
+
+
+_CLAIMS = {"above": "above ", "below": "below \N{MINUS SIGN}", "same": "the same within "}
+
+
+def _of_comparisons(
+    study: Mapping[str, Any],
+    runs: Table,
+    named: Mapping[str, Contrast],
+    family: Counter[str],
+) -> Iterator[_Test]:
+    for name, contrast in named.items():
+        at = places_of(study, contrast)[-1]
+        alpha = _ALPHA / family[contrast.family]
+        if (pairs := pairs_of(study, runs, contrast, at)) is None:
+            continue
+        found, unit = _interval(pairs, 1 - alpha), unit_of(contrast.measure)
+        reach = found.mean - found.low if found.mean > 0 else found.high - found.mean
+        if (law := _law(pairs, reach, 1 - alpha)) is None:
+            continue
+        what = f"{_sides(contrast, at)}: not zero"
+        least = math.ceil(math.log2(2 / alpha))  # 2 in 2 ** n ways to swap labels are as far off
+        for effect, why in _assumed(abs(found.mean), contrast.smallest):
+            assumed = f"{quantity(effect, unit)}, {why}"
+            yield _Test(name, what, assumed, law, effect, least=least)
+
+
+def _interval(pairs: Pairs, level: float) -> Interval:
+    """Of the mean difference, as a report shows it but for its level."""
+    return mean_interval(pairs.first - pairs.second, pairs.person, level)
+
+
+def _law(pairs: Pairs, reach: float, level: float) -> Law | None:
+    return law_of(pairs.first - pairs.second, pairs.person, reach, level)
+
+
+def _plan(test: _Test) -> Plan:
+    law = test.law
+
+    def chance(persons: int) -> float:
+        missed = [1 - law.power(d, persons) for d in (test.distance, test.other) if d < math.inf]
+        return 1 - sum(missed)
+
+    wanted = POWERS if test.distance > 0 else ()
+    counts = tuple(_count(chance, share, law.persons, test.least) for share in wanted)
+    return Plan(test.name, test.what, test.assumed, law.persons, counts)
+
+
+def _count(chance: Callable[[int], float], wanted: float, known: int, least: int) -> Count:
+    """The fewest persons with such a chance, and how far the spread of a few leaves it open."""
+    from scipy import special
+
+    persons = _fewest(chance, wanted)
+    freedom = known - 1
+    # The sum of squares over the true variance is chi-squared; persons go with the variance.
+    low, high = (freedom / special.chdtri(freedom, tail) for tail in (0.025, 0.975))
+    counts = (persons, persons * low, persons * high)
+    return Count(*(_capped(max(count, least)) for count in counts))
+
+
+def _fewest(chance: Callable[[int], float], wanted: float) -> float:
+    """By doubling, then by halves; infinite beyond `MOST_PERSONS`."""
+    low, high = 1, 2
+    while chance(high) < wanted:
+        if high > MOST_PERSONS:
+            return math.inf
+        low, high = high, 2 * high
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (low, middle) if chance(middle) >= wanted else (middle, high)
+    return high
+
+
+def _capped(persons: float) -> float:
+    return math.inf if persons > MOST_PERSONS else math.ceil(persons)
+
+
+def _sides(contrast: Contrast, at: Setting) -> str:
+    measure = measure_of(contrast.measure, contrast.part)
+    return _told(contrast.factor, contrast.contrast, measure, at)
+
+
+def _sides_of(view: View, stop: int) -> str:
+    assert view.line is not None
+    assert view.contrast is not None
+    at = dict(view.panels[0]) | view.at_stop(stop)
+    measure = measure_of(view.measure, view.part.name)
+    return _told(view.line.name, view.contrast, measure, at)
+
+
+def _told(factor: str, levels: tuple[Any, Any], measure: str, at: Setting) -> str:
+    """`A minus B in driving time, at delay 1 s`."""
+    first, second = (level_name(factor, level) for level in levels)
+    where = f", {setting(at)}" if at else ""
+    return f"{first} minus {second} in {measure}{where}"

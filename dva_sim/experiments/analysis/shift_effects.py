@@ -1,0 +1,199 @@
+"""The runs of a study of dispatch, laid out as shift by policy by load.
+
+Percentiles of response over all events of a cell, where never is infinitely late.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dva_sim.experiments.analysis.paired_effects import (
+    Table,
+    View,
+    codes_of,
+    nan_mean,
+    person_means,
+)
+from dva_sim.experiments.analysis.statistics import LEVEL, Band, band
+from dva_sim.experiments.study.labels import setting
+from dva_sim.simulation.shift.bounds import Floats, share_of_the_way
+from dva_sim.simulation.shift.measures import FOLLOW_S
+
+POLICY, INTENSITY = "dispatch.policy", "intensity"
+FLOOR, BEST, CALIBRATED = "random", "oracle", "nearest_idle"
+
+
+def is_dispatch(view: View | None) -> bool:
+    """Whether a study compares policies on timed shifts, one line each."""
+    if view is None or view.line is None or view.line.name != POLICY:
+        return False
+    return view.part.has("response_mean_s") and view.part.has("bound_mean_s")
+
+
+class Shifts:
+    """The part that the answer speaks of; a shift is what is called a person elsewhere.
+
+    Args:
+        view: Its lines are policies, its stops arrival rates.
+        events: Columns of the table `events`, if there is one.
+    """
+
+    def __init__(self, view: View, events: Table | None = None) -> None:
+        self.view = view
+        self.policies = tuple(str(level) for level in view.lines)
+        self.stops = range(len(view.stops))
+        self.events = self._events(events or {})
+
+    @property
+    def baseline(self) -> str:
+        """What others are compared with: the second of the contrast, or the first of all."""
+        return str(self.view.contrast[1]) if self.view.contrast else self.policies[0]
+
+    @property
+    def follow(self) -> float:
+        """For how long each event was followed [s]."""
+        found = self.of("follow_s")
+        return float(np.nanmax(found)) if np.isfinite(found).any() else FOLLOW_S
+
+    def of(self, column: str) -> Floats:
+        """A measure of each run, `(shifts, policies, stops)`; nan where there is no run."""
+        grid, panel = self.view.part.grid(column), self.view.panels[0]
+        curves = [person_means(self.view.curve(grid, panel, p)) for p in self.view.lines]
+        return np.stack(curves, axis=1)
+
+    def means(self, column: str) -> Floats:
+        """Mean over shifts, `(policies, stops)`."""
+        return nan_mean(self.of(column), axis=0)
+
+    def against(self, column: str, baseline: str) -> Band:
+        """Each policy minus the baseline, paired by shift; entries `(policies * stops,)`.
+
+        The band holds for all policies and loads at once.
+        """
+        values = self.of(column)
+        base = values[:, [self.policies.index(baseline)], :]
+        return band((values - base).reshape(len(values), -1))
+
+    @property
+    def loads(self) -> list[float | None]:
+        """Load of each stop: use of the busiest people under the policy it was set with.
+
+        None where something else was varied, and with the few alarms that an oracle can plan
+        for: they come and are over, so that there is no steady load.
+        """
+        over = self.view.over
+        if over is None or over.name != INTENSITY or BEST in self.policies:
+            return [None for _ in self.stops]
+        policy = CALIBRATED if CALIBRATED in self.policies else self.policies[0]
+        seen = self.means("load")[self.policies.index(policy)]
+        return [float(load) if np.isfinite(load) else None for load in seen]
+
+    @property
+    def titles(self) -> list[str]:
+        """What each stop is called: its load, where that is what was varied."""
+        over, loads = self.view.over, self.loads
+        return [
+            f"load {load:.2f}" if load is not None else setting({over.name: stop} if over else {})
+            for load, stop in zip(loads, self.view.stops, strict=True)
+        ]
+
+    @property
+    def can_spare(self) -> bool:
+        """Whether people are in danger, and robots could be instead."""
+        has = self.view.part.has
+        return has("use_of_robots") and bool(np.nanmax(self.means("exposure_s"), initial=0.0) > 0)
+
+    # --- how near to the best possible --------------------------------------------------
+
+    @property
+    def target(self) -> str | None:
+        """What the way from the floor leads to: the oracle if it took part, else `bound`."""
+        if FLOOR not in self.policies:
+            return None
+        return BEST if BEST in self.policies else "bound"
+
+    @property
+    def travellers(self) -> tuple[str, ...]:
+        """Policies on their way from the floor to the target."""
+        return tuple(p for p in self.policies if p not in (FLOOR, BEST))
+
+    def progress(self, stop: int) -> Band:
+        """Share of the way from the floor to the target, for each of `travellers` at once."""
+        response = self.of("response_mean_s")[:, :, stop]
+        floor = response[:, self.policies.index(FLOOR)]
+        if self.target == BEST:
+            best = response[:, self.policies.index(BEST)]
+        else:
+            best = self.of("bound_mean_s")[:, self.policies.index(FLOOR), stop]
+        columns = [self.policies.index(p) for p in self.travellers]
+        return share_of_the_way(floor, response[:, columns], best)
+
+    # --- events ----------------------------------------------------------------------------
+
+    def _events(self, table: Table) -> dict[str, NDArray[Any]]:
+        """Rows of this part and panel, with the numbers of policy and stop."""
+        if not table:
+            return {}
+        view = self.view
+        rows = {name: np.asarray(values) for name, values in table.items()}
+        here = (rows["part"] == view.part.name) & ~rows["is_reference"].astype(bool)
+        assert view.line is not None
+        rows["policy"] = codes_of(rows, view.line)
+        rows["stop"] = codes_of(rows, view.over) if view.over else np.zeros(len(here), dtype=int)
+        for factor in view.part.factors:
+            if factor.name in view.panels[0]:
+                wanted = factor.levels.index(view.panels[0][factor.name])
+                here &= codes_of(rows, factor) == wanted
+        return {name: values[here] for name, values in rows.items()}
+
+    def events_of(self, policy: str, stop: int) -> Mapping[str, NDArray[Any]]:
+        """Columns of the events of one cell; empty where there is no table of events."""
+        if not self.events:
+            return {}
+        number = self.policies.index(policy)
+        mask = (self.events["policy"] == number) & (self.events["stop"] == stop)
+        return {name: values[mask] for name, values in self.events.items()}
+
+
+RESAMPLES = 1000
+
+
+def pooled(
+    events: Mapping[str, NDArray[Any]], quantiles: Sequence[float], follow: float
+) -> tuple[Floats, Floats, Floats]:
+    """Percentiles with the interval of drawing shifts anew: value, low, high, each `(q,)` [s].
+
+    Infinite where the percentile is not reached by `follow`: for all of a cohort that is
+    followed so long this is what the cumulative incidence of response crosses.
+
+    Args:
+        events: Columns `response_s` (nan: never) and `person`.
+        quantiles: Shares of all events, each in (0, 1).
+        follow: [s]
+    """
+    response = np.asarray(events["response_s"], dtype=float)
+    response = np.where(np.isnan(response) | (response > follow), np.inf, response)
+    shifts, owner = np.unique(events["person"], return_inverse=True)
+    order = np.argsort(response, kind="stable")
+    ranked, owner = response[order], owner[order]
+    wanted = np.asarray(quantiles)
+    if not len(ranked):
+        return (np.full(len(wanted), np.nan),) * 3
+    value = _crossed(ranked, np.ones((1, len(ranked))), wanted)[0]
+    rng = np.random.Generator(np.random.PCG64(1))
+    drawn = rng.multinomial(len(shifts), np.full(len(shifts), 1 / len(shifts)), size=RESAMPLES)
+    found = _crossed(ranked, drawn[:, owner].astype(float), wanted)
+    edges = [(1 - LEVEL) / 2, (1 + LEVEL) / 2]
+    low, high = np.quantile(found, edges, axis=0, method="inverted_cdf")
+    return value, low, high
+
+
+def _crossed(ranked: Floats, weights: Floats, wanted: Floats) -> Floats:
+    """The first value by which a share of the weight `(b, n)` is reached, `(b, q)`."""
+    upto = np.cumsum(weights, axis=1)
+    places = [(upto >= q * upto[:, -1:] - 1e-9).argmax(axis=1) for q in wanted]
+    return np.stack([ranked[place] for place in places], axis=1)

@@ -1,0 +1,123 @@
+"""Statistics in which the simulated person is the cluster.
+
+Trials of one person are alike, so they never count as independent: every interval here rests
+on persons, either through their means or by drawing persons with all their trials. Missing
+runs are nan and are left out; with fewer than two persons an interval is nan, not an error.
+All intervals are Monte Carlo intervals: they hold given the model.
+
+How often 95 % intervals hold, in % of studies with 5 trials of each of 24, 12 and 6 persons; how
+much of the variance lies between persons in brackets. Skewed is log-normal, of skewness 1.75 or
+6.2; heavy tails are Student's with 5 degrees of freedom; incomplete is a fifth of the runs and one
+person in twelve missing at random; a study is drawn 10,000 times (seed 2014) where nothing is said.
+
+============================================================  ====  ====  ====
+means and paired differences, and levels of a band alone        24    12     6
+============================================================  ====  ====  ====
+normal (0.3)                                                  95.8  96.2  97.3
+skewness 1.75 (0)                                             95.7  96.2  97.0
+skewness 1.75 (0.3)                                           95.7  95.7  96.4
+skewness 1.75 (0.7)                                           95.6  95.0  95.6
+skewness 1.75 (0.3), incomplete                               95.8  95.8  95.2
+skewness 6.2 (0.3)                                            94.5  93.5  93.7
+skewness 6.2 (0.7), incomplete                                93.3  92.4  89.7
+heavy tails (0.3), incomplete                                 95.5  97.1  96.7
+four fifths of runs zero (0.3), 2000 studies, seed 7          95.9  95.2  92.3
+four fifths of persons and runs zero (0.7), 2000, seed 7      94.1  88.8  85.9
+four fifths of persons zero, trials alike (1)                 94.0  82.7  64.5
+normal (0), slow runs missing more often                      74.3  87.3  95.2
+normal (0.3), the same, 4000, seed 7                          89.9  94.0  96.1
+normal (0.7), the same, 4000, seed 7                          95.0  96.0  97.1
+------------------------------------------------------------  ----  ----  ----
+band over 6 skewed levels at once, 3000, seed 2015            94.2  95.7  95.7
+paired size, skewed times, 2000, seed 2016                    96.0  96.8  98.6
+average size, the same                                        95.9  96.0  97.6
+correlation of pairs, the same                                94.4  94.8  96.9
+ratio of variances, the same                                  93.0  93.2  97.6
+share of 0.5 (0.3), seed 2017                                 96.8  97.1  97.9
+share of 0.2 (0.3)                                            96.2  96.5  99.5
+share of 0.2 (0.7)                                            96.9  95.2  99.8
+share of 0.05 (0.3)                                           93.2  99.4  99.8
+median, normal (0.3), 3000, seed 2018                         96.7  97.3  98.0
+95th percentile, normal (0.3), the same                       97.1  98.7  99.3
+95th percentile, normal (0.7), the same                       95.6  97.6  98.0
+============================================================  ====  ====  ====
+
+The percentile's upper end is infinite in 32 and 82 % of the studies of 24 persons, and in all of
+fewer.
+
+What does not hold: nothing does where slow runs are missing more often (a third of those above the
+middle, a twentieth of those below), for the runs that are left are other runs. Tests to one side
+err more often where the tail is: with the 5 % allowed, in 5 to 8 % of studies of skewness 1.75 and
+in 8 to 15 % of skewness 6.2, and to the other side less. So do tests of equivalence. With 12
+persons or fewer of whom most are zero intervals are too short. Sobol's are wide: of Ishigami's
+function from 64 points they hold in 94 to 99 % (200 studies, one person) and 95 to 100 % (120
+studies, 24 persons).
+"""
+
+from dva_sim.experiments.analysis.statistics.bands import Band, band
+from dva_sim.experiments.analysis.statistics.effect_sizes import EffectSize, effect_size
+from dva_sim.experiments.analysis.statistics.incidence import Incidence, cumulative_incidence
+from dva_sim.experiments.analysis.statistics.means import (
+    Components,
+    components,
+    mean_interval,
+    paired_difference,
+)
+from dva_sim.experiments.analysis.statistics.pairing import (
+    VarianceReduction,
+    pair_correlation,
+    variance_reduction,
+)
+from dva_sim.experiments.analysis.statistics.persons import LEVEL, Interval, person_means
+from dva_sim.experiments.analysis.statistics.resampling import bootstrap_interval
+from dva_sim.experiments.analysis.statistics.sample_size import MOST_PERSONS, Law, law_of
+from dva_sim.experiments.analysis.statistics.sensitivity import (
+    Effect,
+    SobolIndex,
+    factorial_effects,
+    sobol_indices,
+)
+from dva_sim.experiments.analysis.statistics.shares import quantile_interval, share_interval
+from dva_sim.experiments.analysis.statistics.tests import (
+    Equivalence,
+    PermutationTest,
+    equivalence,
+    holm,
+    one_sided_test,
+    permutation_test,
+)
+
+__all__ = [
+    "LEVEL",
+    "MOST_PERSONS",
+    "Band",
+    "Components",
+    "Effect",
+    "EffectSize",
+    "Equivalence",
+    "Incidence",
+    "Interval",
+    "Law",
+    "PermutationTest",
+    "SobolIndex",
+    "VarianceReduction",
+    "band",
+    "bootstrap_interval",
+    "components",
+    "cumulative_incidence",
+    "effect_size",
+    "equivalence",
+    "factorial_effects",
+    "holm",
+    "law_of",
+    "mean_interval",
+    "one_sided_test",
+    "pair_correlation",
+    "paired_difference",
+    "permutation_test",
+    "person_means",
+    "quantile_interval",
+    "share_interval",
+    "sobol_indices",
+    "variance_reduction",
+]

@@ -1,0 +1,206 @@
+"""Means in units of their standard error, as they come out when persons are drawn anew.
+
+How far an interval reaches is decided on each side by itself: where a few persons are far off,
+the mean errs to one side more often and farther. Measured with 24 persons in 10,000 studies each:
+
+===============================================  =========  =========  =========  ========
+95 % interval covers, in % of studies            Student's  symmetric  each side  here
+===============================================  =========  =========  =========  ========
+normal                                           95.4       95.6       95.3       96.0
+person means of skewness 1.1                     94.2       95.0       95.0       96.2
+person means of skewness 2.3                     91.8       94.0       94.5       95.9
+the same, a quarter of the runs missing          91.4       93.7       94.7       95.9
+differences of log-normal times                  94.3       94.9       93.4       95.3
+the same, a quarter missing                      94.4       95.2       93.4       95.6
+times that end at a horizon                      93.6       95.3       95.9       96.8
+seven tenths of the runs zero, the rest skewed   86.5       91.2       93.2       94.2
+four fifths of the persons zero                  95.4       99.0       82.8       99.0
+===============================================  =========  =========  =========  ========
+
+No interval helps where most persons do not differ and a single one differs much: a study that
+happens to be without him cannot know. If the 24 persons of a shipped study are taken for all there
+are, differences of skewness 2 to 4, up to three quarters of them zero, are covered in 78 to 96 %,
+by Student's in 63 to 91 %.
+
+References:
+    Efron & Tibshirani, An Introduction to the Bootstrap (1993), section 12.5 (bootstrap-t); Hall,
+    Ann. Stat. 16 (1988) 927-953 (symmetric and one-sided kinds).
+
+Several levels at once: means over persons with a band that holds all of them.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dva_sim.experiments.analysis.statistics.persons import (
+    LEVEL,
+    RESAMPLES,
+    Floats,
+    draws,
+    students_t,
+)
+
+FEWEST_TO_RESAMPLE = 6  # below, 5 % of the draws repeat one person only and have no spread
+LEAST_ERROR = 0.25  # of the sample's standard error, in any draw
+_ROUNDING = 1e-12  # spread below this share of the values is rounding, not variation
+
+
+def moments(values: Floats, weights: Floats) -> tuple[Floats, Floats, Floats]:
+    """Mean, standard error and count per level `(b, k)` for rows weighted `(b, n)`."""
+    there = np.isfinite(values)
+    filled = np.where(there, values, 0.0)
+    count = weights @ there
+    nobody, few = count < 1, count < 2
+    centre = filled.sum(axis=0) / np.maximum(there.sum(axis=0), 1)
+    off = np.where(there, values - centre, 0.0)  # centred first: squares keep their digits
+    mean = np.where(nobody, np.nan, (weights @ off) / np.maximum(count, 1))
+    square = (weights @ off**2) / np.maximum(count, 1)
+    variance = np.where(few, np.nan, (square - mean**2) / np.maximum(count - 1, 1))
+    tiny = (_ROUNDING * (abs(centre) + abs(off).max(axis=0, initial=0.0))) ** 2
+    error = np.sqrt(np.where(variance <= tiny, 0.0, variance))
+    return mean + centre, error, count
+
+
+def studentised(values: Floats, mean: Floats, error: Floats, seed: int, resamples: int) -> Floats:
+    """By how many standard errors a mean of persons drawn anew is too large `(resamples, k)`.
+
+    A draw that happens to repeat the same few persons has next to no spread of its own; it is
+    given at least a quarter of the sample's. Without that a level at which most persons do not
+    differ at all would make intervals endless. A draw with fewer than two persons of a level says
+    nothing of it and counts as no deviation.
+
+    Args:
+        values: One row per person `(n_persons, k)`, nan where missing.
+        mean: Of each level `(k,)`.
+        error: Its standard error `(k,)`, above zero.
+        seed: Of the resampling.
+        resamples: How many times persons are drawn.
+    """
+    if not len(mean):
+        return np.empty((resamples, 0))
+    drawn, drawn_error, _ = moments(values, draws(len(values), seed, resamples))
+    ratio = (drawn - mean) / np.maximum(drawn_error, LEAST_ERROR * error)
+    return np.where(np.isnan(ratio), 0.0, ratio)
+
+
+def reach(ratio: Floats, count: Floats, level: float) -> tuple[Floats, Floats]:
+    """Standard errors from a mean down and up to the ends of its interval, each `(k,)`.
+
+    On either side the farthest of three: Student's, that of the deviations whatever their sign,
+    and that of the deviations to this side. With fewer than 6 persons it is Student's.
+
+    Args:
+        ratio: See `studentised` `(resamples, k)`.
+        count: How many persons each level has `(k,)`.
+        level: Confidence level.
+    """
+    least = np.array([students_t(level, int(n)) for n in count])
+    few = count < FEWEST_TO_RESAMPLE
+    ranked, sizes = np.sort(ratio, axis=0), np.sort(abs(ratio), axis=0)
+    either = np.maximum(least, sizes[place(len(ratio), level)])
+    end = place(len(ratio), (1 + level) / 2)
+    down, up = ranked[end], -ranked[-1 - end]
+    return (
+        np.where(few, least, np.maximum(either, down)),
+        np.where(few, least, np.maximum(either, up)),
+    )
+
+
+def chance_above(means: Floats, seed: int, resamples: int) -> float:
+    """How likely persons' means `(n,)` are so far above zero if their true mean is zero.
+
+    The one-sided p-value that belongs to `reach`: it is below 0.025 where the interval of 95 %
+    lies above zero. Nan with fewer than two persons.
+    """
+    from scipy import special
+
+    mean, error, _ = (x[0] for x in moments(means[:, np.newaxis], np.ones((1, len(means)))))
+    if not error[0] > 0:
+        return float(mean[0] <= 0) if len(means) > 1 else math.nan
+    off = mean[0] / error[0]
+    students = float(special.stdtr(len(means) - 1, -off))
+    if len(means) < FEWEST_TO_RESAMPLE:
+        return students
+    ratio = studentised(means[:, np.newaxis], mean, error, seed, resamples)
+    either, above = (abs(ratio) >= off).mean() / 2, (ratio >= off).mean()
+    return max(students, float(either), float(above))
+
+
+def place(n: int, level: float) -> int:
+    """Of `n` ascending values, the place of the first that such a share does not exceed."""
+    return max(math.ceil(n * level - _ROUNDING * n) - 1, 0)
+
+
+@dataclass(frozen=True)
+class Band:
+    """Means at `k` levels, with intervals for each level alone and for all of them at once.
+
+    Attributes:
+        mean: Means over persons `(k,)`; nan where nobody has a value.
+        low: Lower edge of the simultaneous band `(k,)`; nan with fewer than two persons.
+        high: Its upper edge `(k,)`.
+        pointwise_low: Lower end of each level's own interval `(k,)`.
+        pointwise_high: Its upper end `(k,)`.
+        critical: Standard errors between each mean and the band's edge `(k,)`, if the level's
+            own interval does not end farther out; nan where there is no spread to measure by.
+        n_persons: How many persons have at least one value.
+    """
+
+    mean: Floats
+    low: Floats
+    high: Floats
+    pointwise_low: Floats
+    pointwise_high: Floats
+    critical: Floats
+    n_persons: int
+
+
+def band(
+    differences: ArrayLike, level: float = LEVEL, seed: int = 1, resamples: int = RESAMPLES
+) -> Band:
+    """A band that holds all levels at once with the given confidence.
+
+    Its width comes from the largest studentised deviation over the levels when persons are
+    drawn anew: that respects how the levels depend on each other and how skewed they are.
+    Nowhere does it end inside a level's own interval. A level with fewer than 6 persons gets
+    Bonferroni's t, and the others share what it leaves of the chance to err.
+
+    Args:
+        differences: One row per person `(n_persons, k)`, nan where a cell is missing.
+        level: Confidence level.
+        seed: Of the resampling.
+        resamples: How many times persons are drawn.
+
+    References:
+        Westfall & Young, Resampling-Based Multiple Testing (1993), section 2.2 (max-t).
+    """
+    values = np.atleast_2d(np.asarray(differences, dtype=float))
+    values = values[np.isfinite(values).any(axis=1)]
+    mean, error, count = (x[0] for x in moments(values, np.ones((1, len(values)))))
+    judged = error > 0  # neither nan nor without spread
+    ratio = studentised(values[:, judged], mean[judged], error[judged], seed, resamples)
+    down, up = np.where(count > 1, 0.0, np.nan), np.where(count > 1, 0.0, np.nan)
+    down[judged], up[judged] = reach(ratio, count[judged], level)
+    critical = np.full(len(mean), np.nan)
+    critical[judged] = _critical(ratio, count[judged], level)
+    reached = np.where(judged, critical, 0.0) * error
+    lowest, highest = mean - down * error, mean + up * error
+    low, high = np.minimum(mean - reached, lowest), np.maximum(mean + reached, highest)
+    return Band(mean, low, high, lowest, highest, critical, len(values))
+
+
+def _critical(ratio: Floats, count: Floats, level: float) -> Floats:
+    """Standard errors `(k,)` that hold all levels at once; never less than the widest one alone."""
+    each = (1 - level) / max(len(count), 1)
+    critical = np.array([students_t(1 - each, int(n)) for n in count])
+    many = count >= FEWEST_TO_RESAMPLE
+    if many.any():
+        together = 1 - each * many.sum()
+        largest = np.sort(abs(ratio[:, many]).max(axis=1))[place(len(ratio), together)]
+        critical[many] = max(float(largest), students_t(together, int(count[many].min())))
+    return critical

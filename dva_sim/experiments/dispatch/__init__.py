@@ -1,1 +1,0 @@
-"""Which policy should send whom: measures, bounds, figures and page of studies of dispatch."""

@@ -1,0 +1,247 @@
+"""What a running study has done so far: one row per run, safe against being killed."""
+
+from __future__ import annotations
+
+import json
+import os
+import sqlite3
+import time
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from dva_sim.kernel.errors import ConfigError, DvaSimError
+
+FILE = "journal.sqlite"
+_PATIENCE_S = 600.0  # how long another runner may hold the journal, to write its tables
+_LOOK_S = 1.0  # Ctrl-C is not heard for as long
+
+_SCHEMA = """
+CREATE TABLE IF NOT EXISTS study (
+  id INTEGER PRIMARY KEY CHECK (id = 1), identity TEXT NOT NULL, wall_s REAL NOT NULL DEFAULT 0,
+  manifest TEXT);
+CREATE TABLE IF NOT EXISTS runs (
+  config TEXT, seed INTEGER, tables TEXT, cost_s REAL NOT NULL, error TEXT,
+  PRIMARY KEY (config, seed), CHECK ((tables IS NULL) <> (error IS NULL)));
+"""
+_ADD = """
+INSERT INTO runs VALUES (?, ?, ?, ?, ?) ON CONFLICT (config, seed) DO UPDATE
+SET tables = excluded.tables, cost_s = excluded.cost_s, error = excluded.error
+WHERE tables IS NULL
+"""
+
+Key = tuple[str, int]
+Value = bool | int | float | str | None
+Tables = dict[str, list[dict[str, Value]]]
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """How one run ended.
+
+    Attributes:
+        key: The run: hash of its configuration, and seed.
+        tables: Its tables as JSON; None if it failed.
+        cost_s: What it cost [CPU s].
+        error: Why it failed; None if it did not.
+    """
+
+    key: Key
+    tables: str | None
+    cost_s: float = 0.0
+    error: str | None = None
+
+
+class Journal:
+    """The runs of one study, in a SQLite file in WAL mode: one row for each.
+
+    A batch is kept whole or not at all. A run kept twice (by two runners) is kept once.
+
+    Args:
+        folder: Results folder, which must exist.
+        identity: Hash of the study; a journal belongs to one study. None: whoever's it is.
+        must_exist: It is to be read only, not begun.
+
+    Attributes:
+        identity: Hash of its study.
+
+    Raises:
+        ConfigError: the journal is another study's, or not a journal.
+        DvaSimError: it cannot be written, or another program holds it.
+    """
+
+    def __init__(self, folder: Path, identity: str | None, must_exist: bool = False) -> None:
+        self.path = folder / FILE
+        with self._told():
+            self._db = self._connected(must_exist)
+            try:
+                if not must_exist:
+                    self._open(identity)
+                (self.identity,) = self._db.execute("SELECT identity FROM study").fetchone()
+            except BaseException:
+                self._db.close()
+                raise
+        if identity not in (None, self.identity):
+            self._db.close()
+            raise ConfigError(
+                f"{folder} holds another study ({self.identity}, not {identity}), or this one "
+                "before it, the program or its libraries were changed; give another folder with -o"
+            )
+
+    def _connected(self, must_exist: bool) -> sqlite3.Connection:
+        """Read only where nothing else is possible: what was written last may be missing then."""
+        file = f"{self.path.absolute().as_uri()}?mode={'rw' if must_exist else 'rwc'}"
+        if must_exist and not os.access(self.path.parent, os.W_OK):
+            file = f"{self.path.absolute().as_uri()}?mode=ro&immutable=1"
+        return sqlite3.connect(file, timeout=_LOOK_S, isolation_level=None, uri=True)
+
+    def _open(self, identity: str | None) -> None:
+        self._patiently("PRAGMA journal_mode = WAL")
+        self._db.execute("PRAGMA synchronous = NORMAL")
+        with self._transaction():
+            for statement in _SCHEMA.split(";"):
+                self._db.execute(statement)
+            self._db.execute("INSERT OR IGNORE INTO study (id, identity) VALUES (1, ?)", [identity])
+
+    def __enter__(self) -> Journal:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._db.close()
+
+    def add(self, batch: Iterable[Outcome], wall_s: float = 0.0) -> None:
+        """Keep some outcomes; a success takes the place of a failure, never the reverse.
+
+        Args:
+            batch: The outcomes.
+            wall_s: Time gone by since the last batch [s].
+
+        Raises:
+            DvaSimError: the disk is full, or another program holds the journal.
+        """
+        rows = [(*o.key, o.tables, o.cost_s, _error(o)) for o in batch]
+        with self._told(), self._transaction():
+            self._db.executemany(_ADD, rows)
+            self._db.execute("UPDATE study SET wall_s = wall_s + ?", [wall_s])
+
+    @contextmanager
+    def alone(self) -> Iterator[None]:
+        """Keep other runners of this study waiting for as long as the block takes.
+
+        Raises:
+            DvaSimError: another program holds the journal.
+        """
+        with self._told():
+            self._patiently("BEGIN IMMEDIATE")
+        try:
+            yield
+        finally:
+            self._db.execute("ROLLBACK")
+
+    @contextmanager
+    def _transaction(self) -> Iterator[None]:
+        self._patiently("BEGIN IMMEDIATE")
+        try:
+            yield
+            self._db.execute("COMMIT")
+        except BaseException:
+            if self._db.in_transaction:
+                self._db.execute("ROLLBACK")
+            raise
+
+    def _patiently(self, statement: str) -> None:
+        """Wait for whoever holds the journal, in steps that let Ctrl-C through."""
+        end = time.monotonic() + _PATIENCE_S
+        while True:
+            try:
+                self._db.execute(statement)
+                return
+            except sqlite3.OperationalError as error:
+                if "locked" not in str(error) or time.monotonic() > end:
+                    raise
+
+    def describe(self, manifest: Mapping[str, Any]) -> None:
+        """Keep what the study is, so that it can be read from here before it is complete.
+
+        Raises:
+            DvaSimError: the disk is full, or another program holds the journal.
+        """
+        with self._told(), self._transaction():
+            self._db.execute("UPDATE study SET manifest = ?", [json.dumps(manifest)])
+
+    def manifest(self) -> dict[str, Any] | None:
+        """What the study is, as `describe` was told; None if nobody has."""
+        columns = {row[1] for row in self._db.execute("PRAGMA table_info(study)")}
+        if "manifest" not in columns:
+            return None
+        with self._told():
+            (text,) = self._db.execute("SELECT manifest FROM study").fetchone()
+        return None if text is None else dict(json.loads(text))
+
+    def done(self) -> set[Key]:
+        """Keys of the runs that need not be run again."""
+        query = "SELECT config, seed FROM runs WHERE tables IS NOT NULL"
+        with self._told():
+            return set(self._db.execute(query))
+
+    def failures(self) -> dict[Key, str]:
+        """Runs that failed and have not succeeded since, with the reason."""
+        query = "SELECT config, seed, error FROM runs WHERE tables IS NULL"
+        with self._told():
+            return {(config, seed): error for config, seed, error in self._db.execute(query)}
+
+    def tables(self, key: Key) -> Tables | None:
+        """The tables of a run; None if it is not done."""
+        query = "SELECT tables FROM runs WHERE config = ? AND seed = ?"
+        with self._told():
+            row = self._db.execute(query, key).fetchone()
+        return json.loads(row[0]) if row is not None and row[0] is not None else None
+
+    def costs(self) -> dict[Key, float]:
+        """What each run that is done has cost [CPU s]."""
+        query = "SELECT config, seed, cost_s FROM runs WHERE tables IS NOT NULL"
+        with self._told():
+            return {(config, seed): cost for config, seed, cost in self._db.execute(query)}
+
+    @property
+    def wall_s(self) -> float:
+        """How long the study has been run so far, in all sessions together [s]."""
+        with self._told():
+            return float(self._db.execute("SELECT wall_s FROM study").fetchone()[0])
+
+    @contextmanager
+    def _told(self) -> Iterator[None]:
+        """Turn what a user can mend into one line."""
+        try:
+            yield
+        except sqlite3.OperationalError as error:
+            raise DvaSimError(f"{self.path}: {_remedy(str(error))}") from None
+        except (sqlite3.DatabaseError, TypeError) as error:
+            raise ConfigError(
+                f"is not the journal of a study, or damaged ({error}); move it away to begin anew",
+                self.path,
+            ) from None
+
+
+def _error(outcome: Outcome) -> str | None:
+    return None if outcome.tables is not None else outcome.error or "failed"
+
+
+def _remedy(problem: str) -> str:
+    if "full" in problem:
+        return "the disk is full; finished runs are kept: free space, then run the command again"
+    if "locked" in problem:
+        return f"held by another program for more than {_PATIENCE_S:g} s; try again later"
+    if "readonly" in problem or "unable to open" in problem:
+        return f"cannot be written ({problem}): is the folder read-only?"
+    if "I/O" in problem:
+        return f"{problem}: is the disk full or gone? finished runs are kept: run the command again"
+    return problem

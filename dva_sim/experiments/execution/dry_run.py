@@ -1,0 +1,165 @@
+"""What running a study would mean: how many runs, what is done already, how long the rest takes."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+from dva_sim.experiments.execution import executors
+from dva_sim.experiments.execution.checkpoint import FILE, Journal
+from dva_sim.experiments.execution.limit import RunTooLong, limited
+from dva_sim.experiments.execution.scheduling import Episode
+from dva_sim.experiments.results.manifest import manifest_of
+from dva_sim.experiments.study import cell_grid
+from dva_sim.experiments.study.cell_grid import Cell, Job, Key
+from dva_sim.experiments.study.stopping import rounds
+from dva_sim.experiments.study.study import Study
+from dva_sim.experiments.study.tuned_values import load_tuned
+
+PROBE_S = 5.0  # after so long no further run is tried,
+_FEW = 3  # unless there are fewer than that, since one may be far from the others
+MOST_S = 60.0  # for all of them: a run that is ended then costs that much at least
+_SHORT_S = 1.0  # the first run reads files too; if it is as short as this it is tried again
+
+
+@dataclass(frozen=True)
+class DryRun:
+    """What running a study would mean.
+
+    Attributes:
+        runs: Different runs in all.
+        done: How many of them the results folder already holds.
+        cells: Configurations, with the reference runs' own.
+        rounds: After how many batches it may stop; 1 if nothing can stop it early.
+        workers: Processes that the estimate is for.
+        estimate_s: Time for the rest [s], if any run tells its cost.
+        tried: Runs that were tried for the estimate and thrown away; 0 if it rests on runs kept.
+        remark: What is doubtful about tuned values; empty if nothing is.
+        is_least: Whether it will take longer, since a run that was tried did not end in time.
+        failed: What went wrong with a run that was tried; empty if nothing did.
+    """
+
+    runs: int
+    done: int
+    cells: int
+    rounds: int
+    workers: int
+    estimate_s: float | None
+    tried: int
+    remark: str
+    is_least: bool = False
+    failed: str = ""
+
+
+class _Tried(NamedTuple):
+    """What some configurations cost [s], and what is told of it; see `DryRun`."""
+
+    costs: dict[str, float]
+    is_least: bool = False
+    failed: str = ""
+
+
+def dry_run(
+    study: Study,
+    out: str | Path,
+    *,
+    jobs: int | None = None,
+    probe: Episode | None = None,
+    cells: Sequence[Cell] | None = None,
+) -> DryRun:
+    """What `run_study` would do, without doing it.
+
+    Args:
+        study: From `load_study`.
+        out: Results folder.
+        jobs: Processes; by default one for each core.
+        probe: Makes the tables of one run. With it, a few runs are tried for the estimate if none
+            is done yet.
+        cells: The study's configurations, if they have been made already.
+
+    Raises:
+        ConfigError: the study is not valid, or the folder holds another one.
+    """
+    cells = cell_grid.cells(study) if cells is None else cells
+    todo = list({job.key: job for job in cell_grid.jobs(study, cells)}.values())
+    costs: dict[Key, float] = {}
+    if (Path(out) / FILE).exists():
+        identity = manifest_of(study, cells, todo)["hash"]
+        with Journal(Path(out), identity, must_exist=True) as journal:
+            costs = journal.costs()
+    left = [job for job in todo if job.key not in costs]
+    known = _by_config(costs)
+    tried = _tried(left, probe) if probe is not None and not known else _Tried({})
+    estimate = _estimate(left, known or tried.costs)
+    workers = executors.local(jobs).width
+    return DryRun(
+        len(todo),
+        len(todo) - len(left),
+        len(cells),
+        len(rounds(study, todo)),
+        workers,
+        None if estimate is None else estimate / min(workers, len(left) or 1),
+        len(tried.costs),
+        _remark(study),
+        tried.is_least,
+        tried.failed,
+    )
+
+
+def _by_config(costs: Mapping[Key, float]) -> dict[str, float]:
+    """What a run of each configuration costs on the average [s]."""
+    spent: dict[str, list[float]] = defaultdict(list)
+    for (config, _), cost in costs.items():
+        spent[config].append(cost)
+    return {config: sum(values) / len(values) for config, values in spent.items()}
+
+
+def _estimate(left: Sequence[Job], known: Mapping[str, float]) -> float | None:
+    """What the rest costs [s]; a configuration never run is taken for an average one."""
+    if not known and left:
+        return None
+    average = sum(known.values()) / max(1, len(known))
+    return sum(known.get(job.config, average) for job in left)
+
+
+def _tried(left: Sequence[Job], probe: Episode) -> _Tried:
+    """Try one run each of some configurations, spread over the design."""
+    first = list({job.config: job for job in reversed(left)}.values())
+    begun, costs, failed = time.monotonic(), dict[str, float](), ""
+    for index in [0, *_spread(len(first))] if first else ():
+        job, gone = first[index], time.monotonic() - begun
+        if costs.get(job.config, 0.0) > _SHORT_S:
+            continue
+        if gone > PROBE_S and len(costs) >= _FEW:
+            break
+        start = time.thread_time()
+        try:
+            with limited(max(MOST_S - gone, _SHORT_S), may_exit=False):
+                probe(job)
+        except RunTooLong:
+            costs[job.config] = time.thread_time() - start
+            return _Tried(costs, True, failed)
+        except Exception as error:
+            failed = failed or f"{type(error).__name__}: {' '.join(str(error).split())}"
+        else:
+            costs[job.config] = time.thread_time() - start
+    return _Tried(costs, False, failed)
+
+
+def _spread(count: int) -> list[int]:
+    """All indices, so ordered that any beginning is spread over the whole range."""
+    step = next(
+        s for s in range(max(1, round(count * 0.618)), count + 2) if math.gcd(s, count) == 1
+    )
+    return [i * step % count for i in range(count)]
+
+
+def _remark(study: Study) -> str:
+    if not cell_grid.is_tuned(study):
+        return ""
+    return load_tuned(study).remark(cell_grid.basis_of_tuning(study))

@@ -1,0 +1,170 @@
+"""Where runs are made: here, or in processes of this machine; the cluster has its own module.
+
+A place gives executors of `concurrent.futures`; nothing else is known of it by who hands out runs.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import AbstractContextManager, contextmanager, suppress
+from pathlib import Path
+from typing import Any, ParamSpec, Protocol, TypeVar
+
+from dva_sim.kernel.errors import ConfigError, RunsFailed
+
+P = ParamSpec("P")
+R = TypeVar("R")
+_FAMILY = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
+
+
+class PlaceLost(RunsFailed):
+    """Nobody is left to run anything; what has been run is kept."""
+
+
+class Place(Protocol):
+    """Where runs are made."""
+
+    @property
+    def width(self) -> int:
+        """Workers."""
+
+    @property
+    def is_here(self) -> bool:
+        """Whether runs are made in this process, one by one."""
+
+    @property
+    def deaths(self) -> tuple[type[Exception], ...]:
+        """What a future raises whose worker has died."""
+
+    def executor(self, width: int, task: Callable[..., Any]) -> AbstractContextManager[Executor]:
+        """Workers that are gone, or have nothing more to do, when the block ends.
+
+        Args:
+            width: How many.
+            task: What they will do, so that they can prepare for it.
+        """
+
+    def guarded(self, task: Callable[P, R]) -> Callable[P, R]:
+        """The task as it should be handed out."""
+
+    def look_after(self, is_idle: bool) -> None:
+        """Called now and then.
+
+        Args:
+            is_idle: Whether nothing has come for some seconds.
+
+        Raises:
+            PlaceLost: nobody is left.
+        """
+
+
+def local(processes: int | None) -> Place:
+    """Processes of this machine; with one, everything happens in this process.
+
+    Raises:
+        ConfigError: less than one.
+    """
+    width = cores() if processes is None else processes
+    if width < 1:
+        raise ConfigError(f"number of processes should be at least 1, not {width}")
+    return Processes(width) if width > 1 else Here()
+
+
+def cores() -> int:
+    """How many processes can run at the same time here."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+class Here:
+    """This process."""
+
+    width, is_here = 1, True
+    deaths: tuple[type[Exception], ...] = ()
+
+    @contextmanager
+    def executor(self, width: int, task: Callable[..., Any]) -> Iterator[Executor]:
+        """One that has done what it is given when `submit` returns."""
+        yield _AtOnce()
+
+    def guarded(self, task: Callable[P, R]) -> Callable[P, R]:
+        """As it is."""
+        return task
+
+    def look_after(self, is_idle: bool) -> None:
+        """Nothing to look after."""
+
+
+class _AtOnce(Executor):
+    def submit(self, fn: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> Future[R]:
+        future: Future[R] = Future()
+        future.set_result(fn(*args, **kwargs))
+        return future
+
+
+class Processes:
+    """Processes of this machine."""
+
+    is_here = False
+    deaths: tuple[type[Exception], ...] = (BrokenProcessPool,)
+
+    def __init__(self, width: int) -> None:
+        self.width = width
+        self._pids: set[int] = set()
+        self._stopped: set[int] = set()
+
+    @contextmanager
+    def executor(self, width: int, task: Callable[..., Any]) -> Iterator[Executor]:
+        """A pool whose processes are gone when the block ends, at once if it ends in an error."""
+        context = multiprocessing.get_context(_FAMILY)
+        context.set_forkserver_preload([task.__module__])
+        pool = ProcessPoolExecutor(min(width, self.width), context, initializer=_begin)
+        self._pool = pool
+        try:
+            yield pool
+        except BaseException:
+            for process in list((pool._processes or {}).values()):
+                process.kill()
+            raise
+        finally:
+            pool.shutdown(wait=True, cancel_futures=True)
+
+    def guarded(self, task: Callable[P, R]) -> Callable[P, R]:
+        """As it is: the processes are of this program."""
+        return task
+
+    def look_after(self, is_idle: bool) -> None:
+        """End a process that has been stopped for some time: another one does what it had."""
+        pids = set(self._pool._processes or {})
+        stopped = {pid for pid in pids if is_idle and _is_stopped(pid)}
+        for pid in stopped & self._stopped:
+            with suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
+        self._stopped = stopped
+
+
+def _is_stopped(pid: int) -> bool:
+    """Whether a signal has stopped a process, where the system tells."""
+    with suppress(OSError):
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "T"
+    return False
+
+
+def _begin() -> None:
+    """Leave Ctrl-C to the parent, and end with it however it ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)

@@ -1,0 +1,229 @@
+"""Which runs of a study are kept as recordings, and how they are made.
+
+A run is determined by its configuration and seed, so those chosen are simply run again after the
+study. What is chosen hangs on the tables alone: not on processes, interruptions or their order.
+"""
+
+from __future__ import annotations
+
+import errno
+import math
+import os
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import closing, suppress
+from dataclasses import dataclass
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+from dva_sim.experiments.execution import executors, scheduling
+from dva_sim.experiments.results.results import Results
+from dva_sim.experiments.study import cell_grid
+from dva_sim.experiments.study.cell_grid import Job
+from dva_sim.experiments.study.hashing import stable_hash
+from dva_sim.experiments.study.study import Study
+from dva_sim.kernel.errors import DvaSimError
+from dva_sim.simulation.models import Tables, tables_of
+from dva_sim.simulation.scenario import Scenario
+
+FOLDER = "recordings"
+_FULL = os.strerror(errno.ENOSPC)
+MORE_IS_BETTER = frozenset({"confirmed", "evacuated_share", "commands_applied"})
+"""Measures whose smallest value is the worst; of all others the largest is."""
+
+Row = Mapping[str, Any]
+Place = tuple[str, int, int, int]  # part, cell, person, trial
+
+
+def refuse_what_cannot_be_recorded(study: Study) -> None:
+    """Better told before anything is run.
+
+    Raises:
+        ConfigError: no part has runs that can be recorded, or the worst is asked for where no
+            answer says by which measure.
+    """
+    if study.record is None:
+        return
+    scenarios = [cell_grid.base_scenario(study, part) for part in study.parts]
+    if not any(isinstance(scenario, Scenario) for scenario in scenarios):
+        models = ", ".join(sorted({scenario.model for scenario in scenarios}))
+        problem = f"record: {study.record} needs runs of the full model; this study's are {models}"
+        raise study.error(problem, ("record",))
+    if study.record == "worst" and study.answer is None:
+        raise study.error("record: worst needs an answer: it says by which measure", ("record",))
+
+
+def record_study(
+    study: Study,
+    out: Path,
+    *,
+    jobs: int | None = None,
+    progress: Callable[[int, int], object] | None = None,
+    limit_s: float = scheduling.LIMIT_S,
+) -> list[str]:
+    """Make the recordings that a study asks for and its results folder does not hold yet.
+
+    Args:
+        study: With all its runs in the folder.
+        out: Its results folder.
+        jobs: Processes; by default one for each core.
+        progress: Called with the number of recordings there are and of all.
+        limit_s: A run that takes longer, by the wall clock, has failed.
+
+    Returns:
+        What went wrong, a line for each recording that could not be made; of a full disk one
+        line for all of them.
+
+    Raises:
+        ConfigError: what `refuse_what_cannot_be_recorded` says, or no results there.
+        DvaSimError: the folder cannot be written.
+        KeyboardInterrupt: after tidying up; its message says what has been done.
+    """
+    refuse_what_cannot_be_recorded(study)
+    if study.record is None:
+        return []
+    rows = rows_of(Results.load(out))
+    wanted = {name_of(job): job for job in chosen(study, rows)}
+    folder = _tidied(out / FOLDER, wanted)
+    rest = [job for name, job in wanted.items() if not (folder / name).exists()]
+    prints = {name_of(job): _fingerprint(job, rows[place_of(job)]) for job in rest}
+    done, total, tell = len(wanted) - len(rest), len(wanted), progress or (lambda *_: None)
+    tell(done, total)
+    problems = []
+    try:
+        place = executors.local(jobs)
+        with closing(scheduling.run_all(rest, Rerun(folder, prints), place, limit_s)) as batches:
+            for outcome in (outcome for batch in batches for outcome in batch):
+                done += outcome.error is None
+                problems += [] if outcome.error is None else [outcome.error]
+                tell(done, total)
+                if (outcome.error or "").endswith(_FULL):
+                    return [f"{outcome.error}; {done} of {total} are made: free space, then again"]
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(f"{done} of {total} recordings are made") from None
+    return sorted(problems)
+
+
+def chosen(study: Study, rows: Mapping[Place, Row]) -> list[Job]:
+    """The runs to record, in the order of the design.
+
+    Args:
+        study: Asks for all, for the worst of each cell, or for a sample of each cell.
+        rows: The runs that were carried out and did not fail.
+    """
+    every = [
+        job
+        for job in cell_grid.jobs(study)
+        if place_of(job) in rows and not job.is_repeat and isinstance(job.scenario, Scenario)
+    ]
+    if study.record == "all":
+        return every
+    in_cells = (list(group) for _, group in groupby(every, key=lambda job: place_of(job)[:2]))
+    if study.record == "sample" or study.answer is None:
+        return [runs[0] for runs in in_cells]
+    measure = study.answer.measure
+    return [max(runs, key=lambda job: _badness(measure, rows[place_of(job)])) for runs in in_cells]
+
+
+def name_of(job: Job) -> str:
+    """The file of a run: part, cell, person and trial."""
+    cell = "reference" if job.is_reference else str(job.index)
+    return f"{job.part}-{cell}-{job.person}-{job.trial}.mcap"
+
+
+def place_of(job: Job) -> Place:
+    """Where a run stands in its study."""
+    return job.part, job.index, job.person, job.trial
+
+
+def rows_of(results: Results) -> dict[Place, Row]:
+    """The table of runs, by place."""
+    runs = results.runs
+    columns = {name: runs[name].tolist() for name in runs}
+    rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+    return {(row["part"], row["cell"], row["person"], row["trial"]): row for row in rows}
+
+
+def _badness(measure: str, row: Row) -> float:
+    """How bad a run is; what never came is worst."""
+    value = row.get(measure)
+    if value is None or math.isnan(value):
+        return math.inf
+    return -float(value) if measure in MORE_IS_BETTER else float(value)
+
+
+def _tidied(folder: Path, wanted: Iterable[str]) -> Path:
+    """The folder without what an earlier choice or a killed process has left."""
+    try:
+        folder.mkdir(exist_ok=True)
+        names = set(wanted)
+        for path in folder.glob("*.mcap"):
+            if path.name not in names:
+                path.unlink()
+        for path in folder.glob(".*.mcap.*"):
+            if not _is_running(path.suffix[1:]):
+                path.unlink(missing_ok=True)
+    except OSError as error:
+        raise DvaSimError(f"{folder} cannot be written: {error.strerror}") from None
+    return folder
+
+
+def _is_running(pid: str) -> bool:
+    with suppress(ValueError, ProcessLookupError):
+        os.kill(int(pid), 0)
+        return True
+    return False
+
+
+@dataclass(frozen=True)
+class Rerun:
+    """An episode that is kept as a file, and has no tables of its own.
+
+    Args:
+        folder: Of the files.
+        prints: Fingerprint of what each run came to in the study, by name of file.
+    """
+
+    folder: Path
+    prints: Mapping[str, str]
+
+    def __call__(self, job: Job) -> Tables:
+        """Run it again and keep it.
+
+        Raises:
+            DvaSimError: the file cannot be written, or the run is not what it was.
+        """
+        from dva_sim.recordings import write_recording
+        from dva_sim.simulation.full import simulate
+
+        assert isinstance(job.scenario, Scenario)
+        name, run = name_of(job), simulate(job.scenario, job.seed, keep_traffic=True)
+        tables = tables_of(run)
+        if _print_of(tables["runs"][0]) != self.prints[name]:
+            raise DvaSimError(f"{name}: the run is not what the study has: another version made it")
+        write_recording(run, self.folder / name, tables=tables, about=_about(job))
+        return {}
+
+
+def _fingerprint(job: Job, row: Row) -> str:
+    """Of what a run came to, beside what it was to be."""
+    asked = {*scheduling.DESIGN_COLUMNS, *(factor for factor, _ in job.cell)}
+    return _print_of({name: value for name, value in row.items() if name not in asked})
+
+
+def _print_of(row: Row) -> str:
+    """The same for a row as it was made and as a table holds it."""
+    there = {name: v for name, v in row.items() if v is not None and v == v}
+    return stable_hash({n: v if isinstance(v, str) else float(v) for n, v in there.items()})
+
+
+def _about(job: Job) -> dict[str, str]:
+    """What tells the run from the others of its study."""
+    return {
+        "part": job.part,
+        "cell": str(job.index),
+        "person": str(job.person),
+        "trial": str(job.trial),
+        "config": job.config,
+        **{f"factor {name}": str(level) for name, level in job.cell},
+    }

@@ -1,0 +1,235 @@
+"""Run a study: what is not done yet, wherever it is run, kept as it comes, then as tables."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, closing, contextmanager
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from dva_sim.experiments.execution import executors, scheduling
+from dva_sim.experiments.execution.checkpoint import FILE, Journal
+from dva_sim.experiments.execution.executors import Place, PlaceLost
+from dva_sim.experiments.execution.scheduling import Episode
+from dva_sim.experiments.execution.tables import design_row, write_tables
+from dva_sim.experiments.results.manifest import failures, machine, manifest_of, write_json
+from dva_sim.experiments.results.results import MACHINE, MANIFEST, TABLES, digests
+from dva_sim.experiments.study import cell_grid
+from dva_sim.experiments.study.cell_grid import Cell, Job
+from dva_sim.experiments.study.stopping import is_enough, rounds
+from dva_sim.experiments.study.study import Study
+from dva_sim.kernel.errors import ConfigError, DvaSimError
+
+Progress = Callable[[int, int], object]
+
+
+def run_study(
+    study: Study,
+    out: str | Path,
+    *,
+    jobs: int | None = None,
+    scheduler: str | None = None,
+    episode: Episode | None = None,
+    progress: Progress | None = None,
+    limit_s: float = scheduling.LIMIT_S,
+    cells: Sequence[Cell] | None = None,
+) -> Path:
+    """Run what the results folder does not hold yet, then write its tables and manifest.
+
+    The tables and the manifest are the same bytes wherever the runs are made and after any
+    interruption; times and costs are apart, in `machine.json`. Runs that fail are listed in
+    the manifest (`Results.failures`) and tried again the next time.
+
+    Args:
+        study: From `load_study`.
+        out: Results folder, made if need be.
+        jobs: Processes of this machine; by default one for each core.
+        scheduler: Address of a dask.distributed cluster to use instead.
+        episode: Makes the tables of one run; by default a simulation.
+        progress: Called with the number of runs done and of all runs, as they finish.
+        limit_s: A run that takes longer, by the wall clock, has failed.
+        cells: The study's configurations, if they have been made already.
+
+    Returns:
+        The results folder.
+
+    Raises:
+        ConfigError: the study is not valid, the folder holds another one, or there is no such
+            cluster.
+        DvaSimError: the disk is full, another program holds the journal, or the cluster is lost.
+        KeyboardInterrupt: after tidying up; its message says what has been done.
+    """
+    out, started, clock = Path(out), datetime.now(UTC), time.perf_counter()
+    cells = cell_grid.cells(study) if cells is None else cells
+    todo = cell_grid.jobs(study, cells)
+    manifest = manifest_of(study, cells, todo)
+    with ExitStack() as stack:
+        place = stack.enter_context(_place(jobs, scheduler))
+        journal = stack.enter_context(_opened(out, manifest["hash"]))
+        journal.describe(manifest)
+        session = _Session(todo, journal, place, episode or _simulation(), progress, limit_s)
+        with session.told():
+            carried_out, stopped = _run_rounds(study, todo, session)
+            with journal.alone():
+                _tidy(out)
+                write_tables(out, carried_out, journal)
+                manifest["runs"] = len({job.key for job in carried_out})
+                manifest |= {"stopped": stopped, "failures": failures(carried_out, journal)}
+                manifest["tables"] = digests(out / TABLES)
+                write_json(out / MANIFEST, manifest)
+        facts = {"cores": executors.cores(), "jobs": place.width, "started": started.isoformat()}
+        facts |= {"wall_s": time.perf_counter() - clock}
+        write_json(out / MACHINE, machine(carried_out, journal) | facts)
+    return out
+
+
+def _opened(out: Path, identity: str) -> Journal:
+    """The journal of a results folder, which must be this study's or new."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        if not (out / FILE).exists() and (out / MANIFEST).exists():
+            found = json.loads((out / MANIFEST).read_text(encoding="utf-8")).get("hash")
+            if found != identity:
+                raise ConfigError(f"{out} holds another study ({found}); give another folder")
+    except FileExistsError:
+        raise ConfigError(f"{out} is a file; give a folder for the results") from None
+    except OSError as error:
+        raise DvaSimError(f"{out} cannot be written: {error.strerror}") from None
+    except ValueError:
+        raise ConfigError(f"{out} holds something else; give another folder") from None
+    return Journal(out, identity)
+
+
+class _Session:
+    """One go at a study: runs what is asked for and is not done, and counts."""
+
+    def __init__(
+        self,
+        todo: Sequence[Job],
+        journal: Journal,
+        place: Place,
+        episode: Episode,
+        progress: Progress | None,
+        limit_s: float,
+    ) -> None:
+        self.journal = journal
+        self._place, self._episode, self._limit_s = place, episode, limit_s
+        self._tell = progress or (lambda *_: None)
+        keys = {job.key for job in todo}
+        self._total, self._count = len(keys), len(keys & journal.done())
+        self._tell(self._count, self._total)
+
+    def left(self, batch: Sequence[Job]) -> list[Job]:
+        """What is not done yet, each run once, person by person.
+
+        So what is known on the way is known of whole persons, in all cells.
+        """
+        done = self.journal.done()
+        rest = [job for key, job in {job.key: job for job in batch}.items() if key not in done]
+        return sorted(rest, key=lambda job: (job.person, job.trial))
+
+    def run(self, rest: Sequence[Job]) -> None:
+        """Run some; what comes together is in the journal before it is counted."""
+        clock = time.perf_counter()
+        batches = scheduling.run_all(rest, self._episode, self._place, self._limit_s)
+        with closing(batches):
+            for batch in batches:
+                now = time.perf_counter()
+                self.journal.add(batch, now - clock)
+                clock, self._count = now, self._count + len(batch)
+                self._tell(self._count, self._total)
+
+    def end(self) -> None:
+        """No more will be run, even if not all have been."""
+        self._tell(self._count, self._count)
+
+    @contextmanager
+    def told(self) -> Iterator[None]:
+        """Say with a Ctrl-C, or when all workers are lost, how far it had come."""
+        go_on = "the same command goes on from there"
+        try:
+            yield
+        except PlaceLost as lost:
+            raise PlaceLost(
+                f"{lost}; {self._count} of {self._total} runs are kept; {go_on}, also with "
+                "another --scheduler or with --jobs"
+            ) from None
+        except KeyboardInterrupt:
+            raise KeyboardInterrupt(
+                f"interrupted after {self._count} of {self._total} runs, which are kept; {go_on}"
+            ) from None
+
+
+def _run_rounds(
+    study: Study, todo: Sequence[Job], session: _Session
+) -> tuple[list[Job], dict[str, Any]]:
+    """Round after round until the study has enough; the jobs it then has, and what ended it.
+
+    Whether it is enough is judged by whole rounds alone, which are the same wherever and however
+    often the study was interrupted. A round that is done counts even if the budget is spent.
+    """
+    batches = rounds(study, todo)
+    chosen: list[Job] = []
+    why, number = None, 0
+    for number, batch in enumerate(batches, 1):
+        rest = session.left(batch)
+        if rest and chosen and _is_spent(study, session.journal):
+            why, number = "budget", number - 1
+            break
+        session.run(rest)
+        chosen.extend(batch)
+        if number < len(batches) and is_enough(study, _rows(todo, chosen, session.journal)):
+            why = "enough"
+            break
+    if why is not None:
+        session.end()
+    return _in_order(todo, chosen), {"rounds": number, "of": len(batches), "why": why}
+
+
+def _is_spent(study: Study, journal: Journal) -> bool:
+    return study.budget_s is not None and journal.wall_s >= study.budget_s
+
+
+def _in_order(todo: Sequence[Job], chosen: Sequence[Job]) -> list[Job]:
+    """The chosen ones in the order of the design."""
+    ids = {id(job) for job in chosen}
+    return [job for job in todo if id(job) in ids]
+
+
+def _rows(todo: Sequence[Job], chosen: Sequence[Job], journal: Journal) -> list[dict[str, Any]]:
+    """The table `runs` of the chosen jobs, but for repeats."""
+    own = [job for job in _in_order(todo, chosen) if not job.is_repeat]
+    tables = ((job, journal.tables(job.key) or {}) for job in own)
+    return [design_row(job) | row for job, found in tables for row in found.get("runs", ())]
+
+
+@contextmanager
+def _place(jobs: int | None, scheduler: str | None) -> Iterator[Place]:
+    if scheduler is None:
+        yield executors.local(jobs)
+        return
+    if jobs is not None:
+        raise ConfigError("give the number of processes or a scheduler, not both")
+    from dva_sim.experiments.execution.dask_cluster import Cluster
+
+    with Cluster(scheduler) as cluster:
+        yield cluster
+
+
+def _simulation() -> Episode:
+    from dva_sim.experiments.execution.job import run_job
+
+    return run_job
+
+
+def _tidy(out: Path) -> None:
+    """Remove what a runner left behind that was killed while it wrote."""
+    for path in out.glob(".tables-*"):
+        shutil.rmtree(path, ignore_errors=True)
+    for name in (MANIFEST, MACHINE):
+        for path in out.glob(f".{name}.*"):
+            path.unlink(missing_ok=True)

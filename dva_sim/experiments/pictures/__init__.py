@@ -1,5 +1,0 @@
-"""Pictures of runs: films, stills and strips from above, and what a robot's camera sees."""
-
-from dva_sim.experiments.pictures.wanted import Wanted
-
-__all__ = ["Wanted"]

@@ -1,0 +1,235 @@
+"""The table of every cell: nothing that was run is left out of the report."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from dva_sim.experiments.analysis.paired_effects import Floats, Part, Setting, plain_level, present
+from dva_sim.experiments.analysis.published_operators import Support
+from dva_sim.experiments.analysis.statistics import mean_interval
+from dva_sim.experiments.study.labels import (
+    factor_name,
+    level_name,
+    measure_name,
+    number,
+    percent,
+    with_unit,
+)
+from dva_sim.kernel.units import unit_of
+
+
+@dataclass(frozen=True)
+class CellTable:
+    """A table ready to print.
+
+    Attributes:
+        part: Part of the study.
+        heads: Column heads.
+        labels: How many leading columns name the cell.
+        rows: Printed values.
+        empty: How many cells have no run.
+        note: What a mark in it means.
+    """
+
+    part: str
+    heads: list[str]
+    labels: int
+    rows: list[list[str]]
+    empty: int = 0
+    note: str = ""
+
+
+def _hundredths(share: float) -> str:
+    """A share in percent, whose sign stands in the head."""
+    return percent(share).removesuffix("\N{NO-BREAK SPACE}%")
+
+
+# column of the runs, head, how the runs of a cell become one number, how it is printed
+_Summarise = Callable[[Floats], Any]
+Summary = tuple[str, str, _Summarise, Callable[[float], str]]
+SUMMARIES: tuple[Summary, ...] = (
+    ("age_in_force_mean_s", "age of the command in force [s]", np.mean, number),
+    ("command_rate_hz", "applied commands [Hz]", np.mean, number),
+    ("stop_share", "in safe stop [%]", np.mean, _hundredths),
+    ("contacts", "contacts per run", np.mean, number),
+    ("completed_share", "completed", np.mean, percent),
+    ("error_share", "errors", np.mean, percent),
+    ("throughput_bps", "throughput [bit/s]", np.mean, number),
+    ("delay_felt_s", "delay felt [s]", np.mean, number),
+    ("violations", "violations", np.sum, number),
+)
+
+
+def cell_table(
+    part: Part,
+    measure: str,
+    summaries: Sequence[Summary] = SUMMARIES,
+    support: Support | None = None,
+    possible: tuple[float, float] = (-np.inf, np.inf),
+    is_listed: bool = False,
+    points: Sequence[str] = (),
+) -> CellTable:
+    """Every cell of a part: size, confirmed share, the measure with its interval, and the rest.
+
+    Args:
+        part: The runs.
+        measure: Column that is shown with its interval.
+        summaries: What else is shown.
+        support: Which cells are extrapolations.
+        possible: Least and greatest value of the measure.
+        is_listed: Whether the design names its cells, so that those without a run are none.
+        points: Factors that are no axes, whose values are shown for each cell.
+    """
+    settings = list(part.settings())
+    columns: list[_Column | None] = [_value(part, name) for name in points]
+    columns += [_counts(part), *_endings(part), *_measure(part, measure, possible)]
+    columns += [*_others(part, [s for s in summaries if s[0] != measure]), _beyond(support)]
+    there = [c for c in columns if c is not None]
+    names = [factor_name(f.name) for f in part.factors]
+    rows = [
+        [*_cell_name(setting), *(values[i] for _, values in there)]
+        for i, setting in enumerate(settings)
+    ]
+    ran = [bool(there) for there in part.ran.ravel()]
+    if is_listed:
+        rows = [row for row, there in zip(rows, ran, strict=True) if there]
+    empty = 0 if is_listed else ran.count(False)
+    heads = [*names, *(head for head, _ in there)]
+    whole = CellTable(part.name, heads, len(names) + len(points), rows, empty)
+    return replace(_told_once(whole), note=_note(whole, _what_is_covered(support)))
+
+
+def _constant(table: CellTable) -> list[int]:
+    """Columns of which every row says the same; of a single row, none."""
+    columns = range(table.labels, len(table.heads))
+    if len(table.rows) < _FEWEST_ROWS:
+        return []
+    return [n for n in columns if len({row[n] for row in table.rows}) == 1]
+
+
+def _told_once(table: CellTable) -> CellTable:
+    """Without the columns that do not vary."""
+    kept = [n for n in range(len(table.heads)) if n not in _constant(table)]
+    heads, rows = [table.heads[n] for n in kept], [[row[n] for n in kept] for row in table.rows]
+    return replace(table, heads=heads, rows=rows)
+
+
+def _note(table: CellTable, covered: str) -> str:
+    """What all rows have in common, and which are extrapolated."""
+    same = [f"{table.heads[n]} {table.rows[0][n]}" for n in _constant(table)]
+    told = f"The same in all configurations: {', '.join(same)}." if same else ""
+    return " ".join(filter(None, (told, covered)))
+
+
+_Column = tuple[str, list[str]]
+_FEWEST_ROWS = 3  # with fewer, a column that does not vary says little
+_MARK = "\N{NO-BREAK SPACE}†"
+
+
+def _cells(part: Part, column: str) -> list[Floats]:
+    """The finite values of every cell, in the order of `Part.settings`."""
+    return [present(cell) for cell in _by_cell(part, part.grid(column))]
+
+
+def _by_cell(part: Part, grid: Floats) -> Floats:
+    return grid.reshape(-1, len(part.persons), len(part.trials))
+
+
+def _cell_name(setting: Setting) -> list[str]:
+    return [level_name(factor, level) for factor, level in setting.items()]
+
+
+def _value(part: Part, name: str) -> _Column:
+    """What a factor that is no axis of the grid is set to in each cell."""
+    values = [plain_level(value) for value in part.first_of_cells(name)]
+    return with_unit(name), [f"{v:.3g}" if isinstance(v, float) else str(v) for v in values]
+
+
+def _counts(part: Part) -> _Column:
+    return "runs", [str(len(values)) for values in _cells(part, "seed")]
+
+
+_ENDINGS = {
+    "refuted": "refuted",
+    "lost link": "link lost",
+    "gave up": "given up",
+    "escalated": "escalated",
+    "expired": "expired",
+    "undetected": "never reported",
+    "timeout": "nothing by the end",
+    "no drive": "no drive",
+}
+
+
+def _endings(part: Part) -> Iterator[_Column]:
+    """The share confirmed, and how the last drives of the others ended, as far as it occurs."""
+    if not part.has("confirmed"):
+        return
+    grid = part.grid("confirmed")
+    yield "confirmed", [_text(np.mean, present(cell), percent) for cell in _by_cell(part, grid)]
+    how = part.treated.get("outcome", np.array([]))
+    for outcome, head in _ENDINGS.items():
+        if np.any(how == outcome):
+            share = np.where(
+                np.isfinite(grid), part.laid_out((how == outcome).astype(float)), np.nan
+            )
+            yield head, [_text(np.mean, present(cell), percent) for cell in _by_cell(part, share)]
+
+
+def _measure(part: Part, measure: str, possible: tuple[float, float]) -> list[_Column]:
+    """Median and mean with its 95 % interval, in excess of the reference where there is one.
+
+    An interval ends where no value is possible.
+    """
+    if not part.has(measure):
+        return []
+    excess = part.has_reference(measure)
+    grid = _by_cell(part, part.excess(measure) if excess else part.grid(measure))
+    person = np.repeat(part.persons, len(part.trials))
+    medians = [_text(np.median, present(cell), number) for cell in grid]
+    intervals = [mean_interval(cell.ravel(), person) for cell in grid]
+    widest = possible[1] - possible[0]
+    least, most = (-widest, widest) if excess else possible
+    means = [
+        f"{number(i.mean)} ({number(max(i.low, least))} to {number(min(i.high, most))})"
+        for i in intervals
+    ]
+    name = "excess time" if excess and unit_of(measure) == "s" else measure_name(measure)
+    unit = f" [{unit_of(measure)}]" if unit_of(measure) else ""
+    return [(f"{name}, median{unit}", medians), (f"its mean (95 % interval){unit}", means)]
+
+
+def _others(part: Part, summaries: Sequence[Summary]) -> list[_Column]:
+    return [
+        (head, [_text(summary, cell, text) for cell in _cells(part, column)])
+        for column, head, summary, text in summaries
+        if part.has(column)
+    ]
+
+
+def _beyond(support: Support | None) -> _Column | None:
+    """The delay that people would have been watched at, marked where nobody was."""
+    if support is None:
+        return None
+    pairs = zip(support.delays.ravel(), support.outside.ravel(), strict=True)
+    marked = [number(delay) + (_MARK if outside else "") for delay, outside in pairs]
+    return "picture to effect, without the person [s]", marked
+
+
+def _what_is_covered(support: Support | None) -> str:
+    if support is None:
+        return ""
+    covered = f"Delays of the loop that published data cover: {support.words}."
+    if not support.outside.any():
+        return covered
+    mark = f"{_MARK.strip()} Extrapolated: beyond these delays, taken without the person's own."
+    return f"{mark} {covered}"
+
+
+def _text(summary: _Summarise, cell: Floats, text: Callable[[float], str]) -> str:
+    """The runs of a cell as one printed number; a dash where there are none."""
+    return text(float(summary(cell))) if len(cell) else "–"

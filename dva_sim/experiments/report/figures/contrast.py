@@ -1,0 +1,234 @@
+"""The figure that answers: the declared difference alone, level by level, with its band.
+
+The contrast under other models of the persons: every repeat with its interval.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dva_sim.experiments.analysis.answer import Finding, condition
+from dva_sim.experiments.analysis.paired_effects import Factor, Floats, View, present
+from dva_sim.experiments.analysis.robustness import Repeat, Robustness, Stop
+from dva_sim.experiments.report.figures.palette import FAINT, INK, ONE, PAPER, SOFT, colours
+from dva_sim.experiments.report.figures.style import (
+    Drawn,
+    Numbers,
+    axis_label,
+    finish,
+    fit_to,
+    panels,
+    stops_axis,
+    with_unit,
+    wrapped,
+)
+from dva_sim.experiments.study.labels import capital, factor_name, level_name, measure_name, number
+from dva_sim.experiments.study.schema import STRATEGY
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+NAME = "answer"
+_SIZE = (5.8, 3.5)  # [in]: small, so that its text stays legible beside words and on a phone
+_FONT = 10.5
+_MOST_LABELS = 8
+_ROOM = 0.05  # of the width, for the figures beside the outer marks
+_LEAST_SHARE = 0.02  # of the height, below which what is too small to matter is not drawn
+
+
+def contrast(finding: Finding, differences: Floats) -> Drawn | None:
+    """The difference that answers the question; None where no interval can be given.
+
+    Args:
+        finding: The answer.
+        differences: First minus second as person means `(persons, stops)`.
+    """
+    if not np.isfinite(finding.low).any():
+        return None
+    from matplotlib import rc_context
+
+    with rc_context({"font.size": _FONT}):
+        return _drawn(finding, differences)
+
+
+def _drawn(finding: Finding, differences: Floats) -> Drawn:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=_SIZE, dpi=150, layout="constrained")
+    ax = figure.add_subplot()
+    over = Factor(finding.over, finding.levels) if finding.over else None
+    _marks(ax, finding, over)
+    stops_axis(ax, over)
+    left, right = ax.get_xlim()
+    room = _ROOM * (right - left)
+    ax.set_xlim(left - room, right + room)
+    cut = fit_to(ax, present(np.append(differences, 0.0)))
+    grey = _too_small(ax, finding)
+    _values(ax, finding)
+    first, second = _names(finding)
+    unit = f" [{finding.unit}]" if finding.unit else ""
+    ax.set_ylabel(wrapped(f"{capital(first)} minus {second}{unit}", 34))
+    caption = _caption(finding, grey)
+    title = f"{capital(first)} minus {second}: {measure_name(finding.measure)}"
+    within = condition(finding, inside=True).removesuffix(", ")
+    title = f"{title}, {within}" if within else title
+    return finish(figure, NAME, title, caption, _table(finding), (cut,))
+
+
+def _names(f: Finding) -> tuple[str, str]:
+    return level_name(f.factor, f.first), level_name(f.factor, f.second)
+
+
+def _marks(ax: Axes, f: Finding, over: Factor | None) -> None:
+    """A bar for the band, a mark for the mean: filled where it differs from zero."""
+    x, differs = np.arange(len(f.mean)), _differs(f)
+    ax.axhline(0, color=INK, lw=0.8, zorder=1)
+    if over is not None and over.is_numeric:
+        ax.plot(x, f.mean, color=ONE.colour, lw=1, alpha=0.5, zorder=2)
+    ax.vlines(x, f.low, f.high, color=ONE.colour, lw=2.2, zorder=3)
+    for chosen, fill in ((differs, ONE.colour), (~differs, PAPER)):
+        ax.plot(x[chosen], f.mean[chosen], "o", color=ONE.colour, mfc=fill, ms=7, mew=1.5, zorder=4)
+
+
+def _differs(f: Finding) -> NDArray[np.bool_]:
+    return np.asarray((f.low > 0) | (f.high < 0))
+
+
+def _too_small(ax: Axes, f: Finding) -> bool:
+    """Grey where a difference was declared too small to matter, if that can be seen."""
+    bottom, top = ax.get_ylim()
+    if f.smallest_effect is None or f.smallest_effect < _LEAST_SHARE * (top - bottom):
+        return False
+    ax.axhspan(-f.smallest_effect, f.smallest_effect, color=FAINT, alpha=0.6, lw=0, zorder=0)
+    ax.set_ylim(bottom, top)
+    return True
+
+
+def _values(ax: Axes, f: Finding) -> None:
+    """Each mean in figures, beside its mark."""
+    if len(f.mean) > _MOST_LABELS:
+        return
+    there = present(f.mean)
+    rises = bool(f.over) and there[-1] > there[0]  # then the line is in the way on the right
+    for x, (mean, differs) in enumerate(zip(f.mean, _differs(f), strict=True)):
+        if np.isfinite(mean):
+            sign = "+" if mean > 0 and number(mean) != "0" else ""
+            ax.annotate(
+                f"{sign}{number(float(mean))}",
+                (x, mean),
+                xytext=(-6 if rises else 7, 4),
+                textcoords="offset points",
+                ha="right" if rises else "left",
+                va="bottom",
+                color=INK if differs else SOFT,
+                weight="bold" if differs else "normal",
+                annotation_clip=True,
+            )
+
+
+def _caption(f: Finding, grey: bool) -> str:
+    over = "the 95 % band, which holds for all levels at once" if len(f.levels) > 1 else "95 %"
+    cluster = f.cluster if f.persons == 1 else f"{f.cluster}s"
+    first, _ = _names(f)
+    more = "takes longer" if f.unit == "s" else "is larger"
+    words = (
+        f"Above zero {first} {more}. Mark: mean of {f.persons} {cluster}, filled where it differs "
+        f"from zero. Bar: {over}."
+    )
+    return f"{words}{' Grey: too small to matter.' * grey}"
+
+
+def _table(f: Finding) -> Numbers:
+    numbers = Numbers()
+    along = {f.over: f.levels} if f.over else {}
+    ends = {"mean": f.mean, "band_low": f.low, "band_high": f.high}
+    columns: dict[str, Any] = {with_unit(n, f.measure): values for n, values in ends.items()}
+    numbers.add({}, along | columns)
+    return numbers
+
+
+_ROW = 0.14  # height of a repeat [in]
+_GAP = 1.5  # rows between two strategies
+
+
+def repeats(view: View, robustness: Robustness) -> Drawn | None:
+    """Effect and interval of every repeat, by strategy, sorted; the study's own as a band."""
+    stops = [stop for stop in robustness.stops if stop.repeats]
+    if not stops or view.contrast is None or view.line is None:
+        return None
+    rows = max(len(stop.repeats) for stop in stops) + _GAP * (len(robustness.strategies) + 1)
+    figure, (axes,) = panels(1, len(stops), max(2.4, _ROW * rows + 0.9), sharey=True)
+    first, second = (level_name(view.line.name, level) for level in view.contrast)
+    for ax, stop in zip(axes, stops, strict=True):
+        _own(ax, stop)
+        _groups(ax, stop, robustness.strategies)
+        ax.set_title(f"{factor_name(robustness.over)} {level_name(robustness.over, stop.level)}")
+        ax.set_xlabel(axis_label(view.measure, f"{first} minus {second}"))
+        ax.grid(axis="x")
+        ax.grid(axis="y", visible=False)
+    caption = (
+        "Each row: the difference under one model of the persons, with its own 95 % interval. "
+        "Diamonds have the usual parameters, dots another set. Line and blue band: the study's "
+        "own result; black: its own model again, which does not count. Grey: declared too small "
+        "to matter. Repeats have fewer persons, so their intervals are wider."
+    )
+    if any(repeat.is_beyond for stop in stops for repeat in stop.repeats):
+        caption += " Hollow: extrapolated."
+    title = f"The contrast in {measure_name(view.measure)} under other models of the persons"
+    return finish(figure, "robustness", title, caption, _numbers(view, robustness))
+
+
+def _numbers(view: View, robustness: Robustness) -> Numbers:
+    """Every repeat, as drawn."""
+    numbers = Numbers()
+    for stop in robustness.stops:
+        for repeat in stop.repeats:
+            edges = {"mean": repeat.mean, "low": repeat.low, "high": repeat.high}
+            told = {with_unit(name, view.measure): value for name, value in edges.items()}
+            who = {"strategy": repeat.strategy, "parameters": repeat.parameters}
+            flags = {"is_own": repeat.is_own, "is_extrapolated": repeat.is_beyond}
+            numbers.row({robustness.over: stop.level}, **who, **told, **flags)
+    return numbers
+
+
+def _own(ax: Axes, stop: Stop) -> None:
+    if stop.smallest is not None:
+        ax.axvspan(-stop.smallest, stop.smallest, color=FAINT, alpha=0.5, lw=0, zorder=0)
+    ax.axvspan(stop.low, stop.high, color=ONE.colour, alpha=0.15, lw=0, zorder=0)
+    ax.axvline(stop.found, color=ONE.colour, lw=1, zorder=1)
+    ax.axvline(0, color=INK, lw=0.8, zorder=1)
+
+
+def _groups(ax: Axes, stop: Stop, strategies: tuple[str, ...]) -> None:
+    """A block of rows for each strategy, named at its middle."""
+    names = strategies or ("",)
+    paint = colours(Factor(STRATEGY, names))
+    row, ticks = 0.0, []
+    for name in names:
+        block = sorted((r for r in stop.repeats if r.strategy == name), key=lambda r: r.mean)
+        for place, repeat in enumerate(block):
+            _row(ax, row + place, repeat, paint[name])
+        ticks.append(row + (len(block) - 1) / 2)
+        row += len(block) + _GAP
+    ax.set_yticks(ticks, [level_name(STRATEGY, name) if name else "" for name in names])
+    ax.set_ylim(row - _GAP, -1)
+
+
+def _row(ax: Axes, y: float, repeat: Repeat, colour: str) -> None:
+    colour = INK if repeat.is_own else colour
+    ax.hlines(y, repeat.low, repeat.high, color=colour, lw=1, alpha=0.6)
+    usual = repeat.parameters == 0
+    edge = colour if repeat.is_beyond else INK if usual else SOFT
+    ax.plot(
+        repeat.mean,
+        y,
+        "D" if usual else "o",
+        ms=5 if usual else 3.5,
+        color=PAPER if repeat.is_beyond else colour,
+        mec=edge,
+        mew=1.0 if repeat.is_beyond else 0.5,
+    )

@@ -1,0 +1,149 @@
+"""Whole distributions: every run is seen, not only its mean."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dva_sim.experiments.analysis.paired_effects import Floats, View, present
+from dva_sim.experiments.report.figures.palette import INK, PAPER, SOFT, Look, legend, looks
+from dva_sim.experiments.report.figures.style import (
+    Drawn,
+    Numbers,
+    axis_label,
+    dodge,
+    finish,
+    hatch_stops,
+    hatch_words,
+    log_axis,
+    panel_title,
+    panels,
+    stops_axis,
+    wrapped,
+)
+from dva_sim.experiments.study.labels import capital, measure_name
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+_CROWD = 60  # runs of a cell from which on dots must be small
+_GOLDEN = 0.6180339887498949
+
+
+def distributions(view: View) -> Drawn:
+    """Every run as a dot, with median and middle half."""
+    shown = view.shown
+    figure, axes = panels(len(shown), 1, 2.7 if len(shown) < 3 else 2.2, sharex=True, sharey=True)
+    look = looks(view.line)
+    raw, confirmed, numbers = view.part.grid(view.measure), _confirmed(view), Numbers()
+    for (ax,), panel in zip(axes, shown, strict=True):
+        for level, offset in dodge(view.lines):
+            values = view.curve(raw, panel, level).reshape(len(view.stops), -1)
+            ok = view.curve(confirmed, panel, level).reshape(values.shape) != 0
+            width = min(0.3, 0.62 / len(view.lines))
+            _dots(ax, offset, width, values, ok, look[level])
+            _boxes(ax, offset, width, values)
+            for stop, told in enumerate(values):
+                where = view.setting(panel, level) | view.at_stop(stop)
+                numbers.add(where, _columns(view, told, ok[stop]))
+        _reference_line(ax, view)
+        panel_title(ax, panel)
+        stops_axis(ax, view.over)
+        hatch_stops(ax, view.stops_outside(panel))
+        if ax is not axes[-1][0]:
+            ax.set_xlabel("")
+        ax.set_ylabel(axis_label(view.measure, wrapped(measure_name(view.measure), 24)))
+    _spread(axes[0][0], present(raw))
+    legend(figure, view.line)
+    caption = (
+        "Each mark is one run; bar, the median; box, the middle half. Columns stand in the order "
+        f"of the key.{_hollow_words(confirmed)}"
+    )
+    title = f"{capital(measure_name(view.measure))} of all {len(view.part):,} runs"
+    return finish(figure, "distributions", title, caption, numbers, (hatch_words(view),))
+
+
+def _columns(view: View, values: Floats, ok: NDArray[np.bool_]) -> dict[str, Any]:
+    """The runs of a cell that gave a value, with who drove and whether it was confirmed."""
+    persons, trials = view.part.persons, view.part.trials
+    there = np.isfinite(values)
+    told = {
+        "person": np.repeat(persons, len(trials))[there],
+        "trial": np.tile(trials, len(persons))[there],
+        view.measure: values[there],
+    }
+    return told | ({"confirmed": ok[there]} if view.part.has("confirmed") else {})
+
+
+def _hollow_words(confirmed: Floats) -> str:
+    if not (confirmed == 0).any():
+        return ""
+    return " Hollow ones were not confirmed and count with all the time they were given."
+
+
+def _dots(
+    ax: Axes, offset: float, width: float, values: Floats, ok: NDArray[np.bool_], look: Look
+) -> None:
+    """Every run `(stops, runs)` as a dot, side by side with the others of its stop."""
+    stops, runs = values.shape
+    spots = width * ((np.arange(runs) * _GOLDEN) % 1 - 0.5)  # even, and the same every time
+    x = np.arange(stops)[:, np.newaxis] + offset + spots
+    good, missed = np.isfinite(values) & ok, np.isfinite(values) & ~ok
+    dots: dict[str, Any] = {
+        "s": 5 if runs > _CROWD else 14,
+        "lw": 0.5,
+        "marker": look.mark,
+        "rasterized": True,
+        "zorder": 2,
+    }
+    ax.scatter(x[good], values[good], color=look.colour, alpha=0.35, **dots)
+    ax.scatter(x[missed], values[missed], facecolor=PAPER, edgecolor=look.colour, **dots)
+
+
+def _boxes(ax: Axes, offset: float, width: float, values: Floats) -> None:
+    """Median and middle half of each stop `(stops, runs)`, where there are runs."""
+    stops = np.flatnonzero(np.isfinite(values).any(axis=1))
+    if not len(stops):
+        return
+    low, middle, high = np.nanquantile(values[stops], [0.25, 0.5, 0.75], axis=1)
+    left, right = stops + offset - width / 2, stops + offset + width / 2
+    box: dict[str, Any] = {"color": INK, "zorder": 3}
+    for x in (left, right):
+        ax.vlines(x, low, high, lw=0.8, **box)
+    for y in (low, high):
+        ax.hlines(y, left, right, lw=0.8, **box)
+    ax.hlines(middle, left, right, lw=2, **box)
+
+
+def _spread(ax: Axes, values: Floats) -> None:
+    """A logarithmic axis where the slowest run takes many times as long as the fastest."""
+    if len(values) and values.min() > 0 and values.max() > 5 * values.min():
+        log_axis(ax)
+
+
+def _reference_line(ax: Axes, view: View) -> None:
+    reference = present(view.part.reference(view.measure))
+    if not len(reference):
+        return
+    ax.axhline(float(np.median(reference)), color=SOFT, lw=1, ls=":")
+    ax.annotate(
+        "reference (median)",
+        (1.0, float(np.median(reference))),
+        xycoords=("axes fraction", "data"),
+        xytext=(0, -2),
+        textcoords="offset points",
+        ha="right",
+        va="top",
+        fontsize=7.5,
+        color=SOFT,
+    )
+
+
+def _confirmed(view: View) -> Floats:
+    """Whether each run ended in a confirmation; a study that does not say so has no misses."""
+    if view.part.has("confirmed"):
+        return view.part.grid("confirmed")
+    return np.ones_like(view.part.grid(view.measure))

@@ -1,0 +1,367 @@
+"""What the factor does to the measure: paired differences, and the measure itself.
+
+What becomes of the commands: how old they are, and how many arrive.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dva_sim.experiments.analysis.paired_effects import (
+    Factor,
+    Floats,
+    Setting,
+    View,
+    nan_mean,
+    person_means,
+    present,
+)
+from dva_sim.experiments.analysis.predictions import Cadence
+from dva_sim.experiments.analysis.statistics import Band, band
+from dva_sim.experiments.report.figures.palette import (
+    FAINT,
+    INK,
+    PAPER,
+    SOFT,
+    Ends,
+    Look,
+    legend,
+    looks,
+    name_lines,
+)
+from dva_sim.experiments.report.figures.style import (
+    Drawn,
+    Numbers,
+    axis_label,
+    dodge,
+    finish,
+    fit_to,
+    has_lines,
+    hatch_stops,
+    hatch_words,
+    label_panels,
+    log_axis,
+    panel_grid,
+    place_of,
+    with_unit,
+    wrapped,
+)
+from dva_sim.experiments.study.labels import capital, factor_name, level_name, measure_name
+from dva_sim.experiments.study.schema import Level
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+_WIDER = 1.2  # of a logarithmic axis, lest marks lie on its edges
+_STEP = 0.12  # between the bars of two lines, in stops
+CadenceOf = Callable[[Setting], Cadence | None]
+
+
+def differences(view: View, cadence_of: CadenceOf) -> Drawn | None:
+    """Each level minus the baseline, paired, with the band that covers all stops at once."""
+    if view.contrast is None or view.line is None:
+        return None
+    baseline = view.contrast[1]
+    others = tuple(level for level in view.lines if level != baseline)
+
+    def curve(panel: Setting, level: Level) -> Floats:
+        return view.difference(panel, level, baseline)
+
+    name = level_name(view.line.name, baseline)
+    label = axis_label(view.measure, f"Difference against\n{name}")
+    limit = view.widest
+    figure, axes, ends, cut, numbers = _curves(
+        view, others, curve, label, (-limit, limit), home=0.0
+    )
+    for ax, panel in zip(axes, view.shown, strict=True):
+        ax.axhline(0, color=INK, lw=0.8, zorder=1)
+        mark_boundary(ax, view.over, cadence_of(panel), text=True)
+    zoomed = _zoom_on_small(axes, view.smallest_effect)
+    _name(view, others, figure, axes, ends)
+    title = f"Difference against {name} in {_what(view)}"
+    boundary = _boundary_words(view, cadence_of)
+    caption = f"Above zero, {name} has the lower value.{zoomed}{boundary}"
+    reads = (_intervals_words(view), hatch_words(view), cut)
+    return finish(figure, "differences", title, caption, numbers, reads)
+
+
+def measure_levels(view: View) -> Drawn:
+    """The measure itself along x, a line for each level."""
+    grid = view.values
+
+    def curve(panel: Setting, level: Level) -> Floats:
+        return person_means(view.curve(grid, panel, level))
+
+    what = capital(_what(view))
+    label = axis_label(view.measure, wrapped(what))
+    limits = (-view.widest, view.widest) if _in_excess(view) else view.possible
+    figure, axes, ends, cut, numbers = _curves(view, view.lines, curve, label, limits)
+    _name(view, view.lines, figure, axes, ends)
+    excess = "Zero is the reference run. " if _in_excess(view) else ""
+    caption = (
+        f"Mean over persons. {excess}Two intervals may overlap although the difference, which is "
+        "taken within persons, is clear."
+    )
+    reads = (_intervals_words(view), hatch_words(view), cut)
+    title = f"{what} under each {factor_name(view.line.name)}" if view.line else what
+    return finish(figure, "levels", title, caption, numbers, reads)
+
+
+def mark_boundary(ax: Axes, over: Factor | None, cadence: Cadence | None, text: bool) -> None:
+    """The delay from which request/reply must fall behind the wanted rate."""
+    if over is None or cadence is None:
+        return
+    place = place_of(over, cadence.boundary_s)
+    if place is None:
+        return
+    ax.axvline(place, color=SOFT, lw=1, ls=(0, (4, 2)), zorder=1)
+    if text:
+        ax.annotate(
+            f"2d + P = T\n(d = {level_name(over.name, round(cadence.boundary_s, 4))})",
+            (place, 0.98),
+            xycoords=("data", "axes fraction"),
+            xytext=(4, 0),
+            textcoords="offset points",
+            va="top",
+            fontsize=8,
+            color=SOFT,
+        )
+
+
+def _curves(
+    view: View,
+    lines: tuple[Level, ...],
+    curve: Callable[[Setting, Level], Floats],
+    ylabel: str,
+    limits: tuple[float, float],
+    home: float = math.nan,
+) -> tuple[Figure, list[Axes], list[Ends], str, Numbers]:
+    """A panel for each setting, in it a line with its band for each level, and where it ends.
+
+    Args:
+        view: How the part is looked at.
+        lines: Levels drawn.
+        curve: Means of persons `(persons, stops)` for each panel and level.
+        ylabel: Of what.
+        limits: Least and greatest value that are possible; bands end there.
+        home: A value that must be seen, such as zero.
+
+    Returns:
+        The figure, its axes, the end of each line, what a caption must say of cut bands, and the
+        numbers drawn.
+    """
+    figure, axes = panel_grid(view, 3.4)
+    look, every, seen, numbers = looks(view.line), [], [np.array([home])], Numbers()
+    draw = _band if has_lines(view) else _points
+    for ax, panel in zip(axes, view.shown, strict=True):
+        ends: Ends = {}
+        for level, shift in _side_by_side(view, lines):
+            matrix = curve(panel, level)
+            bands = band(matrix)
+            seen.append(matrix.ravel())
+            ends[level] = draw(ax, bands, look[level], shift, limits)
+            numbers.add(view.setting(panel, level), view.along_x() | _columns(view.measure, bands))
+        hatch_stops(ax, view.stops_outside(panel))
+        every.append(ends)
+    label_panels(axes, view, ylabel)
+    return figure, axes, every, fit_to(axes[0], present(np.concatenate(seen))), numbers
+
+
+def _columns(measure: str, bands: Band) -> dict[str, Floats]:
+    """A band as columns: mean, simultaneous and pointwise 95 % limits."""
+    edges = {
+        "mean": bands.mean,
+        "band_low": bands.low,
+        "band_high": bands.high,
+        "low": bands.pointwise_low,
+        "high": bands.pointwise_high,
+    }
+    return {with_unit(name, measure): values for name, values in edges.items()}
+
+
+def _zoom_on_small(axes: list[Axes], smallest: float | None) -> str:
+    """Give small differences room, and mark those declared too small to matter."""
+    if smallest is None:
+        return ""
+    for ax in axes:
+        ax.axhspan(-smallest, smallest, color=FAINT, alpha=0.5, lw=0, zorder=0)
+    words = " Grey: declared too small to matter."
+    bottom, top = axes[0].get_ylim()
+    if max(-bottom, top) < 10 * smallest:
+        return words
+    bottom, top = (_WIDER * end if abs(end) > smallest else end for end in (bottom, top))
+    digits = (1, 2, 5) if max(-bottom, top) < 100 * smallest else (1,)
+    steps = [k * 10.0**n for n in range(-3, 7) for k in digits if smallest <= k * 10.0**n]
+    axes[0].set_yscale("symlog", linthresh=2 * smallest)
+    ticks = [0.0, *steps, *(-step for step in steps)]
+    axes[0].set_yticks([tick for tick in ticks if bottom <= tick <= top])
+    axes[0].set_ylim(bottom, top)
+    axes[0].yaxis.set_major_formatter("{x:g}")
+    axes[0].minorticks_off()
+    return f"{words} Axis: linear near zero, logarithmic beyond."
+
+
+def _side_by_side(view: View, lines: tuple[Level, ...]) -> list[tuple[Level, float]]:
+    """Each level's place beside its stop; close together where a line goes on to the next."""
+    if not has_lines(view):
+        return dodge(lines)
+    return [(level, _STEP * (i - (len(lines) - 1) / 2)) for i, level in enumerate(lines)]
+
+
+def _intervals_words(view: View) -> str:
+    if has_lines(view):
+        return "Shaded: the 95 % band of a line. Bars: the 95 % interval of each level alone."
+    return (
+        "Thin bars: the 95 % band of all places of a mark. Thick bars: the interval of each alone."
+    )
+
+
+def _name(
+    view: View, lines: tuple[Level, ...], figure: Figure, axes: list[Axes], ends: list[Ends]
+) -> None:
+    """Lines are named at their ends, marks in a key."""
+    if has_lines(view):
+        name_lines(axes, ends, view.line)
+    elif view.line is not None:
+        legend(figure, view.line, lines)
+
+
+def _points(ax: Axes, bands: Band, look: Look, shift: float, limits: tuple[float, float]) -> float:
+    """A mark with two bars at each stop: the wide interval thin, the narrow one thick."""
+    x = np.arange(len(bands.mean)) + shift
+    ax.vlines(x, *np.clip([bands.low, bands.high], *limits), color=look.colour, lw=1)
+    narrow = np.clip([bands.pointwise_low, bands.pointwise_high], *limits)
+    ax.vlines(x, *narrow, color=look.colour, lw=2.6)
+    ax.plot(x, bands.mean, look.mark, color=look.colour, ms=6, mec=PAPER, mew=0.6, zorder=3)
+    return math.nan  # no line, so no end
+
+
+def _band(ax: Axes, bands: Band, look: Look, shift: float, limits: tuple[float, float]) -> float:
+    """One line with its band and bars; gives the height of its end."""
+    x, colour = np.arange(len(bands.mean)) + shift, look.colour
+    low, high = np.clip([bands.low, bands.high], *limits)
+    ax.fill_between(x, low, high, color=colour, alpha=0.16, lw=0)
+    ax.vlines(
+        x, *np.clip([bands.pointwise_low, bands.pointwise_high], *limits), color=colour, lw=1.2
+    )
+    ax.plot(x, bands.mean, "-", marker=look.mark, color=colour, ms=4.5)
+    seen = present(bands.mean)
+    return float(seen[-1]) if len(seen) else float("nan")
+
+
+def _in_excess(view: View) -> bool:
+    return view.part.has_reference(view.measure)
+
+
+def _what(view: View) -> str:
+    return f"{'excess ' if _in_excess(view) else ''}{measure_name(view.measure)}"
+
+
+def _boundary_words(view: View, cadence_of: CadenceOf) -> str:
+    """Explain the dashed line, if any panel has one."""
+    cadences = [cadence_of(panel) for panel in view.shown]
+    over = view.over
+    if not any(c and over and place_of(over, c.boundary_s) is not None for c in cadences):
+        return ""
+    return (
+        " Dashed: from there on (2 d + P = T: round trip and processing fill the wanted period) "
+        "REQ/REP can no longer send as often as wanted."
+    )
+
+
+_ROOM = 1.08  # above the highest mark
+_QUANTILES = ("p05", "p25", "p50", "p75", "p95")
+
+
+def command_age(view: View) -> Drawn | None:
+    """How old a command is when it takes effect, as quantile ranges."""
+    columns = [f"command_age_{q}_s" for q in _QUANTILES]
+    if not all(view.part.has(column) for column in columns):
+        return None
+    figure, axes = panel_grid(view, 3.0)
+    look = looks(view.line)
+    grids, numbers = [view.part.grid(column) for column in columns], Numbers()
+    for ax, panel in zip(axes, view.shown, strict=True):
+        for level, offset in dodge(view.lines):
+            ages = [_cell_means(view.curve(grid, panel, level)) for grid in grids]
+            _ranges(ax, [stop + offset for stop in range(len(view.stops))], ages, look[level])
+            told = dict(zip(columns, ages, strict=True))
+            numbers.add(view.setting(panel, level), view.along_x() | told)
+    log_axis(axes[0])
+    label_panels(axes, view, axis_label("age_s", wrapped("Command age at application", 22)))
+    legend(figure, view.line)
+    caption = (
+        "From the making of a command to its effect at the motors: mark, the median; thick, the "
+        "middle half; thin, 5 to 95 % (averages over runs). The axis is logarithmic."
+    )
+    return finish(figure, "command_age", "Age of commands when they take effect", caption, numbers)
+
+
+def command_rate(view: View, cadence_of: CadenceOf) -> Drawn | None:
+    """Commands applied per second, beside what arithmetic allows request/reply."""
+    if not view.part.has("command_rate_hz"):
+        return None
+    figure, axes = panel_grid(view, 3.0)
+    look, every, numbers = looks(view.line), [], Numbers()
+    grid = view.part.grid("command_rate_hz")
+    for ax, panel in zip(axes, view.shown, strict=True):
+        ends: Ends = {}
+        for i, (level, place) in enumerate(dodge(view.lines)):
+            means = _cell_means(view.curve(grid, panel, level))
+            if has_lines(view):  # larger marks below, where lines lie on each other
+                _line(ax, means, look[level], 4 + 2.5 * (len(view.lines) - 1 - i))
+            else:
+                x = np.arange(len(means)) + place
+                ax.plot(x, means, look[level].mark, ms=5, color=look[level].colour)
+            ends[level] = float(means[-1])
+            told = view.along_x() | {"command_rate_hz": means}
+            numbers.add(view.setting(panel, level), told)
+        _closed_form(ax, view, cadence_of(panel))
+        every.append(ends)
+    tops = [ax.dataLim.y1 for ax in axes if np.isfinite(ax.dataLim.y1)]  # a panel may be empty
+    axes[0].set_ylim(0, _ROOM * max(tops, default=1.0))
+    label_panels(axes, view, axis_label("command_rate_hz"))
+    if has_lines(view):
+        name_lines(axes, every, view.line)
+    else:
+        legend(figure, view.line)
+    caption = "Mean over runs, without commands that came too old or were overtaken."
+    if any(cadence_of(panel) for panel in view.shown):
+        caption += (
+            " Dashed: what REQ/REP allows by arithmetic, min(1/T, 1/(2 d + P)), with wanted period "
+            "T, one-way delay d and processing time P."
+        )
+    return finish(figure, "command_rate", "Commands applied per second", caption, numbers)
+
+
+def _cell_means(values: Floats) -> Floats:
+    """`(stops, persons, trials)` to means over all runs of a stop."""
+    return nan_mean(values.reshape(len(values), -1), axis=1)
+
+
+def _line(ax: Axes, means: Floats, look: Look, size: float) -> None:
+    ax.plot(means, color=look.colour, lw=1, alpha=0.5)
+    ax.plot(means, look.mark, ms=size, color=look.colour)
+
+
+def _ranges(ax: Axes, x: Sequence[float], ages: list[Floats], look: Look) -> None:
+    low, quarter, middle, three_quarters, high = ages
+    ax.vlines(x, low, high, color=look.colour, lw=1)
+    ax.vlines(x, quarter, three_quarters, color=look.colour, lw=4, alpha=0.55)
+    ax.plot(x, middle, look.mark, color=look.colour, ms=4.5)
+
+
+def _closed_form(ax: Axes, view: View, cadence: Cadence | None) -> None:
+    if cadence is None or view.over is None or not view.over.is_numeric:
+        return
+    delays = np.array([float(v) for v in view.over.levels if isinstance(v, int | float)])
+    x = np.linspace(0, len(delays) - 1, 40 * len(delays))
+    rates = [cadence.lock_step_rate(d) for d in np.interp(x, np.arange(len(delays)), delays)]
+    ax.plot(x, rates, color=INK, lw=1, ls=(0, (4, 2)), zorder=3)
+    mark_boundary(ax, view.over, cadence, text=False)

@@ -1,0 +1,285 @@
+"""How it ended, and when: the ways compete, so they are stacked and fill the whole.
+
+The whole story: who responded, how soon, and what became of every event.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dva_sim.experiments.analysis.competing_risks import NOTHING, Endings
+from dva_sim.experiments.analysis.paired_effects import (
+    Floats,
+    Setting,
+    Table,
+    View,
+    as_floats,
+    codes_of,
+)
+from dva_sim.experiments.report.figures.budget import Stacks, stack
+from dva_sim.experiments.report.figures.palette import FATES, PAPER, Look, box, key, legend, looks
+from dva_sim.experiments.report.figures.style import (
+    Drawn,
+    Numbers,
+    dodge,
+    finish,
+    outer_labels,
+    panels,
+    stops_axis,
+    wrapped,
+)
+from dva_sim.experiments.study.labels import brief, capital, level_name
+from dva_sim.experiments.study.schema import Level
+from dva_sim.simulation.shift.bounds import CUT, incidence
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+_MOST_STOPS, _MOST_LINES, _POINTS = 4, 3, 241
+_TITLE = 70  # characters that the width holds
+
+
+def endings_in_time(endings: Endings, view: View) -> Drawn | None:
+    """Cumulative incidence of each way, stacked; None where all went right."""
+    lines = _lines(endings, view)
+    stops = [stop for stop in view.stops if not _all_right(endings, lines, [stop])][-_MOST_STOPS:]
+    if not stops:
+        return None
+    figure, axes = panels(len(lines), len(stops), 1.9, sharex=True, sharey=True)
+    times, numbers = np.linspace(0.0, endings.horizon, _POINTS), Numbers()
+    for row, line in zip(axes, lines, strict=True):
+        for ax, stop in zip(row, stops, strict=True):
+            mask = endings.under(line, stop)
+            if mask.any():
+                shares = _shares(endings, mask, times)
+                _stack(ax, shares, times)
+                where = view.setting(view.panels[0], line) | _stop(view, stop)
+                numbers.add(where, {"t_s": times} | shares)
+            ax.grid(False)
+        name = level_name(view.line.name, line) if view.line else ""
+        row[0].set_ylabel(f"{wrapped(name, 24)}\nshare of events".strip())
+    axes[0][0].set(xlim=(0, endings.horizon), ylim=(0, 1))
+    axes[0][0].yaxis.set_major_formatter(lambda y, _: f"{100 * y:.0f} %")
+    for ax, stop in zip(axes[0], stops, strict=True):
+        ax.set_title(wrapped(capital(brief(_stop(view, stop))), _TITLE // len(stops)))
+    for ax in axes[-1]:
+        ax.set_xlabel("Since the report [s]")
+    key(figure, [box(FATES[way]) for way in endings.ways], [_named(w) for w in endings.ways])
+    place = f" with {brief(view.panels[0])}" if view.panels[0] else ""
+    caption = (
+        f"Share of the events of part {view.part.name}{place} that had ended in each way by each "
+        "moment (cumulative incidence, Aalen-Johansen), where not all were confirmed. The shares "
+        "at the right edge stand in the table, with intervals."
+    )
+    return finish(figure, "endings", "How it ended, and when", caption, numbers)
+
+
+def _lines(endings: Endings, view: View) -> tuple[Level, ...]:
+    """The two that are compared, and others of which not all went right."""
+    others = [line for line in view.lines if not _all_right(endings, [line], view.stops)]
+    return tuple(dict.fromkeys([*(view.contrast or ()), *others]))[:_MOST_LINES]
+
+
+def _all_right(endings: Endings, lines: Sequence[Level], stops: Sequence[Level]) -> bool:
+    places = itertools.product(lines, stops)
+    return all(bool(endings.is_right[endings.under(*place)].all()) for place in places)
+
+
+def _stop(view: View, stop: Level) -> Setting:
+    return {view.over.name: stop} if view.over else {}
+
+
+def _shares(endings: Endings, mask: NDArray[np.bool_], times: Floats) -> dict[str, Floats]:
+    """Cumulative incidence of each way at some times, and the share to which nothing happened."""
+    ways = endings.ways[:-1]
+    codes = {way: number for number, way in enumerate(ways, 1)}
+    causes = np.array([codes.get(way, CUT) for way in endings.way[mask]], dtype=np.intp)
+    curve = incidence(endings.time[mask], causes, len(ways))
+    shares = {way: curve.at(times, code) for way, code in codes.items()}
+    return shares | {NOTHING: 1.0 - sum(shares.values(), np.zeros_like(times))}
+
+
+def _stack(ax: Axes, shares: dict[str, Floats], times: Floats) -> None:
+    floor = np.zeros_like(times)
+    for way, share in shares.items():
+        fill, top = FATES[way], floor + share
+        look: dict[str, Any] = {"facecolor": fill.colour, "hatch": fill.hatch, "edgecolor": PAPER}
+        ax.fill_between(times, floor, top, step="post", lw=0.6, **look)
+        floor = top
+
+
+def _named(way: str) -> str:
+    return "nothing yet" if way == NOTHING else way
+
+
+_TIMES = {
+    "Guard arrives": ("guard", "response_s"),
+    "Robot arrives": ("robot", "response_s"),
+    "Guard confirms": ("guard", "confirmation_s"),
+    "Robot confirms": ("robot", "confirmation_s"),
+}
+_NAMES = {"open": "open at the end"}
+_FATES = (  # as they are stacked
+    *("confirmed by a robot", "confirmed by a guard", "refuted", "escalated", "expired"),
+    *("undetected", "open", "other"),
+)
+
+
+def fates(outcome: NDArray[Any], responder_kind: NDArray[Any]) -> NDArray[np.str_]:
+    """What became of each event, in words of `_FATES`; outcomes it does not know are `other`."""
+    words = np.char.add("confirmed by a ", responder_kind.astype(str))
+    words = np.where(np.isin(outcome, ("confirmed", "contained")), words, outcome.astype(str))
+    return np.where(np.isin(words, _FATES), words, "other")
+
+
+class Events:
+    """The events of one part, picked by what they happened under.
+
+    Args:
+        table: Columns of the table `events`.
+        part: Which part.
+        view: Names the factors and their levels.
+    """
+
+    def __init__(self, table: Table, part: str, view: View) -> None:
+        rows = {key: np.asarray(values) for key, values in table.items()}
+        self.part = part
+        here = (rows["part"] == part) & ~rows["is_reference"].astype(bool)
+        self.rows = {key: values[here] for key, values in rows.items()}
+        self._view = view
+        self._codes = {
+            factor.name: (factor, codes_of(self.rows, factor))
+            for factor in view.part.factors
+            if factor.name in self.rows
+        }
+
+    def __len__(self) -> int:
+        return len(self.rows["part"])
+
+    def under(self, panel: Setting, line: Level, stop: Level) -> NDArray[np.bool_]:
+        """Which events happened under these levels `(n,)`."""
+        view = self._view
+        wanted = dict(panel)
+        wanted |= {f.name: v for f, v in ((view.line, line), (view.over, stop)) if f}
+        mask = np.ones(len(self), dtype=bool)
+        for name, (factor, codes) in self._codes.items():
+            mask &= codes == factor.levels.index(wanted[name])
+        return mask
+
+    def by(self, responder: str) -> NDArray[np.bool_]:
+        """Which events were answered by this kind of responder `(n,)`."""
+        return np.asarray(self.rows["responder_kind"].astype(str) == responder)
+
+    def times(self, column: str, mask: NDArray[np.bool_]) -> Floats:
+        """The times of some events [s], of those that have one."""
+        values = as_floats(self.rows[column])[mask]
+        return values[np.isfinite(values)]
+
+    def shares(self, mask: NDArray[np.bool_]) -> dict[str, float]:
+        """Share of each fate; they add up to one, or all are nan where nothing happened."""
+        if not mask.any():
+            return dict.fromkeys(_FATES, np.nan)
+        found = fates(self.rows["outcome"][mask], self.rows["responder_kind"][mask])
+        return {fate: float(np.mean(found == fate)) for fate in _FATES}
+
+    def kinds_of_times(self) -> dict[str, tuple[str, str]]:
+        """Those of `_TIMES` that at least one event has."""
+        return {
+            title: (kind, column)
+            for title, (kind, column) in _TIMES.items()
+            if len(self.times(column, self.by(kind)))
+        }
+
+    def one_fate(self) -> str | None:
+        """What became of every event, if it was the same for all."""
+        found = np.unique(fates(self.rows["outcome"], self.rows["responder_kind"]))
+        return str(found[0]) if len(found) == 1 else None
+
+
+def story_part(table: Table, view: View) -> str | None:
+    """The part that tells a story: the one with events that the answer is not about."""
+    parts = sorted({str(p) for p in table["part"]})
+    others = [part for part in parts if part != view.part.name]
+    return next(iter(others or parts), None)
+
+
+def responses(view: View, events: Events) -> Drawn | None:
+    """Times of the events that were reached, guards and robots apart; of those who came."""
+    shown, met, numbers = view.shown, events.kinds_of_times(), Numbers()
+    if not met:
+        return None
+    figure, axes = panels(len(shown), len(met), 2.4, sharex=True, sharey=True)
+    look = looks(view.line)
+    for row, panel in zip(axes, shown, strict=True):
+        for ax, (title, (kind, column)) in zip(row, met.items(), strict=True):
+            for level, offset in dodge(view.lines):
+                masks = [events.by(kind) & events.under(panel, level, v) for v in view.stops]
+                times = [events.times(column, mask) for mask in masks]
+                _quartiles(ax, offset, times, look[level])
+                where = view.setting(panel, level) | {"responder_kind": kind, "time": column}
+                numbers.add(where, view.along_x() | _quantiles(times))
+            stops_axis(ax, view.over)
+            ax.set_title(title if row is axes[0] else "")
+    axes[0][0].set_ylim(bottom=0)
+    outer_labels(axes, shown, "Since detection [s]")
+    legend(figure, view.line)
+    caption = (
+        "Mark, the median; bar, the middle half, of the events that were reached or "
+        f"confirmed{_what_else_came(events)}."
+    )
+    title = f"Part {events.part}: response, by who responded"
+    return finish(figure, "story_times", title, caption, numbers)
+
+
+def outcomes(view: View, events: Events) -> Drawn | None:
+    """What became of every event, as shares that add up to one; None if all met one fate."""
+    if events.one_fate() is not None:
+        return None
+    met = events.shares(np.ones(len(events), dtype=bool))
+    parts = {_NAMES.get(fate, fate): box(FATES[fate]) for fate in _FATES if met[fate]}
+    stacks, numbers = Stacks(view, "Share of events", parts), Numbers()
+    for ax, panel, level in stacks.panels():
+        shares = [events.shares(events.under(panel, level, v)) for v in view.stops]
+        told = {fate: np.array([share[fate] for share in shares]) for fate in _FATES}
+        stack(ax, told, FATES)
+        numbers.add(view.setting(panel, level), view.along_x() | told)
+    stacks.close()
+    stacks.axes[0].set_xlim(0, 1)
+    stacks.axes[0].set_xticks([0, 0.5, 1])
+    stacks.axes[0].xaxis.set_major_formatter(lambda share, _: f"{100 * share:.0f} %")
+    caption = f"All {len(events):,} events of part {events.part}: each has one of these outcomes."
+    title = f"Part {events.part}: what became of the events"
+    return finish(stacks.figure, "story_outcomes", title, caption, numbers)
+
+
+def _what_else_came(events: Events) -> str:
+    """What became of all events, or where that is to be seen."""
+    if (fate := events.one_fate()) is not None:
+        name = _NAMES.get(fate, fate)
+        return f"; all {len(events):,} were {name}" if len(events) > 1 else f"; it was {name}"
+    return ": a fast median may hide misses, which the next figure shows"
+
+
+def _quartiles(ax: Axes, offset: float, times: list[Floats], look: Look) -> None:
+    """Median and middle half of each stop; nothing where nobody came."""
+    met = [stop for stop, values in enumerate(times) if len(values)]
+    if not met:
+        return
+    low, middle, high = np.array([np.quantile(times[stop], [0.25, 0.5, 0.75]) for stop in met]).T
+    x = np.array(met) + offset
+    ax.vlines(x, low, high, color=look.colour, lw=2.4, alpha=0.55)
+    ax.plot(x, middle, look.mark, color=look.colour, ms=3.6)
+
+
+def _quantiles(times: list[Floats]) -> dict[str, Any]:
+    """How many events of each stop have a time, and its quartiles [s]."""
+    found = [np.quantile(t, [0.25, 0.5, 0.75]) if len(t) else np.full(3, np.nan) for t in times]
+    names = ("p25_s", "p50_s", "p75_s")
+    quartiles = {name: [float(q[i]) for q in found] for i, name in enumerate(names)}
+    return {"events": [len(t) for t in times]} | quartiles

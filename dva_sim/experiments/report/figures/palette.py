@@ -1,0 +1,245 @@
+"""Every colour a figure may use, each with what carries it in a print: a mark, or a hatch.
+
+Colours of lines and marks are those of Okabe & Ito, without the yellow that white paper swallows,
+and eight more, chosen to stay far from all others under each of the three dichromacies.
+
+References:
+    Okabe, M. & Ito, K. (2008). Color universal design: how to make figures and presentations that
+        are friendly to colorblind people.
+
+Which mark is what: a key above the panels, or names at the ends of lines.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from dva_sim.experiments.analysis.paired_effects import Factor
+from dva_sim.experiments.study.labels import level_name
+from dva_sim.experiments.study.schema import Level
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+INK, SOFT, FAINT, PAPER = "#222222", "#6b6b6b", "#d9d9d9", "white"
+WARNING, HAZARD = "#8a3800", "#8a0000"
+DIVERGING = "PuOr_r"  # purple below zero, white, orange above: far apart for every eye
+
+
+class Look(NamedTuple):
+    """Of a line and its marks."""
+
+    colour: str
+    mark: str
+
+
+class Fill(NamedTuple):
+    """Of a surface; white lines in it, if any."""
+
+    colour: str
+    hatch: str = ""
+
+
+_BLUE, _VERMILION, _GREEN = Look("#0072B2", "o"), Look("#D55E00", "s"), Look("#009E73", "^")
+_PURPLE, _ORANGE, _SKY = Look("#CC79A7", "D"), Look("#E69F00", "v"), Look("#56B4E9", "P")
+_BLACK, _VIOLET, _BROWN = Look("#222222", "X"), Look("#7a2fd0", "*"), Look("#613305", "h")
+_OLIVE, _PLUM, _CRIMSON = Look("#b4b464", "<"), Look("#91086f", ">"), Look("#da0b3f", "d")
+_NAVY, _MINT, _LILAC = Look("#2929a3", "p"), Look("#87c5a6", "8"), Look("#906ef7", "H")
+LOOKS = (
+    *(_BLUE, _VERMILION, _GREEN, _PURPLE, _ORANGE, _SKY, _BLACK, _VIOLET),
+    *(_BROWN, _OLIVE, _PLUM, _CRIMSON, _NAVY, _MINT, _LILAC),
+)
+ONE = _BLUE  # where there is nothing to be told apart
+
+# Levels that look the same in every figure of every study.
+_OWN: Mapping[str, Look] = {
+    "req-rep": _VERMILION,
+    "pipelined": _PURPLE,
+    "pub-sub": _BLUE,
+    "latest-wins": _GREEN,
+    "robot": _BLUE,
+    "guard": _VERMILION,
+    "bystander": _GREEN,
+    "random": _BLACK,
+    "nearest_idle": _BROWN,
+    "min_eta": _BLUE,
+    "priority_eta": _SKY,
+    "batch_optimal": _GREEN,
+    "auction": _ORANGE,
+    "preemptive": _PURPLE,
+    "hazard_team": _VERMILION,
+    "operator_aware": _VIOLET,
+    "coverage": _PLUM,
+    "preference": _OLIVE,
+    "oracle": _CRIMSON,
+}
+
+# What may become of an event, the best first. In a stack neighbours differ in a print, too.
+FATES: Mapping[str, Fill] = {
+    "confirmed by a robot": Fill("#0072B2"),
+    "confirmed by a guard": Fill("#D55E00", "////"),
+    "confirmed": Fill("#009E73"),
+    "cleared": Fill("#56B4E9", "////"),
+    "refuted": Fill("#CC79A7", "...."),
+    "false alarm confirmed": Fill("#CC79A7", "xxxx"),
+    "link lost": Fill("#da0b3f", "////"),
+    "given up": Fill("#777777", "----"),
+    "escalated": Fill("#E69F00", "\\\\\\\\"),
+    "open": Fill("#dedede"),
+    "expired": Fill("#613305", "xxxx"),
+    "undetected": Fill("#222222"),
+    "never reported": Fill("#222222", "||||"),
+    "other": Fill("#f0f0f0", "++++"),
+    "nothing": Fill("#dedede"),
+}
+
+# The way around the loop, from what the camera saw: blue the link, grey the person, orange the
+# phone, each of them pale or dark. Hatched is what holds a value until the next one comes.
+STAGES: Mapping[str, Fill] = {
+    "delay_frame_s": Fill("#d3ebf8", "////"),
+    "delay_downlink_s": Fill("#56b4e9"),
+    "delay_human_s": Fill("#d4d4d4"),
+    "delay_hand_s": Fill("#777777"),
+    "delay_filter_s": Fill("#e69f00"),
+    "delay_sampling_s": Fill("#fbe3a6", "////"),
+    "delay_pattern_s": Fill("#d55e00"),
+    "delay_uplink_s": Fill("#00507d"),
+    "delay_processing_s": Fill("#cc79a7"),
+    "delay_motor_s": Fill("#222222"),
+}
+
+
+def looks(factor: Factor | None) -> dict[Level, Look]:
+    """A look for each level: one's own, wherever it appears, or one that no other here has."""
+    if factor is None:
+        return {None: ONE}
+    own = {level: _OWN[str(level)] for level in factor.levels if str(level) in _OWN}
+    free = [look for look in LOOKS if look not in own.values()] or list(LOOKS)
+    others = [level for level in factor.levels if level not in own]
+    found = own | {level: free[i % len(free)] for i, level in enumerate(others)}
+    return {level: found[level] for level in factor.levels}
+
+
+def colours(factor: Factor | None) -> dict[Level, str]:
+    """A colour for each level."""
+    return {level: look.colour for level, look in looks(factor).items()}
+
+
+def marks(factor: Factor | None) -> dict[Level, str]:
+    """A mark for each level, as lasting as its colour."""
+    return {level: look.mark for level, look in looks(factor).items()}
+
+
+def look_of(name: str) -> Look:
+    """Of a kind of agents: its own, or that of what is alone."""
+    return _OWN.get(name, ONE)
+
+
+_LINE = 112  # characters that a line of a key holds
+_HANDLE = 7  # characters that a mark and the gap beside it take
+_ROW = 0.22  # height of a line of a key [in]
+_GAP = 0.075  # between names of lines, as a share of the axes' height
+
+Ends = dict[Level, float]  # where each line ends
+
+
+def key(figure: Figure, handles: Sequence[Artist], names: Sequence[str]) -> None:
+    """Above all panels, in as many lines as it takes, to be read line by line."""
+    columns = columns_of([len(name) for name in names])
+    order = [i for column in range(columns) for i in range(column, len(names), columns)]
+    figure.legend(
+        [handles[i] for i in order],
+        [names[i] for i in order],
+        loc="outside upper left",
+        ncols=columns,
+        handlelength=1.4,
+    )
+
+
+def key_height(names: Sequence[str]) -> float:
+    """What a key takes of a figure's height [in]."""
+    columns = columns_of([len(name) for name in names])
+    return _ROW * -(-len(names) // columns)
+
+
+def columns_of(lengths: Sequence[int]) -> int:
+    """How many names stand abreast, if each column is as wide as the longest name in it."""
+    for columns in range(len(lengths), 1, -1):
+        if sum(max(lengths[c::columns]) + _HANDLE for c in range(columns)) <= _LINE:
+            return columns
+    return 1
+
+
+def legend(figure: Figure, factor: Factor | None, levels: Sequence[Level] | None = None) -> None:
+    """The mark of each level, or of some, where marks are too many to be named one by one."""
+    from matplotlib.lines import Line2D
+
+    if factor is None:
+        return
+    look, shown = looks(factor), factor.levels if levels is None else levels
+    handles = [Line2D([], [], color=look[v].colour, marker=look[v].mark, ls="") for v in shown]
+    key(figure, handles, [level_name(factor.name, level) for level in shown])
+
+
+def box(fill: Fill) -> Artist:
+    """A handle for what a surface stands for."""
+    from matplotlib.patches import Patch
+
+    return Patch(facecolor=fill.colour, hatch=fill.hatch, edgecolor=PAPER, lw=0.5)
+
+
+def name_lines(axes: Sequence[Axes], ends: Sequence[Ends], factor: Factor | None) -> None:
+    """Write each line's name beside its mark at its end, apart where lines end close together.
+
+    To be called last: the scale of y must be settled.
+    """
+    if factor is None:
+        return
+    look = looks(factor)
+    for ax, heights in zip(axes, map(_in_axes, axes, ends), strict=True):
+        for level, height in zip(heights, apart(list(heights.values()), _GAP), strict=True):
+            ax.plot(
+                1.02,
+                height,
+                look[level].mark,
+                color=look[level].colour,
+                ms=5,
+                transform=ax.transAxes,
+                clip_on=False,
+            )
+            name = level_name(factor.name, level, short=True)
+            ax.annotate(
+                name,
+                (1.02, height),
+                xycoords="axes fraction",
+                xytext=(7, 0),
+                textcoords="offset points",
+                va="center",
+                annotation_clip=False,
+            )
+
+
+def _in_axes(axes: Axes, ends: Ends) -> Ends:
+    """Heights as fractions of the axes, from the lowest up; lines without an end are left out."""
+    edges = axes.transData.transform([(0.0, y) for y in axes.get_ylim()])
+    bottom, top = float(edges[0, 1]), float(edges[1, 1])
+    there = sorted((item for item in ends.items() if np.isfinite(item[1])), key=lambda i: i[1])
+    return {
+        level: (float(axes.transData.transform((0.0, end))[1]) - bottom) / (top - bottom)
+        for level, end in there
+    }
+
+
+def apart(heights: Sequence[float], gap: float) -> list[float]:
+    """Ascending heights, moved up where they are closer than `gap`, all of them below the top."""
+    placed: list[float] = []
+    for height in heights:
+        placed.append(max(height, placed[-1] + gap) if placed else height)
+    overshoot = max(0.0, placed[-1] - 1.0) if placed else 0.0
+    return [height - overshoot for height in placed]

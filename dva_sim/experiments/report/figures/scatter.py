@@ -1,0 +1,241 @@
+"""Continuous factors: the outcome at every point against each of them, and Sobol's indices."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from dva_sim.experiments.analysis.layout import layout_of
+from dva_sim.experiments.analysis.paired_effects import Floats, Part, Setting, View, nan_mean
+from dva_sim.experiments.analysis.statistics import SobolIndex, sobol_indices
+from dva_sim.experiments.report.figures.palette import INK, ONE, PAPER, SOFT, Look, legend, looks
+from dva_sim.experiments.report.figures.style import (
+    Drawn,
+    Numbers,
+    axis_label,
+    finish,
+    log_axis,
+    panels,
+    with_unit,
+    wrapped,
+)
+from dva_sim.experiments.study.labels import capital, factor_name, level_name, measure_name, setting
+from dva_sim.experiments.study.labels import with_unit as head_of
+from dva_sim.experiments.study.schema import POINT, Level
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from dva_sim.experiments.report.summary import Reading
+
+
+_ABREAST = 3
+_BINS = 8  # of equally many points, through whose means the trend is drawn
+_FEWEST_IN_BIN = 6
+
+
+class Cloud(NamedTuple):
+    """Runs of one kind at every point.
+
+    Attributes:
+        name: What it is: a level, a difference, or nothing.
+        values: `(points, persons, trials)`.
+        level: The level, for its colour; None for a difference.
+    """
+
+    name: str
+    values: Floats
+    level: Level
+
+
+def scatters(reading: Reading) -> list[Drawn]:
+    """For designs of points in ranges; nothing for all others."""
+    view, names = reading.view, reading.points
+    if view is None or not names:
+        return []
+    table, factors = layout_of(reading.study, reading.runs, are_points_trials=False)
+    part = Part(table, view.part.name, factors)
+    panel = view.panels[0] | ({view.over.name: view.stops[-1]} if view.over else {})
+    where = nan_mean(np.stack([_per_point(part, name, {}) for name in names]), axis=-1)
+    clouds = list(_clouds(view, part, panel))
+    ranges = (reading.study.get("design") or {}).get("ranges") or {}
+    drawn = [_against_each(view, clouds, names, where, panel, ranges)]
+    if (reading.study.get("design") or {}).get("saltelli"):
+        drawn.append(_indices(view, clouds, names, where, panel))
+    return drawn
+
+
+def _per_point(part: Part, column: str, setting_: Setting) -> Floats:
+    """A column `(points, ...)`, the other factors at some levels, everything else flat."""
+    axis = [f.name for f in part.factors if f.name not in setting_].index(POINT)
+    grid = np.moveaxis(part.where(part.grid(column), setting_), axis, 0)
+    return grid.reshape(len(grid), -1)
+
+
+def _clouds(view: View, part: Part, panel: Setting) -> list[Cloud]:
+    """Each line, or the contrast of two of them if one was declared."""
+    in_excess = part.has_reference(view.measure)
+    grid = part.excess(view.measure) if in_excess else part.grid(view.measure)
+
+    def at(level: Level) -> Floats:
+        line = {view.line.name: level} if view.line else {}
+        return part.where(grid, panel | line)
+
+    if view.contrast is not None and view.line is not None:
+        first, second = view.contrast
+        name = " minus ".join(level_name(view.line.name, level) for level in view.contrast)
+        return [Cloud(name, at(first) - at(second), None)]
+    names = [level_name(view.line.name, level) if view.line else "" for level in view.lines]
+    return [Cloud(name, at(level), level) for name, level in zip(names, view.lines, strict=True)]
+
+
+def _against_each(
+    view: View,
+    clouds: list[Cloud],
+    names: list[str],
+    where: Floats,
+    panel: Setting,
+    ranges: Mapping[str, Any],
+) -> Drawn:
+    """A panel for each factor: a dot for each point, the mean over all its runs."""
+    columns = min(_ABREAST, len(names))
+    rows = -(-len(names) // columns)
+    figure, grid = panels(rows, columns, 2.7, sharey=True)
+    axes = [ax for row in grid for ax in row]
+    numbers = Numbers()
+    means = [nan_mean(c.values.reshape(len(c.values), -1), axis=1) for c in clouds]
+    for ax, name, x in zip(axes, names, where, strict=False):
+        for cloud, y in zip(clouds, means, strict=True):
+            _dots(ax, x, y, _look(view, cloud))
+        ax.set_xlabel(wrapped(capital(head_of(name)), 30))
+        if (ranges.get(name) or {}).get("scale") == "log":
+            log_axis(ax, "x")
+        if len(clouds) == 1 and clouds[0].level is None and view.contrast is not None:
+            ax.axhline(0, color=INK, lw=0.8, zorder=1)
+    for ax in axes[len(names) :]:
+        ax.set_visible(False)
+    label = clouds[0].name if view.contrast is not None else measure_name(view.measure)
+    for row in grid:
+        row[0].set_ylabel(axis_label(view.measure, wrapped(label, 26)))
+    if view.contrast is None:
+        legend(figure, view.line)
+    for cloud, y in zip(clouds, means, strict=True):
+        told = dict(zip(names, where, strict=True)) | {with_unit("mean", view.measure): y}
+        numbers.add(panel | {"of": cloud.name}, {POINT: range(len(y))} | told)
+    title = f"{capital(_what(view, clouds))} against each factor{_place(panel)}"
+    return finish(figure, "scatter", title, _SCATTER, numbers)
+
+
+_SCATTER = (
+    "Each small mark is a point of the ranges, the mean over all persons and trials there; all "
+    "other factors vary too, which is most of the scatter. Line: means of equally many points in "
+    "order of the factor; shaded, the 95 % interval of each by the scatter of its points, for "
+    "these persons. A slope is seen where the factor matters on average; what it does only "
+    "together with another is not."
+)
+
+
+def _what(view: View, clouds: list[Cloud]) -> str:
+    if view.contrast is None:
+        return measure_name(view.measure)
+    return f"{clouds[0].name} in {measure_name(view.measure)}"
+
+
+def _place(panel: Setting) -> str:
+    return f" ({setting(panel)})" if panel else ""
+
+
+def _look(view: View, cloud: Cloud) -> Look:
+    return ONE if cloud.level is None else looks(view.line)[cloud.level]
+
+
+def _dots(ax: Axes, x: Floats, y: Floats, look: Look) -> None:
+    """Points, and the means of as many equal parts of them as there are enough for."""
+    there = np.isfinite(x) & np.isfinite(y)
+    x, y = x[there], y[there]
+    few: dict[str, Any] = {"s": 12 if len(x) < 200 else 5, "rasterized": len(x) > 500}
+    ax.scatter(x, y, marker=look.mark, color=look.colour, alpha=0.35, lw=0, zorder=2, **few)
+    middle, mean, half = trend(x, y)
+    ax.fill_between(middle, mean - half, mean + half, color=look.colour, alpha=0.16, lw=0)
+    line: dict[str, Any] = {"color": look.colour, "marker": look.mark, "mec": PAPER, "mew": 0.6}
+    ax.plot(middle, mean, "-", ms=5, lw=1.4, zorder=3, **line)
+
+
+def trend(x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
+    """Means of equally many points each, in order of x, with half their 95 % intervals.
+
+    The points of a part differ by all other factors, as drawn: their scatter is what the interval
+    is made of. Three empty arrays where there are too few.
+
+    Returns:
+        The middle of each part along x, the mean of y there, half the interval's width; `(parts,)`.
+    """
+    from scipy.stats import t
+
+    parts = min(_BINS, len(x) // _FEWEST_IN_BIN)
+    if parts < 2:
+        return np.array([]), np.array([]), np.array([])
+    order = np.array_split(np.argsort(x, kind="stable"), parts)
+    spread = [np.std(y[i], ddof=1) / math.sqrt(len(i)) * t.ppf(0.975, len(i) - 1) for i in order]
+    middle = [np.median(x[part]) for part in order]
+    return np.array(middle), np.array([y[part].mean() for part in order]), np.array(spread)
+
+
+# --- Sobol's indices -------------------------------------------------------------------------
+def _indices(
+    view: View, clouds: list[Cloud], names: list[str], where: Floats, panel: Setting
+) -> Drawn:
+    """A panel for each cloud: how much of the variance over the ranges is each factor's."""
+    figure, (axes,) = panels(1, len(clouds), 1.2 + 0.42 * len(names), sharey=True, sharex=True)
+    numbers = Numbers()
+    for ax, cloud in zip(axes, clouds, strict=True):
+        found = _sobol(cloud, names, where, view.part)
+        for row, index in enumerate(found):
+            _bar(ax, row - 0.14, index, "first")
+            _bar(ax, row + 0.14, index, "total")
+            told = {
+                f"{kind}_{edge}": getattr(getattr(index, kind), edge)
+                for kind in ("first", "total")
+                for edge in ("mean", "low", "high")
+            }
+            numbers.row(panel | {"of": cloud.name, "factor": index.factor}, **told)
+        ax.axvline(0, color=INK, lw=0.8)
+        ax.set_title(cloud.name)
+        ax.set_xlabel("Share of the variance")
+        ax.grid(axis="x")
+        ax.grid(axis="y", visible=False)
+    axes[0].set_yticks(range(len(names)), [capital(factor_name(name)) for name in names])
+    axes[0].set_ylim(len(names) - 0.5, -0.5)
+    what = _what(view, clouds)
+    title = f"Which factors the {what} varies with: Sobol' indices{_place(panel)}"
+    return finish(figure, "sobol", title, _SOBOL, numbers)
+
+
+_SOBOL = (
+    "Dot: first-order index, the share of the variance over the ranges that would go if the factor "
+    "alone were fixed. Ring: total index, the share that would stay if all others were fixed; what "
+    "it has more than the dot are interactions. Bars: 95 % intervals over points and persons. "
+    "Estimates from few points may lie below 0 or above 1."
+)
+
+
+def _sobol(cloud: Cloud, names: list[str], where: Floats, part: Part) -> tuple[SobolIndex, ...]:
+    """From every run, flat."""
+    shape = cloud.values.shape
+    levels = {
+        name: np.broadcast_to(x[:, np.newaxis, np.newaxis], shape).ravel()
+        for name, x in zip(names, where, strict=True)
+    }
+    person = np.broadcast_to(np.arange(shape[1])[:, np.newaxis], shape).ravel()
+    cell = np.broadcast_to(np.arange(shape[0])[:, np.newaxis, np.newaxis], shape).ravel()
+    return sobol_indices(levels, cloud.values.ravel(), person, cell)
+
+
+def _bar(ax: Axes, row: float, index: SobolIndex, kind: str) -> None:
+    interval = index.first if kind == "first" else index.total
+    ax.hlines(row, interval.low, interval.high, color=INK if kind == "first" else SOFT, lw=1.4)
+    fill = INK if kind == "first" else "white"
+    ax.plot(interval.mean, row, "o", ms=5.5, mfc=fill, mec=INK, zorder=3)

@@ -1,0 +1,364 @@
+"""The numbers behind a figure, written down as they are drawn, to be kept beside it as CSV.
+
+One look for all figures: colours that stay with their pattern, quiet axes, stable bytes.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import textwrap
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from dva_sim.experiments.analysis.paired_effects import Factor, Floats, Setting, View
+from dva_sim.experiments.report.figures.palette import FAINT as FAINT
+from dva_sim.experiments.report.figures.palette import INK as INK
+from dva_sim.experiments.report.figures.palette import SOFT as SOFT
+from dva_sim.experiments.study.labels import brief, capital, factor_name, level_name, measure_name
+from dva_sim.experiments.study.schema import Level
+from dva_sim.kernel.units import ending_of, unit_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+_DIGITS = 9
+
+
+class Numbers:
+    """Rows that say where (levels of factors, names) and what (numbers)."""
+
+    def __init__(self) -> None:
+        self._rows: list[dict[str, Any]] = []
+
+    def add(self, where: Mapping[str, Any], columns: Mapping[str, Iterable[Any]]) -> None:
+        """One row for each entry of the columns, which are of one length.
+
+        Args:
+            where: Levels and names that hold for all these rows.
+            columns: Numbers, or levels, of each row.
+        """
+        for row in zip(*columns.values(), strict=True):
+            self._rows.append(dict(where) | dict(zip(columns, row, strict=True)))
+
+    def row(self, where: Mapping[str, Any], **columns: Any) -> None:
+        """A single row."""
+        self._rows.append(dict(where) | columns)
+
+    def csv(self) -> bytes:
+        """Comma-separated, with a heading; what is missing is left empty."""
+        heads = list(dict.fromkeys(key for row in self._rows for key in row))
+        text = io.StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerow(heads)
+        writer.writerows([_text(row.get(head)) for head in heads] for row in self._rows)
+        return text.getvalue().encode()
+
+
+def with_unit(word: str, measure: str) -> str:
+    """`mean_s` for the mean of a measure in seconds."""
+    ending = ending_of(measure)
+    return f"{word}_{ending}" if ending else word
+
+
+def _text(value: Any) -> str:
+    if value is None or isinstance(value, str):
+        return value or ""
+    if isinstance(value, bool | np.bool_):
+        return str(bool(value)).lower()
+    if isinstance(value, float | np.floating):
+        return "" if np.isnan(value) else f"{float(value):.{_DIGITS}g}"
+    return str(value)
+
+
+_TITLE = 78  # characters of a title that the width holds
+_CROWDED = 45  # characters of ticks that fit beside each other in the width
+_DECADES = 5e3  # of the ends of a logarithmic axis, from which on 2 and 5 have no room
+_LEAST_TICK = 8  # characters of a tick's name in a line
+_ROOM = 0.15  # share of what persons span that is left free beyond them, where bands are cut
+_ROW_LABEL = 28  # characters that the height of a row holds
+WIDTH = 8.4  # [in]; on screen and on paper it is stretched or shrunk to the column
+
+_STYLE: dict[str, Any] = {
+    "font.family": "DejaVu Sans",
+    "font.size": 9,
+    "axes.titlesize": 9.5,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.labelcolor": INK,
+    "axes.edgecolor": SOFT,
+    "axes.linewidth": 0.7,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.grid.axis": "y",
+    "axes.axisbelow": True,
+    "grid.color": FAINT,
+    "grid.linewidth": 0.6,
+    "hatch.linewidth": 0.5,
+    "xtick.color": SOFT,
+    "ytick.color": SOFT,
+    "xtick.labelcolor": INK,
+    "ytick.labelcolor": INK,
+    "text.color": INK,
+    "lines.linewidth": 1.8,
+    "legend.frameon": False,
+    "svg.hashsalt": "dva-sim",
+    "svg.fonttype": "path",
+}
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A finished figure.
+
+    Attributes:
+        name: Its file name without an ending.
+        title: What is seen.
+        caption: How to read it.
+        reads: What else must be known to read it, in sentences that other figures share.
+        svg: The figure as vectors.
+        png: The same as pixels.
+        csv: The numbers behind it; empty where none were written down.
+        figure: The figure itself, laid out, to be put on a page.
+    """
+
+    name: str
+    title: str
+    caption: str
+    svg: bytes
+    png: bytes
+    csv: bytes = b""
+    figure: Figure | None = field(default=None, compare=False, repr=False)
+    reads: tuple[str, ...] = ()
+
+
+@contextmanager
+def styled() -> Iterator[None]:
+    """The look of the report, for as long as the block lasts."""
+    import matplotlib as mpl
+
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(_STYLE)  # type: ignore[arg-type]
+        yield
+
+
+def panels(
+    rows: int, columns: int, height: float, **options: Any
+) -> tuple[Figure, list[list[Axes]]]:
+    """A grid of axes in the report's width; `height` per row [in]."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(WIDTH, height * rows), dpi=150, layout="constrained")
+    axes = figure.subplots(rows, columns, squeeze=False, **options)
+    return figure, [list(row) for row in axes]
+
+
+def finish(
+    figure: Figure,
+    name: str,
+    title: str,
+    caption: str,
+    numbers: Numbers | None = None,
+    reads: Sequence[str] = (),
+) -> Drawn:
+    """Render once to SVG and once to PNG, with nothing in them that changes from day to day."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+
+    layout = figure.get_layout_engine()
+    if layout is not None:
+        layout.execute(figure)
+    figure.set_layout_engine("none")  # both files get one and the same layout
+    png, svg = io.BytesIO(), io.BytesIO()
+    # The canvases themselves, since savefig would draw each figure twice; the PNG first,
+    # because the SVG leaves the figure at its own resolution.
+    metadata: dict[str, str | None] = {"Software": None}
+    FigureCanvasAgg(figure).print_png(png, metadata=metadata)  # type: ignore[no-untyped-call]
+    metadata = {"Date": None, "Creator": None}
+    FigureCanvasSVG(figure).print_svg(svg, metadata=metadata)  # type: ignore[no-untyped-call]
+    table = numbers.csv() if numbers else b""
+    told = tuple(filter(None, reads))
+    return Drawn(name, title, caption, svg.getvalue(), png.getvalue(), table, figure, told)
+
+
+def axis_label(name: str, text: str | None = None) -> str:
+    """A measure or factor with its unit in brackets."""
+    unit = unit_of(name)
+    words = capital(text or measure_name(name))
+    return f"{words} [{unit}]" if unit else words
+
+
+def wrapped(text: str, width: int = 38) -> str:
+    """Text in lines of at most `width` characters."""
+    return "\n".join(textwrap.wrap(text, width))
+
+
+def stops_axis(axes: Axes, over: Factor | None) -> None:
+    """The factor along x, level beside level: 0 to 1 s are all readable."""
+    if over is None:
+        axes.set_xticks([])
+        axes.set_xlim(-0.5, 0.5)
+        return
+    names, unit = tick_names(over)
+    narrow = max(_LEAST_TICK, _TITLE // len(names))
+    axes.set_xticks(range(len(names)), [wrapped(name, narrow) for name in names])
+    axes.set_xlabel(_factor_label(over, unit))
+    axes.set_xlim(-0.5, len(names) - 0.5)
+    if not over.is_numeric:
+        for stop in range(1, len(names)):  # words are apart: nothing leads from one to the next
+            axes.axvline(stop - 0.5, color=FAINT, lw=0.8, zorder=0)
+
+
+def level_axis(axes: Axes, factor: Factor, width: int = _ROW_LABEL) -> None:
+    """A factor along y, level above level, names in lines of at most `width` characters."""
+    names, unit = tick_names(factor)
+    axes.set_yticks(range(len(names)), [wrapped(name, width) for name in names])
+    axes.set_ylabel(_factor_label(factor, unit))
+    axes.set_ylim(-0.5, len(names) - 0.5)
+
+
+def _factor_label(factor: Factor, unit: str) -> str:
+    """With its unit, and whether its levels are as far apart as their places."""
+    scale = "" if is_to_scale(factor) else ", not to scale"
+    return f"{capital(factor_name(factor.name))}{f' [{unit}]' if unit else ''}{scale}"
+
+
+def is_to_scale(factor: Factor) -> bool:
+    """Whether the steps between its levels are equal; words have none that could differ."""
+    if not factor.is_numeric:
+        return True
+    steps = np.diff([float(v) for v in factor.levels if isinstance(v, int | float)])
+    return bool(np.allclose(steps, steps[:1])) if len(steps) else True
+
+
+def tick_names(over: Factor) -> tuple[list[str], str]:
+    """Short names of the levels and the unit they have in common; below 1 s in milliseconds."""
+    values = [v for v in over.levels if isinstance(v, int | float)]
+    unit = unit_of(over.name)
+    if not over.is_numeric or not unit:
+        return [level_name(over.name, level, short=True) for level in over.levels], ""
+    if unit == "s" and max(values) <= 5 and any(0 < v < 1 for v in values):
+        return [f"{1000 * v:g}" for v in values], "ms"
+    return [f"{v:g}" for v in values], unit
+
+
+def log_axis(axes: Axes, which: Literal["x", "y"] = "y") -> None:
+    """A logarithmic axis for what is drawn, with plain numbers at round places and no others."""
+    from matplotlib.ticker import LogLocator, NullLocator
+
+    axis = axes.xaxis if which == "x" else axes.yaxis
+    axes.set(**{f"{which}scale": "log"})
+    low, high = axis.get_view_interval()
+    ratio = high / low
+    subs = (1,) if ratio > _DECADES else (1, 2, 5) if ratio > 5 else range(1, 10)
+    axis.set_major_locator(LogLocator(subs=subs))
+    axis.set_major_formatter("{x:g}")
+    axis.set_minor_locator(NullLocator())
+
+
+def fit_to(axes: Axes, values: Floats) -> str:
+    """Cut bands far beyond what any person did, lest they flatten all else; says if it did."""
+    bottom, top = axes.get_ylim()
+    if not len(values):
+        return ""
+    room = _ROOM * (float(np.ptp(values)) or abs(float(values[0])) or 1.0)
+    low, high = max(bottom, values.min() - room), min(top, values.max() + room)
+    axes.set_ylim(low, high)
+    if (low, high) == (bottom, top):
+        return ""
+    return "Bands and bars that go far beyond what any person did are cut."
+
+
+def hatch_stops(axes: Axes, stops: Sequence[int]) -> None:
+    """Mark stops that are extrapolations."""
+    for stop in stops:
+        axes.axvspan(
+            stop - 0.5, stop + 0.5, facecolor="none", edgecolor=FAINT, hatch="///", lw=0, zorder=0
+        )
+
+
+def hatch_words(view: View) -> str:
+    """What the hatching means, if a panel has any."""
+    if not any(view.stops_outside(panel) for panel in view.shown):
+        return ""
+    return "Hatched: at least one line is extrapolated there (marked † in the tables)."
+
+
+def panel_grid(view: View, height: float) -> tuple[Figure, list[Axes]]:
+    """Axes for each setting shown, up to three abreast, four as two by two; `height` each [in]."""
+    count = len(view.shown)
+    columns = 2 if count == 4 else count
+    rows = count // columns
+    options = {"sharex": True, "sharey": True}
+    figure, axes = panels(rows, columns, height if rows == 1 else 0.85 * height, **options)
+    return figure, [ax for row in axes for ax in row]
+
+
+def label_panels(axes: Sequence[Axes], view: View, text: str) -> None:
+    """Titles and x for a grid of panels; what is common to them on its outer edges only."""
+    columns = 2 if len(axes) == 4 else len(axes)
+    for index, (ax, panel) in enumerate(zip(axes, view.shown, strict=True)):
+        panel_title(ax, panel, _TITLE // columns)
+        stops_axis(ax, view.over)
+        _make_room(ax, columns)
+        ax.set_ylabel(text if index % columns == 0 else "")
+        if index < len(axes) - columns:
+            ax.set_xlabel("")
+
+
+def panel_title(axes: Axes, panel: Setting, width: int = 90) -> None:
+    """Say which levels a panel shows, in lines of `width`; nothing if there is but one panel."""
+    axes.set_title(wrapped(panel_name(panel), width))
+
+
+def panel_name(panel: Setting) -> str:
+    """`250 ms, latest-wins`; nothing if there is but one panel."""
+    return capital(brief(panel))
+
+
+def outer_labels(axes: list[list[Axes]], shown: Sequence[Setting], text: str) -> None:
+    """In a grid with a row for each panel: label the left and the lower edge only."""
+    for row, panel in zip(axes, shown, strict=True):
+        name = wrapped(panel_name(panel), _ROW_LABEL)
+        row[0].set_ylabel(f"{name}\n{text}" if panel else text)
+        for ax in row:
+            _make_room(ax, len(row))
+            if row is not axes[-1]:
+                ax.set_xlabel("")
+
+
+def _make_room(axes: Axes, columns: int) -> None:
+    """Where several stand abreast, names below them must not run into each other."""
+    axes.set_xlabel(wrapped(axes.get_xlabel(), _TITLE // columns))
+    names = [label.get_text() for label in axes.get_xticklabels()]
+    if columns * sum(map(len, names)) > _CROWDED:
+        narrow = max(_LEAST_TICK, _TITLE // (columns * len(names)))
+        words = [wrapped(name.replace("\n", " "), narrow) for name in names]
+        axes.set_xticks(axes.get_xticks(), words, fontsize=7)
+
+
+def has_lines(view: View) -> bool:
+    """Lines lead from number to number; between words there is nothing to lead through."""
+    return view.over is not None and view.over.is_numeric and len(view.stops) > 1
+
+
+def dodge(lines: tuple[Level, ...]) -> list[tuple[Level, float]]:
+    """Each line's place beside its stop, so that the marks of a stop stand in a row."""
+    width = 0.8 / len(lines)
+    return [(level, (i - (len(lines) - 1) / 2) * width) for i, level in enumerate(lines)]
+
+
+def place_of(over: Factor, value: float) -> float | None:
+    """Where a value lies between the evenly spaced levels; None outside of them."""
+    levels = np.array([float(v) for v in over.levels if isinstance(v, int | float)])
+    if not over.is_numeric or len(levels) < 2 or not levels[0] <= value <= levels[-1]:
+        return None
+    return float(np.interp(value, levels, np.arange(len(levels))))

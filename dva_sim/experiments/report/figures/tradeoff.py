@@ -1,0 +1,138 @@
+"""How soon somebody is there against how long people stand in danger: both are better small."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dva_sim.experiments.analysis.paired_effects import Floats, Setting, View, person_means, present
+from dva_sim.experiments.analysis.statistics import Band, band
+from dva_sim.experiments.report.figures.palette import legend, looks
+from dva_sim.experiments.report.figures.style import (
+    Drawn,
+    Numbers,
+    axis_label,
+    finish,
+    has_lines,
+    panel_grid,
+    panel_title,
+    with_unit,
+)
+from dva_sim.experiments.study.labels import factor_name, level_name, measure_name
+from dva_sim.experiments.study.schema import Level
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+_BELOW = 0.3  # of that room, below: there is little that is less than none
+_NEAR = 0.05  # share of an axis, below which two names would be written over each other
+_ROOM = 0.15  # share of what persons span that is left free beyond them
+EXPOSURES = ("exposure_look_s", "exposure_s", "person_exposure_s")
+RESPONSES = ("response_mean_s", "confirmation_mean_s", "response_s", "drive_time_s")
+
+
+def tradeoff(view: View) -> Drawn | None:
+    """Response over exposure, a line for each level of the compared factor through its stops."""
+    columns = _columns(view)
+    if columns is None:
+        return None
+    figure, axes = panel_grid(view, 3.6)
+    numbers, ends = Numbers(), []
+    for ax, panel in zip(axes, view.shown, strict=True):
+        for level in view.lines:
+            bands = [_band(view, column, panel, level) for column in columns]
+            _line(ax, view, level, *bands)
+            ends.append((ax, bands[0].mean, bands[1].mean))
+            told = {
+                with_unit(f"{word}_{edge}", column): getattr(found, name)
+                for word, column, found in zip(
+                    ("exposure", "response"), columns, bands, strict=True
+                )
+                for edge, name in _EDGES.items()
+            }
+            numbers.add(view.setting(panel, level), view.along_x() | told)
+        panel_title(ax, panel, 78 // len(axes))
+        ax.grid(True, axis="both")
+        ax.margins(0.12)
+    _fit(axes[0], view, columns)
+    for ax, x, y in ends:
+        _name_stops(ax, view, x, y)
+    figure.supxlabel(axis_label(columns[0]), fontsize="medium")
+    figure.supylabel(axis_label(columns[1]), fontsize="medium")
+    legend(figure, view.line)
+    title = f"The trade-off: {measure_name(columns[1])} against {measure_name(columns[0])}"
+    return finish(figure, "tradeoff", title, _caption(view), numbers)
+
+
+_EDGES = {"mean": "mean", "low": "pointwise_low", "high": "pointwise_high"}
+
+
+def _caption(view: View) -> str:
+    along = ""
+    if has_lines(view) and view.over is not None:
+        along = f", from one {factor_name(view.over.name)} to the next"
+    return (
+        f"Down and to the left is better. Each mark is a configuration, the mean over "
+        f"persons{along}; crosses are 95 % intervals of each mean alone. Times in danger are "
+        "summed over all people."
+    )
+
+
+def _columns(view: View) -> tuple[str, str] | None:
+    """The exposure that varies, and the response beside it."""
+    measured = [c for c in (view.measure, *EXPOSURES) if c in EXPOSURES and _varies(view, c)]
+    responses = [c for c in (view.measure, *RESPONSES) if c in RESPONSES and _varies(view, c)]
+    return (measured[0], responses[0]) if measured and responses else None
+
+
+def _varies(view: View, column: str) -> bool:
+    values = present(view.part.grid(column)) if view.part.has(column) else np.array([])
+    return len(values) > 1 and bool(np.ptp(values) > 0)
+
+
+def _band(view: View, column: str, panel: Setting, level: Level) -> Band:
+    means: Floats = person_means(view.curve(view.part.grid(column), panel, level))
+    return band(means)
+
+
+def _fit(ax: Axes, view: View, columns: tuple[str, str]) -> None:
+    """Cut the crosses of few persons far beyond what any person did, lest they flatten all."""
+    for name, column in zip("xy", columns, strict=True):
+        grid = view.part.grid(column)
+        every = [person_means(view.curve(grid, p, v)) for p in view.shown for v in view.lines]
+        seen = present(np.concatenate([values.ravel() for values in every]))
+        room = _ROOM * (float(np.ptp(seen)) or 1.0)
+        low, high = ax.get_xlim() if name == "x" else ax.get_ylim()
+        low, high = max(low, seen.min() - _BELOW * room), min(high, seen.max() + room)
+        ax.set(**{f"{name}lim": (low, high)})
+
+
+def _line(ax: Axes, view: View, level: Level, exposure: Band, response: Band) -> None:
+    """A mark at each stop, joined where stops are numbers."""
+    paint, mark = looks(view.line)[level]
+    x, y = exposure.mean, response.mean
+    ax.hlines(y, exposure.pointwise_low, exposure.pointwise_high, color=paint, lw=0.8, alpha=0.7)
+    ax.vlines(x, response.pointwise_low, response.pointwise_high, color=paint, lw=0.8, alpha=0.7)
+    ax.plot(x, y, "-" if has_lines(view) else "", marker=mark, color=paint, ms=5, lw=1.2)
+
+
+def _name_stops(ax: Axes, view: View, x: Floats, y: Floats) -> None:
+    """The ends of a line, or each word; none beside another that it would be written over."""
+    if view.over is None or len(x) < 2:
+        return
+    wide, high = np.ptp(ax.get_xlim()), np.ptp(ax.get_ylim())
+    named: list[int] = []
+    for stop in (0, len(x) - 1) if has_lines(view) else range(len(x)):
+        gaps = [(abs(x[i] - x[stop]) / wide, abs(y[i] - y[stop]) / high) for i in named]
+        if any(max(gap) < _NEAR for gap in gaps):
+            continue
+        named.append(stop)
+        ax.annotate(
+            level_name(view.over.name, view.over.levels[stop], short=True),
+            (float(x[stop]), float(y[stop])),
+            xytext=(6, 4 if stop else -9),
+            textcoords="offset points",
+            fontsize=7.5,
+        )

@@ -1,0 +1,453 @@
+"""The sections of a report in their order: question and answer first, evidence, then method.
+
+One page that answers a study: self-contained, and the same bytes whenever it is made again.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import chain
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from dva_sim.experiments.analysis.conditions import conditions, timeout_remark
+from dva_sim.experiments.analysis.layout import factors_of, keys_of
+from dva_sim.experiments.analysis.paired_effects import View
+from dva_sim.experiments.analysis.predictions import Judged, judge_all
+from dva_sim.experiments.analysis.robustness import sentences
+from dva_sim.experiments.analysis.tuning import tuned_table
+from dva_sim.experiments.execution.partial_results import load_so_far
+from dva_sim.experiments.report import shift_page as dispatch_page
+from dva_sim.experiments.report import transport_page as transport_figures
+from dva_sim.experiments.report.answer_table import answer_table, size_of, spread_table
+from dva_sim.experiments.report.blocks import (
+    Block,
+    First,
+    Folded,
+    Heading,
+    Items,
+    Printed,
+    Shown,
+    Terms,
+    Verbatim,
+    Words,
+    texts_of,
+)
+from dva_sim.experiments.report.cell_table import CellTable
+from dva_sim.experiments.report.endings import in_a_line
+from dva_sim.experiments.report.endings import sentences as sentences_of_endings
+from dva_sim.experiments.report.endings import table as endings_table
+from dva_sim.experiments.report.figures import Drawn, draw_all
+from dva_sim.experiments.report.figures import shift as dispatch_figures
+from dva_sim.experiments.report.figures.contrast import contrast
+from dva_sim.experiments.report.figures.style import styled
+from dva_sim.experiments.report.glossary import Marker, terms_in
+from dva_sim.experiments.report.method import remarks
+from dva_sim.experiments.report.sample_size_text import plan_table
+from dva_sim.experiments.report.summary import Reading
+from dva_sim.experiments.report.test_tables import (
+    comparison_table,
+    hypothesis_table,
+    registration_table,
+)
+from dva_sim.experiments.study.labels import (
+    capital,
+    factor_name,
+    is_in_file,
+    level_name,
+    listing,
+    number,
+    setting,
+    with_unit,
+)
+from dva_sim.experiments.study.schema import POINT
+from dva_sim.experiments.study.status import Status, status_of
+from dva_sim.kernel.errors import DvaSimError
+
+if TYPE_CHECKING:
+    import jinja2
+    from markupsafe import Markup
+
+
+WORDS = "Words"
+_MOST_ROWS = 12  # of a table that is not folded away
+_KINDS = {
+    "confirmatory": "Confirmatory: run as registered beforehand",
+    "declared": "Declared: run as its file says, not registered beforehand",
+    "exploratory": "Exploratory: no test of what it found",
+}
+
+
+def blocks_of(reading: Reading, drawn: Sequence[Drawn]) -> list[Block]:
+    """The whole report below its title.
+
+    Args:
+        reading: The results.
+        drawn: The figures; the first is the one that answers.
+    """
+    blocks = list(
+        chain(
+            _status(reading),
+            [_first(reading, drawn)],
+            _claims(reading),
+            _comparisons(reading),
+            _endings(reading),
+            _found(reading),
+            _what_varied(reading),
+            _figures(reading, drawn[1:]),
+            _tables(reading),
+            _needed(reading),
+            _method(reading),
+        )
+    )
+    return [*blocks, *_words(blocks), *_manifest(reading)]
+
+
+def _status(reading: Reading) -> Iterator[Block]:
+    if reading.results.partial:
+        yield Words(reading.results.partial, "banner")
+    status = status_of(reading.manifest)
+    yield Words(size_of(reading), "note")
+    yield Words(_KINDS[status.kind], "caution" if status.kind == "exploratory" else "label")
+    if status.why:
+        yield Words(f"Why: {'; '.join(status.why)}.", "note")
+    for warning in reading.warnings:
+        yield Words(warning, "warning")
+
+
+def _first(reading: Reading, drawn: Sequence[Drawn]) -> First:
+    """The answer, the figure that answers it, and what it depends on."""
+    found = reading.answer
+    return First(found.lead, drawn[0] if drawn else None, tuple(found.depends.items()))
+
+
+def _claims(reading: Reading) -> Iterator[Block]:
+    status = status_of(reading.manifest)
+    hypotheses = reading.judgement.tested
+    if hypotheses:
+        yield Heading(_whose_claims(status))
+        yield Printed(hypothesis_table(hypotheses), is_words=True)
+    if status.registration:
+        yield Heading("Registration")
+        if status.kind != "confirmatory":
+            yield Words("This run is not the one that was registered: it settles nothing.", "note")
+        yield Printed(
+            registration_table(reading.manifest, reading.runs, reading.persons), is_words=True
+        )
+    predictions = judge_all(reading.study, reading.view)
+    if predictions:
+        yield Heading("Predictions made before the run")
+        yield Printed(_prediction_table(predictions), is_words=True)
+
+
+def _whose_claims(status: Status) -> str:
+    if status.kind == "confirmatory":
+        return "Registered hypotheses"
+    return (
+        "Hypotheses, not run as registered" if status.registration else "Hypotheses, not registered"
+    )
+
+
+def _prediction_table(predictions: Sequence[Judged]) -> CellTable:
+    heads = ["predicted", "of the contrast", "found (95 % interval)", "verdict"]
+    rows = [[p.text, p.expected, p.found, p.verdict] for p in predictions]
+    return CellTable("", heads, len(heads), rows)
+
+
+def _comparisons(reading: Reading) -> Iterator[Block]:
+    if reading.judgement.compared:
+        yield Heading("Named comparisons")
+        yield Printed(comparison_table(reading.judgement), is_words=True)
+
+
+def _endings(reading: Reading) -> Iterator[Block]:
+    """How runs ended, where not all of them went right; else a line, if the answer has none."""
+    endings, view = reading.endings, reading.view
+    if endings is None or view is None:
+        return
+    if endings.is_right.all():
+        if reading.finding is None or not reading.finding.missed:
+            yield Words(in_a_line(endings, view.part.name, len(reading.results.failures)))
+        return
+    yield Heading(f"How it ended, in part {view.part.name}")
+    for sentence in sentences_of_endings(endings, view, reading.finding):
+        yield Words(sentence)
+    found = endings_table(endings, view, reading.cluster)
+    if len(found.rows) > _MOST_ROWS:
+        yield Folded(f"The shares of all {len(found.rows)} configurations", (Printed(found),))
+    elif found.rows:
+        yield Printed(found)
+
+
+def _found(reading: Reading) -> Iterator[Block]:
+    """The answer level by level, what else was found, and what other models of persons say."""
+    table = answer_table(reading)
+    if table is not None or reading.answer.notes:
+        yield Heading("The answer in numbers")
+    if table is not None:
+        yield Printed(table)
+    for note in reading.answer.notes:
+        yield Words(note)
+    if reading.robustness is not None:
+        yield Heading("Under other models of the persons")
+        for sentence in sentences(reading.robustness):
+            yield Words(sentence)
+
+
+def _what_varied(reading: Reading) -> Iterator[Block]:
+    """Before the figures, whose words must be known."""
+    factors = [f for f in factors_of(reading.study) if f.name != POINT]
+    design = reading.study.get("design") or {}
+    told = [f"{factor_name(f.name)} ({_levels(f.name, f.levels)})" for f in factors]
+    ranges = design.get("ranges") or {}
+    told += [
+        f"{with_unit(k)} from {number(r['low'])} to {number(r['high'])}" for k, r in ranges.items()
+    ]
+    if told:
+        yield Heading("What was varied")
+        yield Words(f"{capital(_how(design, len(factors)))}: {'; '.join(told)}.")
+    if treatments := _treatments(reading.study):
+        yield Items(tuple(f"{level}: {changes}" for level, changes in treatments))
+
+
+def _how(design: Mapping[str, Any], factors: int) -> str:
+    """Which levels met each other."""
+    if design.get("zip"):
+        return f"{listing([factor_name(n) for n in design['zip']])} taken together"
+    if design.get("rows") or design.get("csv"):
+        return "as listed row by row"
+    for kind, words in _SAMPLED.items():
+        if design.get(kind):
+            crossed = ", each with every combination of levels" if factors else ""
+            return f"at points {words}{crossed}"
+    return "in every combination" if factors > 1 else "alone"
+
+
+_SAMPLED = {
+    "latin_hypercube": "that fill the ranges as a Latin hypercube",
+    "sobol": "that fill the ranges as a Sobol' sequence",
+    "saltelli": "that fill the ranges as Saltelli's sample",
+}
+
+
+def _figures(reading: Reading, drawn: Sequence[Drawn]) -> Iterator[Block]:
+    """All others than the one that answers; what several share is said once."""
+    if not drawn or reading.view is None:
+        return
+    yield Heading("Figures")
+    reads = dict.fromkeys(chain.from_iterable(figure.reads for figure in drawn))
+    part = f"All are of part {reading.view.part.name} unless the title names another one."
+    yield Words(" ".join([part, *reads]))
+    yield from map(Shown, drawn)
+
+
+def _tables(reading: Reading) -> Iterator[Block]:
+    yield Heading("Every configuration")
+    if not reading.cells:
+        yield Words("No run was completed.")
+    for table in reading.cells:
+        if table.empty:
+            some = f"{table.empty} of {len(table.rows)} configurations have no run"
+            yield Words(f"Part {table.part}: {some}.", "warning")
+        title = f"Part {table.part}: {len(table.rows)} configurations"
+        yield Folded(title, (Printed(table),))
+    if tuned := tuned_table(reading.manifest):
+        yield Heading("Tuning")
+        whose, what = " and ".join(tuned.heads[: tuned.labels]), tuned.heads[tuned.labels]
+        yield Words(
+            f"Each {whose} has a {what} that suits it best, so for each the same number of values "
+            "was tried. Both tuned and untuned configurations are above."
+        )
+        yield Printed(tuned)
+
+
+def _needed(reading: Reading) -> Iterator[Block]:
+    if reading.plans:
+        yield Heading(f"How many {reading.cluster}s it would take")
+        yield Printed(plan_table(reading.plans, reading.cluster), is_words=True)
+
+
+def _method(reading: Reading) -> Iterator[Block]:
+    yield Heading("Method")
+    yield Items(tuple(remarks(reading)))
+    scenarios, study = reading.scenarios, reading.study
+    if reading.shifts:
+        stated = dispatch_page.conditions(scenarios, keys_of(study))
+    else:
+        stated = conditions(scenarios, keys_of(study), _changed(study))
+    if stated:
+        rows = [[name, *values] for name, values in stated]
+        settings = Printed(CellTable("", ["setting", *scenarios], 1, rows))
+        remark = timeout_remark(scenarios, study)
+        yield Folded("All settings", (settings, *([Words(remark)] if remark else [])))
+    if spread := spread_table(reading.view) if reading.view else None:
+        told = (
+            "Standard deviations of single runs, by the method of moments. What lies between "
+            "persons is not narrowed by more trials, only by more persons."
+        )
+        yield Folded("Between and within persons", (Words(told), Printed(spread)))
+
+
+def _words(blocks: Sequence[Block]) -> Iterator[Block]:
+    """What the words that were used mean."""
+    if terms := terms_in(texts_of(blocks)):
+        yield Heading(WORDS)
+        yield Terms(tuple((term.key, term.name, f"{term.means}.") for term in terms))
+
+
+def _manifest(reading: Reading) -> Iterator[Block]:
+    text = json.dumps(reading.manifest, indent=2, sort_keys=True, ensure_ascii=False)
+    yield Folded("Manifest: all that was asked, and by which program", (Verbatim(text),))
+
+
+def _levels(name: str, levels: Sequence[Any]) -> str:
+    return listing([_in_full(name, level) for level in levels])
+
+
+def _in_full(name: str, level: Any) -> str:
+    """A level with the file it is from, if it is a class in one."""
+    file = f" ({level.rpartition(':')[0]})" if is_in_file(level) else ""
+    return level_name(name, level) + file
+
+
+def _changed(study: Mapping[str, Any]) -> list[str]:
+    """Scenario keys that the study's parts set themselves."""
+    parts = study.get("parts", {}).values()
+    return list(dict.fromkeys(key for part in parts for key in part.get("changes") or {}))
+
+
+def _treatments(study: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """What each named level changes."""
+    return [
+        (level_name(factor, level), setting(changes) or "nothing")
+        for factor, named in study.get("treatments", {}).items()
+        for level, changes in named.items()
+    ]
+
+
+PAGE, PAPER, FIGURES = "report.html", "report.pdf", "figures"
+
+
+def write_report(folder: Path, pdf: bool = False) -> Path:
+    """Make `report.html` and `figures/` from what lies in a results folder.
+
+    Of a study that is not finished, the page says what is known so far.
+
+    Args:
+        folder: Of the results.
+        pdf: Make `report.pdf` too. One that is there already is made again in any case, so that
+            it never says something else than the page.
+
+    Raises:
+        ConfigError: the folder holds no results.
+        DvaSimError: the disk is full or refuses to be written.
+    """
+    reading = Reading(load_so_far(folder))
+    drawn = _draw(reading)
+    blocks = blocks_of(reading, drawn)
+    question = str(reading.study.get("question", "A study without a question"))
+    page = folder / PAGE
+    try:
+        _write_figures(folder / FIGURES, drawn)
+        page.write_text(_page(question, blocks), encoding="utf-8", newline="\n")
+        if pdf or (folder / PAPER).exists():
+            from dva_sim.experiments.report.pdf import write_pdf
+
+            write_pdf(folder / PAPER, question, blocks)
+    except OSError as error:
+        page.unlink(missing_ok=True)  # half a page would pass for a whole one
+        raise DvaSimError(
+            f"the report cannot be written in {folder}: {error.strerror}; "
+            f"mend that, then 'dva-sim report {folder}' makes it"
+        ) from None
+    return page
+
+
+def _draw(reading: Reading) -> list[Drawn]:
+    """All figures, first the one that answers."""
+    if reading.view is None:
+        return []
+    return [*_answering(reading), *_others(reading, reading.view)]
+
+
+def _answering(reading: Reading) -> list[Drawn]:
+    view, finding = reading.view, reading.told
+    if view is None or view.contrast is None or finding is None:
+        return []
+    with styled():
+        drawn = contrast(finding, view.difference(view.panels[0], *view.contrast))
+    return [drawn] if drawn is not None else []
+
+
+def _others(reading: Reading, view: View) -> list[Drawn]:
+    if reading.shifts is not None:
+        return dispatch_figures.draw_all(reading.shifts)
+    if reading.is_contest:
+        return transport_figures.draw_all(view)
+    return draw_all(reading)
+
+
+def _write_figures(folder: Path, drawn: Sequence[Drawn]) -> None:
+    """Each figure as vectors, as pixels, and as the numbers behind it; none of an older report."""
+    folder.mkdir(exist_ok=True)
+    made = {
+        f"{figure.name}.{ending}": content
+        for figure in drawn
+        for ending, content in (("svg", figure.svg), ("png", figure.png), ("csv", figure.csv))
+        if content
+    }
+    for stale in folder.iterdir():
+        if stale.suffix in (".svg", ".png", ".csv") and stale.name not in made:
+            stale.unlink()
+    for name, content in made.items():
+        (folder / name).write_bytes(content)
+
+
+def _page(question: str, blocks: Sequence[Block]) -> str:
+    """Fill the template."""
+    sections = [block.text for block in blocks if isinstance(block, Heading) and block.level == 2]
+    marker = Marker(terms_in(texts_of(blocks)))
+    return _template(marker).render(question=question, blocks=blocks, sections=sections)
+
+
+def _template(marker: Marker) -> jinja2.Template:
+    import jinja2
+
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("dva_sim.experiments.report"),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=jinja2.StrictUndefined,
+    )
+    environment.filters |= {
+        "data_uri": _data_uri,
+        "explained": lambda text: _explained(text, marker),
+        "kind": lambda block: type(block).__name__,
+        "key": _key,
+    }
+    return environment.get_template("report.html.j2")
+
+
+def _explained(text: str, marker: Marker) -> Markup:
+    """With a link from each word that is said for the first time to what it means."""
+    from markupsafe import Markup
+
+    link = Markup('<dfn><a href="#{}" title="{}">{}</a></dfn>')
+    pieces = [
+        link.format(term.key, f"{term.means}.", piece) if term else Markup.escape(piece)
+        for piece, term in marker.split(text)
+    ]
+    return Markup("").join(pieces)
+
+
+def _key(text: str) -> str:
+    """A heading as an identifier."""
+    return re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-")
+
+
+def _data_uri(svg: bytes) -> str:
+    return f"data:image/svg+xml;base64,{base64.b64encode(svg).decode()}"

@@ -1,0 +1,290 @@
+"""What a report says in words and tables about a study of dispatch."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from dva_sim.experiments.analysis.answer import Answer, Finding, answer
+from dva_sim.experiments.analysis.paired_effects import Factor, Setting
+from dva_sim.experiments.analysis.shift_effects import BEST, POLICY, Shifts, pooled
+from dva_sim.experiments.report.cell_table import CellTable, Summary, cell_table
+from dva_sim.experiments.study.labels import listing, number, percent
+
+SUMMARIES: tuple[Summary, ...] = (
+    ("on_scene_share", "on scene by T", np.mean, percent),
+    ("confirmation_mean_s", "time to confirmation [s]", np.mean, number),
+    ("confirmed_share", "confirmed", np.mean, percent),
+    ("refuted_share", "cleared", np.mean, percent),
+    ("escalated_share", "escalated unseen", np.mean, percent),
+    ("escalated_later_share", "escalated after confirmation", np.mean, percent),
+    ("expired_share", "expired", np.mean, percent),
+    ("open_share", "open", np.mean, percent),
+    ("contained_share", "true ones contained", np.mean, percent),
+    ("containment_mean_s", "time to containment [s]", np.mean, number),
+    ("exposure_s", "exposure [s/event]", np.mean, number),
+    ("exposure_look_s", "in finding out [s/event]", np.mean, number),
+    ("exposure_max_s_per_h", "most exposed person [s/h]", np.mean, number),
+    ("robot_share", "by robot", np.mean, percent),
+    ("use_of_guards", "guards busy", np.mean, percent),
+    ("use_of_robots", "robots busy", np.mean, percent),
+    ("use_of_operators", "operators busy", np.mean, percent),
+    ("evenness_of_guards", "evenness, guards", np.mean, number),
+    ("evenness_of_robots", "evenness, robots", np.mean, number),
+    ("zone_ratio", "worst zone / best", np.mean, number),
+    ("bound_mean_s", "fresh unit at every base [s]", np.mean, number),
+    ("beats_bound_share", "sooner than that", np.mean, percent),
+    ("preempted", "redirected", np.mean, number),
+    ("relocated", "relocated", np.mean, number),
+    ("overruled", "overruled", np.mean, number),
+    ("policy_failed", "policy failed", np.sum, number),
+    ("violations", "violations", np.sum, number),
+)
+
+
+_MOST_NAMED = 3  # policies, before they are only counted
+PERCENTILES = (50, 90, 95)
+BOUND = "the best of fresh units that stand ready at every base and station"
+
+
+def cells(shifts: Shifts) -> CellTable:
+    """Every cell of the part the answer speaks of, with percentiles over all its events.
+
+    Percentiles are pooled: the mean of the shifts' own would leave out the shifts that do not
+    reach them, which are the worst.
+    """
+    part = shifts.view.part
+    table = cell_table(part, shifts.view.measure, SUMMARIES)
+    if not shifts.events:
+        return table
+    known = [table.heads.index(head) for _, head, _, _ in SUMMARIES if head in table.heads]
+    at = min(known, default=len(table.heads))
+    rows = []
+    for setting, row in zip(part.settings(), table.rows, strict=True):
+        found = _percentiles(shifts, setting)
+        rows.append([*row[:at], *found, *row[at:]])
+    heads = [f"response, p{q} [s]" for q in PERCENTILES]
+    return replace(table, heads=[*table.heads[:at], *heads, *table.heads[at:]], rows=rows)
+
+
+def _percentiles(shifts: Shifts, setting: Setting) -> list[str]:
+    """Of one cell; a dash in the panels of other factors, which `events_of` does not hold."""
+    view, panel = shifts.view, shifts.view.panels[0]
+    if any(setting[name] != level for name, level in panel.items()):
+        return ["–" for _ in PERCENTILES]
+    stop = view.stops.index(setting[view.over.name]) if view.over else 0
+    events = shifts.events_of(str(setting[POLICY]), stop)
+    values = pooled(events, [q / 100 for q in PERCENTILES], shifts.follow)[0]
+    over = f"> {shifts.follow:g}"
+    return [over if np.isposinf(value) else number(float(value)) for value in values]
+
+
+# --- the answer ------------------------------------------------------------------------------
+def answer_of(finding: Finding | None, shifts: Shifts) -> Answer:
+    """The declared contrast first; then what it is paid with, and what was best."""
+    if finding is None:
+        return Answer(
+            "No contrast was declared that could answer the question; figures show what was run.",
+            notes=_notes(shifts),
+        )
+    found = answer(along_loads(finding, shifts))
+    price = {"In return": " ".join(_price(finding, shifts))} if shifts.can_spare else {}
+    notes = [*_notes(shifts), *found.notes]
+    return replace(found, depends=found.depends | price, notes=notes)
+
+
+def along_loads(finding: Finding, shifts: Shifts) -> Finding:
+    """The same along the load of people, where that is known, instead of the rate of alarms."""
+    loads = [round(load, 2) for load in shifts.loads if load is not None]
+    if len(loads) == len(shifts.stops):
+        finding = replace(finding, over="load", levels=tuple(loads))
+    return replace(finding, cluster="shift")
+
+
+def _price(finding: Finding, shifts: Shifts) -> list[str]:
+    """The same contrast in exposure: both sides of the trade."""
+    if not shifts.can_spare:
+        return []
+    first, second = str(finding.first), str(finding.second)
+    base = shifts.means("exposure_look_s")[shifts.policies.index(second)]
+    found = shifts.against("exposure_look_s", second)
+    row = shifts.policies.index(first)
+    shape = (len(shifts.policies), -1)
+    mean, low, high = (x.reshape(shape)[row] for x in (found.mean, found.low, found.high))
+    parts = [
+        f"{number(m)} s ({number(a)} to {number(b)}; {second}: {number(z)} s) at {title}"
+        for m, a, b, z, title in zip(mean, low, high, base, shifts.titles, strict=True)
+    ]
+    return [
+        f"Under {first} the time that people stand in danger to find out what it is changes, per "
+        f"event, by {listing(parts)}."
+    ]
+
+
+def _notes(shifts: Shifts) -> list[str]:
+    notes = [_quickest(shifts), *_twins(shifts)]
+    if shifts.view.part.has("contained_share"):
+        notes.append(_contained(shifts))
+    if shifts.target is not None:
+        notes.append(_progress(shifts))
+    if shifts.loads[0] is not None:
+        notes.append(
+            "Load is that of guards or operators, whoever is busier, as seen under "
+            f"{_calibrated(shifts)}; the other policies meet the same alarms."
+        )
+    return notes
+
+
+def _calibrated(shifts: Shifts) -> str:
+    return "nearest_idle" if "nearest_idle" in shifts.policies else shifts.policies[0]
+
+
+def _quickest(shifts: Shifts) -> str:
+    """Who has the least mean response at each load, and which others may be as quick."""
+    response = shifts.means("response_mean_s")
+    sentences = []
+    for stop, title in enumerate(shifts.titles):
+        candidates = [i for i, p in enumerate(shifts.policies) if p != BEST]
+        best = min(candidates, key=lambda i: response[i, stop])
+        found = shifts.against("response_mean_s", shifts.policies[best])
+        low = found.low.reshape(response.shape)[:, stop]
+        equal = [shifts.policies[i] for i in candidates if i != best and not low[i] > 0]
+        words = f"{shifts.policies[best]} ({number(response[best, stop])} s)"
+        others = listing(equal) if len(equal) <= _MOST_NAMED else f"{len(equal)} others"
+        words += f", not clearly ahead of {others}" if equal else ", ahead of all others"
+        sentences.append(f"at {title} {words}" if title else words)
+    return (
+        f"Quickest on the mean: {'; '.join(sentences)}. Which is quickest was seen in the same "
+        "shifts, which flatters it a little."
+    )
+
+
+def _twins(shifts: Shifts) -> list[str]:
+    """Policies that came to the very same response in every shift at every load."""
+    response = shifts.of("response_mean_s")
+    groups: dict[bytes, list[str]] = {}
+    for place, policy in enumerate(shifts.policies):
+        groups.setdefault(response[:, place].tobytes(), []).append(policy)
+    same = [listing(names) for names in groups.values() if len(names) > 1]
+    return [f"The same in every shift: {'; '.join(same)}."] if same else []
+
+
+def _contained(shifts: Shifts) -> str:
+    """What the quickest to look pays in containment, against who contains most."""
+    response, share = shifts.means("response_mean_s"), shifts.means("contained_share")
+    parts = []
+    for stop, title in enumerate(shifts.titles):
+        chosen = dict.fromkeys([int(response[:, stop].argmin()), int(share[:, stop].argmax())])
+        words = [f"{percent(share[i, stop])} under {shifts.policies[i]}" for i in chosen]
+        parts.append(f"at {title} {listing(words)}")
+    return (
+        "The same guards look and contain. Contained of the true events within "
+        f"{shifts.follow:g} s, by the quickest policy and by the one that contains most: "
+        f"{'; '.join(parts)}."
+    )
+
+
+def _progress(shifts: Shifts) -> str:
+    target = "what the oracle does" if shifts.target == BEST else f"the bound, {BOUND},"
+    parts = []
+    for stop, title in enumerate(shifts.titles):
+        found = shifts.progress(stop)
+        best = int(np.nanargmax(found.mean))
+        parts.append(
+            f"{100 * found.mean[best]:.0f} % at {title} ({shifts.travellers[best]}, "
+            f"{100 * found.low[best]:.0f} to {100 * found.high[best]:.0f} %)"
+        )
+    return f"Of the way from random choice to {target} the best policy goes {listing(parts)}."
+
+
+# --- the rest of the page ----------------------------------------------------------------------
+def conditions(
+    scenarios: Mapping[str, Mapping[str, Any]], factors: Sequence[Factor]
+) -> list[tuple[str, list[str]]]:
+    """What was the same for all policies, part by part."""
+    parts = list(scenarios.values())
+    if not parts:
+        return []
+    return [
+        ("ground", [_ground(s) for s in parts]),
+        ("team", [_team(s) for s in parts]),
+        ("operators", [str(s.get("operators", {}).get("count", 0)) for s in parts]),
+        ("alarms", [_alarms(s) for s in parts]),
+        ("containment by a person", [_rule(s, "containment", "no") for s in parts]),
+        ("escalated after waiting", [_rule(s, "escalate_after_s", "never") for s in parts]),
+        ("reports merged within", [_rule(s, "merge_distance_m", "8 m on a site") for s in parts]),
+        ("warm-up", [f"{s.get('warm_up_s', 0):g} s" for s in parts]),
+        ("horizon", [f"{s.get('horizon_s', 0):g} s" for s in parts]),
+    ]
+
+
+def _ground(scenario: Mapping[str, Any]) -> str:
+    site, area = scenario.get("site"), scenario.get("area")
+    if site:
+        return str(site.get("name"))
+    return f"{area['width_m']:g} m x {area['height_m']:g} m" if area else "nowhere in particular"
+
+
+def _team(scenario: Mapping[str, Any]) -> str:
+    groups = scenario.get("responders", [])
+    kinds = {k: [g for g in groups if g.get("kind", "guard") == k] for k in ("guard", "robot")}
+    counts = {k: sum(g.get("count", 1) for g in found) for k, found in kinds.items()}
+    words = [f"{n} {kind}{'s' if n > 1 else ''}" for kind, n in counts.items() if n]
+    return listing(words)
+
+
+def _alarms(scenario: Mapping[str, Any]) -> str:
+    """Events per hour and share of false ones, at intensity 1."""
+    streams = [s for s in scenario.get("demand", []) if (s.get("between") or {}).get("mean_s")]
+    rates = [3600.0 / s["between"]["mean_s"] for s in streams]
+    if not rates:
+        return "–"
+    false = sum(r * s.get("false_share", 0.0) for r, s in zip(rates, streams, strict=True))
+    return f"{sum(rates):.3g} per hour times intensity, {percent(false / sum(rates))} false"
+
+
+def _rule(scenario: Mapping[str, Any], key: str, nothing: str) -> str:
+    value = scenario.get("dispatch", {}).get(key)
+    if isinstance(value, bool):
+        return "yes" if value else nothing
+    if value is None:
+        return nothing
+    return f"{value:g} {key.rpartition('_')[2]}"
+
+
+_INTERVALS = (
+    "Intervals reach as far as Student's or the bootstrap-t over shifts; bands come from max-t "
+    "over a bootstrap of shifts. More shifts narrow them, but do not make the model truer."
+)
+
+
+def method(shifts: Shifts, correlation: float | None) -> list[str]:
+    """How the numbers were made, as a list of remarks."""
+    alike = ""
+    if correlation is not None:
+        alike = (
+            f" The two sides of the contrast correlate with {correlation:.2f} at the last level."
+        )
+    follow = f"{shifts.follow:g} s"
+    return [
+        "Intervals are over independent shifts. A shift meets the same alarms, places, walking "
+        "speeds and service times under every policy, and differences are taken within it (common "
+        f"random numbers).{alike}",
+        "Counted are all alarms, true and false, first reported between the warm-up and one "
+        f"follow-up before the end; each is followed for T = {follow}. Confirmed, cleared, "
+        "escalated and expired compete (Aalen-Johansen).",
+        f"Times are restricted means: the mean of min(time, T), where never counts {follow}, so "
+        "that no policy gains by leaving hard ones out. Response is until somebody is on scene; an "
+        "escalated event counts as never reached.",
+        f"The bound is the response to each event by {BOUND}. Somebody who is out already and near "
+        "may be sooner: how often stands in the table.",
+        _INTERVALS,
+        "Use, exposure and evenness are of the whole measured time; what the desk counted "
+        "(redirected, relocated, overruled) of the whole run.",
+        "Not modelled: bodies, cameras, the network and driving (responders are travel and service "
+        "times), learning and fatigue, exposure to events other than one's own, and what others do "
+        "with an event once it is escalated. No human took part.",
+    ]

@@ -1,0 +1,1 @@
+"""What a study leaves: tables, what their columns mean, and the manifest. Data only."""

@@ -1,0 +1,128 @@
+"""Tables for other programs: CSV or Parquet, each table a file, with what the columns mean."""
+
+from __future__ import annotations
+
+import csv
+import os
+import shutil
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+
+from dva_sim.experiments.results.results import Results
+from dva_sim.kernel.errors import ConfigError, DvaSimError
+from dva_sim.kernel.suggestions import either
+
+FORMATS = ("csv", "parquet")
+DICTIONARY = "columns.csv"
+
+
+def export(
+    results: Results,
+    out: Path,
+    tables: Sequence[str] = (),
+    form: str | None = None,
+    overwrite: bool = False,
+) -> list[Path]:
+    """Write tables of results as files.
+
+    A name that ends in `.csv` or `.parquet` is one table, `runs` if none is named. Any other
+    is a folder for all of them or those named, with their dictionary in `columns.csv`. Missing
+    values are empty in CSV. The same results give the same bytes.
+
+    Args:
+        results: Where from.
+        out: File or folder.
+        tables: Names of tables.
+        form: `csv` (the default of folders) or `parquet`.
+        overwrite: Replace what is there already.
+
+    Returns:
+        What was written.
+
+    Raises:
+        ConfigError: no such table or format, or a file that is there already.
+        DvaSimError: the disk is full or refuses to be written.
+    """
+    if not str(out).isprintable():
+        raise ConfigError(f"{str(out)!r} cannot be the name of a file that others read")
+    files = _files(results, out, tables, form)
+    there = [path for path in files if path.exists()]
+    if there and not overwrite:
+        more = f" and {len(there) - 1} more" if len(there) > 1 else ""
+        raise ConfigError(f"{there[0]}{more} would be replaced; give another name, or --overwrite")
+    for path, write in files.items():
+        _put(path, write)
+    return list(files)
+
+
+_Write = Callable[[Path], object]
+
+
+def _files(
+    results: Results, out: Path, tables: Sequence[str], form: str | None
+) -> dict[Path, _Write]:
+    """How each file is written."""
+    if form is not None and form not in FORMATS:
+        raise ConfigError(f"--format {form!r} should be {either(FORMATS)}")
+    ending = out.suffix.removeprefix(".")
+    if ending in FORMATS and not out.is_dir():
+        if form not in (None, ending) or len(tables) > 1:
+            raise ConfigError(f"{out} is one {ending} file; give a folder for several, or another")
+        return {out: _writer(results, tables[0] if tables else "runs", ending)}
+    if out.suffix and not out.is_dir():
+        allowed = either(f".{name}" for name in FORMATS)
+        raise ConfigError(f"{out} should end in {allowed}; a folder for all tables has no ending")
+    if out.is_file():
+        raise ConfigError(
+            f"{out} is a file; give a folder, or a name that ends in .csv or .parquet"
+        )
+    names, ending = tables or results.tables, form or "csv"
+    files = {out / f"{name}.{ending}": _writer(results, name, ending) for name in names}
+    return files | {out / DICTIONARY: partial(_write_dictionary, results, names)}
+
+
+def _writer(results: Results, table: str, form: str) -> _Write:
+    write = shutil.copyfile if form == "parquet" else _write_csv
+    return partial(write, results.path_of(table))
+
+
+def _write_csv(source: Path, path: Path) -> None:
+    """What is nan is as empty as what is missing: both say that there is no number."""
+    import duckdb
+
+    with duckdb.connect(config={"threads": 1}) as connection:
+        rows = connection.read_parquet(str(source))
+        columns = ", ".join(
+            f"nullif({_quoted(n)}, 'nan') AS {_quoted(n)}" if kind == "DOUBLE" else _quoted(n)
+            for n, kind in zip(rows.columns, rows.types, strict=True)
+        )
+        rows.project(columns).write_csv(str(path), header=True)
+
+
+def _write_dictionary(results: Results, tables: Sequence[str], path: Path) -> None:
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(("table", "column", "unit", "meaning"))
+        for table in tables:
+            writer.writerows(results.columns(table))
+
+
+def _put(path: Path, write: _Write) -> None:
+    """A file whole or not at all."""
+    import duckdb
+
+    part = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write(part)
+        part.replace(path)
+    except (OSError, duckdb.Error) as error:
+        reason = str(error).splitlines()[0]
+        raise DvaSimError(f"{path} cannot be written: {reason}") from None
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def _quoted(name: str) -> str:
+    return '"' + name.replace('"', '""') + '"'

@@ -1,0 +1,378 @@
+"""A table as columns of numpy arrays, which other tools can take over.
+
+Read a results folder: the manifest, and the tables as columns of numpy arrays.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from html import escape
+from importlib import import_module
+from pathlib import Path
+from textwrap import shorten
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dva_sim.experiments.execution.checkpoint import FILE as JOURNAL
+from dva_sim.experiments.results.data_dictionary import Column, describe
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.suggestions import hint, listed
+
+if TYPE_CHECKING:
+    from duckdb import DuckDBPyRelation
+
+    from dva_sim.experiments.analysis.answer import Answer
+    from dva_sim.experiments.report.summary import Reading
+
+
+_SHOWN = 10  # rows in a notebook
+
+Array = NDArray[Any]
+
+
+class Frame(dict[str, Array]):
+    """Columns by name, each of shape `(n,)`.
+
+    Missing values are nan in columns of numbers and None in all others.
+    """
+
+    @property
+    def rows(self) -> int:
+        """How many rows it has."""
+        return len(next(iter(self.values()), ()))
+
+    def where(self, rows: Array) -> Frame:
+        """Some rows, by a mask or by their numbers."""
+        return Frame({name: values[rows] for name, values in self.items()})
+
+    def to_pandas(self) -> Any:
+        """The same as a pandas.DataFrame; pandas must be installed.
+
+        Raises:
+            ModuleNotFoundError: it is not.
+        """
+        return import_module("pandas").DataFrame(dict(self))
+
+    def to_duckdb(self) -> DuckDBPyRelation:
+        """The same as a relation of duckdb, to ask by SQL; missing numbers are NULL."""
+        import duckdb
+
+        connection = duckdb.connect()
+        connection.register("rows", {name: _masked(values) for name, values in self.items()})
+        return connection.table("rows")
+
+    def __repr__(self) -> str:
+        return f"Frame of {self.rows} rows, {len(self)} columns: {listed(self)}"
+
+    def _repr_html_(self) -> str:
+        heads = "".join(f"<th>{escape(name)}</th>" for name in self)
+        body = "".join(f"<tr>{self._html_row(row)}</tr>" for row in range(self.rows)[:_SHOWN])
+        table = f"<table><thead><tr>{heads}</tr></thead><tbody>{body}</tbody></table>"
+        return f"{table}<p>{self.rows} rows</p>"
+
+    def _html_row(self, row: int) -> str:
+        return "".join(f"<td>{escape(plain(values[row]))}</td>" for values in self.values())
+
+
+def frame_of(rows: Sequence[Mapping[str, Any]]) -> Frame:
+    """Rows as columns; what a row does not say is missing."""
+    names = dict.fromkeys(name for row in rows for name in row)
+    return Frame({name: _column([row.get(name) for row in rows]) for name in names})
+
+
+def _column(values: list[Any]) -> Array:
+    types = {type(value) for value in values}
+    if str in types or types == {type(None)}:
+        return np.array(values, dtype=object)
+    if type(None) in types:
+        return np.array([np.nan if value is None else value for value in values], dtype=float)
+    return np.array(values)
+
+
+def plain(value: Any) -> str:
+    """A value as text: four figures of a number, nothing for what is missing."""
+    if value is None or (isinstance(value, float) and np.isnan(value)):
+        return ""
+    if isinstance(value, bool | np.bool_):
+        return "yes" if value else "no"
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def without_mask(column: Array) -> Array:
+    """A column without numpy's mask; whole numbers with missing values come as floats."""
+    if not isinstance(column, np.ma.MaskedArray):
+        return column
+    if column.dtype.kind == "f":
+        return np.ma.filled(column, np.nan)
+    missing = np.ma.getmaskarray(column)
+    if not missing.any():
+        return np.asarray(column.data)
+    if column.dtype.kind in "iu":
+        return np.where(missing, np.nan, column.data)
+    values = column.data.astype(object)
+    values[missing] = None
+    return np.asarray(values)
+
+
+def _masked(values: Array) -> Array:
+    """A column for duckdb, which takes what is masked for NULL."""
+    if values.dtype.kind != "f":
+        return values
+    return np.ma.masked_array(values, mask=np.isnan(values))
+
+
+MANIFEST = "manifest.json"
+MACHINE = "machine.json"
+TABLES = "tables"
+_NOT_AS_WRITTEN = "is damaged, edited or of other results; the study's command makes it again"
+
+
+def digests(folder: Path) -> dict[str, str]:
+    """SHA-256 of every table in a folder, by the table's name."""
+    return {path.stem: digest_of(path) for path in sorted(folder.glob("*.parquet"))}
+
+
+def digest_of(path: Path) -> str:
+    """SHA-256 of a file."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+@dataclass(frozen=True)
+class Results:
+    """What a study left behind.
+
+    Every table begins with the design columns `part`, `cell` (position in the grid, -1 for
+    a reference run), `config` (hash of the resolved scenario), one column per factor under
+    its dotted key, `is_reference`, `person`, `trial` and `seed`; the measures follow.
+
+    Attributes:
+        folder: Where it lies.
+        manifest: The study as resolved, its base scenarios, `--set` list, versions, failures;
+            `partial` where the study is not finished.
+        aside: Where its tables lie for now, if the study is not finished.
+    """
+
+    folder: Path
+    manifest: dict[str, Any]
+    aside: Path | None = None
+
+    @classmethod
+    def load(cls, folder: str | Path) -> Results:
+        """Open a results folder.
+
+        Raises:
+            ConfigError: it is not one, or its study has not been completed.
+        """
+        path = Path(folder) / MANIFEST
+        try:
+            manifest = json.loads(path.read_text(encoding="utf-8"))
+        except (FileNotFoundError, NotADirectoryError):
+            raise ConfigError(_not_results(Path(folder))) from None
+        except (OSError, ValueError) as error:
+            raise ConfigError(f"cannot be read as a manifest: {error}", path) from None
+        if not isinstance(manifest, dict) or "study" not in manifest:
+            raise ConfigError("is not the manifest of a study", path)
+        return cls(Path(folder), manifest)
+
+    @property
+    def study(self) -> dict[str, Any]:
+        """The study as resolved: question, seed, persons, replications, factors, parts."""
+        return dict(self.manifest["study"])
+
+    @property
+    def factors(self) -> dict[str, list[Any]]:
+        """Levels of each factor, in the order declared."""
+        return dict(self.study["factors"])
+
+    @property
+    def question(self) -> str:
+        """What was asked."""
+        return str(self.study.get("question", ""))
+
+    @cached_property
+    def reading(self) -> Reading:
+        """What the runs say, in words and tables."""
+        from dva_sim.experiments.report.summary import Reading
+
+        return Reading(self)
+
+    @property
+    def answer(self) -> Answer:
+        """The answer to the question in words, with its interval, and what must be known of it."""
+        return self.reading.answer
+
+    @property
+    def partial(self) -> str:
+        """How much of an unfinished study is there; nothing where it is complete."""
+        found = self.manifest.get("partial")
+        if found is None:
+            return ""
+        persons = self.study["persons"]
+        return (
+            f"Partial: {found['done']} of {found['of']} runs are done. What follows rests on the "
+            f"{found['persons']} of {persons} persons who have all of theirs, and will change."
+        )
+
+    @property
+    def machine(self) -> dict[str, Any]:
+        """Times, costs and machine; nothing where they have not come along."""
+        try:
+            found = json.loads((self.folder / MACHINE).read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return {}
+        return found if isinstance(found, dict) else {}
+
+    @property
+    def failures(self) -> list[dict[str, Any]]:
+        """Runs that failed: their design columns and the `error`."""
+        return list(self.manifest.get("failures", []))
+
+    @property
+    def tables(self) -> list[str]:
+        """Names of the tables."""
+        return sorted(path.stem for path in self._tables.glob("*.parquet"))
+
+    def has(self, name: str) -> bool:
+        """Whether the study wrote a table of that name."""
+        return name in self.tables
+
+    @cached_property
+    def runs(self) -> Frame:
+        """The table of runs, one row each, repeats apart; empty if none was completed.
+
+        Raises:
+            ConfigError: the manifest tells of runs, and the table is not there or damaged.
+        """
+        if not self.has("runs") and self.manifest.get("runs", 0) <= len(self.failures):
+            return Frame()
+        return self.table("runs")
+
+    def columns(self, table: str) -> list[Column]:
+        """What the columns of a table mean.
+
+        Raises:
+            ConfigError: no such table, or a damaged file.
+        """
+        scenarios = self.manifest.get("scenarios", {}).values()
+        models = dict.fromkeys(scenario.get("model", "full") for scenario in scenarios)
+        factors = [*self.factors, *((self.study.get("design") or {}).get("ranges") or {})]
+        return describe(table, self.names(table), list(models), factors)
+
+    def names(self, table: str) -> list[str]:
+        """The columns of a table, without its rows being read.
+
+        Raises:
+            ConfigError: no such table, or a damaged file.
+        """
+        return list(self._read(table, "*", "LIMIT 0"))
+
+    def path_of(self, table: str) -> Path:
+        """The Parquet file of a table.
+
+        Raises:
+            ConfigError: no such table, or another than the manifest was written beside.
+        """
+        if not self.has(table):
+            told = hint(table, self.tables, "tables")
+            raise ConfigError(f"{self.folder} has no table {table!r}; {told}")
+        path = self._tables / f"{table}.parquet"
+        expected = self.manifest.get("tables", {}).get(table)
+        if expected is not None and table not in self._seen:
+            if digest_of(path) != expected:
+                raise ConfigError(_NOT_AS_WRITTEN, path)
+            self._seen.add(table)
+        return path
+
+    def report(self) -> Path:
+        """Make `report.html` and `figures/` in the folder.
+
+        Raises:
+            DvaSimError: the disk is full or refuses to be written.
+        """
+        from dva_sim.experiments.report.report import write_report
+
+        return write_report(self.folder)
+
+    def table(
+        self, name: str, part: str | None = None, columns: Sequence[str] | None = None
+    ) -> Frame:
+        """The columns of a table, in the order of the rows (part, cell, person, trial).
+
+        Missing values are nan in columns of numbers and None in all others; a column of
+        whole numbers with missing values comes as floats.
+
+        Args:
+            name: `runs`, `events`, `tracks`, ...
+            part: Only the rows of this part.
+            columns: Only these, which must be there.
+
+        Raises:
+            ConfigError: no such table, or a damaged file.
+        """
+        wanted = "*" if columns is None else ", ".join(map(_quoted, columns))
+        return self._read(name, wanted, "" if part is None else "WHERE part = ?", part)
+
+    def _read(self, name: str, columns: str, rows: str, part: str | None = None) -> Frame:
+        import duckdb
+
+        file = str(self.path_of(name))
+        values = [file] if part is None else [file, part]
+        try:
+            with duckdb.connect(config={"threads": 1}) as connection:
+                query = f"SELECT {columns} FROM read_parquet(?) {rows}"
+                found = connection.execute(query, values).fetchnumpy()
+        except duckdb.Error as error:
+            raise ConfigError(f"cannot be read: {str(error).splitlines()[0]}", file) from None
+        return Frame({key: without_mask(column) for key, column in found.items()})
+
+    @property
+    def _tables(self) -> Path:
+        return (self.aside or self.folder) / TABLES
+
+    @cached_property
+    def _seen(self) -> set[str]:
+        """Tables that were found as written."""
+        return set()
+
+    def __repr__(self) -> str:
+        """What it is and what to ask it for, without any table being read."""
+        runs, cells = self.manifest.get("runs", 0), len(self.manifest.get("cells", ()))
+        failed = f", {len(self.failures)} failed" if self.failures else ""
+        return "\n".join(
+            (
+                f"Results in {self.folder}: {runs} runs in {cells} configurations{failed}",
+                shorten(self.question, 100, placeholder=" ..."),
+                f"answer, failures, machine, report(), tables {', '.join(self.tables) or 'none'}",
+            )
+        )
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: question, answer, and how many runs stand behind it."""
+        depends = (f"{about}: {words}" for about, words in self.answer.depends.items())
+        notes = "".join(f"<p>{escape(note)}</p>" for note in (*depends, *self.answer.notes))
+        failed = f", {len(self.failures)} failed" if self.failures else ""
+        runs = f"<p>{self.runs.rows} runs{failed}, in {escape(str(self.folder))}</p>"
+        lead = f"<p><b>{escape(self.answer.lead)}</b></p>"
+        return f"<h3>{escape(self.question)}</h3>{lead}{notes}{runs}"
+
+
+def _quoted(name: str) -> str:
+    return '"' + name.replace('"', '""') + '"'
+
+
+def _not_results(folder: Path) -> str:
+    if not folder.is_dir():
+        return f"{folder} is not a folder; give the folder that 'dva-sim run' wrote"
+    if (folder / JOURNAL).exists():
+        return (
+            f"{folder} holds a study that is not finished; the command that began it goes on "
+            "from there, and 'dva-sim show' and 'report' tell what is known so far"
+        )
+    return f"{folder} holds no finished results: it has no {MANIFEST}; finish the study first"

@@ -1,0 +1,377 @@
+"""From a study to its runs: the cells of its design, with luck shared between them."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from dva_sim.experiments.study import designs
+from dva_sim.experiments.study.error_location import blamed
+from dva_sim.experiments.study.hashing import stable_hash
+from dva_sim.experiments.study.robustness_grid import (
+    PARAMETERS,
+    TRAITS,
+    factors_of_repeats,
+    parameter_sets,
+    settings_of_repeats,
+)
+from dva_sim.experiments.study.schema import POINT, REPEATS, TUNED, TUNING, Level
+from dva_sim.experiments.study.study import Study
+from dva_sim.experiments.study.tuned_values import Basis, load_tuned
+from dva_sim.kernel.config import Document, KeyPath
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.key_changes import blame
+from dva_sim.kernel.streams import derive_seed
+from dva_sim.kernel.suggestions import listed, unknown
+from dva_sim.simulation import scenario as scenarios
+from dva_sim.simulation.models import AnyScenario, model_for, model_of
+
+REFERENCE = -1
+
+Key = tuple[str, int]
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """One configuration of one part.
+
+    Attributes:
+        part: Name of the part.
+        index: Position in the design, or `REFERENCE`.
+        levels: Level of each factor; none for the reference.
+        scenario: As it will be run, but for the person.
+        config: Hash of that scenario.
+        changes: What makes it of the scenario's file, by dotted key.
+    """
+
+    part: str
+    index: int
+    levels: tuple[tuple[str, Level], ...]
+    scenario: AnyScenario
+    config: str
+    changes: Mapping[str, Any] = field(default_factory=dict, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """One run of a study, by its place in the design.
+
+    Attributes:
+        part: Name of the part.
+        cell: Level of each factor; empty for a reference run.
+        index: Position of the cell in the design, or `REFERENCE`.
+        person: Index of the simulated person, from 0.
+        trial: Index of the trial, from 0.
+        seed: Random seed of the run: the same for this person and trial in every cell.
+        config: Hash of the scenario but for the person.
+    """
+
+    part: str
+    cell: tuple[tuple[str, Level], ...]
+    index: int
+    person: int
+    trial: int
+    seed: int
+    config: str
+
+    @property
+    def is_reference(self) -> bool:
+        """Whether this is the run that others are compared with."""
+        return self.index == REFERENCE
+
+    @property
+    def is_repeat(self) -> bool:
+        """Whether it repeats the answer under another model of the persons."""
+        return self.part == REPEATS
+
+    @property
+    def key(self) -> Key:
+        """What tells this run from all others; equal keys are the same run."""
+        return self.config, self.seed
+
+
+@dataclass(frozen=True, slots=True)
+class Job(Run):
+    """A run with all that is needed to make it.
+
+    Attributes:
+        scenario: All that the run needs but its seed.
+    """
+
+    scenario: AnyScenario
+
+
+def cells(study: Study) -> list[Cell]:
+    """All configurations, by part, the reference first, then those of the design in order.
+
+    The repeats of the answer come last, as if they were a part of their own.
+
+    Raises:
+        ConfigError: a scenario that cannot be read, or is not valid with some change, or a
+            measure that its runs do not have.
+    """
+    refuse_unknown_measures(study)
+    _at_ends(study)
+    own = [cell for name in study.parts for cell in _cells_of(study, name)]
+    _refuse_impossible_measures(study, own)
+    return [*own, *_repeats_of(study)]
+
+
+def refuse_unknown_measures(study: Study) -> None:
+    """What is asked for must be a column of the runs; better told before they are made.
+
+    Raises:
+        ConfigError: it is none.
+    """
+    for path, part, measure in _asked_measures(study):
+        known = model_of(_source(study, part)).measures()
+        if measure not in known:
+            raise study.error(unknown("measure", measure, known), path)
+
+
+def _refuse_impossible_measures(study: Study, every: Sequence[Cell]) -> None:
+    """What no run of a part can hold would only be missed when all of them are made."""
+    for path, part, measure in _asked_measures(study):
+        made = [c.scenario for c in every if c.part == part and c.index != REFERENCE]
+        possible = [model_for(scenario).measures(scenario) for scenario in made]
+        if not any(measure in names for names in possible):
+            problem = f"no run of part {part!r} has a value of the measure {measure!r}"
+            raise study.error(f"{problem}; it has: {listed(possible[0])}", path)
+
+
+def _asked_measures(study: Study) -> Iterator[tuple[KeyPath, str, str]]:
+    """Where a measure is asked for, of which part, and which."""
+    if study.answer is not None:
+        yield ("answer", "measure"), study.answer.part, study.answer.measure
+    for name, asked in study.comparisons.items():
+        yield ("comparisons", name, "measure"), asked.part, asked.measure
+    if study.tuning is not None:
+        yield ("tuning", "measure"), study.tuning.part, study.tuning.measure
+    if study.stop is not None and study.stop.part and study.stop.measure:
+        yield ("stop", "measure"), study.stop.part, study.stop.measure
+
+
+def base_scenario(study: Study, part: str) -> AnyScenario:
+    """A part's scenario before any factor has changed it."""
+    source = _source(study, part)
+    return _build(study, part, source, _every_change(study, part, source, {}))
+
+
+def basis_of_tuning(study: Study) -> Basis:
+    """The persons and phones that tuned values should rest on."""
+    assert study.tuning is not None
+    scenario = base_scenario(study, study.tuning.part).model_dump(mode="json")
+    return Basis.of(scenario.get("operator", {}).get("population", "operators"))
+
+
+def is_tuned(study: Study) -> bool:
+    """Whether some cells have tuned values."""
+    listed = (row.get(TUNING) for row in study.listed_rows)
+    return TUNED in (*study.factors.get(TUNING, ()), *listed)
+
+
+def jobs(study: Study, grid: Sequence[Cell] | None = None) -> list[Job]:
+    """All runs in a fixed order: part, cell, person, trial; the repeats last.
+
+    Args:
+        study: What is asked.
+        grid: Its cells, if they have been made already.
+
+    Raises:
+        ConfigError: a scenario that cannot be read, or is not valid with some change.
+    """
+    every = cells(study) if grid is None else grid
+    names = dict.fromkeys(cell.part for cell in every)
+    parts = [(name, [cell for cell in every if cell.part == name]) for name in names]
+    return [job for name, part_cells in parts for job in _jobs_of(study, name, part_cells)]
+
+
+def runs_in(manifest: Mapping[str, Any]) -> list[Run]:
+    """The runs that a manifest tells of, in the order of `jobs`.
+
+    Args:
+        manifest: Of a study that may be under way; only its study and cells are read.
+    """
+    study, rows = Study.model_validate(manifest["study"]), manifest["cells"]
+    return [
+        Run(part, tuple(row["levels"].items()), row["cell"], *draw, row["config"])
+        for part in dict.fromkeys(row["part"] for row in rows)
+        for row in rows
+        if row["part"] == part
+        for draw in _draws(study, part)
+    ]
+
+
+def to_rehearse(study: Study, every: Iterable[Cell]) -> list[Cell]:
+    """The cells in which a mistake would show: instead of points in ranges, the ranges' ends."""
+    ends = _at_ends(study)
+    return [*ends, *(cell for cell in every if not (ends and cell.levels))]
+
+
+def _at_ends(study: Study) -> list[Cell]:
+    """Cells at both ends of every range, whichever points are drawn; none without ranges.
+
+    Raises:
+        ConfigError: a range has an end that is not valid.
+    """
+    rows = list(designs.settings_at_ends(study))
+    return [cell for name in study.parts if rows for cell in _cells_at(study, name, rows)]
+
+
+def _cells_of(study: Study, name: str) -> Iterator[Cell]:
+    reference = study.parts[name].reference
+    if reference is not None:
+        yield _cell(study, name, REFERENCE, {}, _source(study, name), reference)
+    yield from _cells_at(study, name, designs.settings(study))
+
+
+def _cells_at(study: Study, name: str, rows: Iterable[Mapping[str, Level]]) -> Iterator[Cell]:
+    source, change = _source(study, name), _changer(study)
+    for index, levels in enumerate(rows):
+        yield _cell(study, name, index, levels, source, change(levels))
+
+
+def _repeats_of(study: Study) -> Iterator[Cell]:
+    """The answer's contrast under every strategy and every set of parameters."""
+    factors = factors_of_repeats(study)
+    if not factors or study.answer is None:
+        return
+    part, fixed, sets = study.answer.part, settings_of_repeats(study), parameter_sets(study)
+    source, change = _source(study, part), _changer(study)
+    for index, levels in enumerate(_grid(factors)):
+        chosen = dict(levels)
+        traits = sets[int(str(chosen.pop(PARAMETERS)))]
+        changes = change(fixed | chosen) | ({TRAITS: traits} if traits else {})
+        yield _cell(study, REPEATS, index, levels, source, changes)
+
+
+def _grid(factors: Mapping[str, Sequence[Level]]) -> Iterator[dict[str, Level]]:
+    """Every combination of levels, the last factor fastest."""
+    for levels in itertools.product(*factors.values()):
+        yield dict(zip(factors, levels, strict=True))
+
+
+def _changer(study: Study) -> Callable[[Mapping[str, Level]], dict[str, Any]]:
+    """What the levels of a cell change in the scenario."""
+    tuned = load_tuned(study) if is_tuned(study) else None
+
+    def change(levels: Mapping[str, Level]) -> dict[str, Any]:
+        changes: dict[str, Any] = {}
+        for factor, level in levels.items():
+            if factor in study.treatments:
+                changes |= study.treatments[factor][str(level)]
+            elif factor == TUNING:
+                if level == TUNED and tuned is not None:
+                    changes[tuned.tuning.key] = tuned.value_for(levels)
+            elif factor != POINT:
+                changes[factor] = level
+        return changes
+
+    return change
+
+
+def _cell(
+    study: Study,
+    part: str,
+    index: int,
+    levels: Mapping[str, Level],
+    source: Document,
+    changes: Mapping[str, Any],
+) -> Cell:
+    every = _every_change(study, part, source, changes)
+    scenario = _build(study, part, source, every)
+    config = stable_hash(scenario.model_dump(mode="json"))
+    return Cell(part, index, tuple(levels.items()), scenario, config, every)
+
+
+def _source(study: Study, part: str) -> Document:
+    path = ("parts", part, "scenario")
+    try:
+        return scenarios.load(study.parts[part].scenario, base=study.folder)
+    except ConfigError as error:
+        if error.file is not None:
+            raise
+        raise study.error(error.problem, path) from None
+
+
+def _every_change(
+    study: Study, part: str, source: Document, changes: Mapping[str, Any]
+) -> dict[str, Any]:
+    """What is otherwise than in a scenario's file: by the part, by `--set`, and by the cell."""
+    fixed = {**study.parts[_source_of(study, part)].changes, **study.changes}
+    of_study = model_of(source).set_by_study(study.seed)
+    return _located({**fixed, **of_study, **changes}, study.folder)
+
+
+def _build(study: Study, part: str, source: Document, changes: Mapping[str, Any]) -> AnyScenario:
+    """The part's scenario; a mistake in a change is told where the study makes it."""
+    try:
+        return model_of(source).build(source, changes)
+    except ConfigError as error:
+        raise blamed(study, _source_of(study, part), error, changes) from None
+
+
+def rehearse(study: Study, cell: Cell) -> None:
+    """Find what cannot work in a cell before anything runs.
+
+    Raises:
+        ConfigError: what cannot be read or placed, told where the study asks for it.
+    """
+    model = model_for(cell.scenario)
+    try:
+        model.rehearse(cell.scenario, study.seed)
+    except ConfigError as error:
+        part = _source_of(study, cell.part)
+        source = _source(study, part)
+
+        def make(changes: Mapping[str, Any]) -> None:
+            model.rehearse(model.build(source, changes), study.seed)
+
+        raise blamed(study, part, blame(error, cell.changes, make), cell.changes) from None
+
+
+def _source_of(study: Study, part: str) -> str:
+    """The part whose scenario is run: repeats have that of the answer."""
+    return study.answer.part if part == REPEATS and study.answer is not None else part
+
+
+def _located(changes: dict[str, Any], folder: Path) -> dict[str, Any]:
+    """A policy in a file beside the study is found from anywhere."""
+    key = "dispatch.policy"
+    named: dict[str, Any] = {"dispatch": {"policy": changes.get(key)}}
+    scenarios.locate_files(named, [folder])
+    return {**changes, key: named["dispatch"]["policy"]} if key in changes else changes
+
+
+def _jobs_of(study: Study, name: str, part_cells: Sequence[Cell]) -> Iterator[Job]:
+    # Persons of one cluster follow each other, so that no two clusters share an operator.
+    team = max(1, *(model_for(cell.scenario).team(cell.scenario) for cell in part_cells))
+    draws = _draws(study, name)
+    for cell in part_cells:
+        play = partial(model_for(cell.scenario).played_by, cell.scenario)
+        scenarios = {person: play(person * team) for person, _, _ in draws}
+        for draw in draws:
+            scenario = scenarios[draw[0]]
+            yield Job(name, cell.levels, cell.index, *draw, cell.config, scenario)
+
+
+def _draws(study: Study, name: str) -> list[tuple[int, int, int]]:
+    """Person, trial and seed of each run in a cell of a part, in order."""
+    persons, trials, part = _size(study, name)
+    return [
+        (person, trial, derive_seed(study.seed, part, person, trial))
+        for person in range(persons)
+        for trial in range(trials)
+    ]
+
+
+def _size(study: Study, name: str) -> tuple[int, int, str]:
+    """Persons, trials, and the part whose random seeds it has: a repeat shares its part's."""
+    if name == REPEATS and study.robustness is not None and study.answer is not None:
+        persons = min(study.robustness.persons, study.persons)
+        return persons, study.robustness.replications, study.answer.part
+    return study.most_persons, study.parts[name].replications or study.replications, name

@@ -1,0 +1,454 @@
+"""Designs: which levels meet each other, if not every one every other.
+
+A design makes rows, each with a level for some of the factors. All other factors cross them: every
+row meets every combination of their levels. Without a design there are no rows, and the cells are
+the full grid.
+
+Points of continuous factors: Latin hypercubes, Sobol' sequences, and samples for Sobol' indices.
+
+The same seed gives the same points. Values have six significant digits, so that the last bits of
+a machine's logarithm do not make another configuration.
+
+The rows of a design in a CSV file: a header of factors, then a level in every cell.
+"""
+
+from __future__ import annotations
+
+import csv
+import itertools
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    field_validator,
+    model_validator,
+)
+from scipy.stats import qmc
+
+from dva_sim.experiments.study.schema import POINT, Level, Levels, refuse_keys_of_the_design, says
+from dva_sim.kernel.config import MOST_VALUES, Config, Document, KeyPath, parse_scalar, read_text
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.streams import derive_seed
+
+if TYPE_CHECKING:
+    from dva_sim.experiments.study.study import Study
+
+
+Row = dict[str, Level]
+
+MOST_POINTS = 2**16
+MOST_CELLS = 10_000  # of a grid, which listed rows may leave empty in part
+MOST_RUNS = 1_000_000  # whose list takes a gigabyte, and whose runs take days of CPU time
+
+
+class Span(Config):
+    """The values of a continuous factor, evenly spread on some scale.
+
+    Attributes:
+        low: Least value.
+        high: Greatest value.
+        scale: `linear`, `log` for even ratios, or `whole` for whole numbers.
+    """
+
+    low: float
+    high: float
+    scale: Literal["linear", "log", "whole"] = "linear"
+
+    @model_validator(mode="after")
+    def _ascends(self) -> Span:
+        if self.low >= self.high:
+            raise ValueError(f"range should ascend, not go from {self.low:g} to {self.high:g}")
+        if self.scale == "log" and self.low <= 0:
+            raise ValueError(f"range on a log scale should be above zero, not from {self.low:g}")
+        if self.scale == "whole" and not (self.low.is_integer() and self.high.is_integer()):
+            raise ValueError("range of whole numbers should begin and end with one")
+        return self
+
+
+def _spelled_out(value: Any) -> Any:
+    """`[low, high]` is short for a linear range."""
+    if isinstance(value, list | tuple) and len(value) == 2:
+        return {"low": value[0], "high": value[1]}
+    return value
+
+
+def _power_of_two(count: int) -> int:
+    if count & (count - 1):
+        below = 2 ** int(math.log2(count))
+        raise ValueError(f"should be a power of 2, such as {below} or {2 * below}")
+    return count
+
+
+Ranges = dict[
+    str,
+    Annotated[
+        Span, BeforeValidator(_spelled_out, json_schema_input_type=Span | tuple[float, float])
+    ],
+]
+Points = Annotated[int, Field(ge=2, le=MOST_POINTS)]
+Dyadic = Annotated[
+    Points,
+    AfterValidator(_power_of_two),
+    Field(json_schema_extra={"enum": [2**n for n in range(1, 17)]}),
+]
+
+LISTED = ("zip", "rows", "csv")
+SAMPLED = ("latin_hypercube", "sobol", "saltelli")
+KINDS = (*LISTED, *SAMPLED)
+
+_ONE_KIND: list[Any] = [
+    *(says(kind, not_="ranges") for kind in LISTED),
+    *(says(kind, "ranges") for kind in SAMPLED),
+]
+
+
+class Design(Config):
+    """Which levels are run together; one key of the first six chooses how.
+
+    Attributes:
+        zip: Factors whose levels are taken together: the first of each, the second of each, ...
+        rows: Levels of some factors, row by row; these are not declared as factors again.
+        csv: File of such rows beside the study; its first line names the factors.
+        latin_hypercube: Number of points in the ranges, one in each equal slice of each range.
+        sobol: Number of points in the ranges by a scrambled Sobol' sequence; a power of 2.
+        saltelli: Number of base points, a power of 2, of the sample that Sobol' indices are
+            estimated from: it has two more points for each than there are ranges.
+        ranges: Continuous factors: `[low, high]`, or `{low, high, scale}`.
+    """
+
+    model_config = ConfigDict(json_schema_extra={"oneOf": _ONE_KIND})
+
+    zip: Annotated[tuple[str, ...], Field(min_length=2)] | None = None
+    rows: Annotated[tuple[Row, ...], Field(min_length=1)] | None = None
+    csv: str | None = None
+    latin_hypercube: Points | None = None
+    sobol: Dyadic | None = None
+    saltelli: Dyadic | None = None
+    ranges: Ranges = Field(default_factory=dict)
+
+    @field_validator("rows")
+    @classmethod
+    def _change_the_scenario(cls, value: tuple[Row, ...] | None) -> tuple[Row, ...] | None:
+        for row in value or ():
+            refuse_keys_of_the_design(row)
+        return value
+
+    @field_validator("ranges")
+    @classmethod
+    def _vary_the_scenario(cls, value: Ranges) -> Ranges:
+        refuse_keys_of_the_design(value)
+        return value
+
+    @model_validator(mode="after")
+    def _is_of_one_kind(self) -> Design:
+        chosen = [kind for kind in KINDS if getattr(self, kind) is not None]
+        if len(chosen) != 1:
+            raise ValueError(f"should have one of {', '.join(KINDS)}")
+        if self.is_sampled != bool(self.ranges):
+            raise ValueError(
+                f"{chosen[0]} needs ranges" if self.is_sampled else f"{chosen[0]} has no ranges"
+            )
+        return self
+
+    @property
+    def is_sampled(self) -> bool:
+        """Whether its rows are points in ranges."""
+        return self.points > 0
+
+    @property
+    def points(self) -> int:
+        """How many points in ranges it has; 0 for one of listed levels."""
+        if self.saltelli is not None:
+            return self.saltelli * (len(self.ranges) + 2)
+        return self.latin_hypercube or self.sobol or 0
+
+
+def all_factors(
+    design: Design | None, declared: Mapping[str, Levels], rows: Sequence[Row]
+) -> dict[str, Levels]:
+    """Every factor with its levels: those that the design brings first, then those declared.
+
+    Listed levels come in the order met. Points in ranges have one factor, their number; so have
+    listed rows whose levels are so many that their grid would be nearly empty.
+    """
+    if design is None or design.zip is not None:
+        return dict(declared)
+    if design.is_sampled:
+        return {POINT: tuple(range(design.points)), **declared}
+    levels = {key: tuple(dict.fromkeys(row[key] for row in rows)) for key in rows[0]}
+    if math.prod(map(len, levels.values())) > MOST_CELLS:
+        return {POINT: tuple(range(len(rows))), **declared}
+    return {**levels, **declared}
+
+
+def settings(study: Study) -> Iterator[Row]:
+    """The level of every factor in every cell, in the order of the cells: last factor fastest."""
+    return _crossed(study, rows_of(study))
+
+
+def settings_at_ends(study: Study) -> Iterator[Row]:
+    """The same with each range at each of its ends, and the others in their middle.
+
+    Which points are drawn depends on the seed; whether the ends are valid does not.
+    """
+    return _crossed(study, _ends_of(study)) if _ranges_of(study) else iter(())
+
+
+def _crossed(study: Study, rows: list[Row]) -> Iterator[Row]:
+    for parts in itertools.product(*_axes(study, rows)):
+        yield {key: level for part in parts for key, level in part.items()}
+
+
+def _axes(study: Study, rows: list[Row]) -> Iterator[list[Row]]:
+    """What is crossed: the rows where the first of their factors stands, and each other factor."""
+    in_rows = together(study)
+    for factor, levels in study.factors.items():
+        if factor not in in_rows:
+            yield [{factor: level} for level in levels]
+        elif rows:
+            yield rows
+            rows = []
+
+
+def rows_of(study: Study) -> list[Row]:
+    """The rows of the study's design; none where all factors are crossed."""
+    design = study.design
+    if design is None:
+        return []
+    if design.zip is not None:
+        columns = [study.factors[name] for name in design.zip]
+        return [dict(zip(design.zip, levels, strict=True)) for levels in zip(*columns, strict=True)]
+    if design.is_sampled:
+        rows = sample(design, study.seed)
+    else:
+        rows = study.listed_rows
+    return [{POINT: i, **row} for i, row in enumerate(rows)] if POINT in study.factors else rows
+
+
+def _ends_of(study: Study) -> list[Row]:
+
+    spans = _ranges_of(study)
+    middle: Row = {key: value_at(span, 0.5) for key, span in spans.items()}
+    return [{**middle, key: value_at(spans[key], end)} for key in spans for end in (0.0, 1.0)]
+
+
+def _ranges_of(study: Study) -> Mapping[str, Span]:
+    return study.design.ranges if study.design is not None else {}
+
+
+def size(study: Study) -> int:
+    """How many cells each part has, without making them."""
+    design, in_rows = study.design, together(study)
+    crossed = math.prod(len(levels) for f, levels in study.factors.items() if f not in in_rows)
+    if design is None:
+        return crossed
+    if design.zip is not None:
+        return crossed * len(study.factors[design.zip[0]])
+    return crossed * (design.points or len(study.listed_rows))
+
+
+def runs_of(study: Study) -> int:
+    """How many runs a study has at most, without making their list."""
+    cells = size(study)
+    trials = [part.replications or study.replications for part in study.parts.values()]
+    has_reference = [part.reference is not None for part in study.parts.values()]
+    each = sum((cells + more) * count for more, count in zip(has_reference, trials, strict=True))
+    return each * study.most_persons + _runs_of_repeats(study)
+
+
+def cells_of_repeats(study: Study) -> int:
+    """How many cells the repeats of the answer have."""
+    robustness, answer = study.robustness, study.answer
+    if robustness is None or answer is None or answer.over is None:
+        return 0
+    levels = len(robustness.at or (None,)) * len(answer.contrast)
+    return max(1, len(robustness.strategies)) * (robustness.sets + 1) * levels
+
+
+def _runs_of_repeats(study: Study) -> int:
+    if study.robustness is None:
+        return 0
+    persons = min(study.robustness.persons, study.persons)
+    return cells_of_repeats(study) * persons * study.robustness.replications
+
+
+def together(study: Study) -> set[str]:
+    """The factors whose levels stand in rows, and so do not cross each other."""
+    design = study.design
+    if design is not None and design.zip is not None:
+        return set(design.zip)
+    number = {POINT} & study.factors.keys()
+    return number | set(keys_of(design, study.listed_rows))
+
+
+def keys_of(design: Design | None, rows: Sequence[Row]) -> list[str]:
+    """The factors that a design brings, beside those declared."""
+    return [*(rows[0] if rows else ()), *(design.ranges if design is not None else ())]
+
+
+def place_of(study: Study, key: str, value: Any) -> KeyPath | None:
+    """Where the design gives a key that value; None if it does not."""
+    if study.design is not None and key in study.design.ranges:
+        return "design", "ranges", key
+    for index, row in enumerate(study.listed_rows):
+        if key in row and row[key] == value:
+            return "design", "rows", index, key
+    return None
+
+
+Floats = NDArray[np.float64]
+
+_DIGITS = 6
+
+
+def sample(design: Design, seed: int) -> list[dict[str, Level]]:
+    """The value of each continuous factor at each point, in order."""
+    spans = design.ranges
+    places = _places(design, len(spans), np.random.default_rng(derive_seed(seed, "design")))
+    return [
+        {key: value_at(span, float(u)) for (key, span), u in zip(spans.items(), place, strict=True)}
+        for place in places
+    ]
+
+
+def _places(design: Design, axes: int, rng: np.random.Generator) -> Floats:
+    """Points in the unit cube `(points, axes)`.
+
+    References:
+        McKay, Beckman & Conover, Technometrics 21 (1979), 239-245.
+        Owen, Journal of Complexity 14 (1998), 466-489.
+    """
+    if design.latin_hypercube is not None:
+        return np.asarray(qmc.LatinHypercube(axes, rng=rng).random(design.latin_hypercube))
+    if design.sobol is not None:
+        return _sobol(axes, design.sobol, rng)
+    assert design.saltelli is not None
+    return saltelli(axes, design.saltelli, rng)
+
+
+def _sobol(axes: int, points: int, rng: np.random.Generator) -> Floats:
+    return np.asarray(qmc.Sobol(axes, rng=rng).random_base2(int(math.log2(points))))
+
+
+def saltelli(axes: int, base: int, rng: np.random.Generator) -> Floats:
+    """Pairs of independent points A and B, and for each axis A with that coordinate of B.
+
+    Returns:
+        Points `(base * (axes + 2), axes)`, pair by pair: A, A with coordinate 0, 1, ... of B, B.
+
+    References:
+        Saltelli, Annoni, Azzini, Campolongo, Ratto & Tarantola, Computer Physics Communications
+        181 (2010), 259-270.
+    """
+    both = _sobol(2 * axes, base, rng)
+    first, second = both[:, :axes], both[:, axes:]
+    blocks = np.repeat(first[:, np.newaxis], axes + 2, axis=1)
+    for axis in range(axes):
+        blocks[:, axis + 1, axis] = second[:, axis]
+    blocks[:, -1] = second
+    return blocks.reshape(-1, axes)
+
+
+def value_at(span: Span, share: float) -> float | int:
+    """What stands at a share of the way from `low` to `high`."""
+    if span.scale == "whole":
+        return min(int(span.high), math.floor(span.low + share * (span.high - span.low + 1)))
+    if span.scale == "log":
+        value = span.low * (span.high / span.low) ** share
+    else:
+        value = span.low + share * (span.high - span.low)
+    return float(f"{value:.{_DIGITS}g}")
+
+
+ROWS = "rows"
+_CELL = re.compile(r'("(?:[^"]|"")*"|[^,]*)(?:,|$)')
+
+
+def read_table(path: Path) -> Document:
+    """The rows of a CSV file, under the key `rows`, with the place of every level.
+
+    Levels are read as YAML would read them: `0.5` is a number, `true` is true, `null` is nothing.
+
+    Raises:
+        ConfigError: unreadable, a row of another length, an empty cell, a key twice.
+    """
+    lines = read_text(path).split("\n")
+    places: dict[KeyPath, tuple[int, int]] = {}
+    header: list[str] = []
+    rows: list[dict[str, Level]] = []
+    for number, line, cells in _cells(path, lines):
+        starts = _starts(line)[: len(cells)]  # the pattern also finds the empty end
+        if not header:
+            header = _header(path, number, starts, cells)
+            continue
+        if len(cells) != len(header):
+            problem = f"row should have {len(header)} cells as the header has, not {len(cells)}"
+            raise ConfigError(problem, path, number, 1)
+        if len(places) > MOST_VALUES:
+            raise ConfigError(f"has more than {MOST_VALUES} values", path, number, 1)
+        places[ROWS, len(rows)] = (number, 1)
+        row: dict[str, Level] = {}
+        for key, text, start in zip(header, cells, starts, strict=True):
+            places[ROWS, len(rows), key] = (number, start)
+            row[key] = _level(path, number, start, key, text)
+        rows.append(row)
+    if not rows:
+        raise ConfigError("should have a header of factors, and rows of levels", path, 1, 1)
+    return Document({ROWS: rows}, path, places)
+
+
+def _cells(path: Path, lines: list[str]) -> Iterator[tuple[int, str, list[str]]]:
+    """Number, text and cells of each line that is not blank; a cell does not go on to the next."""
+    for number, line in enumerate(lines, 1):
+        if not line.strip():
+            continue
+        try:
+            (cells,) = csv.reader([line.rstrip("\r")], strict=True)
+        except csv.Error as error:
+            raise ConfigError(f"is not CSV: {error}", path, number, 1) from None
+        yield number, line, cells
+
+
+def _starts(line: str) -> list[int]:
+    """Column, from 1, at which each cell of a line begins."""
+    return [match.start() + 1 for match in _CELL.finditer(line)]
+
+
+def _header(path: Path, number: int, starts: list[int], cells: list[str]) -> list[str]:
+    keys = [cell.strip() for cell in cells]
+    for index, (key, start) in enumerate(zip(keys, starts, strict=True)):
+        if not key:
+            raise ConfigError("a factor without a name", path, number, start)
+        if key in keys[:index]:
+            raise ConfigError(f"factor {key!r} stands twice", path, number, start)
+        if ";" in key:
+            raise ConfigError("cells are separated by commas, not by ;", path, number, start)
+        try:
+            refuse_keys_of_the_design([key])
+        except ValueError as error:
+            raise ConfigError(str(error), path, number, start) from None
+    return keys
+
+
+def _level(path: Path, line: int, column: int, key: str, text: str) -> Level:
+    if not text.strip():
+        raise ConfigError(f"no level of {key!r}; write null for none", path, line, column)
+    try:
+        level = parse_scalar(text.strip())
+    except ConfigError as error:
+        raise ConfigError(error.problem, path, line, column) from None
+    if not isinstance(level, bool | int | float | str | None):
+        raise ConfigError(f"{text.strip()!r} is not one level of {key!r}", path, line, column)
+    if isinstance(level, float) and not math.isfinite(level):
+        problem = f"level of {key!r} should be a finite number, not {level}"
+        raise ConfigError(problem, path, line, column)
+    return level

@@ -1,0 +1,161 @@
+"""What tells configurations, studies and files apart: hashes that are the same on every machine.
+
+What a run's numbers depend on besides its configuration: the program and what users edit.
+
+Which state of the program made some results: commit, and whether anything was changed since.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import subprocess
+from collections.abc import Iterable, Iterator, Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import dva_sim
+from dva_sim.kernel import resources
+from dva_sim.kernel.config import Config
+
+_LONGEST_NAME = 1000  # of a file that is looked for
+
+
+def stable_hash(data: Any) -> str:
+    """64 bits that depend on the data alone, not on the machine or the order of keys."""
+    return digest(data)[:16]
+
+
+def digest(data: Any) -> str:
+    """All 256 bits of the same."""
+    text = json.dumps(data, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def inputs(scenarios: Iterable[Config]) -> dict[str, str]:
+    """Files that scenarios name by path (maps, traces), with the hash of their contents."""
+    dumps = (scenario.model_dump(mode="json") for scenario in scenarios)
+    names = sorted({text for dump in dumps for text in _texts(dump) if "." in text})
+    short = [name for name in names if "\n" not in name and len(name) < _LONGEST_NAME]
+    paths = [(name, Path(_file_of(name))) for name in short]
+    return {
+        name: hashlib.sha256(path.read_bytes()).hexdigest()[:16]
+        for name, path in paths
+        if path.is_file()
+    }
+
+
+def _file_of(name: str) -> str:
+    """The file of a class that is named as `file.py:Class`; other names are files as they are."""
+    return name.rpartition(":")[0] if ".py:" in name else name
+
+
+def _texts(data: Any) -> Iterator[str]:
+    if isinstance(data, str):
+        yield data
+    elif isinstance(data, Mapping | list):
+        for value in data.values() if isinstance(data, Mapping) else data:
+            yield from _texts(value)
+
+
+# Reports may change without making old runs stale; what measures and simulates may not.
+_CODE = (
+    "agents",
+    "core",
+    "network",
+    "protocol",
+    "simulation",
+    "worlds",
+    "kernel/clock.py",
+    "kernel/recorder.py",
+    "kernel/streams.py",
+    "experiments/execution/job.py",
+)
+# What says whether a hypothesis held: a registration fixes it, other results may be judged anew.
+_JUDGES = (
+    "experiments/analysis/hypothesis_tests.py",
+    "experiments/analysis/paired_effects.py",
+    "experiments/analysis/layout.py",
+    "experiments/analysis/statistics",
+)
+_EDITED = ("agents", "protocol", "worlds")
+_SUFFIXES = {".yaml", ".geojson", ".xsd", ".pgm", ".png", ".py"}
+
+
+def fingerprint() -> str:
+    """64 bits over the simulating code and every profile, site and schema within reach."""
+    return _hash_of((*_code(_CODE), *_edited()))
+
+
+def fingerprint_of_judges() -> str:
+    """64 bits over the code that comes from tables of runs to verdicts."""
+    return _hash_of(_code(_JUDGES))
+
+
+def _hash_of(files: Iterable[tuple[str, Path]]) -> str:
+    total = hashlib.sha256()
+    for name, path in files:
+        total.update(name.encode() + b"\0" + hashlib.sha256(path.read_bytes()).digest())
+    return total.hexdigest()[:16]
+
+
+def _code(parts: Iterable[str]) -> Iterator[tuple[str, Path]]:
+    package = Path(dva_sim.__file__).parent
+    for part in parts:
+        start = package / part
+        for path in sorted(start.rglob("*.py")) if start.is_dir() else [start]:
+            yield path.relative_to(package).as_posix(), path
+
+
+def _edited() -> Iterator[tuple[str, Path]]:
+    """Each name once, from the nearest folder that has it, as it would be found."""
+    seen: dict[str, Path] = {}
+    for root in resources.roots():
+        for folder in _EDITED:
+            for path in sorted((root / folder).rglob("*")):
+                if path.suffix in _SUFFIXES and path.is_file():
+                    seen.setdefault(path.relative_to(root).as_posix(), path)
+    yield from sorted(seen.items())
+
+
+@cache
+def program_state() -> dict[str, str | bool | None]:
+    """Of the program that is running, as it was when first asked for; see `state_of`."""
+    return state_of(Path(dva_sim.__file__).parent)
+
+
+def state_of(package: Path) -> dict[str, str | bool | None]:
+    """Commit of the checkout that a package stands in, and whether it is `dirty`.
+
+    Dirty is a checkout in which some file of the program, or an agent, site or schema beside
+    it, is not as committed, or not committed at all. Results, studies and notes that lie in
+    the same checkout do not count. Both are None for an installed program, and where git is
+    missing.
+    """
+    root = package.parent
+    if _git(root, "ls-files", "--error-unmatch", f"{package.name}/__init__.py") is None:
+        return {"commit": None, "dirty": None}  # installed, perhaps inside a checkout of its user
+    parts = [package.name, *(name for name in _EDITED if (root / name).is_dir())]
+    changed = _git(root, "status", "--porcelain", "--untracked-files=all", "--", *parts)
+    commit = _git(root, "rev-parse", "HEAD")
+    return {"commit": commit, "dirty": None if changed is None else bool(changed)}
+
+
+def _git(folder: Path, *words: str) -> str | None:
+    """What git says, or None if it cannot."""
+    # A hook that started us names its own repository in the environment.
+    environment = {k: v for k, v in os.environ.items() if not k.startswith("GIT_")}
+    try:
+        done = subprocess.run(
+            ["git", "--no-optional-locks", "-C", str(folder), *words],
+            capture_output=True,
+            text=True,
+            env=environment,
+            timeout=20,
+            check=True,
+        )
+    except (OSError, subprocess.SubprocessError):
+        return None
+    return done.stdout.strip()

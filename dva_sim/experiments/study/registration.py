@@ -1,0 +1,238 @@
+"""Registration: what a confirmatory run will be, fixed before anything of it is run.
+
+The hash of all that is fixed gives the run its seed. So its persons and its luck are others than
+in any run before, and a study that is changed and registered anew meets others again.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from dva_sim import __version__
+from dva_sim.experiments.study import cell_grid
+from dva_sim.experiments.study.hashing import (
+    digest,
+    fingerprint,
+    fingerprint_of_judges,
+    inputs,
+    stable_hash,
+)
+from dva_sim.experiments.study.schema import POINT
+from dva_sim.experiments.study.status import Status
+from dva_sim.experiments.study.study import Study
+from dva_sim.kernel.config import Config, Document, load_yaml, validate
+from dva_sim.kernel.errors import ConfigError, DvaSimError
+from dva_sim.kernel.resources import REGISTRATION
+from dva_sim.kernel.streams import derive_seed
+
+_OPEN = {"question", "seed"}  # keys that a registration does not fix
+_ANY_SEED = 0  # what is fixed must not depend on the seed that follows from it
+
+
+class Registration(Config):
+    """What was registered.
+
+    Attributes:
+        study: Name of the study.
+        question: As it was worded then.
+        made_with: Version of the program, and the fingerprint of what simulates.
+        judged_with: The fingerprint of what will judge the hypotheses.
+        full: Whether it is the larger version.
+        earlier: Hashes of the registrations that this one replaces, the oldest first.
+        plan: All that is fixed: the keys of the study, and hashes of its rows, its scenarios
+            as resolved, and the files these name.
+        hash: Of the plan and the earlier ones; a name or a program fixes nothing of the run, and
+            to change one must not buy another seed.
+    """
+
+    study: str
+    question: str = ""
+    made_with: str
+    judged_with: str = ""
+    full: bool = False
+    earlier: tuple[str, ...] = ()
+    plan: dict[str, Any]
+    hash: str = ""
+
+    @property
+    def proper_hash(self) -> str:
+        """The hash of what it fixes."""
+        return digest(self.model_dump(mode="json", include={"plan", "earlier"}))
+
+    @property
+    def seed(self) -> int:
+        """Of the confirmatory run."""
+        return derive_seed("registration", self.hash)
+
+
+def load_registration(document: Document) -> Registration:
+    """The registration that a file holds.
+
+    Raises:
+        ConfigError: it holds none.
+    """
+    return validate(Registration, document.data, document.error)
+
+
+def registration_of(study: Study) -> Registration | None:
+    """The registration beside a study; None where there is none.
+
+    Raises:
+        ConfigError: the file there holds none.
+    """
+    path = study.folder / f"{study.file.stem}{REGISTRATION}"
+    return load_registration(load_yaml(path)) if path.is_file() else None
+
+
+def register(study: Study, again: bool = False) -> str:
+    """Write down what the confirmatory run of a study will be, and say so.
+
+    Args:
+        study: As its file says, in one of its versions.
+        again: Whether an earlier registration is replaced; that is told ever after.
+
+    Raises:
+        ConfigError: nothing to register, a size left open, or a registration that is there.
+    """
+    _refuse_what_is_open(study)
+    path = study.folder / f"{study.file.stem}{REGISTRATION}"
+    found = registration_of(study)
+    if found is not None and not again:
+        raise ConfigError(f"{path} is there already; --again replaces it, and that will be told")
+    made = Registration(
+        study=study.file.stem,
+        question=study.question,
+        made_with=f"{__version__} {fingerprint()}",
+        judged_with=fingerprint_of_judges(),
+        full=study.version == "full",
+        earlier=(*found.earlier, found.hash) if found is not None else (),
+        plan=plan_of(study),
+    )
+    made = made.model_copy(update={"hash": made.proper_hash})
+    cell_grid.cells(study.model_copy(update={"seed": made.seed}))  # its points are valid, too
+    try:
+        path.write_text(_as_text(made), encoding="utf-8", newline="\n")
+    except OSError as error:
+        raise DvaSimError(f"{path} cannot be written: {error.strerror}") from None
+    names, size = ", ".join(study.hypotheses), f"{study.persons} persons x {study.replications}"
+    return f"Registered {names} on {size} trials, in {path}\nRun unchanged, it confirms or refutes"
+
+
+def plan_of(study: Study) -> dict[str, Any]:
+    """All that fixes a confirmatory run, but for its seed, as JSON would hold it."""
+    nobody = study.model_copy(update={"seed": _ANY_SEED})
+    cells = cell_grid.cells(nobody)
+    files = {
+        name: f"{Path(name).name} {content}"
+        for name, content in inputs(cell.scenario for cell in cells).items()
+    }
+    asked = {key: value for key, value in nobody.asked().items() if key not in _OPEN}
+    asked["factors"] = {f: levels for f, levels in asked["factors"].items() if f != POINT}
+    if study.listed_rows:
+        asked["design"]["rows"] = stable_hash(study.listed_rows)
+    resolved = {
+        "scenarios": {
+            part: _hash_of(cell_grid.base_scenario(nobody, part), files) for part in study.parts
+        },
+        "cells": stable_hash([_hash_of(cell.scenario, files) for cell in cells]),
+        "inputs": sorted(files.values()),
+    }
+    plan: dict[str, Any] = json.loads(json.dumps(asked | resolved))
+    return {key: value for key, value in plan.items() if value not in (None, [], {})}
+
+
+def settled(study: Study) -> Study:
+    """The study with its status; run as registered, it has the seed of the registration.
+
+    Raises:
+        ConfigError: the registration cannot be read, or the study has a cell that is not valid.
+    """
+    found = registration_of(study)
+    why = [*_liberties(study), *(departures(found, study) if found is not None else ())]
+    confirms = found is not None and not why
+    if found is not None:
+        why += _remarks(found, study)
+    kept = study.model_copy(update={"seed": found.seed} if found and confirms else {})
+    kept._status = Status(
+        kind="confirmatory" if confirms else "exploratory" if why else "declared",
+        why=tuple(why),
+        reproducible=study.budget_s is None,
+        registration=found.model_dump(mode="json") if found is not None else None,
+    )
+    return kept
+
+
+def _liberties(study: Study) -> Iterator[str]:
+    """What leaves open, when a study is started, what will come of it."""
+    yield from (f"--set {setting}" for setting in study.settings)
+    if study.pilot is not None:
+        yield f"a pilot of {study.pilot} persons"
+    if study.stop is not None:
+        yield "how many persons are simulated depends on the results"
+    if study.budget_s is not None:
+        yield f"how many persons are simulated depends on the clock, {study.budget_s:g} s"
+
+
+def departures(found: Registration, study: Study) -> Iterator[str]:
+    """In what a study is not what was registered."""
+    if found.hash != found.proper_hash:
+        yield "the registration was edited: its hash is not that of what it fixes"
+    now = plan_of(study)
+    keys = [key for key in {**found.plan, **now} if found.plan.get(key) != now.get(key)]
+    for key in (key for key in keys if key in ("persons", "replications")):
+        yield f"{found.plan.get(key)} {key} were registered, not {now[key]}"
+    others = [key for key in keys if key not in ("persons", "replications")]
+    if others:
+        yield f"other than registered: {', '.join(others)}"
+
+
+def _remarks(found: Registration, study: Study) -> Iterator[str]:
+    """What a reader should know, although it is no departure."""
+    if found.study != study.file.stem:
+        yield f"it was registered as {found.study!r}"
+    if found.question not in ("", study.question):
+        yield f"its question was worded otherwise when it was registered: {found.question!r}"
+    now = f"{__version__} {fingerprint()}"
+    if found.made_with != now:
+        yield f"the program is another than when it was registered ({found.made_with}; now {now})"
+    if found.earlier:
+        times = "once" if len(found.earlier) == 1 else f"{len(found.earlier)} times"
+        yield f"it had been registered {times} before, otherwise"
+
+
+def _refuse_what_is_open(study: Study) -> None:
+    if not study.hypotheses:
+        raise study.error("nothing to register: no key 'hypotheses'", ())
+    for key, asked in (("stop", study.stop), ("budget_s", study.budget_s)):
+        if asked is not None:
+            problem = f"a registered study has a fixed number of persons; leave {key!r} out"
+            raise study.error(problem, (key,))
+
+
+def _hash_of(scenario: Config, files: Mapping[str, str]) -> str:
+    """Files count by name and content, wherever they lie."""
+    return stable_hash(_portable(scenario.model_dump(mode="json"), files))
+
+
+def _portable(data: Any, files: Mapping[str, str]) -> Any:
+    if isinstance(data, str):
+        return files.get(data, data)
+    if isinstance(data, Mapping):
+        return {key: _portable(value, files) for key, value in data.items()}
+    return [_portable(value, files) for value in data] if isinstance(data, list) else data
+
+
+def _as_text(made: Registration) -> str:
+    """YAML with a key of the plan on each line, so that a difference is seen as one."""
+    data = made.model_dump(mode="json")
+    plan = data.pop("plan")
+    lines = [
+        f"# Written by `dva-sim register {made.study}` before it was run; not to be edited.",
+        *(f"{key}: {json.dumps(value, ensure_ascii=False)}" for key, value in data.items()),
+        "plan:",
+        *(f"  {key}: {json.dumps(value, ensure_ascii=False)}" for key, value in plan.items()),
+    ]
+    return "\n".join(lines) + "\n"

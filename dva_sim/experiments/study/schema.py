@@ -1,0 +1,293 @@
+"""The keys of a study's file below its top level: what is asked, expected, tuned and repeated."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, ConfigDict, Field, field_validator, model_validator
+
+from dva_sim.kernel.config import Config
+
+SET_BY_DESIGN = {"operator.person": "persons", "operator.population_seed": "seed"}
+
+TUNING = "tuning"  # name of the factor whose levels are these:
+UNTUNED, TUNED = "untuned", "tuned"
+REPEATS = "robustness"  # name of the table of repeats, so of no part
+STRATEGY = "operator.strategy"
+ANSWER = "answer"  # the declared contrast, where a comparison is named
+POINT = "point"  # name of the factor that numbers the points of a design without levels
+
+Level = bool | int | float | str | None
+Direction = Literal["above", "below", "same"]
+
+
+def _distinct(levels: tuple[Level, ...]) -> tuple[Level, ...]:
+    seen: set[Level] = set()
+    for level in levels:
+        if level in seen:
+            raise ValueError(f"level {level!r} stands twice")
+        seen.add(level)
+    return levels
+
+
+def _ascending(range_: tuple[float, float]) -> tuple[float, float]:
+    if range_[0] > range_[1]:
+        raise ValueError(f"range should ascend, not go from {range_[0]:g} to {range_[1]:g}")
+    return range_
+
+
+Levels = Annotated[
+    tuple[Level, ...],
+    Field(min_length=1, json_schema_extra={"uniqueItems": True}),
+    AfterValidator(_distinct),
+]
+Count = Annotated[int, Field(ge=1)]
+Seed = Annotated[int, Field(ge=0, lt=2**63)]
+Range = Annotated[tuple[float, float], AfterValidator(_ascending)]
+Changes = dict[str, Any]
+
+
+def says(*keys: str, not_: str = "") -> dict[str, Any]:
+    """The JSON Schema of a mapping with something under these keys, and nothing under another."""
+    rules: dict[str, Any] = {key: {"not": {"type": "null"}} for key in keys}
+    return {
+        "required": list(keys),
+        "properties": rules | ({not_: {"maxProperties": 0}} if not_ else {}),
+    }
+
+
+def refuse_keys_of_the_design(keys: Iterable[str]) -> None:
+    """Persons are the study's own to choose.
+
+    Raises:
+        ValueError: a key that the study sets itself.
+    """
+    for key in keys:
+        if key in SET_BY_DESIGN:
+            raise ValueError(f"{key!r} is set by the study; change {SET_BY_DESIGN[key]!r} instead")
+
+
+class Part(Config):
+    """One scenario that is run in every cell.
+
+    Attributes:
+        scenario: By name or path, also relative to the study's file.
+        changes: What this study has otherwise than the scenario, in every cell of the part.
+        reference: Changes that make the reference run, one for each person and trial.
+        replications: Trials per person, if not those of the study.
+    """
+
+    scenario: str
+    changes: Changes = Field(default_factory=dict)
+    reference: Changes | None = None
+    replications: Count | None = None
+
+    @field_validator("changes", "reference")
+    @classmethod
+    def _person_is_the_designs(cls, value: Changes | None) -> Changes | None:
+        refuse_keys_of_the_design(value or {})
+        return value
+
+
+class Contrast(Config):
+    """Two levels of one factor, compared in one measure.
+
+    Attributes:
+        part: Part it is measured in.
+        measure: Column of the table `runs`; in excess of the reference run where there is one.
+        factor: Factor whose two levels are compared.
+        contrast: The two levels: the first minus the second.
+        over: Factor along which the difference is followed; without it, one difference.
+        within: Levels of the other factors.
+        family: Tests of one family share their chance of a false alarm.
+        smallest_effect: Smallest difference that matters, in the measure's own unit.
+        smallest_effect_s: The same for a measure in seconds [s].
+    """
+
+    part: str
+    measure: str
+    factor: str
+    contrast: tuple[Level, Level]
+    over: str | None = None
+    within: dict[str, Level] = Field(default_factory=dict)
+    family: Annotated[str, Field(min_length=1)] = "main"
+    smallest_effect: Annotated[float, Field(gt=0)] | None = None
+    smallest_effect_s: Annotated[float, Field(gt=0)] | None = None
+
+    @property
+    def smallest(self) -> float | None:
+        """Smallest difference that matters, in the measure's unit."""
+        if self.measure.endswith("_s") and self.smallest_effect_s is not None:
+            return self.smallest_effect_s
+        return self.smallest_effect
+
+
+class Hypothesis(Config):
+    """A claim about one contrast at one place, to be tested; registered, it is confirmatory.
+
+    Attributes:
+        text: In words.
+        comparison: Which contrast: `answer`, or the name of a comparison.
+        direction: Of the first level minus the second: `above` zero, `below` it, or the `same`.
+        margin: By how much at least it is above or below; or within how much it is the same.
+            In the measure's unit.
+        at: Levels of other factors than the contrast's. By default those that the contrast is
+            `within`, and the last level of the factor it runs `over`.
+    """
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "anyOf": [
+                {"properties": {"direction": {"enum": ["above", "below"]}}},
+                {"required": ["margin"], "properties": {"margin": {"exclusiveMinimum": 0}}},
+            ]
+        }
+    )
+
+    text: str = ""
+    comparison: str = ANSWER
+    direction: Direction
+    margin: Annotated[float, Field(ge=0)] = 0.0
+    at: dict[str, Level] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _same_within_something(self) -> Hypothesis:
+        if self.direction == "same" and self.margin == 0:
+            raise ValueError("'same' needs a margin: nothing is the same to the last digit")
+        return self
+
+
+class Stop(Config):
+    """When enough persons were simulated: decided after whole batches of them, in seed order.
+
+    The study's `persons` are the first batch. After each, every half-width of the 95 % interval
+    is looked at: of the mean of a measure in each cell of a part, or of a contrast at each level
+    of the factor it runs over, for all of them at once.
+
+    Attributes:
+        half_width: Largest half-width that is good enough, in the measure's unit.
+        measure: Column of the table `runs`, in excess of the reference run where there is one.
+        part: Part it is measured in.
+        comparison: Instead of a measure: `answer`, or the name of a comparison.
+        batch_persons: How many persons each further batch has.
+        most_persons: After so many it ends in any case.
+
+    References:
+        Chow & Robbins, Annals of Mathematical Statistics 36 (1965), 457-462: why a fixed width
+        can be waited for, and that the interval holds in the limit only.
+    """
+
+    model_config = ConfigDict(
+        json_schema_extra={"oneOf": [says("comparison"), says("measure", "part")]}
+    )
+
+    half_width: Annotated[float, Field(gt=0)]
+    measure: str | None = None
+    part: str | None = None
+    comparison: str | None = None
+    batch_persons: Count
+    most_persons: Count
+
+    @model_validator(mode="after")
+    def _looks_at_one_thing(self) -> Stop:
+        asked = (self.measure is not None, self.part is not None)
+        if asked != (self.comparison is None,) * 2:
+            raise ValueError("should name a comparison, or a measure and its part")
+        return self
+
+
+class Prediction(Config):
+    """What is expected of one contrast, written down before the first run.
+
+    Attributes:
+        text: In words.
+        direction: Of the first level minus the second: `above` zero, `below` it, or the `same`
+            but for less than the smallest effect that matters. Without it nothing is judged.
+        factor: Whose levels are compared; by default the answer's.
+        contrast: The two levels; by default the answer's.
+        at: Levels of other factors. By default those the answer is `within`, the last level of
+            the factor it runs `over`, and the second of its contrast.
+        expects: Range in which the mean difference is expected, in the measure's unit.
+        expects_s: The same for a measure in seconds [s].
+    """
+
+    text: Annotated[str, Field(min_length=1)]
+    direction: Direction | None = None
+    factor: str | None = None
+    contrast: tuple[Level, Level] | None = None
+    at: dict[str, Level] = Field(default_factory=dict)
+    expects: Range | None = None
+    expects_s: Range | None = None
+
+    @model_validator(mode="after")
+    def _can_be_judged(self) -> Prediction:
+        judged = self.direction is not None
+        if not judged and (self.at or self.factor or self.contrast or self.expected):
+            raise ValueError("a prediction with a contrast or a range needs a direction")
+        if self.factor is not None and self.contrast is None:
+            raise ValueError("a prediction of another factor needs its contrast")
+        return self
+
+    @property
+    def expected(self) -> Range | None:
+        """Range of the mean difference, in the measure's unit."""
+        return self.expects if self.expects is not None else self.expects_s
+
+
+class Tuning(Config):
+    """One rule, with one budget for all, by which a key is chosen for each level of some factors.
+
+    The rule: least mean of the measure over persons who take no part in the study; of equal ones
+    the nearest to 1.
+
+    Attributes:
+        key: What is tuned.
+        levels: Its values tried, the same for all.
+        by: Factors for each of whose levels it is tuned on its own.
+        at: Levels of the other factors while it is tuned.
+        part: Part it is tuned in.
+        measure: Column of the table `runs` that should be small.
+        persons: Simulated persons, others than the study's.
+        replications: Trials of each.
+        seed: Of the tuning; not that of the study.
+    """
+
+    key: str
+    levels: Annotated[tuple[Annotated[float, Field(gt=0)], ...], Field(min_length=2)]
+    by: Annotated[tuple[str, ...], Field(min_length=1)]
+    at: dict[str, Level] = Field(default_factory=dict)
+    part: str
+    measure: str
+    persons: Count = 8
+    replications: Count = 2
+    seed: Seed
+
+    @field_validator("levels")
+    @classmethod
+    def _tried_once(cls, value: tuple[float, ...]) -> tuple[float, ...]:
+        _distinct(value)
+        return value
+
+
+class Robustness(Config):
+    """The answer's contrast again, under other models of the persons.
+
+    Every strategy is tried with the persons' usual parameters and with each of `sets` others,
+    which fill the bands of calibration evenly (Latin hypercube, on a logarithmic scale).
+
+    Attributes:
+        strategies: Of the operators; by default the scenario's alone.
+        sets: How many other sets of parameters.
+        bands: File of the bands, in `agents/people` or by path: `[low, high]` for each trait.
+        at: Levels of the factor that the answer runs `over`; by default its last.
+        persons: Simulated persons in each repeat: the first of the study's.
+        replications: Trials of each.
+    """
+
+    strategies: Annotated[tuple[str, ...], AfterValidator(_distinct)] = ()
+    sets: Annotated[int, Field(ge=0, le=1000)] = 8
+    bands: str = "operators-bands"
+    at: Levels | None = None
+    persons: Annotated[int, Field(ge=2)] = 6
+    replications: Count = 2

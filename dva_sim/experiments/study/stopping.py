@@ -1,0 +1,133 @@
+"""Stopping rules: pure deciders on whole batches of persons, in the order of the design.
+
+Who finished first plays no part, so the same study stops after the same batch on every machine.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dva_sim.experiments.analysis.statistics import band, mean_interval
+from dva_sim.experiments.study.cell_grid import Job
+from dva_sim.experiments.study.designs import together
+from dva_sim.experiments.study.schema import Contrast, Level, Stop
+from dva_sim.experiments.study.study import Study
+
+_BATCH_IN_BUDGET = 2  # persons, where a budget alone ends a study
+
+Row = Mapping[str, Any]
+Floats = NDArray[np.float64]
+_Run = tuple[int, int]  # person, trial
+
+
+def rounds(study: Study, jobs: Sequence[Job]) -> list[list[Job]]:
+    """The jobs in batches of persons; a study that nothing can stop early is one batch."""
+    edges = _edges(study)
+    batches: list[list[Job]] = [[] for _ in edges]
+    for job in jobs:
+        batches[int(np.searchsorted(edges, job.person, side="right"))].append(job)
+    return [batch for batch in batches if batch]
+
+
+def is_enough(study: Study, rows: Sequence[Row]) -> bool:
+    """Whether every interval of the stopping rule is as narrow as it asks.
+
+    Args:
+        study: What is asked.
+        rows: Of the table `runs` so far, in the order of the design.
+    """
+    stop = study.stop
+    if stop is None:
+        return False
+    found = half_widths(study, stop, rows)
+    return bool(len(found)) and bool(np.all(found <= stop.half_width))
+
+
+def half_widths(study: Study, stop: Stop, rows: Sequence[Row]) -> Floats:
+    """Half of each 95 % interval that the rule looks at; nan where there is none yet."""
+    if stop.comparison is not None:
+        return _of_contrast(study, study.contrasts[stop.comparison], rows)
+    return _of_measure(str(stop.measure), [row for row in rows if row["part"] == stop.part])
+
+
+def _edges(study: Study) -> list[int]:
+    """How many persons there are after each batch."""
+    if study.stop is not None:
+        most, step = study.most_persons, study.stop.batch_persons
+        return [*range(study.persons, most, step), most]
+    if study.budget_s is not None:
+        return [*range(_BATCH_IN_BUDGET, study.persons, _BATCH_IN_BUDGET), study.persons]
+    return [study.persons]
+
+
+def _of_measure(measure: str, rows: Iterable[Row]) -> Floats:
+    """Of the mean in each cell, in excess of the reference run where there is one."""
+    cells: dict[int, dict[_Run, float]] = defaultdict(dict)
+    aside: dict[_Run, float] = {}
+    for row in rows:
+        kept = aside if row["is_reference"] else cells[row["cell"]]
+        kept[row["person"], row["trial"]] = _number(row.get(measure))
+    widths = []
+    for runs in cells.values():
+        values = [value - aside.get(who, np.nan if aside else 0.0) for who, value in runs.items()]
+        found = mean_interval(values, [person for person, _ in runs])
+        widths.append(found.half_width)
+    return np.array(widths)
+
+
+def _of_contrast(study: Study, asked: Contrast, rows: Iterable[Row]) -> Floats:
+    """Of the paired difference at each level of `over`, all at once; the reference cancels."""
+    sides: tuple[dict[Any, float], dict[Any, float]] = ({}, {})
+    fixed = _place(study, asked)
+    keys = [name for name in _factors(study) if name != asked.factor]
+    for row in rows:
+        if row["part"] != asked.part or row["is_reference"] or not _is_at(row, fixed):
+            continue
+        for side, level in zip(sides, asked.contrast, strict=True):
+            if row[asked.factor] == level:
+                place = tuple(row.get(key) for key in keys)
+                side[place, row["person"], row["trial"]] = _number(row.get(asked.measure))
+    at = keys.index(asked.over) if asked.over is not None else None
+    means = _means(*sides, at)
+    found = band(means)
+    return np.asarray((found.high - found.low) / 2) if means.size else np.array([])
+
+
+def _means(first: dict[Any, float], second: dict[Any, float], at: int | None) -> Floats:
+    """Mean differences `(persons, levels of over)`."""
+    pairs: dict[tuple[int, Level], list[float]] = defaultdict(list)
+    for (place, person, trial), value in first.items():
+        difference = value - second.get((place, person, trial), np.nan)
+        pairs[person, None if at is None else place[at]].append(difference)
+    persons = {who: i for i, who in enumerate(dict.fromkeys(who for who, _ in pairs))}
+    levels = {level: i for i, level in enumerate(dict.fromkeys(level for _, level in pairs))}
+    means = np.full((len(persons), len(levels)), np.nan)
+    for (who, level), values in pairs.items():
+        there = [value for value in values if np.isfinite(value)]
+        means[persons[who], levels[level]] = np.mean(there) if there else np.nan
+    return means
+
+
+def _factors(study: Study) -> list[str]:
+    """All columns that say which cell a run is of."""
+    return [*study.factors, *(study.design.ranges if study.design is not None else ())]
+
+
+def _place(study: Study, asked: Contrast) -> dict[str, Level]:
+    """The panel that the contrast speaks of: the levels it is within, else the first."""
+    names = {asked.factor, asked.over, *together(study)}
+    free = {f: levels[0] for f, levels in study.factors.items() if f not in names}
+    return free | dict(asked.within)
+
+
+def _is_at(row: Row, place: Mapping[str, Level]) -> bool:
+    return all(row.get(factor) == level for factor, level in place.items())
+
+
+def _number(value: Any) -> float:
+    return float(value) if value is not None else np.nan

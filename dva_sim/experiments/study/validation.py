@@ -1,0 +1,311 @@
+"""What makes no sense in a study although each of its keys does: told before anything runs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from dva_sim.experiments.results.data_dictionary import DESIGN, DICTIONARY
+from dva_sim.experiments.study.designs import (
+    MOST_CELLS,
+    MOST_POINTS,
+    MOST_RUNS,
+    keys_of,
+    place_of,
+    runs_of,
+    size,
+    together,
+)
+from dva_sim.experiments.study.schema import (
+    ANSWER,
+    POINT,
+    REPEATS,
+    STRATEGY,
+    TUNED,
+    TUNING,
+    UNTUNED,
+    Contrast,
+    Level,
+    Prediction,
+    refuse_keys_of_the_design,
+)
+from dva_sim.kernel.config import KeyPath
+from dva_sim.kernel.suggestions import hint
+
+if TYPE_CHECKING:
+    from dva_sim.experiments.study.study import Study
+
+
+Fault = tuple[str, KeyPath]
+"""What is wrong, and the key at which that is said."""
+
+
+def of_design(study: Study) -> Iterator[Fault]:
+    """Rows that do not fit together, and factors that are there twice."""
+    design = study.design
+    for name in (POINT,) if POINT in study.factors else ():
+        yield f"{name!r} numbers the rows of a design; call the factor otherwise", ("factors", name)
+    if design is None:
+        return
+    yield from _faults_of_zip(study, design.zip or ())
+    yield from _faults_of_rows(study.listed_rows)
+    for key in keys_of(design, study.listed_rows):
+        if key in study.factors:
+            yield f"{key!r} is varied by the design already", ("factors", key)
+    for key in design.ranges:
+        if key in study.treatments or key == TUNING:
+            yield f"{key!r} has names for levels, so it has no range", ("design", "ranges", key)
+    if study.robustness is not None:
+        yield "robustness needs all levels with each other: a study without 'design'", (REPEATS,)
+
+
+def _faults_of_zip(study: Study, names: Sequence[str]) -> Iterator[Fault]:
+    for index, name in enumerate(names):
+        path = ("design", "zip", index)
+        if name not in study.factors:
+            yield f"{name!r} is not a factor; {hint(name, study.factors, 'factors')}", path
+        elif name in names[:index]:
+            yield f"{name!r} stands twice", path
+        elif names[0] in study.factors:
+            wanted, count = len(study.factors[names[0]]), len(study.factors[name])
+            if count != wanted:
+                yield f"{name!r} should have {wanted} levels as {names[0]!r}, not {count}", path
+
+
+def _faults_of_rows(rows: Sequence[Mapping[str, Level]]) -> Iterator[Fault]:
+    first: dict[tuple[Level, ...], int] = {}
+    for index, row in enumerate(rows):
+        path = ("design", "rows", index)
+        if not row:
+            yield "row should name a level of each factor", path
+        if row.keys() != rows[0].keys():
+            odd = sorted(row.keys() ^ rows[0].keys())
+            yield f"row should name the same factors as the first, but for {', '.join(odd)}", path
+            return
+        same = first.setdefault(tuple(row[key] for key in rows[0]), index)
+        if same != index:
+            yield f"row {index + 1} is row {same + 1} again", path
+
+
+def of_factors(study: Study) -> Iterator[Fault]:
+    """Names of treatments that do not exist, keys that two factors set, tuning without a rule."""
+    setters: dict[str, str] = {}
+    listed = keys_of(study.design, study.listed_rows)
+    for factor in dict.fromkeys([*study.factors, *listed]):
+        levels = _levels_of(study, factor)
+        named = study.treatments.get(factor)
+        if named is not None:
+            yield from _faults_of_name(study, factor)
+            for level in (level for level in levels if level not in named):
+                told = hint(str(level), named, "named")
+                yield f"{level!r} is not a treatment; {told}", _place(study, factor, level)
+        keys = {key for changes in (named or {}).values() for key in changes} or {factor}
+        for key in keys if factor != TUNING else ():
+            if setters.setdefault(key, factor) != factor:
+                yield f"{key!r} is set by two factors", _place(study, factor)
+    for key in study.changes:
+        if setters.get(key) in listed:
+            yield f"{key!r} is varied by the design; change 'design'", ("design",)
+    try:
+        refuse_keys_of_the_design(study.changes)
+    except ValueError as error:
+        yield str(error), ()
+    yield from _faults_of_tuning(study)
+    yield from of_size(study)
+
+
+def _faults_of_name(study: Study, factor: str) -> Iterator[Fault]:
+    """A treatment is a column of every table, so no other column is called so."""
+    measured = {name for model in DICTIONARY.values() for table in model.values() for name in table}
+    if factor in DESIGN or factor in measured or factor == TUNING:
+        what = "the design" if factor in DESIGN else "what is measured"
+        what = "the tuning" if factor == TUNING else f"a column of {what}"
+        yield f"a treatment cannot be called {factor!r}: {what} is", ("treatments", factor)
+
+
+def of_size(study: Study) -> Iterator[Fault]:
+    """A slip in a grid, or in how many persons there are, would take years to run."""
+    count, has_points = size(study), POINT in study.factors
+    most = MOST_POINTS if has_points else MOST_CELLS
+    if count > most:
+        how = "points or levels" if has_points else "levels, or draw points with 'design'"
+        problem = f"a part would have {count:,} cells, more than {most:,}; have fewer {how}"
+        yield problem, ("design",) if has_points else ("factors",)
+    elif (runs := runs_of(study)) > MOST_RUNS:
+        asked = "most_persons" if study.most_persons > study.persons else "persons"
+        is_trials = study.replications > study.most_persons
+        path: KeyPath = ("stop", asked) if asked == "most_persons" else (asked,)
+        problem = f"there would be {runs:,} runs, more than {MOST_RUNS:,}"
+        fewer = "have fewer persons, replications or levels"
+        yield f"{problem}; {fewer}", ("replications",) if is_trials else path
+
+
+def _levels_of(study: Study, factor: str) -> Sequence[Level]:
+    """The levels of a factor, declared or in rows; none for a range."""
+    listed = [row[factor] for row in study.listed_rows if factor in row]
+    return study.factors.get(factor, tuple(listed))
+
+
+def _place(study: Study, factor: str, level: Level = None) -> KeyPath:
+    return place_of(study, factor, level) or ("factors", factor)
+
+
+def _faults_of_tuning(study: Study) -> Iterator[Fault]:
+    levels, tuning = study.factors.get(TUNING, ()), study.tuning
+    if TUNING in study.factors and tuning is None:
+        yield "the factor 'tuning' needs a rule: the key 'tuning'", ("factors", TUNING)
+    for level in (level for level in levels if level not in (UNTUNED, TUNED)):
+        yield f"{level!r} is not a level of 'tuning': untuned, tuned", ("factors", TUNING)
+    if tuning is None:
+        return
+    if tuning.seed == study.seed:
+        yield (
+            "tuning needs a random seed of its own, for other persons than the study's",
+            ("tuning", "seed"),
+        )
+    if tuning.part not in study.parts:
+        told = hint(tuning.part, study.parts, "parts")
+        yield f"tuning.part {tuning.part!r} is not a part; {told}", ("tuning", "part")
+    for name in tuning.by:
+        yield from _fault_of_level(study, ("tuning", "by"), name, ())
+    for name, level in tuning.at.items():
+        yield from _fault_of_level(study, ("tuning", "at", name), name, (level,))
+
+
+def of_claims(study: Study) -> Iterator[Fault]:
+    """What was declared about factors and levels that the study does not have."""
+    yield from of_answer(study)
+    yield from of_robustness(study)
+    for name, comparison in study.comparisons.items():
+        yield from _faults_of_contrast(study, comparison, ("comparisons", name))
+    for name in study.hypotheses:
+        yield from _faults_of_hypothesis(study, name)
+    if study.predictions and study.answer is None:
+        if any(p.direction for p in study.predictions):
+            yield "a prediction is judged against the answer; declare one", ("predictions",)
+        return
+    for index, prediction in enumerate(study.predictions):
+        yield from _faults_of_prediction(study, prediction, ("predictions", index))
+
+
+def kept_claims(study: Study) -> Study:
+    """The study without what was declared about parts, factors or levels that are gone.
+
+    Predictions stay: of each is told that it was not run.
+    """
+    lost: dict[str, object] = {}
+    if any(of_answer(study)):
+        lost["answer"] = None
+    if "answer" in lost or any(of_robustness(study)):
+        lost["robustness"] = None
+    lost["comparisons"] = {
+        name: comparison
+        for name, comparison in study.comparisons.items()
+        if not any(_faults_of_contrast(study, comparison, ()))
+    }
+    rest = study.model_copy(update=lost)
+    kept = {n: h for n, h in rest.hypotheses.items() if not any(_faults_of_hypothesis(rest, n))}
+    return rest.model_copy(update={"hypotheses": kept})
+
+
+def of_answer(study: Study) -> Iterator[Fault]:
+    """Why the declared contrast cannot be computed."""
+    if study.answer is not None:
+        yield from _faults_of_contrast(study, study.answer, (ANSWER,))
+
+
+def _faults_of_contrast(study: Study, asked: Contrast, path: KeyPath) -> Iterator[Fault]:
+    if asked.part not in study.parts:
+        name, told = ".".join(map(str, (*path, "part"))), hint(asked.part, study.parts, "parts")
+        yield f"{name} {asked.part!r} is not a part; {told}", (*path, "part")
+    yield from _fault_of_level(study, (*path, "factor"), asked.factor, ())
+    if asked.factor in study.factors:
+        yield from _fault_of_level(study, (*path, "contrast"), asked.factor, asked.contrast)
+    ranges = study.design.ranges if study.design is not None else {}
+    if asked.over is not None and asked.over not in ranges:
+        yield from _fault_of_level(study, (*path, "over"), asked.over, ())
+    for name, level in asked.within.items():
+        yield from _fault_of_level(study, (*path, "within", name), name, (level,))
+    if asked.contrast[0] == asked.contrast[1]:
+        yield "contrast compares a level with itself", (*path, "contrast")
+    if asked.over is None or path != (ANSWER,):
+        yield from _fault_of_place(study, asked, path)
+
+
+def _fault_of_place(study: Study, asked: Contrast, path: KeyPath) -> Iterator[Fault]:
+    """The levels of all other factors have to be given, or what is meant is open."""
+    given = {asked.factor, asked.over, *asked.within, *together(study)}
+    for name, levels in study.factors.items():
+        if len(levels) > 1 and name not in given:
+            yield f"should run over {name!r} or be within a level of it", path
+
+
+def _faults_of_hypothesis(study: Study, name: str) -> Iterator[Fault]:
+    hypothesis, path = study.hypotheses[name], ("hypotheses", name)
+    asked = study.contrasts.get(hypothesis.comparison)
+    if asked is None:
+        told = hint(hypothesis.comparison, study.contrasts, "there are")
+        yield f"{hypothesis.comparison!r} is not a comparison; {told}", (*path, "comparison")
+        return
+    for factor, level in hypothesis.at.items():
+        yield from _fault_of_level(study, (*path, "at", factor), factor, (level,))
+    if asked.factor in hypothesis.at:
+        yield f"{asked.factor!r} is what is compared", (*path, "at", asked.factor)
+
+
+def of_stop(study: Study) -> Iterator[Fault]:
+    """Why a stopping rule cannot be applied."""
+    stop = study.stop
+    if stop is None:
+        return
+    if stop.comparison is not None and stop.comparison not in study.contrasts:
+        told = hint(stop.comparison, study.contrasts, "there are")
+        yield f"{stop.comparison!r} is not a comparison; {told}", ("stop", "comparison")
+    if stop.part is not None and stop.part not in study.parts:
+        told = hint(stop.part, study.parts, "parts")
+        yield f"stop.part {stop.part!r} is not a part; {told}", ("stop", "part")
+    if stop.most_persons < study.persons:
+        problem = f"most_persons should be at least the first batch, persons: {study.persons}"
+        yield problem, ("stop", "most_persons")
+
+
+def _faults_of_prediction(study: Study, prediction: Prediction, path: KeyPath) -> Iterator[Fault]:
+    assert study.answer is not None
+    factor = prediction.factor or study.answer.factor
+    contrast = prediction.contrast or ()
+    yield from _fault_of_level(study, (*path, "contrast"), factor, contrast)
+    for name, level in prediction.at.items():
+        yield from _fault_of_level(study, (*path, "at", name), name, (level,))
+    if contrast and contrast[0] == contrast[1]:
+        yield "contrast compares a level with itself", (*path, "contrast")
+    if prediction.direction == "same" and study.answer.smallest is None:
+        yield "'same' needs the answer's smallest effect", (*path, "direction")
+
+
+def of_robustness(study: Study) -> Iterator[Fault]:
+    """Why the contrast cannot be repeated."""
+    robustness = study.robustness
+    if robustness is None:
+        return
+    if study.answer is None:
+        yield "robustness repeats the answer's contrast; declare one", (REPEATS,)
+        return
+    over = study.answer.over
+    if over is None:
+        yield "robustness needs a factor that the answer runs over", (REPEATS,)
+        return
+    yield from _fault_of_level(study, (REPEATS, "at"), over, robustness.at or ())
+    if robustness.strategies and STRATEGY in study.factors:
+        yield f"{STRATEGY!r} is a factor already", (REPEATS, "strategies")
+
+
+def _fault_of_level(
+    study: Study, path: KeyPath, factor: str, levels: Sequence[Level]
+) -> Iterator[Fault]:
+    if factor not in study.factors:
+        yield f"{factor!r} is not a factor; {hint(factor, study.factors, 'factors')}", path
+        return
+    for level in levels:
+        if level not in study.factors[factor]:
+            told = hint(str(level), map(str, study.factors[factor]), "levels")
+            yield f"{level!r} is not a level of {factor!r}; {told}", path

@@ -1,0 +1,1 @@
+"""What everybody stands on: clock, random streams, recorder, configuration, errors."""

@@ -1,0 +1,488 @@
+"""Which key somebody meant: one beside it, one elsewhere in the file, or one by another name.
+
+What is wrong with plain data, in words: what pydantic found, said without Python.
+
+Read YAML 1.2 and check it against a pydantic model; mistakes are told by line and column.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationError
+from pydantic_core import CoreSchema
+from ruamel.yaml import YAML
+from ruamel.yaml.comments import CommentedMap, CommentedSeq
+from ruamel.yaml.error import MarkedYAMLError, YAMLError
+
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.suggestions import either, guess, listed, plain_name, unknown
+from dva_sim.kernel.units import as_number
+
+KeyPath = tuple[str | int, ...]
+
+_DEPTH = 4  # of keys in keys
+_MEANT = 3  # keys of one name that are told
+_UNITS = {
+    "s": "seconds",
+    "m": "metres",
+    "mps": "metres per second",
+    "hz": "hertz",
+    "bps": "bits per second",
+    "bytes": "bytes",
+    "deg": "degrees",
+    "rad": "radians",
+}
+
+
+@dataclass(frozen=True)
+class AlsoCalled:
+    """Names that people try for a key, beside the key itself: `Annotated[int, AlsoCalled("n")]`."""
+
+    names: tuple[str, ...]
+
+    def __init__(self, *names: str) -> None:
+        object.__setattr__(self, "names", names)
+
+
+def meant(path: KeyPath, value: Any, *models: Any) -> str:
+    """What to write instead of an unknown key: `did you mean 'x'?`, or what there is.
+
+    Args:
+        path: The key as it was given.
+        value: What it was given.
+        models: What the file may be; the first has the place of the key.
+    """
+    given, here = str(path[-1]), fields_at(models[0], path[:-1])
+    known = {} if isinstance(value, Mapping) else _every_name(models)
+    exact = [key for name, key in known.items() if plain_name(name) == plain_name(_dotted(path))]
+    if exact:
+        return _ask(given, exact)
+    beside = {name: name for name in here} | {
+        other: name for name, info in here.items() for other in _others(info)
+    }
+    near = guess(given, beside)
+    if near is not None:
+        return _ask(given, [beside[near]])
+    found = _elsewhere(path, known)
+    if found:
+        return _ask(given, found)
+    return f"known here: {listed(sorted(here), most=24)}" if here else ""
+
+
+def keys_of(model: Any) -> dict[str, tuple[str, ...]]:
+    """Every dotted key of a model, and what else people call it."""
+    return {key: _others(info) for key, info in _walk(model, "", _DEPTH)}
+
+
+def fields_at(model: Any, path: KeyPath) -> Mapping[str, Any]:
+    """The fields of the model that stands at `path` inside `model`, by name."""
+    for step in path:
+        if isinstance(step, int):
+            continue
+        info = _fields(model).get(step)
+        if info is not None:  # else a key that the user chose, inside a mapping to models
+            model = model_in(info.annotation)
+    return _fields(model)
+
+
+def model_in(annotation: Any) -> Any:
+    """The first pydantic model inside an annotation such as `tuple[Event, ...] | None`."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    for inner in getattr(annotation, "__args__", ()):
+        found = model_in(inner)
+        if found is not None:
+            return found
+    return None
+
+
+def _every_name(models: tuple[Any, ...]) -> dict[str, str]:
+    """All dotted keys by their names, and by what else they are called."""
+    known: dict[str, str] = {}
+    for key, others in (item for model in models for item in keys_of(model).items()):
+        for name in (key, *others):
+            known.setdefault(name, key)
+    return known
+
+
+def _elsewhere(path: KeyPath, known: Mapping[str, str]) -> list[str]:
+    """Keys in other places that are called so, or else the one most like it."""
+    last = plain_name(str(path[-1]))
+    names = {name: plain_name(name.rpartition(".")[2]) for name in known}
+    near = last if last in names.values() else guess(last, names.values())
+    same = list(dict.fromkeys(known[name] for name, end in names.items() if end == near))
+    least = min((key.count(".") for key in same), default=0)
+    return [key for key in same if key.count(".") == least][:_MEANT]
+
+
+def _dotted(path: KeyPath) -> str:
+    return ".".join(map(str, path))
+
+
+def _ask(given: str, keys: list[str]) -> str:
+    """The keys that may be meant, with their unit where another one was given."""
+    unit, other = keys[0].rpartition("_")[2], given.rpartition("_")[2]
+    told = f" (in {_UNITS[unit]})" if unit in _UNITS and other != unit else ""
+    return f"did you mean {either(map(repr, keys))}?{told}"
+
+
+def _walk(model: Any, above: str, depth: int) -> Iterator[tuple[str, Any]]:
+    for name, info in _fields(model).items():
+        yield f"{above}{name}", info
+        inner = model_in(info.annotation)
+        if inner is not None and depth > 1:
+            step = ".0" if "tuple" in str(info.annotation) else ""
+            yield from _walk(inner, f"{above}{name}{step}.", depth - 1)
+
+
+def _fields(model: Any) -> dict[str, Any]:
+    """Of a model, with those of what it takes its other keys from."""
+    further = getattr(model, "further_keys", None)
+    fields: dict[str, Any] = dict(getattr(model, "model_fields", {}))
+    return fields | (dict(further().model_fields) if further is not None else {})
+
+
+def _others(info: Any) -> tuple[str, ...]:
+    return tuple(n for m in info.metadata if isinstance(m, AlsoCalled) for n in m.names)
+
+
+_SHOWN = 60  # characters of a value
+
+# What a value should be, by what pydantic says that it is not.
+_KINDS = {
+    "float_type": "a number",
+    "int_type": "a whole number",
+    "string_type": "text",
+    "bool_type": "true or false",
+    "none_required": "null",
+}
+_PLAIN = ("bool", "int", "float", "str")
+_STRUCTURES = {
+    "tuple_type": "a list",
+    "list_type": "a list",
+    "dict_type": "a mapping of keys to values",
+    "model_type": "a mapping of keys to values",
+    "model_attributes_type": "a mapping of keys to values",
+}
+_BOUNDS = {
+    "greater_than": ("above", "gt"),
+    "greater_than_equal": ("at least", "ge"),
+    "less_than": ("below", "lt"),
+    "less_than_equal": ("at most", "le"),
+}
+
+
+def first_mistake(
+    model: type[BaseModel], data: Mapping[str, Any], found: Sequence[Any]
+) -> tuple[str, KeyPath]:
+    """The first mistake, and the path of the key that it is about.
+
+    Args:
+        model: What the data should be.
+        data: Plain data.
+        found: The errors of pydantic, at least one.
+    """
+    paths = [_path(e, data) for e in found]
+    told = [e for e, path in zip(found, paths, strict=True) if path == paths[0]]
+    return _explain(model, told, paths[0]), paths[0]
+
+
+def _path(problem: Any, data: Mapping[str, Any]) -> KeyPath:
+    """The path of a key, without what names one of several kinds that a value may be of."""
+    loc = problem["loc"]
+    if loc and loc[-1] in _PLAIN and problem["type"].endswith("_type"):
+        loc = loc[:-1]
+    return tuple(part for part in loc if not _is_tag(part, data, loc))
+
+
+def _is_tag(part: str | int, data: Any, loc: Sequence[str | int]) -> bool:
+    """Whether `part` of an error location names a union member rather than a key."""
+    for step in loc:
+        inside = isinstance(data, Mapping) and step in data
+        inside = inside or (isinstance(data, list) and isinstance(step, int) and step < len(data))
+        if step == part:
+            # The last part is a missing key where there are keys.
+            is_key = step == loc[-1] and isinstance(data, Mapping)
+            return not inside and not is_key and isinstance(step, str)
+        if inside:
+            data = data[step]
+    return False
+
+
+def _explain(model: type[BaseModel], problems: Sequence[Any], path: KeyPath) -> str:
+    """One mistake in words, from all that was found at its place: one for each kind allowed."""
+    key, first = ".".join(str(p) for p in path), problems[0]
+    if first["type"] == "extra_forbidden":
+        hint = meant(path, first["input"], model)
+        return f"unknown key {key!r}; {hint}" if hint else f"unknown key {key!r}"
+    if first["type"] == "union_tag_not_found":
+        return f"missing key '{key}.{_tag(first)}'"
+    if first["type"] == "union_tag_invalid":
+        tag = first["ctx"]["tag"]
+        return f"{key}: {unknown(_tag(first), tag, _quoted(first['ctx']['expected_tags']))}"
+    if first["type"] == "missing":
+        item = path[-1]
+        if isinstance(item, int):
+            return f"{key.removesuffix(f'.{item}')}: should have at least {item + 1} items"
+        return f"missing key {key!r}"
+    message = _in_words(problems)
+    message += f"{_given(first, message)}{_instead(model, problems, path)}"
+    return f"{key}: {message}" if key else message
+
+
+def _given(problem: Any, message: str) -> str:
+    """The value there is, unless it is long or has been told already."""
+    given = problem["input"]
+    if given is None:
+        return ", not null" if problem["type"] != "value_error" else ""
+    shown = repr(given)
+    if not isinstance(given, str | int | float | bool):
+        return ""
+    if problem["type"] == "value_error" and shown in message:
+        return ""
+    return f", not {shown if len(shown) <= _SHOWN else shown[:_SHOWN] + '...'}"
+
+
+def _instead(model: type[BaseModel], problems: Sequence[Any], path: KeyPath) -> str:
+    """What to write instead, where that can be guessed."""
+    given, kinds = problems[0]["input"], {problem["type"] for problem in problems}
+    if isinstance(given, str) and "float_type" in kinds:
+        number = as_number(str(path[-1]) if path else "", given)
+        return f"; write {number}" if number else ""
+    if isinstance(given, str) and "literal_error" in kinds:
+        near = guess(given, _choices(problems[0]))
+        return f"; did you mean {near!r}?" if near is not None else ""
+    if kinds & {"model_type", "model_attributes_type"} and not isinstance(given, list | dict):
+        keys = list(fields_at(model, path))
+        return f", such as {'.'.join(map(str, (*path, keys[0])))}" if keys and path else ""
+    return ""
+
+
+def _in_words(problems: Sequence[Any]) -> str:
+    """What would be right, in words that need no Python."""
+    kinds = {problem["type"]: problem for problem in problems}
+    first = kinds.get("finite_number", problems[0])
+    if first["type"] in ("too_short", "too_long"):
+        few = first["type"] == "too_short"
+        count = first["ctx"]["min_length" if few else "max_length"]
+        items = "item" if count == 1 else "items"
+        return f"should have at {'least' if few else 'most'} {count} {items}"
+    if first["type"] in _BOUNDS:
+        word, name = _BOUNDS[first["type"]]
+        return f"should be {word} {first['ctx'][name]:g}"
+    if first["type"] == "literal_error":
+        return f"should be {either(_choices(first))}"
+    if first["type"].startswith("int_") and isinstance(first["input"], float):
+        return "should be a whole number, without a point"
+    if first["type"] in _STRUCTURES:
+        return f"should be {_STRUCTURES[first['type']]}"
+    allowed = [word for kind, word in _KINDS.items() if kind in kinds]
+    if "float_type" in kinds and "int_type" in kinds:
+        allowed.remove(_KINDS["int_type"])  # which is a number, too
+    if first["type"] in _KINDS and allowed:
+        return f"should be {_or(allowed)}"
+    message: str = first["msg"].removeprefix("Value error, ").removeprefix("Input ")
+    return message[0].lower() + message[1:]
+
+
+def _or(words: Sequence[str]) -> str:
+    """`a number, text, or true or false`."""
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])}, or {words[-1]}"
+
+
+def _choices(problem: Any) -> list[str]:
+    """The words that a value should be one of."""
+    return _quoted(problem["ctx"]["expected"])
+
+
+def _quoted(text: str) -> list[str]:
+    return re.findall(r"'([^']*)'", text)
+
+
+def _tag(problem: Any) -> str:
+    """The key whose value says of which kind a mapping is."""
+    return str(problem["ctx"]["discriminator"]).strip("'")
+
+
+M = TypeVar("M", bound=BaseModel)
+Fail = Callable[[str, KeyPath], ConfigError]
+"""Makes the error for a problem at a key path."""
+
+
+def _make_strict(schema: Any) -> None:
+    """Let no number in a schema be read from something else; lists and paths may be."""
+    if isinstance(schema, dict):
+        if schema.get("type") in ("int", "float", "bool"):
+            schema["strict"] = True
+        for key in schema.keys() - {"default", "metadata"}:
+            _make_strict(schema[key])
+    elif isinstance(schema, list | tuple):
+        for inner in schema:
+            _make_strict(inner)
+
+
+class Config(BaseModel):
+    """Base of all configuration: unknown keys are mistakes, values do not change.
+
+    Numbers are numbers: neither `true` nor `"2"` is one, and `2.0` is no whole number.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    def __repr_args__(self) -> Iterator[tuple[str | None, Any]]:
+        """What is otherwise than by default, so that a whole scenario fits a screen."""
+        fields = type(self).model_fields
+        for name, value in super().__repr_args__():
+            info = fields.get(name or "")
+            if info is None or value != info.get_default(call_default_factory=True):
+                yield name, value
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """The schema of the model, with its numbers and truth values strict."""
+        schema = handler(source)
+        _make_strict(schema)
+        return schema
+
+
+MOST_VALUES = 20_000  # in one file
+
+
+@dataclass(frozen=True)
+class Document:
+    """A parsed file: plain data, and the place of every key.
+
+    Attributes:
+        data: Plain dictionaries, lists and scalars.
+        file: Where it was read.
+        places: Line and column (from 1) of each key path.
+    """
+
+    data: dict[str, Any]
+    file: Path
+    places: Mapping[KeyPath, tuple[int, int]] = field(default_factory=dict)
+
+    def error(self, problem: str, path: KeyPath = ()) -> ConfigError:
+        """The mistake at `path`, or at its nearest ancestor with a known place."""
+        while path and path not in self.places:
+            path = path[:-1]
+        line, column = self.places.get(path, (None, None))
+        return ConfigError(problem, self.file, line, column)
+
+
+def read_text(path: Path) -> str:
+    """The text of a file in UTF-8.
+
+    Raises:
+        ConfigError: unreadable, or a byte that such a text cannot have, with its place.
+    """
+    try:
+        data = path.read_bytes()
+        return data.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
+    except OSError as error:
+        raise ConfigError(f"cannot be read: {error.strerror}", path) from error
+    except UnicodeDecodeError as error:
+        before = data[: error.start].decode("utf-8", "replace")
+        line, column = before.count("\n") + 1, len(before) - (before.rfind("\n") + 1) + 1
+        raise ConfigError("is not text in UTF-8", path, line, column) from error
+
+
+def load_yaml(path: str | Path) -> Document:
+    """Read a mapping from a YAML file.
+
+    Raises:
+        ConfigError: unreadable, not YAML, a key twice, or not a mapping.
+    """
+    path = Path(path)
+    text = read_text(path)
+    try:
+        tree = YAML(typ="rt", pure=True).load(text)
+    except MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        problem = (error.problem or "is not valid YAML").split("\n")[0]
+        line, column = (mark.line + 1, mark.column + 1) if mark else (None, None)
+        raise ConfigError(problem, path, line, column) from error
+    except YAMLError as error:
+        raise ConfigError(f"is not valid YAML: {str(error).splitlines()[0]}", path) from error
+    except RecursionError:
+        raise ConfigError("is nested too deeply", path) from None
+    except ValueError as error:  # such as the date 2001-13-32, or a number of 5000 digits
+        raise ConfigError(f"has a value that cannot be read: {error}", path) from error
+    if not isinstance(tree, CommentedMap):
+        raise ConfigError("should be a mapping of keys to values", path, 1, 1)
+    places: dict[KeyPath, tuple[int, int]] = {(): (1, 1)}
+    try:
+        data = _plain(tree, (), places)
+    except _TooMuchError as error:
+        raise ConfigError(str(error), path) from None
+    except RecursionError:
+        raise ConfigError("is nested too deeply", path) from None
+    assert isinstance(data, dict)
+    return Document(data, path, places)
+
+
+class _TooMuchError(ValueError):
+    """A few aliases of aliases can stand for more values than any memory holds."""
+
+
+def _plain(node: Any, path: KeyPath, places: dict[KeyPath, tuple[int, int]]) -> Any:
+    """Plain data without ruamel's types; records the place of every key on the way."""
+    if len(places) > MOST_VALUES:
+        raise _TooMuchError(f"has more than {MOST_VALUES} values, aliases counted")
+    if isinstance(node, CommentedMap):
+        out = {}
+        for key, value in node.items():
+            line, column = node.lc.key(key)
+            places[(*path, str(key))] = (line + 1, column + 1)
+            out[str(key)] = _plain(value, (*path, str(key)), places)
+        return out
+    if isinstance(node, CommentedSeq):
+        for index in range(len(node)):
+            line, column = node.lc.item(index)
+            places[(*path, index)] = (line + 1, column + 1)
+        return [_plain(value, (*path, index), places) for index, value in enumerate(node)]
+    if isinstance(node, bool) or node is None:
+        return node
+    for kind in (int, float, str):
+        if isinstance(node, kind):
+            return kind(node)
+    return node
+
+
+def parse_scalar(text: str) -> Any:
+    """What `text` would be as a value in YAML: `--set seed=3` gives the number 3."""
+    try:
+        return _plain(YAML(typ="safe", pure=True).load(text), (), {})
+    except (YAMLError, ValueError, RecursionError) as error:
+        raise ConfigError(f"value {text[:80]!r} is not valid YAML") from error
+
+
+def validate(
+    model: type[M],
+    data: Mapping[str, Any],
+    error: Fail | None = None,
+) -> M:
+    """Build `model` from `data`.
+
+    Args:
+        model: The pydantic model.
+        data: Plain data.
+        error: Makes the error for a problem at a key path; normally `Document.error`.
+
+    Raises:
+        ConfigError: the first mistake, with the key and what would be right.
+    """
+    try:
+        return model.model_validate(data)
+    except ValidationError as problems:
+        text, path = first_mistake(model, data, problems.errors(include_url=False))
+        raise (error or _unplaced)(text, path) from None
+
+
+def _unplaced(problem: str, path: KeyPath) -> ConfigError:
+    return ConfigError(problem)

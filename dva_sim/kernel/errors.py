@@ -1,0 +1,103 @@
+"""What the program ends with: one number for each way in which a command can end.
+
+Errors that a caller may handle; everything else is a bug and keeps its traceback.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from pathlib import Path
+from typing import ClassVar, Final
+
+
+class ExitCode(IntEnum):
+    """How a command ended, as a shell and CI see it."""
+
+    OK = 0
+    DOES_NOT_HOLD = 1
+    MISTAKE = 2
+    RUNS_FAILED = 3
+    GATE_FAILED = 4
+    INTERRUPTED = 130
+    READER_GONE = 141
+
+    @property
+    def meaning(self) -> str:
+        """In a few words, as help and README say it."""
+        return _MEANINGS[self]
+
+
+_MEANINGS: Final = {
+    ExitCode.OK: "done",
+    ExitCode.DOES_NOT_HOLD: "a file, an agent or the emulated link that was checked is not valid",
+    ExitCode.MISTAKE: "a mistake in the call or in a file, or what cannot be read or written",
+    ExitCode.RUNS_FAILED: "runs failed; the others are kept, and the same command tries again",
+    ExitCode.GATE_FAILED: "a gate failed: `compare --fail-if` holds, or `validate` misses",
+    ExitCode.INTERRUPTED: "stopped by Ctrl-C; what is finished is kept (`live` ends with 0)",
+    ExitCode.READER_GONE: "whoever read the output has gone, as in `| head`",
+}
+
+
+class DvaSimError(Exception):
+    """Base of all errors a user can cause and mend.
+
+    Attributes:
+        exit_code: What the command line ends with.
+    """
+
+    exit_code: ClassVar[ExitCode] = ExitCode.MISTAKE
+
+
+class RunsFailed(DvaSimError):
+    """Runs failed, so there is nothing to go on with; the input was as it should be."""
+
+    exit_code = ExitCode.RUNS_FAILED
+
+
+class ConfigError(DvaSimError):
+    """Bad input: one line that says where, what, and what would be right.
+
+    Args:
+        problem: What is wrong and what would be right, without a trailing full stop.
+        file: The file that holds the mistake, if one does.
+        line: Line in that file, counted from 1.
+        column: Column in that line, counted from 1.
+        keys: Which of the keys that were changed are at fault, if the file alone is valid.
+    """
+
+    def __init__(
+        self,
+        problem: str,
+        file: str | Path | None = None,
+        line: int | None = None,
+        column: int | None = None,
+        keys: tuple[str, ...] = (),
+    ) -> None:
+        self.keys = keys
+        self.problem = problem
+        self.file = None if file is None else str(file)
+        self.line = line
+        self.column = column
+        super().__init__(problem)
+
+    def __str__(self) -> str:
+        place = ":".join(str(p) for p in (self.file, self.line, self.column) if p is not None)
+        return f"{place}: {self.problem}" if place else self.problem
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return type(self), (self.problem, self.file, self.line, self.column, self.keys)
+
+
+ERROR = "error: "
+_LONGEST = 160  # characters of a word
+
+
+def error_line(problem: object) -> str:
+    """A mistake as the command line says it: one line, whatever a name or a file in it holds."""
+    words = (
+        word if len(word) <= _LONGEST else f"{word[:_LONGEST]}..." for word in str(problem).split()
+    )
+    text = " ".join(words)
+    return ERROR + "".join(
+        c if c.isprintable() else c.encode("unicode_escape").decode() for c in text
+    )

@@ -1,0 +1,153 @@
+"""Configurations with some keys changed, as by `--set`; a mistake is told where it was made."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from dva_sim.kernel.config import Document, Fail, M, parse_scalar, validate
+from dva_sim.kernel.errors import ConfigError
+
+_SHOWN = 80  # characters of a setting
+
+
+def parse_changes(pairs: Iterable[str]) -> dict[str, Any]:
+    """`key=value` pairs, as given on the command line, as a mapping.
+
+    Raises:
+        ConfigError: a pair without `=`, or a value that is not YAML.
+    """
+    changes = {}
+    for pair in pairs:
+        key, equals, value = pair.partition("=")
+        if not equals or not key.strip():
+            raise ConfigError(f"--set {pair!r} should be key=value, such as seed=2")
+        try:
+            changes[key.strip()] = parse_scalar(value)
+        except ConfigError as error:
+            raise ConfigError(f"--set {_cut(pair)}: {error.problem}") from None
+    return changes
+
+
+def build(
+    model: type[M],
+    source: Document | Mapping[str, Any],
+    changes: Mapping[str, Any],
+    complete: Callable[[M, Fail], M],
+    locate: Callable[[dict[str, Any], Sequence[Path]], object],
+) -> M:
+    """A configuration with some keys changed, whose mistakes are told with their place.
+
+    Args:
+        model: What it is.
+        source: A document or plain data.
+        changes: New values by dotted key; a number chooses an item of a list.
+        complete: Judges what the model alone cannot, and adds what follows from it.
+        locate: Lets files that the data names be found from the folders given.
+
+    Raises:
+        ConfigError: an unknown key, a wrong type, a value out of range, or what `complete` finds.
+            It has a place if the file is at fault, and the keys if changes of it are.
+    """
+
+    def make(some: Mapping[str, Any]) -> M:
+        return _built(model, source, some, complete, locate)
+
+    try:
+        return make(changes)
+    except ConfigError as error:
+        raise blame(error, changes, make, source) from None
+
+
+def _built(
+    model: type[M],
+    source: Document | Mapping[str, Any],
+    changes: Mapping[str, Any],
+    complete: Callable[[M, Fail], M],
+    locate: Callable[[dict[str, Any], Sequence[Path]], object],
+) -> M:
+    document = source if isinstance(source, Document) else None
+    data = copy.deepcopy(dict(document.data if document else source))  # type: ignore[arg-type]
+    for key, value in changes.items():
+        set_key(data, key, value)
+    error = (lambda problem, _: ConfigError(problem)) if document is None else document.error
+    locate(data, [document.file.parent] if document else [])
+    return complete(validate(model, data, error), error)
+
+
+def blame(
+    error: ConfigError,
+    changes: Mapping[str, Any],
+    make: Callable[[Mapping[str, Any]], object],
+    source: Document | Mapping[str, Any] | None = None,
+) -> ConfigError:
+    """The same mistake with the changes that make it, and without a place in a file that is valid.
+
+    Args:
+        error: A mistake of all changes together.
+        changes: New values by dotted key.
+        make: Makes what is wanted of some of the changes; raises `ConfigError`.
+        source: The file that is changed.
+    """
+
+    def mistake(some: Mapping[str, Any]) -> ConfigError | None:
+        try:
+            make(some)
+        except ConfigError as found:
+            return found
+        return None
+
+    if not changes or mistake({}) is not None:
+        return error
+    keys = [k for k in changes if mistake({o: v for o, v in changes.items() if o != k}) is None]
+    for key, value in changes.items() if not keys else ():
+        own = mistake({key: value})
+        if own is not None:  # one of several: the others can wait
+            error, keys = own, [key]
+            break
+    is_here = isinstance(source, Document) and error.file == str(source.file)
+    place = (None, None, None) if is_here else (error.file, error.line, error.column)
+    return ConfigError(error.problem, *place, tuple(keys) or tuple(changes))
+
+
+def set_by(pairs: Sequence[str], error: ConfigError) -> ConfigError:
+    """A mistake of changes that were given as `--set key=value`, told with these words."""
+    given = {pair.partition("=")[0].strip(): pair for pair in pairs}
+    if error.file is not None or not error.keys:
+        return error
+    told = ", ".join(f"--set {_cut(given[key])}" for key in error.keys)
+    return ConfigError(f"{told}: {error.problem.removeprefix(f'{error.keys[0]}: ')}")
+
+
+def _cut(pair: str) -> str:
+    return pair if len(pair) <= _SHOWN else f"{pair[:_SHOWN]}..."
+
+
+def set_key(data: dict[str, Any], key: str, value: Any) -> None:
+    """Change one value by dotted key, making the mappings on the way.
+
+    Raises:
+        ConfigError: a part of the key names something that is not there, or holds no keys.
+    """
+    node: Any = data
+    above, names = "", key.split(".")
+    for depth, name in enumerate(names, 1):
+        place: Any = _place_in(node, name, above, key)
+        if depth == len(names):
+            node[place] = value
+        else:
+            node = node[place] if isinstance(node, list) else node.setdefault(place, {})
+            above = name
+
+
+def _place_in(node: Any, name: str, above: str, key: str) -> str | int:
+    """Where a part of a dotted key leads: a key of a mapping, or an item of a list."""
+    if isinstance(node, dict):
+        return name
+    if not isinstance(node, list):
+        raise ConfigError(f"unknown key {key!r}: {above!r} holds no keys")
+    if not name.isdigit() or int(name) >= len(node):
+        raise ConfigError(f"unknown key {key!r}: {above!r} has items 0 to {len(node) - 1}")
+    return int(name)

@@ -1,0 +1,235 @@
+"""Classes of users by name: the shipped ones, one in a file, or an installed package's."""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+import math
+import sys
+import traceback
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
+from types import ModuleType
+from typing import Any, Final, Generic, TypeVar
+
+from dva_sim.kernel import resources
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.suggestions import hint, unknown
+
+T = TypeVar("T")
+A = TypeVar("A")
+
+FAILURES: Final = (Exception, SystemExit)  # what is wrong with a plug-in: it may not end us either
+
+
+@dataclass(frozen=True)
+class Plugins(Generic[T]):
+    """One kind of thing that users may add.
+
+    Attributes:
+        kind: What it is called: `policy`.
+        base: What its classes derive from.
+        shipped: What we bring, by name.
+        folder: Where files are looked for last: `agents/policies`.
+        group: Entry points of installed packages: `dva_sim.policies`.
+        key: What names one in a configuration: `dispatch.policy`.
+        needs: A method that a class must define, as it is written in a message.
+        public: Where users import `base` from.
+        hidden: Shipped names that a configuration cannot use.
+    """
+
+    kind: str
+    base: type[T]
+    shipped: Mapping[str, Callable[..., T]]
+    folder: str
+    group: str
+    key: str
+    needs: str
+    public: str
+    hidden: frozenset[str] = frozenset()
+
+    def known(self) -> list[str]:
+        """Names that a configuration can use: shipped and installed ones; files come on top."""
+        shipped = self.shipped.keys() - self.hidden
+        return sorted(shipped | {entry.name for entry in self.installed()})
+
+    def installed(self) -> list[EntryPoint]:
+        """What installed packages offer."""
+        return sorted(entry_points(group=self.group), key=lambda entry: entry.name)
+
+    def files(self) -> list[Path]:
+        """Files in `folder`, whose classes can be named without their path."""
+        found = [path for root in resources.roots() for path in (root / self.folder).glob("*.py")]
+        return sorted({path.resolve(): None for path in found})
+
+    def find(self, name: str, base: Path | None = None) -> Callable[..., T]:
+        """The class that a name means.
+
+        Args:
+            name: A shipped name, a class in a file such as `mine.py:Mine`, or the name under
+                which an installed package offers one.
+            base: Folder that a file is looked for in first; then the working folder, and
+                `folder`.
+
+        Raises:
+            ConfigError: there is none, or its file or package cannot be loaded, or it is of
+                another kind. The line says what would be right.
+        """
+        return self.shipped.get(name) or self._from_file(name, base) or self._installed(name)
+
+    def make(
+        self, name: str, factory: Callable[..., T], options: Mapping[str, Any], *given: Any
+    ) -> T:
+        """Make one of a class that was found, from options and from what it is always given.
+
+        Raises:
+            ConfigError: an option is unknown or bad, or it cannot be made.
+        """
+        self._check_options(name, factory, options, len(given))
+        return self.ask(name, lambda: factory(*given, **options))
+
+    def ask(self, name: str, what: Callable[[], A]) -> A:
+        """Do what runs code of one that was found, and tell what is wrong with that.
+
+        Raises:
+            ConfigError: it fails, or ends the program.
+        """
+        try:
+            return what()
+        except ConfigError as error:
+            raise ConfigError(f"{self.kind} {name!r}: {error}") from None
+        except FAILURES as error:
+            problem = f"{self.kind} {name!r} cannot be made: {said(error)}"
+            raise ConfigError(problem) from error
+
+    def _check_options(
+        self, name: str, factory: Callable[..., T], options: Mapping[str, Any], given: int
+    ) -> None:
+        parameters = list(inspect.signature(factory).parameters.values())[given:]
+        if any(p.kind is p.VAR_KEYWORD for p in parameters):
+            return
+        known = [p.name for p in parameters if p.kind not in (p.POSITIONAL_ONLY, p.VAR_POSITIONAL)]
+        for option in options:
+            if option not in known:
+                there = hint(option, known) if known else "it has none"
+                raise ConfigError(f"{self.kind} {name!r} has no option {option!r}; {there}")
+
+    # --- files -------------------------------------------------------------------------
+
+    def _from_file(self, name: str, base: Path | None) -> type[T] | None:
+        """The class that `file.py:Class` means; None if the name is not of that form."""
+        file, colon, wanted = name.rpartition(":")
+        if not colon and name.endswith(".py"):
+            raise ConfigError(f"{self.kind} {name!r} should name a class too, as {name}:Mine")
+        if not colon or not file.endswith(".py"):
+            return None
+        path = self._find_file(name, file, base)
+        module = _run(path, self.kind)
+        found = vars(module).get(wanted)
+        if found is None:
+            there = [n for n, c in vars(module).items() if _is_own_class(c, module)]
+            problem = f"there is no class {wanted!r} in {path}; {hint(wanted, there, 'classes')}"
+            raise ConfigError(f"{self.kind} {name!r}: {problem}")
+        return self._right_class(name, found)
+
+    def _find_file(self, name: str, file: str, base: Path | None) -> Path:
+        folders = [] if base is None else [base]
+        for root in resources.roots():
+            folders += [root, root / self.folder]
+        for folder in folders:
+            if resources.is_file(folder / file):
+                return (folder / file).resolve()
+        near = ", ".join(dict.fromkeys(str(folder) for folder in [base or Path.cwd(), Path.cwd()]))
+        problem = f"file {file!r} not found; looked in {near} and {self.folder}"
+        raise ConfigError(f"{self.kind} {name!r}: {problem}")
+
+    # --- packages ----------------------------------------------------------------------
+
+    def _installed(self, name: str) -> type[T]:
+        """The class that an installed package offers under a name."""
+        offers = {entry.name: entry for entry in self.installed()}
+        if name not in offers:
+            problem = unknown(self.kind, name, self.known())
+            more = "" if problem.endswith("?") else "; or a file: mine.py:Mine"
+            raise ConfigError(problem + more)
+        return self._right_class(name, self._offered(name, offers[name]))
+
+    def _offered(self, name: str, entry: EntryPoint) -> Any:
+        try:
+            return entry.load()
+        except FAILURES as error:
+            problem = f"{entry.value} cannot be loaded: {said(error)}"
+            raise ConfigError(f"{self.kind} {name!r}: {problem}") from error
+
+    def _right_class(self, name: str, found: Any) -> type[T]:
+        base = self.base
+        if not (isinstance(found, type) and issubclass(found, base)):
+            wanted = f"should be a class derived from {self.public}"
+            raise ConfigError(f"{self.kind} {name!r} is not a {self.kind}; {wanted}")
+        method = self.needs.partition("(")[0]
+        if getattr(found, method) is getattr(base, method):
+            raise ConfigError(f"{self.kind} {name!r} has no {self.needs}; should define it")
+        return found
+
+
+class Guard:
+    """Asks a plug-in in a run; what it gets wrong is counted, and whoever asks goes on without.
+
+    Attributes:
+        failures: How often there was no answer that is one.
+        first_failure: What was wrong first, in a line.
+    """
+
+    failures: int
+    first_failure: str
+
+    def _answer(self, ask: Callable[..., Any], *given: Any) -> tuple[float, float] | None:
+        """Two finite numbers, or None."""
+        try:
+            one, other = ask(*given)
+            if math.isfinite(one) and math.isfinite(other):
+                return float(one), float(other)
+            self._count(f"answers {one!r}, {other!r}")
+        except FAILURES as error:
+            self._count(said(error))
+        return None
+
+    def _count(self, problem: str) -> None:
+        self.failures += 1
+        self.first_failure = self.first_failure or problem
+
+
+def said(error: BaseException) -> str:
+    """An error in one line."""
+    text = " ".join(str(error).split())
+    return f"{type(error).__name__}: {text}" if text else type(error).__name__
+
+
+def _run(path: Path, kind: str) -> ModuleType:
+    """Run a file as a module of its own name, so that two files named alike do not meet."""
+    unique = f"dva_sim_{kind}_{hashlib.sha256(bytes(path)).hexdigest()[:16]}"
+    module = ModuleType(unique)
+    module.__file__ = str(path)
+    sys.modules[unique] = module  # dataclasses look their module up there
+    try:
+        exec(compile(path.read_bytes(), str(path), "exec"), vars(module))
+    except SyntaxError as error:
+        raise ConfigError(f"is not valid Python: {error.msg}", path, error.lineno) from None
+    except OSError as error:
+        raise ConfigError(f"cannot be read: {error.strerror or error}", path) from None
+    except FAILURES as error:
+        raise ConfigError(f"cannot be loaded: {said(error)}", path, _line(error, path)) from error
+    return module
+
+
+def _is_own_class(value: object, module: ModuleType) -> bool:
+    return isinstance(value, type) and value.__module__ == module.__name__
+
+
+def _line(error: BaseException, path: Path) -> int | None:
+    """The last line of the file that the error came through."""
+    frames = traceback.extract_tb(error.__traceback__)
+    lines = [frame.lineno for frame in frames if frame.filename == str(path)]
+    return lines[-1] if lines else None

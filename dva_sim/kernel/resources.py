@@ -1,0 +1,164 @@
+"""Find what users edit: worlds, agents, experiments and the protocol, by path or by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import cache
+from pathlib import Path
+from typing import Final, NamedTuple
+
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.suggestions import guess, hint
+
+_PACKAGE = Path(__file__).parent.parent
+FOLDERS = ("protocol", "worlds", "agents", "experiments")
+REGISTRATION = ".registration.yaml"  # ending of a file that belongs to the study beside it
+_RESULTS = "manifest.json"  # of a results folder
+
+
+class Kind(NamedTuple):
+    """What is found in one folder.
+
+    Attributes:
+        word: What such a file is called.
+        command: What does something with it, if a command does.
+    """
+
+    word: str
+    command: str = ""
+
+
+KINDS: Final = {
+    "experiments": Kind("study", "dva-sim run"),
+    "experiments/scenarios": Kind("scenario", "dva-sim episode"),
+    "experiments/validation": Kind("file"),
+    "worlds": Kind("site", "dva-sim site show"),
+    "agents/robots": Kind("robot"),
+    "agents/phones": Kind("phone"),
+    "agents/accelerometers": Kind("accelerometer"),
+    "agents/people": Kind("profile of people"),
+}
+
+
+def roots() -> list[Path]:
+    """Folders that may hold `worlds/`, `agents/`, ...: working folder, source tree, wheel."""
+    return [Path.cwd(), *_installed()]
+
+
+@cache
+def _installed() -> tuple[Path, ...]:
+    source = _PACKAGE.parent
+    tree = (source,) if (source / "pyproject.toml").is_file() else ()
+    return *tree, _PACKAGE / "_data"
+
+
+def available(folder: str, pattern: str = "*.yaml") -> dict[str, Path]:
+    """All files of a kind by name; a nearer folder hides a farther one of the same name."""
+    names: dict[str, Path] = {}
+    for root in roots():
+        for path in sorted((root / folder).glob(pattern)):
+            if not path.name.endswith(REGISTRATION):
+                names.setdefault(path.stem, path)
+    return names
+
+
+def is_there(name: str, folder: str) -> bool:
+    """Whether there is a file of that name, without reading whole folders."""
+    return any(is_file(root.joinpath(folder, f"{name}.yaml")) for root in roots())
+
+
+def find(
+    name: str,
+    folder: str,
+    suffix: str = ".yaml",
+    base: Path | None = None,
+    is_asked: bool = False,
+) -> Path:
+    """The file that `name` means: a path (also relative to `base`), or a name in `folder`.
+
+    Args:
+        name: `experiments/drive.yaml`, `drive.yaml` or just `drive`.
+        folder: Folder below each root, for example `experiments` or `experiments/scenarios`.
+        suffix: Ending that a bare name stands for.
+        base: Folder of the file that mentions `name`.
+        is_asked: Whether a user asks for this one to be used, who may want another command.
+
+    Raises:
+        ConfigError: nothing of that name; the message says what was meant, or what there is.
+    """
+    for candidate in _candidates(name, folder, suffix, base):
+        if is_file(candidate):
+            return candidate
+    problem = _Missing(name, folder, sorted(available(folder, f"*{suffix}")), is_asked)
+    raise ConfigError(problem.is_folder() or problem.is_other() or problem.is_nothing())
+
+
+class _Missing(NamedTuple):
+    """A name that no file of its kind has."""
+
+    name: str
+    folder: str
+    known: list[str]
+    is_asked: bool
+
+    @property
+    def kind(self) -> str:
+        return KINDS.get(self.folder, Kind(Path(self.folder).name.removesuffix("s"))).word
+
+    def is_folder(self) -> str:
+        """That it is the name of a folder, and what to do with it."""
+        path = Path(self.name)
+        if not self.name or not _is_there(path.is_dir):
+            return ""
+        if is_file(path / _RESULTS):
+            return f"{self.name!r} is a results folder, not a {self.kind}; try: dva-sim show {path}"
+        return f"{self.name!r} is a folder; give the file of a {self.kind}, or its name"
+
+    def is_other(self) -> str:
+        """That it, or a name most like it, is that of something else."""
+        others = {folder: kind for folder, kind in KINDS.items() if folder != self.folder}
+        for folder, kind in others.items():
+            if is_there(self.name, folder):
+                problem = f"{self.name!r} is a {kind.word}, not a {self.kind}"
+                return problem + self._try(kind, self.name)
+        for folder, kind in others.items() if not guess(self.name, self.known) else ():
+            near = guess(self.name, available(folder))
+            if near is not None and kind.command:
+                problem = f"{self.kind} {self.name!r} not found"
+                meant = f"did you mean the {kind.word} {near!r}?"
+                return f"{problem}; {meant}{self._try(kind, near).replace('; try', ' Try')}"
+        return ""
+
+    def is_nothing(self) -> str:
+        """What there is instead."""
+        told = hint(Path(self.name).stem, self.known, "available")
+        return f"{self.kind} {self.name!r} not found; {told}"
+
+    def _try(self, kind: Kind, name: str) -> str:
+        return f"; try: {kind.command} {name}" if kind.command and self.is_asked else ""
+
+
+def is_file(path: Path) -> bool:
+    """Whether there is such a file; what nothing can be called is none."""
+    return _is_there(path.is_file)
+
+
+def _is_there(look: Callable[[], bool]) -> bool:
+    """What nothing can be called, such as a name of a thousand letters, is not there."""
+    try:
+        return look()
+    except (OSError, ValueError):
+        return False
+
+
+def _candidates(name: str, folder: str, suffix: str, base: Path | None) -> Iterator[Path]:
+    path = Path(name)
+    is_path = bool(path.suffix) or path.is_absolute()
+    if base is not None and is_path:
+        yield base / path
+    if is_path:
+        yield path
+    for root in roots():
+        if is_path:
+            yield root / path
+        yield root / folder / (name if name.endswith(suffix) else name + suffix)

@@ -1,0 +1,209 @@
+"""One teleoperation session beside TCP flows on one congested link: what came when, what was taken.
+
+Who drives does not change what is sent, so the network can be simulated first and the drive
+afterwards, with the fates of commands and pictures as they were.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from dva_sim.kernel.clock import Clock
+from dva_sim.kernel.config import Config
+from dva_sim.kernel.streams import Streams
+from dva_sim.network.link import Direction, Link
+from dva_sim.network.transports.bottleneck import WAYS, Bottleneck, BottleneckConfig, Bulk
+from dva_sim.network.transports.config import Message, Transport, TransportConfig, Udp
+from dva_sim.network.transports.sessions import ends_at, open_session
+
+DRAIN_S = 5.0  # the last messages that count may still arrive; assumed
+Rate = Annotated[float, Field(gt=0, le=200)]
+Floats = NDArray[np.float64]
+
+
+class CommandsConfig(Config):
+    """What the operator sends.
+
+    Attributes:
+        rate_hz: How often there is a new command.
+        bytes: Of each.
+        crucial_every: Each so many is one that must arrive, such as a stop; 0: none is.
+    """
+
+    rate_hz: Rate = 20.0
+    bytes: Annotated[int, Field(ge=1, le=60_000)] = 400
+    crucial_every: Annotated[int, Field(ge=0)] = 0
+
+
+class PicturesConfig(Config):
+    """What the robot sends back.
+
+    Attributes:
+        rate_hz: How often there is a new picture.
+        bytes: Of each, with the state that comes with it.
+    """
+
+    rate_hz: Rate = 10.0
+    bytes: Annotated[int, Field(ge=1, le=1_000_000)] = 4_000
+
+
+class BulkConfig(Config):
+    """TCP flows that always have more to send, over the same link.
+
+    Attributes:
+        up: How many send the way of the commands.
+        down: How many send the way of the pictures.
+    """
+
+    up: Annotated[int, Field(ge=0, le=50)] = 0
+    down: Annotated[int, Field(ge=0, le=50)] = 0
+
+
+class ContestConfig(Config):
+    """A session and its competitors.
+
+    Attributes:
+        transport: Of the session.
+        warm_up_s: Not counted, so that all flows have found their rate.
+        measure_s: Counted.
+    """
+
+    transport: TransportConfig = Udp()
+    commands: CommandsConfig = CommandsConfig()
+    pictures: PicturesConfig = PicturesConfig()
+    bottleneck: BottleneckConfig = BottleneckConfig()
+    bulk: BulkConfig = BulkConfig()
+    warm_up_s: Annotated[float, Field(ge=0, le=600)] = 10.0
+    measure_s: Annotated[float, Field(gt=0, le=3600)] = 60.0
+
+
+@dataclass
+class Fates:
+    """What became of the messages of one direction.
+
+    Attributes:
+        made: When each was ready to be sent [s].
+        arrived: When all of it had arrived [s]; infinity if that did not happen.
+        crucial: Whether it had to.
+    """
+
+    made: list[float] = field(default_factory=list)
+    arrived: list[float] = field(default_factory=list)
+    crucial: list[bool] = field(default_factory=list)
+
+    def add(self, now: float, crucial: bool) -> int:
+        """A new message; its number."""
+        self.made.append(now)
+        self.arrived.append(math.inf)
+        self.crucial.append(crucial)
+        return len(self.made) - 1
+
+
+@dataclass(frozen=True)
+class Contest:
+    """What came of it.
+
+    Attributes:
+        since: From when on it counts [s].
+        until: Until when [s].
+        commands: Fates of the commands.
+        pictures: Fates of the pictures.
+        session_bytes: That the session put on the line in each direction, with all headers, while
+            it counted [B].
+        bulk_bytes: The same of each TCP flow, in the direction of its data [B].
+    """
+
+    since: float
+    until: float
+    commands: Fates
+    pictures: Fates
+    session_bytes: dict[Direction, int]
+    bulk_bytes: dict[Direction, list[int]]
+
+
+def play(config: ContestConfig, seed: int) -> Contest:
+    """Let them send.
+
+    Args:
+        config: Who sends what over which link.
+        seed: Decides when everything begins, and the link's luck.
+    """
+    clock, streams = Clock(), Streams(seed)
+    bottleneck = Bottleneck(config.bottleneck, streams)
+    commands, pictures = Fates(), Fates()
+
+    def applied(number: int) -> None:
+        commands.arrived[number] = clock.now
+
+    def shown(number: int) -> None:
+        pictures.arrived[number] = clock.now
+
+    ends = ends_at(bottleneck, config.transport, applied, shown)
+    session = open_session(clock, config.transport, ends)
+    bulk = _bulk(clock, config, bottleneck, streams)
+    _feed(clock, config, session, (commands, pictures), streams)
+    links = {"session": [ends.up, ends.down]} | {way: bulk[way] for way in WAYS}
+    clock.run(config.warm_up_s)
+    before = {name: [link.bytes for link in some] for name, some in links.items()}
+    until = config.warm_up_s + config.measure_s
+    clock.run(until)
+    took = {
+        name: [link.bytes - was for link, was in zip(some, before[name], strict=True)]
+        for name, some in links.items()
+    }
+    clock.run(until + DRAIN_S)
+    return Contest(
+        since=config.warm_up_s,
+        until=until,
+        commands=commands,
+        pictures=pictures,
+        session_bytes=dict(zip(WAYS, took["session"], strict=True)),
+        bulk_bytes={way: took[way] for way in WAYS},
+    )
+
+
+def _bulk(
+    clock: Clock, config: ContestConfig, bottleneck: Bottleneck, streams: Streams
+) -> dict[Direction, list[Link]]:
+    """Start the TCP flows at times of their own; the links that their data take."""
+    links: dict[Direction, list[Link]] = {way: [] for way in WAYS}
+    for way, count in zip(WAYS, (config.bulk.up, config.bulk.down), strict=True):
+        back: Direction = "down" if way == "up" else "up"
+        for number in range(count):
+            name = f"bulk-{way}-{number}"
+            out = bottleneck.link(name, way)
+            flow = Bulk(clock, out, bottleneck.link(name, back))
+            clock.call_at(float(streams[name].uniform(0.0, 1.0)), flow.start)
+            links[way].append(out)
+    return links
+
+
+def _feed(
+    clock: Clock,
+    config: ContestConfig,
+    session: Transport,
+    fates: tuple[Fates, Fates],
+    streams: Streams,
+) -> None:
+    """Commands and pictures at their rates, from times of their own on."""
+    commands, pictures = fates
+    every = config.commands.crucial_every
+
+    def command() -> None:
+        crucial = every > 0 and len(commands.made) % every == every - 1
+        number = commands.add(clock.now, crucial)
+        session.command(Message(number, config.commands.bytes, crucial))
+
+    def picture() -> None:
+        number = pictures.add(clock.now, crucial=False)
+        session.picture(Message(number, config.pictures.bytes))
+
+    for action, rate in ((command, config.commands.rate_hz), (picture, config.pictures.rate_hz)):
+        period = 1.0 / rate
+        clock.every(period, action, float(streams["phase"].uniform(0.0, period)))

@@ -1,0 +1,420 @@
+"""Robots and people in a recording: where they are, what they do, where they are taken to be.
+
+Hazards as grids over the floor: smoke, radiant heat, gas and water.
+
+What a viewer draws: walls and names of rooms, everybody's body, hazards as they grow.
+
+What is told and said in a recording: the story, the messages, commands, what screens show.
+"""
+
+from __future__ import annotations
+
+import base64
+import heapq
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import groupby
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dva_sim.agents.robot.camera import Frame
+from dva_sim.kernel.recorder import Sent, TrackPoint
+from dva_sim.recordings import messages
+from dva_sim.recordings.messages import FRAME, HERE, XML, Message
+from dva_sim.simulation.full import Playback
+from dva_sim.worlds.hazards import Raster
+
+POSE, ACTIVITY, FIX, SEEN = "pose", "activity", "fix", "seen"  # last parts of topics
+ALIVE_S = 1.0  # who stands still is told of so often, on whole multiples [s]
+
+
+def poses(playback: Playback) -> Iterator[Message]:
+    """Where everybody is: a pose for each who moves, and all of a moment in one transform."""
+    tracks = playback.recorder.tracks.items()
+    every = heapq.merge(
+        *([(p.time, name, p) for p in sparse(track)] for name, track in tracks),
+        key=lambda entry: entry[0],
+    )
+    for time, group in groupby(every, key=lambda entry: entry[0]):
+        moved = [(name, point) for _, name, point in group]
+        for name, p in moved:
+            yield _pose(name, POSE, p)
+        transforms = [_transform(name, p) for name, p in moved]
+        yield Message(time, "/tf", "foxglove.FrameTransforms", {"transforms": transforms})
+
+
+def sparse(track: Sequence[TrackPoint]) -> Iterator[TrackPoint]:
+    """The points of a track between which everything lies on straight lines.
+
+    Of somebody who stands still, the first and the last point, and one for each `ALIVE_S`.
+    """
+    last = len(track) - 1
+    for index, here in enumerate(track):
+        before, after = track[max(0, index - 1)], track[min(last, index + 1)]
+        still = before[1:] == here[1:] == after[1:]
+        alive = here.time // ALIVE_S != before.time // ALIVE_S
+        if not still or alive or index in (0, last):
+            yield here
+
+
+def activities(playback: Playback) -> Iterator[Message]:
+    """What everybody does, told when it changes."""
+    for name, track in playback.recorder.tracks.items():
+        for mode, points in groupby(track, key=lambda p: p.mode):
+            time = next(points).time
+            content = {"timestamp": messages.stamp(time), "activity": mode}
+            yield Message(time, f"/{name}/{ACTIVITY}", "dva_sim.Activity", content)
+
+
+def beliefs(playback: Playback) -> Iterator[Message]:
+    """Where operators take the robots to be that they drive."""
+    for robot, views in playback.recorder.views.items():
+        for seen in views:
+            yield _pose(playback.labels[robot], SEEN, seen)
+
+
+def fixes(playback: Playback) -> Iterator[Message]:
+    """Where the robots are on earth, once a second."""
+    for robot in playback.radii:
+        name = playback.labels[robot]
+        for _, points in groupby(playback.recorder.tracks[name], key=lambda p: p.time // 1.0):
+            p = next(points)
+            latitude, longitude = playback.site.frame.to_latlon(p.x, p.y)
+            content = {
+                "timestamp": messages.stamp(p.time),
+                "frame_id": name,
+                "latitude": round(latitude, 9),
+                "longitude": round(longitude, 9),
+                "altitude": 0.0,
+                "position_covariance": [0.0] * 9,
+                "position_covariance_type": 0,
+            }
+            yield Message(p.time, f"/{name}/{FIX}", "foxglove.LocationFix", content)
+
+
+def _pose(name: str, what: str, p: TrackPoint) -> Message:
+    content = {
+        "timestamp": messages.stamp(p.time),
+        "frame_id": FRAME,
+        "pose": messages.pose(p.x, p.y, p.heading),
+    }
+    return Message(p.time, f"/{name}/{what}", "foxglove.PoseInFrame", content)
+
+
+def _transform(name: str, p: TrackPoint) -> dict[str, Any]:
+    return {
+        "timestamp": messages.stamp(p.time),
+        "parent_frame_id": FRAME,
+        "child_frame_id": name,
+        "translation": messages.point(p.x, p.y),
+        "rotation": messages.turned(p.heading),
+    }
+
+
+FIELDS = {"fire": ("smoke", "heat"), "gas_leak": ("gas",), "flood": ("water",)}
+PERIOD_S = 2.0  # between two grids [s]
+CELL = 0.5  # [m]
+MOST_CELLS = 20_000  # of a grid; on a larger site cells are larger
+DIGITS = 11  # of the 23 binary ones of a number: one part in 4000, and half the file
+
+
+def grids(playback: Playback) -> Iterator[Message]:
+    """All fields of the hazards there are, as far as they are not zero."""
+    kinds = {i.kind for i in playback.incidents if not i.false_alarm}
+    whats = [what for kind in sorted(kinds) for what in FIELDS[kind]]
+    west, south, east, north = playback.site.extent
+    cell = max(CELL, ((east - west) * (north - south) / MOST_CELLS) ** 0.5)
+    starts = [i.start for i in playback.incidents if not i.false_alarm]
+    for number in range(int(playback.duration / PERIOD_S) + 1):
+        time = number * PERIOD_S
+        for what in whats if time > min(starts) else ():
+            raster = playback.surroundings.raster(what, time, cell)
+            if raster.values.max() > 0:
+                yield _grid(what, time, cell, raster)
+
+
+def _grid(what: str, time: float, cell: float, raster: Raster) -> Message:
+    rows, columns = np.nonzero(raster.values > 0)
+    low, left = int(rows.min()), int(columns.min())
+    part = raster.values[low : rows.max() + 1, left : columns.max() + 1]
+    west, _, south, _ = raster.extent
+    content = {
+        "timestamp": messages.stamp(time),
+        "frame_id": FRAME,
+        "pose": messages.pose(west + left * cell, south + low * cell),
+        "column_count": part.shape[1],
+        "cell_size": {"x": round(cell, 6), "y": round(cell, 6)},
+        "row_stride": 4 * part.shape[1],
+        "cell_stride": 4,
+        "fields": [{"name": what, "offset": 0, "type": 7}],
+        "data": base64.b64encode(_shortened(part).tobytes()).decode(),
+    }
+    return Message(time, f"/fields/{what}", "foxglove.Grid", content)
+
+
+def _shortened(values: NDArray[np.float64]) -> NDArray[np.float32]:
+    """As 32-bit numbers whose last digits are zero, which are packed far smaller."""
+    bits = np.ascontiguousarray(values, "<f4").view("<u4")
+    mask = np.uint32(0xFFFFFFFF << (23 - DIGITS) & 0xFFFFFFFF)
+    return (bits & mask).view("<f4")
+
+
+TOPIC, SCHEMA = "/scene", "foxglove.SceneUpdate"
+WALL, INK, EXIT = "#3a3f47", "#2b3038", "#2f7d32"
+BODIES = {"robot": "#2f7fd0", "guard": "#2f7d32", "bystander": "#8c6d5a"}
+HAZARDS = {"fire": "#d1332e", "gas_leak": "#b59a00", "flood": "#2a7fb8"}
+TALL = {"robot": 0.5, "guard": 1.75, "bystander": 1.7}  # as drawn [m]
+PERSON = 0.25  # radius [m]
+STEP_S = 1.0  # between updates of a hazard [s]
+LEAST_GROWTH = 0.05  # less is not drawn anew [m]
+
+
+def bodies(playback: Playback) -> Iterator[Message]:
+    """Everybody, in a frame that moves with them; those who leave vanish."""
+    tracks = playback.recorder.tracks
+    for name, track in tracks.items():
+        yield _update(track[0].time, _body(playback, name, track[0].time))
+    gone = [(t[-1].time, n) for n, t in tracks.items() if t[-1].time < playback.duration]
+    for time, name in sorted(gone):
+        yield _removal(time, name)
+
+
+def ground(playback: Playback) -> Iterator[Message]:
+    """The site, which stands still."""
+    site, middles = playback.site, [(r.name, r.polygon.mean(axis=0)) for r in playback.site.rooms]
+    lines = [_lines(site.walls.tolist(), WALL), _lines([e.ends for e in site.exits], EXIT)]
+    texts = [_words(name, float(x), float(y)) for name, (x, y) in middles]
+    entity = _entity(0.0, "site", FRAME, lines=[line for line in lines if line["points"]])
+    yield _update(0.0, entity | {"texts": texts})
+
+
+def hazards(playback: Playback) -> Iterator[Message]:
+    """What is real, from when it begins until it is dealt with or the run ends."""
+    for number, incident in enumerate(playback.incidents):
+        if incident.false_alarm:
+            continue
+        name, until = f"hazard-{number + 1}", playback.contained.get(number, math.inf)
+        drawn = -math.inf
+        for time in _steps(incident.start, min(until, playback.duration)):
+            radius = incident.hazard.radius(time)
+            if radius - drawn >= LEAST_GROWTH:
+                drawn = radius
+                yield _update(
+                    time, _disc(name, time, incident.kind, incident.hazard.position, radius)
+                )
+        if until < playback.duration:
+            yield _removal(until, name)
+
+
+def states(playback: Playback) -> Iterator[Message]:
+    """The same hazards as numbers, once a second."""
+    for number, incident in enumerate(playback.incidents):
+        until = min(playback.contained.get(number, math.inf), playback.duration)
+        x, y = incident.hazard.position
+        for time in _steps(incident.start, until) if not incident.false_alarm else ():
+            content = {
+                "timestamp": messages.stamp(time),
+                "number": number + 1,
+                "kind": incident.kind,
+                "room": incident.room,
+                "x_m": round(x, messages.PLACES),
+                "y_m": round(y, messages.PLACES),
+                "radius_m": round(incident.hazard.radius(time), 3),
+                "danger_radius_m": round(incident.hazard.danger_radius(time), 3),
+                "severity": round(incident.hazard.severity(time), 4),
+            }
+            yield Message(time, "/hazards", "dva_sim.Hazard", content)
+
+
+def _steps(start: float, end: float) -> Iterator[float]:
+    count = max(0, math.ceil((end - start) / STEP_S))
+    return (start + number * STEP_S for number in range(count))
+
+
+def _update(time: float, entity: dict[str, Any]) -> Message:
+    return Message(time, TOPIC, SCHEMA, {"deletions": [], "entities": [entity]})
+
+
+def _removal(time: float, name: str) -> Message:
+    deletion = {"timestamp": messages.stamp(time), "type": 0, "id": name}
+    return Message(time, TOPIC, SCHEMA, {"deletions": [deletion], "entities": []})
+
+
+def _entity(time: float, name: str, frame: str, **parts: list[Any]) -> dict[str, Any]:
+    kinds = "arrows", "cubes", "spheres", "cylinders", "lines", "triangles", "texts", "models"
+    return {
+        "timestamp": messages.stamp(time),
+        "frame_id": frame,
+        "id": name,
+        "lifetime": {"sec": 0, "nsec": 0},
+        "frame_locked": True,
+        "metadata": [],
+        **{kind: parts.get(kind, []) for kind in kinds},
+    }
+
+
+def _body(playback: Playback, name: str, time: float) -> dict[str, Any]:
+    kind, robot = name.rpartition("-")[0], playback.robot_named(name)
+    radius = PERSON if robot is None else playback.radii[robot]
+    tall, paint = TALL[kind], messages.colour(BODIES[kind])
+    arrow = {
+        "pose": messages.pose(0.0, 0.0, z=tall),
+        "shaft_length": radius,
+        "shaft_diameter": radius / 4,
+        "head_length": radius / 2,
+        "head_diameter": radius / 2,
+        "color": messages.colour(INK),
+    }
+    label = _words(name, 0.0, 0.0, tall + 0.3)
+    return _entity(
+        time, name, name, cylinders=[_cylinder(radius, tall, paint)], arrows=[arrow], texts=[label]
+    )
+
+
+def _disc(
+    name: str, time: float, kind: str, place: tuple[float, float], radius: float
+) -> dict[str, Any]:
+    paint = messages.colour(HAZARDS[kind], 0.5)
+    return _entity(time, name, FRAME, cylinders=[_cylinder(radius, 0.05, paint, *place)])
+
+
+def _cylinder(
+    radius: float, tall: float, paint: dict[str, float], x: float = 0.0, y: float = 0.0
+) -> dict[str, Any]:
+    size = messages.point(2 * radius, 2 * radius, tall)
+    upright = messages.pose(x, y, z=tall / 2)
+    return {"pose": upright, "size": size, "bottom_scale": 1.0, "top_scale": 1.0, "color": paint}
+
+
+def _lines(segments: Any, code: str) -> dict[str, Any]:
+    ends = [messages.point(*end) for x1, y1, x2, y2 in segments for end in ((x1, y1), (x2, y2))]
+    return {
+        "type": 2,
+        "pose": HERE,
+        "thickness": 2.0,
+        "scale_invariant": True,
+        "points": ends,
+        "color": messages.colour(code),
+        "colors": [],
+        "indices": [],
+    }
+
+
+def _words(text: str, x: float, y: float, z: float = 0.0) -> dict[str, Any]:
+    return {
+        "pose": messages.pose(x, y, z=z),
+        "billboard": True,
+        "font_size": 12.0,
+        "scale_invariant": True,
+        "color": messages.colour(INK),
+        "text": text,
+    }
+
+
+STORY, MESSAGES = "/story", "/messages"
+SCREEN, COMMANDS, CAMERA = "screen", "commands", "camera"  # last parts of topics
+LEVELS = {"safety": 3, "mode": 1, "link": 1}  # of Foxglove's log; all else is for information
+
+
+def told(playback: Playback) -> Iterator[Message]:
+    """The timeline."""
+    for moment in playback.recorder.timeline:
+        content = {
+            "timestamp": messages.stamp(moment.time),
+            "level": LEVELS.get(moment.kind, 2),
+            "message": moment.what,
+            "name": moment.who,
+            "file": "",
+            "line": 0,
+            "kind": moment.kind,
+        }
+        yield Message(moment.time, STORY, "foxglove.Log", content)
+
+
+def said(playback: Playback) -> Iterator[Message]:
+    """All messages as they went onto the network; of a camera's frame, what it stands for."""
+    names = names_of(playback.labels)
+    for sent in playback.recorder.traffic or ():
+        if isinstance(sent.payload, Frame):
+            yield _frame(sent, names)
+        else:
+            topic = f"{MESSAGES}/{names[sent.source]}/{names[sent.destination]}"
+            yield Message(sent.time, topic, XML, sent.payload)
+
+
+def names_of(labels: Mapping[str, str]) -> dict[str, str]:
+    """A name for each id that fits into a topic, and that no other id has."""
+    names: dict[str, str] = {}
+    for device, label in labels.items():
+        name = label.replace(" ", "-")
+        taken = name in names.values()
+        names[device] = f"{name}-{device.replace(':', '')}" if taken else name
+    return names
+
+
+def shown(playback: Playback) -> Iterator[Message]:
+    """The frames that come onto the operators' screens."""
+    labels = playback.labels
+    for number, drive in enumerate(playback.recorder.drives):
+        for frame in drive.frames:
+            content = {
+                "timestamp": messages.stamp(frame.time),
+                "drive": number,
+                "robot": labels[drive.robot],
+                "captured_s": frame.captured,
+            }
+            topic = f"/{labels[drive.operator]}/{SCREEN}"
+            yield Message(frame.time, topic, "dva_sim.Shown", content)
+
+
+def commanded(playback: Playback) -> Iterator[Message]:
+    """What the phones make of the tilt."""
+    labels = playback.labels
+    for number, drive in enumerate(playback.recorder.drives):
+        for time, speed, turn_rate in drive.commands:
+            content = {
+                "timestamp": messages.stamp(time),
+                "drive": number,
+                "robot": labels[drive.robot],
+                "speed_m_s": round(speed, 5),
+                "turn_rate_rad_s": round(turn_rate, 5),
+            }
+            topic = f"/{labels[drive.operator]}/{COMMANDS}"
+            yield Message(time, topic, "dva_sim.Command", content)
+
+
+def applied(playback: Playback) -> Iterator[Message]:
+    """What the robots make of the commands."""
+    for drive in playback.recorder.drives:
+        for a in drive.applied:
+            content = {
+                "timestamp": messages.stamp(a.time),
+                "made_s": a.issued,
+                "sent_s": a.sent,
+                "arrived_s": a.arrived,
+                "until_s": messages.finite(a.until),
+                "captured_s": messages.finite(a.captured),
+            }
+            topic = f"/{playback.labels[drive.robot]}/applied"
+            yield Message(a.time, topic, "dva_sim.Applied", content)
+
+
+def _frame(sent: Sent, names: Mapping[str, str]) -> Message:
+    frame: Frame = sent.payload
+    seen = frame.observation
+    content: dict[str, Any] = {
+        "timestamp": messages.stamp(sent.time),
+        "to": names[sent.destination],
+        "size_bytes": sent.size,
+        "captured_s": frame.captured,
+        "x_m": round(seen.x, messages.PLACES),
+        "y_m": round(seen.y, messages.PLACES),
+        "heading_rad": round(seen.heading, messages.PLACES),
+        "visibility_m": round(seen.visibility, 2),
+        "hazards": [
+            {"kind": h.kind, "x_m": round(h.x, 2), "y_m": round(h.y, 2)} for h in seen.hazards
+        ],
+    }
+    return Message(sent.time, f"/{names[sent.source]}/{CAMERA}", "dva_sim.Frame", content)

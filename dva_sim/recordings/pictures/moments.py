@@ -1,0 +1,259 @@
+"""A recorded run at any moment: who is where, what burns, what a camera sees.
+
+How runs ended, in a few words each: when all was confirmed, and how far ahead one of two was.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from dva_sim.agents.people.bystander import DOWN
+from dva_sim.experiments.study.labels import level_name
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.recorder import DriveLog, TrackPoint
+from dva_sim.kernel.suggestions import unknown
+from dva_sim.simulation.full import Playback
+from dva_sim.simulation.full.hazards import Incident
+from dva_sim.worlds.camera import Camera, Figure, Smoke, Spot
+from dva_sim.worlds.camera.raycast import Picture
+from dva_sim.worlds.geo import Pose
+
+ROBOT, GUARD, BYSTANDER = "robot", "guard", "bystander"
+GONE = 1.0  # so long after the end of the track of somebody who left [s]
+PERSON = 0.25  # radius of somebody on foot, seen from above [m]
+FRESH = 3.0  # an older picture is not looked at any more [s]
+
+
+def kind_of(label: str) -> str:
+    """What somebody of that name is: `robot-1` is a robot."""
+    return label.rpartition("-")[0]
+
+
+class Glance(NamedTuple):
+    """What an operator's screen shows.
+
+    Attributes:
+        operator: Whose.
+        robot: The robot that took the picture, by its label.
+        captured: When it was taken [s].
+    """
+
+    operator: str
+    robot: str
+    captured: float
+
+
+class Moments:
+    """A run that can be asked about any time.
+
+    Args:
+        recording: The run.
+    """
+
+    def __init__(self, recording: Playback) -> None:
+        self.recording = recording
+        self.tracks = recording.recorder.tracks
+        self._times = {name: [p.time for p in track] for name, track in self.tracks.items()}
+        self.kinds = {i.kind for i in recording.incidents if not i.false_alarm}
+        self._cameras: dict[tuple[int, int], Camera] = {}
+
+    # --- who is where ------------------------------------------------------------------
+
+    def names(self, *kinds: str) -> list[str]:
+        """Everybody of some kinds who left a track."""
+        return [name for kind in kinds for name in self.tracks if kind_of(name) == kind]
+
+    def within(self, time: float) -> float:
+        """The moment [s] to show at `time`: a run that has ended stays as it was at its end."""
+        return min(time, self.recording.duration)
+
+    def is_there(self, name: str, time: float) -> bool:
+        """Whether somebody is on the site at `time` [s]; tracks of those who leave end."""
+        return time <= self._times[name][-1] + GONE
+
+    def past(self, name: str, time: float) -> list[TrackPoint]:
+        """Where somebody has been up to `time` [s], and is now."""
+        track, index = self.tracks[name], bisect_right(self._times[name], time)
+        return [*track[: max(1, index)], self.at(name, time)]
+
+    def at(self, name: str, time: float) -> TrackPoint:
+        """Where somebody is at `time` [s], between two samples on a straight line."""
+        track, index = self.tracks[name], bisect_right(self._times[name], time)
+        before, after = track[max(0, index - 1)], track[min(index, len(track) - 1)]
+        gap = after.time - before.time
+        share = (time - before.time) / gap if gap > 0 else 0.0
+        turn = (after.heading - before.heading + math.pi) % (2 * math.pi) - math.pi
+        return TrackPoint(
+            time,
+            before.x + share * (after.x - before.x),
+            before.y + share * (after.y - before.y),
+            before.heading + share * turn,
+            before.mode,
+        )
+
+    def going_on(self, time: float) -> list[Incident]:
+        """What has begun, is real and not dealt with at `time` [s]."""
+        contained = self.recording.contained
+        return [
+            incident
+            for number, incident in enumerate(self.recording.incidents)
+            if incident.is_there(time) and time < contained.get(number, math.inf)
+        ]
+
+    # --- what cameras see --------------------------------------------------------------
+
+    def radius(self, name: str) -> float:
+        """Of somebody, seen from above [m]."""
+        robot = self.recording.robot_named(name)
+        return PERSON if robot is None else self.recording.radii[robot]
+
+    def glance(self, time: float) -> Glance | None:
+        """The newest picture that an operator at the wheel looks at, if there is one."""
+        labels = self.recording.labels
+        for drive in self.recording.recorder.drives:
+            captured = _shown(drive, time)
+            if captured is not None:
+                return Glance(labels[drive.operator], labels[drive.robot], captured)
+        return None
+
+    def eye(self, robot: str, time: float, width: int = 320, height: int = 240) -> Picture:
+        """What a robot's camera sees at `time` [s].
+
+        Raises:
+            ConfigError: no such robot.
+        """
+        if robot not in self.names(ROBOT):
+            raise ConfigError(unknown("robot", robot, self.names(ROBOT)))
+        size = width, height
+        if size not in self._cameras:
+            angle = math.radians(self.recording.scenario.camera.field_of_view_deg)
+            self._cameras[size] = Camera(self.recording.site, width, height, angle)
+        here, spots = self.at(robot, time), [i.spot(time) for i in self.going_on(time)]
+        raster = self.recording.surroundings.raster
+        smoke = None
+        if "fire" in self.kinds:
+            smoke = Smoke(raster("smoke", time), raster("layer", time))
+        return self._cameras[size].picture(
+            Pose(here.x, here.y, here.heading),
+            self._others(robot, time),
+            [Spot(*spot) for spot in spots if spot is not None],
+            smoke,
+            raster("water", time) if "flood" in self.kinds else None,
+            time,
+        )
+
+    def _others(self, robot: str, time: float) -> list[Figure]:
+        """Everybody else who is still on the site."""
+        others = (name for name in self.tracks if name != robot)
+        return [self._figure(name, time) for name in others if self.is_there(name, time)]
+
+    def _figure(self, name: str, time: float) -> Figure:
+        here, number = self.at(name, time), name.rpartition("-")[2]
+        looks = int(number) if number.isdigit() else 1
+        return Figure(kind_of(name), here.x, here.y, here.heading, looks, here.mode == DOWN)
+
+
+def _shown(drive: DriveLog, time: float) -> float | None:
+    """When the picture was taken that the driver looks at, if there is one."""
+    if drive.started is None or not drive.started <= time < (drive.ended or math.inf):
+        return None
+    shown = [frame for frame in drive.frames if frame.time <= time]
+    return shown[-1].captured if shown and time - shown[-1].time < FRESH else None
+
+
+SAME = 0.05  # a shorter lead is none, as times are told [s]
+
+
+class Verdict(NamedTuple):
+    """How a run ended.
+
+    Attributes:
+        time: From when on that is so [s].
+        text: In words; empty if it is not known.
+        good: Whether every event was confirmed, and every false alarm refuted.
+        ahead: How much earlier than the other of two runs that was [s]; infinite if the other
+            never came to it, negative if this one was later.
+    """
+
+    time: float
+    text: str
+    good: bool
+    ahead: float = 0.0
+
+    @property
+    def told(self) -> str:
+        """The words, with the lead if there is one."""
+        if self.ahead == math.inf:
+            return f"{self.text}, the other not at all"
+        return f"{self.text}, {seconds(self.ahead)} ahead" if self.ahead > SAME else self.text
+
+
+def verdicts(runs: Sequence[Playback]) -> list[Verdict]:
+    """How each run ended; of two, the one that was ahead says by how much."""
+    found = [_verdict(run) for run in runs]
+    if len(found) != 2 or not all(verdict.text for verdict in found):
+        return found
+    times = [verdict.time if verdict.good else math.inf for verdict in found]
+    leads = _lead(*times), _lead(*reversed(times))
+    return [v._replace(ahead=lead) for v, lead in zip(found, leads, strict=True)]
+
+
+def decided_at(found: Sequence[Verdict]) -> float | None:
+    """The moment that shows what some runs differ in: when the first one had come to a good end."""
+    return min((verdict.time for verdict in found if verdict.good), default=None)
+
+
+def story(runs: Sequence[Playback]) -> list[str]:
+    """How runs under several patterns ended, a line for each."""
+    names = [pattern_name(run) for run in runs]
+    width = max(map(len, names))
+    return [f"{name:<{width}}  {v.told}" for name, v in zip(names, verdicts(runs), strict=True)]
+
+
+def pattern_name(run: Playback) -> str:
+    """The messaging pattern of a run, as reports call it."""
+    return level_name("pattern", run.scenario.pattern)
+
+
+def seconds(time: float) -> str:
+    """A span of time: whole seconds, but tenths of a short one."""
+    return f"{time:.0f} s" if time >= 10.0 else f"{time:.1f} s"
+
+
+def _lead(own: float, other: float) -> float:
+    return 0.0 if own == other else other - own
+
+
+def _verdict(run: Playback) -> Verdict:
+    """How a run ended, by itself."""
+    right = [
+        ending.outcome == ("refuted" if incident.false_alarm else "confirmed")
+        for incident, ending in zip(run.incidents, run.endings, strict=False)
+    ]
+    if not right:
+        return Verdict(run.duration, "", False)
+    good = all(right)
+    last = max(ending.time for ending in run.endings)
+    time = min(last, run.duration)
+    if len(right) == 1:
+        return Verdict(time, _of_one(run, good), good)
+    word = "settled" if any(i.false_alarm for i in run.incidents) else "confirmed"
+    if good:
+        all_of = "both" if len(right) == 2 else f"all {len(right)}"
+        return Verdict(time, f"{all_of} events {word} at {last:.1f} s", good)
+    text = f"{sum(right)} of {len(right)} events {word} within {time:.0f} s"
+    return Verdict(time, text, good)
+
+
+def _of_one(run: Playback, good: bool) -> str:
+    """How the only event of a run ended."""
+    ((outcome, time),) = run.endings
+    if math.isinf(time):
+        never = "reported" if outcome == "undetected" else "confirmed"
+        return f"not {never} within {run.duration:.0f} s"
+    wrong = {"confirmed": "wrongly confirmed", "refuted": "wrongly refuted"}
+    what = outcome if good else wrong.get(outcome, f"not confirmed, {outcome}")
+    return f"{what} at {time:.1f} s"

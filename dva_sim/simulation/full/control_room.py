@@ -1,0 +1,208 @@
+"""The control room: the DVA, and the operators with their phones."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+import shapely
+
+from dva_sim.agents.operator.attention import DriverSeat, OperatorSetup
+from dva_sim.agents.operator.drive import Drive
+from dva_sim.agents.operator.operator import OperatorAgent
+from dva_sim.agents.operator.person import draw_person
+from dva_sim.agents.operator.strategies import Truth, load_strategy
+from dva_sim.agents.operator.supervision import Supervise
+from dva_sim.agents.robot.camera import Observation
+from dva_sim.agents.robot.robot import EXPECTED_READY, EXPECTED_SPEED
+from dva_sim.agents.tilt import Phone
+from dva_sim.core.dispatch import load_policy
+from dva_sim.core.dispatcher import Patrols
+from dva_sim.core.dva import Desk
+from dva_sim.core.permissions import LOW_BITS, Access, AccessRule, Permissions
+from dva_sim.core.sessions import Sessions
+from dva_sim.core.store import Memory
+from dva_sim.core.travel_times import Floats, Ground, Start, Station
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.streams import Streams
+from dva_sim.protocol import messages as m
+from dva_sim.simulation.full.dva_server import DvaAgent
+from dva_sim.simulation.full.stage import DVA, Stage, middle_of
+from dva_sim.simulation.scenario import (
+    Scenario,
+    command_timeout_s,
+    guard_profile,
+    phone_profile,
+    population,
+)
+from dva_sim.worlds.layout import FOOTPRINT
+
+
+def add_dva(
+    stage: Stage,
+    permissions: Permissions | None = None,
+    memory: Memory | None = None,
+    keep_events: bool = True,
+) -> DvaAgent:
+    """The DVA; sessions are drawn by the run's seed where no other `permissions` are given.
+
+    Args:
+        stage: Where.
+        permissions: Who holds what, if not drawn by the seed.
+        memory: What survives the DVA.
+        keep_events: Whether every event that ever was is kept, for a recording.
+
+    Raises:
+        ConfigError: a policy that cannot be loaded.
+    """
+    dispatch, draw = stage.scenario.dispatch, stage.streams["dva/sessions"]
+    permissions = permissions or Permissions(lambda: int(draw.integers(2**LOW_BITS)))
+    permissions.own = DVA
+    policy = load_policy(dispatch.policy, dispatch.options)
+    desk = Desk(
+        policy,
+        _Ways(stage),
+        replace(dispatch.rules(), operator_span=stage.scenario.operator.span),
+        stage.streams["dva/policy"],
+        Sessions(permissions),
+        _ground(stage) if policy.relocates else Ground(),
+        _access(stage.scenario),
+        _patrols(stage),
+    )
+    return DvaAgent(stage.device("dva", 1), desk, memory, keep_events)
+
+
+class _Ways:
+    """What the DVA expects of ways: the planner's length, and a pace for each kind.
+
+    Args:
+        stage: Where.
+    """
+
+    def __init__(self, stage: Stage) -> None:
+        guards = guard_profile(stage.scenario)
+        self._stage = stage
+        self._paces = {
+            "guard": (guards.walking_mean_mps, guards.mobilisation_s.median),
+            "robot": (EXPECTED_SPEED, EXPECTED_READY),
+        }
+
+    def __call__(
+        self, starts: Sequence[Start], goals: Sequence[m.Position]
+    ) -> tuple[Floats, Floats]:
+        """See `Travel`."""
+        speed = np.array([self._paces[s.kind][0] for s in starts])
+        ready = np.array([0.0 if s.under_way else self._paces[s.kind][1] for s in starts])
+        ways = [[self._length(s.position, goal) for s in starts] for goal in goals]
+        distance = np.array(ways, dtype=np.float64).reshape(len(goals), len(starts))
+        return distance, ready + distance / speed
+
+    def _length(self, start: m.Position, goal: m.Position) -> float:
+        frame = self._stage.site.frame
+        a = frame.to_xy(start.latitude, start.longitude)
+        return self._stage.planner.distance(a, frame.to_xy(goal.latitude, goal.longitude))
+
+
+def _ground(stage: Stage) -> Ground:
+    """Guards wait at their posts; each room is a zone that counts by its floor's area."""
+    frame = stage.site.frame
+    stations = tuple(
+        Station(f"post {number}", m.Position(*frame.to_latlon(post.x, post.y)))
+        for number, post in enumerate(stage.site.guard_posts, 1)
+    )
+    rooms = [shapely.Polygon(room.polygon) for room in stage.site.rooms]
+    if not stations or not rooms:
+        return Ground()
+    starts = [Start(s.name, "guard", s.position, under_way=True) for s in stations]
+    middles = [room.representative_point() for room in rooms]
+    goals = [m.Position(*frame.to_latlon(middle.x, middle.y)) for middle in middles]
+    area = np.array([room.area for room in rooms])
+    return Ground(None, stations, _Ways(stage)(starts, goals)[1].T, area / area.sum())
+
+
+def _access(scenario: Scenario) -> Access:
+    """Without rules in the scenario everything is allowed to who asks."""
+    rules = [
+        AccessRule(
+            frozenset(rule.holders),
+            frozenset(rule.robots),
+            frozenset(rule.levels),
+            None if rule.sensors is None else frozenset(rule.sensors),
+            rule.from_s,
+            math.inf if rule.until_s is None else rule.until_s,
+        )
+        for rule in scenario.access
+    ]
+    return Access(rules) if rules else Access()
+
+
+def _patrols(stage: Stage) -> Patrols:
+    """The beats of the scenario's robots.
+
+    Raises:
+        ConfigError: a room that the site does not have, or a place where no robot fits.
+    """
+    site, to_latlon = stage.site, stage.site.frame.to_latlon
+    beats: dict[str, tuple[m.Position, ...]] = {}
+    for patrol in stage.scenario.patrols:
+        if patrol.robot not in stage.labels.values():
+            raise ConfigError(f"patrols: there is no {patrol.robot!r}; robots: robot-1 and on")
+        places = [middle_of(site, p) if isinstance(p, str) else p for p in patrol.places]
+        for x, y in places:
+            if not site.is_free(x, y, FOOTPRINT):
+                raise ConfigError(f"patrols: no robot fits at x {x:g} m, y {y:g} m")
+        beats[patrol.robot] = tuple(m.Position(*to_latlon(x, y)) for x, y in places)
+    return Patrols(beats)
+
+
+def add_operator(
+    stage: Stage, number: int, truth: Callable[[str], Truth[Observation]] | None = None
+) -> OperatorAgent:
+    """The `number`-th operator.
+
+    Args:
+        stage: Where.
+        number: From 1.
+        truth: The true state of a robot by id, where somebody can tell.
+
+    Raises:
+        ConfigError: the strategy needs the truth, and nobody can tell.
+    """
+    scenario, config = stage.scenario, stage.scenario.operator
+    device = stage.device("operator", number)
+    person = draw_person(population(config), config.population_seed, config.person + number - 1)
+    strategy = load_strategy(config.strategy, config.options)
+    needs_truth = config.strategy == "oracle"
+    if needs_truth and truth is None:
+        raise ConfigError("operator.strategy 'oracle' knows the truth: only in virtual time")
+    command = scenario.command
+    setup = OperatorSetup(
+        scenario.window,
+        command.rate_hz,
+        command_timeout_s(scenario),
+        command.attempts,
+        truth=truth if needs_truth else None,
+        guarded=scenario.control == "coordinated",
+    )
+    seat = DriverSeat(
+        device,
+        person,
+        Phone(
+            phone_profile(scenario),
+            person,
+            stage.streams[f"{device.label}/phone"],
+            Streams(config.population_seed).fresh(f"person-{config.person + number - 1}/phone"),
+        ),
+        strategy,
+        stage.reach,
+        stage.planner,
+        setup,
+        stage.streams[f"{device.label}/judgement"],
+        lambda what: stage.streams.fresh(f"{device.label}/look/{what}"),
+    )
+    kind = Supervise if scenario.control == "supervisory" else Drive
+    operator = OperatorAgent(seat, kind, config.span)
+    device.register()
+    return operator

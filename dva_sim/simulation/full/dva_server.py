@@ -1,0 +1,145 @@
+"""The DVA on the network: binds the desk, which knows no clock, to messages and time."""
+
+from __future__ import annotations
+
+from collections import Counter
+from functools import partial
+
+from dva_sim.agents.device import HEARTBEAT, STATUS, Device
+from dva_sim.core.dva import Desk
+from dva_sim.core.events import Event, State
+from dva_sim.core.outbox import Send
+from dva_sim.core.registry import DETECTOR, GUARD, ROBOT
+from dva_sim.core.store import Memory
+from dva_sim.network.patterns import Subscription
+from dva_sim.protocol import messages as m
+
+MOST_TOLD = 20_000  # events whose last word is remembered, so that none is said twice
+TICK = 1.0  # how often the desk looks at deadlines [s]
+
+
+class DvaAgent:
+    """The DVA core node.
+
+    Args:
+        device: Its identity and ways to talk.
+        desk: What decides.
+
+    Attributes:
+        beats: Heartbeats heard, by device.
+        events: Every event there ever was, by number, where `keep_events`.
+    """
+
+    def __init__(
+        self, device: Device, desk: Desk, memory: Memory | None = None, keep_events: bool = True
+    ) -> None:
+        self.device, self.desk = device, desk
+        self.events: dict[int, Event] = {}
+        self._memory, self._keep_events = memory, keep_events
+        self._told: dict[int, State] = {}
+        self._problem: str | None = None
+        self.beats: Counter[str] = Counter()
+        self._heard: dict[tuple[str, str], tuple[str, Subscription]] = {}
+        device.serve(self._on_request)
+
+    def start(self) -> None:
+        """Begin to look at deadlines; a memory tells what was going on before."""
+        clock = self.device.clock
+        if self._memory is not None and self._memory.recall(self.desk, clock.now):
+            count = len(self.desk.book.open)
+            self.device.tell(f"remembers {count} open event{'s' * (count != 1)}")
+            for entry in list(self.desk.registry.entries.values()):
+                self._meet(entry.device)
+            self._carry_out(self.desk.go_on())
+        clock.every(TICK, self._tick, start=clock.now + TICK)
+
+    def close(self) -> None:
+        """End all sessions: nobody drives by a permission of a DVA that is no more."""
+        self._carry_out(self.desk.close())
+
+    def _on_request(self, message: m.Message) -> m.Reply:
+        reply, sends = self.desk.handle(message, self.device.clock.now)
+        if isinstance(message.body, m.Registration) and reply.code == m.OK:
+            body = message.body
+            self._meet(m.Device(message.source, body.label, body.device_type, body.address))
+        self._carry_out(sends)
+        return reply
+
+    def _meet(self, device: m.Device) -> None:
+        """Listen to what a device publishes, anew when it has moved to another address.
+
+        Detectors only speak when they have something to report.
+        """
+        source = device.id_tag
+        self.device.network.introduce(source, device.address)
+        topics = [] if device.device_type == DETECTOR else [HEARTBEAT]
+        if device.device_type in (ROBOT, GUARD):
+            topics.append(STATUS)
+        for topic in topics:
+            address, earlier = self._heard.get((source, topic), ("", None))
+            if address == device.address:
+                continue
+            if earlier is not None:
+                earlier.close()
+            heard = self.device.network.subscribe(
+                self.device.id_tag, source, topic, partial(self._on_published, source)
+            )
+            self._heard[source, topic] = device.address, heard
+
+    def _on_published(self, source: str, data: bytes) -> None:
+        message = self.device.read(data, source)
+        if message is not None:
+            self.beats[source] += isinstance(message.body, m.Heartbeat)
+            self.desk.note(message, self.device.clock.now)
+
+    def _tick(self) -> None:
+        self._carry_out(self.desk.tick(self.device.clock.now))
+
+    def _carry_out(self, sends: list[Send]) -> None:
+        """Keep what has changed, then say it: what was said must not be forgotten."""
+        self._keep_changes()
+        for send in sends:
+            self.device.ask(
+                send.to,
+                send.body,
+                lambda reply, send=send: self._answered(send, reply),  # type: ignore[misc]
+                lambda send=send: self._undelivered(send),  # type: ignore[misc]
+                send.session,
+            )
+
+    def _answered(self, send: Send, reply: m.Reply) -> None:
+        # Whoever refuses to hear that something is over knows nothing of it: it is over there.
+        if reply.code == m.OK or isinstance(send.body, m.PermissionRevocation | m.OrderProgress):
+            self._carry_out(self.desk.delivered(send, self.device.clock.now))
+        else:
+            self._undelivered(send)
+
+    def _undelivered(self, send: Send) -> None:
+        self._carry_out(self.desk.undelivered(send, self.device.clock.now))
+
+    def _keep_changes(self) -> None:
+        """Put each change of an event on the timeline, and all that changed into the memory."""
+        changed = self.desk.book.changes()
+        if self._memory is not None:
+            self._complain(self._memory.keep(self.desk, changed, self.device.clock.now))
+        for event in changed:
+            if self._keep_events:
+                self.events[event.number] = event
+            self._tell(event)
+
+    def _complain(self, problem: str | None) -> None:
+        """Say once what goes wrong with the memory; the DVA works on."""
+        if problem is not None and problem != self._problem:
+            self.device.tell(problem, "link")
+        self._problem = problem
+
+    def _tell(self, event: Event) -> None:
+        if self._told.get(event.number) is event.state:
+            return
+        self._told[event.number] = event.state
+        if len(self._told) > MOST_TOLD:
+            del self._told[next(iter(self._told))]
+        told = f"event {event.number} ({event.kind}) is {event.state}"
+        if event.state is State.ASSIGNED and event.holder:
+            told += f" to {self.device.label_of(event.holder)}"
+        self.device.tell(told)

@@ -1,0 +1,124 @@
+"""The hazards of a run: which, where and when, drawn by the run's seed."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from dva_sim.agents.robot.camera import HazardSpot
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.streams import Streams
+from dva_sim.simulation.scenario import EventConfig
+from dva_sim.worlds.hazards import DETECTS, Hazard, first_detection, make_hazard
+from dva_sim.worlds.layout import Site
+from dva_sim.worlds.site_parts import Detector
+
+REACHABLE = 0.4  # radius that fits through the doors on the way there [m]
+CLEARANCE = 0.7  # around the middle of a hazard, so that a robot can get near [m]
+FAR_ENOUGH = 6.0  # from every base, so that there is a way to go [m]
+TRIES = 200
+HEARSAY_WITHIN = 3.0  # so far from the true place do other people report it [m]
+HEARSAY_LATE = (2.0, 20.0)  # so long after the first report [s]
+
+
+@dataclass(frozen=True)
+class Hearsay:
+    """What another person reports of an incident: when [s], and where that is told to be [m]."""
+
+    time: float
+    position: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Incident:
+    """A hazard of this run.
+
+    Attributes:
+        kind: `fire`, `gas_leak` or `flood`.
+        room: Where, by name; empty outside all rooms.
+        start: When it begins [s].
+        detected: When a detector or a person notices it [s]; infinite if nobody does.
+        detector: The detector that does, if one does.
+        hazard: How it grows.
+        false_alarm: Nothing is there; the hazard is what those who report it believe in.
+        hearsay: What others report of it after the first report.
+    """
+
+    kind: str
+    room: str
+    start: float
+    detected: float
+    detector: Detector | None
+    hazard: Hazard
+    false_alarm: bool = False
+    hearsay: tuple[Hearsay, ...] = ()
+
+    def is_there(self, now: float) -> bool:
+        """Whether it has begun and is real; whether it is over by `now` [s], the field knows."""
+        return now >= self.start and not self.false_alarm
+
+    def spot(self, now: float) -> HazardSpot | None:
+        """What a camera may see of it at `now` [s]."""
+        if not self.is_there(now):
+            return None
+        x, y = self.hazard.position
+        return HazardSpot(self.kind, x, y, self.hazard.radius(now))
+
+
+def draw_incidents(events: tuple[EventConfig, ...], site: Site, streams: Streams) -> list[Incident]:
+    """Place the events of a scenario, each by a stream of its own.
+
+    Raises:
+        ConfigError: a room that the site does not have, or no free place for an event.
+    """
+    return [_draw(event, site, streams, number) for number, event in enumerate(events, 1)]
+
+
+def _draw(event: EventConfig, site: Site, streams: Streams, number: int) -> Incident:
+    rng = streams[f"event-{number}"]
+    start = event.at_s
+    if event.latest_s is not None:
+        start = float(rng.uniform(event.at_s, event.latest_s))
+    x, y = _place(event, site, rng)
+    hazard = make_hazard(event.kind, (x, y), start, **event.hazard)
+    room = site.room_at(x, y) or ""
+    detector, detected = None, start
+    if not event.reported:
+        detector, detected = first_detection(hazard, site)
+    luck = streams[f"event-{number}/hearsay"]
+    hearsay = tuple(_hearsay(detected, (x, y), site, luck) for _ in range(event.reports - 1))
+    return Incident(event.kind, room, start, detected, detector, hazard, event.false_alarm, hearsay)
+
+
+def _hearsay(
+    first: float, place: tuple[float, float], site: Site, luck: np.random.Generator
+) -> Hearsay:
+    """Somewhere free near the true place, in the same room."""
+    time = first + float(luck.uniform(*HEARSAY_LATE))
+    for _ in range(TRIES):
+        far, angle = HEARSAY_WITHIN * luck.uniform(), luck.uniform(0.0, 2.0 * math.pi)
+        x, y = place[0] + far * math.cos(angle), place[1] + far * math.sin(angle)
+        if site.is_free(x, y, REACHABLE) and site.room_at(x, y) == site.room_at(*place):
+            return Hearsay(time, (float(x), float(y)))
+    return Hearsay(time, place)
+
+
+def _place(event: EventConfig, site: Site, rng: np.random.Generator) -> tuple[float, float]:
+    """A free place in the event's room; without one, in some room that is watched for its kind."""
+    rooms: list[str | None] = [event.room] if event.room else _watched_rooms(event.kind, site)
+    bases = [*site.robot_bases, *site.guard_posts]
+    for _ in range(TRIES):
+        x, y = site.sample_free(rng, REACHABLE, rooms[int(rng.integers(len(rooms)))])
+        gap = min((math.dist((x, y), (b.x, b.y)) for b in bases), default=math.inf)
+        if site.is_free(x, y, CLEARANCE) and (event.room is not None or gap >= FAR_ENOUGH):
+            return x, y
+    where = f"in room {event.room!r}" if event.room else f"{FAR_ENOUGH:g} m from all bases"
+    raise ConfigError(f"site {site.name!r} has no free place for a {event.kind} {where}")
+
+
+def _watched_rooms(kind: str, site: Site) -> list[str | None]:
+    """Rooms with a detector for a kind of event; `None`, which is anywhere, if there are none."""
+    watched = {site.room_at(d.x, d.y) for d in site.detectors if d.kind in DETECTS[kind]}
+    return [room.name for room in site.rooms if room.name in watched] or [None]

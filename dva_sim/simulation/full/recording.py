@@ -1,0 +1,134 @@
+"""What is left of a run when it is over: what can be shown of it, and all that is measured."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from dva_sim.agents.robot.robot import RobotAgent
+from dva_sim.core.events import Event, State
+from dva_sim.kernel.recorder import Recorder
+from dva_sim.network.link import Link
+from dva_sim.simulation.full.hazards import Incident
+from dva_sim.simulation.scenario import Scenario
+from dva_sim.worlds.hazards import Surroundings
+from dva_sim.worlds.layout import Site
+
+MERGED_WITHIN = 8.5  # the DVA takes reports so near each other for one event [m]
+
+
+class PersonLog(NamedTuple):
+    """What became of a guard or bystander.
+
+    Attributes:
+        name: As in `guard-1`.
+        kind: `guard` or `bystander`.
+        activity: At the end.
+        exposure: Time within the danger radius of a hazard and in sight of it, or in air or water
+            that is dangerous [s].
+        heat: Fractional effective dose of heat; at 1 half of all people are incapacitated.
+        toxic: The same of carbon monoxide.
+        leaves: When it set out to leave [s]; infinite if it never did.
+        out: When it was out [s]; infinite if it never was.
+    """
+
+    name: str
+    kind: str
+    activity: str
+    exposure: float
+    heat: float
+    toxic: float
+    leaves: float = math.inf
+    out: float = math.inf
+
+
+class Ending(NamedTuple):
+    """What became of an incident, as far as the DVA knows.
+
+    Attributes:
+        outcome: `confirmed`, `refuted`, `escalated` or `expired`; `open` if none of them came
+            before the run ended, and `undetected` if nobody reported it.
+        time: When [s]; infinite if it is open or undetected.
+    """
+
+    outcome: str
+    time: float
+
+
+@dataclass(kw_only=True)
+class Playback:
+    """What can be told and shown of a run, with or without what ran.
+
+    Attributes:
+        recorder: What happened, as far as it is told or seen.
+        incidents: The hazards as they were.
+        surroundings: What the hazards made of the air and the floor.
+        labels: Names by id.
+        radii: Of the robots, seen from above, by id [m].
+        duration: How long the run lasted [s].
+        contained: When incidents were dealt with [s], by their place in `incidents`.
+        endings: What became of each incident, in the order of `incidents`; empty if that is not
+            known, as of a recording that was cut short.
+    """
+
+    scenario: Scenario
+    seed: int
+    site: Site
+    recorder: Recorder
+    incidents: list[Incident]
+    surroundings: Surroundings
+    labels: dict[str, str]
+    radii: dict[str, float]
+    duration: float
+    contained: dict[int, float] = field(default_factory=dict)
+    endings: list[Ending] = field(default_factory=list)
+
+    def robot_named(self, label: str) -> str | None:
+        """The id of a robot, if there is one of that name."""
+        return next((robot for robot in self.radii if self.labels[robot] == label), None)
+
+
+@dataclass(kw_only=True)
+class Recording(Playback):
+    """All that is left of one run, to be measured.
+
+    Attributes:
+        events: The events as the DVA knew them.
+        robots: The robots by id, as they ended.
+        people: What became of the people on foot.
+        depth: How the network was modelled: `message`, `segment` (where any connection was), or
+            `datagram`.
+    """
+
+    events: list[Event]
+    robots: dict[str, RobotAgent]
+    links: dict[str, tuple[Link, Link]]
+    people: list[PersonLog] = field(default_factory=list)
+    depth: str = "message"
+
+    def event_of(self, number: int) -> Event | None:
+        """The DVA's event about incident `number`, if it knows of it."""
+        return event_about(self.incidents[number], self.events, self.site)
+
+
+def ending_of(event: Event | None) -> Ending:
+    """What became of an incident that was reported as `event`, or as none."""
+    if event is None:
+        return Ending("undetected", math.inf)
+    if "confirmed" in event.times and event.state is not State.REFUTED:
+        return Ending("confirmed", event.times["confirmed"])
+    if event.open:
+        return Ending("open", math.inf)
+    return Ending(event.state.value, event.times["closed"])
+
+
+def event_about(incident: Incident, events: list[Event], site: Site) -> Event | None:
+    """The DVA's event that an incident was reported as; two near each other are one event."""
+    known: tuple[float, Event | None] = MERGED_WITHIN, None
+    for event in events:
+        at = site.frame.to_xy(event.position.latitude, event.position.longitude)
+        gap = math.dist(at, incident.hazard.position)
+        if event.kind == incident.kind and gap <= known[0]:
+            known = gap, event
+    return known[1]

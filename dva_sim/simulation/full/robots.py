@@ -1,0 +1,253 @@
+"""Where robots and guards begin: at the site's bases and posts, or a given way from the event.
+
+The robots of a run: body, battery, sensors, computer.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dva_sim.agents.robot.battery import Battery
+from dva_sim.agents.robot.camera import CAMERA_SCHEME, HazardSpot, View
+from dva_sim.agents.robot.command_queue import service_times
+from dva_sim.agents.robot.controller import Limits, RobotController
+from dva_sim.agents.robot.profile import RobotProfile
+from dva_sim.agents.robot.robot import FRAME, RobotAgent, RobotSetup
+from dva_sim.agents.robot.sensors import make_ports, sources_of
+from dva_sim.kernel.clock import Clock
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.recorder import DriveLog
+from dva_sim.simulation.full.stage import DVA, Stage, place_of
+from dva_sim.worlds.bodies import GRIP
+from dva_sim.worlds.geo import Pose
+from dva_sim.worlds.hazards import Surroundings
+from dva_sim.worlds.layout import FOOTPRINT
+from dva_sim.worlds.lidar import Lidar
+from dva_sim.worlds.physics import World
+from dva_sim.worlds.robot_body import RobotBody
+
+TRIES = 200
+APART = 1.5  # between the middles of two who begin [m]
+
+Point = tuple[float, float]
+
+
+class Starts:
+    """Gives everybody a place to begin at.
+
+    Whoever is to begin a given way from the event begins on the way to it from anywhere else on
+    the site, chosen by the run's seed: that way, cut off where so much of it is left.
+
+    Args:
+        stage: Where.
+        goal: Where the first event is [m].
+    """
+
+    def __init__(self, stage: Stage, goal: Point) -> None:
+        self._stage, self._goal = stage, goal
+        self._taken: list[Point] = []
+
+    def of_robot(self, number: int) -> Pose:
+        """Where the `number`-th robot begins, and is charged.
+
+        Raises:
+            ConfigError: there is no such place.
+        """
+        stage = self._stage
+        way, bases = stage.scenario.robot.way_m, stage.site.robot_bases
+        if way is None:
+            return place_of(bases, number, "robot base", stage.site)
+        return self._away(f"robot-{number}", way)
+
+    def of_guard(self, number: int) -> Pose:
+        """Where the `number`-th guard waits.
+
+        Raises:
+            ConfigError: there is no such place.
+        """
+        stage = self._stage
+        way, posts = stage.scenario.guard.way_m, stage.site.guard_posts
+        if way is None:
+            return place_of(posts, number, "guard post", stage.site)
+        return self._away(f"guard-{number}", way)
+
+    def _away(self, label: str, length: float) -> Pose:
+        """A place so far [m] from the event, looking along the way there."""
+        site, rng = self._stage.site, self._stage.streams.fresh(f"{label}/start")
+        longest = 0.0
+        for _ in range(TRIES):
+            way = self._stage.planner.path(site.sample_free(rng, FOOTPRINT), self._goal)
+            if way is None:
+                continue
+            longest = max(longest, _length(way))
+            pose = _cut(way, length)
+            if pose is not None and self._is_free(pose):
+                self._taken.append((pose.x, pose.y))
+                return pose
+        problem = f"site {site.name!r} has no place {length:g} m from the event for {label}"
+        raise ConfigError(f"{problem}; the longest way tried was {longest:.0f} m")
+
+    def _is_free(self, pose: Pose) -> bool:
+        here = pose.x, pose.y
+        alone = all(math.dist(here, other) >= APART for other in self._taken)
+        return alone and self._stage.site.is_free(*here, FOOTPRINT)
+
+
+def _length(way: NDArray[np.float64]) -> float:
+    return float(np.hypot(*np.diff(way, axis=0).T).sum())
+
+
+def _cut(way: NDArray[np.float64], left: float) -> Pose | None:
+    """Where so much of a way `(n, 2)` is left [m], looking along it; None if it is shorter."""
+    steps = np.hypot(*np.diff(way, axis=0).T)
+    gone = np.concatenate([[0.0], np.cumsum(steps)])
+    at = float(gone[-1]) - left
+    if at < 0.0:
+        return None
+    place = min(int(np.searchsorted(gone, at, side="right")) - 1, len(steps) - 1)
+    (x, y), ahead = way[place], way[place + 1] - way[place]
+    share = (at - gone[place]) / steps[place] if steps[place] > 0.0 else 0.0
+    heading = math.atan2(ahead[1], ahead[0])
+    return Pose(float(x + share * ahead[0]), float(y + share * ahead[1]), heading)
+
+
+WET_GRIP = 0.4  # friction coefficient of rubber on a wet floor; assumed
+WET = 0.002  # deeper water than this makes a floor slippery [m]
+HOUSEKEEPING = 1.0  # how often a robot looks at its battery, and the floor at the robot [s]
+AT_BASE = 0.5  # so near its base a robot that stands is charged [m]
+STANDING = 0.02  # slower than this it stands [m/s]
+
+
+class Machines:
+    """Makes robots and keeps them going.
+
+    Args:
+        stage: Where.
+        world: The physics.
+        around: The hazards.
+        spots: What cameras may see of them, at a time [s].
+        drive_of: The log of a robot's newest drive, if it had any.
+        starts: Where they begin.
+    """
+
+    def __init__(
+        self,
+        stage: Stage,
+        world: World,
+        around: Surroundings,
+        spots: Callable[[float], list[HazardSpot]],
+        drive_of: Callable[[str], DriveLog | None],
+        starts: Starts,
+    ) -> None:
+        self._stage, self._world, self._around = stage, world, around
+        self._spots, self._drive_of, self._starts = spots, drive_of, starts
+        self._lidar = Lidar(world)
+        self._failures: dict[str, int] = {}
+
+    def add(self, number: int) -> RobotAgent:
+        """The `number`-th robot, in its place; it registers and begins to work.
+
+        Raises:
+            ConfigError: the site has no base for it, or something is in its way.
+        """
+        stage, config = self._stage, self._stage.scenario.robot
+        profile = stage.robots[number - 1]
+        base = self._starts.of_robot(number)
+        device = stage.device("robot", number)
+        body = self._world.add_robot(device.label, profile.drive_spec(), base)
+        controller = RobotController(
+            device.id_tag,
+            DVA,
+            Limits(config.watchdog_s, config.max_age_s),
+            camera_url=f"{CAMERA_SCHEME}{device.address}/{FRAME}",
+            clock_offset=float(stage.streams[f"{device.label}/clock"].uniform(10.0, 100_000.0)),
+        )
+        power = Power(profile, config.charge, body, base, stage.clock)
+        setup = self._setup(profile, body, power)
+        robot = RobotAgent(
+            device, controller, self._world, body, stage.planner, setup, self._drive_of
+        )
+        device.register(robot.start)
+        stage.clock.every(HOUSEKEEPING, lambda: self._look_after(robot, power))
+        return robot
+
+    def _setup(self, profile: RobotProfile, body: RobotBody, power: Power) -> RobotSetup:
+        stage, scenario = self._stage, self._stage.scenario
+        camera, robot = scenario.camera, scenario.robot
+        angle = math.radians(camera.field_of_view_deg)
+        sources = sources_of(self._world, body, self._around, self._lidar, power.share)
+        processing = profile.processing_s if robot.processing_s is None else robot.processing_s
+        configs = profile.sensors if robot.sensors is None else robot.sensors
+        return RobotSetup(
+            scenario.pattern,
+            service_times(processing, stage.streams.fresh(f"{body.name}/processing")),
+            camera.rate_hz,
+            camera.frame_bytes,
+            View(angle, camera.range_m, stage.planner.line_of_sight, self._smoke),
+            self._spots,
+            make_ports(
+                configs, sources, lambda what: stage.streams.fresh(f"{body.name}/sensor/{what}")
+            ),
+            guarded=scenario.control == "coordinated",
+            encode=camera.encode_s,
+            charge=power.share,
+            conflates=scenario.zeromq.conflates_receiver,
+            limit=scenario.zeromq.high_water_mark,
+        )
+
+    def _smoke(self, a: tuple[float, float], b: tuple[float, float]) -> float:
+        return self._around.optical_depth(a, b, self._stage.clock.now)
+
+    def _look_after(self, robot: RobotAgent, power: Power) -> None:
+        """Once a second: is there power, does its drive answer, and is the floor wet?"""
+        now, body = self._stage.clock.now, robot.body
+        self._world.advance_to(now)
+        robot.power(power.share() > 0.0)
+        self._look_at_drive(robot)
+        if self._around.may_be_wet:
+            wet = self._around.at(body.x, body.y, now).water > WET
+            body.grip = WET_GRIP if wet else GRIP
+
+    def _look_at_drive(self, robot: RobotAgent) -> None:
+        """Count what motors of a user got wrong, and tell of the first time."""
+        device, failures = robot.device, robot.body.drive_failures
+        known = self._failures.get(device.label, 0)
+        if failures > known:
+            device.recorder.counters["failed: an answer of a drive"] += failures - known
+            self._failures[device.label] = failures
+            if not known:
+                device.tell(f"brakes, as its drive fails: {robot.body.first_failure}", "mode")
+
+
+class Power:
+    """A robot's battery, if it has one, and the base that charges it.
+
+    Args:
+        profile: Of the robot.
+        charge: Share of the capacity that it begins with.
+        body: Says how far it went, and what that took.
+        base: Where it is charged.
+        clock: The run's.
+    """
+
+    def __init__(
+        self, profile: RobotProfile, charge: float, body: RobotBody, base: Pose, clock: Clock
+    ) -> None:
+        self._battery = None
+        if profile.battery is not None:
+            self._battery = Battery(profile.battery, profile.mass_kg, charge)
+        self._body, self._base, self._clock = body, base, clock
+
+    def share(self) -> float:
+        """Of the capacity that is left now; 1 without a battery."""
+        battery, body = self._battery, self._body
+        if battery is None:
+            return 1.0
+        near = math.dist((body.x, body.y), (self._base.x, self._base.y)) < AT_BASE
+        at_base = near and abs(body.speed) < STANDING
+        battery.advance(self._clock.now, body.distance, body.work, at_base)
+        return battery.share

@@ -1,0 +1,267 @@
+"""What carries the messages of a scenario, and what they ask of a robot's link.
+
+Build a run from a scenario, let its virtual time pass, and keep what happened.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+
+from dva_sim.agents.people.bystander import ALARMED, EVACUATING, SAFE, BystanderAgent
+from dva_sim.agents.people.guard import GuardAgent
+from dva_sim.agents.robot.controller import Mode
+from dva_sim.kernel.clock import Clock
+from dva_sim.kernel.recorder import Recorder, TrackPoint
+from dva_sim.network.connections import Connector, Load
+from dva_sim.network.link import (
+    ConstantRate,
+    Direction,
+    Link,
+    LinkConfig,
+    check_partitions,
+    part_links,
+)
+from dva_sim.network.radio import Reception, make_link
+from dva_sim.network.stream import HEADERS, MSS
+from dva_sim.network.virtual import VirtualNetwork
+from dva_sim.simulation.full.control_room import add_dva, add_operator
+from dva_sim.simulation.full.field import Danger, Field, is_dangerous
+from dva_sim.simulation.full.recording import PersonLog, Recording, ending_of, event_about
+from dva_sim.simulation.full.safety_checks import broken_event_rules, broken_rules
+from dva_sim.simulation.full.stage import Stage, id_of
+from dva_sim.simulation.scenario import Scenario
+
+# Beside pictures and commands: heartbeats, status, sensors, orders, replies; assumed, and ample.
+OTHERS_HZ = 20.0
+MESSAGE = 1000  # more than any but a picture takes, with all headers [B]
+TOGETHER = 10  # messages that may coincide with a picture; assumed
+
+
+def connector_of(scenario: Scenario) -> Connector:
+    """Makes the connections of a scenario's network."""
+    return Connector(scenario.transport, scenario.network_depth, scenario.zeromq, load_of(scenario))
+
+
+def load_of(scenario: Scenario) -> Load:
+    """What a robot's link is offered at most, in the busier direction."""
+    frame = scenario.camera.frame_bytes
+    picture = frame + -(-frame // MSS) * HEADERS
+    messages = MESSAGE * (scenario.command.rate_hz + OTHERS_HZ)
+    rate = 8.0 * (scenario.camera.rate_hz * picture + messages)
+    return Load(rate, picture + TOGETHER * MESSAGE)
+
+
+LAN = LinkConfig(delay_s=0.0005, rate_bps=1e9, queue_bytes=10_000_000)
+WATCH_PERIOD = 0.5  # how often tracks are sampled and rules are checked [s]
+FILM_PERIOD = 0.1  # the same where pictures are wanted [s]
+
+
+def simulate(scenario: Scenario, seed: int, keep_traffic: bool = False) -> Recording:
+    """Run one scenario.
+
+    Args:
+        scenario: What the run consists of.
+        seed: Decides all luck but the persons'.
+        keep_traffic: Keep messages, the operators' views and finer tracks, for pictures and
+            recordings.
+
+    Raises:
+        ConfigError: the site cannot hold the team or the events.
+    """
+    return Run(scenario, seed, keep_traffic).run()
+
+
+def rehearse(scenario: Scenario, seed: int) -> None:
+    """Build a run without letting any time pass, to find what cannot work before it counts.
+
+    Raises:
+        ConfigError: a map or trace that cannot be read, a team or an event without a place.
+    """
+    Run(scenario, seed)
+
+
+class Run:
+    """Everybody in place on the virtual network, at time zero.
+
+    Args:
+        scenario: What the run consists of.
+        seed: Decides all luck but the persons'.
+        keep_traffic: Keep messages and the operators' views, for pictures.
+    """
+
+    def __init__(self, scenario: Scenario, seed: int, keep_traffic: bool = False) -> None:
+        self.scenario, self.clock, self.recorder = scenario, Clock(), Recorder(keep_traffic)
+        self.network = VirtualNetwork(
+            self.clock, self._link_between, self.recorder.message_sent, connector_of(scenario)
+        )
+        self.stage = Stage(scenario, seed, self.network, self.recorder)
+        check_partitions(scenario.link.partitions, self.stage.labels.values())
+        self.links = self._make_links()
+        lan = Link(LAN, ConstantRate(LAN.rate_bps), self.stage.streams, "lan")
+        self._lan = lan, lan
+        self.dva = add_dva(self.stage)
+        self.field = Field(self.stage)
+        self.field.populate()
+        for number in range(1, scenario.operator.count + 1):
+            add_operator(self.stage, number, self.field.truth)
+        self.field.schedule_incidents()
+        self.dva.start()
+        self._last_mission: dict[str, float] = {}
+        self.clock.every(WATCH_PERIOD, self._watch)
+        self.clock.every(FILM_PERIOD if keep_traffic else WATCH_PERIOD, self._sample)
+
+    def run(self) -> Recording:
+        """Let time pass until all is settled or the horizon is reached."""
+        now, horizon = 0.0, self.scenario.horizon_s
+        while now < horizon and not self._settled():
+            now = min(now + 1.0, horizon)
+            self.clock.run(now)
+        self._watch()
+        self._sample()
+        stage, field = self.stage, self.field
+        events = list(self.dva.events.values())
+        return Recording(
+            scenario=self.scenario,
+            seed=stage.seed,
+            site=stage.site,
+            recorder=self.recorder,
+            incidents=field.incidents,
+            surroundings=field.surroundings,
+            labels=stage.labels,
+            radii={name: robot.body.spec.radius for name, robot in field.robots.items()},
+            duration=self.clock.now,
+            contained=field.contained,
+            endings=[ending_of(event_about(i, events, stage.site)) for i in field.incidents],
+            events=events,
+            robots=field.robots,
+            links=self.links,
+            people=self._people(),
+            depth=self.network.connector.deepest,
+        )
+
+    def _people(self) -> list[PersonLog]:
+        exposure, field = self.recorder.exposure, self.field
+        return [
+            PersonLog(name, "guard", g.activity, exposure[name], g.dose.heat, g.dose.toxic)
+            for g in field.guards
+            for name in (g.device.label,)
+        ] + [
+            PersonLog(
+                *(b.name, "bystander", b.activity, exposure[b.name], b.dose.heat, b.dose.toxic),
+                *(b.leaves_at, b.out_at),
+            )
+            for b in field.bystanders
+        ]
+
+    def _settled(self) -> bool:
+        """Whether every incident is known and closed, nobody drives, and nobody is leaving."""
+        events = list(self.dva.events.values())
+        return (
+            bool(events)
+            and not any(e.open for e in events)
+            and all(d.ended is not None for d in self.recorder.drives)
+            and not any(b.activity in (ALARMED, EVACUATING) for b in self.field.bystanders)
+            and all(
+                event_about(i, events, self.stage.site) is not None
+                for i in self.field.incidents
+                if i.detected < math.inf
+            )
+        )
+
+    # --- the network -------------------------------------------------------------------
+
+    def _make_links(self) -> dict[str, tuple[Link, Link]]:
+        """To each robot and back, by its id."""
+        links = {}
+        for number in range(1, self.scenario.robot.count + 1):
+            robot = id_of("robot", number)
+            links[robot] = self._make_link(robot, "up"), self._make_link(robot, "down")
+        return links
+
+    def _make_link(self, robot: str, direction: Direction) -> Link:
+        stage = self.stage
+        reception = partial(self._reception, robot) if stage.site.wifi else None
+        name = f"{stage.labels[robot]}/link"
+        return make_link(self.scenario.link, direction, stage.streams, name, reception)
+
+    def _reception(self, robot: str) -> Reception | None:
+        """The radio link's quality where a robot was at the last tick of the physics."""
+        known = self.field.robots.get(robot)  # it talks before the next one has been placed
+        if known is None:
+            return None
+        here = self.stage.site.link_quality(known.body.x, known.body.y)
+        return None if here is None else here.quality
+
+    def _link_between(self, source: str, destination: str) -> tuple[Link, Link]:
+        """The link from one to another and the one back, as far as they are not parted."""
+        links, partitions = self._unparted(source, destination), self.scenario.link.partitions
+        if not partitions:
+            return links
+        name_of = self.stage.labels.get
+        return part_links(
+            links, name_of(source, source), name_of(destination, destination), partitions
+        )
+
+    def _unparted(self, source: str, destination: str) -> tuple[Link, Link]:
+        """A robot's link is the only one that matters; everybody else is on the LAN."""
+        if destination in self.links:
+            return self.links[destination]
+        if source in self.links:
+            up, down = self.links[source]
+            return down, up
+        return self._lan
+
+    # --- watching ----------------------------------------------------------------------
+
+    def _watch(self) -> None:
+        """Check the rules that must hold at every moment."""
+        now = self.clock.now
+        self.field.world.advance_to(now)
+        self._watch_robots(now)
+        dangers = self.field.dangers(now)
+        for guard in self.field.guards:
+            self._watch_person(guard.device.label, guard, now, dangers)
+        for bystander in self.field.bystanders:
+            self._watch_person(bystander.name, bystander, now, dangers)
+        deadline = self.scenario.dispatch.rules().escalate_after
+        for rule, what in broken_event_rules(self.dva.desk.book, deadline, now):
+            self.recorder.violated(rule, now, "dva", what)
+
+    def _watch_robots(self, now: float) -> None:
+        recorder = self.recorder
+        for robot in self.field.robots.values():
+            label = robot.device.label
+            if robot.controller.mode is Mode.MISSION:
+                self._last_mission[label] = now
+            drive = self.field.newest_drive(robot.device.id_tag)
+            mission = self._last_mission.get(label, 0.0)
+            command = recorder.newest_command.get(robot.device.id_tag)
+            limits = self.scenario.robot
+            for rule, what in broken_rules(robot, drive, command, limits, mission, now):
+                recorder.violated(rule, now, label, what)
+
+    def _watch_person(
+        self, name: str, who: GuardAgent | BystanderAgent, now: float, dangers: list[Danger]
+    ) -> None:
+        if who.activity == SAFE:
+            return
+        x, y = who.walking.place
+        if is_dangerous(who.exposure.conditions) or self.field.is_near(dangers, x, y):
+            self.recorder.exposure[name] += WATCH_PERIOD
+
+    def _sample(self) -> None:
+        """Note where everybody is who is on the site."""
+        now, tracks = self.clock.now, self.recorder.tracks
+        self.field.world.advance_to(now)
+        for robot in self.field.robots.values():
+            pose, mode = robot.body.pose(), robot.controller.mode.value
+            tracks[robot.device.label].append(TrackPoint(now, pose.x, pose.y, pose.heading, mode))
+        people: list[tuple[str, GuardAgent | BystanderAgent]] = [
+            *((guard.device.label, guard) for guard in self.field.guards),
+            *((bystander.name, bystander) for bystander in self.field.bystanders),
+        ]
+        for name, who in people:
+            x, y = who.walking.place
+            if who.activity != SAFE:
+                tracks[name].append(TrackPoint(now, x, y, who.heading, who.activity))

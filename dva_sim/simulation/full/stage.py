@@ -1,0 +1,164 @@
+"""Ids on the wire and names for people.
+
+What the parts of a run share: scenario, luck, clock, network, site, and who is who.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+import shapely
+
+from dva_sim.agents.device import Device
+from dva_sim.agents.operator.strategies import Reach
+from dva_sim.core.registry import DETECTOR, GUARD, OPERATOR, ROBOT
+from dva_sim.kernel.clock import Clock
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.recorder import Recorder
+from dva_sim.kernel.streams import Streams
+from dva_sim.network.patterns import Transport
+from dva_sim.protocol.exchange import NOON
+from dva_sim.simulation.scenario import Scenario, request_timeout_s, robot_profiles, site_of
+from dva_sim.worlds.geo import Pose
+from dva_sim.worlds.layout import FOOTPRINT, Site
+from dva_sim.worlds.planning import Planner
+
+DVA = "02:00:00:00:00:01"
+_ROOMS = {"dva": 0, "robot": 1, "guard": 2, "operator": 3, "detector": 4}
+
+
+def id_of(kind: str, number: int) -> str:
+    """The id of the `number`-th device of a kind, from 1: locally administered, never random."""
+    return f"02:00:00:{_ROOMS[kind]:02X}:{number >> 8:02X}:{number & 0xFF:02X}"
+
+
+def label_of(kind: str, number: int) -> str:
+    """Its name for people: `robot-1`; of the DVA there is but one."""
+    return "dva" if kind == "dva" else f"{kind}-{number}"
+
+
+def address_of(kind: str, number: int) -> str:
+    """Its address in the registration, where nobody has a real one."""
+    return f"192.168.{_ROOMS[kind] or 1}.{number % 250 + 1}"
+
+
+TYPES = {"dva": "DVA", "robot": ROBOT, "guard": GUARD, "operator": OPERATOR, "detector": DETECTOR}
+
+
+@dataclass
+class Stage:
+    """Where a run, or a part of one, takes place.
+
+    Attributes:
+        scenario: What the run consists of.
+        seed: Decides all luck but the persons'.
+        network: What carries messages.
+        recorder: Told what happens.
+        address: Gives a new device its address, by kind and number.
+        time_of_day: See `Device`.
+
+    Raises:
+        ConfigError: a map that cannot be read, or that the team does not fit on.
+    """
+
+    scenario: Scenario
+    seed: int
+    network: Transport
+    recorder: Recorder
+    address: Callable[[str, int], str] = address_of
+    time_of_day: tuple[float, bool] = (NOON, False)
+    labels: dict[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.streams = Streams(self.seed)
+        self.site = site_of(self.scenario, self.seed)
+        self.robots = robot_profiles(self.scenario)
+        # One map of ways for all: what the largest robot fits through, people and others do.
+        radius = max((robot.radius_m for robot in self.robots), default=FOOTPRINT)
+        self.planner = planner_of(self.site, radius)
+        counts = {
+            "robot": self.scenario.robot.count,
+            "guard": self.scenario.guard.count,
+            "operator": self.scenario.operator.count,
+        }
+        self._specs = {
+            id_of("robot", number): profile.drive_spec()
+            for number, profile in enumerate(self.robots, 1)
+        }
+        self.labels[DVA] = label_of("dva", 1)
+        for kind, count in counts.items():
+            for number in range(1, count + 1):
+                self.labels[id_of(kind, number)] = label_of(kind, number)
+
+    @property
+    def clock(self) -> Clock:
+        """The clock that everybody shares."""
+        return self.network.clock
+
+    def reach(self, robot: str) -> Reach:
+        """What a robot can do, by its id, as its operator has been taught."""
+        spec = self._specs[robot]
+        return Reach(spec.max_speed, spec.max_turn_rate, spec.drive(spec).turning_radius)
+
+    def device(self, kind: str, number: int) -> Device:
+        """A new device: its identity and ways to talk."""
+        return Device(
+            id_of(kind, number),
+            label_of(kind, number),
+            TYPES[kind],
+            self.address(kind, number),
+            DVA,
+            self.network,
+            self.recorder,
+            self.site.frame,
+            request_timeout_s(self.scenario),
+            self.scenario.request.attempts,
+            self.labels,
+            self.time_of_day,
+        )
+
+
+_PLANNERS: dict[tuple[str, float], tuple[Site, Planner]] = {}
+
+
+def planner_of(site: Site, radius: float) -> Planner:
+    """The planner of a site, kept for the next run on it in this process."""
+    key = site.name, radius
+    known = _PLANNERS.get(key)
+    if known is None or known[0] is not site:
+        known = _PLANNERS[key] = site, Planner(site, radius)
+    return known[1]
+
+
+def place_of(places: tuple[Pose, ...], number: int, what: str, site: Site) -> Pose:
+    """The place of the `number`-th of something.
+
+    Raises:
+        ConfigError: the site has not so many.
+    """
+    if number > len(places):
+        problem = f"site {site.name!r} has {len(places)} {what}s, the scenario needs more"
+        raise ConfigError(problem)
+    return places[number - 1]
+
+
+def middle_of(site: Site, room: str) -> tuple[float, float]:
+    """The place in a room that is farthest from everything [m].
+
+    Raises:
+        ConfigError: there is no such room.
+    """
+    outline = shapely.Polygon(site.room(room).polygon)
+    low_x, low_y, high_x, high_y = outline.bounds
+    (low_row, low_column), (high_row, high_column) = (
+        site.grid.to_cell(low_x, low_y),
+        site.grid.to_cell(high_x, high_y),
+    )
+    rows, columns = np.mgrid[low_row : high_row + 1, low_column : high_column + 1]
+    points = site.grid.to_xy(rows + 0.5, columns + 0.5)
+    inside = shapely.contains_xy(outline, points[..., 0], points[..., 1])
+    best = np.argmax(np.where(inside, site.grid.clearance[rows, columns], -1.0))
+    x, y = points.reshape(-1, 2)[best].tolist()
+    return x, y

@@ -1,0 +1,290 @@
+"""How busy operators are, and how they steer: pure functions over what a run has recorded.
+
+References:
+    O. Nakayama, T. Futami, T. Nakamura, E. R. Boer: Development of a steering entropy method for
+    evaluating driver workload. SAE Technical Paper 1999-01-0892.
+    E. R. Boer: Behavioral entropy as an index of workload. Proc. Human Factors and Ergonomics
+    Society 44 (2000) 125-128.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from dva_sim.kernel.recorder import DriveLog, TrackPoint
+from dva_sim.simulation.full import Recording
+from dva_sim.simulation.full.stage import id_of
+
+Row = dict[str, Any]
+Floats = NDArray[np.float64]
+Span = tuple[float, float]  # from when to when [s]
+
+GAP = 0.1  # a smaller change of the turn rate is no reversal [rad/s]; assumed
+STEP = 0.15  # of resampling for the entropy, as published [s]
+BAND = 0.05  # of prediction errors, see `steering_entropy` [rad/s]; assumed
+EDGES = (-5.0, -2.5, -1.0, -0.5, 0.5, 1.0, 2.5, 5.0)  # of the nine bins, in bands, as published
+TRACK_STEP = 0.5  # between the points of a track that was not filmed [s]
+LEVEL_SPEED, LEVEL_TURN = 0.025, 0.035  # half a step of the phone, two degrees a second
+
+
+# --- spans of time -----------------------------------------------------------------------------
+def covered(spans: Iterable[Span]) -> float:
+    """How long at least one of the spans lasts [s]."""
+    total, end = 0.0, -math.inf
+    for since, until in sorted(spans):
+        total += max(0.0, until - max(since, end))
+        end = max(end, until)
+    return total
+
+
+def most_at_once(spans: Iterable[Span]) -> int:
+    """How many spans overlap at most."""
+    changes = sorted((t, d) for since, until in spans for t, d in ((since, 1), (until, -1)))
+    return max(np.cumsum([change for _, change in changes]).tolist(), default=0)
+
+
+def in_hand(log: DriveLog, end: float) -> Span:
+    """From the order until the operator is done with it, or the run ends at `end` [s]."""
+    return log.ordered, end if log.ended is None else log.ended
+
+
+def attended(log: DriveLog, end: float) -> list[Span]:
+    """When its operator looked at a robot's picture."""
+    now = [] if log.looks_since is None else [(log.looks_since, max(end, log.looks_since))]
+    return log.attended + now
+
+
+def waits(log: DriveLog, end: float) -> list[Span]:
+    """When a robot waited for its operator to turn to it: for its turn, or for the eyes."""
+    until = in_hand(log, end)[1]
+    spans = [(log.ordered, until if log.taken_up is None else log.taken_up)]
+    if log.waits_from is not None:
+        seen = [
+            max(since, log.waits_from) for since, to in attended(log, end) if to > log.waits_from
+        ]
+        spans.append((log.waits_from, min(seen, default=until)))
+    return [span for span in spans if span[1] > span[0]]
+
+
+# --- steering ----------------------------------------------------------------------------------
+def reversals(values: Iterable[float], gap: float = GAP) -> int:
+    """How often a signal turns round, counting only changes of at least `gap`."""
+    count, direction = 0, 0
+    low, high = math.inf, -math.inf
+    for value in values:
+        low, high = min(low, value), max(high, value)
+        if direction <= 0 and value >= low + gap:
+            count, direction, high = count + (direction < 0), 1, value
+            low = value
+        elif direction >= 0 and value <= high - gap:
+            count, direction, low = count + (direction > 0), -1, value
+            high = value
+    return count
+
+
+def changes(commands: Iterable[tuple[float, float]]) -> int:
+    """How often a command [m/s, rad/s] was clearly another than the last that counted."""
+    count, last = -1, (math.inf, math.inf)
+    for speed, turn in commands:
+        if abs(speed - last[0]) > LEVEL_SPEED or abs(turn - last[1]) > LEVEL_TURN:
+            count, last = count + 1, (speed, turn)
+    return max(count, 0)
+
+
+def steering_entropy(turn_rate: Floats, band: float = BAND) -> float:
+    """How unpredictably somebody steers, from 0 (like clockwork) to 1; nan for under 3 s.
+
+    Each value, sampled every 0.15 s, is predicted from the three before it by a Taylor expansion
+    of second order; the errors fall into nine bins, and the entropy is -sum p log9 p. Published,
+    the width of the bins is each person's own: the 90th percentile of the errors in a drive
+    without a second task. Here it is the same for all and given, so that cells can be compared.
+
+    Args:
+        turn_rate: Asked for, every 0.15 s, shape `(n,)` [rad/s].
+        band: The width of the bins [rad/s].
+    """
+    if len(turn_rate) < 20:
+        return math.nan
+    third, second, first = turn_rate[:-3], turn_rate[1:-2], turn_rate[2:-1]
+    slope = first - second
+    predicted = first + slope + 0.5 * (slope - (second - third))
+    bins = np.searchsorted(EDGES, (turn_rate[3:] - predicted) / band)
+    share = np.bincount(bins, minlength=9) / len(bins)
+    share = share[share > 0.0]
+    return float(-(share * np.log(share)).sum() / math.log(9)) + 0.0
+
+
+def sampled(log: DriveLog, end: float, step: float = STEP) -> Floats:
+    """What the phone asked for, as it stood every `step` [s]: shape `(n, 2)` [m/s, rad/s]."""
+    if not log.commands:
+        return np.empty((0, 2))
+    times, *values = np.array(log.commands).T
+    until = in_hand(log, end)[1]
+    at = np.arange(times[0], max(until, times[0]), step)
+    return np.stack(values, axis=1)[np.searchsorted(times, at, side="right") - 1]
+
+
+def steering(logs: Sequence[DriveLog], end: float) -> Row:
+    """How these drives were steered, all together; nothing known where nobody steered."""
+    samples = [sampled(log, end) for log in logs]
+    minutes = sum(map(len, samples)) * STEP / 60.0
+    if not minutes:
+        names = ("reversals_per_min", "command_changes_per_min", "steering_entropy")
+        own = ("move_waits", "move_and_wait_share")
+        return dict.fromkeys((*names, "waiting_share", *own), math.nan)
+    entropies = [(len(s), steering_entropy(s[:, 1])) for s in samples]
+    known = [(weight, value) for weight, value in entropies if not math.isnan(value)]
+    level = sum(int(_is_level(s).sum()) for s in samples) * STEP / 60.0
+    made = sum(changes((speed, turn) for _, speed, turn in log.commands) for log in logs)
+    turns = sum(reversals(turn for _, _, turn in log.commands) for log in logs)
+    weights = sum(weight for weight, _ in known)
+    return {
+        "reversals_per_min": turns / minutes,
+        "command_changes_per_min": made / minutes,
+        "steering_entropy": sum(w * v for w, v in known) / weights if known else math.nan,
+        "waiting_share": level / minutes,
+        **_strategies(logs, [len(s) for s in samples]),
+    }
+
+
+def _strategies(logs: Sequence[DriveLog], weights: Sequence[int]) -> Row:
+    """What the ways of steering count themselves: 0 for those that neither wait nor change.
+
+    `move_waits` is how often the operators waited to see the result of a move,
+    `move_and_wait_share` how much of their driving they spent in that way of steering.
+    """
+    shares = [log.workload.get("move_and_wait_share", 0.0) for log in logs]
+    return {
+        "move_waits": sum(log.workload.get("waits", 0.0) for log in logs),
+        "move_and_wait_share": float(np.average(shares, weights=weights)),
+    }
+
+
+def _is_level(samples: Floats) -> NDArray[np.bool_]:
+    """Whether the phone asks for a standing robot."""
+    level: NDArray[np.bool_] = np.all(np.abs(samples) < (LEVEL_SPEED, LEVEL_TURN), axis=1)
+    return level
+
+
+# --- the way -----------------------------------------------------------------------------------
+def off_the_way(log: DriveLog, track: Iterable[TrackPoint], end: float) -> Floats:
+    """How far from the way that its operator had planned the robot was, shape `(n,)` [m]."""
+    if log.started is None or not log.ways:
+        return np.empty(0)
+    until = in_hand(log, end)[1]
+    starts = np.array([time for time, _ in log.ways])
+    ways = [shapely.linestrings(points) if len(points) > 1 else None for _, points in log.ways]
+    gaps = []
+    for point in filter(_is_sample, track):
+        way = ways[max(int(np.searchsorted(starts, point.time, side="right")) - 1, 0)]
+        if starts[0] <= point.time <= until and way is not None:
+            gaps.append(float(shapely.distance(way, shapely.points(point.x, point.y))))
+    return np.array(gaps)
+
+
+def _is_sample(point: TrackPoint) -> bool:
+    """Whether a point is one of those that every track has, however closely it was filmed."""
+    return abs(point.time / TRACK_STEP - round(point.time / TRACK_STEP)) < 1e-6
+
+
+def path_error(recording: Recording) -> Row:
+    """Root mean square and greatest distance from the ways planned, over all drives [m]."""
+    tracks, labels = recording.recorder.tracks, recording.labels
+    gaps = np.concatenate(
+        [
+            np.empty(0),
+            *(
+                off_the_way(log, tracks[labels[log.robot]], recording.duration)
+                for log in recording.recorder.drives
+            ),
+        ]
+    )
+    rms = float(np.sqrt((gaps**2).mean())) if len(gaps) else math.nan
+    return {
+        "path_error_rms_m": rms,
+        "path_error_max_m": float(gaps.max()) if len(gaps) else math.nan,
+    }
+
+
+# --- right and wrong ---------------------------------------------------------------------------
+def was_there(recording: Recording, event: int, time: float) -> bool:
+    """Whether what the DVA's event of that number is about was there at `time` [s]."""
+    for number, incident in enumerate(recording.incidents):
+        known = recording.event_of(number)
+        over = recording.contained.get(number, math.inf)
+        if known is not None and known.number == event and incident.is_there(time) and time <= over:
+            return True
+    return False
+
+
+def judgement(recording: Recording, log: DriveLog) -> str:
+    """`missed`: refuted though it was there. `false`: confirmed though nothing was. Else empty."""
+    if log.ended is None or log.outcome not in ("confirmed", "refuted"):
+        return ""
+    there = was_there(recording, log.event, log.ended)
+    if log.outcome == "refuted":
+        return "missed" if there else ""
+    return "" if there else "false"
+
+
+# --- rows --------------------------------------------------------------------------------------
+def operator_rows(recording: Recording) -> list[Row]:
+    """One row per operator."""
+    ids = [id_of("operator", n) for n in range(1, recording.scenario.operator.count + 1)]
+    return [operator_row(recording, id_tag) for id_tag in ids]
+
+
+def operator_row(recording: Recording, operator: str) -> Row:
+    """How one operator fared; shares are of the whole run.
+
+    `utilisation` is the share of time with an order in hand, `attending_share` that of looking
+    at a picture. A robot waits for attention while its operator is at another one, and
+    `turns_per_min` counts turning from one robot to another per minute with work in hand.
+    """
+    end = recording.duration
+    logs = [log for log in recording.recorder.drives if log.operator == operator]
+    hands = [in_hand(log, end) for log in logs]
+    queue = [span for log in logs for span in waits(log, end)]
+    busy, turned = covered(hands), sum(log.turned_to for log in logs)
+    judged = [judgement(recording, log) for log in logs]
+    return {
+        "operator_name": recording.labels[operator],
+        "orders": len(logs),
+        "utilisation": busy / end,
+        "attending_share": covered(span for log in logs for span in attended(log, end)) / end,
+        "robots_mean": sum(until - since for since, until in hands) / end,
+        "robots_max": most_at_once(hands),
+        "queue_mean": sum(until - since for since, until in queue) / end,
+        "queue_max": most_at_once(queue),
+        "turns": turned,
+        "turns_per_min": 60.0 * turned / busy if busy else math.nan,
+        **steering(logs, end),
+        "missed": judged.count("missed"),
+        "false_confirmations": judged.count("false"),
+        "gave_up": sum(log.outcome == "gave up" for log in logs),
+        "lost_links": sum(log.outcome == "lost link" for log in logs),
+    }
+
+
+_OF_A_RUN = ("utilisation", "attending_share", "queue_mean", "turns_per_min")
+
+
+def run_measures(recording: Recording) -> Row:
+    """The same for a run: shares are means over the operators, steering is over all drives."""
+    rows = operator_rows(recording)
+    if not rows:
+        return {}
+    row: Row = {}
+    for name in _OF_A_RUN:
+        values = [r[name] for r in rows if not math.isnan(r[name])]
+        row[name] = float(np.mean(values)) if values else math.nan
+    row |= steering(recording.recorder.drives, recording.duration) | path_error(recording)
+    row["missed"] = sum(r["missed"] for r in rows)
+    row["false_confirmations"] = sum(r["false_confirmations"] for r in rows)
+    return row

@@ -1,0 +1,44 @@
+"""What one run consists of: site, team, network, phone, events; units are in the keys."""
+
+from dva_sim.simulation.scenario.contradictions import (
+    TRIPS_OF_A_START,
+    command_timeout_s,
+    contradictions,
+    request_timeout_s,
+    time_out_s,
+)
+from dva_sim.simulation.scenario.loading import FOLDER, build, check_policy, load, locate_files
+from dva_sim.simulation.scenario.parts import AccessConfig, DispatchConfig, EventConfig, RobotConfig
+from dva_sim.simulation.scenario.scenario import (
+    Scenario,
+    bystander_profile,
+    guard_profile,
+    phone_profile,
+    population,
+    robot_profiles,
+    site_of,
+)
+
+__all__ = [
+    "FOLDER",
+    "TRIPS_OF_A_START",
+    "AccessConfig",
+    "DispatchConfig",
+    "EventConfig",
+    "RobotConfig",
+    "Scenario",
+    "build",
+    "bystander_profile",
+    "check_policy",
+    "command_timeout_s",
+    "contradictions",
+    "guard_profile",
+    "load",
+    "locate_files",
+    "phone_profile",
+    "population",
+    "request_timeout_s",
+    "robot_profiles",
+    "site_of",
+    "time_out_s",
+]

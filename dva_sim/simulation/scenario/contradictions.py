@@ -1,0 +1,234 @@
+"""How long an answer takes over a link, and how long one should wait for it.
+
+What in a scenario works against something else in it, told before it runs.
+
+A contradiction is no mistake: the scenario can be run, and somebody may want to see what happens.
+Each is one sentence that names the keys and says what would go together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from dva_sim.agents.robot.command_queue import mean_of
+from dva_sim.agents.robot.controller import LEASE_S
+from dva_sim.simulation.scenario.scenario import Scenario, phone_profile, robot_profiles, site_of
+from dva_sim.worlds.hazards import DETECTS
+
+TRIPS_OF_A_START = 4  # round trips: three until a new connection stands, one for the request
+USUAL_S = 9.0  # time-out, where the link leaves time for an answer
+LONGEST_S = 120.0
+_ROOM = 1.25  # over what is needed, beyond the usual
+
+
+def time_out_s(needed_s: float) -> float:
+    """The time-out of a request that nobody gave one [s]: the usual one, or longer.
+
+    Args:
+        needed_s: What the first answer over a new connection takes [s].
+    """
+    return USUAL_S if needed_s < USUAL_S else min(_ROOM * needed_s, LONGEST_S)
+
+
+def request_timeout_s(scenario: Scenario) -> float:
+    """Time-out of a request: as given, else as the link needs it [s]."""
+    given = scenario.request.timeout_s
+    return time_out_s(start_needs_s(scenario)) if given is None else given
+
+
+def command_timeout_s(scenario: Scenario) -> float:
+    """Time-out of a command that is to be answered, likewise [s]."""
+    given = scenario.command.timeout_s
+    return time_out_s(start_needs_s(scenario)) if given is None else given
+
+
+def start_needs_s(scenario: Scenario) -> float:
+    """What the first answer over a new connection to a robot takes [s]."""
+    return TRIPS_OF_A_START * round_trip_s(scenario) + mean_processing_s(scenario)
+
+
+def command_needs_s(scenario: Scenario) -> float:
+    """What the reply to a command takes, over a connection that stands [s]."""
+    return round_trip_s(scenario) + mean_processing_s(scenario)
+
+
+def round_trip_s(scenario: Scenario) -> float:
+    """Mean delay there and back, without queues and losses [s]."""
+    return sum(scenario.link.toward(way).delay_s for way in ("up", "down"))
+
+
+def mean_processing_s(scenario: Scenario) -> float:
+    """Mean time that a message takes the slowest robot's computer [s]."""
+    if scenario.robot.processing_s is not None:
+        return mean_of(scenario.robot.processing_s)
+    return max((mean_of(robot.processing_s) for robot in robot_profiles(scenario)), default=0.0)
+
+
+_BITS = 8
+_OVER_TRACE = ("rate_bps",)
+_OF_SOCKETS = "zeromq"
+
+
+def contradictions(scenario: Scenario, *, live: bool = False) -> list[str]:
+    """What does not go together, a sentence for each without its full stop.
+
+    Args:
+        scenario: As `build` makes it.
+        live: Whether it is run over real sockets, where the modelled link plays no part.
+    """
+    link = _of_modelled_link(scenario) if live else _of_link(scenario)
+    return [*link, *_of_watchdog(scenario, live), *_of_team(scenario), *_of_time(scenario)]
+
+
+def _of_modelled_link(scenario: Scenario) -> Iterator[str]:
+    if keys := sorted(scenario.link.model_fields_set):
+        named = ", ".join(f"link.{key}" for key in keys)
+        yield f"{named}: a live run has the real link; the modelled one plays no part in it"
+
+
+def _of_link(scenario: Scenario) -> Iterator[str]:
+    """Time-outs and limits that the link's delay, or its rate, goes beyond."""
+    trip, needs, timeout = (of(scenario) for of in (round_trip_s, start_needs_s, request_timeout_s))
+    why = f"with a round trip of {trip:g} s"
+    if _moves_robots(scenario) and timeout < needs:
+        yield (
+            f"request.timeout_s {timeout:g} is below {needs:g} s, which a "
+            f"request over a new connection needs {why}: nothing will be answered; give more, or "
+            "leave it out"
+        )
+    if not _drives(scenario):
+        return
+    answer, waits = command_needs_s(scenario), command_timeout_s(scenario)
+    if scenario.window is not None and waits <= answer:
+        yield (
+            f"command.timeout_s {waits:g} is not above {answer:g} s, which "
+            f"the reply to a command takes {why}: every command counts as unanswered; give more, "
+            "or leave it out"
+        )
+    if scenario.robot.max_age_s <= answer:
+        yield (
+            f"robot.max_age_s {scenario.robot.max_age_s:g} is not above {answer:g} s, the age of "
+            f"every command {why}: the robot refuses all of them; give more"
+        )
+    yield from _of_computer(scenario)
+    if needs > LEASE_S:
+        yield (
+            f"a robot ends a drive that is {LEASE_S:g} s without a command, and {why} (link."
+            f"delay_s) the first takes {needs:g} s: no drive will begin"
+        )
+    yield from _of_pictures(scenario)
+    if scenario.link.trace_up or scenario.link.trace_down:
+        for key in _OVER_TRACE:
+            if key in scenario.link.model_fields_set:
+                yield f"link.{key} has no effect where link.trace_up or trace_down gives the rate"
+
+
+def _of_computer(scenario: Scenario) -> Iterator[str]:
+    """A robot that needs longer for a command than the next one takes to come."""
+    takes, rate = mean_processing_s(scenario), scenario.command.rate_hz
+    if scenario.pattern == "pub-sub" and takes * rate > 1:
+        yield (
+            f"robot.processing_s {takes:g} is longer than the time between two commands "
+            f"(command.rate_hz {rate:g}), and under pub-sub each of them is obeyed: they queue, "
+            "and a stop is obeyed ever later"
+        )
+
+
+def _of_pictures(scenario: Scenario) -> Iterator[str]:
+    camera, down = scenario.camera, scenario.link.toward("down")
+    wanted = camera.rate_hz * camera.frame_bytes * _BITS
+    if scenario.link.trace_down is None and wanted > down.rate_bps:
+        yield (
+            f"the camera sends {wanted / 1e3:g} kbit/s (camera.rate_hz x frame_bytes) over a link "
+            f"of {down.rate_bps / 1e3:g} kbit/s (link.rate_bps): pictures will come late or not "
+            "at all"
+        )
+    if camera.encode_s * camera.rate_hz > 1:
+        yield (
+            f"camera.rate_hz {camera.rate_hz:g} cannot be reached with camera.encode_s "
+            f"{camera.encode_s:g}: one picture is encoded at a time"
+        )
+
+
+def _of_watchdog(scenario: Scenario, live: bool) -> Iterator[str]:
+    """A robot that stops between any two commands."""
+    if not _drives(scenario):
+        return
+    limit, phone = scenario.robot.watchdog_s, phone_profile(scenario)
+    period = 1 / scenario.command.rate_hz
+    if limit <= period:
+        yield (
+            f"robot.watchdog_s {limit:g} is not above {period:g} s, the time between two commands "
+            f"(command.rate_hz {scenario.command.rate_hz:g}): the robot stops after each"
+        )
+    elif scenario.pattern == "req-rep" and not live and limit <= command_needs_s(scenario):
+        yield (
+            f"robot.watchdog_s {limit:g} is not above {command_needs_s(scenario):g} s, the time "
+            "between two commands under req-rep, which waits for each reply: the robot stops "
+            "after each"
+        )
+    if phone.send == "on_change" and limit <= phone.max_delay_s:
+        yield (
+            f"robot.watchdog_s {limit:g} is not above phone.max_delay_s {phone.max_delay_s:g}, "
+            "the longest time between two commands: the robot stops after each"
+        )
+
+
+def _of_team(scenario: Scenario) -> Iterator[str]:
+    if scenario.dispatch.containment and not scenario.guard.count:
+        yield (
+            "dispatch.containment waits for a guard, and guard.count is 0: no event will be "
+            "contained"
+        )
+    robots = {f"robot-{number}" for number in range(1, scenario.robot.count + 1)}
+    holders = {f"operator-{number}" for number in range(1, scenario.operator.count + 1)} | {"dva"}
+    for number, rule in enumerate(scenario.access):
+        for kind, named, there in (
+            ("robots", rule.robots, robots),
+            ("holders", rule.holders, holders),
+        ):
+            for label in (label for label in named if label not in there):
+                yield f"access.{number}.{kind} names {label!r}, who is not in this scenario"
+    if scenario.transport != "zeromq" and scenario.zeromq.model_fields_set:
+        keys = ", ".join(f"{_OF_SOCKETS}.{key}" for key in sorted(scenario.zeromq.model_fields_set))
+        yield f"{keys}: transport {scenario.transport!r} has no ZeroMQ sockets"
+
+
+def _of_time(scenario: Scenario) -> Iterator[str]:
+    """What would happen after the end."""
+    end = scenario.horizon_s
+    for number, event in enumerate(scenario.events):
+        if event.at_s >= end:
+            yield (
+                f"events.{number}.at_s {event.at_s:g} is not before horizon_s {end:g}: the event "
+                "will not happen"
+            )
+    yield from _of_detectors(scenario)
+    for kind in ("outages", "partitions"):
+        for number, gap in enumerate(getattr(scenario.link, kind)):
+            if gap.from_s >= end:
+                yield (
+                    f"link.{kind}.{number}.from_s {gap.from_s:g} is not before horizon_s {end:g}: "
+                    "it will not happen"
+                )
+
+
+def _of_detectors(scenario: Scenario) -> Iterator[str]:
+    """Events that nobody reports and no detector of the site can notice."""
+    unreported = [(n, event) for n, event in enumerate(scenario.events) if not event.reported]
+    there = {d.kind for d in site_of(scenario, seed=0).detectors} if unreported else set()
+    for number, event in unreported:
+        if there.isdisjoint(DETECTS[event.kind]):
+            yield (
+                f"events.{number}.reported is false, and the site has no detector for a "
+                f"{event.kind.replace('_', ' ')}: the DVA will not hear of it"
+            )
+
+
+def _moves_robots(scenario: Scenario) -> bool:
+    return scenario.robot.count > 0
+
+
+def _drives(scenario: Scenario) -> bool:
+    """Whether operators send commands, rather than goals."""
+    return _moves_robots(scenario) and scenario.control != "supervisory"

@@ -1,0 +1,175 @@
+"""What a scenario names, and whether it is there.
+
+How a scenario is read, completed and checked.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from dva_sim.kernel import key_changes, resources
+from dva_sim.kernel.config import Document, Fail, KeyPath, load_yaml
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.suggestions import unknown
+from dva_sim.simulation.scenario.contradictions import command_timeout_s, request_timeout_s
+from dva_sim.simulation.scenario.scenario import Scenario, phone_profile, robot_profiles, site_of
+from dva_sim.worlds.site import load_site
+
+if TYPE_CHECKING:
+    from dva_sim.agents.tilt import PhoneProfile
+
+
+_OPTION = re.compile(r"option '([^']+)'")  # as those who make things by name say it
+_IN_FILES = (
+    ("dispatch", "policy"),
+    ("operator", "strategy"),
+    ("phone", "filter"),
+    ("phone", "mapping"),
+)
+
+
+def locate_files(data: dict[str, Any], folders: Sequence[Path]) -> None:
+    """Let a class in a file beside the one that names it be found from anywhere."""
+    for part, key in _IN_FILES:
+        holder = data.get(part)
+        named = holder.get(key) if isinstance(holder, dict) else None
+        file, colon, wanted = named.rpartition(":") if isinstance(named, str) else ("", "", "")
+        beside = [folder / file for folder in folders if colon and resources.is_file(folder / file)]
+        if beside and isinstance(holder, dict):
+            holder[key] = f"{beside[0]}:{wanted}"
+
+
+def check_names(scenario: Scenario, error: Fail) -> None:
+    """Refuse a profile, strategy or policy that does not exist, before anything runs."""
+    choices: dict[KeyPath, tuple[str | tuple[str, ...], str]] = {
+        ("phone", "profile"): (scenario.phone.profile, "agents/phones"),
+        ("robot", "profile"): (scenario.robot.profile, "agents/robots"),
+        ("guard", "profile"): (scenario.guard.profile, "agents/people"),
+        ("bystander", "profile"): (scenario.bystander.profile, "agents/people"),
+        ("operator", "population"): (scenario.operator.population, "agents/people"),
+    }
+    for path, (given, folder) in choices.items():
+        for name in (given,) if isinstance(given, str) else given:
+            if not resources.is_there(name, folder) and not resources.is_file(Path(name)):
+                key, known = ".".join(str(p) for p in path), resources.available(folder)
+                raise error(unknown(key, name, sorted(known)), path)
+    check_strategy(scenario.operator.strategy, scenario.operator.options, error)
+    check_policy(scenario.dispatch.policy, scenario.dispatch.options, error)
+
+
+def check_strategy(strategy: str, options: Mapping[str, Any], error: Fail) -> None:
+    """Refuse a way of steering that cannot be loaded, or does not know its options."""
+    from dva_sim.agents.operator.strategies import try_strategy
+
+    with _told(error, lambda problem: _place(problem, "operator", "strategy", "options")):
+        try_strategy(strategy, options)
+
+
+def check_policy(policy: str, options: Mapping[str, Any], error: Fail) -> None:
+    """Refuse a policy that cannot be loaded, or does not know its options."""
+    from dva_sim.core.dispatch import load_policy
+
+    with _told(error, lambda problem: _place(problem, "dispatch", "policy", "options")):
+        load_policy(policy, options)
+
+
+def check_phone(profile: PhoneProfile, error: Fail) -> None:
+    """Refuse a phone whose part, filter or mapping cannot be had, or does not know its options."""
+    from dva_sim.agents.tilt import try_phone
+
+    def place(problem: ConfigError) -> KeyPath:
+        stages = ("accelerometer", "mapping", "filter")
+        key = next((s for s in stages if problem.problem.startswith(s)), "filter")
+        return _place(problem, "phone", key, f"{key}_options")
+
+    with _told(error, place):
+        try_phone(profile)
+
+
+@contextmanager
+def _told(error: Fail, place: Callable[[ConfigError], KeyPath]) -> Iterator[None]:
+    """Tell a mistake at its key of the scenario, unless it is in another file."""
+    try:
+        yield
+    except ConfigError as problem:
+        if problem.file is not None:
+            raise
+        raise error(problem.problem, place(problem)) from None
+
+
+def _place(problem: ConfigError, part: str, key: str, options: str) -> KeyPath:
+    """The key that a problem is told at: the option that it speaks of, or the name."""
+    found = _OPTION.search(problem.problem)
+    return (part, options, found[1]) if found else (part, key)
+
+
+FOLDER = "experiments/scenarios"
+
+
+def load(name: str, base: Path | None = None) -> Document:
+    """Read a scenario by name or path; the data is checked by `build`.
+
+    Raises:
+        ConfigError: not found or not YAML.
+    """
+    return load_yaml(resources.find(name, FOLDER, base=base, is_asked=base is None))
+
+
+def build(
+    source: Document | Mapping[str, Any], changes: Mapping[str, Any] | None = None
+) -> Scenario:
+    """A scenario from a file or plain data, with some keys changed.
+
+    Args:
+        source: A document (mistakes are told with their place) or plain data.
+        changes: New values by dotted key, for example `{"link.delay_s": 0.25}`.
+
+    Raises:
+        ConfigError: an unknown key, a wrong type, a value out of range, a missing profile.
+    """
+    return key_changes.build(Scenario, source, changes or {}, _complete, locate_files)
+
+
+def _complete(scenario: Scenario, error: Fail) -> Scenario:
+    """With what follows from the profiles; refuses what does not go together."""
+    check_names(scenario, error)
+    _check_options(scenario, error)
+    check_phone(phone_profile(scenario, error), error)
+    _check_draughts(scenario, error)
+    processing = {profile.processing_s for profile in robot_profiles(scenario)}
+    if scenario.robot.processing_s is None and len(processing) == 1:
+        robot = scenario.robot.model_copy(update={"processing_s": processing.pop()})
+        scenario = scenario.model_copy(update={"robot": robot})
+    waits = {"request": request_timeout_s(scenario), "command": command_timeout_s(scenario)}
+    return scenario.model_copy(
+        update={
+            key: getattr(scenario, key).model_copy(update={"timeout_s": timeout})
+            for key, timeout in waits.items()
+        }
+    )
+
+
+def _check_options(scenario: Scenario, error: Fail) -> None:
+    """Options of a site say what it becomes, so it has to be made to judge them."""
+    if scenario.site.options and scenario.site.map is None:
+        try:
+            load_site(scenario.site.name, scenario.site.options)
+        except ConfigError as problem:
+            raise error(problem.problem, ("site", "options")) from None
+
+
+def _check_draughts(scenario: Scenario, error: Fail) -> None:
+    """Where a draught blows is on the site, so it has to be made to judge that."""
+    for number, event in enumerate(scenario.events):
+        if "draught" in event.hazard:
+            west, south, east, north = site_of(scenario, seed=0).extent
+            for end in ("supply", "exhaust"):
+                x, y = (float(event.hazard.get(f"{end}_{axis}", 0.0)) for axis in "xy")
+                if not (west <= x <= east and south <= y <= north):
+                    problem = f"{end} of a draught ({x:g}, {y:g}) is not on the site, which is "
+                    extent = f"from ({west:g}, {south:g}) to ({east:g}, {north:g})"
+                    raise error(problem + extent, ("events", number, "hazard"))

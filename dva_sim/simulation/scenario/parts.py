@@ -1,0 +1,298 @@
+"""What a scenario consists of, part by part; units are in the keys.
+
+How the DVA decides: who goes, and who may ask for what.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from dva_sim.agents.robot.command_queue import Service
+from dva_sim.agents.robot.sensors import SensorConfig
+from dva_sim.core.assignments import Rules
+from dva_sim.core.permissions import LEVELS
+from dva_sim.kernel.config import AlsoCalled, Config
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.worlds.hazards import make_hazard
+
+Positive = Annotated[float, Field(gt=0)]
+NonNegative = Annotated[float, Field(ge=0)]
+AnyNumber = Annotated[float, Field(allow_inf_nan=True)]  # `make_hazard` says what is wrong with it
+
+
+class SiteConfig(Config):
+    """Where it happens: a site by name or path, or a bare map in ROS map_server form.
+
+    Attributes:
+        options: Of a site that is generated, such as `{seed: 7, width_m: 80}`.
+    """
+
+    name: str = "caparica"
+    options: dict[str, Any] = Field(default_factory=dict)
+    map: str | None = None
+
+    @model_validator(mode="after")
+    def _one_place(self) -> SiteConfig:
+        if self.map is not None and self.name != SiteConfig.model_fields["name"].default:
+            raise ValueError(f"site.map and site.name {self.name!r} are two places; leave out one")
+        if self.map is not None and self.options:
+            raise ValueError("site.options are of a generated site: site.map takes none")
+        return self
+
+
+class RobotConfig(Config):
+    """The robots: how many, which kind, and the limits that keep them safe.
+
+    Attributes:
+        profile: One for all, or a list: the first robot has the first, and so on in turn.
+        processing_s: Time a message takes a robot's computer, a number or a law such as
+            `{law: gamma, mean_s: 0.2, cv: 0.5, first_s: 2}`; left out: as its profile says.
+        sensors: What they carry; left out: as their profile says.
+        charge: Share of the battery's capacity that they begin with.
+        way_m: They begin at places from which the way to the first event is so long, rather than
+            at the site's bases.
+    """
+
+    profile: str | Annotated[tuple[str, ...], Field(min_length=1)] = "servrobot"
+    count: Annotated[int, Field(ge=0, le=1000), AlsoCalled("robots", "n_robots")] = 1
+    processing_s: Service | None = None
+    sensors: Annotated[tuple[SensorConfig, ...], Field(max_length=16)] | None = None
+    charge: Annotated[float, Field(gt=0, le=1)] = 1.0
+    way_m: Positive | None = None
+    watchdog_s: Annotated[float, Field(gt=0, le=60)] = 3.0
+    max_age_s: Annotated[float, Field(gt=0, le=120)] = 6.0
+
+    @model_validator(mode="after")
+    def _every_profile_has_a_robot(self) -> RobotConfig:
+        if isinstance(self.profile, tuple) and len(self.profile) > self.count:
+            raise ValueError(
+                f"robot.profile names {len(self.profile)} robots, robot.count is {self.count}"
+            )
+        return self
+
+
+class GuardConfig(Config):
+    """The guards: how many, and from which profile they are drawn.
+
+    Attributes:
+        mobilisation_s: Median from the order to the first step; left out: as the profile says.
+        way_m: They wait at places from which the way to the first event is so long, rather than
+            at the site's posts.
+    """
+
+    profile: str = "guard"
+    count: Annotated[int, Field(ge=0, le=200), AlsoCalled("guards", "n_guards")] = 0
+    mobilisation_s: Positive | None = None
+    way_m: Positive | None = None
+
+
+class BystanderConfig(Config):
+    """People who are there for other reasons: how many, and from which profile they are drawn."""
+
+    profile: str = "bystanders"
+    count: Annotated[int, Field(ge=0, le=1000), AlsoCalled("bystanders", "people")] = 0
+
+
+class PhoneConfig(BaseModel):
+    """The tilt phones of the operators: a profile, and whatever of it is otherwise.
+
+    Any key of a phone's profile may stand beside its name, such as `filter: none`; they are
+    judged where the profile is read.
+    """
+
+    model_config = ConfigDict(extra="allow", frozen=True, allow_inf_nan=False)
+
+    profile: str = "default"
+
+    @classmethod
+    def further_keys(cls) -> type[BaseModel]:
+        """The model of all other keys that it may have."""
+        from dva_sim.agents.tilt import PhoneProfile
+
+        return PhoneProfile
+
+    @property
+    def changes(self) -> dict[str, Any]:
+        """What is otherwise than in the profile."""
+        return dict(self.__pydantic_extra__ or {})
+
+
+class OperatorConfig(Config):
+    """The operators: how they drive, and which simulated person each is.
+
+    Attributes:
+        strategy: By name, or a class in a file, `mine.py:Mine`.
+        options: Of the strategy, such as `{inner: pursuit, quality: 0.8}` of the predictor.
+        traits: Medians that take the place of the population's, such as `{margin: 0.4}`.
+        span: How many robots one operator may have in hand at once.
+        person: Index of the first operator's person in the population; the next operator
+            is the next person.
+        population_seed: Draws the population; a study gives its own seed.
+    """
+
+    strategy: str = "adaptive"
+    options: dict[str, Any] = Field(default_factory=dict)
+    traits: dict[str, Positive] = Field(default_factory=dict)
+    count: Annotated[int, Field(ge=0, le=50), AlsoCalled("operators", "n_operators")] = 1
+    span: Annotated[int, Field(ge=1, le=20)] = 1
+    population: str = "operators"
+    person: Annotated[int, Field(ge=0)] = 0
+    population_seed: Annotated[int, Field(ge=0)] = 1
+
+
+class CommandConfig(Config):
+    """How commands are sent, the same for every pattern.
+
+    Attributes:
+        timeout_s: Of a command that is to be answered; left out: 9 s, or as much longer as the
+            link's round trip needs.
+        attempts: How often it is sent before the link counts as lost.
+        window: How many requests may be unanswered at once under `pipelined`.
+    """
+
+    rate_hz: Annotated[float, Field(gt=0, le=100), AlsoCalled("rate", "command_hz")] = 10.0
+    timeout_s: Annotated[float, Field(gt=0, le=120)] | None = None
+    attempts: Annotated[int, Field(ge=1, le=10)] = 3
+    window: Annotated[int, Field(ge=2, le=1000)] = 8
+
+
+class RequestConfig(Config):
+    """All other requests: registration, permissions, orders, the start and end of a drive.
+
+    A time-out below four round trips is never met over a new connection, which needs three
+    before the request leaves: nothing would ever be answered.
+
+    Attributes:
+        timeout_s: Of a request; left out: 9 s, or as much longer as the link's round trip needs.
+        attempts: How often it is sent before the link counts as lost.
+    """
+
+    timeout_s: Annotated[float, Field(gt=0, le=120)] | None = None
+    attempts: Annotated[int, Field(ge=1, le=10)] = 3
+
+
+class CameraConfig(Config):
+    """The robots' cameras: what a frame costs and what it can show.
+
+    Attributes:
+        encode_s: From taking a frame to publishing it; one frame at a time.
+    """
+
+    rate_hz: Annotated[float, Field(gt=0, le=60), AlsoCalled("fps", "frame_rate_hz")] = 10.0
+    frame_bytes: Annotated[int, Field(ge=100, le=1_000_000)] = 12_000
+    encode_s: Annotated[float, Field(ge=0, le=5)] = 0.0
+    field_of_view_deg: Annotated[float, Field(gt=10, le=360), AlsoCalled("fov")] = 70.0
+    range_m: Positive = 6.0
+
+
+class EventConfig(Config):
+    """A fire, a gas leak or a flood.
+
+    Attributes:
+        room: Where, by name; left out, the run's seed chooses a room.
+        at_s: When it starts.
+        latest_s: If given, the seed draws the start between `at_s` and this.
+        reported: Whether somebody reports it at once; otherwise detectors must notice it.
+        false_alarm: Whether nothing is there: it is reported as it would be, and that is all.
+        hazard: What else belongs to its kind, such as `{growth: fast}` of a fire or
+            `{gas: propane, rate: 0.01}` of a leak: the settings of `make_hazard`.
+        reports: How many report it; the others are people who see it a little later, and tell
+            the place a little otherwise.
+    """
+
+    kind: Literal["fire", "gas_leak", "flood"]
+    room: str | None = None
+    at_s: NonNegative = 0.0
+    latest_s: NonNegative | None = None
+    reported: bool = False
+    false_alarm: bool = False
+    hazard: dict[str, str | AnyNumber] = Field(default_factory=dict)
+    reports: Annotated[int, Field(ge=1, le=20)] = 1
+
+    @model_validator(mode="after")
+    def _in_order(self) -> EventConfig:
+        if self.latest_s is not None and self.latest_s < self.at_s:
+            raise ValueError(f"latest_s {self.latest_s:g} is before at_s {self.at_s:g}")
+        return self
+
+    @model_validator(mode="after")
+    def _hazard_can_be_made(self) -> EventConfig:
+        try:
+            make_hazard(self.kind, (0.0, 0.0), self.at_s, **self.hazard)
+        except ConfigError as error:
+            raise ValueError(error.problem) from None
+        return self
+
+
+class DispatchConfig(Config):
+    """How the DVA chooses who goes, and the rules that hold whatever is chosen.
+
+    Attributes:
+        policy: By name, or as `my_policy.py:Mine`.
+        options: Of that policy.
+        escalate_after_s: An event that has waited so long for somebody is escalated; 0: at
+            once if nobody is free; null: never.
+        containment: Whether a confirmed event also needs a guard who deals with it.
+        most_waiting: More events than that do not wait: the newest is escalated at once.
+        merge_distance_m: Reports of one kind nearer than this are one event; 0: never.
+        order_limit_s: Who has not settled an event so long after the order gives it back.
+        bid_within_s: How long an auction takes bids.
+    """
+
+    policy: str = "min_eta"
+    options: dict[str, Any] = Field(default_factory=dict)
+    escalate_after_s: NonNegative | None = 120.0
+    containment: bool = False
+    most_waiting: Annotated[int, Field(ge=0)] | None = None
+    merge_distance_m: NonNegative = 8.0
+    max_attempts: Annotated[int, Field(ge=1)] = 4
+    order_limit_s: Positive = 900.0
+    bid_within_s: Positive = 2.0
+
+    def rules(self) -> Rules:
+        """As the core wants them."""
+        never = math.inf
+        return Rules(
+            never if self.escalate_after_s is None else self.escalate_after_s,
+            self.containment,
+            self.most_waiting,
+            self.merge_distance_m,
+            self.max_attempts,
+            self.order_limit_s,
+            self.bid_within_s,
+        )
+
+
+class AccessConfig(Config):
+    """What some devices may ask for, for a time; what no rule allows is refused.
+
+    Attributes:
+        holders: Labels such as `operator-1`; left out: all.
+        robots: Labels such as `robot-1`; left out: all.
+        levels: `teleoperation`, `missions`, `both`, `sensors`.
+        sensors: Names of the sensors that may be read; left out: all.
+        from_s: From when on.
+        until_s: Up to when; what is in use then is revoked. Left out: for good.
+    """
+
+    holders: tuple[str, ...] = ()
+    robots: tuple[str, ...] = ()
+    levels: tuple[Literal["teleoperation", "missions", "both", "sensors"], ...] = LEVELS
+    sensors: tuple[str, ...] | None = None
+    from_s: NonNegative = 0.0
+    until_s: Positive | None = None
+
+
+class PatrolConfig(Config):
+    """A round that the DVA sends a robot while nothing happens.
+
+    Attributes:
+        robot: Its label, such as `robot-1`.
+        places: Names of rooms, or places as `[x, y]` in metres on the site's plane, in order.
+    """
+
+    robot: str
+    places: Annotated[tuple[str | tuple[float, float], ...], Field(min_length=1, max_length=64)]

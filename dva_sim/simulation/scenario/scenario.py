@@ -1,0 +1,194 @@
+"""Everything one run needs but its seed.
+
+The site and the profiles that a scenario names.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from typing import Annotated, Any, Literal, cast
+
+from pydantic import Field, model_validator
+
+from dva_sim.agents.operator.person import Population
+from dva_sim.agents.people.profiles import BystanderProfile, GuardProfile
+from dva_sim.agents.robot.profile import RobotProfile, load_robot
+from dva_sim.agents.tilt import PhoneProfile
+from dva_sim.kernel import resources
+from dva_sim.kernel.config import (
+    AlsoCalled,
+    Config,
+    Document,
+    Fail,
+    KeyPath,
+    M,
+    load_yaml,
+    validate,
+)
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.network.connections import Depth, TransportKind, ZeromqConfig
+from dva_sim.network.link import LinkConfig
+from dva_sim.simulation.scenario.parts import (
+    AccessConfig,
+    BystanderConfig,
+    CameraConfig,
+    CommandConfig,
+    DispatchConfig,
+    EventConfig,
+    GuardConfig,
+    OperatorConfig,
+    PatrolConfig,
+    PhoneConfig,
+    RequestConfig,
+    RobotConfig,
+    SiteConfig,
+)
+from dva_sim.worlds.layout import Site
+from dva_sim.worlds.site import load_site, map_site
+
+
+class Scenario(Config):
+    """Everything one run needs but its seed.
+
+    Attributes:
+        model: Tells this kind of scenario from the timed ones.
+        control: How operators use robots. `direct`: they close the loop over the link.
+            `coordinated`: the robot also watches where it drives, and slows by itself.
+            `supervisory`: they name the goal and judge the picture, the robot drives alone.
+        transport: What carries messages: ZeroMQ over TCP, or datagrams.
+        network_depth: How ZeroMQ over TCP is modelled: by whole messages, exact where nothing
+            is lost or piles up; by TCP segments; or as each link asks for.
+    """
+
+    model: Literal["full"] = "full"
+    description: str = ""
+    site: SiteConfig = SiteConfig()
+    robot: RobotConfig = RobotConfig()
+    guard: GuardConfig = GuardConfig()
+    bystander: BystanderConfig = BystanderConfig()
+    operator: OperatorConfig = OperatorConfig()
+    control: Literal["direct", "coordinated", "supervisory"] = "direct"
+    pattern: Annotated[
+        Literal["req-rep", "pipelined", "pub-sub", "latest-wins"],
+        AlsoCalled("messaging", "messaging_pattern", "protocol"),
+    ] = "latest-wins"
+    phone: PhoneConfig = PhoneConfig()
+    command: CommandConfig = CommandConfig()
+    request: RequestConfig = RequestConfig()
+    transport: TransportKind = "zeromq"
+    zeromq: ZeromqConfig = ZeromqConfig()
+    network_depth: Depth = "auto"
+    link: LinkConfig = LinkConfig()
+    camera: CameraConfig = CameraConfig()
+    events: Annotated[tuple[EventConfig, ...], Field(min_length=1)] = (EventConfig(kind="fire"),)
+    dispatch: DispatchConfig = DispatchConfig()
+    access: tuple[AccessConfig, ...] = ()
+    patrols: tuple[PatrolConfig, ...] = ()
+    horizon_s: Annotated[
+        float, Field(ge=0.001, le=86_400), AlsoCalled("duration_s", "time_limit_s", "length_s")
+    ] = 300.0
+
+    @property
+    def window(self) -> int | None:
+        """How many commands may be unanswered at once; None if nobody answers them."""
+        return {"req-rep": 1, "pipelined": self.command.window}.get(self.pattern)
+
+    @model_validator(mode="after")
+    def _somebody_can_act(self) -> Scenario:
+        if self.robot.count and not self.operator.count:
+            raise ValueError("robots need an operator: operator.count is 0")
+        if not self.robot.count and not self.guard.count:
+            raise ValueError("nobody can respond: robot.count and guard.count are 0")
+        return self
+
+
+def site_of(scenario: Scenario, seed: int) -> Site:
+    """The site a scenario plays on; a bare map places its bases by `seed`."""
+    if scenario.site.map is None:
+        return load_site(scenario.site.name, scenario.site.options)
+    team = max(1, scenario.robot.count), max(1, scenario.guard.count)
+    return map_site(scenario.site.map, seed, robots=team[0], guards=team[1])
+
+
+def robot_profiles(scenario: Scenario) -> list[RobotProfile]:
+    """What the scenario's robots are, one after the other."""
+    named = scenario.robot.profile
+    names = (named,) if isinstance(named, str) else named
+    kinds = [load_robot(name) for name in names]
+    return [kinds[number % len(kinds)] for number in range(scenario.robot.count)]
+
+
+def phone_profile(scenario: Scenario, error: Fail | None = None) -> PhoneProfile:
+    """The tilt phone the operators hold: its profile, and what the scenario changes of it.
+
+    Args:
+        scenario: Names the profile.
+        error: Makes the error for a change that is not valid, at its key path.
+
+    Raises:
+        ConfigError: no such profile, or a change that is not valid.
+    """
+    phone = scenario.phone
+    if not phone.changes:
+        return _profile(PhoneProfile, phone.profile, "agents/phones")
+
+    def wrong(problem: str, path: KeyPath) -> ConfigError:
+        told = f"phone: {problem}"
+        return error(told, ("phone", *path)) if error else ConfigError(told)
+
+    data = _merged(_read_document(phone.profile, "agents/phones").data, phone.changes)
+    return validate(PhoneProfile, data, wrong)
+
+
+def guard_profile(scenario: Scenario) -> GuardProfile:
+    """How the scenario's guards are drawn."""
+    profile = _profile(GuardProfile, scenario.guard.profile, "agents/people")
+    median = scenario.guard.mobilisation_s
+    if median is None:
+        return profile
+    trait = profile.mobilisation_s.model_copy(update={"median": median})
+    return profile.model_copy(update={"mobilisation_s": trait})
+
+
+def bystander_profile(scenario: Scenario) -> BystanderProfile:
+    """How the scenario's bystanders are drawn."""
+    return _profile(BystanderProfile, scenario.bystander.profile, "agents/people")
+
+
+def population(operator: OperatorConfig) -> Population:
+    """The population that persons are drawn from, around the medians that are named otherwise.
+
+    Raises:
+        ConfigError: there is no such population or trait.
+    """
+    people = _profile(Population, operator.population, "agents/people")
+    return people.with_medians(operator.traits)
+
+
+def _profile(model: type[M], name: str, folder: str) -> M:
+    profile = _read_profile(model, name, folder)
+    assert isinstance(profile, model)
+    return profile
+
+
+@cache
+def _read_profile(model: type[Config], name: str, folder: str) -> Config:
+    """A profile, read once per process: reading costs more than a short run."""
+    document = _read_document(name, folder)
+    return validate(model, document.data, document.error)
+
+
+@cache
+def _read_document(name: str, folder: str) -> Document:
+    return load_yaml(resources.find(name, folder))
+
+
+def _merged(data: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Data with some values changed, mappings within it key by key."""
+    merged = dict(data)
+    for key, value in changes.items():
+        old = merged.get(key)
+        nested = isinstance(old, Mapping) and isinstance(value, Mapping)
+        merged[key] = _merged(cast(Mapping[str, Any], old), value) if nested else value
+    return merged

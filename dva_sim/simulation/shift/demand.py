@@ -1,0 +1,311 @@
+"""Something that happens in the world, whatever the DVA knows of it.
+
+What happens, when and where: all of it luck of the events, none of who serves them.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections.abc import Callable
+from itertools import accumulate, count
+
+from dva_sim.core.events import Event
+from dva_sim.kernel.clock import Clock
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.streams import Streams
+from dva_sim.protocol import messages as m
+from dva_sim.simulation.shift.distributions import ZERO, Always, Draws, shares, times
+from dva_sim.simulation.shift.scenario import Severity, Stream, TimedScenario
+from dva_sim.simulation.shift.travel import Place, Terrain
+from dva_sim.worlds.hazards import Hazard, make_hazard
+
+
+class Incident:
+    """One event of the world, with all the luck that is its own.
+
+    Attributes:
+        stream: Number of its stream.
+        index: Its place in the stream.
+        number: Its place among all incidents of the run.
+        kind: `fire`, `gas_leak` or `flood`.
+        place: Where.
+        true: Whether there is something at all.
+        severity: As reported, 0 to 1.
+        confidence: As reported, 0 to 1.
+        occurred: When it broke out [s].
+        noticed: When it was first reported [s]; nan before.
+        sources: Devices that have reported it.
+        event: The DVA's event about it, once it is reported.
+        shared: Whether the DVA knew the event already from another incident.
+        over: When there was no danger any more, or others took over [s].
+    """
+
+    __slots__ = (
+        "_hazard",
+        "confidence",
+        "event",
+        "index",
+        "kind",
+        "noticed",
+        "number",
+        "occurred",
+        "over",
+        "place",
+        "severity",
+        "shared",
+        "sources",
+        "stream",
+        "true",
+    )
+
+    def __init__(
+        self,
+        stream: int,
+        index: int,
+        number: int,
+        kind: str,
+        place: Place,
+        true: bool,
+        severity: float,
+        confidence: float,
+        occurred: float,
+    ) -> None:
+        self.stream, self.index, self.number = stream, index, number
+        self.kind, self.place, self.true = kind, place, true
+        self.severity, self.confidence, self.occurred = severity, confidence, occurred
+        self.noticed = math.nan
+        self.sources: list[str] = []
+        self.event: Event | None = None
+        self.shared = False
+        self.over = math.inf
+        self._hazard: Hazard | None = None
+        place.about = self
+
+    def danger_radius(self, now: float) -> float:
+        """Within which people should not be [m]; 0 where there is nothing, or no more."""
+        if not self.true or now >= self.over:
+            return 0.0
+        if self._hazard is None:
+            self._hazard = make_hazard(self.kind, self.place.point, self.occurred)
+        return self._hazard.danger_radius(now)
+
+    def report(self, finding: str) -> m.EventReport:
+        """What somebody says who was not sent."""
+        return m.EventReport(
+            None, self.kind, self.place.position, self.severity, self.confidence, finding
+        )
+
+
+CALLERS = 32  # devices that report a stream's events in turn, where reports are taken back
+
+
+class Luck:
+    """The luck of a stream's events, by their index.
+
+    Args:
+        stream: What the scenario says.
+        name: Of the stream.
+        streams: The run's luck.
+        terrain: Where.
+    """
+
+    def __init__(self, stream: Stream, name: str, streams: Streams, terrain: Terrain) -> None:
+        def one(purpose: str) -> Draws[float]:
+            return shares(streams, f"demand/{name}/{purpose}")
+
+        still: Draws[float] = Always(0.0)
+        self._stream, self._terrain = stream, terrain
+        self._zones = [terrain.zones.index(zone) for zone in stream.zones]
+        weights = list(accumulate(stream.zones.values()))
+        self._bounds = [w / weights[-1] for w in weights[:-1]] if weights else []
+        self._zone = one("zone") if len(self._zones) > 1 else still
+        self._x, self._y = (one("x"), one("y")) if terrain.placed else (still, still)
+        self._truth = one("truth") if stream.false_share else Always(1.0)
+        self._severity = one("severity") if isinstance(stream.severity, Severity) else still
+        self._repeated = one("repeated") if stream.repeats else Always(1.0)
+        base, repeats = f"demand/{name}", stream.repeats
+        self._repeat = times(streams, f"{base}/repeat", repeats.after if repeats else ZERO)
+        self.patience = times(streams, f"{base}/patience", stream.patience or ZERO)
+        notice = ZERO if stream.notice == "detectors" else stream.notice
+        self._notice = times(streams, f"{base}/notice", notice)
+
+    def place(self, index: int) -> Place:
+        """Where event number `index` happens."""
+        zone = -1
+        if self._zones:
+            zone = self._zones[bisect_right(self._bounds, self._zone[index])]
+        return self._terrain.event_place(zone, self._x[index], self._y[index])
+
+    def true(self, index: int) -> bool:
+        """Whether there is something at all."""
+        return self._truth[index] >= self._stream.false_share
+
+    def severity(self, index: int) -> float:
+        """0 to 1."""
+        severity = self._stream.severity
+        if isinstance(severity, Severity):
+            return severity.low + (severity.high - severity.low) * self._severity[index]
+        return severity
+
+    def repeat_after(self, index: int) -> float | None:
+        """How long after the first report a second source reports it [s]; None: never."""
+        repeats = self._stream.repeats
+        if repeats is None or self._repeated[index] >= repeats.share:
+            return None
+        return self._repeat[index]
+
+    def noticed_after(self, incident: Incident) -> float:
+        """From the outbreak to the first report [s]; infinite if nobody notices."""
+        if self._stream.notice != "detectors":
+            return self._notice[incident.index]
+        return _detected_after(incident, self._terrain)
+
+
+def _detected_after(incident: Incident, terrain: Terrain) -> float:
+    from dva_sim.simulation.shift.travel import Rooms
+
+    assert isinstance(terrain, Rooms)
+    return terrain.detected_after(incident.kind, incident.place)
+
+
+class Demand:
+    """Lets the events of a scenario happen.
+
+    Args:
+        scenario: What may happen.
+        streams: The run's luck.
+        terrain: Where.
+        clock: When.
+        happens: Told of each incident as it breaks out.
+        noticed: Told of each incident when it is to be reported.
+    """
+
+    def __init__(
+        self,
+        scenario: TimedScenario,
+        streams: Streams,
+        terrain: Terrain,
+        clock: Clock,
+        happens: Callable[[Incident], None],
+        noticed: Callable[[Incident], None],
+    ) -> None:
+        self._scenario, self._terrain, self._clock = scenario, terrain, clock
+        self._streams = streams
+        self._happens, self._noticed = happens, noticed
+        self._names = scenario.stream_names
+        self.luck = [
+            Luck(stream, name, streams, terrain)
+            for stream, name in zip(scenario.demand, self._names, strict=True)
+        ]
+        self._left = scenario.max_events if scenario.max_events is not None else math.inf
+        self._numbers = count()
+        self._rest: dict[int, Draws[float]] = {}
+        self._check()
+
+    def _check(self) -> None:
+        """Find out now what would fail later."""
+        for stream in self._scenario.demand:
+            if stream.notice == "detectors":
+                from dva_sim.simulation.shift.travel import Rooms
+
+                if not isinstance(self._terrain, Rooms):
+                    raise ConfigError("notice 'detectors' needs a site")
+                self._terrain.check_detectors(stream.kind)
+
+    def start(self) -> None:
+        """Begin."""
+        for number, stream in enumerate(self._scenario.demand):
+            name = f"demand/{self._names[number]}"
+            if stream.between is not None:
+                gaps = times(self._streams, f"{name}/between", stream.between)
+                self._next(number, gaps, 0, stream.from_s)
+            elif stream.sources is not None:
+                self._rest[number] = times(self._streams, f"{name}/rest", stream.sources.rest)
+                for source in range(stream.sources.count):
+                    self._rests(number, source, stream.from_s)
+            elif stream.batch is not None:
+                for index in range(stream.batch.count):
+                    self._at(number, index, stream.batch.at_s)
+
+    def closed(self, incident: Incident, now: float) -> None:
+        """An incident is over: where sources are finite, its source rests."""
+        sources = self._scenario.demand[incident.stream].sources
+        if sources is not None:
+            self._rests(incident.stream, incident.index + sources.count, now)
+
+    @property
+    def exhausted(self) -> bool:
+        """Whether as many events have happened as may."""
+        return self._left <= 0
+
+    def share(self) -> list[float]:
+        """Share of all events that each zone has in the long run, shape `(zones,)`."""
+        zones = self._terrain.zones
+        total = [0.0] * len(zones)
+        for stream in self._scenario.demand:
+            weights = stream.zones or {
+                zone: self._terrain.size(number) for number, zone in enumerate(zones)
+            }
+            whole = sum(weights.values()) or 1.0
+            for zone, weight in weights.items():
+                total[zones.index(zone)] += _rate(stream) * weight / whole
+        return [part / sum(total) for part in total]
+
+    # --- one after the other -------------------------------------------------------------
+
+    def _next(self, stream: int, gaps: Draws[float], index: int, last: float) -> None:
+        when = last + gaps[index] / self._scenario.intensity
+        if when <= self._ends(stream):
+            self._clock.call_at(when, self._renew, stream, gaps, index, when)
+
+    def _renew(self, stream: int, gaps: Draws[float], index: int, when: float) -> None:
+        self._next(stream, gaps, index + 1, when)
+        self._break_out(stream, index)
+
+    def _rests(self, stream: int, index: int, now: float) -> None:
+        self._at(stream, index, now + self._rest[stream][index])
+
+    def _at(self, stream: int, index: int, when: float) -> None:
+        if when <= self._ends(stream):
+            self._clock.call_at(when, self._break_out, stream, index)
+
+    def _ends(self, stream: int) -> float:
+        if self._left <= 0:
+            return -math.inf
+        until = self._scenario.demand[stream].until_s
+        return min(self._scenario.horizon_s, math.inf if until is None else until)
+
+    def _break_out(self, stream: int, index: int) -> None:
+        if self._left <= 0:
+            return
+        self._left -= 1
+        now, luck, config = self._clock.now, self.luck[stream], self._scenario.demand[stream]
+        place = luck.place(index)
+        incident = Incident(
+            stream,
+            index,
+            next(self._numbers),
+            config.kind,
+            place,
+            luck.true(index),
+            luck.severity(index),
+            config.confidence,
+            now,
+        )
+        self._happens(incident)
+        after = luck.noticed_after(incident)
+        if after <= 0.0:
+            self._noticed(incident)
+        elif after < math.inf:
+            self._clock.call_after(after, self._noticed, incident)
+
+
+def _rate(stream: Stream) -> float:
+    """Events per second, as long as nobody is late."""
+    if stream.between is not None:
+        return 1.0 / stream.between.mean
+    if stream.sources is not None:
+        return stream.sources.count / max(stream.sources.rest.mean, 1e-9)
+    assert stream.batch is not None
+    return float(stream.batch.count)

@@ -1,0 +1,348 @@
+"""Laws of chance for times: each is drawn from, and knows its first two moments exactly.
+
+Luck with an index: draw number `k` is the same whoever asks for it, and when.
+
+Policies are compared on the same events. What befalls an event must therefore hang on its
+place in its stream, never on how often luck was drawn before. Draws are made in blocks, each
+from a random stream of its own, so that any of them can be made again.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from collections.abc import Callable
+from typing import Annotated, Any, Generic, Literal, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BeforeValidator, Field, model_validator
+
+from dva_sim.kernel.config import Config
+from dva_sim.kernel.streams import Streams
+
+Floats = NDArray[np.float64]
+Seconds = Annotated[float, Field(ge=0, le=1e12)]
+PositiveSeconds = Annotated[float, Field(gt=0, le=1e12)]
+Shape = Annotated[float, Field(gt=0, le=1e6)]
+
+
+class _Law(Config):
+    """What all laws can do; every draw is in proportion to the law's scale."""
+
+    @property
+    @abstractmethod
+    def mean(self) -> float:
+        """First moment [s]."""
+
+    @property
+    @abstractmethod
+    def second(self) -> float:
+        """Second moment [s^2]."""
+
+    @property
+    def variance(self) -> float:
+        """[s^2]"""
+        return max(0.0, self.second - self.mean**2)
+
+    @property
+    def cv2(self) -> float:
+        """Variance over squared mean; 1 for the exponential law, 0 if the mean is."""
+        return self.variance / self.mean**2 if self.mean else 0.0
+
+    @abstractmethod
+    def sample(self, rng: np.random.Generator, count: int) -> Floats:
+        """That many draws [s], shape `(count,)`."""
+
+
+class Constant(_Law):
+    """Always the same; a bare number means this."""
+
+    law: Literal["constant"] = "constant"
+    mean_s: Seconds
+
+    @property
+    def mean(self) -> float:
+        """See `Law`."""
+        return self.mean_s
+
+    @property
+    def second(self) -> float:
+        """See `Law`."""
+        return self.mean_s**2
+
+    def sample(self, rng: np.random.Generator, count: int) -> Floats:
+        """See `Law`."""
+        return np.full(count, self.mean_s)
+
+
+class Exponential(_Law):
+    """Without memory."""
+
+    law: Literal["exponential"]
+    mean_s: PositiveSeconds
+
+    @property
+    def mean(self) -> float:
+        """See `Law`."""
+        return self.mean_s
+
+    @property
+    def second(self) -> float:
+        """See `Law`."""
+        return 2.0 * self.mean_s**2
+
+    def sample(self, rng: np.random.Generator, count: int) -> Floats:
+        """See `Law`."""
+        return self.mean_s * rng.standard_exponential(count)
+
+
+class Uniform(_Law):
+    """Anything between two bounds."""
+
+    law: Literal["uniform"]
+    low_s: Seconds
+    high_s: Seconds
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Uniform:
+        if self.high_s < self.low_s:
+            raise ValueError(f"high_s {self.high_s:g} is below low_s {self.low_s:g}")
+        return self
+
+    @property
+    def mean(self) -> float:
+        """See `Law`."""
+        return 0.5 * (self.low_s + self.high_s)
+
+    @property
+    def second(self) -> float:
+        """See `Law`."""
+        return (self.low_s**2 + self.low_s * self.high_s + self.high_s**2) / 3.0
+
+    def sample(self, rng: np.random.Generator, count: int) -> Floats:
+        """See `Law`."""
+        return self.low_s + (self.high_s - self.low_s) * rng.random(count)
+
+
+class Erlang(_Law):
+    """The sum of a number of equal exponential phases."""
+
+    law: Literal["erlang"]
+    mean_s: PositiveSeconds
+    phases: Annotated[int, Field(ge=1, le=1000)]
+
+    @property
+    def mean(self) -> float:
+        """See `Law`."""
+        return self.mean_s
+
+    @property
+    def second(self) -> float:
+        """See `Law`."""
+        return self.mean_s**2 * (1.0 + 1.0 / self.phases)
+
+    def sample(self, rng: np.random.Generator, count: int) -> Floats:
+        """See `Law`."""
+        return self.mean_s / self.phases * rng.standard_gamma(float(self.phases), count)
+
+
+class Hyperexponential(_Law):
+    """One of two exponential laws, each with the same part in the mean ("balanced means").
+
+    Attributes:
+        cv2: Squared coefficient of variation, above 1.
+    """
+
+    law: Literal["hyperexponential"]
+    mean_s: PositiveSeconds
+    squared_cv: Annotated[float, Field(gt=1, le=1e4)]
+
+    @property
+    def share(self) -> float:
+        """How often the faster of the two is drawn."""
+        return 0.5 * (1.0 + math.sqrt((self.squared_cv - 1.0) / (self.squared_cv + 1.0)))
+
+    @property
+    def mean(self) -> float:
+        """See `Law`."""
+        return self.mean_s
+
+    @property
+    def second(self) -> float:
+        """See `Law`."""
+        return self.mean_s**2 * (1.0 + self.squared_cv)
+
+    def sample(self, rng: np.random.Generator, count: int) -> Floats:
+        """See `Law`."""
+        fast = rng.random(count) < self.share
+        means = np.where(fast, 0.5 / self.share, 0.5 / (1.0 - self.share))
+        return np.asarray(self.mean_s * means * rng.standard_exponential(count))
+
+
+class Lognormal(_Law):
+    """A product of many small influences.
+
+    Attributes:
+        mean_s: Its mean; or give `median_s`.
+        median_s: Half of all draws are below.
+        spread: Standard deviation of the natural logarithm.
+    """
+
+    law: Literal["lognormal"]
+    mean_s: PositiveSeconds | None = None
+    median_s: PositiveSeconds | None = None
+    spread: Annotated[float, Field(ge=0, le=5)]
+
+    @model_validator(mode="after")
+    def _one_scale(self) -> Lognormal:
+        if (self.mean_s is None) == (self.median_s is None):
+            raise ValueError("a lognormal law needs mean_s or median_s, and not both")
+        return self
+
+    @property
+    def median(self) -> float:
+        """[s]"""
+        if self.median_s is not None:
+            return self.median_s
+        assert self.mean_s is not None
+        return self.mean_s * math.exp(-0.5 * self.spread**2)
+
+    @property
+    def mean(self) -> float:
+        """See `Law`."""
+        return self.median * math.exp(0.5 * self.spread**2)
+
+    @property
+    def second(self) -> float:
+        """See `Law`."""
+        return self.median**2 * math.exp(2.0 * self.spread**2)
+
+    def sample(self, rng: np.random.Generator, count: int) -> Floats:
+        """See `Law`."""
+        return np.asarray(self.median * np.exp(self.spread * rng.standard_normal(count)))
+
+
+class Gamma(_Law):
+    """Erlang's law with any number of phases, whole or not."""
+
+    law: Literal["gamma"]
+    mean_s: PositiveSeconds
+    shape: Shape
+
+    @property
+    def mean(self) -> float:
+        """See `Law`."""
+        return self.mean_s
+
+    @property
+    def second(self) -> float:
+        """See `Law`."""
+        return self.mean_s**2 * (1.0 + 1.0 / self.shape)
+
+    def sample(self, rng: np.random.Generator, count: int) -> Floats:
+        """See `Law`."""
+        return self.mean_s / self.shape * rng.standard_gamma(self.shape, count)
+
+
+class Weibull(_Law):
+    """A hazard rate that grows (shape above 1) or falls (below 1) with age."""
+
+    law: Literal["weibull"]
+    mean_s: PositiveSeconds
+    shape: Annotated[float, Field(ge=0.1, le=1e3)]
+
+    @property
+    def _scale(self) -> float:
+        return self.mean_s / math.gamma(1.0 + 1.0 / self.shape)
+
+    @property
+    def mean(self) -> float:
+        """See `Law`."""
+        return self.mean_s
+
+    @property
+    def second(self) -> float:
+        """See `Law`."""
+        return self._scale**2 * math.gamma(1.0 + 2.0 / self.shape)
+
+    def sample(self, rng: np.random.Generator, count: int) -> Floats:
+        """See `Law`."""
+        return self._scale * rng.weibull(self.shape, count)
+
+
+def _number_is_constant(value: Any) -> Any:
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        return {"law": "constant", "mean_s": value}
+    return value
+
+
+_Any = Annotated[
+    Constant | Exponential | Uniform | Erlang | Hyperexponential | Lognormal | Gamma | Weibull,
+    Field(discriminator="law"),
+]
+Law = Annotated[_Any, BeforeValidator(_number_is_constant, json_schema_input_type=float | _Any)]
+"""A law in a configuration file: a mapping with the key `law`, or a bare number of seconds."""
+
+ZERO = Constant(mean_s=0.0)
+
+
+BLOCK = 256
+KEPT = 8  # blocks; events are asked about roughly in their order
+
+T = TypeVar("T")
+
+
+class Draws(Generic[T]):
+    """Draws number 0, 1, 2, ... for one purpose.
+
+    Args:
+        streams: The run's luck.
+        name: Of the purpose, unique in the run.
+        draw: Makes a number of draws from a generator.
+    """
+
+    def __init__(
+        self,
+        streams: Streams,
+        name: str,
+        draw: Callable[[np.random.Generator, int], list[T]],
+    ) -> None:
+        self._streams, self._name, self._draw = streams, name, draw
+        self._blocks: dict[int, list[T]] = {}
+
+    def __getitem__(self, index: int) -> T:
+        """Draw number `index`."""
+        block = self._blocks.get(index // BLOCK)
+        if block is None:
+            block = self._make(index // BLOCK)
+        return block[index % BLOCK]
+
+    def _make(self, number: int) -> list[T]:
+        if len(self._blocks) >= KEPT:
+            del self._blocks[next(iter(self._blocks))]
+        rng = self._streams.fresh(f"{self._name}/{number}")
+        block = self._blocks[number] = self._draw(rng, BLOCK)
+        return block
+
+
+class Always(Draws[T]):
+    """No luck at all."""
+
+    def __init__(self, value: T) -> None:
+        self._value = value
+
+    def __getitem__(self, index: int) -> T:
+        return self._value
+
+
+def times(streams: Streams, name: str, law: Law) -> Draws[float]:
+    """Times by a law [s]."""
+    if isinstance(law, Constant):
+        return Always(law.mean_s)
+    return Draws(streams, name, lambda rng, count: law.sample(rng, count).tolist())
+
+
+def shares(streams: Streams, name: str) -> Draws[float]:
+    """Numbers between 0 and 1, all alike."""
+    return Draws(streams, name, lambda rng, count: rng.random(count).tolist())

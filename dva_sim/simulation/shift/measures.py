@@ -1,0 +1,312 @@
+"""From a timed run to rows: each measure of dispatch is defined here, once.
+
+**Cohort**: all events, true ones and false alarms, first reported between the end of the warm-up
+and one follow-up before the horizon. Each is followed for the same time T after its first report
+(`follow_s`), whatever the policy. So nothing is cut off by the end of the run, and every policy
+is judged on the same events. A scenario that drains is followed to the end of every event, and
+its cohort ends at the horizon.
+
+**By T**: somebody was on scene (`on_scene_share`); the event was confirmed, refuted (a false
+alarm cleared), escalated or expired, or is still open. These shares add up to one.
+
+**Time to X** is a restricted mean: the mean of `min(time, T)`, in which an event that never got
+there counts T. Response is for all events, confirmation and containment for the true ones.
+Percentiles are over all events of the cohort, never being infinitely late; nan where the
+percentile is not reached by T.
+
+Use of the team, its exposure and what the desk counted are of the whole measured time, from the
+end of the warm-up to the horizon, or (the desk's counts) of the whole run.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.simulation.shift.bounds import (
+    Floats,
+    Incidence,
+    evenness,
+    first_of,
+    incidence,
+    response_bounds,
+)
+from dva_sim.simulation.shift.recording import TimedRecording, UnitRecord
+from dva_sim.simulation.shift.scenario import TimedScenario
+from dva_sim.simulation.shift.statistics import OUTCOMES
+
+FOLLOW_S = 600.0
+FATES = ("confirmed", "refuted", "escalated", "expired")
+PERCENTILES = (50, 90, 95)
+FEWEST_IN_ZONE = 3  # events without which a zone's mean says nothing
+SLACK = 1e-6  # [s]
+
+MEASURES = (
+    *("follow_s", "events", "true_share", "on_scene_share"),
+    *("response_mean_s", "confirmation_mean_s", *(f"response_p{q}_s" for q in PERCENTILES)),
+    *("robot_share", *(f"{fate}_share" for fate in FATES), "open_share"),
+    *("escalated_later_share", "confirmed_of_true_share", "contained_share", "containment_mean_s"),
+    *("zone_ratio", "bound_mean_s", "beats_bound_share"),
+    *("use_of_guards", "evenness_of_guards", "use_of_robots", "evenness_of_robots"),
+    *("use_of_operators", "load", "exposure_s", "exposure_look_s", "exposure_max_s_per_h"),
+    *("preempted", "relocated", "auctions", "overruled", "policy_failed", "messages"),
+    *("violations", "simulated_s"),
+)
+"""Numbers that a row of `run_row` may hold, and so what a study may ask for."""
+_OF_CONTAINMENT = ("contained_share", "containment_mean_s")
+
+
+def measures_of(scenario: TimedScenario) -> tuple[str, ...]:
+    """Those of `MEASURES` that a run of a scenario holds: nothing is contained that need not be."""
+    gone = () if scenario.dispatch.containment else _OF_CONTAINMENT
+    return tuple(name for name in MEASURES if name not in gone)
+
+
+Row = dict[str, Any]
+Columns = dict[str, NDArray[Any]]
+
+
+def tables(recording: TimedRecording, follow: float = FOLLOW_S) -> dict[str, list[Row]]:
+    """The rows of a run: one of the run, one for each event of the cohort, one per responder.
+
+    Args:
+        recording: The run; it must have kept its events.
+        follow: For how long each event is followed, T [s].
+
+    Raises:
+        ConfigError: the run is too short to follow anything, or has kept no events.
+    """
+    events = cohort(recording, follow)
+    return {
+        "runs": [run_row(recording, events, follow)],
+        "events": [_row(events, place) for place in range(len(events["event_id"]))],
+        "responders": [_responder_row(recording, unit) for unit in recording.units],
+    }
+
+
+# --- events ------------------------------------------------------------------------------
+def cohort(recording: TimedRecording, follow: float = FOLLOW_S) -> Columns:
+    """The events of the cohort by column; times ending in `_s` are from the first report.
+
+    Raises:
+        ConfigError: see `tables`.
+    """
+    scenario, raw = recording.scenario, recording.columns
+    since, until = scenario.warm_up_s, scenario.horizon_s - (0.0 if scenario.drain else follow)
+    if scenario.keep != "events":
+        raise ConfigError(f"keep is {scenario.keep!r}; a study of dispatch needs 'events'")
+    if until <= since:
+        raise ConfigError(
+            f"horizon_s {scenario.horizon_s:g} leaves nothing to follow for {follow:g} s after "
+            f"warm_up_s {since:g}; give a longer one, or drain"
+        )
+    detected = raw["detected"]
+    chosen = (detected >= since) & (detected <= until)
+    bounds = response_bounds(recording)
+    picked = {name: values[chosen] for name, values in raw.items()}
+    return _columns(recording, picked, bounds[chosen], follow)
+
+
+def _columns(recording: TimedRecording, raw: Columns, bounds: Floats, follow: float) -> Columns:
+    detected = raw["detected"]
+    ended = np.array([*OUTCOMES, "open"])[_open_ones(raw)]
+    kinds = np.array([*(unit.kind for unit in recording.units), "none"])
+    names = np.array([*recording.responders, ""])
+    since = {name: raw[name] - detected for name in ("arrived", "confirmed", "contained", "closed")}
+    if recording.scenario.drain:  # watched until all was over
+        watched = np.full(len(detected), follow)
+    else:
+        watched = np.minimum(recording.scenario.horizon_s - detected, follow)
+    return {
+        "event_id": raw["number"] + 1,
+        "stream": np.array(recording.streams)[raw["stream"]],
+        "kind": np.array([s.kind for s in recording.scenario.demand])[raw["stream"]],
+        "zone": np.array([*recording.zones, ""])[raw["zone"]],
+        "is_true": raw["true"].astype(bool),
+        "severity": raw["severity"],
+        "shared": raw["shared"].astype(bool),
+        "responder": names[raw["responder"]],
+        "responder_kind": kinds[raw["responder"]],
+        "attempts": raw["attempts"],
+        "preemptions": raw["preemptions"],
+        "outcome": ended,
+        "t_detected_s": detected,
+        "response_s": np.maximum(since["arrived"], 0.0),
+        "confirmation_s": np.maximum(since["confirmed"], 0.0),
+        "containment_s": np.maximum(since["contained"], 0.0),
+        "closing_s": np.maximum(since["closed"], 0.0),
+        "bound_s": bounds,
+        "watched_s": watched,
+    }
+
+
+def _open_ones(raw: Columns) -> NDArray[np.intp]:
+    """Code of each outcome; of what was not closed, that of `open`."""
+    return np.where(np.isfinite(raw["closed"]), raw["outcome"], len(OUTCOMES)).astype(np.intp)
+
+
+def _row(columns: Columns, place: int) -> Row:
+    return {name: values[place].item() for name, values in columns.items()}
+
+
+# --- their fates in time -------------------------------------------------------------------
+def fates(events: Columns) -> Incidence:
+    """Cumulative incidence of `FATES`, the first that each event met.
+
+    Works on the rows of either model: it needs the columns `outcome`, `confirmation_s`,
+    `closing_s` and `watched_s`.
+    """
+    closed, outcome = events["closing_s"], events["outcome"]
+    ends = [np.where(outcome == fate, closed, np.nan) for fate in FATES[1:]]
+    time, cause = first_of([events["confirmation_s"], *ends], events["watched_s"])
+    return incidence(time, cause, len(FATES))
+
+
+def reaching(events: Columns, column: str) -> Incidence:
+    """Cumulative incidence of getting there (cause 1) against being over without it (2).
+
+    Args:
+        events: Columns; those of `fates`, and `column`.
+        column: `response_s`, `confirmation_s` or `containment_s`.
+    """
+    time, cause = first_of([events[column], events["closing_s"]], events["watched_s"])
+    return incidence(time, cause, 2)
+
+
+def only(events: Columns, mask: NDArray[np.bool_]) -> Columns:
+    """The same columns of some events."""
+    return {name: values[mask] for name, values in events.items()}
+
+
+def zone_ratio(events: Columns, follow: float) -> float:
+    """The worst zone's restricted mean response over the best one's; nan with fewer than two."""
+    means = [
+        reaching(only(events, here), "response_s").restricted_mean(follow)
+        for zone in sorted(set(events["zone"].tolist()))
+        if (here := events["zone"] == zone).sum() >= FEWEST_IN_ZONE
+    ]
+    return max(means) / min(means) if len(means) > 1 and min(means) > 0 else math.nan
+
+
+# --- the run -------------------------------------------------------------------------------
+def run_row(recording: TimedRecording, events: Columns, follow: float) -> Row:
+    """One row of all measures; see the head of this file."""
+    row: Row = {"follow_s": follow, "events": len(events["event_id"])}
+    row["true_share"] = _mean(events["is_true"])
+    row |= _times(events, follow) | _fates(events, follow)
+    if recording.scenario.dispatch.containment:
+        row |= _containment(only(events, events["is_true"]), follow)
+    row |= {"zone_ratio": zone_ratio(events, follow)} | _bound(events, follow)
+    row |= _team(recording) | _exposure(recording) | _desk(recording)
+    return row | {"violations": sum(recording.violations.values()), "simulated_s": recording.ended}
+
+
+def _times(events: Columns, follow: float) -> Row:
+    response = reaching(events, "response_s")
+    confirmation = reaching(only(events, events["is_true"]), "confirmation_s")
+    row: Row = {
+        "on_scene_share": float(response.at(follow)),
+        "response_mean_s": response.restricted_mean(follow),
+        "confirmation_mean_s": confirmation.restricted_mean(follow),
+    }
+    for q in PERCENTILES:
+        row[f"response_p{q}_s"] = response.quantile(q / 100)
+    arrived = np.isfinite(events["response_s"])
+    row["robot_share"] = _mean(events["responder_kind"][arrived] == "robot")
+    return row
+
+
+def _fates(events: Columns, follow: float) -> Row:
+    curve = fates(events)
+    shares = {fate: float(curve.at(follow, 1 + i)) for i, fate in enumerate(FATES)}
+    row: Row = {f"{fate}_share": share for fate, share in shares.items()}
+    row["open_share"] = max(0.0, 1.0 - sum(shares.values()))
+    later = (events["outcome"] == "escalated") & (events["confirmation_s"] <= follow)
+    row["escalated_later_share"] = _mean(later & (events["closing_s"] <= follow))
+    true = only(events, events["is_true"])
+    row["confirmed_of_true_share"] = float(reaching(true, "confirmation_s").at(follow))
+    return row
+
+
+def _containment(true: Columns, follow: float) -> Row:
+    curve = reaching(true, "containment_s")
+    return {
+        "contained_share": float(curve.at(follow)),
+        "containment_mean_s": curve.restricted_mean(follow),
+    }
+
+
+def _bound(events: Columns, follow: float) -> Row:
+    """The bound, as a restricted mean as well, and how often it was none."""
+    bounds, response = events["bound_s"], events["response_s"]
+    return {
+        "bound_mean_s": _mean(np.minimum(bounds, follow)),
+        "beats_bound_share": _mean(response < bounds - SLACK),
+    }
+
+
+def _team(recording: TimedRecording) -> Row:
+    """How busy everybody was, and how evenly; `load` is that of the busiest kind of people.
+
+    Robots do not limit a team that has more of them than operators; people do: guards look and
+    contain, operators drive.
+    """
+    row: Row = {}
+    for kind in ("guard", "robot"):
+        busy = [unit.busy for unit in recording.units if unit.kind == kind]
+        row[f"use_of_{kind}s"] = _mean(busy) / recording.duration if busy else math.nan
+        row[f"evenness_of_{kind}s"] = evenness(busy)
+    operators = recording.operators
+    row["use_of_operators"] = _mean(operators) / recording.duration if operators else math.nan
+    people = (row["use_of_guards"], row["use_of_operators"])
+    row["load"] = max((use for use in people if math.isfinite(use)), default=math.nan)
+    return row
+
+
+def _exposure(recording: TimedRecording) -> Row:
+    """Time of people within danger radii, in all of the measured time.
+
+    `exposure_s` is the sum per event, of which `exposure_look_s` comes from finding out (way,
+    look and leaving) and the rest from containing; `exposure_max_s_per_h` is that of the person
+    most exposed, per hour.
+    """
+    events = max(1, int(recording.measured.sum()))
+    guards = [unit.exposure for unit in recording.units if unit.kind == "guard"]
+    whole = [sum(stages.values()) for stages in guards]
+    act = sum(stages["act"] for stages in guards)
+    return {
+        "exposure_s": sum(whole) / events,
+        "exposure_look_s": (sum(whole) - act) / events,
+        "exposure_max_s_per_h": max(whole, default=0.0) / recording.duration * 3600.0,
+    }
+
+
+def _desk(recording: TimedRecording) -> Row:
+    counted = recording.counters
+    return {
+        "preempted": counted["preempted"],
+        "relocated": counted["relocated"],
+        "auctions": counted["auctions"],
+        "overruled": counted["overruled"],
+        "policy_failed": counted["policy failed"],
+        "messages": recording.messages,
+    }
+
+
+def _responder_row(recording: TimedRecording, unit: UnitRecord) -> Row:
+    return {
+        "name": unit.name,
+        "kind": unit.kind,
+        "use": unit.busy / recording.duration,
+        "exposure_s": float(sum(unit.exposure.values())),
+        "distance_m": unit.distance,
+        **{f"{task}s": unit.jobs[task] for task in ("confirm", "contain", "stand_by")},
+    }
+
+
+def _mean(values: Any) -> float:
+    return float(np.mean(values)) if len(values) else math.nan

@@ -1,0 +1,407 @@
+"""Names in a timed scenario: each must mean something, before anything runs.
+
+What one run of the timed world consists of; units are in the keys.
+
+Nobody drives and nothing is sent over a network: responders are travel and service times. What
+is asked, decided and answered is the DVA's own core, so that a queue known from the books is a
+scenario of this kind, and so is a shift on a site with guards, robots and operators.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, model_validator
+
+from dva_sim.kernel import key_changes
+from dva_sim.kernel.config import Config, Document, Fail, KeyPath
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.suggestions import unknown
+from dva_sim.simulation.scenario import check_policy, locate_files
+from dva_sim.simulation.shift.distributions import ZERO, Constant, Law
+
+
+def check_names(scenario: TimedScenario, error: Fail) -> TimedScenario:
+    """Refuse names that mean nothing, before anything runs.
+
+    Raises:
+        ConfigError: an unknown site, zone, responder, station or policy.
+    """
+    zones = zone_names(scenario, error)
+    for number, stream in enumerate(scenario.demand):
+        _known(stream.zones, zones, "zone", ("demand", number, "zones"), error)
+        if stream.notice == "detectors" and scenario.site is None:
+            raise error("notice 'detectors' needs a site", ("demand", number, "notice"))
+    dispatch = scenario.dispatch
+    _known(dispatch.preferences, zones, "zone", ("dispatch", "preferences"), error)
+    for zone, names in dispatch.preferences.items():
+        path = ("dispatch", "preferences", zone)
+        _known(names, scenario.names, "responder", path, error)
+    for zone in sorted({z for s in scenario.demand for z in s.zones or zones}):
+        if dispatch.preferences and zone not in dispatch.preferences:
+            problem = f"preferences has no list for zone {zone!r}"
+            raise error(problem, ("dispatch", "preferences"))
+    _check_places(scenario, zones, error)
+    if dispatch.policy != "oracle":  # which is made from the run's own luck
+        check_policy(dispatch.policy, dispatch.options, error)
+    return scenario
+
+
+def zone_names(scenario: TimedScenario, error: Fail) -> list[str]:
+    """Names of the zones, in order."""
+    if scenario.site is None:
+        return list(scenario.zones) or ["area" if scenario.area else "here"]
+    from dva_sim.worlds.site import load_site
+
+    try:
+        return [room.name for room in load_site(scenario.site.name).rooms]
+    except ConfigError as problem:
+        if problem.file is not None:
+            raise
+        raise error(problem.problem, ("site", "name")) from None
+
+
+def _known(names: Any, known: list[str], what: str, path: KeyPath, error: Fail) -> None:
+    for name in names:
+        if name not in known:
+            raise error(unknown(what, name, known), (*path, name))
+
+
+def _check_places(scenario: TimedScenario, zones: list[str], error: Fail) -> None:
+    stations = [s.name for s in scenario.dispatch.stations]
+    places: list[tuple[Any, KeyPath, list[str]]] = [
+        (group.base, ("responders", number, "base"), stations)
+        for number, group in enumerate(scenario.responders)
+    ]
+    places += [
+        (station.at, ("dispatch", "stations", number, "at"), [])
+        for number, station in enumerate(scenario.dispatch.stations)
+    ]
+    for place, path, names in places:
+        if isinstance(place, str) and not _names_place(place, scenario, [*zones, *names]):
+            known = ["random", *(["post", "robot_base"] if scenario.site else []), *names, *zones]
+            raise error(unknown("place", place, known), path)
+
+
+def _names_place(place: str, scenario: TimedScenario, names: list[str]) -> bool:
+    if place in names or place == "random":
+        return True
+    what, _, number = place.partition("-")
+    if scenario.site is None or what not in ("post", "robot_base"):
+        return False
+    return not number or (number.isdigit() and int(number) > 0)
+
+
+Name = Annotated[str, Field(min_length=1, max_length=40)]
+Share = Annotated[float, Field(ge=0, le=1)]
+NonNegative = Annotated[float, Field(ge=0)]
+Positive = Annotated[float, Field(gt=0)]
+Limit = Annotated[float, Field(ge=0, allow_inf_nan=True)] | None
+Point = tuple[float, float]
+Box = tuple[float, float, float, float]
+Kind = Literal["fire", "gas_leak", "flood"]
+
+LOOK_S, ACT_S = Constant(mean_s=0.0), Constant(mean_s=0.0)
+MOST_UNITS = 2000
+
+
+class TimedSite(Config):
+    """A site whose rooms are the zones.
+
+    Attributes:
+        name: Name or path.
+        spots: Events happen at so many places of each room; ways to them are planned once.
+    """
+
+    name: str = "caparica"
+    spots: Annotated[int, Field(ge=1, le=50)] = 4
+
+
+class Area(Config):
+    """A bare rectangle with a corner at x = y = 0."""
+
+    width_m: Positive
+    height_m: Positive
+
+
+class Group(Config):
+    """Responders that are alike.
+
+    Attributes:
+        name: Members are `NAME-1`, `NAME-2`, ...; a group of one is just `NAME`.
+        base: `[x, y]`; `post` (guard posts) or `robot_base` of the site, in turn; the name of a
+            station or zone; or `random`: anywhere, by the run's seed. Left out, the post or
+            robot base on a site, the middle of an area.
+        speed_mps: The mean, and what the DVA expects.
+        speed_sd_mps: Between members.
+        mobilisation: From the order to the first step.
+        look: From arrival to being sure, unless the event says otherwise.
+        act: What it takes a person to contain an event, unless the event says otherwise.
+        after: `stay` where the event was; `return` to base and be busy until there; or `recall`:
+            walk back, but take orders on the way.
+        from_s: When the shift begins.
+    """
+
+    name: Name
+    kind: Literal["guard", "robot"] = "guard"
+    count: Annotated[int, Field(ge=1, le=MOST_UNITS)] = 1
+    base: Point | str | None = None
+    speed_mps: Positive = 1.0
+    speed_sd_mps: NonNegative = 0.0
+    mobilisation: Law = ZERO
+    look: Law = LOOK_S
+    act: Law = ACT_S
+    after: Literal["stay", "return", "recall"] = "stay"
+    from_s: NonNegative = 0.0
+
+    @model_validator(mode="after")
+    def _robots_are_driven(self) -> Group:
+        if self.kind == "robot" and self.after == "recall":
+            raise ValueError("a robot is driven back by its operator: after is stay or return")
+        return self
+
+
+class Operators(Config):
+    """Who drives the robots."""
+
+    count: Annotated[int, Field(ge=0, le=MOST_UNITS)] = 0
+
+
+class Severity(Config):
+    """Anything between two bounds."""
+
+    low: Share
+    high: Share
+
+
+class Sources(Config):
+    """A fixed number of sources; each brings its next event `rest` after its last was closed."""
+
+    count: Annotated[int, Field(ge=1, le=10_000)]
+    rest: Law
+
+
+class Batch(Config):
+    """A number of events at once."""
+
+    count: Annotated[int, Field(ge=1, le=5000)]
+    at_s: NonNegative = 0.0
+
+
+class Repeats(Config):
+    """Some events are reported once more, by another source, `after` the first report."""
+
+    share: Share
+    after: Law = ZERO
+
+
+class Stream(Config):
+    """Events of one class, one after the other.
+
+    Attributes:
+        name: Left out, the kind.
+        between: From one to the next; exponential: a Poisson process.
+        sources: Instead of `between`: a finite number of sources.
+        batch: Instead of `between`: all at once.
+        zones: Where, with weights. Left out, anywhere: uniform over the area, or over the
+            rooms of the site.
+        notice: From the outbreak to the first report; `detectors`: until a detector of the site
+            notices.
+        severity: As reported.
+        confidence: As reported.
+        false_share: How often there is nothing.
+        look: Instead of the responders' own.
+        act: Instead of the responders' own.
+        patience: Whoever reported it takes it back so long after the report.
+        repeats: Doubled reports.
+        from_s: The first event comes one interval after this.
+        until_s: No event after this; left out, the horizon.
+    """
+
+    kind: Kind = "fire"
+    name: Name = ""
+    between: Law | None = None
+    sources: Sources | None = None
+    batch: Batch | None = None
+    zones: dict[str, Positive] = Field(default_factory=dict)
+    notice: Literal["detectors"] | Law = ZERO
+    severity: Share | Severity = 0.5
+    confidence: Share = 0.9
+    false_share: Share = 0.0
+    look: Law | None = None
+    act: Law | None = None
+    patience: Law | None = None
+    repeats: Repeats | None = None
+    from_s: NonNegative = 0.0
+    until_s: Positive | None = None
+
+    @model_validator(mode="after")
+    def _one_origin(self) -> Stream:
+        given = [self.between, self.sources, self.batch]
+        if sum(g is not None for g in given) != 1:
+            raise ValueError("a stream needs one of between, sources and batch")
+        if isinstance(self.between, Constant) and self.between.mean_s <= 0:
+            raise ValueError("between should be longer than 0 s")
+        return self
+
+
+class Station(Config):
+    """A place where guards may wait: `[x, y]`, `post-2`, or a zone's name."""
+
+    name: Name
+    at: Point | str
+
+
+class TimedDispatch(Config):
+    """The policy and the rules.
+
+    Attributes:
+        policy: By name, or `file.py:Class`.
+        options: What the policy can be told.
+        escalate_after_s: How long an event may wait; 0: not at all; `.inf` or null: forever.
+        containment: Whether a confirmed event needs a person who deals with it.
+        most_waiting: How many events may wait.
+        merge_distance_m: Reports so near each other are one event; left out, 8 m on a site,
+            elsewhere 1 m if events are reported twice, and else 0 (never).
+        max_attempts: Orders for one event.
+        order_limit_s: How long an order may take; left out, without limit.
+        bid_within_s: How long bids are taken.
+        preferences: For each zone, names of responders in order.
+        stations: Where guards may wait.
+    """
+
+    policy: str = "min_eta"
+    options: dict[str, Any] = Field(default_factory=dict)
+    escalate_after_s: Limit = None
+    containment: bool = False
+    most_waiting: Annotated[int, Field(ge=0)] | None = None
+    merge_distance_m: NonNegative | None = None
+    max_attempts: Annotated[int, Field(ge=1, le=1_000_000)] = 4
+    order_limit_s: Limit = None
+    bid_within_s: NonNegative = 2.0
+    preferences: dict[str, tuple[str, ...]] = Field(default_factory=dict)
+    stations: tuple[Station, ...] = ()
+
+
+class TimedScenario(Config):
+    """Everything one run needs but its seed.
+
+    Attributes:
+        model: Tells this kind of scenario from the others.
+        site: Where; or ...
+        area: ... where; without either, place does not matter.
+        zones: Named parts of an area: xmin, ymin, xmax, ymax [m].
+        travel: `none`: no time; `straight`; `path`: planned on the site; or a law: a time for
+            each pair of an event and a responder. Left out, whatever the ground allows best.
+        intensity: Events of every stream with a `between` come so many times as often.
+        warm_up_s: Not measured.
+        horizon_s: No event after this.
+        max_events: No event after so many.
+        drain: Go on after the horizon until every event is closed.
+        keep: `events`: a row for each; `batches`: sums only, for very long runs.
+        batches: How many parts of equal length the measured time is cut into.
+    """
+
+    model: Literal["timed"]
+    description: str = ""
+    site: TimedSite | None = None
+    area: Area | None = None
+    zones: dict[str, Box] = Field(default_factory=dict)
+    travel: Literal["none", "straight", "path"] | Law | None = None
+    responders: Annotated[tuple[Group, ...], Field(min_length=1)]
+    operators: Operators = Operators()
+    demand: Annotated[tuple[Stream, ...], Field(min_length=1)]
+    dispatch: TimedDispatch = TimedDispatch()
+    intensity: Positive = 1.0
+    warm_up_s: NonNegative = 0.0
+    horizon_s: Annotated[float, Field(gt=0, le=1e11)] = 86_400.0
+    max_events: Annotated[int, Field(ge=1)] | None = None
+    drain: bool = False
+    keep: Literal["events", "batches"] = "events"
+    batches: Annotated[int, Field(ge=1, le=10_000)] = 20
+
+    @property
+    def way(self) -> Literal["none", "straight", "path"] | Law:
+        """How long it takes to get somewhere."""
+        if self.travel is not None:
+            return self.travel
+        return "path" if self.site else "straight" if self.area else "none"
+
+    def members(self, group: Group) -> list[str]:
+        """Names of a group's responders."""
+        if group.count == 1:
+            return [group.name]
+        return [f"{group.name}-{number}" for number in range(1, group.count + 1)]
+
+    @property
+    def merge_distance(self) -> float:
+        """Reports so near each other are one event [m]."""
+        if self.dispatch.merge_distance_m is not None:
+            return self.dispatch.merge_distance_m
+        return 8.0 if self.site else 1.0 if any(s.repeats for s in self.demand) else 0.0
+
+    @property
+    def names(self) -> list[str]:
+        """Names of all responders, in order."""
+        return [name for group in self.responders for name in self.members(group)]
+
+    @property
+    def stream_names(self) -> list[str]:
+        """Names of all streams, in order."""
+        return [stream.name or stream.kind for stream in self.demand]
+
+    @model_validator(mode="after")
+    def _ground(self) -> TimedScenario:
+        if self.site and self.area:
+            raise ValueError("a scenario has a site or an area, not both")
+        if self.zones and not self.area:
+            raise ValueError("zones belong to an area; on a site the rooms are the zones")
+        if self.travel == "path" and not self.site:
+            raise ValueError("travel 'path' needs a site")
+        if self.travel == "straight" and not (self.site or self.area):
+            raise ValueError("travel 'straight' needs a site or an area")
+        for name, (left, low, right, high) in self.zones.items():
+            if right < left or high < low:
+                raise ValueError(f"zone {name!r} should be xmin, ymin, xmax, ymax")
+        return self
+
+    @model_validator(mode="after")
+    def _team(self) -> TimedScenario:
+        for what, names in (("responder", self.names), ("stream", self.stream_names)):
+            twice = next((n for n in names if names.count(n) > 1), None)
+            if twice is not None:
+                raise ValueError(f"there are two {what}s {twice!r}: give them different names")
+        if any(g.kind == "robot" for g in self.responders) and not self.operators.count:
+            raise ValueError("robots need an operator: operators.count is 0")
+        if self.dispatch.containment and all(g.kind == "robot" for g in self.responders):
+            raise ValueError("containment needs guards: robots only look")
+        if not self.merge_distance and any(s.repeats for s in self.demand):
+            raise ValueError("repeats need dispatch.merge_distance_m above 0, to be known as such")
+        if self.warm_up_s >= self.horizon_s:
+            raise ValueError(
+                f"warm_up_s {self.warm_up_s:g} should be before horizon_s {self.horizon_s:g}"
+            )
+        return self
+
+
+def build(
+    source: Document | Mapping[str, Any], changes: Mapping[str, Any] | None = None
+) -> TimedScenario:
+    """A scenario from a file or plain data, with some keys changed.
+
+    Args:
+        source: A document (mistakes are told with their place) or plain data.
+        changes: New values by dotted key, for example `{"dispatch.policy": "batch"}`; a number
+            chooses an item of a list: `{"responders.0.count": 3}`.
+
+    Raises:
+        ConfigError: an unknown key or name, a wrong type, a value out of range.
+    """
+    return key_changes.build(TimedScenario, source, changes or {}, check_names, locate_files)
+
+
+def limit_of(value: float | None) -> float:
+    """A time limit [s]; none is infinite."""
+    return math.inf if value is None else value

@@ -1,0 +1,468 @@
+"""The balance of a timed run: every event of the world in exactly one state, none lost.
+
+What the world counted is held against what the DVA's book says, and the rules that hold
+whatever a policy advises against what everybody is really at.
+
+A shift: the world of one timed run, around the DVA's own desk.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from dva_sim.core.dispatch import Policy
+from dva_sim.core.events import Event, State
+from dva_sim.core.travel_times import Start
+from dva_sim.kernel.clock import Clock
+from dva_sim.kernel.streams import Streams
+from dva_sim.protocol import messages as m
+from dva_sim.simulation.shift import knowledge
+from dva_sim.simulation.shift.demand import CALLERS, Demand, Incident
+from dva_sim.simulation.shift.distributions import Draws, Law, times
+from dva_sim.simulation.shift.mailbox import Mail
+from dva_sim.simulation.shift.recording import TimedRecording, UnitRecord
+from dva_sim.simulation.shift.responders import Job, Unit
+from dva_sim.simulation.shift.scenario import TimedScenario
+from dva_sim.simulation.shift.statistics import CODES, STEPS_IN_ORDER, Floats, Ledger, Level, Slices
+from dva_sim.simulation.shift.travel import Place, Terrain, terrain_of
+
+SLACK = 1e-3  # deadlines are looked at exactly, but for the clock's step [s]
+
+
+def check(shift: Shift) -> None:
+    """Count every rule that does not hold now."""
+    for broken in (*_conservation(shift), *_limits(shift), *_team(shift)):
+        shift.violations[broken] += 1
+
+
+def _conservation(shift: Shift) -> Iterator[str]:
+    """S6: the counts add up, here and in the book, and both know the same open events."""
+    held = sum(len(incidents) for incidents in shift.events.values())
+    if shift.total != len(shift.unnoticed) + held + sum(shift.settled.values()):
+        yield "an event of the world is lost"
+    book = shift.desk.book
+    if sum(book.counts.values()) != book.total:
+        yield "the book's counts do not add up"
+    if book.open.keys() != shift.events.keys():
+        yield "the book and the world know different open events"
+    if len(book.waiting) != sum(level.now for level in shift.waiting):
+        yield "the book and the world count different waiting events"
+
+
+def _limits(shift: Shift) -> Iterator[str]:
+    """Nothing waits beyond its deadline, and no more than may wait."""
+    rules, now, book = shift.desk.orders.rules, shift.clock.now, shift.desk.book
+    for event in book.waiting.values():
+        if now - event.waiting_since > rules.escalate_after + SLACK:
+            yield "an event waits beyond its deadline"
+    if rules.most_waiting is not None and len(book.waiting) > rules.most_waiting:
+        yield "more events wait than may"
+
+
+def _team(shift: Shift) -> Iterator[str]:
+    """One event per responder and one responder per event, as the DVA believes it to be."""
+    engaged = shift.desk.orders.engaged
+    for unit in shift.units:
+        job, at = unit.job, [event.number for event in engaged.all(unit.device)]
+        if ([] if job is None else [job.order.event_id]) != at:
+            yield "a responder is at something else than the DVA believes"
+    for event in shift.desk.book.in_state(State.ASSIGNED, State.ON_SCENE):
+        if event.responder is None:
+            yield "an event that somebody should be at has nobody"
+    for event in shift.desk.book.open.values():
+        if (
+            event.responder is not None
+            and event.responder == event.actor
+            and event.state
+            in (
+                State.ASSIGNED,
+                State.ON_SCENE,
+            )
+        ):
+            yield "somebody is to do two things at once"
+
+
+CHECKS = 64  # of the balance in a run
+
+
+class Shift:
+    """Everybody in place at time zero.
+
+    Args:
+        scenario: What the run consists of.
+        seed: Decides all luck.
+        policy: Who decides; made from the scenario by the caller.
+
+    Raises:
+        ConfigError: a site that cannot hold the team.
+    """
+
+    def __init__(self, scenario: TimedScenario, seed: int, policy: Policy) -> None:
+        self.scenario, self.seed = scenario, seed
+        self.clock, self.streams = Clock(), Streams(seed)
+        self.terrain: Terrain = terrain_of(scenario)
+        slices = Slices(scenario.warm_up_s, scenario.horizon_s, scenario.batches)
+        self.slices = slices
+        self.ledger = Ledger(len(scenario.demand), slices, scenario.keep == "events")
+        self.waiting = [Level(slices) for _ in scenario.demand]
+        self.served = [Level(slices) for _ in scenario.demand]
+        self.demand = Demand(
+            scenario, self.streams, self.terrain, self.clock, self._happens, self._noticed
+        )
+        self.stations = knowledge.stations(scenario, self.terrain)
+        self.units = knowledge.hire(self, self.streams, self.stations)
+        self.by_device = {unit.device: unit for unit in self.units}
+        self.numbers = {unit.device: unit.number for unit in self.units}
+        self.desk = knowledge.open_desk(self, policy)
+        self.mail = self._open_mail(policy)
+        self.records = [UnitRecord(unit.name, unit.kind) for unit in self.units]
+        self.events: dict[int, list[Incident]] = {}
+        self.reports: dict[int, int] = {}
+        self.unnoticed: dict[int, Incident] = {}
+        self.total, self.settled = 0, Counter[str]()
+        self.violations: Counter[str] = Counter()
+        self.driven = {knowledge.id_of("operator", n): 0.0 for n in range(scenario.operators.count)}
+        self.told: list[m.Position | None] = [None] * len(self.units)
+        self.half_way: dict[Unit, Place] = {}
+        self._served: set[int] = set()
+        self._newest = 0
+        self._moving: dict[Unit, None] = {}
+        self._luck: dict[tuple[str, int, str, int], Draws[float]] = {}
+        knowledge.register(self)
+        self.mail.carry()
+        for start in sorted({group.from_s for group in scenario.responders}):
+            on_duty = [unit for unit in self.units if unit.group.from_s == start]
+            self.clock.call_at(start, self._begin_shift, on_duty)
+
+    def _open_mail(self, policy: Policy) -> Mail:
+        """One decision leads to the next where orders build on each other, or guards move."""
+        containment = self.scenario.dispatch.containment
+        attentive = containment or policy.preempts or policy.relocates
+        return Mail(self.desk, self.clock, self._changed, self._tell_who_moves, attentive)
+
+    def _begin_shift(self, units: list[Unit]) -> None:
+        for unit in units:
+            self.stands(unit, "waiting")
+        self.mail.tick()
+
+    # --- a run ---------------------------------------------------------------------------
+
+    def run(self) -> TimedRecording:
+        """Let time pass until the horizon, or until all is settled."""
+        scenario = self.scenario
+        self.demand.start()
+        for check_number in range(1, CHECKS + 1):
+            self.clock.run(scenario.horizon_s * check_number / CHECKS)
+            check(self)
+            if self.demand.exhausted and not self.events and not self.unnoticed:
+                break
+        if scenario.drain:
+            self._drain()
+        return self._close()
+
+    def _drain(self) -> None:
+        """Let what is open be closed, as far as anybody will still do anything."""
+        env = self.clock.env
+        while (self.events or self.unnoticed) and env.peek() < math.inf:
+            env.step()
+        check(self)
+
+    def _close(self) -> TimedRecording:
+        now, scenario = self.clock.now, self.scenario
+        for level in (*self.waiting, *self.served):
+            level.advance(now)
+        for unit in self.units:
+            if unit.job is not None:
+                self.spent(unit, unit.job.phase, unit.since)
+                self.freed(unit, unit.job)
+        for incidents in self.events.values():
+            for incident in incidents:
+                assert incident.event is not None
+                self.ledger.write(incident, CODES[incident.event.state.value], self.numbers)
+        for incident in self.unnoticed.values():
+            self.ledger.write(incident, CODES["unnoticed"], self.numbers)
+        counters = Counter(self.desk.counters)
+        counters.update({f"refused {text}": n for text, n in self.mail.refused.items()})
+        for unit, record in zip(self.units, self.records, strict=True):
+            record.distance, record.jobs = unit.distance, unit.jobs
+        return TimedRecording(
+            scenario,
+            self.seed,
+            self.terrain.zones,
+            scenario.stream_names,
+            [unit.name for unit in self.units],
+            self.ledger.columns() if scenario.keep == "events" else {},
+            self.ledger.cells,
+            self.ledger.outcomes,
+            np.array([level.areas for level in self.waiting]),
+            np.array([level.areas for level in self.served]),
+            self.records,
+            list(self.driven.values()),
+            counters,
+            self.violations,
+            self.total,
+            self.mail.sent,
+            now,
+            max(0.0, min(now, scenario.horizon_s) - scenario.warm_up_s),
+        )
+
+    # --- what happens --------------------------------------------------------------------
+
+    def _happens(self, incident: Incident) -> None:
+        self.total += 1
+        self.unnoticed[incident.number] = incident
+        self.terrain.remember(incident.place)
+
+    def _noticed(self, incident: Incident) -> None:
+        """The first report; later ones and the withdrawal are luck of the event, too."""
+        luck = self.demand.luck[incident.stream]
+        incident.noticed = self.clock.now
+        self._report(incident, "caller")
+        repeat = luck.repeat_after(incident.index)
+        if repeat is not None:
+            self.clock.call_after(repeat, self._report_again, incident)
+        if self.scenario.demand[incident.stream].patience is not None:
+            patience = luck.patience[incident.index]
+            self.clock.call_after(patience, self._take_back, incident)
+
+    def _report(self, incident: Incident, kind: str) -> None:
+        stream = self.scenario.demand[incident.stream]
+        caller = incident.index % CALLERS if stream.patience or stream.repeats else 0
+        source = knowledge.id_of(kind, incident.stream * CALLERS + caller)
+        incident.sources.append(source)
+        self.mail.say(source, incident.report("detected"), incident)
+        self.mail.carry()
+
+    def _report_again(self, incident: Incident) -> None:
+        """Who comes when it is over sees nothing to report."""
+        if incident.event is not None and incident.event.open:
+            self._report(incident, "second")
+
+    def _take_back(self, incident: Incident) -> None:
+        if incident.event is not None and incident.event.open:
+            for source in incident.sources:
+                self.mail.say(source, incident.report("refuted"))
+            self.mail.carry()
+
+    # --- what the DVA has done -----------------------------------------------------------
+
+    def _changed(self, about: object) -> None:
+        """Follow the events of the DVA."""
+        changes = self.desk.book.changes()
+        if changes:
+            now = self.clock.now
+            for event in changes:
+                if event.number > self._newest or event.number in self.events:
+                    self._match(about, event, now)
+                    self._follow(event, now)
+        if isinstance(about, Incident) and about.event is None:
+            self._settle(about, "refused", self.clock.now)
+
+    def _match(self, about: object, event: Event, now: float) -> None:
+        """Find out what the DVA took a report for."""
+        if event.number > self._newest:
+            self._newest = event.number
+            assert isinstance(about, Incident)
+            self.events[event.number] = [about]
+            self._reported(about, event)
+            self.waiting[about.stream].change(1, now)
+        elif event.reports > self.reports[event.number]:
+            self.reports[event.number] = event.reports
+            if isinstance(about, Incident) and about.event is None:
+                about.shared = True
+                self.events[event.number].append(about)
+                self._reported(about, event)
+
+    def _reported(self, incident: Incident, event: Event) -> None:
+        """Now it is known as what the DVA knows an incident."""
+        incident.event = event
+        self.reports[event.number] = event.reports
+        del self.unnoticed[incident.number]
+
+    def _follow(self, event: Event, now: float) -> None:
+        """Count an event where it stands now: waiting, served or over."""
+        number, book, stream = event.number, self.desk.book, self.events[event.number][0].stream
+        waited = number not in self._served
+        if number not in book.open:
+            (self.waiting if waited else self.served)[stream].change(-1, now)
+            self._served.discard(number)
+            self._end(event, now)
+        elif waited and number not in book.waiting:
+            self.waiting[stream].change(-1, now)
+            self.served[stream].change(1, now)
+            self._served.add(number)
+        elif not waited and number in book.waiting:
+            self.waiting[stream].change(1, now)
+            self.served[stream].change(-1, now)
+            self._served.discard(number)
+
+    def _end(self, event: Event, now: float) -> None:
+        given_up = event.state in (State.ESCALATED, State.EXPIRED)
+        del self.reports[event.number]
+        for incident in self.events.pop(event.number):
+            if given_up:
+                incident.over = min(incident.over, now)
+            self._settle(incident, event.state.value, now)
+
+    def _settle(self, incident: Incident, outcome: str, now: float) -> None:
+        """An incident is closed: count it, and let its source make the next."""
+        self.unnoticed.pop(incident.number, None)
+        self.settled[outcome] += 1
+        if incident.event is not None and not in_order(incident):
+            self.violations["times are out of order"] += 1
+        self.ledger.write(incident, CODES[outcome], self.numbers)
+        self.terrain.forget(incident.place)
+        self.demand.closed(incident, now)
+
+    def travel(self, starts: Sequence[Start], goals: Sequence[m.Position]) -> tuple[Floats, Floats]:
+        """What the DVA is told of ways: see `core.ground.Travel`."""
+        return knowledge.travel(self, starts, goals)
+
+    def _tell_who_moves(self) -> None:
+        """Before each decision the DVA hears where those are who move and may be called."""
+        for unit in self._moving:
+            self._publish(unit, unit.here(), "walking")
+
+    # --- what units may ask, and tell: see `units.World` -----------------------------------
+
+    @property
+    def now(self) -> float:
+        """Time [s]."""
+        return self.clock.now
+
+    def after(self, delay: float, action: Any, *args: Any) -> None:
+        """Do something later [s]; what it says is heard when it is done."""
+        self.clock.call_after(delay, self._do, action, args)
+
+    def _do(self, action: Any, args: tuple[Any, ...]) -> None:
+        action(*args)
+        self.mail.carry()
+
+    def say(self, source: str, body: m.Body) -> None:
+        """Say something to the DVA."""
+        self.mail.say(source, body)
+
+    def says_arrived(self, unit: Unit, job: Job) -> None:
+        """Tell the DVA that a unit is where it was sent; so it knows where the unit is."""
+        event = job.incident.event
+        self.told[unit.number] = None if event is None else event.position
+        self.mail.say(job.voice, m.OrderProgress(job.order.event_id, "arrived"))
+
+    def stands(self, unit: Unit, activity: str) -> None:
+        """Publish where a unit is."""
+        self._publish(unit, unit.here(), activity)
+
+    def _publish(self, unit: Unit, place: Place, activity: str) -> None:
+        if unit.group.from_s > self.clock.now or self.told[unit.number] is place.position:
+            return
+        self.told[unit.number] = place.position
+        self.terrain.forget(self.half_way.pop(unit, place))
+        if place.fixed is None and place.about is None:
+            self.half_way[unit] = self.terrain.remember(place)
+        if unit.kind == "guard":
+            self.mail.publish(unit.device, m.PersonStatus(activity, place.position))
+        else:
+            mode = "Idle" if unit.job is None else "Teleoperation"
+            body = m.RobotStatus(mode, place.position, 0.0, 0.0, 0.0, round(self.now * 1000.0))
+            self.mail.publish(unit.device, body)
+
+    def incident_at(self, event: int) -> Incident:
+        """What an event of the DVA really is: the first of what was reported as it."""
+        return self.events[event][0]
+
+    def length(self, a: Place, b: Place) -> float:
+        """Length of the way [m]; infinite if there is none."""
+        return self.terrain.length(a, b)
+
+    def place_at(self, position: m.Position) -> Place:
+        """The place a message speaks of."""
+        return self.terrain.known_at(position)
+
+    def along(self, a: Place, b: Place, gone: float) -> Place:
+        """Where somebody is who has gone so far [m]."""
+        return self.terrain.along(a, b, gone)
+
+    def mobilisation(self, unit: Unit, incident: Incident) -> float:
+        """What it takes this unit this time to get ready [s]."""
+        return self._drawn("mobilisation", unit.group.mobilisation, incident, unit.name)
+
+    def trip(self, unit: Unit, start: Place, goal: Place) -> float:
+        """Time to get somewhere [s]; infinite if there is no way."""
+        way = self.scenario.way
+        if isinstance(way, str):
+            return self.terrain.length(start, goal) / unit.speed
+        if goal.about is None:
+            return 0.0  # back
+        return self._drawn("travel", way, goal.about, unit.name)
+
+    def look(self, unit: Unit, incident: Incident) -> float:
+        """From arrival to being sure [s]: luck of the event, whoever looks."""
+        law = self.scenario.demand[incident.stream].look or unit.group.look
+        return self._drawn("look", law, incident)
+
+    def act(self, unit: Unit, incident: Incident) -> float:
+        """What it takes to contain it [s]: luck of the event, whoever does it."""
+        law = self.scenario.demand[incident.stream].act or unit.group.act
+        return self._drawn("act", law, incident)
+
+    def _drawn(self, purpose: str, law: Law, incident: Incident, whose: str = "") -> float:
+        """Draws by the event's index; two laws for one purpose share their luck."""
+        key = purpose, incident.stream, whose, id(law)
+        draws = self._luck.get(key)
+        if draws is None:
+            stream = self.scenario.stream_names[incident.stream]
+            name = f"demand/{stream}/{purpose}/{whose}"
+            draws = self._luck[key] = times(self.streams, name, law)
+        return draws[incident.index]
+
+    def needs_people(self, incident: Incident) -> bool:
+        """Whether a person will be called to contain it."""
+        return self.scenario.dispatch.containment and incident.true and self._is_open(incident)
+
+    def _is_open(self, incident: Incident) -> bool:
+        return incident.event is not None and incident.event.open
+
+    def spent(self, unit: Unit, phase: str, since: float) -> None:
+        """A unit has been at something until now; what lies in the measured time counts."""
+        seconds = self._measured(since)
+        if seconds > 0.0:
+            self.records[unit.number].spent[phase] += seconds
+
+    def freed(self, unit: Unit, job: Job) -> None:
+        """A job is over: so is the work of the operator who drove."""
+        if unit.kind == "robot":
+            self.driven[job.voice] += self._measured(job.begun)
+
+    def _measured(self, since: float) -> float:
+        return max(0.0, min(self.clock.now, self.slices.end) - max(since, self.slices.start))
+
+    def exposed(self, unit: Unit, stage: str, seconds: float) -> None:
+        """A guard has been within a danger radius for so long."""
+        if seconds > 0.0 and self.slices.of(self.clock.now) is not None:
+            self.records[unit.number].exposure[stage] += seconds
+
+    def moving(self, unit: Unit, moves: bool) -> None:
+        """A unit begins or ceases to move; the DVA is told of those it might call."""
+        if moves and (unit.job is None or self.desk.dispatcher.policy.preempts):
+            self._moving[unit] = None
+        else:
+            self._moving.pop(unit, None)
+
+
+def in_order(incident: Incident) -> bool:
+    """Whether the times of an incident's event follow each other (S7)."""
+    event = incident.event
+    assert event is not None
+    last = event.times["detected"] if incident.shared else incident.occurred
+    for step in STEPS_IN_ORDER:
+        time = event.times.get(step)
+        if time is not None:
+            if time < last:
+                return False
+            last = time
+    return True

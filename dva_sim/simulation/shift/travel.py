@@ -1,0 +1,466 @@
+"""Places and the ways between them: nowhere in particular, or on a plane.
+
+A site as the timed world sees it: a few places in each room, and planned ways between them.
+
+Ways between places that stay are planned once per process. From half-way, where planning
+each time would cost more than the rest of the run, the way leads straight to what is in sight
+- the goal, a door or an opening - and on from there.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.streams import Streams
+from dva_sim.kernel.suggestions import unknown
+from dva_sim.protocol import messages as m
+from dva_sim.simulation.shift.distributions import Floats, Law
+from dva_sim.simulation.shift.scenario import Point, TimedScenario
+from dva_sim.worlds.geo import GeoFrame, Pose
+from dva_sim.worlds.hazards import DETECTS, first_detection, make_hazard
+from dva_sim.worlds.layout import FOOTPRINT, Site
+from dva_sim.worlds.planning import Planner
+from dva_sim.worlds.site import DEFAULT_FRAME, load_site
+
+if TYPE_CHECKING:
+    from dva_sim.simulation.shift.demand import Incident
+
+
+APART = 1e-10  # between events at one place, so that each position is one event's [deg]
+FAR_APART = 1e-5  # where place does not matter, so that nobody takes two events for one [deg]
+NUMBERED = 4096  # positions at one place before they repeat
+
+
+class Place:
+    """A place: x, y [m], as it is told in messages, and its zone (-1: none).
+
+    Attributes:
+        fixed: The place that is there in every run, if there is one: ways to it are kept.
+        about: The incident that happens here, if one does.
+    """
+
+    __slots__ = ("about", "fixed", "position", "x", "y", "zone")
+
+    def __init__(
+        self, x: float, y: float, position: m.Position, zone: int = -1, fixed: Place | None = None
+    ) -> None:
+        self.x, self.y, self.position, self.zone = x, y, position, zone
+        self.fixed = fixed
+        self.about: Incident | None = None
+
+    @property
+    def point(self) -> Point:
+        """x, y [m]."""
+        return self.x, self.y
+
+
+class Terrain:
+    """Where place does not matter: everything is here.
+
+    Attributes:
+        zones: Names of the zones.
+        frame: Where on earth it lies.
+        placed: Whether events have a place by luck.
+    """
+
+    placed = False
+
+    def __init__(
+        self, zones: Sequence[str], frame: GeoFrame = DEFAULT_FRAME, apart: float = FAR_APART
+    ) -> None:
+        self.zones, self.frame = list(zones), frame
+        self._apart = apart
+        self._known: dict[m.Position, Place] = {}
+        self._numbered = 0
+
+    # --- places ------------------------------------------------------------------------
+
+    def place(self, x: float, y: float, zone: int = -1) -> Place:
+        """A place at a point [m]."""
+        return Place(x, y, m.Position(*self.frame.to_latlon(x, y)), zone)
+
+    def fix(self, x: float, y: float, zone: int = -1) -> Place:
+        """A place that stays, such as a base."""
+        place = self.place(x, y, zone)
+        place.fixed = place
+        self._known[place.position] = place
+        return place
+
+    def remember(self, place: Place) -> Place:
+        """Know a place by its position, until it is forgotten; a fixed one is known already."""
+        return self._known.setdefault(place.position, place)
+
+    def forget(self, place: Place) -> None:
+        """The place plays no part any more."""
+        if self._known.get(place.position) is place and place.fixed is not place:
+            del self._known[place.position]
+
+    def known_at(self, position: m.Position) -> Place:
+        """The place that a message speaks of."""
+        known = self._known.get(position)
+        if known is None:
+            x, y = self.frame.to_xy(position.latitude, position.longitude)
+            known = Place(x, y, position)
+        return known
+
+    def event_place(self, zone: int, u: float, v: float) -> Place:
+        """Where an event happens: by two shares of luck, at a position that is its alone."""
+        return self.apart(self._middle(zone))
+
+    def apart(self, place: Place) -> Place:
+        """The same place under a position of its own."""
+        self._numbered = self._numbered % NUMBERED + 1
+        at = place.position
+        position = m.Position(at.latitude + self._apart * self._numbered, at.longitude)
+        return Place(place.x, place.y, position, place.zone, place.fixed)
+
+    def named(self, name: str, number: int) -> Place:
+        """A base or station by name; the `number`-th that asks gets the `number`-th post.
+
+        Raises:
+            ConfigError: there is no such place.
+        """
+        if name in self.zones:
+            return self.centre(self.zones.index(name))
+        raise ConfigError(unknown("place", name, self.zones, "zones"))
+
+    def centre(self, zone: int) -> Place:
+        """A place that stands for a zone."""
+        return self._middle(zone)
+
+    def anywhere(self, rng: np.random.Generator) -> Place:
+        """A place by chance."""
+        return self._middle(0)
+
+    def default_base(self, kind: str) -> str | None:
+        """Where responders of a kind wait if nobody says where."""
+        return None
+
+    def spots(self, zone: int) -> list[Place]:
+        """Places that a zone is known by: what is far from them is far from the zone."""
+        return [self.centre(zone)]
+
+    def origin(self) -> Place:
+        """Where responders wait by default."""
+        return self._middle(0)
+
+    def _middle(self, zone: int) -> Place:
+        place = self._known.get(_ORIGIN)
+        if place is None:
+            place = Place(0.0, 0.0, _ORIGIN, 0)
+            place.fixed = place
+            self._known[_ORIGIN] = place
+        return place
+
+    def size(self, zone: int) -> float:
+        """Weight of a zone among others where events may happen anywhere."""
+        return 1.0
+
+    # --- ways --------------------------------------------------------------------------
+
+    def length(self, a: Place, b: Place) -> float:
+        """Length of the way [m]; infinite if there is none."""
+        return 0.0
+
+    def along(self, a: Place, b: Place, gone: float) -> Place:
+        """Where somebody is who has gone so far [m] from `a` to `b`."""
+        return b
+
+
+_ORIGIN = m.Position(DEFAULT_FRAME.latitude, DEFAULT_FRAME.longitude)
+
+
+class Plane(Terrain):
+    """A rectangle on which everybody walks straight.
+
+    Args:
+        width: [m]
+        height: [m]
+        zones: Rectangles xmin, ymin, xmax, ymax [m] by name.
+        straight: Whether ways take any time.
+    """
+
+    placed = True
+
+    def __init__(
+        self,
+        width: float,
+        height: float,
+        zones: dict[str, tuple[float, float, float, float]],
+        straight: bool = True,
+    ) -> None:
+        super().__init__(list(zones) or ["area"], apart=APART)
+        self._boxes = list(zones.values()) or [(0.0, 0.0, width, height)]
+        self._named, self._whole = bool(zones), (0.0, 0.0, width, height)
+        self._straight = straight
+        self._centres: dict[int, Place] = {}
+
+    def event_place(self, zone: int, u: float, v: float) -> Place:
+        """See `Terrain`."""
+        left, low, right, high = self._boxes[zone] if zone >= 0 else self._whole
+        x, y = left + u * (right - left), low + v * (high - low)
+        place = self.place(x, y, zone if zone >= 0 else self._zone_at(x, y))
+        return self.apart(place) if left == right and low == high else place
+
+    def _zone_at(self, x: float, y: float) -> int:
+        for zone, (left, low, right, high) in enumerate(self._boxes):
+            if left <= x <= right and low <= y <= high:
+                return zone
+        return -1
+
+    def centre(self, zone: int) -> Place:
+        """See `Terrain`."""
+        if zone not in self._centres:
+            left, low, right, high = self._boxes[zone]
+            self._centres[zone] = self.fix(0.5 * (left + right), 0.5 * (low + high), zone)
+        return self._centres[zone]
+
+    def anywhere(self, rng: np.random.Generator) -> Place:
+        """See `Terrain`."""
+        u, v = rng.random(2).tolist()
+        return self.fix(u * self._whole[2], v * self._whole[3])
+
+    def origin(self) -> Place:
+        """See `Terrain`: the middle of the area."""
+        return self.fix(0.5 * self._whole[2], 0.5 * self._whole[3])
+
+    def size(self, zone: int) -> float:
+        """See `Terrain`: its area, unless events may happen outside all zones, too."""
+        left, low, right, high = self._boxes[zone]
+        return (right - left) * (high - low)
+
+    def length(self, a: Place, b: Place) -> float:
+        """See `Terrain`."""
+        return math.hypot(a.x - b.x, a.y - b.y) if self._straight else 0.0
+
+    def along(self, a: Place, b: Place, gone: float) -> Place:
+        """See `Terrain`."""
+        whole = self.length(a, b)
+        if gone >= whole:
+            return b
+        if gone <= 0.0:
+            return a
+        share = gone / whole
+        return self.place(a.x + share * (b.x - a.x), a.y + share * (b.y - a.y))
+
+
+def terrain_of(scenario: TimedScenario) -> Terrain:
+    """The ground that a scenario plays on.
+
+    Raises:
+        ConfigError: a site that cannot be read.
+    """
+    if scenario.site is not None:
+        return Rooms(scenario.site.name, scenario.site.spots, scenario.way)
+    if scenario.area is not None:
+        straight = scenario.way == "straight"
+        return Plane(scenario.area.width_m, scenario.area.height_m, scenario.zones, straight)
+    return Terrain(["here"])
+
+
+CLEARANCE = 0.4  # radius that must fit where an event happens [m]
+MOST_PATHS = 5000  # kept at a time
+FOUND = 3600.0  # what no detector notices people do, after so long [s]; assumed
+WALL, PASSAGE = 0.05, 0.6  # thickness of a wall, and the least width to pass [m]
+
+
+class _Ways:
+    """Lengths of ways on a site, kept for the next run in this process."""
+
+    def __init__(self, site: Site) -> None:
+        self.planner = Planner(site, FOOTPRINT)
+        self._lengths: dict[tuple[Point, Point], float] = {}
+        self._paths: dict[tuple[Point, Point], Floats | None] = {}
+
+    def length(self, a: Point, b: Point) -> float:
+        """The way is as long there as back [m]."""
+        pair = (a, b) if a <= b else (b, a)
+        length = self._lengths.get(pair)
+        if length is None:
+            length = self._lengths[pair] = self.planner.distance(*pair) if a != b else 0.0
+        return length
+
+    def path(self, a: Point, b: Point) -> Floats | None:
+        """The way itself: who is under way is asked again and again where it is."""
+        if (a, b) not in self._paths:
+            if len(self._paths) >= MOST_PATHS:
+                self._paths.clear()
+            self._paths[a, b] = self.planner.path(a, b)
+        return self._paths[a, b]
+
+
+@lru_cache(maxsize=8)
+def _ways_of(site: Site) -> _Ways:
+    return _Ways(site)
+
+
+@lru_cache(maxsize=8)
+def _spots_of(site: Site, count: int) -> tuple[tuple[Point, ...], ...]:
+    """The same places in every run: they belong to the site."""
+    luck = Streams(0)
+    return tuple(
+        tuple(site.sample_free(rng, CLEARANCE, room.name) for _ in range(count))
+        for room in site.rooms
+        for rng in [luck.fresh(f"spots/{room.name}")]
+    )
+
+
+@lru_cache(maxsize=8)
+def _passages_of(site: Site) -> tuple[Point, ...]:
+    """Middles of doors, and of where two rooms are open to each other."""
+    import shapely
+
+    walls = shapely.MultiLineString(site.walls.reshape(-1, 2, 2).tolist()).buffer(WALL)
+    doors = [((a + c) / 2, (b + d) / 2) for a, b, c, d in site.doors.tolist()]
+    borders = [shapely.Polygon(room.polygon).exterior for room in site.rooms]
+    for number, border in enumerate(borders):
+        for other in borders[:number]:
+            opening = shapely.line_merge(border.intersection(other.buffer(WALL)).difference(walls))
+            for part in shapely.get_parts(opening):
+                middle = part.interpolate(0.5, normalized=True)
+                near = any(math.dist((middle.x, middle.y), door) < PASSAGE for door in doors)
+                if part.length >= PASSAGE and not near:
+                    doors.append((middle.x, middle.y))
+    return tuple(doors)
+
+
+@lru_cache(maxsize=4096)
+def _detected_after(site: Site, kind: str, point: Point) -> float:
+    """Events happen at the same few spots again and again: once per process."""
+    return min(FOUND, first_detection(make_hazard(kind, point, 0.0), site)[1])
+
+
+class Rooms(Terrain):
+    """A site.
+
+    Args:
+        name: Name or path.
+        spots: Places in each room.
+        way: How ways are measured.
+
+    Raises:
+        ConfigError: the site cannot be read, or has no rooms.
+    """
+
+    placed = True
+
+    def __init__(
+        self, name: str, spots: int, way: Literal["none", "straight", "path"] | Law
+    ) -> None:
+        self.site = load_site(name)
+        if not self.site.rooms:
+            raise ConfigError(f"site {name!r} has no rooms: events need them")
+        super().__init__([room.name for room in self.site.rooms], self.site.frame, APART)
+        self._ways, self._way = _ways_of(self.site), way
+        self._spots = [
+            [self.fix(x, y, zone) for x, y in points]
+            for zone, points in enumerate(_spots_of(self.site, spots))
+        ]
+        self._passages = _passages_of(self.site)
+
+    # --- places ------------------------------------------------------------------------
+
+    def event_place(self, zone: int, u: float, v: float) -> Place:
+        """See `Terrain`."""
+        if zone < 0:
+            zone, u = int(u * len(self._spots)), u * len(self._spots) % 1.0
+        spots = self._spots[zone]
+        return self.apart(spots[int(u * len(spots))])
+
+    def named(self, name: str, number: int) -> Place:
+        """See `Terrain`."""
+        what, _, given = name.partition("-")
+        if name in self.zones or what not in ("post", "robot_base"):
+            return super().named(name, number)
+        poses = self.site.guard_posts if what == "post" else self.site.robot_bases
+        if not poses or int(given or 1) > len(poses):
+            wanted = f"no {name!r}: there are {len(poses)}"
+            raise ConfigError(f"site {self.site.name!r} has {wanted}")
+        return self._base(poses[((int(given) if given else number) - 1) % len(poses)])
+
+    def _base(self, pose: Pose) -> Place:
+        room = self.site.room_at(pose.x, pose.y)
+        return self.fix(pose.x, pose.y, self.zones.index(room) if room else -1)
+
+    def centre(self, zone: int) -> Place:
+        """See `Terrain`: the first of its places."""
+        return self._spots[zone][0]
+
+    def spots(self, zone: int) -> list[Place]:
+        """See `Terrain`."""
+        return self._spots[zone]
+
+    def anywhere(self, rng: np.random.Generator) -> Place:
+        """See `Terrain`."""
+        x, y = self.site.sample_free(rng, CLEARANCE)
+        return self.fix(x, y)
+
+    def default_base(self, kind: str) -> str | None:
+        """See `Terrain`."""
+        return "post" if kind == "guard" else "robot_base"
+
+    # --- ways --------------------------------------------------------------------------
+
+    def length(self, a: Place, b: Place) -> float:
+        """See `Terrain`."""
+        if self._way == "straight":
+            return math.hypot(a.x - b.x, a.y - b.y)
+        if self._way != "path":
+            return 0.0
+        if a.fixed is not None and b.fixed is not None:
+            return self._ways.length(a.fixed.point, b.fixed.point)
+        if b.fixed is None:
+            a, b = b, a
+        return self._from_half_way(a.point, b)
+
+    def _from_half_way(self, start: Point, goal: Place) -> float:
+        planner, sees = self._ways.planner, self._ways.planner.line_of_sight
+        if sees(start, goal.point):
+            return math.dist(start, goal.point)
+        end = goal.fixed.point if goal.fixed is not None else goal.point
+        if goal.zone >= 0 and self.site.rooms[goal.zone].contains(*start):
+            return planner.distance(start, end)  # behind a shelf
+        ways = [
+            math.dist(start, passage) + self._ways.length(passage, end)
+            for passage in self._passages
+            if sees(start, passage)
+        ]
+        return min(ways) if ways else planner.distance(start, end)
+
+    def along(self, a: Place, b: Place, gone: float) -> Place:
+        """See `Terrain`."""
+        if gone >= self.length(a, b):
+            return b
+        if gone <= 0.0:
+            return a
+        if self._way == "straight":
+            share = gone / self.length(a, b)
+            return self.place(a.x + share * (b.x - a.x), a.y + share * (b.y - a.y))
+        points = self._ways.path(a.point, b.point)
+        if points is None:
+            return b
+        reached = np.r_[0.0, np.cumsum(np.hypot(*np.diff(points, axis=0).T))]
+        at = gone * reached[-1] / max(self.length(a, b), 1e-9)
+        x, y = np.interp(at, reached, points[:, 0]), np.interp(at, reached, points[:, 1])
+        return self.place(float(x), float(y))
+
+    # --- detectors ---------------------------------------------------------------------
+
+    def check_detectors(self, kind: str) -> None:
+        """See to it that somebody can notice a kind of event.
+
+        Raises:
+            ConfigError: there is no detector for it.
+        """
+        if not any(d.kind in DETECTS[kind] for d in self.site.detectors):
+            raise ConfigError(f"site {self.site.name!r} has no {DETECTS[kind][0]} detectors")
+
+    def detected_after(self, kind: str, place: Place) -> float:
+        """From the outbreak to the first detector, or somebody, that notices it [s]."""
+        return _detected_after(self.site, kind, place.point)

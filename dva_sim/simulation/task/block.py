@@ -1,0 +1,377 @@
+"""Trials in which a vehicle is driven: around a corner, a slalom, a course.
+
+A block of trials: one person does what a scenario asks for, trial after trial.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from dva_sim.agents.operator.delay_estimation import DelayEstimate
+from dva_sim.agents.operator.person import Person, draw_person
+from dva_sim.agents.operator.strategies import (
+    Driver,
+    Intent,
+    Oracle,
+    Reach,
+    Truth,
+    View,
+    load_strategy,
+)
+from dva_sim.agents.robot.camera import Observation
+from dva_sim.agents.route_following import Route
+from dva_sim.kernel.streams import Streams, derive_seed
+from dva_sim.simulation.scenario.scenario import population
+from dva_sim.simulation.task import measures
+from dva_sim.simulation.task.cursor import (
+    CursorTrial,
+    Goal,
+    PointGoal,
+    ReachGoal,
+    TrackGoal,
+    TunnelGoal,
+)
+from dva_sim.simulation.task.delays import Channel, RecordedChannel, Recording, normals
+from dva_sim.simulation.task.devices import Joystick, Pair, Unicycle
+from dva_sim.simulation.task.kinds import (
+    Corner,
+    Course,
+    Pointing,
+    ReachTask,
+    Slalom,
+    Task,
+    Tracking,
+    Tunnel,
+)
+from dva_sim.simulation.task.scenario import OneWay, TaskScenario
+from dva_sim.simulation.task.trial import Seat, Trace, Trial
+
+RUN_OUT = 5.0  # the way goes on so far beyond the finish, so that nobody stops before it [m]
+MACHINE_LOOK = 1.0  # of a machine that steers by itself [m]; assumed
+CONE = 0.1  # radius in a picture [m]
+CONE_STEP = 0.1  # between corners of the line that stands for a slalom [m]
+Points = list[Pair]
+
+
+def way_of(task: Task, first: float, width: float) -> Points:
+    """The middle of the way that a vehicle has to take, from (0, 0) along x at first [m].
+
+    Args:
+        task: A corner, slalom or course.
+        first: The condition's length or spacing [m].
+        width: Of the way [m].
+    """
+    if isinstance(task, Corner):
+        leg = 0.5 * first
+        return [(0.0, 0.0), (leg, 0.0), (leg, leg)]
+    if isinstance(task, Slalom):
+        end = task.cones * first
+        steps = np.linspace(0.0, end, max(2, round(end / CONE_STEP)) + 1)
+        return [(float(x), task.swing_m * math.sin(math.pi * x / first)) for x in steps]
+    assert isinstance(task, Course)
+    return list(task.points_m)
+
+
+def length_of(points: Points) -> float:
+    """Way along the corners [m]."""
+    return sum(math.dist(a, b) for a, b in pairwise(points))
+
+
+def extended(points: Points, by: float) -> Route:
+    """The way, going straight on after its end [m]."""
+    (ax, ay), (bx, by_) = points[-2:]
+    step = math.dist((ax, ay), (bx, by_))
+    on = bx + by * (bx - ax) / step, by_ + by * (by_ - ay) / step
+    return Route(np.array([*points, on]))
+
+
+class DriveTrial(Trial[Observation]):
+    """One drive with a joystick: forward is speed, sideways is turn rate.
+
+    The body is as wide as `plant.width_m`; that it crosses the edge of the way is counted once
+    until it is back, and nothing holds it.
+
+    Args:
+        scenario: Vehicle, links, frames.
+        seat: Who drives.
+        condition: See the kinds of tasks.
+        streams: The luck of this trial.
+        reaction: See `Trial`.
+    """
+
+    STEP = 0.01
+
+    def __init__(
+        self,
+        scenario: TaskScenario,
+        seat: Seat,
+        condition: tuple[float, float],
+        streams: Streams,
+        reaction: float = 0.0,
+    ) -> None:
+        plant = scenario.plant
+        assert plant.speed_mps is not None
+        self._top = plant.speed_mps, math.radians(plant.turn_rate_deg_s)
+        super().__init__(scenario, seat, Reach(*self._top), streams, reaction)
+        self.points = way_of(scenario.task, *condition)
+        self.length, self.width = length_of(self.points), condition[1]
+        self._limit = 0.5 * (self.width - plant.width_m)
+        self._seen_way, self._way = (extended(self.points, RUN_OUT) for _ in range(2))
+        self.plant = Unicycle(plant.lag_s, *self._top)
+        self.plant.heading = math.atan2(self.points[1][1], self.points[1][0])
+        unit = scenario.device.model_copy(update={"gain": 1.0})
+        self.device = Joystick(unit, seat.person, streams, self.STEP)
+        way = OneWay() if self.is_oracle else scenario.link.up
+        self._up: Channel[Pair] = Channel(way, 0.0, streams, "up")
+        self._errors = normals(streams.fresh("judgement"))
+        self._next_reading, self.path = 0.0, 0.0
+        self._squares, self._crossings, self._inside = 0.0, 0, True
+
+    def replay(self, recording: Recording, begin: float) -> None:
+        """Take the link from a recording, from `begin` [s] in it on; no link reaches the oracle."""
+        if not self.is_oracle:
+            self._up = RecordedChannel(recording.up, begin, 0.0)
+            self._frames = RecordedChannel(recording.down, begin, self._late)
+
+    def sight(self) -> Observation:
+        """See `Trial`."""
+        at = self.plant
+        tick = round(1000 * self.now)
+        return Observation(tick, at.x, at.y, at.heading, at.speed, at.turn_rate, ())
+
+    def decide(self, driver: Driver, seen: Observation, now: float) -> None:
+        """See `Trial`."""
+        delay = self.seat.delay
+        delay.see(now, seen.speed, seen.turn_rate)
+        if isinstance(driver, Oracle):
+            intent = driver.drive(self._seen_way, Truth(seen), 0.0)
+        else:
+            intent = driver.drive(self._seen_way, View(now, self._judged(seen), delay.value), 0.0)
+        self.device.aim(intent.speed / self._top[0], intent.turn_rate / self._top[1])
+        self.intended(now, intent.speed, intent.turn_rate)
+
+    def _judged(self, seen: Observation) -> Observation:
+        """As the person takes it: place and heading with an error."""
+        person, error = self.seat.person, self._errors
+        return seen._replace(
+            x=seen.x + person.position_error * next(error),
+            y=seen.y + person.position_error * next(error),
+            heading=seen.heading + person.heading_error * next(error),
+        )
+
+    def advance(self, dt: float) -> None:
+        """See `Trial`."""
+        now, plant = self.now, self.plant
+        self.device.move(dt)
+        if now >= self._next_reading - 0.5 * dt:
+            self._up.put(now, self.device.reading())
+            self._next_reading += self.device.period
+        arrived = self._up.take(now + 0.5 * dt)
+        speed, turn = self.device.command(arrived[-1] if arrived else None, dt)
+        wanted = Intent(speed * self._top[0], turn * self._top[1])
+        if self.scenario.automation:
+            wanted = self._corrected(self.scenario.automation, wanted)
+        plant.step(wanted.speed, wanted.turn_rate, dt)
+        self.path += plant.speed * dt
+        self._check(dt)
+
+    def _corrected(self, share: float, wanted: Intent) -> Intent:
+        """The machine helps to steer (pure pursuit); the speed stays the person's."""
+        at = self.plant
+        ahead = self._way.ahead(at.x, at.y, at.heading, MACHINE_LOOK)
+        own = at.speed * 2.0 * math.sin(ahead.bearing) / max(ahead.distance, 0.1)
+        return Intent(wanted.speed, (1.0 - share) * wanted.turn_rate + share * own)
+
+    def _check(self, dt: float) -> None:
+        ahead = self._way.ahead(self.plant.x, self.plant.y, 0.0, 0.0)
+        self._squares += ahead.offset * ahead.offset * dt
+        inside = ahead.offset <= self._limit
+        if self._inside and not inside:
+            self._crossings += 1
+            self.trace.touched.append((self.plant.x, self.plant.y))
+        self._inside = inside
+        self.over = ahead.remaining <= RUN_OUT
+
+    def row(self) -> dict[str, Any]:
+        """What is measured."""
+        return {
+            "steering_id": measures.steering_id(self.length, self.width),
+            "movement_time_s": self.now,
+            "completed": float(self.over),
+            "error": float(self._crossings > 0),
+            "wall_crossings": self._crossings,
+            "path_error_rms_m": math.sqrt(self._squares / self.now),
+        }
+
+    def place_now(self) -> Pair:
+        """See `Trial`."""
+        return self.plant.x, self.plant.y
+
+    def draw_goal(self) -> None:
+        """Add the geometry to the trace."""
+        for side in (-1.0, 1.0):
+            self.trace.walls.append(beside(self.points, side * 0.5 * self.width))
+        task = self.scenario.task
+        if isinstance(task, Slalom):
+            spacing = self.points[-1][0] / task.cones
+            self.trace.marks += [((n + 0.5) * spacing, 0.0, CONE) for n in range(task.cones)]
+
+
+def beside(points: Points, aside: float) -> Points:
+    """A line to the left of another one, mitred at its corners [m]."""
+    steps = [math.atan2(b[1] - a[1], b[0] - a[0]) for a, b in pairwise(points)]
+    before, after = [steps[0], *steps], [*steps, steps[-1]]
+    line = []
+    for (x, y), first, second in zip(points, before, after, strict=True):
+        half = 0.5 * math.remainder(second - first, 2.0 * math.pi)
+        far = aside / max(math.cos(half), 0.2)
+        line.append((x - far * math.sin(first + half), y + far * math.cos(first + half)))
+    return line
+
+
+Row = dict[str, Any]
+PAUSE = 1.0  # between two trials, nothing is done [s]
+FINE = 0.01  # resolution at which the delay is learnt from a cursor [s]
+
+
+def play(scenario: TaskScenario, seed: int, recording: Recording | None = None) -> list[Row]:
+    """Do all trials; one row each, in order.
+
+    The luck of a trial is its own: it depends on seed, person and number alone, so that two
+    devices or delays meet the same noise.
+
+    Args:
+        scenario: The task, the person and what lies between.
+        seed: Decides all luck but who the person is.
+        recording: Of a link that takes the place of the scenario's, for a vehicle; each trial
+            begins somewhere in it.
+    """
+    return [row for row, _ in _play(scenario, seed, drawn=None, recording=recording)]
+
+
+def trace_of(scenario: TaskScenario, seed: int, number: int = 0) -> tuple[Row, Trace]:
+    """Row and trace of one of the trials that are kept, to be drawn."""
+    for index, (row, trace) in enumerate(_play(scenario, seed, drawn=number)):
+        if index == number:
+            return row, trace
+    raise IndexError(f"there is no trial {number}")
+
+
+def rehearse(scenario: TaskScenario) -> None:
+    """Make the first trial, and let no time pass in it.
+
+    Raises:
+        ConfigError: who does it, or with what, cannot be made.
+    """
+    first = next(iter(scenario.task.conditions()))
+    _trial(scenario, seat_of(scenario), first, 0, Streams(0))
+
+
+def seat_of(scenario: TaskScenario) -> Seat:
+    """Who sits down to the block, without any idea yet how late the link makes it."""
+    operator = scenario.operator
+    person = draw_person(population(operator), operator.population_seed, operator.person)
+    guess = person.perceptual_delay + person.hand_lag
+    delay = DelayEstimate(0.0, guess)
+    if not scenario.is_driven:
+        pace = max(first for first, _ in scenario.task.conditions())  # in a second; assumed
+        delay = DelayEstimate(0.0, guess, FINE, (pace, pace))
+    return Seat(person, load_strategy(operator.strategy, operator.options), delay)
+
+
+def _play(
+    scenario: TaskScenario, seed: int, drawn: int | None, recording: Recording | None = None
+) -> Iterator[tuple[Row, Trace]]:
+    seat, operator = seat_of(scenario), scenario.operator
+    conditions = list(scenario.task.conditions())
+    plan = [(conditions[0], -1)] * scenario.practice
+    plan += [(c, n) for n, c in enumerate(conditions) for _ in range(scenario.trials)]
+    for number, (condition, cell) in enumerate(plan):
+        kept = number - scenario.practice
+        streams = Streams(derive_seed(seed, operator.population_seed, operator.person, number))
+        trial = _trial(scenario, seat, condition, number, streams)
+        if recording is not None and isinstance(trial, DriveTrial):
+            trial.replay(recording, streams.fresh("recording").uniform(0.0, recording.length))
+        trial.run(keep=kept == drawn)
+        seat.delay.intend(seat.begun + trial.now, 0.0, 0.0)
+        seat.delay.rest()
+        seat.begun += trial.now + PAUSE
+        if kept >= 0:
+            trial.draw_goal()
+            yield _row(trial, condition, cell, kept), trial.trace
+        if drawn is not None and kept == drawn:
+            return
+
+
+def _trial(
+    scenario: TaskScenario,
+    seat: Seat,
+    condition: tuple[float, float],
+    number: int,
+    streams: Streams,
+) -> CursorTrial | DriveTrial:
+    task, reaction = scenario.task, seat.person.reaction
+    if scenario.is_driven:
+        return DriveTrial(scenario, seat, condition, streams, reaction)
+    surprises = isinstance(task, Pointing) and task.cue == "unexpected"
+    goal = _goal(scenario, seat.person, condition, number, streams)
+    return CursorTrial(scenario, seat, goal, streams, reaction if surprises else 0.0)
+
+
+def _goal(
+    scenario: TaskScenario,
+    person: Person,
+    condition: tuple[float, float],
+    number: int,
+    streams: Streams,
+) -> Goal:
+    task, (first, second) = scenario.task, condition
+    if isinstance(task, Pointing):
+        angle = 0.0 if task.axes == 1 else number * (math.pi + math.pi / task.targets)
+        return PointGoal(task, first, second, angle, person.hand_lag + scenario.link.up.delay_s)
+    if isinstance(task, Tunnel):
+        return TunnelGoal(task, first, second)
+    if isinstance(task, Tracking):
+        rng = streams.fresh("forcing")
+        return TrackGoal(task, rng.uniform(0.0, 2.0 * math.pi, len(task.frequencies)).tolist())
+    assert isinstance(task, ReachTask)
+    return ReachGoal(task, 0.5 * second)
+
+
+def _row(
+    trial: CursorTrial | DriveTrial, condition: tuple[float, float], cell: int, kept: int
+) -> Row:
+    """The measures of a trial, with what tells it from the others."""
+    goal = trial.row() if isinstance(trial, DriveTrial) else trial.goal.row(trial)
+    names = NAMES[trial.scenario.task.kind]
+    return {
+        "number": kept,
+        "condition": cell,
+        **dict(zip(names, condition, strict=True)),
+        **goal,
+        "trial_time_s": trial.now,
+        "path_m": trial.path,
+        "waits": trial.waits.count,
+        "wait_s": trial.waits.seconds,
+        "move_and_wait_share": trial.move_and_wait_share,
+        "delay_felt_s": trial.seat.delay.value,
+        **trial.device.farthest(),
+        "plugin_failures": trial.failures + trial.device.failures,
+    }
+
+
+NAMES = {
+    "pointing": ("amplitude_m", "width_m"),
+    "tunnel": ("length_m", "width_m"),
+    "tracking": ("excursion_m", "bandwidth_rad_s"),
+    "corner": ("length_m", "width_m"),
+    "slalom": ("spacing_m", "width_m"),
+    "course": ("length_m", "width_m"),
+    "reach": ("length_m", "width_m"),
+}
+"""What the two numbers of a condition are, by kind of task."""

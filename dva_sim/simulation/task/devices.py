@@ -1,0 +1,351 @@
+"""What is in the hand: from the velocity that a person wants to what the machine is told.
+
+A practised person knows the device, so the hand aims at what would give the wanted velocity. It
+follows with a first-order lag and with signal-dependent noise, whose size is a share of what it
+does, and which lasts about as long as the hand takes to follow; a tilted device adds tremor and
+what the accelerometer does to it.
+
+References:
+    C. M. Harris, D. M. Wolpert: Signal-dependent noise determines motor planning. Nature 394,
+    1998.
+
+What is moved: cursors by place or by velocity, a slow arm, a vehicle; plain kinematics.
+
+A vehicle is a unicycle that follows speed and turn rate with one time constant, as the drive of
+the robot does within its limits of acceleration; there is no contact, so that walls are crossed
+and counted.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator
+
+from dva_sim.agents.operator.person import Person
+from dva_sim.agents.tilt.accelerometer import GRAVITY, Accelerometer, load_part
+from dva_sim.agents.tilt.filters import FILTERS, load_filter
+from dva_sim.agents.tilt.guarded import GuardedFilter
+from dva_sim.agents.tilt.hand import MAX_SPEED, Hand
+from dva_sim.kernel.streams import Streams
+from dva_sim.simulation.task.delays import slow_noise
+from dva_sim.simulation.task.scenario import DeviceConfig
+
+Pair = tuple[float, float]
+
+HAND_SPEED = 1.0  # the fastest that a hand moves a mouse [m/s]; assumed
+CALIBRATING = 20  # samples
+
+
+class Device(ABC):
+    """What every device offers to a trial.
+
+    Attributes:
+        top: The fastest cursor that it can ask for [m/s].
+        period: Between two readings [s].
+        failures: How often a filter of a user gave no answer that is one.
+    """
+
+    top: float
+    period: float
+    failures = 0
+
+    @abstractmethod
+    def aim(self, vx: float, vy: float) -> None:
+        """From now on the person wants this velocity of the cursor [m/s]."""
+
+    @abstractmethod
+    def move(self, dt: float) -> None:
+        """Let `dt` [s] pass for the hand."""
+
+    @abstractmethod
+    def reading(self) -> Pair:
+        """What the device sends now."""
+
+    @abstractmethod
+    def command(self, reading: Pair | None, dt: float) -> Pair:
+        """At the machine: the velocity [m/s] for a step, given what has arrived, if anything."""
+
+    def farthest(self) -> dict[str, float]:
+        """How far the hand went from rest, as a column; nothing where there is no rest."""
+        return {}
+
+
+class Mouse(Device):
+    """The hand's place is the cursor's."""
+
+    def __init__(self, config: DeviceConfig, person: Person, streams: Streams, dt: float) -> None:
+        self._gain, self.period = config.gain, 1.0 / config.rate_hz
+        self.top = HAND_SPEED * config.gain
+        self._keep = keep_of(person.hand_lag, dt)
+        self._noise = noise_of(person, streams, dt)
+        self._aim = self._velocity = self._place = self._told = (0.0, 0.0)
+
+    def aim(self, vx: float, vy: float) -> None:
+        """See `Device`."""
+        self._aim = vx / self._gain, vy / self._gain
+
+    def move(self, dt: float) -> None:
+        """See `Device`."""
+        (ax, ay), (vx, vy), (x, y), keep = self._aim, self._velocity, self._place, self._keep
+        self._velocity = vx, vy = ax + (vx - ax) * keep, ay + (vy - ay) * keep
+        nx, ny = shaken(vx, vy, self._noise)
+        self._place = x + nx * dt, y + ny * dt
+
+    def reading(self) -> Pair:
+        """See `Device`."""
+        return self._place
+
+    def command(self, reading: Pair | None, dt: float) -> Pair:
+        """See `Device`."""
+        if reading is None:
+            return 0.0, 0.0
+        last, self._told = self._told, reading
+        return _velocity(last, reading, self._gain, dt)
+
+
+class Joystick(Device):
+    """The deflection is the velocity; both axes spring back to the middle."""
+
+    def __init__(self, config: DeviceConfig, person: Person, streams: Streams, dt: float) -> None:
+        self.top, self.period = config.gain, 1.0 / config.rate_hz
+        self._keep = keep_of(person.hand_lag, dt)
+        self._noise = noise_of(person, streams, dt)
+        self._aim = self._hand = self._shown = self._told = (0.0, 0.0)
+        self._most = 0.0
+
+    def aim(self, vx: float, vy: float) -> None:
+        """See `Device`."""
+        self._aim = clamped(vx / self.top, 1.0), clamped(vy / self.top, 1.0)
+
+    def move(self, dt: float) -> None:
+        """See `Device`."""
+        (ax, ay), (x, y), keep = self._aim, self._hand, self._keep
+        self._hand = x, y = ax + (x - ax) * keep, ay + (y - ay) * keep
+        x, y = shaken(x, y, self._noise)
+        self._shown = x, y = clamped(x, 1.0), clamped(y, 1.0)
+        self._most = max(self._most, abs(x), abs(y))
+
+    def reading(self) -> Pair:
+        """See `Device`."""
+        return self._shown
+
+    def command(self, reading: Pair | None, dt: float) -> Pair:
+        """See `Device`."""
+        if reading is not None:
+            self._told = self.top * reading[0], self.top * reading[1]
+        return self._told
+
+    def farthest(self) -> dict[str, float]:
+        """See `Device`: the largest deflection, in shares of a full one."""
+        return {"deflection_max": self._most}
+
+
+class Tilt(Device):
+    """A tilted device: roll is along x, pitch along y; a subclass says what a tilt means.
+
+    The device is calibrated at rest before each trial, so that of the part's offset only the
+    drift within the trial is left.
+    """
+
+    def __init__(self, config: DeviceConfig, person: Person, streams: Streams, dt: float) -> None:
+        part = load_part(config.accelerometer)
+        rate = min(config.rate_hz, part.rate_hz)
+        self._gain, self.period = config.gain, 1.0 / rate
+        self._limit = math.radians(config.limit_deg)
+        noise = person.motor_noise
+        self._hand = Hand(person.hand_lag, streams.fresh("hand"), noise, max_tilt=self._limit)
+        self._sensor = Accelerometer(part, streams.fresh("accelerometer"), rate_hz=rate)
+        made = load_filter(config.filter, config.filter_options)(self.period)
+        own = config.filter not in FILTERS
+        self._filter = GuardedFilter(made, self.period) if own else made
+        rest = [self._measured(0.0, 0.0) for _ in range(CALIBRATING)]
+        self._rest = sum(r for r, _ in rest) / CALIBRATING, sum(p for _, p in rest) / CALIBRATING
+        self._aim = self._told = (0.0, 0.0)
+        self._most = 0.0
+
+    def move(self, dt: float) -> None:
+        """The hand moves when the sensor looks; its steps are exact for any length."""
+
+    def reading(self) -> Pair:
+        """See `Device`: one more sample, filtered."""
+        pitch, roll = self._hand.step(self._aim[1], self._aim[0], self.period)
+        self._most = max(self._most, abs(pitch), abs(roll))
+        x, y = self._measured(pitch, roll)
+        self._filter.add((x - self._rest[0], y - self._rest[1]))
+        value = self._filter.value()
+        self.failures = self._filter.failures
+        return value
+
+    def farthest(self) -> dict[str, float]:
+        """See `Device`: the largest tilt about either axis [rad]."""
+        return {"tilt_max_rad": self._most}
+
+    def _measured(self, pitch: float, roll: float) -> Pair:
+        """Roll and pitch as the accelerometer tells them [rad]."""
+        ax, ay, az = self._sensor.sample(pitch, roll)
+        return math.atan2(ay, az), math.asin(clamped(ax / GRAVITY, 1.0))
+
+
+class TiltVelocity(Tilt):
+    """The tilt is the cursor's velocity."""
+
+    def __init__(self, config: DeviceConfig, person: Person, streams: Streams, dt: float) -> None:
+        super().__init__(config, person, streams, dt)
+        self.top = self._gain * self._limit
+
+    def aim(self, vx: float, vy: float) -> None:
+        """See `Device`."""
+        self._aim = vx / self._gain, vy / self._gain
+
+    def command(self, reading: Pair | None, dt: float) -> Pair:
+        """See `Device`."""
+        if reading is not None:
+            self._told = self._gain * reading[0], self._gain * reading[1]
+        return self._told
+
+
+class TiltPosition(Tilt):
+    """The tilt is the cursor's place, so that the hand aims at a tilt that moves."""
+
+    def __init__(self, config: DeviceConfig, person: Person, streams: Streams, dt: float) -> None:
+        super().__init__(config, person, streams, dt)
+        self.top = self._gain * MAX_SPEED
+        self._rate = 0.0, 0.0
+
+    def aim(self, vx: float, vy: float) -> None:
+        """See `Device`."""
+        self._rate = vx / self._gain, vy / self._gain
+
+    def move(self, dt: float) -> None:
+        """See `Device`."""
+        limit, (x, y), (vx, vy) = self._limit, self._aim, self._rate
+        self._aim = clamped(x + vx * dt, limit), clamped(y + vy * dt, limit)
+
+    def command(self, reading: Pair | None, dt: float) -> Pair:
+        """See `Device`."""
+        if reading is None:
+            return 0.0, 0.0
+        last, self._told = self._told, reading
+        return _velocity(last, reading, self._gain, dt)
+
+
+def _velocity(last: Pair, place: Pair, gain: float, dt: float) -> Pair:
+    """Of a cursor that goes `gain` times the way from the last place to this one in `dt` [m/s]."""
+    return gain * (place[0] - last[0]) / dt, gain * (place[1] - last[1]) / dt
+
+
+KINDS: dict[str, Callable[[DeviceConfig, Person, Streams, float], Device]] = {
+    "mouse": Mouse,
+    "tilt_position": TiltPosition,
+    "tilt_velocity": TiltVelocity,
+    "joystick": Joystick,
+}
+
+
+def make_device(config: DeviceConfig, person: Person, streams: Streams, dt: float) -> Device:
+    """The device of a trial, in a person's hand.
+
+    Args:
+        config: Which, and its gain.
+        person: Whose hand it is.
+        streams: The luck of the trial.
+        dt: The trial's step [s].
+    """
+    return KINDS[config.kind](config, person, streams, dt)
+
+
+def keep_of(lag: float, dt: float) -> float:
+    """The share of a first-order lag [s] that a step [s] leaves."""
+    return math.exp(-dt / lag) if lag > 0.0 else 0.0
+
+
+def noise_of(person: Person, streams: Streams, dt: float) -> Iterator[Pair]:
+    """The motor noise of a trial, as a share of what the hand does, step by step."""
+    keep = keep_of(person.hand_lag, dt)
+    share = person.motor_noise
+    first, second = (slow_noise(streams.fresh(f"hand/{axis}"), keep) for axis in "xy")
+    for x, y in zip(first, second, strict=True):
+        yield share * x, share * y
+
+
+def shaken(x: float, y: float, noise: Iterator[Pair]) -> Pair:
+    """What a hand does that means (x, y): off by a share of its size, in any direction."""
+    nx, ny = next(noise)
+    size = math.hypot(x, y)
+    return x + size * nx, y + size * ny
+
+
+def clamped(value: float, limit: float) -> float:
+    """Within +-limit."""
+    return -limit if value < -limit else limit if value > limit else value
+
+
+def lagged(value: float, target: float, dt: float, lag: float) -> float:
+    """A step of a first-order lag [s], exact for a constant target."""
+    return target if lag <= 0.0 else target + (value - target) * math.exp(-dt / lag)
+
+
+class Cursor:
+    """A point on a plane that follows a velocity.
+
+    Args:
+        lag: Time constant with which its velocity follows the command [s].
+        top: Speed along each axis at most [m/s].
+
+    Attributes:
+        x: [m]
+        y: [m]
+        vx: [m/s]
+        vy: [m/s]
+    """
+
+    def __init__(self, lag: float = 0.0, top: float = math.inf) -> None:
+        self.x = self.y = self.vx = self.vy = 0.0
+        self._lag, self._top = lag, top
+        self._dt, self._keep = 0.0, 0.0
+
+    def step(self, vx: float, vy: float, dt: float) -> None:
+        """Let `dt` [s] pass under a command [m/s]."""
+        if dt != self._dt:
+            self._dt = dt
+            self._keep = math.exp(-dt / self._lag) if self._lag > 0.0 else 0.0
+        top, keep = self._top, self._keep
+        vx = -top if vx < -top else top if vx > top else vx
+        vy = -top if vy < -top else top if vy > top else vy
+        self.vx = vx = vx + (self.vx - vx) * keep
+        self.vy = vy = vy + (self.vy - vy) * keep
+        self.x += vx * dt
+        self.y += vy * dt
+
+
+class Unicycle:
+    """A vehicle that goes where it points.
+
+    Args:
+        lag: Time constant of speed and turn rate [s].
+        top_speed: At most, never in reverse [m/s].
+        top_turn: At most, either way [rad/s].
+
+    Attributes:
+        x: [m]
+        y: [m]
+        heading: [rad]
+        speed: [m/s]
+        turn_rate: [rad/s]
+    """
+
+    def __init__(self, lag: float, top_speed: float, top_turn: float) -> None:
+        self.x = self.y = self.heading = self.speed = self.turn_rate = 0.0
+        self._lag, self._top_speed, self._top_turn = lag, top_speed, top_turn
+
+    def step(self, speed: float, turn_rate: float, dt: float) -> None:
+        """Let `dt` [s] pass under a command [m/s, rad/s]; the heading is taken in mid-step."""
+        speed = min(max(speed, 0.0), self._top_speed)
+        turn_rate = min(max(turn_rate, -self._top_turn), self._top_turn)
+        self.speed = lagged(self.speed, speed, dt, self._lag)
+        self.turn_rate = lagged(self.turn_rate, turn_rate, dt, self._lag)
+        middle = self.heading + 0.5 * dt * self.turn_rate
+        self.x += self.speed * math.cos(middle) * dt
+        self.y += self.speed * math.sin(middle) * dt
+        self.heading += self.turn_rate * dt

@@ -1,0 +1,222 @@
+"""What a task of the literature consists of: what is to be done, by whom, with what, how late."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Annotated, Any, Literal, TypeVar
+
+from pydantic import Field, model_validator
+
+from dva_sim.agents.tilt.accelerometer import load_part
+from dva_sim.agents.tilt.filters import load_filter
+from dva_sim.kernel import key_changes
+from dva_sim.kernel.config import Config, Document, Fail, KeyPath
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.network.link import LinkConfig
+from dva_sim.simulation.scenario.loading import check_strategy
+from dva_sim.simulation.scenario.parts import OperatorConfig
+from dva_sim.simulation.scenario.scenario import population
+from dva_sim.simulation.task.kinds import VEHICLES, Pointing, ReachTask, Task, Tracking
+
+T = TypeVar("T")
+Positive = Annotated[float, Field(gt=0)]
+NonNegative = Annotated[float, Field(ge=0)]
+FASTEST_LINE = 1e12  # [bit/s]: what is sent here is a few numbers, so its length costs no time
+
+
+class OneWay(Config):
+    """One direction of the link between the hand and what it moves.
+
+    Attributes:
+        delay_s: One way.
+        jitter_s: Half-width of a uniform law around the delay; nothing overtakes.
+        loss: Probability that what is sent is lost.
+    """
+
+    delay_s: Annotated[float, Field(ge=0, le=30)] = 0.0
+    jitter_s: Annotated[float, Field(ge=0, le=30)] = 0.0
+    loss: Annotated[float, Field(ge=0, le=0.9)] = 0.0
+
+    @model_validator(mode="after")
+    def _causal(self) -> OneWay:
+        if self.jitter_s > self.delay_s:
+            raise ValueError(f"jitter_s {self.jitter_s:g} is above delay_s {self.delay_s:g}")
+        return self
+
+    def link(self) -> LinkConfig:
+        """The same as a link of the network."""
+        return LinkConfig(
+            delay_s=self.delay_s, jitter_s=self.jitter_s, loss=self.loss, rate_bps=FASTEST_LINE
+        )
+
+
+class Ways(Config):
+    """Both directions: commands go up, frames come down."""
+
+    up: OneWay = OneWay()
+    down: OneWay = OneWay()
+
+
+class FramesConfig(Config):
+    """How what happens is shown.
+
+    Attributes:
+        rate_hz: Frames per second.
+        extra_s: From taking a frame to sending it, such as encoding.
+    """
+
+    rate_hz: Annotated[float, Field(gt=0, le=1000)] = 60.0
+    extra_s: Annotated[float, Field(ge=0, le=10)] = 0.0
+
+
+class DeviceConfig(Config):
+    """What is in the hand.
+
+    Attributes:
+        kind: `mouse`: the hand's place is the cursor's. `tilt_position`, `tilt_velocity`: the
+            tilt is the cursor's place, or its velocity. `joystick`: the deflection is the
+            velocity.
+        gain: Of the cursor, per unit of the hand: [m/m] of a mouse, [m/rad] and [m/s per rad]
+            of a tilt, [m/s] at full deflection of a joystick. Vehicles and arms have their top
+            speed at full deflection, and need none.
+        rate_hz: How often it is read and its reading sent. A tilt device has the rate of its
+            accelerometer if that is lower.
+        limit_deg: No hand tilts farther (tilt devices).
+        accelerometer: By name (tilt devices).
+        filter: On what the accelerometer measures, by name (tilt devices).
+        filter_options: Of the filter.
+    """
+
+    kind: Literal["mouse", "tilt_position", "tilt_velocity", "joystick"] = "mouse"
+    gain: Positive = 1.0
+    rate_hz: Annotated[float, Field(gt=0, le=1000)] = 125.0
+    limit_deg: Annotated[float, Field(gt=0, le=80)] = 45.0
+    accelerometer: str = "adxl345"
+    filter: str = "none"
+    filter_options: dict[str, Any] = Field(default_factory=dict)
+
+
+class PlantConfig(Config):
+    """What is moved.
+
+    Attributes:
+        lag_s: Time constant with which it follows its command.
+        speed_mps: Its top speed, of an arm along each axis; left out, a cursor has none.
+        turn_rate_deg_s: Of a vehicle, at most.
+        width_m: Of a vehicle's body.
+    """
+
+    lag_s: NonNegative = 0.0
+    speed_mps: Positive | None = None
+    turn_rate_deg_s: Positive = 30.0
+    width_m: NonNegative = 0.0
+
+
+class TaskScenario(Config):
+    """A task, and everything else that a run of it needs but its seed.
+
+    Attributes:
+        model: Tells this kind of scenario from the others.
+        operator: Who does it, as in a full scenario; there is one, with one thing in hand.
+        automation: Share of the correction that the machine makes itself: the part of the
+            command that removes the error (towards the target, the middle of the tunnel or
+            of the road) is (1 - share) of what the person asks for and share of what a
+            proportional controller at the machine, which knows the error without delay, asks
+            for. How fast a tunnel or a road is gone through stays the person's. 0 is direct
+            control; 1 leaves the person nothing to correct.
+        trials: Of each condition that the task crosses.
+        practice: Trials before them that are not kept, in which the person learns the delay.
+        horizon_s: A trial that is not done by then is given up.
+    """
+
+    model: Literal["task"]
+    description: str = ""
+    task: Task
+    operator: OperatorConfig = OperatorConfig()
+    device: DeviceConfig = DeviceConfig()
+    link: Ways = Ways()
+    frames: FramesConfig = FramesConfig()
+    plant: PlantConfig = PlantConfig()
+    automation: Annotated[float, Field(ge=0, le=1)] = 0.0
+    trials: Annotated[int, Field(ge=1, le=1000)] = 1
+    practice: Annotated[int, Field(ge=0, le=100)] = 3
+    horizon_s: Annotated[float, Field(gt=0, le=7200)] = 30.0
+
+    @property
+    def is_driven(self) -> bool:
+        """Whether a vehicle is driven, rather than a cursor or an arm moved."""
+        return isinstance(self.task, VEHICLES)
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> TaskScenario:
+        if (self.is_driven or isinstance(self.task, ReachTask)) and self.device.kind != "joystick":
+            raise ValueError(
+                f"a {self.task.kind} needs device.kind joystick, not {self.device.kind!r}"
+            )
+        if (self.is_driven or isinstance(self.task, ReachTask)) and self.plant.speed_mps is None:
+            raise ValueError(f"what is driven in a {self.task.kind} needs plant.speed_mps")
+        return self
+
+    @model_validator(mode="after")
+    def _there_is_room(self) -> TaskScenario:
+        task, body = self.task, self.plant.width_m
+        if isinstance(task, VEHICLES) and body >= min(w for _, w in task.conditions()):
+            raise ValueError(f"plant.width_m {body:g} should be below the smallest width_m")
+        return self
+
+    @model_validator(mode="after")
+    def _there_is_time(self) -> TaskScenario:
+        task, needed = self.task, 0.0
+        if isinstance(task, Pointing) and task.selection == "dwell":
+            needed = task.dwell_s
+        elif isinstance(task, Tracking):
+            needed = task.warm_up_s + task.record_s
+        elif isinstance(task, ReachTask):
+            needed = sum(stop.work_s + task.settle_s for stop in task.stops)
+        if needed >= self.horizon_s:
+            raise ValueError(
+                f"horizon_s {self.horizon_s:g} should be above the {needed:g} s that the task "
+                "alone takes"
+            )
+        return self
+
+
+def build(
+    source: Document | Mapping[str, Any], changes: Mapping[str, Any] | None = None
+) -> TaskScenario:
+    """A task from a file or plain data, with some keys changed.
+
+    Args:
+        source: A document (mistakes are told with their place) or plain data.
+        changes: New values by dotted key, such as `{"link.down.delay_s": 0.225}`.
+
+    Raises:
+        ConfigError: an unknown key or name, a wrong type, a value out of range.
+    """
+    return key_changes.build(
+        TaskScenario, source, changes or {}, _complete, lambda data, folders: None
+    )
+
+
+def _complete(scenario: TaskScenario, error: Fail) -> TaskScenario:
+    """Refuse what is named and does not exist."""
+    operator, device = scenario.operator, scenario.device
+    check_strategy(operator.strategy, operator.options, error)
+    traits: KeyPath = ("operator", "traits" if operator.traits else "population")
+    _try(lambda: population(operator), error, traits)
+    if device.kind.startswith("tilt"):
+        _try(lambda: load_part(device.accelerometer), error, ("device", "accelerometer"))
+        name, options = device.filter, device.filter_options
+        make = _try(lambda: load_filter(name, options), error, ("device", "filter"))
+        _try(lambda: make(0.01), error, ("device", "filter_options"))
+    return scenario
+
+
+def _try(get: Callable[[], T], error: Fail, path: KeyPath) -> T:
+    """What `get` gives; its mistake is told at a key of the scenario."""
+    try:
+        return get()
+    except ConfigError as problem:
+        if problem.file is not None:
+            raise
+        raise error(problem.problem, path) from None

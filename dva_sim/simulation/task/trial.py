@@ -1,0 +1,232 @@
+"""One trial: frames come, a person perceives them and wants something, a hand does it.
+
+The way is that of a real drive: frames at a rate -> link -> perceptual delay -> strategy, told the
+delay as the person has learnt it -> hand and device -> link -> what is moved. Only the oracle sees
+and moves it without frames, links and perception. Time goes by fixed steps; what is due is done at
+the step nearest to it, so that no delay is longer or shorter on average.
+
+A trial begins when its goal appears, at the machine. A person who did not expect it acts a reaction
+after the first frame is on its screen, on the newest one that it has perceived by then; so link,
+encoding and lost frames come before the reaction, and how many frames there are does not matter.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Generic, TypeVar
+
+from dva_sim.agents.operator.delay_estimation import DelayEstimate
+from dva_sim.agents.operator.person import Person
+from dva_sim.agents.operator.strategies import Driver, Oracle, Reach, Strategy
+from dva_sim.kernel.streams import Streams
+from dva_sim.simulation.task.delays import Channel
+from dva_sim.simulation.task.scenario import TaskScenario
+
+S = TypeVar("S")  # what a frame shows
+Pair = tuple[float, float]
+
+WAIT_FROM = 0.1  # who wants nothing for so long waits [s]; assumed
+MACHINE_GAIN = 2.0  # of a machine that corrects by itself [rad/s]; assumed
+TRACE_EVERY = 0.02  # [s]
+
+
+@dataclass
+class Seat:
+    """Who does the trials of a block, and what stays from one to the next.
+
+    Attributes:
+        person: Who it is.
+        strategy: Makes the strategy for what is steered.
+        delay: What the person has learnt of the delay, on a clock that runs on over trials.
+        begun: When this trial begins, on that clock [s].
+    """
+
+    person: Person
+    strategy: Callable[[Person, Reach], Driver]
+    delay: DelayEstimate
+    begun: float = 0.0
+
+
+@dataclass
+class Trace:
+    """What can be drawn of a trial.
+
+    Attributes:
+        times: [s]
+        places: [m]
+        speeds: Since the time before [m/s].
+        touched: Where a wall was crossed, or a target left again [m].
+        walls: Lines that show the geometry, each a list of places [m].
+        marks: Circles that show targets: x, y and radius [m].
+    """
+
+    times: list[float] = field(default_factory=list)
+    places: list[Pair] = field(default_factory=list)
+    speeds: list[float] = field(default_factory=list)
+    touched: list[Pair] = field(default_factory=list)
+    walls: list[list[Pair]] = field(default_factory=list)
+    marks: list[tuple[float, float, float]] = field(default_factory=list)
+
+
+class Waits:
+    """Counts how often, and how long, a person wants nothing and waits to see.
+
+    Attributes:
+        count: How often.
+        seconds: In all [s].
+    """
+
+    def __init__(self) -> None:
+        self.count, self.seconds = 0, 0.0
+        self._since: float | None = None
+
+    def note(self, now: float, moves: bool) -> None:
+        """From `now` [s] on the person wants to move something, or wants it to stand."""
+        if moves:
+            if self._since is not None and now - self._since >= WAIT_FROM:
+                self.count += 1
+                self.seconds += now - self._since
+            self._since = None
+        elif self._since is None:
+            self._since = now
+
+
+class Trial(ABC, Generic[S]):
+    """What all trials have in common.
+
+    Args:
+        scenario: Rates, links, horizon.
+        seat: Who does it.
+        reach: What can be done with what is moved.
+        streams: The luck of this trial.
+        reaction: From the first frame on the screen to the first that is acted on, perception in
+            it [s]; 0 for who expects the goal: it acts as soon as it has perceived a frame.
+
+    Attributes:
+        now: Since the trial began [s].
+        over: Whether it is done.
+        first_move: When the person first wanted to move anything [s], or None.
+    """
+
+    STEP: float  # [s]
+
+    def __init__(
+        self,
+        scenario: TaskScenario,
+        seat: Seat,
+        reach: Reach,
+        streams: Streams,
+        reaction: float = 0.0,
+    ) -> None:
+        self.scenario, self.seat, self.trace = scenario, seat, Trace()
+        self.waits, self.now, self.over = Waits(), 0.0, False
+        self.first_move: float | None = None
+        self._driver = seat.strategy(seat.person, reach)
+        perception = seat.person.perceptual_delay
+        self._surprise = max(reaction - perception, 0.0)
+        self._acts_from: float | None = None  # known once a frame is perceived
+        self._newest: S | None = None
+        self._late = scenario.frames.extra_s + perception
+        self._frames: Channel[S] = Channel(scenario.link.down, self._late, streams, "down")
+
+    @abstractmethod
+    def sight(self) -> S:
+        """What a frame taken now shows."""
+
+    @abstractmethod
+    def decide(self, driver: Driver, seen: S, now: float) -> None:
+        """A frame is perceived: want something; `now` is the person's clock [s]."""
+
+    @abstractmethod
+    def advance(self, dt: float) -> None:
+        """Let `dt` [s] pass for hand, link and what is moved."""
+
+    @abstractmethod
+    def place_now(self) -> Pair:
+        """Where it is, for the picture [m]."""
+
+    def run(self, keep: bool = False) -> None:
+        """Play the trial to its end; `keep` its trace to be drawn."""
+        step, half, look = self.STEP, 0.5 * self.STEP, self._look_of()
+        steps, next_frame, next_trace = 0, 0.0, 0.0
+        horizon = self.scenario.horizon_s
+        while not self.over and self.now < horizon:
+            now = self.now
+            if now >= next_frame - half:
+                self._frames_due(now)
+                next_frame += look
+            self._perceive(now, half)
+            if keep and now >= next_trace - half:
+                self._draw()
+                next_trace += TRACE_EVERY
+            self.advance(step)
+            steps += 1
+            self.now = steps * step
+        if keep and self.now > self.trace.times[-1] + 0.5 * TRACE_EVERY:
+            self._draw()
+        self.waits.note(self.now, moves=True)
+
+    def intended(self, now: float, one: float, other: float) -> None:
+        """The person wants this from now on: the delay is learnt from it, and waits are counted."""
+        self.seat.delay.intend(now, one, other)
+        moves = one != 0.0 or other != 0.0
+        if moves and self.first_move is None:
+            self.first_move = self.now
+        if self.first_move is not None:
+            self.waits.note(self.now, moves)
+
+    def _look_of(self) -> float:
+        """Between two frames [s]."""
+        return Oracle.DELAY if self.is_oracle else 1.0 / self.scenario.frames.rate_hz
+
+    @property
+    def is_oracle(self) -> bool:
+        """Whether the reference steers, which no delay reaches."""
+        return isinstance(self._driver, Oracle)
+
+    @property
+    def move_and_wait_share(self) -> float:
+        """For how much of its time the strategy moved and waited, if it can tell."""
+        told = self._driver.workload() if isinstance(self._driver, Strategy) else {}
+        return told.get("move_and_wait_share", 0.0)
+
+    @property
+    def failures(self) -> int:
+        """How often a strategy of a user gave no answer that is one."""
+        return self._driver.failures if isinstance(self._driver, Strategy) else 0
+
+    def _frames_due(self, now: float) -> None:
+        if self.is_oracle:
+            self.decide(self._driver, self.sight(), self.seat.begun + now)
+        else:
+            self._frames.put(now, self.sight())
+
+    def _perceive(self, now: float, half: float) -> None:
+        """Act on the newest frame, if there is one that was not acted on, and not before the cue.
+
+        Args:
+            now: [s]
+            half: Of a step [s].
+        """
+        seen = self._frames.take(now + half)
+        if seen:
+            self._newest = seen[-1]
+            if self._acts_from is None:
+                self._acts_from = now + self._surprise
+        newest, acts_from = self._newest, self._acts_from
+        if newest is not None and acts_from is not None and now >= acts_from - half:
+            self._newest = None
+            self.decide(self._driver, newest, self.seat.begun + now)
+
+    def _draw(self) -> None:
+        place, trace = self.place_now(), self.trace
+        if trace.times:
+            since = self.now - trace.times[-1]
+            trace.speeds.append(math.dist(place, trace.places[-1]) / since)
+        else:
+            trace.speeds.append(0.0)
+        trace.times.append(self.now)
+        trace.places.append(place)

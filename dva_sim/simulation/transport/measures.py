@@ -1,0 +1,180 @@
+"""What is measured of a session on a congested link; each measure is defined here, once.
+
+**Delivered** is a message all of which has arrived before the run was over, some time after the
+last message that counts.
+**Applied** is a command that was delivered before any newer one: a robot drops older ones. Its
+**age** is from when it was made until then. The **age in force** at any moment is that of the
+newest applied command. The **round trip** of an applied command lasts from when it was made until
+the first picture taken after it was applied has arrived, so it holds the wait for that picture.
+
+Rates are of bytes put on the line, with all headers and what is sent again. **Jain's index** is of
+the rates of session and TCP flows in one direction, 1 if all are alike, 1/n if one has everything.
+A session that does not want its share lowers it without doing harm, so `share_of_fair` and
+`bulk_use` stand beside it: its rate in shares of an equal one, and what TCP gets of the line.
+
+References:
+    R. Jain, D. Chiu, W. Hawe: A quantitative measure of fairness and discrimination for resource
+    allocation in shared computer systems. DEC-TR-301, 1984.
+    S. Kaul, R. Yates, M. Gruteser: Real-time status: how often should one update? INFOCOM 2012.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dva_sim.network.transports import Contest, ContestConfig, Fates
+from dva_sim.network.transports.bottleneck import WAYS
+
+Row = dict[str, Any]
+Floats = NDArray[np.float64]
+
+MEASURES = (
+    *("commands", "delivered_share", "crucial_delivered_share", "crucial_age_p95_s"),
+    *("command_rate_hz", "command_age_mean_s", "command_age_p50_s", "command_age_p95_s"),
+    *("age_in_force_mean_s", "picture_delivered_share", "picture_rate_hz"),
+    *("picture_age_mean_s", "picture_age_p95_s", "round_trip_mean_s", "round_trip_p95_s"),
+    *(f"{name}_{way}" for way in WAYS for name in ("bulk_use", "jain", "share_of_fair")),
+    *(f"{name}_{way}_bps" for way in WAYS for name in ("session", "bulk")),
+    *("movement_time_s", "completed", "path_error_rms_m", "wall_crossings"),
+    *("waits", "wait_s", "delay_felt_s", "plugin_failures", "simulated_s"),
+)
+"""Numbers that a row of a run holds, and so what a study may ask for."""
+
+
+def contest_row(config: ContestConfig, contest: Contest) -> Row:
+    """Everything that is measured of the network."""
+    commands, pictures = _counted(contest, contest.commands), _counted(contest, contest.pictures)
+    row = _command_row(contest, *commands) | _picture_row(contest, *pictures)
+    trips = round_trips(commands[0], commands[1], pictures[0], pictures[1])
+    row |= {"round_trip_mean_s": mean(trips), "round_trip_p95_s": percentile(trips, 95)}
+    for way in WAYS:
+        row |= _way_row(config, contest, way)
+    return row
+
+
+def flow_rows(contest: Contest) -> list[Row]:
+    """The rate of each flow in each direction [bit/s]."""
+    per_byte = 8.0 / (contest.until - contest.since)
+    rows = []
+    for way in WAYS:
+        rates = {"session": contest.session_bytes[way]}
+        rates |= {f"bulk {n + 1}": took for n, took in enumerate(contest.bulk_bytes[way])}
+        rows += [
+            {"way": way, "flow": flow, "rate_bps": took * per_byte} for flow, took in rates.items()
+        ]
+    return rows
+
+
+# --- messages ----------------------------------------------------------------------------
+def applied(arrived: Floats) -> NDArray[np.bool_]:
+    """Which messages, in the order of making, arrived before all newer ones, shape `(n,)`."""
+    newer = np.minimum.accumulate(arrived[::-1])[::-1]
+    first_newer = np.append(newer[1:], math.inf)
+    return np.isfinite(arrived) & (arrived <= first_newer)
+
+
+def age_in_force(made: Floats, arrived: Floats, since: float, until: float) -> float:
+    """Mean over time of the age of the newest message that has arrived [s].
+
+    Args:
+        made: When each was made, ascending [s], shape `(n,)`.
+        arrived: When it was there [s], shape `(n,)`; infinity if never.
+        since: Beginning of the time looked at [s].
+        until: Its end [s].
+
+    Returns:
+        nan if none had arrived at the beginning.
+    """
+    used = applied(arrived)
+    at, made = arrived[used], made[used]
+    edges = np.clip(np.append(at, math.inf), since, until)
+    if not len(at) or at[0] > since:
+        return math.nan
+    middle, length = 0.5 * (edges[1:] + edges[:-1]), np.diff(edges)
+    return float(((middle - made) * length).sum() / (until - since))
+
+
+def round_trips(made: Floats, arrived: Floats, taken: Floats, shown: Floats) -> Floats:
+    """From an applied command to the first picture that can show it, for each [s].
+
+    Args:
+        made: Of the commands [s], shape `(n,)`.
+        arrived: At the robot [s], shape `(n,)`.
+        taken: Of the pictures [s], shape `(m,)`.
+        shown: At the operator [s], shape `(m,)`.
+    """
+    used = applied(arrived)
+    soonest = np.append(np.minimum.accumulate(shown[::-1])[::-1], math.inf)
+    trips = soonest[np.searchsorted(taken, arrived[used])] - made[used]
+    return trips[np.isfinite(trips)]
+
+
+def percentile(values: Floats, q: float) -> float:
+    """nan of nothing."""
+    return float(np.percentile(values, q)) if len(values) else math.nan
+
+
+def mean(values: Sequence[float] | NDArray[Any]) -> float:
+    """nan of nothing."""
+    return float(np.mean(values)) if len(values) else math.nan
+
+
+def _counted(contest: Contest, fates: Fates) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+    """When they were made, when they arrived, and which are counted; shape `(n,)` each."""
+    made, arrived = np.array(fates.made), np.array(fates.arrived)
+    return made, arrived, (made >= contest.since) & (made < contest.until)
+
+
+def _command_row(contest: Contest, made: Floats, arrived: Floats, counts: NDArray[np.bool_]) -> Row:
+    crucial = counts & np.array(contest.commands.crucial)
+    late = (arrived - made)[crucial & np.isfinite(arrived)]
+    ages = (arrived - made)[counts & applied(arrived)]
+    seconds = contest.until - contest.since
+    return {
+        "commands": int(counts.sum()),
+        "delivered_share": mean(np.isfinite(arrived[counts])),
+        "crucial_delivered_share": mean(np.isfinite(arrived[crucial])),
+        "crucial_age_p95_s": percentile(late, 95),
+        "command_rate_hz": len(ages) / seconds,
+        "command_age_mean_s": mean(ages),
+        "command_age_p50_s": percentile(ages, 50),
+        "command_age_p95_s": percentile(ages, 95),
+        "age_in_force_mean_s": age_in_force(made, arrived, contest.since, contest.until),
+    }
+
+
+def _picture_row(contest: Contest, made: Floats, arrived: Floats, counts: NDArray[np.bool_]) -> Row:
+    ages = (arrived - made)[counts & applied(arrived)]
+    return {
+        "picture_delivered_share": mean(np.isfinite(arrived[counts])),
+        "picture_rate_hz": len(ages) / (contest.until - contest.since),
+        "picture_age_mean_s": mean(ages),
+        "picture_age_p95_s": percentile(ages, 95),
+    }
+
+
+# --- rates -------------------------------------------------------------------------------
+def jain(rates: Sequence[float]) -> float:
+    """Jain's index of fairness; nan if there is nothing to share."""
+    squares = sum(rate * rate for rate in rates)
+    return sum(rates) ** 2 / (len(rates) * squares) if squares else math.nan
+
+
+def _way_row(config: ContestConfig, contest: Contest, way: Any) -> Row:
+    """Rates and fairness in one direction; nan where there is no competitor."""
+    per_byte, line = 8.0 / (contest.until - contest.since), config.bottleneck.rate_bps
+    session = contest.session_bytes[way] * per_byte
+    bulk = [took * per_byte for took in contest.bulk_bytes[way]]
+    fair = line / (1 + len(bulk))
+    return {
+        f"session_{way}_bps": session,
+        f"bulk_{way}_bps": mean(bulk),
+        f"bulk_use_{way}": sum(bulk) / line if bulk else math.nan,
+        f"jain_{way}": jain([session, *bulk]) if bulk else math.nan,
+        f"share_of_fair_{way}": session / fair if bulk else math.nan,
+    }

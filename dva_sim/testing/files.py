@@ -1,0 +1,197 @@
+"""One file: what kind it is of, and what is wrong with it.
+
+The schemas that files follow: the XSD of messages, JSON Schemas of configurations.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import stat
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from dva_sim.kernel.config import Document, load_yaml
+from dva_sim.kernel.errors import ConfigError, DvaSimError
+from dva_sim.kernel.suggestions import hint
+from dva_sim.testing.messages import READ_BYTES, check_message, schema_file
+from dva_sim.testing.promises import Problem, not_text
+
+YAML_BYTES: Final = 256 * 1024
+PLAN_BYTES: Final = 16 * 1024 * 1024
+_SUFFIXES: Final = {
+    ".xml": "message",
+    ".geojson": "plan",
+    ".json": "plan",
+    ".yaml": "configuration",
+    ".yml": "configuration",
+}
+_UNKNOWN: Final = (
+    "cannot be recognised; should be a message (.xml), a plan (.geojson), or a study, scenario, "
+    "site, ROS map or agent profile (.yaml)"
+)
+
+
+class NotReadError(DvaSimError):
+    """There is no file to judge, or it cannot be read."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What was found: the kind of a file, its problems, and what does not go together in it.
+
+    It is valid if it has no problems.
+    """
+
+    kind: str
+    problems: list[Problem]
+    doubts: Sequence[str] = ()
+
+
+def check_file(path: Path) -> Verdict:
+    """Judge one file.
+
+    Raises:
+        NotReadError: not there, not a file, or not readable.
+    """
+    kind = _SUFFIXES.get(path.suffix.lower()) or _by_content(_read(path, READ_BYTES))
+    if kind == "message":
+        return Verdict(kind, check_message(_read(path, READ_BYTES)))
+    if kind == "plan":
+        return _check_plan(path)
+    if kind == "configuration":
+        return _check_yaml(path)
+    return Verdict("unknown", [Problem(1, 1, _UNKNOWN)])
+
+
+def _by_content(head: bytes) -> str | None:
+    """What a file without a telling name holds."""
+    text = head.lstrip()
+    if text.startswith(b"<"):
+        return "message"
+    return "plan" if text.startswith(b"{") and b'"FeatureCollection"' in text else None
+
+
+def _read(path: Path, limit: int) -> bytes:
+    """The first bytes of a file; never waits for a pipe, and never reads more than asked."""
+    try:
+        mode = path.stat().st_mode
+        if stat.S_ISDIR(mode):
+            raise NotReadError("is a folder; give the files in it")
+        if not stat.S_ISREG(mode):
+            raise NotReadError("is not a file; a message may come through -")
+        with path.open("rb") as file:
+            return file.read(limit)
+    except FileNotFoundError:
+        raise NotReadError("is not there") from None
+    except OSError as error:
+        raise NotReadError(f"cannot be read: {error.strerror}") from None
+
+
+def _flawed(path: Path, limit: int) -> list[Problem]:
+    """What is wrong before anything is parsed."""
+    data = _read(path, limit + 1)
+    if not data.strip():
+        return [Problem(1, 1, "is empty")]
+    if len(data) > limit:
+        return [Problem(1, 1, f"is too large; should have at most {limit} bytes")]
+    problem = not_text(data)
+    return [problem] if problem else []
+
+
+def _check_plan(path: Path) -> Verdict:
+    from dva_sim.testing.configs import check_plan
+
+    return Verdict("plan", _flawed(path, PLAN_BYTES) or check_plan(path))
+
+
+def _check_yaml(path: Path) -> Verdict:
+    """A message needs none of what reads configurations: it is imported here."""
+    from dva_sim.experiments.study.documents import recognise
+    from dva_sim.testing.configs import check_config, doubts
+
+    problems = _flawed(path, YAML_BYTES)
+    document, problem = (None, problems[0]) if problems else _parse(path)
+    if document is None:
+        return Verdict("configuration", [problem] if problem else [])
+    kind = recognise(document)
+    if kind is None:
+        return Verdict("unknown", [Problem(1, 1, _UNKNOWN)])
+    problems = check_config(kind, document)
+    return Verdict(kind.name, problems, () if problems else doubts(kind, document))
+
+
+def _parse(path: Path) -> tuple[Document | None, Problem | None]:
+    """The document, or why there is none."""
+    try:
+        return load_yaml(path), None
+    except ConfigError as error:
+        return None, Problem(error.line or 1, error.column or 1, error.problem)
+
+
+KINDS: Final = ("message", "study", "scenario", "cases", "site", "agent")
+_KEYS: Final = "Attributes"  # the section of a model's description that tells its keys
+_KEY: Final = re.compile(r"^ {4}(?P<key>\w+): (?P<text>.*(?:\n {5,}.*)*)", re.MULTILINE)
+_DIALECT: Final = "https://json-schema.org/draft/2020-12/schema"
+
+
+def schema_text(kind: str) -> str:
+    """The schema of a kind of file.
+
+    Raises:
+        ConfigError: no such kind.
+    """
+    if kind == "message":
+        return schema_file().read_text(encoding="utf-8")
+    if kind in KINDS:
+        schema = {"$schema": _DIALECT} | _json_schema(kind)
+        for model in (schema, *schema.get("$defs", {}).values()):
+            _describe_keys(model)
+        return json.dumps(schema, indent=2) + "\n"
+    raise ConfigError(f"no schema {kind!r}; {hint(kind, KINDS, 'there are')}")
+
+
+def _describe_keys(model: dict[str, Any]) -> None:
+    """Give each key what its model's description says of it, so that editors can show it."""
+    text, _, rest = model.get("description", "").partition(f"\n\n{_KEYS}:\n")
+    if not rest:
+        return
+    model["description"] = text
+    for match in _KEY.finditer(rest.partition("\n\n")[0]):
+        if match["key"] in model.get("properties", {}):
+            model["properties"][match["key"]]["description"] = " ".join(match["text"].split())
+
+
+def _json_schema(kind: str) -> dict[str, Any]:
+    """From the models that read the files; an agent may be of any of seven kinds."""
+    from pydantic import TypeAdapter
+
+    from dva_sim.agents.operator.person import Population
+    from dva_sim.agents.people.profiles import BystanderProfile, GuardProfile
+    from dva_sim.agents.robot.profile import RobotProfile
+    from dva_sim.agents.tilt import AccelerometerPart, PhoneProfile
+    from dva_sim.experiments.study.robustness_grid import Bands
+    from dva_sim.experiments.study.study import Study
+    from dva_sim.simulation.scenario import Scenario
+    from dva_sim.simulation.shift.scenario import TimedScenario
+    from dva_sim.simulation.task import TaskScenario
+    from dva_sim.simulation.transport import TransportScenario
+    from dva_sim.validation.dispatch.cases import CaseFile
+    from dva_sim.worlds.site import SiteFile
+
+    kinds: dict[str, Any] = {
+        "study": Study,
+        "scenario": Scenario | TimedScenario | TaskScenario | TransportScenario,
+        "cases": CaseFile,
+        "site": SiteFile,
+        "agent": RobotProfile
+        | PhoneProfile
+        | AccelerometerPart
+        | GuardProfile
+        | BystanderProfile
+        | Population
+        | Bands,
+    }
+    return TypeAdapter(kinds[kind]).json_schema()

@@ -1,0 +1,265 @@
+"""What the value of an element should look like, in words, read from the schema itself.
+
+Messages: the codec judges, and only what it has refused is searched for the place.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any, Final
+from xml.parsers import expat
+
+from lxml import etree
+
+from dva_sim.kernel.resources import roots
+from dva_sim.protocol.codec import MAX_BYTES, decode
+from dva_sim.protocol.errors import ProtocolError
+from dva_sim.testing.promises import Problem, at, not_text
+
+_XS: Final = "{http://www.w3.org/2001/XMLSchema}"
+_WHOLE: Final = {"xs:unsignedInt": str(2**32 - 1), "xs:unsignedLong": str(2**64 - 1)}
+
+
+def schema_file() -> Path:
+    """The schema of the program; one in the working folder does not judge messages."""
+    found = (root / "protocol" / "dva.xsd" for root in roots()[1:])
+    return next(path for path in found if path.is_file())
+
+
+@cache
+def form_of(element: str) -> str | None:
+    """What an element should hold; None if it holds elements, or different things by place."""
+    tree = etree.parse(schema_file())
+    types = {e.get("type") for e in tree.iter(f"{_XS}element") if e.get("name") == element}
+    if len(types) != 1:
+        return None
+    facets = _facets(tree, str(types.pop()))
+    return _in_words(facets) if facets else None
+
+
+def _facets(tree: etree._ElementTree, name: str) -> dict[str, list[str]]:
+    """All that restricts a simple type, the narrowest first, and `base`, what it starts from."""
+    facets: dict[str, list[str]] = {}
+    while (restriction := _restriction(tree, name)) is not None:
+        for facet in restriction.iterchildren(f"{_XS}*"):
+            facets.setdefault(etree.QName(facet).localname, []).append(str(facet.get("value")))
+        name = str(restriction.get("base"))
+        facets["base"] = [name]
+    return facets
+
+
+def _restriction(tree: etree._ElementTree, name: str) -> etree._Element | None:
+    for simple in tree.getroot().iterchildren(f"{_XS}simpleType"):
+        if simple.get("name") == name:
+            return simple.find(f"{_XS}restriction")
+    return None
+
+
+def _in_words(facets: dict[str, list[str]]) -> str:
+    if "enumeration" in facets:
+        *others, last = facets["enumeration"]
+        return f"one of {', '.join(others)} or {last}" if others else last
+    base = facets["base"][0]
+    if base in _WHOLE or "minInclusive" in facets:
+        low = facets.get("minInclusive", ["0"])[0]
+        high = facets.get("maxInclusive", [_WHOLE.get(base, "any")])[0]
+        kind = "a whole number" if base in _WHOLE else "a number"
+        return f"{kind} from {low} to {high}, in the digits 0 to 9"
+    if "maxLength" in facets:
+        shortest, longest = facets.get("minLength", ["0"])[0], facets["maxLength"][0]
+        length = f"{shortest} to {longest} characters"
+        return f"{length} of the form {facets['pattern'][0]}" if "pattern" in facets else length
+    return "of the form " + " and ".join(facets["pattern"])
+
+
+READ_BYTES: Final = MAX_BYTES + 1
+"""Enough to know that a message is too long."""
+_SHOWN: Final = 60  # characters of a wrong value
+
+_PIECES: Final = (
+    (rb"<\?xml", "should begin <?xml"),
+    (rb"""\s+version\s*=\s*(["'])1\.0\1""", 'should go on with version="1.0"'),
+    (rb"""(?:\s+encoding\s*=\s*(["'])(?i:utf-8)\1)?""", ""),
+    (rb"""(?:\s+standalone\s*=\s*(["'])(?:yes|no)\1)?""", ""),
+    (rb"\s*\?>", 'should be <?xml version="1.0" encoding="UTF-8"?>, or left out'),
+)
+_ALLOWED: Final = re.compile(rb"</?\w+\s*/?>")
+_MARKUP: Final = (
+    (rb"<!--", "a comment is not allowed; leave it out"),
+    (rb"<!\[CDATA\[", "a CDATA section is not allowed; write &lt; and &amp; in plain text"),
+    (rb"(?i)<!DOCTYPE", "a DOCTYPE is not allowed; leave it out"),
+    (rb"<\?", "a processing instruction is not allowed; leave it out"),
+    (rb"</?[^\s<>&/=!?]*:", "a prefix is not allowed; names stand without a namespace"),
+    (rb"<[^\s<>&/=!?]+\s+[^\s<>=]+\s*=", "an attribute is not allowed; leave it out"),
+    (rb"</?[^\s<>&/=!?]+\s*/?>", "a name of other signs is not allowed; all are A to Z and a to z"),
+)
+
+
+@dataclass
+class _Place:
+    """Where an element begins, and the first text directly inside it: offsets in bytes."""
+
+    start: int
+    text: int | None = None
+
+
+def check_message(data: bytes) -> list[Problem]:
+    """All that is wrong with a message, in the order of the file; empty if it is valid."""
+    try:
+        decode(data)
+    except ProtocolError as error:
+        found = _by_sight(data) or _by_grammar(data) or _by_schema(data)
+        return sorted(set(found)) or [Problem(1, 1, f"{error.reason}; see protocol/README.md")]
+    return []
+
+
+def _by_sight(data: bytes) -> list[Problem]:
+    """What no schema can say: size, encoding, declaration, markup; the first kind that occurs."""
+    if not data.strip():
+        return [Problem(1, 1, "is empty; should hold one <msg>")]
+    if len(data) > MAX_BYTES:
+        return [at(data, MAX_BYTES, f"is too long; a message has at most {MAX_BYTES} bytes")]
+    if data.startswith((b"\xef\xbb\xbf", b"\xff\xfe", b"\xfe\xff")):
+        return [Problem(1, 1, "begins with a byte order mark; should be UTF-8 without one")]
+    broken, end = _declaration(data)
+    found = broken or not_text(data) or _before_the_root(data, end)
+    return [found] if found else list(_other_markup(data, end))
+
+
+def _declaration(data: bytes) -> tuple[Problem | None, int]:
+    """Where the declaration is broken, if it is, and where it ends."""
+    end = 0
+    if not data.startswith(b"<?xml"):
+        return None, end
+    for piece, right in _PIECES:
+        match = re.compile(piece).match(data, end)
+        if match is None:
+            while data[end : end + 1].isspace():
+                end += 1
+            return at(data, end, f"the XML declaration is broken; it {right}"), end
+        end = match.end()
+    return None, end
+
+
+def _before_the_root(data: bytes, start: int) -> Problem | None:
+    rest = data[start:].lstrip()
+    if rest.startswith(b"<"):
+        return None
+    return at(data, len(data) - len(rest), "no element begins here; should be <msg>")
+
+
+def _other_markup(data: bytes, start: int) -> Iterator[Problem]:
+    for mark in re.finditer(rb"<", data[start:]):
+        offset = start + mark.start()
+        if _ALLOWED.match(data, offset):
+            continue
+        texts = (text for form, text in _MARKUP if re.compile(form).match(data, offset))
+        text = next(texts, None)
+        if text is not None:  # else it is no markup at all, which the parser tells better
+            yield at(data, offset, text)
+
+
+def _by_grammar(data: bytes) -> list[Problem]:
+    """Where the text ceases to be XML: libxml2's reason, at expat's more exact place."""
+    parser = _plain_parser()
+    try:
+        etree.fromstring(data, parser)
+    except etree.XMLSyntaxError as error:
+        said = parser.error_log[0].message if len(parser.error_log) else str(error.msg)
+        text = f"is not well-formed XML: {said}"
+        _, stop = _walk(data)
+        return [Problem(*error.position, text) if stop is None else at(data, stop, text)]
+    return []
+
+
+def _by_schema(data: bytes) -> list[Problem]:
+    """Every element that the schema refuses, each with the first reason."""
+    tree = etree.ElementTree(etree.fromstring(data, _plain_parser()))
+    schema = _schema()
+    schema.validate(tree)
+    places = dict(zip(tree.iter("*"), _walk(data)[0], strict=True))
+    found: dict[int, Problem] = {}
+    for entry in _entries(schema):
+        element = _element_at(tree, entry.path)
+        place = places[element]
+        stray = place.text if "haracter content" in entry.message else None
+        offset = place.start if stray is None else stray
+        found.setdefault(offset, at(data, offset, _explain(element, entry)))
+    return list(found.values())
+
+
+def _entries(schema: etree.XMLSchema) -> list[Any]:
+    log: Any = schema.error_log  # known to be iterable by lxml, not by its stubs
+    return list(log)
+
+
+def _element_at(tree: etree._ElementTree, path: str | None) -> etree._Element:
+    found: Any = tree.xpath(path) if path else None
+    element: etree._Element = found[0] if found else tree.getroot()
+    return element
+
+
+def _explain(element: etree._Element, entry: Any) -> str:
+    """What libxml2 found, and what would be right."""
+    name, kind = str(element.tag), entry.type_name
+    _, _, expected = entry.message.rstrip(". ").partition(" Expected is ")
+    right = expected.removeprefix("one of").strip("() ").replace(", ", " or ")
+    if kind == "SCHEMAV_CVC_ELT_1":
+        return f"{name} is no message; the root should be msg"
+    if "Missing child" in entry.message:
+        return f"{name} is not complete; should go on with {right}"
+    if kind == "SCHEMAV_ELEMENT_CONTENT":
+        return f"{name} does not belong here; should be " + (
+            right or "the end of what is around it"
+        )
+    if kind.startswith("SCHEMAV_CVC_COMPLEX_TYPE"):
+        what = "text" if "haracter content" in entry.message else "an element"
+        return f"{what} should not stand in {name}; leave it out"
+    form = form_of(name) or "as protocol/dva.xsd says"
+    return f"{name} {_short(element.text or '')} is not valid; should be {form}"
+
+
+def _short(value: str) -> str:
+    return repr(value if len(value) <= _SHOWN else value[:_SHOWN] + "...")
+
+
+def _walk(data: bytes) -> tuple[list[_Place], int | None]:
+    """The place of every element in the order of the file, and the byte where that had to end."""
+    parser = expat.ParserCreate("UTF-8")
+    parser.buffer_text = False  # else text is told where the next element begins
+    places: list[_Place] = []
+    inside: list[_Place] = []
+
+    def start(_name: str, _attributes: object) -> None:
+        places.append(_Place(parser.CurrentByteIndex))
+        inside.append(places[-1])
+
+    def text(characters: str) -> None:
+        blank = len(characters) - len(characters.lstrip(" \t\r\n"))
+        if blank < len(characters) and inside[-1].text is None:
+            inside[-1].text = parser.CurrentByteIndex + blank
+
+    parser.StartElementHandler = start
+    parser.EndElementHandler = lambda _name: inside.pop()
+    parser.CharacterDataHandler = text
+    try:
+        parser.Parse(data, True)
+    except expat.ExpatError:
+        return places, parser.ErrorByteIndex
+    return places, None
+
+
+@cache
+def _schema() -> etree.XMLSchema:
+    return etree.XMLSchema(file=str(schema_file()))
+
+
+def _plain_parser() -> etree.XMLParser:
+    """A parser without the schema, as harmless as the codec's; a new one has an empty log."""
+    return etree.XMLParser(
+        encoding="UTF-8", resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False
+    )

@@ -1,0 +1,280 @@
+"""What every strategy of an operator promises, tried on whatever may be seen, and in drives."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterator, Sequence
+from itertools import pairwise
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from dva_sim.agents.operator.person import Person, Population, draw_person, median_person
+from dva_sim.agents.operator.strategies import (
+    Driver,
+    Guarded,
+    Intent,
+    PathView,
+    PointView,
+    Reach,
+    Sighting,
+    Strategy,
+    View,
+)
+from dva_sim.agents.robot.camera import Observation
+from dva_sim.agents.route_following import Route
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.testing.promises import Case, Outcome, line, part_by_part
+
+FRAME: Final = 0.1  # from one picture to the next [s]
+ROBOTS: Final = (Reach(0.5, math.pi / 6), Reach(0.8, 1.4, 0.56))  # one turns on the spot
+CURSOR: Final = Reach(0.5, 1.0)
+ROUTES: Final = {
+    "a straight way": ((0.0, 0.0), (10.0, 0.0)),
+    "a corner": ((0.0, 0.0), (5.0, 0.0), (5.0, 5.0)),
+    "a double bend": ((0.0, 0.0), (4.0, 0.0), (6.0, 2.0), (10.0, 2.0)),
+}
+STAIRS: Final = tuple((4.0 * (n // 2), 4.0 * ((n + 1) // 2)) for n in range(16))  # 60 m
+WAYS: Final = {**ROUTES, "a long way": STAIRS}
+LONG: Final = 120.0  # so long one is watched there, to see what it does late in a drive [s]
+DELAYS: Final = (0.0, 1.0)  # [s]
+STOP: Final = 0.5  # before the end of a way [m]
+CORRIDOR: Final = 1.0  # either side of a way [m]
+PATIENCE: Final = 30.0  # who takes so many times what full speed takes does not arrive
+SLOWER: Final = 6.0  # than full speed: that is slow
+REST: Final = 10.0  # watched at the end of a way [s]
+CREEP: Final = 0.005  # who wants less stands [m/s]
+SLOW: Final = 200e-6  # [s] of one answer; above that an episode is no longer fast
+SLACK: Final = 1e-9  # of limits, for rounding
+LOOKS: Final = 400  # things seen at random
+FAR: Final = (0.0, 1e-9, 1.0, 40.0, 1e4, -1e4)  # [m], or [rad]
+WAITS: Final = (0.0, 0.02, 0.1, 5.0)  # between two pictures [s]
+GUESSES: Final = (0.0, 0.05, 0.4, 3.0, 60.0)  # of the delay [s]
+
+
+def try_operator(
+    make: Callable[[Person, Reach], Driver], seed: int = 1, slow: float = SLOW
+) -> Outcome:
+    """Try a way of steering: on things seen at random, then in drives of an ideal robot.
+
+    What users bring is held within the limits when it runs; here it is tried without that, so
+    that nothing is hidden.
+
+    Args:
+        make: Makes the strategy for a person, and what it steers.
+        seed: Of what is seen.
+        slow: An answer that takes longer earns a warning [s].
+
+    Raises:
+        ConfigError: it cannot be made, or sees nothing: the oracle.
+    """
+    found: dict[str, list[str]] = {}
+    trial = _Trial(make, np.random.default_rng(seed))
+    trial.new(median_person(Population()), ROBOTS[0])
+    for promise, case in trial.all():
+        found.setdefault(promise, []).append(case)
+    slowest = min(trial.took, default=0.0)
+    warnings = [f"is slow: {what}" for what in trial.late]
+    if slowest > slow:
+        warnings.append(f"thinks slowly: {slowest:.2g} s an answer; should be {slow:g} s")
+    broken = tuple(line(promise, cases) for promise, cases in found.items())
+    return Outcome(broken, tuple(warnings), trial.count, slowest)
+
+
+class _Step(NamedTuple):
+    """A moment of a drive: time [s], place [m], what was wanted."""
+
+    time: float
+    x: float
+    y: float
+    wanted: Intent
+
+
+class _Trial:
+    """All that is tried with one strategy.
+
+    Attributes:
+        count: Drives so far.
+        took: Mean time of an answer, for each drive [s].
+        late: Drives that ended well, but slowly.
+    """
+
+    def __init__(self, make: Callable[[Person, Reach], Driver], rng: np.random.Generator) -> None:
+        self._make, self._rng = make, rng
+        self.count, self.took, self.late = 0, list[float](), list[str]()
+        population = Population()
+        drawn = (draw_person(population, 1, index) for index in range(2))
+        self._persons = (median_person(population), *drawn)
+
+    def all(self) -> Iterator[Case]:
+        """Every promise that is broken, with a case."""
+        return part_by_part((self._robots, self._cursors, self._alike, self._blind, self._ways))
+
+    def new(self, person: Person, reach: Reach) -> Strategy:
+        """The strategy itself.
+
+        Raises:
+            ConfigError: it sees nothing.
+        """
+        made = self._make(person, reach)
+        if not isinstance(made, Strategy):
+            raise ConfigError("is told the truth, and sees nothing: there is nothing to try")
+        return made.strategy if isinstance(made, Guarded) else made
+
+    # --- whatever is seen --------------------------------------------------------------
+
+    def _robots(self) -> Iterator[Case]:
+        """Finite and within reach, whatever is seen."""
+        for reach in ROBOTS:
+            strategy, now, route = self.new(self._persons[0], reach), 0.0, _way(WAYS["a corner"])
+            for number in range(LOOKS):
+                now += self._one_of(WAITS)
+                x, y, heading, speed, turn = (self._anything() for _ in range(5))
+                seen = Observation(number, x, y, heading, speed, turn, ())
+                got = strategy.drive(route, View(now, seen, self._one_of(GUESSES)), STOP)
+                case = f"{got!r} on {seen!r}"
+                if not _is_pair(got):
+                    yield "answers no two finite numbers", case
+                elif not -SLACK <= got[0] <= reach.speed + SLACK:
+                    yield "wants a speed beyond reach", case
+                elif abs(got[1]) > reach.turn_rate + SLACK:
+                    yield "wants a turn rate beyond reach", case
+
+    def _cursors(self) -> Iterator[Case]:
+        """The same of cursors."""
+        strategy, now = self.new(self._persons[0], CURSOR), 0.0
+        path = Route(np.array([(0.0, 0.0), (0.5, 0.0), (0.5, 0.5)]))
+        for number in range(LOOKS):
+            now += self._one_of(WAITS)
+            seen = Sighting._make([number, *(self._anything() for _ in range(8)), 0.01])
+            delay = self._one_of(GUESSES)
+            point, view = PointView(now, seen, delay), PathView(now, seen, delay, path)
+            for got in (strategy.point(point), strategy.follow(view)):
+                case = f"{got!r} on {seen!r}"
+                if not _is_pair(got):
+                    yield "gives a cursor no velocity", case
+                elif math.hypot(*got) > CURSOR.speed * (1 + SLACK):
+                    yield "gives a cursor a velocity beyond reach", case
+
+    def _anything(self) -> float:
+        far = self._one_of(FAR)
+        return far * float(self._rng.uniform(-1, 1)) if far else 0.0
+
+    def _one_of(self, values: Sequence[float]) -> float:
+        return values[int(self._rng.integers(len(values)))]
+
+    # --- drives ------------------------------------------------------------------------
+
+    def _alike(self) -> Iterator[Case]:
+        """The same again, and the same beside another one; by one of them for long."""
+        for person in self._persons:
+            is_first = person is self._persons[0]
+            route, seconds = ("a long way", LONG) if is_first else ("a double bend", 20.0)
+            alone = self._drive(person, ROBOTS[0], route, 1.0, seconds)
+            beside = self.new(self._persons[-1], ROBOTS[1])
+            self._drive(person, ROBOTS[1], "a corner", 0.0, seconds=20.0, strategy=beside)
+            again = self._drive(person, ROBOTS[0], route, 1.0, seconds)
+            if again != alone:
+                yield "remembers what another one did, or draws random numbers", f"on {route}"
+
+    def _blind(self) -> Iterator[Case]:
+        """Nothing is answered otherwise before the picture shows why."""
+        for person in self._persons:
+            plain, pushed = (
+                self._drive(person, ROBOTS[0], "a straight way", 1.0, seconds=12.0, push=push)
+                for push in (0.0, 0.4)
+            )
+            for before, after in zip(plain, pushed, strict=True):
+                if after.time < PUSHED_AT + 1.0 - SLACK and after.wanted != before.wanted:
+                    yield "sees what no picture has shown yet", f"at {after.time:.1f} s"
+                    break
+
+    def _ways(self) -> Iterator[Case]:
+        """Ways to their end, within a wide corridor; and there it stays."""
+        for name, corners in ROUTES.items():
+            for delay in DELAYS:
+                case = f"{name}, delay {delay:g} s"
+                full = _way(corners).length / ROBOTS[0].speed
+                track = self._drive(self._persons[0], ROBOTS[0], name, delay, PATIENCE * full)
+                off = max(_off(corners, step) for step in track)
+                arrived = [s.time for s in track if math.dist((s.x, s.y), corners[-1]) < 1.5 * STOP]
+                if off > CORRIDOR:
+                    yield "leaves a wide corridor", f"{case}: by {off:.1f} m"
+                elif not arrived:
+                    yield "does not arrive", case
+                elif any(step.wanted.speed > CREEP for step in track[-round(REST / FRAME) :]):
+                    yield "does not stand at the end of its way", case
+                elif arrived[0] > SLOWER * full:
+                    self.late.append(f"{arrived[0]:.0f} s for {case}")
+
+    def _drive(
+        self,
+        person: Person,
+        reach: Reach,
+        name: str,
+        delay: float,
+        seconds: float,
+        push: float = 0.0,
+        strategy: Strategy | None = None,
+    ) -> list[_Step]:
+        """A drive of a robot that does at once what it is told; pictures are late by `delay`."""
+        self.count += 1
+        strategy, route = strategy or self.new(person, reach), _way(WAYS[name])
+        x = y = heading = 0.0
+        late = round(delay / FRAME)
+        pictures = [Observation(0, 0.0, 0.0, 0.0, 0.0, 0.0, ())] * (late + 1)
+        track, spent = list[_Step](), 0.0
+        for number in range(round(seconds / FRAME)):
+            view = View(number * FRAME, pictures[-late - 1], max(delay, FRAME))
+            started = time.perf_counter()
+            wanted = Intent(*strategy.drive(route, view, STOP))
+            spent += time.perf_counter() - started
+            track.append(_Step(view.now, x, y, wanted))
+            middle = heading + 0.5 * wanted.turn_rate * FRAME
+            x += wanted.speed * FRAME * math.cos(middle)
+            y += wanted.speed * FRAME * math.sin(middle)
+            heading += wanted.turn_rate * FRAME
+            y += push if number == round(PUSHED_AT / FRAME) else 0.0
+            tick = round(1000 * (number + 1) * FRAME)
+            pictures.append(Observation(tick, x, y, heading, *wanted, ()))
+            if self._rests(track):
+                break
+        self.took.append(spent / len(track))
+        return track
+
+    @staticmethod
+    def _rests(track: Sequence[_Step]) -> bool:
+        """Whether it has stood for long, so that nothing new will come."""
+        long = track[-round(2 * REST / FRAME) :]
+        return len(track) > len(long) and long[0][1:] == long[-1][1:] and not any(long[-1].wanted)
+
+
+PUSHED_AT: Final = 6.0  # in drives in which the robot is pushed aside [s]
+
+
+def _way(corners: Sequence[tuple[float, float]]) -> Route:
+    return Route(np.array(corners))
+
+
+def _is_pair(got: Any) -> bool:
+    """Whether that is two finite numbers."""
+    try:
+        one, other = got
+        return math.isfinite(one) and math.isfinite(other)
+    except (TypeError, ValueError):
+        return False
+
+
+def _off(corners: Sequence[tuple[float, float]], step: _Step) -> float:
+    """Distance of a place from a way [m]."""
+    return min(_from(leg, step.x, step.y) for leg in pairwise(corners))
+
+
+def _from(leg: tuple[tuple[float, float], tuple[float, float]], x: float, y: float) -> float:
+    """Distance of a place from a straight piece [m]."""
+    (ax, ay), (bx, by) = leg
+    dx, dy = bx - ax, by - ay
+    share = ((x - ax) * dx + (y - ay) * dy) / (dx * dx + dy * dy)
+    share = min(max(share, 0.0), 1.0)
+    return math.hypot(ax + share * dx - x, ay + share * dy - y)

@@ -1,0 +1,210 @@
+"""What every robot's motors promise, tried by themselves and in a hall."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from dva_sim.testing.promises import Case, Outcome, line, part_by_part
+from dva_sim.worlds.drives import LONGEST_TICK, Drive, DriveSpec, Guarded
+from dva_sim.worlds.geo import Pose
+from dva_sim.worlds.physics import World, hall
+
+TICKS: Final = (0.01, 0.02, LONGEST_TICK)  # [s]
+DRIVES: Final = 40  # random drives by themselves, of a minute each
+COMMANDS: Final = 30  # of such a drive, 2 s each
+APPROACHES: Final = 24  # angles at which a wall is hit at top speed
+SLOW: Final = 50e-6  # [s] of one answer; above that an episode is no longer fast
+SLACK: Final = 1e-9  # of limits, for rounding
+CREEP: Final = 0.01  # backwards, while motors come to rest [m/s]
+HOSTILE: Final = (math.nan, math.inf, -math.inf, 1e308, -1e308, -1.0, 1e-300, 0.0, 9.0)
+
+
+def try_robot(spec: DriveSpec, seed: int = 1, slow: float = SLOW) -> Outcome:
+    """Try the motors of a robot, first by themselves, then in its body.
+
+    What users bring is held within the limits when it runs; here it is tried without that, so
+    that nothing is hidden.
+
+    Args:
+        spec: The robot.
+        seed: Of the commands.
+        slow: An answer that takes longer earns a warning [s].
+
+    Raises:
+        ConfigError: the motors cannot be made.
+    """
+    spec.drive(spec)
+    found: dict[str, list[str]] = {}
+    trial = _Trial(spec, np.random.default_rng(seed))
+    for promise, case in trial.all():
+        found.setdefault(promise, []).append(case)
+    slowest = min(trial.took, default=0.0)
+    warnings = (f"is slow: {slowest:.2g} s an answer; should be {slow:g} s",) * (slowest > slow)
+    broken = tuple(line(promise, cases) for promise, cases in found.items())
+    return Outcome(broken, warnings, trial.count, slowest)
+
+
+@dataclass
+class _State:
+    """Motion on a floor that holds: what the motors do happens."""
+
+    drive: Drive
+    dt: float
+    speed: float = 0.0
+    turn_rate: float = 0.0
+    way: float = 0.0
+
+    def step(self, speed: float, turn_rate: float) -> None:
+        """One tick; forces act after the body has moved, as in the world."""
+        along, turn = self.drive.accelerations(
+            speed, turn_rate, self.speed, self.turn_rate, self.dt
+        )
+        self.way += self.speed * self.dt
+        self.speed += along * self.dt
+        self.turn_rate += turn * self.dt
+
+
+class _Trial:
+    """All that is tried with one robot.
+
+    Attributes:
+        count: Drives so far.
+        took: Mean time of an answer, for each drive [s].
+    """
+
+    def __init__(self, spec: DriveSpec, rng: np.random.Generator) -> None:
+        self.spec, self.rng = spec, rng
+        self.count, self.took = 0, list[float]()
+
+    def all(self) -> Iterator[Case]:
+        """Every promise that is broken, with a case."""
+        return part_by_part(
+            (self._set_points, self._answers, self._drives, self._stops, self._obeys, self._walls)
+        )
+
+    def _new(self) -> Drive:
+        """The motors themselves."""
+        drive = self.spec.drive(self.spec)
+        return drive.drive if isinstance(drive, Guarded) else drive
+
+    def _command(self) -> tuple[float, float]:
+        """Something within the limits; often one of the limits, or nothing."""
+        spec, rng = self.spec, self.rng
+        speed = rng.choice([0.0, spec.max_speed, rng.uniform(0, spec.max_speed)])
+        most = spec.max_turn_rate
+        return float(speed), float(rng.choice([0.0, most, -most, rng.uniform(-most, most)]))
+
+    def _set_points(self) -> Iterator[Case]:
+        drive, spec = self._new(), self.spec
+        for _ in range(500):
+            asked = self._command()
+            speed, turn_rate = drive.set_point(*asked)
+            case = f"({speed!r}, {turn_rate!r}) for {_told(*asked)}"
+            if not (math.isfinite(speed) and math.isfinite(turn_rate)):
+                yield "aims at what is no number", case
+            elif not -SLACK <= speed <= spec.max_speed + SLACK:
+                yield "aims at a speed beyond the limits", case
+            elif abs(turn_rate) > spec.max_turn_rate + SLACK:
+                yield "aims at a turn rate beyond the limit", case
+
+    def _answers(self) -> Iterator[Case]:
+        """Finite, whatever is measured; the same from each copy, used or new."""
+        used, spec, rng = self._new(), self.spec, self.rng
+        for number in range(500):
+            speed, turn_rate = used.set_point(*self._command())
+            now = rng.uniform(-1, 1.5) * spec.max_speed, rng.uniform(-2, 2) * spec.max_turn_rate
+            now = (0.0, 0.0) if number % 10 == 0 else now
+            dt = TICKS[number % len(TICKS)]
+            answer = used.accelerations(speed, turn_rate, *now, dt)
+            case = f"{_told(speed, turn_rate)} at {_told(*now)}"
+            if not all(map(math.isfinite, answer)):
+                yield "answers what is no number", case
+            elif answer != self._new().accelerations(speed, turn_rate, *now, dt):
+                yield "remembers: a new copy answers differently", case
+
+    def _drives(self) -> Iterator[Case]:
+        """Limits of motion, over long random drives."""
+        spec = self.spec
+        for number in range(DRIVES):
+            self.count += 1
+            state, ticks = _State(self._new(), TICKS[number % len(TICKS)]), 0
+            started = time.perf_counter()
+            for _ in range(COMMANDS):
+                wanted = state.drive.set_point(*self._command())
+                for _ in range(round(2.0 / state.dt)):
+                    state.step(*wanted)
+                    ticks += 1
+                    yield from self._within(state, f"in drive {number + 1}")
+            self.took.append((time.perf_counter() - started) / ticks)
+            if not (math.isfinite(state.speed) and state.speed < 10 * spec.max_speed):
+                return
+
+    def _within(self, state: _State, where: str) -> Iterator[Case]:
+        speed, turn_rate, spec = state.speed, state.turn_rate, self.spec
+        case = f"{_told(speed, turn_rate)} {where}, tick {state.dt:g} s"
+        if not speed <= spec.max_speed * (1 + SLACK):
+            yield "drives faster than its limit", case
+        if not speed >= -CREEP:
+            yield "drives backwards", case
+        if not abs(turn_rate) <= spec.max_turn_rate * (1 + SLACK):
+            yield "turns faster than its limit", case
+
+    def _stops(self) -> Iterator[Case]:
+        """From top speed within the distance that its profile states."""
+        spec = self.spec
+        stated = spec.stopping_distance
+        for turn in (0.0, spec.max_turn_rate, -spec.max_turn_rate):
+            for dt in TICKS:
+                self.count += 1
+                state = _State(self._new(), dt, spec.max_speed, turn)
+                rest = state.drive.set_point(0.0, 0.0)
+                for _ in range(round(60.0 / dt)):
+                    state.step(*rest)
+                if abs(state.speed) > CREEP or abs(state.turn_rate) > CREEP:
+                    yield "does not stop within a minute", _told(state.speed, state.turn_rate)
+                elif state.way > stated + spec.max_speed * dt:
+                    yield "stops too late", f"{state.way:.3f} m; its profile says {stated:.3f} m"
+
+    def _obeys(self) -> Iterator[Case]:
+        """In its body, whatever it is asked for."""
+        spec = self.spec
+        world = World(hall(60.0, 60.0), LONGEST_TICK)
+        robot = world.add_robot("robot", spec, Pose(30.0, 30.0, 0.3))
+        for speed in HOSTILE:
+            for turn_rate in HOSTILE:
+                self.count += 1
+                robot.drive(speed, turn_rate, world.time + 0.4)
+                world.advance_to(world.time + 0.8)
+                now = robot.speed, robot.turn_rate
+                within = -CREEP <= now[0] <= spec.max_speed * 1.02
+                if not (within and abs(now[1]) <= spec.max_turn_rate * 1.02):
+                    yield "leaves its limits when asked for", f"{speed!r}, {turn_rate!r}"
+
+    def _walls(self) -> Iterator[Case]:
+        """At top speed against a thin wall, at every angle, and against where it ends."""
+        spec = self.spec
+        run = 2.0 + spec.max_speed**2 / spec.max_acceleration + spec.radius
+        size = 2 * run + 4
+        for number in range(APPROACHES):
+            self.count += 1
+            heading = 2 * math.pi * number / APPROACHES
+            x, y = size / 2 + run * math.cos(heading), size / 2 + run * math.sin(heading)
+            far = 0.0 if math.sin(heading) >= 0 else size
+            wall = (size / 2, far, size / 2, size - far if number % 2 else size / 2)
+            world = World(hall(size, size, [wall]), LONGEST_TICK)
+            robot = world.add_robot("robot", spec, Pose(x, y, heading + math.pi))
+            robot.drive(spec.max_speed, 0.0, math.inf)
+            world.advance_to(3 * size / spec.max_speed)
+            inside = 0 < robot.x < size and 0 < robot.y < size
+            if not inside or (number % 2 and (robot.x - size / 2) * (x - size / 2) < 0):
+                yield "passes through a wall", f"at {math.degrees(heading):.0f} degrees"
+
+
+def _told(speed: float, turn_rate: float) -> str:
+    return f"{speed:.3g} m/s, {turn_rate:.3g} rad/s"

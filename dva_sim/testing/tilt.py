@@ -1,0 +1,326 @@
+"""What every filter and every mapping of a tilt phone promises, tried on made-up readings."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterator, Sequence
+from typing import Final
+
+import numpy as np
+
+from dva_sim.agents.tilt import Filter, Mapping
+from dva_sim.agents.tilt.calibration import LEVELS, MAX_TURN_DEG
+from dva_sim.agents.tilt.filters import check_filter, is_age
+from dva_sim.kernel.plugins import FAILURES
+from dva_sim.testing.promises import Case, Outcome, line, said
+
+Pair = tuple[float, float]
+Part = Callable[[], Iterator[Case]]
+
+PERIOD: Final = 1 / 34  # between samples [s]
+LONG: Final = 20_000  # samples, ten minutes: what came before is forgotten
+RUNS: Final = 40  # of random readings
+SAMPLES: Final = 120  # of such a run
+SLOW: Final = 20e-6  # [s] of one reading; above that an episode is no longer fast
+HAND: Final = (19.0, 57.0)  # the largest reading that a hand can tilt to, at 45 degrees
+WITHIN: Final = 0.9  # in which a gap on the display is to be closed [s]
+NEAR: Final = 0.02  # of the full range: as good as there
+HOSTILE: Final = (0.0, 1e-300, -1e-300, 1e3, -1e3, 1e9, -1e9)
+
+
+def try_filter(make: Callable[[float], Filter], seed: int = 1, slow: float = SLOW) -> Outcome:
+    """Try a filter, sample by sample; one that works in batches, batch by batch.
+
+    Args:
+        make: Makes a copy, told the time between samples.
+        seed: Of the samples.
+        slow: A sample that takes longer earns a warning [s].
+
+    Raises:
+        ConfigError: it cannot be made, or no phone could work with it.
+    """
+    check_filter(make(PERIOD))
+    trial = _FilterTrial(lambda: make(PERIOD), np.random.default_rng(seed))
+    return _outcome(trial.parts, trial.sticks, trial.took, slow)
+
+
+def try_mapping(make: Callable[[], Mapping], seed: int = 1, slow: float = SLOW) -> Outcome:
+    """Try a mapping, by itself and with a hand that steers by the display.
+
+    Args:
+        make: Makes a copy.
+        seed: Of the readings.
+        slow: A reading that takes longer earns a warning [s].
+
+    Raises:
+        ConfigError: it cannot be made.
+    """
+    make()
+    trial = _MappingTrial(make, np.random.default_rng(seed))
+    return _outcome(trial.parts, lambda: iter(()), trial.took, slow)
+
+
+def _outcome(
+    parts: Sequence[Part], doubts: Callable[[], Iterator[str]], took: list[float], slow: float
+) -> Outcome:
+    """What came of all parts; after one that is broken the next ones mean nothing."""
+    found: dict[str, list[str]] = {}
+    for part in parts:
+        try:
+            for promise, case in part():
+                found.setdefault(promise, []).append(case)
+        except FAILURES as error:
+            found.setdefault("raises", []).append(said(error))
+        if found:
+            break
+    slowest = min(took, default=0.0)
+    warnings = [] if found else list(doubts())
+    if slowest > slow:
+        warnings.append(f"is slow: {slowest:.2g} s a reading; should be {slow:g} s")
+    broken = tuple(line(promise, cases) for promise, cases in found.items())
+    return Outcome(broken, tuple(warnings), RUNS, slowest)
+
+
+class _FilterTrial:
+    """All that is tried with one filter.
+
+    Attributes:
+        took: Mean time of a sample, for each run [s].
+    """
+
+    def __init__(self, make: Callable[[], Filter], rng: np.random.Generator) -> None:
+        self.make, self.rng, self.took = make, rng, list[float]()
+        self.parts: tuple[Part, ...] = (
+            self._begins, self._bounds, self._copies, self._constant, self._ages
+        )  # fmt: skip
+
+    def _values(self, filter_: Filter, samples: Sequence[Pair]) -> list[Pair]:
+        """The value at each moment at which one is taken."""
+        every = filter_.batch or 1
+        values = []
+        for number, sample in enumerate(samples, 1):
+            filter_.add(sample)
+            if number % every == 0:
+                values.append(filter_.value())
+        return values
+
+    def _samples(self, count: int = SAMPLES) -> list[Pair]:
+        level, turn = self.rng.uniform(-2, 12, count), self.rng.uniform(-40, 40, count)
+        return list(zip(level.tolist(), turn.tolist(), strict=True))
+
+    def _begins(self) -> Iterator[Case]:
+        value = self.make().value()
+        if value != (0.0, 0.0):
+            yield "is not zero before the first sample", _told(value)
+
+    def _bounds(self) -> Iterator[Case]:
+        """Finite, and never beyond what came in; zero is what a filter begins with."""
+        hostile = [(one, other) for one in HOSTILE for other in HOSTILE]
+        for number in range(RUNS):
+            samples = self._samples() if number else hostile
+            started = time.perf_counter()
+            values = self._values(self.make(), samples)
+            self.took.append((time.perf_counter() - started) / len(samples))
+            for axis in (0, 1):
+                low = min(0.0, *(sample[axis] for sample in samples))
+                high = max(0.0, *(sample[axis] for sample in samples))
+                slack = 1e-9 * max(-low, high)
+                for value in values:
+                    if not math.isfinite(value[axis]):
+                        yield "answers what is no number", f"{_told(value)} in run {number + 1}"
+                    elif not low - slack <= value[axis] <= high + slack:
+                        yield "leaves the range of its input", f"{_told(value)} in run {number + 1}"
+
+    def _copies(self) -> Iterator[Case]:
+        """The same from each copy, whatever others of its kind are told; asking changes nothing."""
+        samples, other = self._samples(), self._samples()
+        alone = self._values(self.make(), samples)
+        one, disturbing = self.make(), self.make()
+        beside = []
+        for number, (sample, odd) in enumerate(zip(samples, other, strict=True), 1):
+            one.add(sample)
+            disturbing.add(odd)
+            if number % (one.batch or 1) == 0:
+                disturbing.value()
+                beside.append(one.value())
+                if one.batch is None and one.value() != beside[-1]:
+                    yield "changes when it is asked, though it has no batch", f"sample {number}"
+        if alone != beside:
+            place = next(n for n, (a, b) in enumerate(zip(alone, beside, strict=True)) if a != b)
+            yield "shares memory with other copies, or draws random numbers", f"value {place + 1}"
+
+    def _constant(self) -> Iterator[Case]:
+        """What stands comes through, whatever was before."""
+        for level, turn in ((7.0, -20.0), (0.0, 0.0), (3.0, 30.0)):
+            filter_ = self.make()
+            self._values(filter_, self._samples())
+            value = self._values(filter_, [(level, turn)] * LONG)[-1]
+            if not _near(value, (level, turn)):
+                yield (
+                    "does not come to what stands for ten minutes",
+                    (f"{_told(value)} for {_told((level, turn))}"),
+                )
+
+    def _ages(self) -> Iterator[Case]:
+        """A rising input, from long before on, comes out as much later as the filter says."""
+        filter_ = self.make()
+        count = LONG - LONG % (filter_.batch or 1)  # so that the last sample ends a batch
+        value = self._values(filter_, [(n / 100, -n / 100) for n in range(count)])[-1]
+        newest = count - 1
+        for lag in (newest - 100 * value[0], newest + 100 * value[1]):
+            age = filter_.age
+            if not (is_age(age) and abs(lag - age) <= 0.5):
+                says = f"age says {age:.1f}" if is_age(age) else f"age is {age!r}"
+                case = f"{lag:.1f} samples behind a rising input; {says}"
+                yield "is not as old as it says", case
+
+    def sticks(self) -> Iterator[str]:
+        """A doubt: batches that end early, as when the longest delay of the app is short."""
+        batch = self.make().batch
+        if batch is None:
+            return
+        for fresh in (batch // 3, batch // 2):
+            filter_, value = self.make(), (0.0, 0.0)
+            for level in (2.0, 8.0, 2.0):
+                for _ in range(10):
+                    for _ in range(fresh):
+                        filter_.add((level, 0.0))
+                    value = filter_.value()
+            if not _near(value, (2.0, 0.0)):
+                yield f"sticks where only {fresh} of {batch} samples are fresh: {value[0]:g} for 2"
+                return
+
+
+class _MappingTrial:
+    """All that is tried with one mapping.
+
+    Attributes:
+        took: Mean time of a reading, for each run [s].
+    """
+
+    def __init__(self, make: Callable[[], Mapping], rng: np.random.Generator) -> None:
+        self.make, self.rng, self.took = make, rng, list[float]()
+        self.parts: tuple[Part, ...] = (
+            self._limits, self._copies, self._steps, self._rest, self._way, self._tilts,
+            self._steered,
+        )  # fmt: skip
+
+    def _readings(self, count: int = SAMPLES) -> list[Pair]:
+        level, turn = self.rng.uniform(-5, 15, count), self.rng.uniform(-50, 50, count)
+        return list(zip(level.tolist(), turn.tolist(), strict=True))
+
+    def _limits(self) -> Iterator[Case]:
+        hostile = [(one, other) for one in HOSTILE for other in HOSTILE]
+        for number in range(RUNS):
+            mapping, readings = self.make(), self._readings() if number else hostile
+            started = time.perf_counter()
+            commands = [mapping.command(*reading, PERIOD) for reading in readings]
+            self.took.append((time.perf_counter() - started) / len(readings))
+            for (level, turn), reading in zip(commands, readings, strict=True):
+                case = f"{_told((level, turn))} for {_told(reading)}"
+                if not (math.isfinite(level) and math.isfinite(turn)):
+                    yield "answers what is no number", case
+                elif not (0.0 <= level <= LEVELS and abs(turn) <= MAX_TURN_DEG):
+                    yield "leaves the limits of a command", case
+
+    def _copies(self) -> Iterator[Case]:
+        """The same from each copy; a new drive is a new beginning; no memory without saying so."""
+        readings = self._readings()
+        one, other = self.make(), self.make()
+        alone = [one.command(*reading, PERIOD) for reading in readings]
+        for reading in self._readings():
+            other.command(*reading, PERIOD)
+        fresh = self.make()
+        if [fresh.command(*reading, PERIOD) for reading in readings] != alone:
+            yield (
+                "shares memory with other copies, or draws random numbers",
+                "a new copy answers differently",
+            )
+        other.begin()
+        if [other.command(*reading, PERIOD) for reading in readings] != alone:
+            yield "remembers the drive before", "after begin() it answers differently"
+        if not one.integrates:
+            backwards = [one.command(*reading, PERIOD) for reading in reversed(readings)]
+            if backwards[::-1] != alone:
+                yield "depends on readings before, though it does not integrate", "in other order"
+
+    def _steps(self) -> Iterator[Case]:
+        """How a second is cut into steps is no matter to what a reading that stands leads to."""
+        if not self.make().integrates:
+            return
+        for share in (1.0, 0.3, 0.1, 0.03):
+            reading, count = (share * HAND[0], share * HAND[1]), round(1.0 / PERIOD)
+            whole, halves = self.make(), self.make()
+            for _ in range(count):
+                one = whole.command(*reading, PERIOD)
+                halves.command(*reading, PERIOD / 2)
+                two = halves.command(*reading, PERIOD / 2)
+            if not all(math.isclose(a, b, rel_tol=NEAR) for a, b in zip(one, two, strict=True)):
+                case = f"{_told(two)} after {2 * count} half steps, "
+                yield "integrates by steps, not by time", f"{case}{_told(one)} after {count} whole"
+
+    def _rest(self) -> Iterator[Case]:
+        """A phone held at rest stands, and turns no faster than when it came to rest."""
+        for level, turn in ((8.0, 25.0), (3.0, -12.0), (0.0, 0.0)):
+            mapping = self.make()
+            for _ in range(50):
+                _, last = mapping.command(level, turn, PERIOD)
+            speed, rate = mapping.command(0.0, 0.0, PERIOD)
+            for _ in range(200):
+                last, (speed, rate) = rate, mapping.command(0.0, 0.0, PERIOD)
+                if abs(rate) > abs(last) + 1e-9:
+                    yield "turns faster and faster at rest", f"after {_told((level, turn))}"
+                    break
+            if speed != 0.0:
+                yield "drives at rest", f"level {speed:g} after {_told((level, turn))}"
+
+    def _way(self) -> Iterator[Case]:
+        """Tilting to the left turns to the left, and more tilt no less; and so with speed."""
+        before: Pair = 0.0, 0.0
+        for share in (0.0, 0.2, 0.4, 0.6, 0.8, 1.0):
+            reading = share * HAND[0], share * HAND[1]
+            mapping, mirror = self.make(), self.make()
+            for _ in range(10):
+                now = mapping.command(*reading, PERIOD)
+                _, turned = mirror.command(reading[0], -reading[1], PERIOD)
+            if now[0] < before[0] - 1e-9 or now[1] < before[1] - 1e-9:
+                yield "answers less to more tilt", f"{_told(now)} for {_told(reading)}"
+            if abs(now[1] + turned) > 1e-9 * MAX_TURN_DEG:
+                yield "turns left and right differently", f"for {_told(reading)}"
+            before = now
+
+    def _tilts(self) -> Iterator[Case]:
+        mapping = self.make()
+        for wanted in ((-1.0, 0.0), (0.0, 30.0), (10.0, -30.0), (5.0, 0.0), (2.0, 1e-9)):
+            for shown in ((0.0, 0.0), (10.0, 30.0), (4.0, -30.0)):
+                reading = mapping.tilt_for(wanted, shown, WITHIN)
+                if not all(map(math.isfinite, reading)):
+                    yield "would tilt to what is no number", f"for {_told(wanted)}"
+
+    def _steered(self) -> Iterator[Case]:
+        """A hand that tilts as `tilt_for` says gets what is wanted, and keeps it."""
+        for wanted in ((-1.0, 0.0), (5.0, 20.0), (9.0, -25.0), (2.0, 3.0)):
+            mapping, shown = self.make(), (0.0, 0.0)
+            shown = mapping.command(0.0, 0.0, PERIOD)
+            for _ in range(round(20 * WITHIN / PERIOD)):
+                level, turn = mapping.tilt_for(wanted, shown, WITHIN)
+                shown = mapping.command(_cut(level, HAND[0]), _cut(turn, HAND[1]), PERIOD)
+            if not _near(shown, (max(wanted[0], 0.0), wanted[1])):
+                yield (
+                    "does not get where tilt_for tilts to",
+                    (f"{_told(shown)} when {_told(wanted)} is wanted"),
+                )
+
+
+def _near(one: Pair, other: Pair) -> bool:
+    level, turn = abs(one[0] - other[0]) / LEVELS, abs(one[1] - other[1]) / MAX_TURN_DEG
+    return max(level, turn) < NEAR
+
+
+def _cut(value: float, most: float) -> float:
+    return min(max(value, -most), most)
+
+
+def _told(pair: Pair) -> str:
+    return f"level {pair[0]:.3g}, {pair[1]:.3g} deg/s"

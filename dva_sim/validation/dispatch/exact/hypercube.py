@@ -1,0 +1,235 @@
+"""Units that are told apart, and calls that each have their own list of preferred units.
+
+References:
+    R. C. Larson, A hypercube queuing model for facility location and redistricting in urban
+    emergency services, Comput. Oper. Res. 1 (1974) 67-95; R. C. Larson & A. R. Odoni, Urban
+    Operations Research (1981), section 5.4.
+
+A fixed number of machines that need somebody from time to time: robots and their operators.
+
+References:
+    D. R. Olsen & M. A. Goodrich, Metrics for evaluating human-robot interactions, PerMIS
+    (2003); D. R. Olsen & S. B. Wood, Fan-out: measuring human control of multiple robots,
+    CHI (2004) 231-238.
+
+The more urgent first, but nobody is called back: waits of each class.
+
+Class 1 is the most urgent. Measures: `wait_1_s`, `wait_2_s`, ... of the classes, `wait_s` of
+all customers, `utilisation`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dva_sim.validation.dispatch.exact.queues import (
+    Floats,
+    Law,
+    Measures,
+    Memoryless,
+    birth_death,
+    erlang_c,
+)
+
+Ints = NDArray[np.int64]
+
+MOST_UNITS = 8
+
+
+def hypercube(
+    arrival_rates: Sequence[float],
+    preferences: Sequence[Sequence[int]],
+    mean_service_s: Memoryless | Sequence[Memoryless],
+    queue: Literal["infinite", "none"] = "infinite",
+) -> Measures:
+    """Workloads and who serves whom, from the Markov chain of all sets of busy units.
+
+    A call goes to the first free unit on its class's list, each list naming all units. If
+    none is free it waits (first come, first served, whatever the class) or is lost.
+
+    Args:
+        arrival_rates: Of each class of calls [1/s].
+        preferences: For each class its units, best first, counted from 1.
+        mean_service_s: Of all units, or of each unit.
+        queue: `infinite`, or `none` for loss.
+
+    Returns:
+        `workload_n` of unit n; `share_n_k`, of all calls served those that are class k and
+        served by unit n; `utilisation`; `delayed` and `wait_s`, or `lost`.
+
+    References:
+        R. C. Larson, Comput. Oper. Res. 1 (1974) 67-95, solved exactly as a Markov chain.
+    """
+    units = len(preferences[0])
+    if not 1 <= units <= MOST_UNITS:
+        raise ValueError(f"{units} units; from 1 to {MOST_UNITS} can be solved")
+    if any(sorted(order) != list(range(1, units + 1)) for order in preferences):
+        raise ValueError(f"each list of preferences should name the units 1 to {units} once")
+    calls = np.asarray(arrival_rates, dtype=float)
+    rates = 1 / np.broadcast_to(np.asarray(mean_service_s, dtype=float), (units,))
+    chosen = _first_free(np.asarray(preferences) - 1, units)
+    chance = _stationary(calls, rates, chosen)
+    tail = _queued(calls.sum() / rates.sum(), chance) if queue == "infinite" else 0.0
+    chance = chance / (1 + tail)  # the tail, relative to the sets without a queue
+    waiting = tail / (1 + tail)
+    return _measures(calls, rates, chosen, chance, waiting, queue)
+
+
+def _first_free(orders: Ints, units: int) -> Ints:
+    """Unit that a call of each class gets in each set of busy units `(classes, 2^units)`.
+
+    A set is a number whose bit n says whether unit n is busy; -1 where all are.
+    """
+    chosen = np.full((len(orders), 2**units), -1)
+    for k, order in enumerate(orders):
+        for busy in range(2**units - 1):
+            chosen[k, busy] = next(n for n in order if not busy >> n & 1)
+    return chosen
+
+
+def _stationary(calls: Floats, rates: Floats, chosen: Ints) -> Floats:
+    """Chances of the sets, all units being busy counted without a queue `(2^units,)`.
+
+    With a queue this is the same, up to its sum: as many calls begin to wait as cease to,
+    and whenever there is a queue all units are busy.
+    """
+    sets = chosen.shape[1]
+    flow = np.zeros((sets, sets))
+    for busy in range(sets):
+        for n, rate in enumerate(rates):
+            if busy >> n & 1:
+                flow[busy, busy & ~(1 << n)] += rate
+        for k, rate in enumerate(calls):
+            if chosen[k, busy] >= 0:
+                flow[busy, busy | 1 << int(chosen[k, busy])] += rate
+    balance = (flow - np.diag(flow.sum(axis=1))).T
+    balance[-1] = 1.0  # one equation follows from the others; the sum takes its place
+    return np.asarray(np.linalg.solve(balance, np.eye(sets)[-1]))
+
+
+def _queued(load: float, chance: Floats) -> float:
+    """How likely a queue is, relative to no queue: all units serve it, so it is geometric."""
+    if not load < 1:
+        raise ValueError(f"the units are offered {load:g} of what they can do; below 1 is stable")
+    return float(chance[-1] * load / (1 - load))
+
+
+def _measures(
+    calls: Floats,
+    rates: Floats,
+    chosen: Ints,
+    chance: Floats,
+    waiting: float,
+    queue: str,
+) -> Measures:
+    units, sets = len(rates), np.arange(len(chance))
+    saturated = float(chance[-1]) + waiting
+    served = 1.0 if queue == "infinite" else 1 - saturated
+    workloads = [float(chance[(sets >> n & 1) == 1].sum()) + waiting for n in range(units)]
+    measures = {f"workload_{n + 1}": workload for n, workload in enumerate(workloads)}
+    for n in range(units):
+        for k in range(len(calls)):
+            at_once = float(chance[chosen[k] == n].sum())
+            later = saturated * rates[n] / rates.sum() if queue == "infinite" else 0.0
+            share = calls[k] / calls.sum() * (at_once + later) / served
+            measures[f"share_{n + 1}_{k + 1}"] = float(share)
+    measures["utilisation"] = sum(workloads) / units
+    if queue == "none":
+        return measures | {"lost": saturated}
+    wait = saturated / float(rates.sum() - calls.sum())  # as in an M/M/c
+    return measures | {"delayed": saturated, "wait_s": wait}
+
+
+def finite_source(
+    sources: int, servers: int, mean_autonomous_s: Memoryless, mean_service_s: Memoryless
+) -> Measures:
+    """M/M/c//N: each source works alone for an exponential time, then waits for a server.
+
+    Measures: `utilisation` of a server, `autonomous` (mean number of sources that work
+    alone), `delayed`, `wait_s`, `stay_s`, `throughput` (services per second).
+
+    References:
+        Gross et al., Fundamentals of Queueing Theory, 4th ed. (2008), chapter 2 (finite source).
+        Who asks for service sees the system as it is with one source less.
+    """
+    needy = np.arange(sources + 1)
+    busy = np.minimum(needy, servers)
+    chance = birth_death((sources - needy[:-1]) / mean_autonomous_s, busy[1:] / mean_service_s)
+    alone = float(chance @ (sources - needy))
+    throughput = alone / mean_autonomous_s
+    wait = float(chance @ (needy - busy)) / throughput  # Little
+    asking = (sources - needy) * chance / alone
+    return {
+        "utilisation": float(chance @ busy) / servers,
+        "autonomous": alone,
+        "delayed": float(asking[servers:].sum()),
+        "wait_s": wait,
+        "stay_s": wait + mean_service_s,
+        "throughput": throughput,
+    }
+
+
+def fan_out(neglect_s: float, interaction_s: float, robots: int = 1) -> Measures:
+    """How many robots one operator can serve if nothing is left to chance.
+
+    `fan_out` is the number at which the operator has just no pause left; with fewer `robots`
+    nobody waits, with more each waits until all the others have been served.
+
+    References:
+        Olsen & Goodrich (2003): fan-out = activity time / interaction time, where activity
+        time = neglect time + interaction time.
+    """
+    cycle = max(neglect_s + interaction_s, robots * interaction_s)
+    return {
+        "fan_out": neglect_s / interaction_s + 1,
+        "utilisation": robots * interaction_s / cycle,
+        "autonomous": robots * neglect_s / cycle,
+        "wait_s": cycle - neglect_s - interaction_s,
+        "throughput": robots / cycle,
+    }
+
+
+def priorities(
+    arrival_rates: Sequence[float], mean_service_s: Memoryless, servers: int
+) -> Measures:
+    """M/M/c, several classes with the same law of service.
+
+    References:
+        R. H. Davis, Oper. Res. 14 (1966) 133-136; O. Kella & U. Yechiali, Stochastic
+        Models 1 (1985) 257-262: `W_k = C / (c mu (1 - sigma_(k-1)) (1 - sigma_k))`, where C is
+        Erlang's probability of waiting and sigma_k the load of classes 1 to k.
+    """
+    load = sum(arrival_rates) * mean_service_s
+    ahead = erlang_c(servers, load) * mean_service_s / servers
+    loads = [rate * mean_service_s / servers for rate in arrival_rates]
+    return _by_class(ahead, arrival_rates, loads)
+
+
+def cobham(arrival_rates: Sequence[float], services: Sequence[Law]) -> Measures:
+    """M/G/1, each class with its own law of service.
+
+    References:
+        A. Cobham, Oper. Res. 2 (1954) 70-76: `W_k = W_0 / ((1 - sigma_(k-1)) (1 - sigma_k))`,
+        where `W_0 = sum lambda_i E[S_i^2] / 2`.
+    """
+    pairs = list(zip(arrival_rates, services, strict=True))
+    ahead = sum(rate * service.second for rate, service in pairs) / 2
+    return _by_class(ahead, arrival_rates, [rate * service.mean for rate, service in pairs])
+
+
+def _by_class(ahead: float, rates: Sequence[float], loads: Sequence[float]) -> Measures:
+    """Waits from the mean work that is in service when somebody comes [s]."""
+    if not sum(loads) < 1:
+        raise ValueError(f"the servers are offered {sum(loads):g} of what they can do")
+    waits, above = [], 0.0
+    for load in loads:
+        waits.append(ahead / ((1 - above) * (1 - above - load)))
+        above += load
+    measures = {f"wait_{k}_s": wait for k, wait in enumerate(waits, start=1)}
+    overall = math.fsum(r * w for r, w in zip(rates, waits, strict=True)) / math.fsum(rates)
+    return measures | {"wait_s": overall, "utilisation": above}

@@ -1,0 +1,310 @@
+"""Laplace transforms of the laws that times can follow.
+
+One waiting line, one or more servers: what queueing theory says of it, exactly.
+
+A server is a responder or an operator, a customer an event. Every formula takes rates per
+second and times in seconds, and gives its measures by name:
+
+- `utilisation`: share of time that a server is busy;
+- `delayed`: share of the admitted customers that have to wait;
+- `wait_s`: mean time from arrival to the beginning of service, of those who are served;
+- `stay_s`: mean time from arrival to the end of service, of those who are served;
+- `lost`: share of all customers who find no room.
+
+References:
+    L. Kleinrock, Queueing Systems, vol. 1 (1975); D. Gross et al., Fundamentals of Queueing
+    Theory, 4th ed. (2008).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Annotated, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dva_sim.simulation.shift import distributions
+from dva_sim.simulation.shift import distributions as timed
+
+_NODES = 128
+
+
+def laplace(law: distributions.Law, s: float) -> float:
+    """The expected value of `exp(-s X)`, for `s >= 0` [1/s].
+
+    References:
+        Kleinrock, Queueing Systems, vol. 1 (1975), appendix I. The lognormal and the Weibull
+        law have no closed form: they are integrated over the chance they are made from.
+    """
+    if isinstance(law, distributions.Constant):
+        return math.exp(-s * law.mean_s)
+    if isinstance(law, distributions.Exponential):
+        return 1 / (1 + s * law.mean_s)
+    if isinstance(law, distributions.Uniform):
+        width = s * (law.high_s - law.low_s)
+        return math.exp(-s * law.low_s) * (-math.expm1(-width) / width if width else 1.0)
+    if isinstance(law, distributions.Erlang):
+        return (1 + s * law.mean_s / law.phases) ** -law.phases
+    if isinstance(law, distributions.Gamma):
+        return float((1 + s * law.mean_s / law.shape) ** -law.shape)
+    if isinstance(law, distributions.Hyperexponential):
+        fast, slow = 0.5 / law.share, 0.5 / (1 - law.share)  # times the mean
+        rest = 1 - law.share
+        return law.share / (1 + s * law.mean_s * fast) + rest / (1 + s * law.mean_s * slow)
+    if isinstance(law, distributions.Lognormal):
+        return _over_normal(law, s)
+    return _over_exponential(law, s)
+
+
+def _over_normal(law: distributions.Lognormal, s: float) -> float:
+    """The mean over a standard normal number, whose exponential the time is."""
+    nodes, weights = np.polynomial.hermite_e.hermegauss(_NODES)
+    times = law.median * np.exp(law.spread * nodes)
+    return float(weights @ np.exp(-s * times) / weights.sum())
+
+
+def _over_exponential(law: distributions.Weibull, s: float) -> float:
+    """The mean over a unit exponential number, a power of which the time is."""
+    scale = law.mean_s / math.gamma(1 + 1 / law.shape)
+    nodes, weights = np.polynomial.legendre.leggauss(_NODES)
+    ends = np.array([0.0, 1e-6, 1e-4, 1e-2, 0.1, 0.5, 1, 2, 4, 8, 16, 32, 64])
+    starts, widths = ends[:-1, None], np.diff(ends)[:, None]
+    e = starts + widths * (nodes + 1) / 2
+    inner = np.exp(-s * scale * e ** (1 / law.shape) - e)
+    return float((widths[:, 0] / 2) @ (inner @ weights))
+
+
+Measures = dict[str, float]
+Floats = NDArray[np.float64]
+
+
+Memoryless = Annotated[float, "exponential"]
+"""The mean of a time that must be exponential for the formula to hold [s]."""
+
+
+class Law(Protocol):
+    """What most formulas want to know of a duration."""
+
+    @property
+    def mean(self) -> float:
+        """Expected value [s]."""
+
+    @property
+    def second(self) -> float:
+        """Expected square [s^2]."""
+
+
+def erlang_b(servers: int, load: float) -> float:
+    """Probability that all servers are busy if nobody waits.
+
+    Args:
+        servers: How many there are.
+        load: Arrivals during one mean service time.
+
+    References:
+        Gross et al. (2008), chapter 2 (Erlang's loss formula), by the usual recursion.
+    """
+    blocked = 1.0
+    for n in range(1, servers + 1):
+        blocked = load * blocked / (n + load * blocked)
+    return blocked
+
+
+def erlang_c(servers: int, load: float) -> float:
+    """Probability of having to wait if everybody waits; needs `load < servers`.
+
+    References:
+        Gross et al. (2008), chapter 2 (several servers).
+    """
+    require_stable(load / servers)
+    blocked = erlang_b(servers, load)
+    return servers * blocked / (servers - load * (1 - blocked))
+
+
+def mmc(
+    arrival_rate: float, mean_service_s: Memoryless, servers: int, at_s: Sequence[float] = ()
+) -> Measures:
+    """M/M/c: random arrivals, exponential service, everybody waits, first come first served.
+
+    Beside the usual measures: `wait_50_s`, `wait_90_s` and `wait_95_s`, quantiles of the wait
+    of all customers (0 for those who need not wait), and `beyond_T`, the share that waits
+    longer than each time T in `at_s`.
+
+    References:
+        Gross et al. (2008), chapter 2: a wait beyond `t` has the probability
+        `C exp(-(c mu - lambda) t)`.
+    """
+    load = arrival_rate * mean_service_s
+    delayed = erlang_c(servers, load)
+    drain = servers / mean_service_s - arrival_rate
+    measures = {
+        "utilisation": load / servers,
+        "delayed": delayed,
+        "wait_s": delayed / drain,
+        "stay_s": delayed / drain + mean_service_s,
+    }
+    for percent in (50, 90, 95):
+        beyond = 1 - percent / 100
+        measures[f"wait_{percent}_s"] = max(0.0, math.log(delayed / beyond) / drain)
+    return measures | {f"beyond_{t:g}": delayed * math.exp(-drain * t) for t in at_s}
+
+
+def mgcc(arrival_rate: float, mean_service_s: float, servers: int) -> Measures:
+    """M/G/c/c: who finds all servers busy is lost; only the mean of the service matters.
+
+    References:
+        A. K. Erlang (1917); insensitivity: B. A. Sevastyanov, Theory Probab. Appl. 2 (1957)
+        104-112.
+    """
+    load = arrival_rate * mean_service_s
+    lost = erlang_b(servers, load)
+    return {
+        "lost": lost,
+        "utilisation": load * (1 - lost) / servers,
+        "wait_s": 0.0,
+        "delayed": 0.0,
+        "stay_s": mean_service_s,
+    }
+
+
+def mmck(arrival_rate: float, mean_service_s: Memoryless, servers: int, places: int) -> Measures:
+    """M/M/c/K: at most `places` customers wait (K = c + places); others are lost.
+
+    References:
+        Gross et al. (2008), chapter 2 (a limited queue).
+    """
+    room = servers + places
+    inside = np.arange(room + 1)
+    busy = np.minimum(inside, servers)
+    chance = birth_death(np.full(room, arrival_rate), busy[1:] / mean_service_s)
+    admitted = 1 - chance[-1]
+    wait = float(chance @ (inside - busy)) / (arrival_rate * admitted)  # Little
+    return {
+        "lost": float(chance[-1]),
+        "utilisation": float(chance @ busy) / servers,
+        "delayed": float(chance[servers:-1].sum()) / admitted,
+        "wait_s": wait,
+        "stay_s": wait + mean_service_s,
+    }
+
+
+def mg1(arrival_rate: float, service: Law) -> Measures:
+    """M/G/1: one server, any law of service, everybody waits.
+
+    References:
+        F. Pollaczek (1930), A. Khinchine (1932); Kleinrock (1975), eq. (5.113).
+    """
+    load = arrival_rate * service.mean
+    require_stable(load)
+    wait = arrival_rate * service.second / (2 * (1 - load))
+    return {
+        "utilisation": load,
+        "delayed": load,
+        "wait_s": wait,
+        "stay_s": wait + service.mean,
+    }
+
+
+def gm1(between: timed.Law, mean_service_s: Memoryless) -> Measures:
+    """G/M/1: any law between arrivals, one server with exponential service.
+
+    References:
+        Kleinrock (1975), section 6.4: sigma is the root of `sigma = A*(mu - mu sigma)`
+        in (0, 1), eq. (6.27); mean wait `sigma / (mu (1 - sigma))`, eq. (6.30).
+    """
+    from scipy.optimize import brentq
+
+    require_stable(mean_service_s / between.mean)
+    rate = 1 / mean_service_s
+    # At sigma = 1 the equation always holds; the root sought lies below it.
+    sigma = float(brentq(lambda x: laplace(between, rate * (1 - x)) - x, 0.0, 1 - 1e-9))
+    wait = sigma * mean_service_s / (1 - sigma)
+    return {
+        "utilisation": mean_service_s / between.mean,
+        "delayed": sigma,
+        "wait_s": wait,
+        "stay_s": wait + mean_service_s,
+    }
+
+
+def erlang_a(
+    arrival_rate: float, mean_service_s: Memoryless, servers: int, mean_patience_s: Memoryless
+) -> Measures:
+    """M/M/c+M: who waits gives up after an exponential time.
+
+    Beside the usual measures: `abandoned`, share of all customers who give up, and
+    `wait_all_s`, mean wait of all customers, who gave up included.
+
+    References:
+        C. Palm (1957); A. Mandelbaum & S. Zeltyn, Service engineering in action: the
+        Palm/Erlang-A queue (2007). A customer with `j` places to go until it is served
+        leaves each with rate `c mu + i theta` and is served with `c mu / (c mu + j theta)`.
+    """
+    rate, impatience = 1 / mean_service_s, 1 / mean_patience_s
+    most = _longest_queue(arrival_rate, rate * servers, impatience)
+    inside = np.arange(servers + most + 1)
+    busy = np.minimum(inside, servers)
+    deaths = busy * rate + (inside - busy) * impatience
+    chance = birth_death(np.full(len(inside) - 1, arrival_rate), deaths[1:])
+    abandoned = float(chance @ (inside - busy)) * impatience / arrival_rate
+    place = np.arange(1, most + 2)  # of who arrives when all servers are busy
+    served = servers * rate / (servers * rate + place * impatience)
+    until = np.cumsum(1 / (servers * rate + place * impatience))
+    wait = float(chance[servers:] @ (served * until)) / (1 - abandoned)
+    return {
+        "abandoned": abandoned,
+        "delayed": float(chance[servers:].sum()),
+        "wait_s": wait,
+        "wait_all_s": abandoned * mean_patience_s,
+        "stay_s": wait + mean_service_s,
+        "utilisation": float(chance @ busy) / servers,
+    }
+
+
+def tandem(
+    arrival_rate: float,
+    first_service_s: Memoryless,
+    first_servers: int,
+    second_service_s: Memoryless,
+    second_servers: int,
+) -> Measures:
+    """Two M/M/c in a row: the second sees random arrivals, as if the first were not there.
+
+    Measures carry the number of their station: `wait_1_s`, `wait_2_s`, `utilisation_1`, ...;
+    `stay_s` is the whole way through.
+
+    References:
+        P. J. Burke, Oper. Res. 4 (1956) 699-704; J. R. Jackson, Oper. Res. 5 (1957) 518-521.
+    """
+    first = mmc(arrival_rate, first_service_s, first_servers)
+    second = mmc(arrival_rate, second_service_s, second_servers)
+    return {
+        "utilisation_1": first["utilisation"],
+        "utilisation_2": second["utilisation"],
+        "delayed_1": first["delayed"],
+        "delayed_2": second["delayed"],
+        "wait_1_s": first["wait_s"],
+        "wait_2_s": second["wait_s"],
+        "stay_s": first["stay_s"] + second["stay_s"],
+    }
+
+
+def birth_death(births: Floats, deaths: Floats) -> Floats:
+    """Stationary probabilities of states 0 to n from the n rates up and the n rates down."""
+    logs = np.concatenate([[0.0], np.cumsum(np.log(births) - np.log(deaths))])
+    weights = np.exp(logs - logs.max())
+    return np.asarray(weights / weights.sum())
+
+
+def _longest_queue(arrival_rate: float, drain: float, impatience: float) -> int:
+    """A queue so long that longer ones do not count: beyond it, leaving is likelier by far."""
+    balance = max(0.0, (arrival_rate - drain) / impatience)
+    return int(balance + 40 * math.sqrt(arrival_rate / impatience + 1) + 100)
+
+
+def require_stable(load: float) -> None:
+    """Refuse a load [share of what the servers can do] that no stationary state belongs to."""
+    if not load < 1:
+        raise ValueError(f"the servers are offered {load:g} of what they can do; below 1 is stable")

@@ -1,0 +1,271 @@
+"""Static instances turned and shuffled: a policy must choose the same all the same.
+
+What must hold exactly, whatever the numbers: no chance, no tolerance but the clock's step.
+"""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dva_sim.core.dispatch import Assignment, Responder, Situation, Task, load_policy
+from dva_sim.kernel.streams import derive_seed
+from dva_sim.simulation.shift import TimedRecording, build, simulate_timed
+from dva_sim.validation.dispatch.samples import Floats, Ints, many_servers, sample_of
+
+POLICIES = (
+    "nearest_idle",
+    "min_eta",
+    "batch_optimal",
+    "priority_eta",
+    "preemptive",
+    "operator_aware",
+    "hazard_team",
+)
+INSTANCES = 50
+Choice = set[tuple[int, str]]
+Flags = NDArray[np.bool_]
+
+
+def changed_choices(seed: int) -> Iterator[tuple[str, float]]:
+    """How often each policy chooses otherwise once a place is turned and its team shuffled."""
+    changed = dict.fromkeys(POLICIES, 0)
+    rng = np.random.Generator(np.random.PCG64(seed))
+    for _ in range(INSTANCES):
+        events, units = 1 + int(rng.integers(6)), 1 + int(rng.integers(6))
+        goals, starts = rng.uniform(0, 300, (events, 2)), rng.uniform(0, 300, (units, 2))
+        severities, robots = rng.random(events), rng.random(units) < 0.4
+        order, angle = rng.permutation(units), float(rng.uniform(0, 2 * math.pi))
+        same = np.arange(units)
+        for policy in POLICIES:
+            before = _choice(policy, goals, starts, severities, robots, same)
+            after = _choice(
+                policy, _turned(goals, angle), _turned(starts, angle), severities, robots, order
+            )
+            changed[policy] += before != after
+    for policy, count in changed.items():
+        yield f"of {INSTANCES} choices of {policy}: changed by turning and shuffling", float(count)
+
+
+def _turned(points: Floats, angle: float) -> Floats:
+    """The points rotated about somewhere far away, shape `(n, 2)`."""
+    cosine, sine = math.cos(angle), math.sin(angle)
+    turn = np.array([[cosine, -sine], [sine, cosine]])
+    return np.asarray((points - [1000.0, -500.0]) @ turn.T)
+
+
+def _choice(
+    policy: str, goals: Floats, starts: Floats, severities: Floats, robots: Flags, order: Ints
+) -> Choice:
+    """Who is sent where, by number of the event and name."""
+    tasks = tuple(
+        Task(
+            number + 1, "fire", "confirm", True, float(severity), 0.9, float(number), float(number)
+        )
+        for number, severity in enumerate(severities)
+    )
+    team = tuple(Responder(f"unit-{n}", "robot" if robots[n] else "guard") for n in order)
+    away = goals[:, None, :] - starts[None, order, :]
+    distance = np.hypot(away[..., 0], away[..., 1])
+    speed = np.where(robots[order], 0.5, 1.4)
+    operators = int(robots.sum() + 1) // 2
+    situation = Situation(20.0, tasks, team, distance, distance / speed, operators=operators)
+    advice = load_policy(policy).advise(situation, np.random.Generator(np.random.PCG64(1)))
+    sent = (piece for piece in advice if isinstance(piece, Assignment))
+    return {(tasks[piece.task].event, team[piece.responder].device) for piece in sent}
+
+
+Found = Iterator[tuple[str, float]]
+"""What was looked at, and how far it is from what it should be: always 0."""
+
+SLACK_S = 1e-3  # what the clock's whole microseconds may add up to
+TIMES = ("detected", "assigned", "departed", "arrived", "confirmed", "closed")
+FACTOR = 8
+
+_PLACES: dict[str, Any] = {
+    "model": "timed",
+    "area": {"width_m": 400, "height_m": 300},
+    "responders": [
+        {"name": "east", "base": [390, 150], "speed_mps": 1.5, "after": "return"},
+        {"name": "west", "base": [10, 130], "speed_mps": 1.2, "after": "stay"},
+        {"name": "gate", "base": [180, 5], "speed_mps": 1.1, "after": "return"},
+    ],
+    "demand": [
+        {"kind": "fire", "severity": 0.8, "between": {"law": "exponential", "mean_s": 240}},
+        {"kind": "flood", "severity": 0.3, "between": {"law": "gamma", "mean_s": 300, "shape": 2}},
+    ],
+    "horizon_s": 40_000,
+    "drain": True,
+}
+for _stream in _PLACES["demand"]:
+    _stream["look"] = {"law": "lognormal", "mean_s": 60, "spread": 0.5}
+
+
+def check_identity(name: str, seed: int) -> list[tuple[str, float]]:
+    """Look at one of `IDENTITIES`: what was looked at, and how far off it is.
+
+    Args:
+        name: Which.
+        seed: Of the luck with which it is looked at; it must hold whatever that is.
+    """
+    return list(IDENTITIES[name](derive_seed("identity", name, seed)))
+
+
+# --- one path, known from another calculation ------------------------------------------
+def _first_come_first_served(seed: int) -> Found:
+    """Waits are those of Kiefer and Wolfowitz's recursion, event by event."""
+    for guards in (1, 2, 5):
+        scenario = {
+            "model": "timed",
+            "responders": [{"name": "guard", "count": guards}],
+            "demand": [{"between": {"law": "exponential", "mean_s": 1.2 / guards}}],
+            "horizon_s": 1000 / guards,
+            "drain": True,
+        }
+        scenario["demand"][0]["look"] = {"law": "gamma", "mean_s": 1, "shape": 0.5}  # type: ignore[index]
+        sample = sample_of(_run(scenario, seed))
+        waits = many_servers(sample.detected, sample.confirmed - sample.arrived, guards)
+        off = abs(sample.assigned - sample.detected - waits).max()
+        yield f"waits with {guards} guards against Kiefer and Wolfowitz [s]", _beyond(off)
+
+
+def _conservation(seed: int) -> Found:
+    """Every event is closed in one way and one only, whatever happens to it."""
+    scenario = copy.deepcopy(_PLACES)
+    scenario["responders"][0] |= {"kind": "robot"}
+    scenario["operators"] = {"count": 1}
+    scenario["demand"][0] |= {"patience": {"law": "exponential", "mean_s": 400}}
+    scenario["demand"][1] |= {"false_share": 0.3, "repeats": {"share": 0.2, "after": 20}}
+    scenario["dispatch"] = {"containment": True, "escalate_after_s": 600, "most_waiting": 4}
+    for policy in ("min_eta", "preemptive", "hazard_team", "auction"):
+        scenario["dispatch"]["policy"] = policy
+        run = _run(scenario, seed)
+        open_ = sum(run.count(o) for o in ("unnoticed", "pending", "assigned", "on scene"))
+        lost = abs(run.events - run.count()) + open_ + sum(run.violations.values())
+        yield f"events lost, open or twice, rules broken, with {policy}", float(lost)
+
+
+# --- the same world, seen otherwise ----------------------------------------------------
+def _time_scaling(seed: int) -> Found:
+    """With everything 8 times as slow every moment comes 8 times as late."""
+    scenario = copy.deepcopy(_PLACES)
+    scenario["dispatch"] = {"policy": "priority_eta", "options": {"ageing_per_s": 0.002}}
+    scenario["dispatch"]["escalate_after_s"] = 900
+    slow = _run(_slower(scenario), seed)
+    off = _apart(_run(scenario, seed), slow, FACTOR)
+    yield f"moments with everything {FACTOR} times as slow [s]", _beyond(off)
+
+
+def _relabelling(seed: int) -> Found:
+    """Other names, and another order of the same responders, change nothing."""
+    plain = _run(_PLACES, seed)
+    named = copy.deepcopy(_PLACES)
+    for number, group in enumerate(named["responders"]):
+        group["name"] = f"post-{number}"
+    yield "moments with other names [s]", _beyond(_apart(plain, _run(named, seed)))
+    turned = _PLACES | {"responders": _PLACES["responders"][::-1]}
+    yield "moments in another order of guards [s]", _beyond(_apart(plain, _run(turned, seed)))
+
+
+def _rotation(seed: int) -> Found:
+    """A policy's choice does not depend on where north is, nor on who is listed first."""
+    yield from changed_choices(seed)
+
+
+# --- better and worse ------------------------------------------------------------------
+def _best_of_all(seed: int) -> Found:
+    """All events at once: the best assignment is never worse than the nearest first."""
+    ways: dict[str, dict[str, Any]] = {
+        "straight ways": {"area": {"width_m": 100, "height_m": 100}},
+        "ways by chance": {"travel": {"law": "exponential", "mean_s": 60}},
+    }
+    for name, ground in ways.items():
+        base = {"base": "random"} if "area" in ground else {}
+        scenario = ground | {
+            "model": "timed",
+            "responders": [{"name": "guard", "count": 6, "from_s": 1} | base],
+            "demand": [{"batch": {"count": 5}}],
+            "horizon_s": 10,
+            "drain": True,
+        }
+        worse = 0
+        for trial in range(40):
+            totals = [
+                _total_way(_run(scenario | {"dispatch": {"policy": policy}}, seed + trial))
+                for policy in ("batch_optimal", "nearest_idle", "min_eta")
+            ]
+            worse += totals[0] > min(totals[1:]) + SLACK_S
+        yield f"of 40 days with {name}: batch_optimal worse than nearest first", float(worse)
+
+
+def _oracle(seed: int) -> Found:
+    """Nobody has a smaller sum of responses than who knows the future."""
+    scenario = _PLACES | {"max_events": 6, "horizon_s": 10_000, "drain": False}
+    scenario["responders"] = [g | {"after": "return"} for g in _PLACES["responders"][:2]]
+    scenario["demand"] = [
+        stream | {"between": {"law": "exponential", "mean_s": 150}} for stream in _PLACES["demand"]
+    ]
+    others = ("nearest_idle", "min_eta", "batch_optimal", "priority_eta", "random")
+    worse = dict.fromkeys(others, 0)
+    for trial in range(20):
+        best = _total_response(_run(scenario | {"dispatch": {"policy": "oracle"}}, seed + trial))
+        for policy in others:
+            run = _run(scenario | {"dispatch": {"policy": policy}}, seed + trial)
+            worse[policy] += best > _total_response(run) + SLACK_S
+    for policy, count in worse.items():
+        yield f"of 20 small days: the oracle worse than {policy}", float(count)
+
+
+IDENTITIES: dict[str, Callable[[int], Found]] = {
+    "first come, first served": _first_come_first_served,
+    "conservation": _conservation,
+    "time scaling": _time_scaling,
+    "relabelling": _relabelling,
+    "rotation": _rotation,
+    "best assignment": _best_of_all,
+    "oracle": _oracle,
+}
+
+
+# --- helpers ---------------------------------------------------------------------------
+def _run(scenario: dict[str, Any], seed: int) -> TimedRecording:
+    return simulate_timed(build(scenario), seed)
+
+
+def _beyond(off: float) -> float:
+    """What is more than the clock explains."""
+    return float(off) if off > SLACK_S else 0.0
+
+
+def _slower(node: Any, key: str = "") -> Any:
+    """The same scenario with every time `FACTOR` times as long, and every pace as slow."""
+    if isinstance(node, dict):
+        return {name: _slower(value, name) for name, value in node.items()}
+    if isinstance(node, list):
+        return [_slower(item, key) for item in node]
+    if key.endswith(("_mps", "_per_s")):
+        return node / FACTOR
+    return node * FACTOR if key.endswith("_s") else node
+
+
+def _apart(one: TimedRecording, other: TimedRecording, factor: float = 1.0) -> float:
+    """The largest difference between the moments of two runs [s]; infinite if events differ."""
+    if one.events != other.events:
+        return np.inf
+    pairs = [(one.columns[name] * factor, other.columns[name]) for name in TIMES]
+    if any((np.isnan(a) != np.isnan(b)).any() for a, b in pairs):
+        return np.inf
+    return max(float(np.nanmax(abs(a - b), initial=0.0)) for a, b in pairs)
+
+
+def _total_way(run: TimedRecording) -> float:
+    return float((run.columns["arrived"] - run.columns["assigned"]).sum())
+
+
+def _total_response(run: TimedRecording) -> float:
+    return float((run.columns["arrived"] - run.columns["detected"]).sum())

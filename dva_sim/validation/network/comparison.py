@@ -1,0 +1,315 @@
+"""Many runs of the model, spread over processes.
+
+The whole comparison: which runs of the model it takes, and what they come to.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, cast
+
+from dva_sim.experiments.execution import executors
+from dva_sim.experiments.execution.checkpoint import Tables
+from dva_sim.experiments.execution.scheduling import run_all
+from dva_sim.experiments.study.cell_grid import Job
+from dva_sim.kernel.errors import RunsFailed
+from dva_sim.kernel.streams import Streams, derive_seed
+from dva_sim.network.condition import Condition
+from dva_sim.network.measures import Measures
+from dva_sim.simulation.models import AnyScenario
+from dva_sim.validation.network.judging import (
+    KINDS,
+    MIN_INSIDE,
+    Cell,
+    Group,
+    Kind,
+    Row,
+    Verdict,
+    cells_of,
+    judge,
+    share_inside,
+)
+from dva_sim.validation.network.pooling import (
+    Pooled,
+    is_steady,
+    pool,
+    pool_variant,
+    tells,
+    to_be_pooled,
+)
+from dva_sim.validation.network.predict import WITHOUT, Depth, depth_for, predict
+
+CHUNK = 10  # runs of one job
+KEPT = (
+    *("n_sent", "n_applied", "n_distinct", "send_hz", "applied_hz", "skip_frac", "first_seq"),
+    *("age_mean", "age_p50", "age_p95", "rtt_p50", "rtt_p95", "stale_p50", "stale_p95"),
+    *("timeouts", "alerts", "t_hs_ms"),
+)
+
+Progress = Callable[[int], None]
+
+
+@dataclass(frozen=True)
+class Order:
+    """Runs of one condition.
+
+    Attributes:
+        condition: What is set.
+        runs: How many.
+        depth: How deep they are played.
+        without: Mechanisms that are left out.
+    """
+
+    condition: Condition
+    runs: int
+    depth: Depth = "auto"
+    without: tuple[str, ...] = ()
+
+
+def play_all(
+    orders: Sequence[Order], seed: int, workers: int, progress: Progress = lambda done: None
+) -> dict[Order, list[Row]]:
+    """The results of every run of some orders.
+
+    Run n of a condition has the same luck at every depth and whatever is left out.
+
+    Args:
+        orders: What to play.
+        seed: Of all luck.
+        workers: Processes.
+        progress: Told how many runs are finished.
+
+    Raises:
+        RunsFailed: a run failed.
+    """
+    jobs = [job for order in orders for job in _jobs(order, seed)]
+    # The longest first, so that the processes finish together.
+    jobs.sort(key=lambda job: -_effort(job))
+    rows: dict[tuple[str, int], list[Row]] = {}
+    done = 0
+    for batch in run_all(jobs, perform, executors.local(workers)):
+        for outcome in batch:
+            if outcome.error is not None:
+                raise RunsFailed(f"{outcome.key[0]} could not be played: {outcome.error}")
+            rows[outcome.key] = json.loads(outcome.tables or "")["rows"]
+            done += len(rows[outcome.key])
+        progress(done)
+    return {order: _joined(order, seed, rows) for order in orders}
+
+
+def perform(job: Job) -> Tables:
+    """The runs of one job."""
+    row, depth, without, first, count = _asked(job)
+    condition = Condition.from_row(row)
+    seeds = [
+        derive_seed("network", condition.hash, job.seed, run) for run in range(first, first + count)
+    ]
+    return {"rows": [_kept(predict(condition, seed, depth, without)) for seed in seeds]}
+
+
+def _kept(row: Measures) -> dict[str, Any]:
+    return {name: row[name] for name in KEPT}
+
+
+def _jobs(order: Order, seed: int) -> list[Job]:
+    jobs = []
+    for first in range(0, order.runs, CHUNK):
+        count = min(CHUNK, order.runs - first)
+        asked = order.condition.to_row(), order.depth, order.without, first, count
+        cell = (("order", json.dumps(asked)),)
+        name, nobody = _name(order, first), cast(AnyScenario, None)
+        jobs.append(Job("network", cell, 0, 0, 0, seed, name, nobody))
+    return jobs
+
+
+def _asked(job: Job) -> tuple[dict[str, str], Depth, tuple[str, ...], int, int]:
+    row, depth, without, first, count = json.loads(str(dict(job.cell)["order"]))
+    return row, depth, tuple(without), first, count
+
+
+def _name(order: Order, first: int) -> str:
+    left_out = f" without {', '.join(order.without)}" if order.without else ""
+    condition = f"{order.condition.label} ({order.condition.hash})"
+    return f"{condition} {order.depth}{left_out}, runs from {first}"
+
+
+def _effort(job: Job) -> float:
+    """Commands to be played, about."""
+    row, _, _, _, count = _asked(job)
+    return count * float(row["hz"]) * float(row["dur_s"])
+
+
+def _joined(order: Order, seed: int, rows: Mapping[tuple[str, int], list[Row]]) -> list[Row]:
+    return [row for first in range(0, order.runs, CHUNK) for row in rows[_name(order, first), seed]]
+
+
+RUNS, QUICK_RUNS = 200, 40  # of a condition under loss
+CONTROL_RUNS, QUICK_CONTROL_RUNS = 50, 20
+JITTER_RUNS = 20  # where nothing is lost, but delays are left to chance
+MODEL = "the model"
+CONTROLS: dict[str, Depth] = {
+    "message by message": "message",
+    "datagrams": "datagram",
+}
+"""Models that are too simple, and must be found out."""
+
+Rows = dict[Order, list[Row]]
+
+WANTED, WANTED_POOLED = 150, 40  # conditions that should be judged
+
+
+@dataclass(frozen=True)
+class Setting:
+    """How much is played.
+
+    Attributes:
+        seed: Of all luck.
+        quick: Few runs.
+        workers: Processes.
+        ablate: Whether mechanisms are left out one by one.
+    """
+
+    seed: int = 1
+    quick: bool = False
+    workers: int = 1
+    ablate: bool = False
+
+    def runs(self, group: Group) -> int:
+        """Of the model for a condition: one where nothing is left to chance."""
+        condition = group.condition
+        if condition.loss > 0:
+            return QUICK_RUNS if self.quick else RUNS
+        return JITTER_RUNS if condition.jitter_frac > 0 else 1
+
+    @property
+    def control_runs(self) -> int:
+        """Of each variant that is only looked at for pooled conditions."""
+        return QUICK_CONTROL_RUNS if self.quick else CONTROL_RUNS
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What was found.
+
+    Attributes:
+        groups: The conditions that were judged, with their measurements.
+        left_out: Those that were not played, and why.
+        verdicts: Bands and prediction intervals, cell by cell; of pooled conditions those
+            measures in which runs hardly differ.
+        pooled: Means over many runs under loss, by the model as it is.
+        rarely: Measures of pooled conditions that tell too little.
+        controls: The same by models that are too simple, by name.
+        ablated: The same with a mechanism left out, by its name.
+    """
+
+    groups: Sequence[Group]
+    left_out: Sequence[Group]
+    verdicts: Sequence[Verdict]
+    pooled: Pooled
+    rarely: Sequence[Cell]
+    controls: dict[str, Pooled] = field(default_factory=dict)
+    ablated: dict[str, Pooled] = field(default_factory=dict)
+
+    def of_kind(self, kind: Kind) -> list[Verdict]:
+        """The verdicts on conditions of a kind."""
+        return [v for v in self.verdicts if v.cell.group.kind == kind]
+
+    def passes_bands(self, kind: Kind) -> bool:
+        """Whether enough lies inside: everything, of single runs under loss nine of ten."""
+        inside, judged = share_inside(self.of_kind(kind))
+        return inside >= (MIN_INSIDE if kind == "single" else 1.0) * judged
+
+    @property
+    def fooled(self) -> list[str]:
+        """The models that are too simple and were not found out."""
+        return [name for name, pooled in self.controls.items() if pooled.passes]
+
+    @property
+    def passes(self) -> bool:
+        """Whether all bands hold and all that is too simple fails."""
+        bands = all(self.passes_bands(kind) for kind in KINDS)
+        return bands and (self.pooled.passes or not self.pooled.scored) and not self.fooled
+
+    @property
+    def missing(self) -> tuple[int, int]:
+        """How many conditions, and how many pooled ones, are wanted beyond those judged."""
+        judged = self.judged
+        pooled = sum(group.kind == "pooled" for group in judged)
+        return max(0, WANTED - len(judged)), max(0, WANTED_POOLED - pooled)
+
+    @property
+    def judged(self) -> list[Group]:
+        """The conditions of which at least one measure is judged."""
+        found = {v.cell.group.condition for v in self.verdicts if not v.why}
+        found |= {scored.cell.group.condition for scored in self.pooled.scored}
+        return [group for group in self.groups if group.condition in found]
+
+
+def compare(
+    groups: Sequence[Group], setting: Setting, progress: Progress = lambda done: None
+) -> Comparison:
+    """Play every condition that may be judged, and judge it.
+
+    Raises:
+        DvaSimError: a run failed.
+    """
+    played = [group for group in groups if not group.left_out]
+    orders = orders_of(played, setting)
+    rows = play_all(
+        [o for each in orders.values() for o in each], setting.seed, setting.workers, progress
+    )
+    cells = _cells(played, orders.pop(MODEL), rows)
+    own = [c for c in cells if c.group.kind == "pooled"]
+    pooled = pool(to_be_pooled(own), Streams(setting.seed).fresh("null"))
+    found = {
+        name: pool_variant(pooled, _cells(pooled_of(played), variant, rows))
+        for name, variant in orders.items()
+    }
+    return Comparison(
+        groups=played,
+        left_out=[group for group in groups if group.left_out],
+        verdicts=[judge(c) for c in cells if c.group.kind != "pooled" or is_steady(c)],
+        pooled=pooled,
+        rarely=[c for c in own if not tells(c)],
+        controls={name: each for name, each in found.items() if name in CONTROLS},
+        ablated={name: each for name, each in found.items() if name in WITHOUT},
+    )
+
+
+def orders_of(groups: Sequence[Group], setting: Setting) -> dict[str, list[Order]]:
+    """What to play: the model as it is, what is too simple, and with mechanisms left out."""
+    pooled, runs = pooled_of(groups), setting.control_runs
+    orders = {MODEL: [Order(g.condition, setting.runs(g)) for g in groups]}
+    for name, depth in CONTROLS.items() if pooled else ():
+        orders[name] = [Order(g.condition, runs, depth) for g in pooled]
+    for name in WITHOUT if pooled and setting.ablate else ():
+        orders[name] = [Order(g.condition, runs, without=(name,)) for g in pooled]
+    return orders
+
+
+def pooled_of(groups: Sequence[Group]) -> list[Group]:
+    """The conditions that are pooled."""
+    return [group for group in groups if group.kind == "pooled"]
+
+
+def runs_in(groups: Sequence[Group], setting: Setting) -> int:
+    """How many runs a comparison takes."""
+    played = [group for group in groups if not group.left_out]
+    return sum(order.runs for own in orders_of(played, setting).values() for order in own)
+
+
+def depths_of(comparison: Comparison) -> dict[str, int]:
+    """How many conditions were played how deep."""
+    found: dict[str, int] = {}
+    for group in comparison.groups:
+        depth = depth_for(group.condition)
+        found[depth] = found.get(depth, 0) + 1
+    return found
+
+
+def _cells(groups: Sequence[Group], orders: Sequence[Order], rows: Rows) -> list[Cell]:
+    return [
+        c for group, own in zip(groups, orders, strict=True) for c in cells_of(group, rows[own])
+    ]

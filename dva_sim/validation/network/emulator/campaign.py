@@ -1,0 +1,349 @@
+"""The machine that a measurement was made on: what a reader needs to judge it, and nothing else.
+
+A condition measured: real pyzmq programs over the emulated link, and what they came to.
+
+A table of measurements that grows by whole rows, also when its writer is killed.
+
+Many conditions measured, several times each: it can be stopped, killed and taken up again.
+"""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import fcntl
+import gzip
+import io
+import json
+import math
+import os
+import platform
+import re
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import zmq
+
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.streams import derive_seed
+from dva_sim.network.condition import EMULATOR_RESULTS, RESULTS, Condition
+from dva_sim.network.measures import RunLog, measure_log
+from dva_sim.validation.network.emulator.cell import PACKETS, Job, Outcome
+from dva_sim.validation.network.emulator.notes import Kind, Note
+from dva_sim.validation.network.emulator.programs import HANDSHAKE_LIMIT_S
+from dva_sim.validation.network.emulator.running import EmulatorError, refuse_for_proxy, run_job
+from dva_sim.validation.network.emulator.wire import WireConfig
+
+Machine = dict[str, str | int | bool | None]
+
+
+def describe_machine(link: str, way: str, realtime: bool) -> Machine:
+    """Versions, clock and processor; no names of machines, people or folders.
+
+    Args:
+        link: `packets` or `proxy`.
+        way: How the namespaces were made.
+        realtime: Whether real-time priority was granted.
+    """
+    return {
+        "kernel": f"{platform.system()} {platform.release()}",
+        "timer_hz": _timer_hz(),
+        "processor": _processor(),
+        "cores": os.cpu_count(),
+        "python": platform.python_version(),
+        "pyzmq": zmq.pyzmq_version(),
+        "libzmq": zmq.zmq_version(),
+        "link": link,
+        "namespaces": way,
+        "realtime": realtime,
+    }
+
+
+def _timer_hz() -> int | None:
+    """The kernel's timer frequency [Hz], where its configuration can be read."""
+    text = ""
+    with suppress(OSError):
+        text = gzip.decompress(Path("/proc/config.gz").read_bytes()).decode()
+    with suppress(OSError):
+        text = text or Path(f"/boot/config-{platform.release()}").read_text(encoding="utf-8")
+    found = re.search(r"^CONFIG_HZ=(\d+)$", text, re.MULTILINE)
+    return int(found[1]) if found else None
+
+
+def _processor() -> str | None:
+    with suppress(OSError):
+        text = Path("/proc/cpuinfo").read_text(encoding="utf-8")
+        found = re.search(r"^model name\s*: (.*)$", text, re.MULTILINE)
+        return found[1] if found else None
+    return None
+
+
+Row = dict[str, str]
+_NOTES_PER_TURN = 8  # a command or an attempt
+_DECIMALS = 4
+COLUMNS = (*Condition("pub", 1).to_row(), *RESULTS, *EMULATOR_RESULTS, "realtime")
+"""What a measurement tells: the condition, the results, the emulator, real-time priority."""
+
+
+def measure(condition: Condition, seed: int, link: str = PACKETS) -> Row:
+    """Run a condition once on real sockets.
+
+    Args:
+        condition: What is set.
+        seed: Of the link's luck, together with the condition: no two share theirs.
+        link: `packets`, or `proxy` where namespaces are forbidden.
+
+    Returns:
+        The columns `COLUMNS` as a table holds them; empty where a result is not defined.
+
+    Raises:
+        EmulatorError: the run failed, or this link cannot do what the condition asks.
+    """
+    job = job_of(condition, seed, link)
+    refuse_for_proxy(job)
+    outcome = run_job(job)
+    results = measure_log(log_of(outcome), condition.warm_s, condition.dur_s) | outcome.link
+    if condition.pattern != "req":
+        results |= {"timeouts": math.nan, "alerts": math.nan}
+    row = condition.to_row() | _written(results) | {"realtime": str(int(outcome.realtime))}
+    return {name: row[name] for name in COLUMNS}
+
+
+def job_of(condition: Condition, seed: int, link: str = PACKETS) -> Job:
+    """What the process of such a run is told."""
+    played_s = condition.warm_s + condition.dur_s
+    patience_ms = condition.timeout_ms or math.inf
+    return Job(
+        "commands",
+        WireConfig.of(condition),
+        derive_seed(condition.hash, seed),
+        bound_s=HANDSHAKE_LIMIT_S + condition.subscription_wait_s + played_s + 10.0,
+        arguments=dataclasses.asdict(condition),
+        congestion=condition.cc,
+        link=link,
+        room=1000 + int(_NOTES_PER_TURN * played_s * max(condition.hz, 1e3 / patience_ms)),
+    )
+
+
+def log_of(outcome: Outcome) -> RunLog:
+    """What both programs noted, as the record that results are counted from."""
+    log = RunLog(start=_time(outcome.operator, Kind.STARTED))
+    opened = _time(outcome.operator, Kind.OPENED)
+    log.connected_s = _time(outcome.operator, Kind.CONNECTED) - opened
+    log.handshake_s = _time(outcome.operator, Kind.HANDSHAKE) - opened
+    for kind, number, at in [*outcome.operator, *outcome.robot]:
+        match kind:
+            case Kind.ISSUED:
+                log.issued.append(at)
+            case Kind.REPLIED:
+                log.replied.append((number, at))
+            case Kind.TIMEOUT:
+                log.timeouts.append(at)
+            case Kind.ALERT:
+                log.alerts.append(at)
+            case Kind.APPLIED:
+                log.applied.append((number, at))
+    return log
+
+
+def _time(notes: list[Note], kind: Kind) -> float:
+    """When something happened first [s]; nan if it never did."""
+    return next((at for noted, _, at in notes if noted == kind), math.nan)
+
+
+def _written(results: Mapping[str, float]) -> Row:
+    return {
+        name: "" if math.isnan(value) else f"{round(value, _DECIMALS):.10g}"
+        for name, value in results.items()
+    }
+
+
+class Table:
+    """A CSV file of one campaign, and beside it the machine it was measured on.
+
+    A row is one write that is forced to the disk; what a killed writer left of a row is cut off
+    when the file is opened again. Only one campaign can write to it.
+
+    Args:
+        path: The file; made if it is not there.
+        columns: Its columns.
+
+    Raises:
+        ConfigError: it cannot be written, has other columns, or another campaign writes to it.
+    """
+
+    def __init__(self, path: Path, columns: Sequence[str]) -> None:
+        self.path = path
+        self.columns = tuple(columns)
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
+        except OSError as error:
+            raise ConfigError(f"cannot be written: {error.strerror}", path) from None
+        try:
+            self.rows = self._take_over()
+        except BaseException:
+            os.close(self._file)
+            raise
+
+    def __enter__(self) -> Table:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        os.close(self._file)
+
+    def append(self, row: Mapping[str, str]) -> None:
+        """Add a row."""
+        self._write([row[column] for column in self.columns])
+        self.rows.append(dict(row))
+
+    def sign(self, machine: Mapping[str, Any]) -> None:
+        """Say which machine measures.
+
+        Raises:
+            ConfigError: rows of another one are there already.
+        """
+        beside = self.path.with_suffix(".machine.json")
+        if self.rows and beside.exists():
+            known = json.loads(beside.read_text(encoding="utf-8"))
+            other = [name for name in machine if known.get(name) != machine[name]]
+            if other:
+                told = ", ".join(f"{n} was {known.get(n)}, is {machine[n]}" for n in other)
+                raise ConfigError(f"was measured elsewhere ({told}): begin another file", self.path)
+        beside.write_text(json.dumps(machine, indent=1) + "\n", encoding="utf-8")
+
+    def _take_over(self) -> list[dict[str, str]]:
+        """Lock the file, cut off half a row, write the header where it is new; its rows."""
+        try:
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise ConfigError("is being written by another campaign", self.path) from None
+        content = self.path.read_bytes()
+        whole = content.rfind(b"\n") + 1
+        os.ftruncate(self._file, whole)
+        if not whole:
+            self._write(self.columns)
+            return []
+        reader = csv.DictReader(io.StringIO(content[:whole].decode()))
+        if tuple(reader.fieldnames or ()) != self.columns:
+            raise ConfigError("is not a table of measurements: other columns", self.path)
+        return list(reader)
+
+    def _write(self, values: Sequence[str]) -> None:
+        text = io.StringIO()
+        csv.writer(text, lineterminator="\n").writerow(values)
+        os.write(self._file, text.getvalue().encode())
+        os.fsync(self._file)
+
+
+_IDENTITY = ("cell", "group", "seed", "cond_id")
+_OVERHEAD_S = 1.5  # processes, handshake and waiting, about
+_MOST_FAILURES = 3  # in a row
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a campaign is.
+
+    Attributes:
+        done: Rows that are there.
+        total: Rows that are wanted.
+        left_s: About the time it still takes [s].
+        cell: What was measured last; empty at the beginning.
+        problem: Why it could not be measured; empty if it could.
+    """
+
+    done: int
+    total: int
+    left_s: float
+    cell: str = ""
+    problem: str = ""
+
+
+def measure_all(
+    conditions: Sequence[Condition],
+    seeds: Sequence[int],
+    path: Path,
+    tell: Callable[[Progress], object] = lambda progress: None,
+    group: str = "own",
+    link: str = PACKETS,
+) -> list[str]:
+    """Measure every condition with every seed that the table does not hold yet.
+
+    All conditions come once before any comes twice, so that a table cut short is a fair one.
+
+    Args:
+        conditions: What to measure.
+        seeds: A run for each; the luck of a run is that of its condition and seed together.
+        path: CSV file of the results.
+        tell: Told after every run, and at the beginning.
+        group: Name for the column `group`.
+        link: `packets` or `proxy`.
+
+    Returns:
+        What could not be measured, a line each.
+
+    Raises:
+        ConfigError: the file cannot be written, or holds something else.
+        EmulatorError: the link cannot be set up, or fails again and again.
+    """
+    machine = _look_at_machine(link)
+    wanted = [(condition, seed) for seed in seeds for condition in conditions]
+    with Table(path, (*_IDENTITY, *COLUMNS)) as table:
+        table.sign(machine)
+        known = {(row["cond_id"], row["seed"]) for row in table.rows}
+        left = [(c, s) for c, s in wanted if (c.hash, str(s)) not in known]
+        return _measure_left(left, len(wanted), table, tell, group, link)
+
+
+def _measure_left(
+    left: Sequence[tuple[Condition, int]],
+    total: int,
+    table: Table,
+    tell: Callable[[Progress], object],
+    group: str,
+    link: str,
+) -> list[str]:
+    """Measure what is not there yet; what failed, a line each."""
+    done, failures, in_a_row = total - len(left), [], 0
+    tell(Progress(done, total, _time_of(left)))
+    for turn, (condition, seed) in enumerate(left, start=1):
+        cell, problem = f"{group}_{condition.label}_s{seed}", ""
+        try:
+            row = measure(condition, seed, link)
+            table.append(_identity(cell, group, seed, condition) | row)
+            done, in_a_row = done + 1, 0
+        except EmulatorError as error:
+            problem, in_a_row = str(error), in_a_row + 1
+            failures.append(f"{cell}: {problem}")
+            if in_a_row == _MOST_FAILURES:
+                raise
+        tell(Progress(done, total, _time_of(left[turn:]), cell, problem))
+    return failures
+
+
+def _look_at_machine(link: str) -> dict[str, str | int | bool | None]:
+    """The machine, after a run of nothing that shows what it allows.
+
+    Raises:
+        EmulatorError: the link cannot be set up.
+    """
+    outcome = run_job(Job("nothing", link=link))
+    return describe_machine(link, outcome.way, outcome.realtime)
+
+
+def _identity(cell: str, group: str, seed: int, condition: Condition) -> Row:
+    return {"cell": cell, "group": group, "seed": str(seed), "cond_id": condition.hash}
+
+
+def _time_of(left: Sequence[tuple[Condition, int]]) -> float:
+    return sum(c.warm_s + c.dur_s + 8e-3 * c.delay_ms + _OVERHEAD_S for c, _ in left)

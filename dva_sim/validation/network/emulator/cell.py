@@ -1,0 +1,314 @@
+"""The two ends of a link: a process each, with a network of its own where packets are emulated.
+
+A namespace here has no name: it ends with its process, and the process ends with the one that
+started it. So nothing can be left behind, whoever is killed.
+
+One run: a process that starts both ends, is the link between them, and tells what they noted.
+
+It happens in a fresh interpreter with one thread, told what to do by one line of JSON (see
+`start`). Its standard input stays open as long as somebody waits for the answer: when it closes,
+the run ends.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import gc
+import json
+import os
+import signal
+import socket
+import time
+import traceback
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field
+from typing import Any, Protocol
+
+from dva_sim.kernel.streams import Streams
+from dva_sim.network.condition import Condition
+from dva_sim.validation.network.emulator import linux
+from dva_sim.validation.network.emulator.linux import OPERATOR_END, ROBOT_END, End, open_tun
+from dva_sim.validation.network.emulator.notes import Note, Notes
+from dva_sim.validation.network.emulator.programs import (
+    await_nothing,
+    begin_nothing,
+    run_counter,
+    run_operator,
+    run_robot,
+    run_sender,
+)
+from dva_sim.validation.network.emulator.relay import Proxy
+from dva_sim.validation.network.emulator.wire import (
+    FORWARDER_PRIORITY,
+    Forwarder,
+    Told,
+    Wire,
+    WireConfig,
+)
+
+PROGRAM_PRIORITY = 10  # real-time, below the forwarder's
+_PATIENCE_S = 20.0  # for a node to be ready
+
+Program = Callable[[socket.socket, Notes], None]
+"""Runs in a node: with a connection to whoever started it, and a place for its notes."""
+
+
+@dataclass(frozen=True)
+class Node:
+    """A process at one end.
+
+    Attributes:
+        name: `operator` or `robot`.
+        pid: Process.
+        ended: File descriptor that becomes readable when the process ends.
+        channel: Connection to it.
+        notes: What it noted.
+    """
+
+    name: str
+    pid: int
+    ended: int
+    channel: socket.socket
+    notes: Notes
+
+    def hear(self) -> tuple[bytes, list[int]]:
+        """Wait for the next word of the node: what it says, and file descriptors it hands over.
+
+        Raises:
+            ChildProcessError: it ended or said nothing.
+        """
+        with contextlib.suppress(OSError):
+            said, handed, *_ = socket.recv_fds(self.channel, 256, 1)
+            if said:
+                return said, handed
+        raise ChildProcessError(f"the {self.name} did not become ready")
+
+    def end(self) -> int:
+        """Kill the process and wait for it; its exit code, negative if it was killed."""
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(self.pid, signal.SIGKILL)
+        status = os.waitpid(self.pid, 0)[1]
+        self.channel.close()
+        os.close(self.ended)
+        return os.waitstatus_to_exitcode(status)
+
+
+def start_node(name: str, program: Program, room: int) -> Node:
+    """A process that runs a program and then ends.
+
+    Args:
+        name: What it is called.
+        program: What it runs.
+        room: Notes that find room.
+    """
+    here, there = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    here.settimeout(_PATIENCE_S)
+    notes = Notes(room)
+    parent = os.getpid()
+    pid = os.fork()
+    if pid == 0:
+        here.close()
+        _live(parent, program, there, notes)
+    there.close()
+    return Node(name, pid, os.pidfd_open(pid), here, notes)
+
+
+def _live(parent: int, program: Program, channel: socket.socket, notes: Notes) -> None:
+    """All that a node's process does; it never returns."""
+    code = 1
+    try:
+        linux.die_with_parent(parent)
+        gc.disable()  # a pause would look like delay
+        linux.be_punctual(PROGRAM_PRIORITY)
+        program(channel, notes)
+        code = 0
+    except BaseException:
+        traceback.print_exc()
+    finally:
+        os._exit(code)
+
+
+PORT = 5555
+_STDIN = 0
+PACKETS, PROXY = "packets", "proxy"
+"""Kinds of link: whole packets between namespaces, or a relay of TCP over the loopback."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """What one run is told.
+
+    Attributes:
+        program: `commands` for operator and robot, `probe` for the link's own check, `nothing`
+            to see whether it can be set up.
+        wire: Both directions.
+        seed: Of the link's luck.
+        bound_s: The run ends after so much time, whatever happens [s].
+        arguments: Of the program.
+        congestion: Congestion control of all TCP.
+        link: `packets` or `proxy`.
+        room: Notes that find room at each end.
+        rootless: Take a user namespace also where root could do without.
+    """
+
+    program: str
+    wire: WireConfig = field(default_factory=WireConfig)
+    seed: int = 1
+    bound_s: float = 10.0
+    arguments: dict[str, Any] = field(default_factory=dict)
+    congestion: str = "cubic"
+    link: str = PACKETS
+    room: int = 10_000
+    rootless: bool = False
+
+    def to_json(self) -> str:
+        """One line."""
+        return json.dumps(asdict(self))
+
+    @classmethod
+    def from_json(cls, text: str) -> Job:
+        """The job of such a line."""
+        data = json.loads(text)
+        return cls(**data | {"wire": WireConfig(**data["wire"])})
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What one run came to.
+
+    Attributes:
+        operator: Notes of the operator.
+        robot: Notes of the robot.
+        link: Columns of the emulator.
+        way: How the namespaces were made: `root`, `user namespace`, or `proxy` without any.
+        realtime: Real-time priority was granted.
+        problem: Why it failed; empty if it did not.
+    """
+
+    operator: list[Note] = field(default_factory=list)
+    robot: list[Note] = field(default_factory=list)
+    link: Told = field(default_factory=dict)
+    way: str = ""
+    realtime: bool = False
+    problem: str = ""
+
+    def to_json(self) -> str:
+        """One line."""
+        return json.dumps(asdict(self))
+
+    @classmethod
+    def from_json(cls, text: str) -> Outcome:
+        """The outcome of a line that the process printed."""
+        data = json.loads(text)
+        for end in ("operator", "robot"):
+            data[end] = [tuple(note) for note in data[end]]
+        return cls(**data)
+
+
+class Link(Protocol):
+    """What joins both ends while they run."""
+
+    def run(self, watched: list[int], deadline: float) -> int | None:
+        """Work until one of the watched file descriptors is readable, or the deadline."""
+
+    def told(self) -> Told:
+        """The columns of the emulator."""
+
+    def close(self) -> None:
+        """Let go of devices and sockets."""
+
+
+class Cell:
+    """One run, from set-up to the last kill.
+
+    Args:
+        job: What to do.
+        way: How this process became one that may make namespaces.
+    """
+
+    def __init__(self, job: Job, way: str) -> None:
+        self._job = job
+        self._way = way
+        self._nodes: list[Node] = []
+        streams = Streams(job.seed)
+        self._wires = (Wire(job.wire, streams, "ab"), Wire(job.wire, streams, "ba"))
+
+    def play(self) -> Outcome:
+        """Set up, run, and end everything; problems become part of the outcome."""
+        problem, realtime = "", False
+        told: Told = {}
+        try:
+            realtime = linux.be_punctual(FORWARDER_PRIORITY)
+            link, word = self._set_up()
+            gc.disable()  # a pause would look like delay
+            self._nodes[0].channel.send(word)
+            problem = self._run(link)
+            told = link.told()
+            link.close()
+        except OSError as error:
+            problem = error.strerror or str(error)
+        finally:
+            codes = [node.end() for node in self._nodes]
+            notes = [node.notes.read() for node in self._nodes] or [[], []]
+        if not problem and codes[0] != 0:
+            problem = "the operator failed"
+        return Outcome(notes[0], notes[-1], told, self._way, realtime, problem)
+
+    def _set_up(self) -> tuple[Link, bytes]:
+        """The link with both ends, and what the operator is told to begin."""
+        operator, robot = _programs(self._job)
+        if self._job.link == PROXY:
+            self._start("operator", operator)
+            address, _ = self._start("robot", robot).hear()
+            proxy = Proxy(self._wires, address.decode())
+            return proxy, proxy.address.encode()
+        a = self._start("operator", _networked(operator, OPERATOR_END, self._job.congestion))
+        b = self._start("robot", _networked(robot, ROBOT_END, self._job.congestion))
+        tuns = (a.hear()[1][0], b.hear()[1][0])
+        return Forwarder(tuns, self._wires), b.hear()[0]
+
+    def _start(self, name: str, program: Program) -> Node:
+        self._nodes.append(start_node(name, program, self._job.room))
+        return self._nodes[-1]
+
+    def _run(self, link: Link) -> str:
+        """Let both ends run until the operator's program is over; what went wrong, if it did."""
+        operator, robot = self._nodes
+        watched = [operator.ended, robot.ended, _STDIN]
+        end = link.run(watched, time.monotonic() + self._job.bound_s)
+        if end is None:
+            return f"the run did not come to an end within {self._job.bound_s:g} s"
+        if end == _STDIN:
+            return "nobody waits for the answer any more"
+        return "the robot failed" if end == robot.ended else ""
+
+
+def _networked(program: Program, end: End, congestion: str) -> Program:
+    """The program in a network of its own, whose device goes to whoever started it."""
+
+    def run(channel: socket.socket, notes: Notes) -> None:
+        linux.enter_network_namespace()
+        tun = open_tun(end, congestion)
+        socket.send_fds(channel, [b"device"], [tun])
+        os.close(tun)
+        program(channel, notes)
+
+    return run
+
+
+def _programs(job: Job) -> tuple[Program, Program]:
+    """What both ends run: the operator, the robot."""
+    arguments = job.arguments
+    if job.program == "commands":
+        condition = Condition(**arguments)
+        where = "127.0.0.1:*" if job.link == PROXY else f"{ROBOT_END.address}:{PORT}"
+        return (
+            lambda channel, notes: run_operator(condition, channel, notes),
+            lambda channel, notes: run_robot(condition, f"tcp://{where}", channel, notes),
+        )
+    if job.program == "probe":
+        return (
+            lambda channel, notes: run_sender(channel, notes, ROBOT_END.address, **arguments),
+            lambda channel, notes: run_counter(channel, notes, ROBOT_END.address),
+        )
+    return begin_nothing, await_nothing

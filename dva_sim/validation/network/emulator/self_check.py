@@ -1,0 +1,197 @@
+"""Whether the emulated link does what it is told, measured with real packets.
+
+Datagrams cross it from one namespace to the other; delay, jitter, losses and rate are counted
+where they arrive, and not where they are decided.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import groupby
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dva_sim.validation.network.emulator.cell import Job, Outcome
+from dva_sim.validation.network.emulator.running import run_job
+from dva_sim.validation.network.emulator.wire import WireConfig
+
+Floats = NDArray[np.float64]
+_DELAY_BAND_S = 1e-3
+_RATE_BAND = 0.02
+_SIGMAS = 3.0
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One measured property.
+
+    Attributes:
+        name: What.
+        unit: Of the numbers.
+        wanted: As the link was told.
+        found: As it was measured.
+        band: Largest difference that passes.
+    """
+
+    name: str
+    unit: str
+    wanted: float
+    found: float
+    band: float
+
+    @property
+    def passed(self) -> bool:
+        """Whether it lies within its band."""
+        return abs(self.found - self.wanted) <= self.band
+
+    def __str__(self) -> str:
+        verdict = "ok" if self.passed else "MISSED"
+        numbers = f"{self.found:8.3f} wanted {self.wanted:8.3f} within {self.band:.3f} {self.unit}"
+        return f"{self.name:24} {numbers:52} {verdict}"
+
+
+@dataclass(frozen=True)
+class Probe:
+    """Datagrams in equal steps over a link, and what is found out by them.
+
+    Attributes:
+        wire: What the link is told.
+        count: Datagrams.
+        interval_s: Between two of them [s].
+        size: Of each with all headers [B].
+        find: Findings from the wire, the times of sending and arrival [s] and their numbers.
+    """
+
+    wire: WireConfig
+    count: int
+    interval_s: float
+    size: int
+    find: Callable[[Crossing], list[Finding]]
+
+    def job(self, rootless: bool) -> Job:
+        """What the run is told: long enough for the last one to arrive."""
+        wire = self.wire
+        linger_s = wire.delay_s + wire.jitter_s + 0.1
+        linger_s += max(0.0, self.count * (8 * self.size / wire.rate_bps - self.interval_s))
+        told = {"count": self.count, "size": self.size, "interval_s": self.interval_s}
+        bound_s = self.count * self.interval_s + linger_s + 10.0
+        return Job(
+            "probe", wire, bound_s=bound_s, arguments=told | {"linger_s": linger_s},
+            room=self.count + 1, rootless=rootless,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """Datagrams that were sent and that arrived.
+
+    Attributes:
+        wire: What the link was told.
+        size: Of each [B].
+        sent: When each was sent [s], shape `(n,)`.
+        numbers: Of those that arrived, in the order of arrival, shape `(m,)`.
+        arrived: When [s], shape `(m,)`.
+    """
+
+    wire: WireConfig
+    size: int
+    sent: Floats
+    numbers: NDArray[np.int_]
+    arrived: Floats
+
+    @classmethod
+    def of(cls, probe: Probe, outcome: Outcome) -> Crossing:
+        """What both ends noted."""
+        sent = np.array([at for _, _, at in outcome.operator])
+        numbers = np.array([number for _, number, _ in outcome.robot], dtype=int)
+        arrived = np.array([at for _, _, at in outcome.robot])
+        return cls(probe.wire, probe.size, sent, numbers, arrived)
+
+    @property
+    def delays(self) -> Floats:
+        """One-way delays [s], shape `(m,)`."""
+        return np.asarray(self.arrived - self.sent[self.numbers])
+
+    @property
+    def lost(self) -> NDArray[np.bool_]:
+        """Which did not arrive, shape `(n,)`."""
+        return ~np.isin(np.arange(len(self.sent)), self.numbers)
+
+
+def check_link(rootless: bool = False) -> list[Finding]:
+    """Measure the emulated link; some ten seconds.
+
+    Args:
+        rootless: Take a user namespace also where root could do without.
+
+    Raises:
+        EmulatorError: the link cannot be set up here.
+    """
+    findings = []
+    for probe in PROBES:
+        outcome = run_job(probe.job(rootless))
+        findings += probe.find(Crossing.of(probe, outcome))
+    return findings
+
+
+def find_delay(crossing: Crossing) -> list[Finding]:
+    """The median and the 95th percentile of a constant delay."""
+    wanted = 1e3 * crossing.wire.delay_s
+    p50, p95 = (1e3 * float(p) for p in np.percentile(crossing.delays, (50, 95)))
+    band = 1e3 * _DELAY_BAND_S
+    return [
+        Finding("delay, median", "ms", wanted, p50, band),
+        Finding("delay, 95th percentile", "ms", wanted, p95, band),
+    ]
+
+
+def find_jitter(crossing: Crossing) -> list[Finding]:
+    """Half-width of a uniform law, and whether packets overtake as they may.
+
+    From the standard deviation, which a single late packet does not move.
+    """
+    wanted = 1e3 * crossing.wire.jitter_s
+    found = 1e3 * float(np.std(crossing.delays)) * np.sqrt(3)
+    overtaken = float(np.mean(np.diff(crossing.numbers) < 0))
+    interval = float(np.mean(np.diff(crossing.sent)))
+    share = 0.5 * (1 - interval / (2 * crossing.wire.jitter_s)) ** 2
+    sigma = np.sqrt(share * (1 - share) / len(crossing.numbers))
+    return [
+        Finding("jitter, half-width", "ms", wanted, float(found), 1e3 * _DELAY_BAND_S),
+        Finding("overtaken", "", share, overtaken, float(_SIGMAS * sigma)),
+    ]
+
+
+def find_loss(crossing: Crossing) -> list[Finding]:
+    """The share of independent losses."""
+    share, lost = crossing.wire.loss, crossing.lost
+    sigma = np.sqrt(share * (1 - share) / len(lost))
+    return [Finding("loss", "", share, float(lost.mean()), float(_SIGMAS * sigma))]
+
+
+def find_bursts(crossing: Crossing) -> list[Finding]:
+    """The mean length of runs of losses, whose law is geometric."""
+    runs = [sum(1 for _ in run) for lost, run in groupby(crossing.lost) if lost]
+    mean = crossing.wire.burst_pkts or 1.0
+    sigma = np.sqrt(mean * (mean - 1) / len(runs))
+    return [Finding("run of losses, mean", "packets", mean, float(np.mean(runs)), _SIGMAS * sigma)]
+
+
+def find_rate(crossing: Crossing) -> list[Finding]:
+    """Bits that arrive per second while packets wait."""
+    wanted = 1e-3 * crossing.wire.rate_bps
+    bits = 8 * crossing.size * (len(crossing.arrived) - 1)
+    found = 1e-3 * bits / float(crossing.arrived[-1] - crossing.arrived[0])
+    return [Finding("rate", "kbit/s", wanted, found, _RATE_BAND * wanted)]
+
+
+PROBES = (
+    Probe(WireConfig(delay_s=0.05), 300, 0.004, 100, find_delay),
+    Probe(WireConfig(delay_s=0.05, jitter_s=0.02, reorder=True), 1500, 1e-3, 100, find_jitter),
+    Probe(WireConfig(loss=0.1), 4000, 5e-4, 100, find_loss),
+    Probe(WireConfig(loss=0.1, burst_pkts=4.0), 4000, 5e-4, 100, find_bursts),
+    Probe(WireConfig(rate_bps=1e6, queue_pkts=400), 250, 4e-3, 1000, find_rate),
+)
+"""What the link is asked; light enough for a slow machine."""

@@ -1,0 +1,46 @@
+"""Where the process of a run begins: first the namespaces, then everything else.
+
+A user namespace is refused to a process with several threads, and numerical libraries start
+some when they are imported; so this module imports none before the namespaces are made.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+
+from dva_sim.validation.network.emulator import linux
+
+
+def main() -> None:
+    """Read a job from standard input, print its outcome.
+
+    The one argument is the id of the process that waits for it: it may be gone by now.
+    """
+    line = sys.stdin.readline()
+    told = json.loads(line)
+    os.environ["OPENBLAS_NUM_THREADS"] = os.environ["OMP_NUM_THREADS"] = "1"
+    way, problem = told["link"], ""
+    if way != "proxy":
+        try:
+            way = _become_owner(told["rootless"])
+        except OSError as error:
+            problem = error.strerror or str(error)
+    linux.die_with_parent(int(sys.argv[1]))
+
+    from dva_sim.validation.network.emulator.cell import Cell, Job, Outcome
+
+    outcome = Outcome(problem=problem) if problem else Cell(Job.from_json(line), way).play()
+    print(outcome.to_json(), flush=True)
+
+
+def _become_owner(rootless: bool) -> str:
+    if not rootless:
+        return linux.become_owner()
+    linux.become_root_of_a_user_namespace()
+    return "user namespace"
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,262 @@
+"""One direction of the emulated link: decides when a packet that is offered now comes out.
+
+Drop-tail queue, serialisation at the rate, loss, delay with jitter, in this order. It knows no
+device and no clock: the forwarder asks it with real packets, tests with scripted ones.
+
+Moves packets between the two TUN devices when the wires say, and notes how late it is.
+"""
+
+from __future__ import annotations
+
+import heapq
+import math
+import os
+import select
+import time
+from array import array
+from collections import deque
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.random import Generator
+
+from dva_sim.kernel.streams import Streams
+from dva_sim.network.condition import Condition
+
+_BLOCK = 4096
+
+
+@dataclass(frozen=True)
+class WireConfig:
+    """What one direction does to packets.
+
+    Attributes:
+        delay_s: Propagation delay [s].
+        jitter_s: Half-width of a uniform law around the delay [s].
+        loss: Share of the packets lost in the long run.
+        burst_pkts: Mean length of a run of lost packets (Gilbert-Elliott: all is lost in the
+            bad state, nothing in the good one); None is independent losses.
+        rate_bps: Serialisation rate [bit/s].
+        queue_pkts: Packets that find room, with the one that is being sent.
+        reorder: A packet may come out before an earlier one.
+
+    References:
+        Gilbert, "Capacity of a burst-noise channel", Bell System Technical Journal 39 (1960).
+    """
+
+    delay_s: float = 0.0
+    jitter_s: float = 0.0
+    loss: float = 0.0
+    burst_pkts: float | None = None
+    rate_bps: float = math.inf
+    queue_pkts: int = 100
+    reorder: bool = False
+
+    @classmethod
+    def of(cls, condition: Condition) -> WireConfig:
+        """What a condition sets; both directions are alike."""
+        delay_s = 1e-3 * condition.delay_ms
+        return cls(
+            delay_s=delay_s,
+            jitter_s=condition.jitter_frac * delay_s,
+            loss=condition.loss,
+            burst_pkts=condition.burst_pkts,
+            rate_bps=1e3 * condition.rate_kbit,
+            queue_pkts=condition.queue_pkts,
+            reorder=condition.reorder,
+        )
+
+
+@dataclass
+class Counts:
+    """What became of the packets.
+
+    Attributes:
+        offered: All of them.
+        lost: By chance.
+        tail: Because the queue was full.
+    """
+
+    offered: int = 0
+    lost: int = 0
+    tail: int = 0
+
+
+class Wire:
+    """One direction.
+
+    Args:
+        config: What it does.
+        streams: All luck of the run.
+        name: Of this direction, for its luck: losses and jitter have a stream each.
+    """
+
+    def __init__(self, config: WireConfig, streams: Streams, name: str) -> None:
+        self.config = config
+        self.counts = Counts()
+        self._loss = Losses(config.loss, config.burst_pkts, streams[f"emulator/{name}/loss"])
+        self._jitter = Uniform(streams[f"emulator/{name}/jitter"])
+        self._departures: deque[float] = deque()  # of what is in the queue
+        self._last_release = -math.inf
+
+    def offer(self, now: float, size: int) -> float | None:
+        """When a packet of `size` bytes [B] offered at `now` comes out [s]; None is never."""
+        self.counts.offered += 1
+        queue = self._departures
+        while queue and queue[0] <= now:
+            queue.popleft()
+        if len(queue) >= self.config.queue_pkts:
+            self.counts.tail += 1
+            return None
+        departure = (queue[-1] if queue else now) + 8 * size / self.config.rate_bps
+        queue.append(departure)
+        if self._loss.takes_next():
+            self.counts.lost += 1
+            return None
+        return self._release(departure)
+
+    def backlog(self, now: float) -> int:
+        """Packets in the queue at `now`, with the one that is being sent."""
+        return sum(departure > now for departure in self._departures)
+
+    def _release(self, departure: float) -> float:
+        config = self.config
+        release = departure + config.delay_s + config.jitter_s * (2 * self._jitter.draw() - 1)
+        if not config.reorder:
+            release = max(release, self._last_release)
+        self._last_release = release
+        return release
+
+
+class Uniform:
+    """Numbers between 0 and 1, drawn in blocks."""
+
+    def __init__(self, rng: Generator) -> None:
+        self._rng = rng
+        self._ahead: list[float] = []
+
+    def draw(self) -> float:
+        """The next one."""
+        if not self._ahead:
+            self._ahead = self._rng.random(_BLOCK).tolist()[::-1]
+        return self._ahead.pop()
+
+
+@dataclass
+class Losses:
+    """Which packets are lost: each by itself, or in runs.
+
+    Attributes:
+        share: Lost in the long run.
+        burst: Mean length of a run [packets]; None is each packet by itself.
+        rng: Luck: one number per packet.
+    """
+
+    share: float
+    burst: float | None
+    rng: Generator
+    _bad: bool = field(default=False, init=False)
+
+    def __post_init__(self) -> None:
+        self._luck = Uniform(self.rng)
+        if self.burst is not None:
+            self._leave = 1 / self.burst
+            self._enter = self.share * self._leave / (1 - self.share)
+
+    def takes_next(self) -> bool:
+        """Whether the next packet is lost."""
+        luck = self._luck.draw()
+        if self.burst is None:
+            return luck < self.share
+        self._bad = luck >= self._leave if self._bad else luck < self._enter
+        return self._bad
+
+
+FORWARDER_PRIORITY = 20  # real-time, above the programs'
+_LARGEST = 65_536
+_MOST_AT_ONCE = 32  # packets of one device before what is due is looked at again
+_VERSION_4 = 4
+
+Told = dict[str, float | int]
+
+
+class Forwarder:
+    """Both directions of an emulated link.
+
+    Args:
+        tuns: Devices of the operator's and of the robot's namespace.
+        wires: From the operator to the robot, and back.
+    """
+
+    def __init__(self, tuns: tuple[int, int], wires: tuple[Wire, Wire]) -> None:
+        self._ways = {tuns[0]: (wires[0], tuns[1]), tuns[1]: (wires[1], tuns[0])}
+        self._wires = wires
+        self._due: list[tuple[float, int, int, bytes]] = []
+        self._number = 0
+        self._late = array("d")
+
+    def run(self, watched: Sequence[int], deadline: float) -> int | None:
+        """Forward until one of the watched file descriptors has something to say.
+
+        Returns:
+            That one; None when the deadline has passed.
+        """
+        tuns = list(self._ways)
+        while (now := time.monotonic()) < deadline:
+            self._release(now)
+            until = min(deadline, self._due[0][0]) if self._due else deadline
+            pause = max(0.0, until - time.monotonic())
+            ready = select.select([*tuns, *watched], [], [], pause)[0]
+            for file in ready:
+                if file not in self._ways:
+                    return int(file)
+                self._take(file)
+        return None
+
+    def told(self) -> Told:
+        """The columns of the emulator."""
+        return tell(self._wires, self._late)
+
+    def close(self) -> None:
+        """Let go of the devices."""
+        for tun in self._ways:
+            os.close(tun)
+
+    def _take(self, tun: int) -> None:
+        """Offer what waits in a device to its wire; what is not IPv4 is not forwarded."""
+        wire, out = self._ways[tun]
+        with suppress(OSError):  # nothing waits, or the namespace has just ended
+            for _ in range(_MOST_AT_ONCE):
+                packet = os.read(tun, _LARGEST)
+                if not packet or packet[0] >> 4 != _VERSION_4:
+                    continue
+                release = wire.offer(time.monotonic(), len(packet))
+                if release is not None:
+                    self._number += 1
+                    heapq.heappush(self._due, (release, self._number, out, packet))
+
+    def _release(self, now: float) -> None:
+        """Write everything that is due."""
+        due = self._due
+        while due and due[0][0] <= now:
+            release, _, out, packet = heapq.heappop(due)
+            with suppress(OSError):  # a namespace that has just ended takes nothing more
+                os.write(out, packet)
+            now = time.monotonic()
+            self._late.append(now - release)
+
+
+def tell(wires: tuple[Wire, Wire], late: Sequence[float]) -> Told:
+    """The columns of the emulator from counts and from the lateness of releases [s]."""
+    told: Told = {}
+    for way, wire in zip(("ab", "ba"), wires, strict=True):
+        counts = wire.counts
+        told[f"emu_pkts_{way}"] = counts.offered
+        told[f"emu_lost_{way}"] = counts.lost
+        told[f"emu_tail_{way}"] = counts.tail
+    shares = np.percentile(late, (50, 99, 100)) if len(late) else (np.nan,) * 3
+    for name, value in zip(("p50", "p99", "max"), shares, strict=True):
+        told[f"emu_late_{name}_ms"] = 1e3 * float(value)
+    return told

@@ -1,0 +1,221 @@
+"""Many runs under loss: is the model's mean off by more than chance explains?
+
+For each condition and measure, z is the difference of the means over its standard error; that
+comes from how much the model's runs differ, scaled to the number of runs on sockets. The laws
+without loss are exact to half a millisecond only, so that much is added to the error; where it
+is more than chance, runs hardly differ, and the measure is judged as without loss.
+
+What z are to be expected is not left to the normal law, since ages under loss are skewed and
+the measures of a run go together: runs of the model itself take the place of the sockets' many
+times over.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dva_sim.experiments.analysis.statistics import holm
+from dva_sim.network.condition import Condition
+from dva_sim.validation.network.judging import MEASURES, Cell, Measure, reason_against
+
+Floats = NDArray[np.float64]
+
+EXACT_S = 0.0005  # the laws without loss hold to this
+SIGNIFICANT = 0.05
+MAX_BIAS, MAX_TAIL_BIAS = 0.05, 0.10  # median over conditions; the latter of ages' tails
+MIN_EVENTS = 5  # fewer time-outs or alerts than this, expected in all runs, tell nothing
+MIN_CONDITIONS = 10  # fewer have no median to speak of
+MIN_SHARE = 0.9  # of the model's runs in which a measure must be defined
+DRAWS = 1000
+
+
+@dataclass(frozen=True)
+class Scored:
+    """One measure of one pooled condition.
+
+    Attributes:
+        cell: What is compared.
+        z: Difference of the means in standard errors.
+        error: The standard error.
+        p: Two-sided, by the normal law.
+    """
+
+    cell: Cell
+    z: float
+    error: float
+    p: float
+
+
+@dataclass(frozen=True)
+class Pooled:
+    """What all pooled conditions come to.
+
+    Attributes:
+        scored: Each measure of each condition.
+        significant: Those that are after Holm's correction for their number.
+        rms: Root mean square of z.
+        expected: The range in which 95 of 100 of them would lie if the model were right.
+        false_alarms: How often something would be significant although the model were right.
+        biases: Median over conditions of model / real - 1, by measure; of measures that enough
+            conditions have.
+    """
+
+    scored: tuple[Scored, ...]
+    significant: tuple[Scored, ...]
+    rms: float
+    expected: tuple[float, float]
+    false_alarms: float
+    biases: dict[Measure, float]
+
+    @property
+    def biased(self) -> list[Measure]:
+        """The measures whose median bias is too large."""
+        return [m for m, bias in self.biases.items() if not abs(bias) < bias_limit(m)]
+
+    @property
+    def spread_is_right(self) -> bool:
+        """Whether the root mean square lies in the expected range."""
+        return self.expected[0] <= self.rms <= self.expected[1]
+
+    @property
+    def passes(self) -> bool:
+        """Whether all three hold."""
+        return not self.significant and self.spread_is_right and not self.biased
+
+
+def bias_limit(measure: Measure) -> float:
+    """How large a median bias may be."""
+    tail_of_age = measure.is_tail and measure.name.startswith(("age", "stale"))
+    return MAX_TAIL_BIAS if tail_of_age else MAX_BIAS
+
+
+def pool_variant(own: Pooled, variants: Sequence[Cell]) -> Pooled:
+    """A variant of the model by the measures, and in the standard errors, of the model itself.
+
+    So it cannot gain or lose by how much its own runs differ.
+
+    Args:
+        own: What the model as it is comes to.
+        variants: Cells of the variant; those that the model is not judged by are left out.
+    """
+    known = {(c.group.condition, c.measure): c for c in variants if len(c.predicted)}
+    scored = []
+    for each in own.scored:
+        cell = known.get((each.cell.group.condition, each.cell.measure))
+        if cell is not None:
+            z = (cell.model - cell.real) / each.error
+            scored.append(Scored(cell, z, each.error, float(two_sided(np.array([z]))[0])))
+    return _judged(scored, own.expected, own.false_alarms)
+
+
+def to_be_pooled(cells: Sequence[Cell]) -> list[Cell]:
+    """The cells that may be judged, say something, and differ from run to run."""
+    return [c for c in cells if not reason_against(c) and tells(c) and not is_steady(c)]
+
+
+def pool(judged: Sequence[Cell], rng: np.random.Generator) -> Pooled:
+    """Judge cells of pooled conditions together.
+
+    Args:
+        judged: What is compared; see `to_be_pooled`.
+        rng: Luck of the runs that take the sockets' place.
+    """
+    scored = [score(cell) for cell in judged]
+    null = null_scores(judged, rng)
+    rms = np.sqrt((null**2).mean(axis=1)) if judged else np.zeros(1)
+    low, high = np.percentile(rms, (2.5, 97.5))
+    alarms = [bool((holm(two_sided(row)) <= SIGNIFICANT).any()) for row in null]
+    return _judged(scored, (float(low), float(high)), float(np.mean(alarms)))
+
+
+def _judged(scored: Sequence[Scored], expected: tuple[float, float], false_alarms: float) -> Pooled:
+    """What scores come to."""
+    found = holm([s.p for s in scored]) <= SIGNIFICANT
+    offs = {m: [s.cell.off for s in scored if s.cell.measure == m] for m in MEASURES}
+    return Pooled(
+        tuple(scored),
+        tuple(s for s, is_significant in zip(scored, found, strict=True) if is_significant),
+        float(np.sqrt(np.mean([s.z**2 for s in scored]))) if scored else 0.0,
+        expected,
+        false_alarms,
+        {m: float(np.median(own)) for m, own in offs.items() if len(own) >= MIN_CONDITIONS},
+    )
+
+
+def tells(cell: Cell) -> bool:
+    """Whether a mean over runs says anything: defined nearly always, and not of rare events."""
+    runs = len(cell.group.runs)
+    if not len(cell.measured) or len(cell.predicted) < 2:
+        return False
+    if cell.measure.name in ("timeouts", "alerts"):
+        return runs * max(cell.model, cell.real) >= MIN_EVENTS
+    return len(cell.measured) >= MIN_SHARE * runs
+
+
+def is_steady(cell: Cell) -> bool:
+    """Whether runs differ less than the model can tell."""
+    return tells(cell) and chance(cell) < resolution(cell)
+
+
+def score(cell: Cell) -> Scored:
+    """z of one cell."""
+    error = standard_error(cell)
+    z = (cell.model - cell.real) / error
+    return Scored(cell, z, error, float(two_sided(np.array([z]))[0]))
+
+
+def standard_error(cell: Cell) -> float:
+    """Of the difference of the means: chance on both sides, and what cannot be told apart."""
+    return float(np.hypot(chance(cell), resolution(cell)))
+
+
+def chance(cell: Cell) -> float:
+    """Standard error of the difference of the means, by how much the model's runs differ."""
+    spread = float(cell.predicted.std(ddof=1))
+    return float(spread * np.sqrt(1 / len(cell.measured) + 1 / len(cell.predicted)))
+
+
+def resolution(cell: Cell) -> float:
+    """What half a millisecond more for each command would change."""
+    measure, condition = cell.measure, cell.group.condition
+    if measure.is_time:
+        return 1000.0 * EXACT_S
+    if measure.name == "applied_hz":
+        per_command = cell.real**2 * EXACT_S if condition.pattern == "req" else 0.0
+        return float(max(per_command, 1.0 / condition.dur_s / len(cell.group.runs)))
+    if measure.name == "queue":
+        return float(max(EXACT_S * condition.hz, 1e-6))
+    if measure.name == "delivered":
+        return 1.0 / (condition.hz * condition.dur_s * len(cell.group.runs))
+    return 1.0 / len(cell.group.runs)
+
+
+def null_scores(cells: Sequence[Cell], rng: np.random.Generator) -> Floats:
+    """z if runs of the model take the sockets' place, shape `(DRAWS, cells)`.
+
+    A condition's measures are taken from the same runs, so that they go together as they do;
+    the model's own mean is one of other runs, and what cannot be told apart is an offset.
+    """
+    luck: dict[Condition, tuple[NDArray[np.int64], NDArray[np.int64], Floats]] = {}
+    columns = []
+    for cell in cells:
+        runs, taken = len(cell.predicted), len(cell.group.runs)
+        own = luck.get(cell.group.condition)
+        if own is None:
+            picks = rng.integers(0, 1 << 30, size=(2, DRAWS, max(runs, taken)))
+            own = luck[cell.group.condition] = picks[0], picks[1], rng.normal(size=DRAWS)
+        sockets = cell.predicted[own[0][:, : len(cell.measured)] % runs].mean(axis=1)
+        model = cell.predicted[own[1][:, :runs] % runs].mean(axis=1)
+        columns.append((model - sockets + own[2] * resolution(cell)) / standard_error(cell))
+    return np.column_stack(columns) if columns else np.zeros((1, 0))
+
+
+def two_sided(z: Floats) -> Floats:
+    """Probability of such a z or a larger one, by the normal law."""
+    from scipy.special import ndtr
+
+    return np.asarray(2.0 * ndtr(-np.abs(z)))

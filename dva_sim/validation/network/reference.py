@@ -1,0 +1,203 @@
+"""What was measured on real sockets: the reference that is shipped, and what is made here.
+
+The document of the comparison: where measurements come from, and what is measured here.
+
+Our own conditions are a design: in each block every link meets every pair of programs.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated
+
+from pydantic import Field
+
+from dva_sim.kernel import resources
+from dva_sim.kernel.config import Config, load_yaml, validate
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.suggestions import unknown
+from dva_sim.network.condition import CONDITION, Condition
+
+FOLDER = "experiments/validation"
+NUMBERS = (
+    *("n_sent", "n_applied", "n_distinct", "send_hz", "applied_hz", "skip_frac", "first_seq"),
+    *("age_mean", "age_p50", "age_p95", "rtt_p50", "rtt_p95", "stale_p50", "stale_p95"),
+    *("timeouts", "alerts", "t_conn_ms", "t_hs_ms"),
+    *("emu_tail_ab", "emu_tail_ba", "emu_late_p99_ms"),
+)
+"""Columns of results that a table of measurements must have."""
+
+
+class SourceConfig(Config):
+    """A table of measurements and where it comes from.
+
+    Attributes:
+        file: CSV file, beside the document or by path.
+        made_with: Versions of what it was made with, and the machine.
+        independent: Groups of runs whose luck is their own; the others share one seed, so that
+            nothing can be said of them under loss. Left out: all of them.
+        realtime: Whether the emulated link had real-time priority where the table does not say.
+    """
+
+    file: str
+    made_with: dict[str, str]
+    independent: tuple[str, ...] | None = None
+    realtime: bool = False
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run on real sockets.
+
+    Attributes:
+        condition: What was set.
+        source: `reference` or `own`.
+        group: Block of the design it belongs to.
+        seed: Of the emulated link's luck.
+        independent: Whether no other condition had the same luck.
+        realtime: Whether the emulated link had real-time priority.
+        values: What was measured, by column; nan where it is not defined.
+    """
+
+    condition: Condition
+    source: str
+    group: str
+    seed: int
+    independent: bool
+    realtime: bool
+    values: Mapping[str, float]
+
+
+def load_runs(sources: Mapping[str, SourceConfig]) -> list[Run]:
+    """Every run of some tables, in their order.
+
+    Raises:
+        ConfigError: a table cannot be read, or something in it is not as it should be.
+    """
+    return [run for name, source in sources.items() for run in read_runs(name, source)]
+
+
+def read_runs(name: str, source: SourceConfig) -> list[Run]:
+    """The runs of one table.
+
+    Raises:
+        ConfigError: it cannot be read, or something in it is not as it should be.
+    """
+    path = resources.find(source.file, FOLDER, ".csv")
+    try:
+        with path.open(encoding="utf-8", newline="") as file:
+            rows = list(csv.DictReader(file))
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(f"cannot be read: {error}", str(path)) from None
+    missing = [c for c in ("group", "seed", *NUMBERS) if rows and c not in rows[0]]
+    if missing:
+        raise ConfigError(f"has no column {', '.join(missing)}", str(path))
+    return [_run(name, source, row, str(path), line) for line, row in enumerate(rows, start=2)]
+
+
+def _run(name: str, source: SourceConfig, row: dict[str, str], path: str, line: int) -> Run:
+    try:
+        condition = Condition.from_row(row)
+        values = {column: _number(row[column]) for column in NUMBERS}
+        seed = int(row["seed"])
+        realtime = bool(int(row["realtime"])) if row.get("realtime") else source.realtime
+    except (ConfigError, ValueError, KeyError) as error:
+        raise ConfigError(str(error), path, line, 1) from None
+    own = source.independent is None or row["group"] in source.independent
+    return Run(condition, name, row["group"], seed, own, realtime, values)
+
+
+def _number(text: str) -> float:
+    return float(text) if text else math.nan
+
+
+SHIPPED = "network"
+
+Settings = dict[str, float | int | str | bool]
+
+
+class BlockConfig(Config):
+    """Links and programs that are crossed.
+
+    Attributes:
+        group: Name of the block in the tables.
+        seeds: Runs of each condition, each with luck of its own.
+        settings: What is the same in the whole block, by column of a condition.
+        links: What lies between, by name.
+        programs: What the two ends do, by name.
+    """
+
+    group: str
+    seeds: Annotated[int, Field(ge=1, le=100)] = 1
+    settings: Settings = Field(default_factory=dict)
+    links: dict[str, Settings]
+    programs: dict[str, Settings]
+
+
+class OwnConfig(Config):
+    """Our own measurements.
+
+    Attributes:
+        table: The table that they are kept in, and how it was made; left out before there is one.
+        blocks: The design.
+    """
+
+    table: SourceConfig | None = None
+    blocks: tuple[BlockConfig, ...]
+
+
+class PlanConfig(Config):
+    """The whole document.
+
+    Attributes:
+        reference: The measurements that are shipped.
+        own: Those of our own campaign.
+    """
+
+    reference: SourceConfig
+    own: OwnConfig
+
+    @property
+    def sources(self) -> dict[str, SourceConfig]:
+        """The tables there are, by name."""
+        own = {"own": self.own.table} if self.own.table is not None else {}
+        return {"reference": self.reference} | own
+
+
+def load_plan(name: str = SHIPPED) -> PlanConfig:
+    """The document, by name or path.
+
+    Raises:
+        ConfigError: no such file, or a mistake in it, with its place.
+    """
+    document = load_yaml(resources.find(name, FOLDER))
+    plan = validate(PlanConfig, document.data, document.error)
+    try:
+        for block in plan.own.blocks:
+            conditions_of(block)
+    except ConfigError as error:
+        raise document.error(str(error), ("own", "blocks")) from None
+    return plan
+
+
+def conditions_of(block: BlockConfig) -> list[Condition]:
+    """Every link with every pair of programs.
+
+    Raises:
+        ConfigError: a setting that no condition has.
+    """
+    found = []
+    for link in block.links.values():
+        for programs in block.programs.values():
+            settings = {**block.settings, **link, **programs}
+            if odd := settings.keys() - set(CONDITION):
+                raise ConfigError(unknown("setting", min(odd), CONDITION))
+            try:
+                found.append(Condition.from_row(settings))
+            except TypeError:
+                problem = f"block {block.group!r} does not say which pattern and how many hz"
+                raise ConfigError(problem) from None
+    return found

@@ -1,0 +1,333 @@
+"""The comparison in rows: one for each condition to be read, one for each measure to be kept.
+
+What the comparison leaves behind: its rows, its words and its page.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from dva_sim.network.condition import Condition
+from dva_sim.validation.frame import Row, render, write_all
+from dva_sim.validation.network.comparison import Comparison
+from dva_sim.validation.network.figures import draw_all
+from dva_sim.validation.network.judging import (
+    BY_NAME,
+    KINDS,
+    MIN_INSIDE,
+    Cell,
+    Group,
+    Kind,
+    Verdict,
+    share_inside,
+)
+from dva_sim.validation.network.pooling import Pooled, Scored, bias_limit
+from dva_sim.validation.network.predict import depth_for
+
+HEADS = (
+    *("condition", "runs", "depth", "period [ms]", "age [ms]", "in force [ms]"),
+    *("round trip [ms]", "delivered", "queue", "time-outs", "alerts", "verdict"),
+)
+_COLUMNS = (("age_p50", "age_p95"), ("stale_p50", "stale_p95"), ("rtt_p50", "rtt_p95"))
+_ALONE = ("delivered", "queue", "timeouts", "alerts")
+
+
+def table(comparison: Comparison, kind: Kind) -> list[list[str]]:
+    """A row for each condition of a kind: measured, an arrow, predicted; and a verdict."""
+    cells = _by_condition(comparison)
+    misses = _misses(comparison)
+    return [
+        _line(group, cells[group.condition], misses.get(group.condition, []))
+        for group in comparison.groups
+        if group.kind == kind
+    ]
+
+
+def _line(group: Group, cells: Mapping[str, Cell], misses: Sequence[str]) -> list[str]:
+    period = cells.get("applied_hz")
+    shown = [_both(period, lambda rate: 1000 / rate if rate else math.inf)]
+    for pair in _COLUMNS:
+        shown.append(" | ".join(filter(None, (_both(cells.get(name)) for name in pair))))
+    shown += [_both(cells.get(name)) for name in _ALONE]
+    verdict = "passes" if not misses else f"misses {', '.join(misses)}"
+    depth = depth_for(group.condition)
+    return [group.condition.label, str(len(group.runs)), depth, *shown, verdict]
+
+
+def _both(cell: Cell | None, change: Any = lambda value: value) -> str:
+    """`105 → 106`, measured and predicted; nothing where neither is defined."""
+    if cell is None:
+        return ""
+    return f"{number(change(cell.real))} → {number(change(cell.model))}"
+
+
+def _by_condition(comparison: Comparison) -> dict[Condition, dict[str, Cell]]:
+    found: dict[Condition, dict[str, Cell]] = {}
+    for cell in _all_cells(comparison):
+        found.setdefault(cell.group.condition, {})[cell.measure.name] = cell
+    return found
+
+
+def _all_cells(comparison: Comparison) -> list[Cell]:
+    pooled = [scored.cell for scored in comparison.pooled.scored]
+    return [*(v.cell for v in comparison.verdicts), *pooled, *comparison.rarely]
+
+
+def _misses(comparison: Comparison) -> dict[Condition, list[str]]:
+    """The measures of each condition that lie outside, or are significantly off."""
+    found: dict[Condition, list[str]] = {}
+    for cell in _outside(comparison):
+        found.setdefault(cell.group.condition, []).append(cell.measure.name)
+    return found
+
+
+def _outside(comparison: Comparison) -> list[Cell]:
+    outside = [v.cell for v in comparison.verdicts if v.word == "outside"]
+    return outside + [scored.cell for scored in comparison.pooled.significant]
+
+
+def number(value: float) -> str:
+    """Four digits that count, without an exponent."""
+    if math.isnan(value):
+        return "–"
+    if math.isinf(value):
+        return "∞"
+    return f"{value:.0f}" if abs(value) >= 1000 else f"{value:.4g}"
+
+
+def rows_of(comparison: Comparison) -> list[Row]:
+    """A row for each measure of each condition."""
+    rows = [_row(v.cell) | _judged(v) for v in comparison.verdicts]
+    significant = {id(scored) for scored in comparison.pooled.significant}
+    rows += [_row(s.cell) | _scored(s, id(s) in significant) for s in comparison.pooled.scored]
+    return rows + [_row(cell) | _untold() for cell in comparison.rarely]
+
+
+def _row(cell: Cell) -> Row:
+    group = cell.group
+    row: Row = {"condition": group.condition.label, "cond_id": group.condition.hash}
+    row |= {"kind": group.kind, "groups": " ".join(sorted({run.group for run in group.runs}))}
+    row |= {"source": " ".join(sorted({run.source for run in group.runs}))}
+    row |= {"depth": depth_for(group.condition), "measure": cell.measure.name}
+    row |= {"unit": cell.measure.unit, "runs": len(cell.measured)}
+    row |= {"model_runs": len(cell.predicted)}
+    return row | {"measured": _known(cell.real), "predicted": _known(cell.model)}
+
+
+def _judged(verdict: Verdict) -> Row:
+    low, high = _known(verdict.low), _known(verdict.high)
+    row: Row = {"low": low, "high": high, "z": None, "p": None}
+    return row | {"verdict": verdict.word, "why": verdict.why}
+
+
+def _scored(scored: Scored, significant: bool) -> Row:
+    row: Row = {"low": None, "high": None, "z": scored.z, "p": scored.p}
+    return row | {"verdict": "outside" if significant else "inside", "why": ""}
+
+
+def _untold() -> Row:
+    row: Row = {"low": None, "high": None, "z": None, "p": None}
+    return row | {"verdict": "shown only", "why": "tells too little"}
+
+
+def _known(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def variant_rows(comparison: Comparison) -> list[Row]:
+    """Root mean square of z of each variant, over all measures and for each."""
+    found = {"nothing": comparison.pooled, **comparison.controls, **comparison.ablated}
+    return [
+        {
+            "left_out": name,
+            "rms_z": pooled.rms,
+            "expected_low": pooled.expected[0],
+            "expected_high": pooled.expected[1],
+            "significant": len(pooled.significant),
+            "compared": len(pooled.scored),
+            **{f"bias_{m}": pooled.biases.get(measure) for m, measure in BY_NAME.items()},
+        }
+        for name, pooled in found.items()
+    ]
+
+
+NAME = "network"
+FEW_SINGLES = 20
+SUMMARY_HEADS = ("what", "found", "asked for", "verdict")
+ABLATION_HEADS = ("left out, or instead", "RMS z", "expected", "significant")
+TITLES: dict[Kind, str] = {
+    "lossless": "Without loss, load below 0.95",
+    "overload": "Overload without loss",
+    "single": "Single runs under loss",
+    "pooled": "Pooled runs under loss, at least six seeds each",
+}
+TOLD: dict[Kind, str] = {
+    "lossless": "without loss, within the bands",
+    "overload": "overload, within the bands",
+    "single": "single runs under loss, within the model's 95 % intervals",
+    "pooled": "pooled under loss, where runs hardly differ: within the bands",
+}
+
+
+def write(folder: Path, comparison: Comparison, conditions: Mapping[str, str]) -> Path:
+    """Write everything; the page's path.
+
+    Args:
+        folder: Made if it is not there.
+        comparison: What was found.
+        conditions: What the page says of how.
+
+    Raises:
+        DvaSimError: the folder cannot be written.
+    """
+    drawn = draw_all(comparison)
+    page = render(
+        "validation-network.html.j2",
+        drawn,
+        headline=headline(comparison),
+        notes=notes(comparison),
+        fails=not comparison.passes,
+        conditions=conditions,
+        summary=summary(comparison),
+        ablation=ablation(comparison),
+        heads=HEADS,
+        groups=[(TITLES[kind], table(comparison, kind)) for kind in KINDS],
+        left_out=left_out(comparison),
+    )
+    kept = {NAME: rows_of(comparison)}
+    if comparison.controls or comparison.ablated:
+        kept["variants"] = variant_rows(comparison)
+    return write_all(folder, kept, drawn, page)
+
+
+def headline(comparison: Comparison) -> str:
+    """What it comes to, in two sentences."""
+    judged = comparison.judged
+    counts = ", ".join(
+        f"{sum(g.kind == kind for g in judged)} {words}"
+        for kind, words in zip(
+            KINDS, ("without loss", "overloaded", "single", "pooled"), strict=True
+        )
+    )
+    verdict = "passes" if comparison.passes else "fails"
+    return f"{len(judged)} conditions are judged ({counts}). The model {verdict}."
+
+
+def notes(comparison: Comparison) -> list[str]:
+    """What is missing, and what was found out."""
+    found = []
+    every, pooled = comparison.missing
+    if every or pooled:
+        found.append(
+            f"Wanted beyond these: {every} more conditions, {pooled} more pooled under loss. "
+            "`dva-sim validate network --measure FILE` makes them."
+        )
+    if comparison.pooled.scored:
+        chance = 100 * comparison.pooled.false_alarms
+        found.append(
+            f"If the model were right, something would still be significant in {chance:.0f} % "
+            "of such comparisons."
+        )
+    singles = sum(group.kind == "single" for group in comparison.judged)
+    if 0 < singles < FEW_SINGLES:
+        found.append(
+            f"Of single runs under loss there are only {singles}: the measures of a run go "
+            "together, so an unlucky one counts for many."
+        )
+    if comparison.rarely:
+        found.append(
+            f"{len(comparison.rarely)} measures of pooled conditions are left out: too rare, or "
+            "not defined in most runs."
+        )
+    return found
+
+
+def summary(comparison: Comparison) -> list[tuple[str, str, str, str]]:
+    """Each criterion: what, found, asked for, verdict."""
+    rows = []
+    for kind in KINDS:
+        inside, judged = share_inside(comparison.of_kind(kind))
+        if judged:
+            least = f"{100 * MIN_INSIDE:.0f} %" if kind == "single" else "all"
+            share = f"{inside} of {judged} ({100 * inside / judged:.1f} %)"
+            rows.append((TOLD[kind], share, least, _passes(comparison.passes_bands(kind))))
+    if comparison.pooled.scored:
+        rows += _pooled_rows(comparison.pooled)
+    for name, pooled in comparison.controls.items():
+        found = f"RMS z {pooled.rms:.1f}, {len(pooled.significant)} significant"
+        verdict = "fooled us" if pooled.passes else "found out"
+        rows.append((f"control: {name}", found, "to be found out", verdict))
+    return rows
+
+
+def _pooled_rows(pooled: Pooled) -> list[tuple[str, str, str, str]]:
+    low, high = pooled.expected
+    count = len(pooled.scored)
+    rows = [
+        (
+            "pooled under loss, significant after Holm",
+            f"{len(pooled.significant)} of {count}",
+            "none",
+            _passes(not pooled.significant),
+        ),
+        (
+            "pooled under loss, root mean square of z",
+            f"{pooled.rms:.2f}",
+            f"{low:.2f} to {high:.2f}",
+            _passes(pooled.spread_is_right),
+        ),
+    ]
+    if pooled.biases:
+        worst = max(pooled.biases, key=lambda m: abs(pooled.biases[m]) / bias_limit(m))
+        bias = f"{100 * pooled.biases[worst]:+.1f} % ({worst.words})"
+        asked = f"below {100 * bias_limit(worst):.0f} %"
+        what = "pooled under loss, worst median bias"
+        rows.append((what, bias, asked, _passes(not pooled.biased)))
+    return rows
+
+
+def ablation(comparison: Comparison) -> list[tuple[str, str, str, str]]:
+    """Root mean square of z with something left out, the worst first."""
+    own = comparison.pooled
+    found = {"nothing": own, **comparison.controls, **comparison.ablated}
+    if not comparison.ablated:
+        return []
+    ordered = sorted(found.items(), key=lambda item: -item[1].rms)
+    return [
+        (
+            name,
+            f"{pooled.rms:.2f}",
+            f"{own.expected[0]:.2f} to {own.expected[1]:.2f}",
+            f"{len(pooled.significant)} of {len(pooled.scored)}",
+        )
+        for name, pooled in ordered
+    ]
+
+
+def left_out(comparison: Comparison) -> list[tuple[str, str]]:
+    """Why conditions were not judged, and how many."""
+    reasons: dict[str, list[str]] = {}
+    for group in comparison.left_out:
+        reasons.setdefault(group.left_out, []).append(group.condition.label)
+    return [(why, _some(labels)) for why, labels in reasons.items()]
+
+
+def _some(labels: Sequence[str]) -> str:
+    return f"{len(labels)} conditions" if len(labels) > 12 else ", ".join(labels)
+
+
+def _passes(passes: bool) -> str:
+    return "passes" if passes else "fails"
+
+
+def worst(comparison: Comparison, count: int) -> list[str]:
+    """The largest z, in words."""
+    ordered = sorted(comparison.pooled.scored, key=lambda s: -abs(s.z))[:count]
+    return [
+        f"{s.cell.group.condition.label} {s.cell.measure.name}: measured "
+        f"{number(s.cell.real)}, predicted {number(s.cell.model)}, z {s.z:.1f}"
+        for s in ordered
+    ]

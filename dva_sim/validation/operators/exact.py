@@ -1,0 +1,115 @@
+"""Fires, alarms, walkers, plumes and helpers, asked for the numbers of standards and textbooks.
+
+Answers that nobody measured on persons: theory, the dissertation's app, standards.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dva_sim.agents.people.profiles import GuardProfile, Walker
+from dva_sim.kernel import resources
+from dva_sim.kernel.config import load_yaml, validate
+from dva_sim.kernel.streams import Streams
+from dva_sim.simulation.shift import scenario as timed
+from dva_sim.simulation.shift import simulate_timed
+from dva_sim.validation.operators import delayed_loops
+from dva_sim.worlds.hazards import GROWTH_S, Fire
+from dva_sim.worlds.hazards.detectors import CoAlarm
+from dva_sim.worlds.hazards.fire import FULL_GROWTH_KW
+from dva_sim.worlds.hazards.gas_dispersion import sigma_y
+
+Values = dict[str, float]
+Floats = NDArray[np.float64]
+
+PERSONS = 20_000
+HELP = "outside-help"
+HELP_S = 2.4e7  # simulated of it: some 6600 calls of each kind
+LATEST = 8 * 3600.0  # no alarm within a shift is none [s]
+PPM = (30, 50, 100, 300)
+
+
+def fires() -> Values:
+    """When each class of fire has grown to 1055 kW [s]."""
+    times = np.arange(0.0, 700.0, 0.05)
+    found = {}
+    for growth in GROWTH_S:
+        heat = np.array([Fire((0.0, 0.0), 0.0, growth).heat_release(float(t)) for t in times])
+        found[growth] = float(times[np.argmax(heat >= FULL_GROWTH_KW * (1.0 - 1e-9))])
+    return found
+
+
+def helpers(seed: int) -> Values:
+    """The times within which nine in ten turn out, and arrive [s].
+
+    Turnout to a fire is that of the guards, to a patient that of an ambulance, which drives.
+    """
+    document = load_yaml(resources.find(HELP, "experiments/scenarios"))
+    recording = simulate_timed(timed.build(document, {"horizon_s": HELP_S}), seed)
+    row, names = recording.columns, recording.streams
+    came = np.isfinite(row["arrived"])
+    assigned, departed, arrived = (
+        np.asarray(row[name][came], dtype=float) for name in ("assigned", "departed", "arrived")
+    )
+    turnout, travel = departed - assigned, arrived - departed
+    stream = np.asarray(names)[row["stream"][came].astype(int)]
+    rng, guard = Streams(seed).fresh("guards"), _guard()
+    guards = np.array([Walker.draw(guard, rng).mobilisation for _ in range(PERSONS)])
+    return {
+        "turnout-fire": _nine_in_ten(guards),
+        "turnout-ems": _nine_in_ten(turnout[stream == "patients"]),
+        "travel": _nine_in_ten(travel),
+    }
+
+
+def alarms() -> Values:
+    """When a carbon monoxide alarm sounds in air of so many ppm [min]; never: infinite."""
+    return {str(ppm): _alarm_time(float(ppm)) / 60.0 for ppm in PPM}
+
+
+def walkers(seed: int) -> Values:
+    """Mean and standard deviation of the free walking speed of guards [m/s]."""
+    rng, guard = Streams(seed).fresh("walkers"), _guard()
+    speeds = [Walker.draw(guard, rng).speed for _ in range(PERSONS)]
+    return {"mean": float(np.mean(speeds)), "sd": float(np.std(speeds, ddof=1))}
+
+
+def plumes() -> Values:
+    """Width of a plume 1 km downwind by stability class [m]."""
+    return {stability: sigma_y(stability, 1000.0) for stability in "ABCDEF"}
+
+
+def _guard() -> GuardProfile:
+    document = load_yaml(resources.find("guard", "agents/people"))
+    return validate(GuardProfile, document.data, document.error)
+
+
+def _nine_in_ten(times: Floats) -> float:
+    return float(np.quantile(times, 0.9))
+
+
+def _alarm_time(ppm: float) -> float:
+    alarm, dt = CoAlarm(), 1.0
+    steps = round(LATEST / dt)
+    return next(((n + 1) * dt for n in range(steps) if alarm.add(ppm, dt)), np.inf)
+
+
+SMITH = 4.0, 0.5, 1.5  # gain [1/s], delay [s] and time of the look at it [s]
+
+EXACT: dict[str, Callable[[int], Values]] = {
+    "S1": lambda seed: {"critical": delayed_loops.critical(delayed_loops.integrator, 1.0, 2.2)},
+    "S2": lambda seed: {"critical": delayed_loops.critical(delayed_loops.pure_pursuit, 0.3, 0.8)},
+    "S3": lambda seed: {"response": delayed_loops.smith_response(*SMITH)[-1]},
+    "S4": lambda seed: delayed_loops.ages(),
+    "S5": lambda seed: delayed_loops.steps(),
+    "S6": delayed_loops.smoothing,
+    "S16": lambda seed: fires(),
+    "S16b": helpers,
+    "S16c": lambda seed: alarms(),
+    "S16d": walkers,
+    "S16e": lambda seed: plumes(),
+}
+"""How each exact check is simulated, given the seed of all luck."""

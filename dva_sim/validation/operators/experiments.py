@@ -1,0 +1,248 @@
+"""Published experiments: which task is played under which conditions, and how it is aggregated.
+
+Each aggregates as the publication did: means over all persons, lines through the means of
+conditions. How, was settled before anything was compared.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from dva_sim.simulation.task.measures import fit_line
+from dva_sim.validation.operators.judging import Cells, Floats, Trials, Values, mean, person_means
+
+FOLDER = "experiments/scenarios/tasks"
+
+LAGS_S = {"8.3": 0.0, "25": 1 / 60, "75": 4 / 60, "225": 13 / 60}  # by the lag's name [ms]
+SHORTEST_LAG = "8.3"  # half a frame
+PUBLISHED_LAGS = ("8.3", "25", "75")
+AT_BITS = 4.0
+GAINS = {25: 0.2435, 50: 0.487, 100: 0.974, 200: 1.948}  # pixels/s per degree: [m/s per rad]
+PUBLISHED_GAIN = 50
+SELECTIONS = {"first-entry": "first_entry", "dwell": "dwell"}
+LATENCY_S = 0.05  # of the machine in the steering experiment; assumed
+STEP_S = 1.0 / 60.0
+FEWEST_WAITS = 0.5  # in a trial on average; who waits less does not move and wait
+WAITS_S = (1.0, 1.5, 2.0, 2.5, 3.2)
+EXCAVATOR_S = 1.5
+FRAME_RATES = (5, 10, 20, 60)
+FRAME_DELAYS_S = (0.0, 0.1, 0.2, 0.3)
+_NOTHING = 1e-9  # times that differ by less are the same [s]
+_C = np.linspace(0.0, 6.0, 121)  # tried for the collapse
+TRIED = {"S15/c": (float(_C[0]), float(_C[-1]))}  # from where to where a value was looked for
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """A published experiment.
+
+    Attributes:
+        name: Of the experiment.
+        scenario: The task, by name.
+        cells: What is changed in each cell that the task itself does not cross.
+        measure: From the trials to the value of each line.
+        quick: What is changed besides for a quick look.
+    """
+
+    name: str
+    scenario: str
+    cells: Mapping[str, Mapping[str, Any]]
+    measure: Callable[[Cells], Values]
+    quick: Mapping[str, Any] = field(default_factory=dict)
+
+
+# --- pointing under lag: MacKenzie & Ware 1993 -----------------------------------------------
+def lag_values(cells: Cells) -> Values:
+    """Ratios of mean movement times, what a millisecond of lag costs at 4 bits, the times [ms]."""
+    times = {lag: mean(trials, "movement_time_s") for lag, trials in cells.items()}
+    ratio = {lag: time / times[SHORTEST_LAG] for lag, time in times.items()}
+    values = {"S7/25": ratio["25"], "S7/75": ratio["75"], "S8/slope": lag_slope(cells)}
+    return values | {f"S7/time-{lag}": 1000.0 * times[lag] for lag in PUBLISHED_LAGS}
+
+
+def lag_slope(cells: Cells) -> float:
+    """The publication's model, MT = a + (b + c LAG) ID, through the means; 4 c [ms/ms]."""
+    rows = [
+        (1.0, bits, bits * float(lag), 1000.0 * float(some["movement_time_s"].mean()))
+        for lag, trials in cells.items()
+        for (bits,), some in trials.by("id_bits")
+    ]
+    *design, times = np.array(rows).T
+    return float(AT_BITS * np.linalg.lstsq(np.column_stack(design), times, rcond=None)[0][2])
+
+
+# --- pointing by tilt: MacKenzie & Teather 2012 ----------------------------------------------
+def tilt_cell(gain: int, selection: str) -> str:
+    """Name of a cell."""
+    return f"{gain}/{selection}"
+
+
+def tilt_values(cells: Cells) -> Values:
+    """Throughput at a gain of 50, the best gain, and the range of the largest tilts."""
+    values = {f"S9/{s}": throughput(cells[tilt_cell(PUBLISHED_GAIN, s)]) for s in SELECTIONS}
+    times = [
+        np.mean([mean(cells[tilt_cell(g, s)], "movement_time_s") for s in SELECTIONS])
+        for g in GAINS
+    ]
+    tilts = [np.degrees(mean(trials, "tilt_max_rad")) for trials in cells.values()]
+    values["S10/best"] = float(list(GAINS)[int(np.argmin(times))])
+    return values | {"S10/least-tilt": float(min(tilts)), "S10/most-tilt": float(max(tilts))}
+
+
+def throughput(trials: Trials) -> float:
+    """Bits per second: of each person and condition, then the mean of all.
+
+    Selections cannot miss here, so the index is the nominal one.
+    """
+    rates = []
+    for (bits,), some in trials.by("id_bits"):
+        rates.append(bits / person_means(some, "movement_time_s"))
+    return float(np.mean(np.concatenate(rates)))
+
+
+# --- steering: Wang et al. 2021; latency of steering -----------------------------------------
+def steering_values(cells: Cells) -> Values:
+    """How straight mean and variance of the movement time are in ID and its square."""
+    ids, means, variances = steering_points(cells["tunnel"])
+    return {
+        "S11/mean": fit_line(ids, means).r2,
+        "S11/variance": fit_line(ids**2, variances).r2,
+    }
+
+
+def steering_points(trials: Trials) -> tuple[Floats, Floats, Floats]:
+    """Of each index of difficulty: it, mean [s] and variance [s^2] over all trials of all."""
+    rows = [
+        (key, some["movement_time_s"].mean(), some["movement_time_s"].var(ddof=1))
+        for (key,), some in trials.by("steering_id")
+    ]
+    ids, means, variances = np.array(rows).T
+    return ids, means, variances
+
+
+def latency_values(cells: Cells) -> Values:
+    """Ratios of mean movement times of steering."""
+    times = {name: mean(trials, "movement_time_s") for name, trials in cells.items()}
+    return {f"S12/{name}": times[name] / times["as it is"] for name in ("less", "more")}
+
+
+# --- waiting for what one has done: Ferrell 1965, an excavator -------------------------------
+def wait_values(cells: Cells) -> Values:
+    """How straight completion times are in the delay, and their slope less the waits.
+
+    The slope of who does not wait says nothing of move-and-wait.
+    """
+    delays = [float(name) for name in cells]
+    times = [mean(trials, "movement_time_s") for trials in cells.values()]
+    line = fit_line(delays, times)
+    waits = float(np.mean([mean(trials, "waits") for trials in cells.values()]))
+    straight = line.r2 if np.ptp(times) >= _NOTHING else math.nan  # nothing there to explain
+    beyond = line.slope - waits if waits >= FEWEST_WAITS else math.nan
+    return {"S13/linear": straight, "S13/slope": beyond}
+
+
+def excavator_values(cells: Cells) -> Values:
+    """What the delay adds, as a share."""
+    late, prompt = (mean(cells[name], "movement_time_s") for name in (str(EXCAVATOR_S), "0"))
+    return {"S17/increase": late / prompt - 1.0}
+
+
+# --- shown only: tracking and frame rate -----------------------------------------------------
+def tracking_values(cells: Cells) -> Values:
+    """Means over persons of what is read off their open loops."""
+    trials = cells["tracking"]
+    crossover, margin = mean(trials, "crossover_rad_s"), mean(trials, "phase_margin_deg")
+    return {"S14/crossover": crossover, "S14/margin": margin}
+
+
+def frame_cell(rate: int, delay: float) -> str:
+    """Name of a cell."""
+    return f"{rate}/{delay:g}"
+
+
+def frame_points(cells: Cells) -> tuple[Floats, Floats, Floats]:
+    """Delay [s], time between frames [s] and mean movement time [s] of each cell."""
+    keys = [name.split("/") for name in cells]
+    delays = np.array([float(delay) for _, delay in keys])
+    gaps = np.array([1.0 / float(rate) for rate, _ in keys])
+    return delays, gaps, np.array([mean(t, "movement_time_s") for t in cells.values()])
+
+
+def frame_values(cells: Cells) -> Values:
+    """The share of the time between frames that acts as delay, if times lie on one parabola."""
+    delays, gaps, times = frame_points(cells)
+    fits = [_parabola(delays + c * gaps, times) for c in _C]
+    best = int(np.argmax(fits))  # the first of all if none is a number
+    return {"S15/c": float(_C[best]), "S15/collapse": fits[best]}
+
+
+def _parabola(x: Floats, y: Floats) -> float:
+    """R2 of the least-squares parabola; nan where nothing varies that could be explained."""
+    if np.ptp(y) < _NOTHING:
+        return math.nan
+    rest = y - np.polyval(np.polyfit(x, y, 2), x)
+    return 1.0 - float(rest.var() / y.var())
+
+
+# --- all of them -----------------------------------------------------------------------------
+LATE = "link.down.delay_s"
+
+
+def _tilt_cells() -> dict[str, dict[str, Any]]:
+    return {
+        tilt_cell(gain, name): {"device.gain": scale, "task.selection": selection}
+        for gain, scale in GAINS.items()
+        for name, selection in SELECTIONS.items()
+    }
+
+
+def _frame_cells() -> dict[str, dict[str, Any]]:
+    return {
+        frame_cell(rate, delay): {"frames.rate_hz": rate, LATE: delay}
+        for rate in FRAME_RATES
+        for delay in FRAME_DELAYS_S
+    }
+
+
+def _both_ways(delay: float) -> dict[str, Any]:
+    return {"link.up.delay_s": 0.5 * delay, LATE: 0.5 * delay}
+
+
+_ONE = {"trials": 1, "practice": 1}  # of each of many conditions
+_TWO = {"trials": 2, "practice": 1}
+_FEW = {"trials": 3, "practice": 1}
+
+EXPERIMENTS: tuple[Experiment, ...] = (
+    Experiment("lag", "fitts-lag", {lag: {LATE: s} for lag, s in LAGS_S.items()}, lag_values, _ONE),
+    Experiment("tilt", "fitts-tilt", _tilt_cells(), tilt_values, _TWO),
+    Experiment("steering", "steering-law", {"tunnel": {}}, steering_values, _TWO),
+    Experiment(
+        "latency",
+        "steering-law",
+        {
+            "less": {LATE: LATENCY_S - STEP_S},
+            "as it is": {LATE: LATENCY_S},
+            "more": {LATE: LATENCY_S + STEP_S},
+        },
+        latency_values,
+        _ONE,
+    ),
+    Experiment(
+        "waiting", "move-and-wait", {f"{s:g}": _both_ways(s) for s in WAITS_S}, wait_values, _FEW
+    ),
+    Experiment(
+        "excavator",
+        "excavator",
+        {"0": {LATE: 0.0}, str(EXCAVATOR_S): {LATE: EXCAVATOR_S}},
+        excavator_values,
+        _ONE,
+    ),
+    Experiment("tracking", "tracking", {"tracking": {}}, tracking_values),
+    Experiment("frames", "frame-rate", _frame_cells(), frame_values, _ONE),
+)
+"""Every experiment; which of them may be fitted to, the split file says."""

@@ -1,0 +1,320 @@
+"""Upright surfaces of a site, and which of them a camera's columns of pixels meet.
+
+One ray for each column is enough: walls are upright, so all pixels of a column that show the
+same surface are equally far away.
+
+Which room is where on a site, and the colour that each is known by.
+"""
+
+from __future__ import annotations
+
+import colorsys
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from dva_sim.worlds.geo import Pose
+from dva_sim.worlds.layout import Site
+from dva_sim.worlds.site_parts import DOOR_HEIGHT
+
+Floats = NDArray[np.float32]
+Ints = NDArray[np.intp]
+
+SOLID_HEIGHT = 1.8  # of shelves and machines [m], assumed
+POSTS = 4  # upright parts of a door frame
+POST = 0.08  # width of a door post [m]
+REVEAL = 0.07  # how far a door frame stands out of the wall on both sides [m]
+SHORT = 0.6  # shorter pieces of wall, as bare maps have them, make no corners [m]
+HANGING = 0.04  # so much behind a wall it still counts as on it [m]
+NEAR = 0.05  # what is nearer to the lens is cut off [m]
+FAR = 80.0  # what is farther away is not looked for [m]
+
+WALL, FRAME, LINTEL, SOLID, LEAF, NOTHING = range(6)
+
+
+class Hits(NamedTuple):
+    """Surfaces met by columns, one entry for each pair `(n,)`.
+
+    Attributes:
+        column: Which column of the picture.
+        surface: Which surface.
+        depth: How far ahead of the lens, along its axis [m].
+        along: Where on the surface, from its first end [m].
+    """
+
+    column: Ints
+    surface: Ints
+    depth: Floats
+    along: Floats
+
+    def where(self, choice: NDArray[Any]) -> Hits:
+        """Some of them, by mask or by index."""
+        return Hits(*(values[choice] for values in self))
+
+
+class Surfaces:
+    """Walls, door frames, lintels and the sides of solids.
+
+    Args:
+        site: Whose.
+
+    Attributes:
+        ends: x1, y1, x2, y2 of each, shape `(n, 4)` [m].
+        kind: `WALL`, `FRAME`, `LINTEL`, `SOLID` or the `LEAF` of a shut door; the last one is
+            `NOTHING`, without height.
+        low: Height of the lower edge [m].
+        high: Height of the upper edge [m].
+        light: How bright its orientation makes it, 0 to 1.
+        door: Which door a lintel belongs to, -1 for others.
+        length: [m].
+        dark_ends: Where the shade of a corner begins and ends `(n, 2)` [m]; doors make none.
+    """
+
+    def __init__(self, site: Site) -> None:
+        walls = np.asarray(site.walls, dtype=np.float64).reshape(-1, 4)
+        solid = _sides_of_solids(site, walls)
+        doors, tall = doorways(site)
+        frames = np.vstack([_frame(door) for door in doors]) if len(doors) else doors
+        nothing = np.array([[0.0, 0.0, 1.0, 0.0]])
+        shut = _shut(doors, walls)
+        leaves = _inset(doors[shut])
+        parts = [walls[~solid], frames, doors, walls[solid], leaves, nothing]
+        heights = (site.ceiling, 0, 0, SOLID_HEIGHT, 0, 0)
+        counts = [len(part) for part in parts]
+        self.ends: Floats = np.vstack(parts).astype(np.float32)
+        self.kind = np.repeat(np.arange(6), counts)
+        self.low: Floats = np.zeros(len(self.kind), dtype=np.float32)
+        self.high: Floats = np.repeat(np.array(heights, dtype=np.float32), counts)
+        self.high[self.kind == FRAME] = np.repeat(tall, POSTS)
+        self.high[self.kind == LEAF] = tall[shut]
+        self.low[self.kind == LINTEL] = tall
+        self.high[self.kind == LINTEL] = site.ceiling
+        self.door = np.full(len(self.kind), -1)
+        self.door[self.kind == LINTEL] = np.arange(len(doors))
+        dx, dy = self.ends[:, 2] - self.ends[:, 0], self.ends[:, 3] - self.ends[:, 1]
+        self.length: Floats = np.hypot(dx, dy)
+        # Light as from high windows in the south-west: walls of the two directions differ.
+        across = np.abs(np.cos(np.arctan2(dy, dx) - 0.35))
+        self.light: Floats = (0.74 + 0.24 * across).astype(np.float32)
+        self.dark_ends = self._dark_ends(doors)
+        self._full = self.kind == WALL
+        # A shut door hangs on its wall; what stands against a wall does not show through it.
+        self._slack = np.where(self.kind == SOLID, -HANGING / 4, HANGING).astype(np.float32)
+
+    def _dark_ends(self, doors: NDArray[np.float64]) -> Floats:
+        """Places of the corners along each surface; far away where there is none."""
+        places = np.stack([np.zeros_like(self.length), self.length], axis=1)
+        if len(doors):
+            jambs = doors.reshape(-1, 1, 1, 2)
+            gaps = np.hypot(*np.moveaxis(self.ends.reshape(1, -1, 2, 2) - jambs, -1, 0))
+            places[gaps.min(axis=0) < 0.2] = -FAR
+        places[(self.kind == LINTEL) | (self.length < SHORT)] = -FAR
+        return places.astype(np.float32)
+
+    def hits(self, pose: Pose, slopes: Floats) -> tuple[Hits, Hits]:
+        """What the columns meet: the nearest wall of each, and what stands before it.
+
+        Args:
+            pose: Of the lens [m, rad].
+            slopes: How far to the right per metre ahead each column looks, rising `(w,)`.
+
+        Returns:
+            The nearest wall of each column, `NOTHING` where there is none; and all lower or
+            hanging surfaces before it, the farthest first.
+        """
+        met = self._all_hits(pose, slopes)
+        full = self._full[met.surface]
+        walls = met.where(full)
+        order = np.argsort(-walls.depth, kind="stable")
+        nearest = np.full(len(slopes), len(walls.depth))
+        nearest[walls.column[order]] = order  # of a column, the nearest is written last
+        columns = np.arange(len(slopes))
+        walls = Hits(
+            columns,
+            np.r_[walls.surface, len(self.kind) - 1][nearest],
+            np.r_[walls.depth, np.float32(FAR)][nearest],
+            np.r_[walls.along, np.float32(0)][nearest],
+        )
+        reach = walls.depth[met.column] + self._slack[met.surface]
+        before = met.where(~full & (met.depth < reach))
+        return walls, before.where(np.argsort(-before.depth, kind="stable"))
+
+    def _all_hits(self, pose: Pose, slopes: Floats) -> Hits:
+        """Every pair of a surface and a column that meets it."""
+        cos, sin = math.cos(pose.heading), math.sin(pose.heading)
+        turn = np.array([[cos, sin], [sin, -cos]], dtype=np.float32)  # ahead, to the right
+        ends = (self.ends - np.array([pose.x, pose.y] * 2, dtype=np.float32)).reshape(-1, 2)
+        local = (ends @ turn.T).reshape(-1, 4)
+        ahead = (np.maximum(local[:, 0], local[:, 2]) > NEAR) & (
+            np.minimum(local[:, 0], local[:, 2]) < FAR
+        )
+        ahead[-1] = False
+        index = np.flatnonzero(ahead)
+        first, last, det, step = _spans(local[index], slopes)
+        seen = (last > first) & (np.abs(det) > 1e-6)
+        index, first, last, det, step = (v[seen] for v in (index, first, last, det, step))
+        count = last - first
+        which = np.repeat(np.arange(len(index)), count)
+        column = np.arange(len(which)) - np.repeat(np.cumsum(count) - count - first, count)
+        z1, t1 = local[index, 0][which], local[index, 1][which]
+        slope, (dz, dt) = slopes[column], (step[which, 0], step[which, 1])
+        # The ray t = slope z meets the line (z1, t1) + s (dz, dt).
+        closing = dt - slope * dz
+        depth = det[which] / closing
+        surface = index[which]
+        along = (slope * z1 - t1) / closing * self.length[surface]
+        return Hits(column, surface, depth, along)
+
+
+def _spans(local: Floats, slopes: Floats) -> tuple[Any, ...]:
+    """First and last column of each surface, cut off at the lens."""
+    z1, t1, z2, t2 = local.T
+    dz, dt = z2 - z1, t2 - t1
+    det = z1 * dt - t1 * dz
+    with np.errstate(divide="ignore", invalid="ignore"):
+        cut1 = np.where(z1 < NEAR, t1 + (NEAR - z1) / dz * dt, t1) / np.maximum(z1, NEAR)
+        cut2 = np.where(z2 < NEAR, t2 + (NEAR - z2) / dz * dt, t2) / np.maximum(z2, NEAR)
+    first = np.searchsorted(slopes, np.minimum(cut1, cut2))
+    last = np.searchsorted(slopes, np.maximum(cut1, cut2))
+    return first, last, det, np.stack([dz, dt], axis=1)
+
+
+def _sides_of_solids(site: Site, walls: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which walls are sides of solids, not of rooms."""
+    corners = {
+        corner for solid in site.solids for corner in map(tuple, np.round(solid, 3).tolist())
+    }
+    ends = np.round(walls, 3).tolist()
+    return np.array([(a, b) in corners and (c, d) in corners for a, b, c, d in ends], dtype=bool)
+
+
+def doorways(site: Site) -> tuple[NDArray[np.float64], Floats]:
+    """Doors and exits: ends x1, y1, x2, y2, shape `(n, 4)` [m], and heights `(n,)` [m]."""
+    exits = [way.ends for way in site.exits]
+    ends = np.vstack([np.reshape(site.doors, (-1, 4)), np.reshape(exits, (-1, 4))])
+    heights = site.door_heights or (DOOR_HEIGHT,) * len(site.doors)
+    return ends, np.array([*heights, *(DOOR_HEIGHT for _ in exits)], dtype=np.float32)
+
+
+def _shut(doors: NDArray[np.float64], walls: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which doors have a wall right across them: ways out that nobody drives through `(n,)`."""
+    import shapely
+
+    lines: Any = shapely.linestrings(walls.reshape(-1, 2, 2))
+    middles: Any = shapely.points((doors[:, :2] + doors[:, 2:]) / 2)
+    gaps = shapely.distance(middles[:, None], lines[None, :])
+    return np.asarray(gaps.min(axis=1, initial=np.inf) < HANGING)
+
+
+def _inset(doors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The leaves of doors, between their posts."""
+    along = doors[:, 2:] - doors[:, :2]
+    along = along / np.maximum(np.hypot(*along.T), 1e-6)[:, None] * POST
+    return np.hstack([doors[:, :2] + along, doors[:, 2:] - along])
+
+
+def _frame(door: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Posts of a door: across its line and along it, at both ends `(4, 4)` [m]."""
+    a, b = door[:2], door[2:]
+    along = (b - a) / max(float(np.hypot(*(b - a))), 1e-6)
+    across = np.array([-along[1], along[0]]) * REVEAL
+    posts = []
+    for end, inward in ((a, along), (b, -along)):
+        edge = end + inward * POST
+        posts += [np.r_[edge - across, edge + across], np.r_[end, edge]]
+    return np.array(posts)
+
+
+Colours = NDArray[np.uint32]
+
+ACCENTS = 12  # different colours of rooms
+MOST_CELLS = 4_000_000  # of a floor
+BORDER = 1.0  # of unknown ground around a site [m]
+BLOCK = 16  # cells; floors are made of whole blocks, so that coarser ones fit
+FACADE, PLAIN = (0.74, 0.60, 0.50), (0.66, 0.68, 0.70)  # from outside; of bare maps
+GOLDEN = 0.61803399  # steps of the hue, so that neighbours differ
+
+
+def pack(colours: Any) -> Colours:
+    """Colours `(..., 3)`, each in one number."""
+    rgb = np.asarray(colours, dtype=np.uint32)
+    return np.asarray(rgb[..., 0] | rgb[..., 1] << 8 | rgb[..., 2] << 16, dtype=np.uint32)
+
+
+class Rooms:
+    """The rooms of a site on a grid, numbered from 1; 0 is outside all.
+
+    Args:
+        site: Whose.
+
+    Attributes:
+        cell: Side of a cell [m].
+        origin: x, y of the first cell [m].
+        numbers: Which room each cell belongs to `(rows, columns)`, from south to north.
+        palette: Colours of rooms, 0 to 1 `(n, 3)`.
+        accent: Which of them each room has.
+        outdoor: Whether the sky is above each room.
+    """
+
+    def __init__(self, site: Site) -> None:
+        xmin, ymin, xmax, ymax = site.extent
+        sides = ymax - ymin + 2 * BORDER, xmax - xmin + 2 * BORDER
+        self.cell = max(0.05, (sides[0] * sides[1] / MOST_CELLS) ** 0.5)
+        self.origin = xmin - BORDER, ymin - BORDER
+        rows, columns = (BLOCK * int(np.ceil(side / self.cell / BLOCK)) for side in sides)
+        self.numbers = _room_numbers(site, self.origin, self.cell, (rows, columns))
+        self.palette = _palette(FACADE if site.rooms else PLAIN)
+        self.accent = _accents(site)
+        self.outdoor = np.array([True, *(room.outdoor for room in site.rooms)])
+
+    def at(self, x: Any, y: Any) -> NDArray[np.uint16]:
+        """Numbers of the rooms at places, arrays of 32 bits [m]."""
+        rows, columns = self.numbers.shape
+        scale = np.float32(1 / self.cell)
+        column = (x - np.float32(self.origin[0])) * scale
+        row = (y - np.float32(self.origin[1])) * scale
+        np.clip(column, 0, columns - 1, out=column)
+        np.clip(row, 0, rows - 1, out=row)
+        index = row.astype(np.int32)
+        index *= columns
+        index += column.astype(np.int32)
+        return np.asarray(self.numbers.take(index))
+
+
+def _palette(outside: tuple[float, float, float]) -> NDArray[np.float64]:
+    """Colours of rooms, 0 to 1, `(ACCENTS + 2, 3)`: none, then the accents, then corridors."""
+    hues = (0.58 + GOLDEN * np.arange(ACCENTS)) % 1.0
+    accents = [colorsys.hls_to_rgb(float(hue), 0.56, 0.42) for hue in hues]
+    return np.array([outside, *accents, (0.78, 0.78, 0.80)])
+
+
+def _accents(site: Site) -> Ints:
+    """Which colour of the palette each room has, by its number from 1."""
+    accents = [0]
+    for room in site.rooms:
+        if room.outdoor:
+            accents.append(0)
+        elif "corridor" in room.name.lower():
+            accents.append(ACCENTS + 1)
+        else:
+            accents.append(sum(0 < accent <= ACCENTS for accent in accents) % ACCENTS + 1)
+    return np.array(accents, dtype=np.intp)
+
+
+def _room_numbers(
+    site: Site, origin: tuple[float, float], cell: float, shape: tuple[int, int]
+) -> NDArray[np.uint16]:
+    """Which room each cell belongs to, from 1; 0 outside all."""
+    numbers = np.zeros(shape, dtype=np.uint16)
+    for number, room in enumerate(site.rooms, 1):
+        # Cells whose middles lie inside.
+        low = np.ceil((room.polygon.min(axis=0) - origin) / cell - 0.5).astype(int)
+        high = np.ceil((room.polygon.max(axis=0) - origin) / cell - 0.5).astype(int)
+        columns, rows = np.arange(low[0], high[0]), np.arange(low[1], high[1])
+        x, y = np.meshgrid(origin[0] + (columns + 0.5) * cell, origin[1] + (rows + 0.5) * cell)
+        inside = shapely.contains_xy(shapely.Polygon(room.polygon), x, y)
+        numbers[low[1] : high[1], low[0] : high[0]][inside] = number
+    return numbers

@@ -1,0 +1,440 @@
+"""Drawn features: GeoJSON in longitude and latitude, as any GeoJSON editor saves it.
+
+Plans: what the drawn features of a site come to, in metres.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+
+from dva_sim.kernel.config import load_yaml, validate
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.suggestions import unknown
+from dva_sim.worlds.geo import GeoFrame, Pose
+from dva_sim.worlds.maps import segments
+from dva_sim.worlds.site_parts import (
+    CEILING,
+    DOOR_HEIGHT,
+    QUALITIES,
+    BaseStation,
+    Coverage,
+    Detector,
+    Exit,
+    FixedCamera,
+    LinkQuality,
+    Lookup,
+    Room,
+    Zone,
+)
+
+Points = NDArray[np.float64]
+Fail = Callable[[str], ConfigError]
+
+DIGITS = 9  # of a coordinate [deg]: a tenth of a millimetre
+
+
+class Drawn(BaseModel):
+    """Properties of a feature; what an editor adds of its own is left alone."""
+
+    model_config = ConfigDict(extra="ignore", frozen=True, allow_inf_nan=False)
+
+    name: Annotated[str | None, BeforeValidator(lambda v: v if v is None else str(v))] = None
+
+
+class DrawnRoom(Drawn):
+    """A room; without a height of its own it has the site's."""
+
+    ceiling_m: Annotated[float, Field(ge=1.5, le=50)] | None = None
+
+
+class DrawnDoor(Drawn):
+    """A door."""
+
+    height_m: Annotated[float, Field(ge=1.5, le=10)] = DOOR_HEIGHT
+
+
+class DrawnPose(Drawn):
+    """A place with a heading, counter-clockwise from east."""
+
+    heading_deg: float = 0.0
+
+
+class DrawnZone(Drawn):
+    """A part of the floor with a rule or a purpose."""
+
+    use: Literal["restricted", "charging", "assembly"] = "restricted"
+
+
+class DrawnCamera(DrawnPose):
+    """A fixed camera."""
+
+    field_of_view_deg: Annotated[float, Field(gt=0, le=360)] = 90.0
+    range_m: Annotated[float, Field(gt=0, le=500)] = 15.0
+
+
+class DrawnBaseStation(Drawn):
+    """An antenna."""
+
+    radio: Literal["wifi", "lte", "nr"] = "wifi"
+
+
+class DrawnWifi(Drawn):
+    """The quality of a link: a word, numbers, or a word and the numbers that differ from it."""
+
+    quality: Literal["good", "fair", "poor", "none"] | None = None
+    loss: Annotated[float, Field(ge=0, le=1)] | None = None
+    rate_bps: Annotated[float, Field(ge=1e3)] | None = None
+    extra_delay_s: Annotated[float, Field(ge=0, le=30)] | None = None
+
+    @model_validator(mode="after")
+    def _says_something(self) -> DrawnWifi:
+        if self.quality is None and not self.numbers:
+            raise ValueError("should have a quality (good, fair, poor, none) or numbers")
+        return self
+
+    @property
+    def numbers(self) -> dict[str, float]:
+        """Those that are given."""
+        given = {name: getattr(self, name) for name in LinkQuality._fields}
+        return {name: value for name, value in given.items() if value is not None}
+
+    @property
+    def link(self) -> LinkQuality:
+        """All three numbers."""
+        return QUALITIES[self.quality or "good"]._replace(**self.numbers)
+
+
+class Kind(NamedTuple):
+    """How a kind of feature is drawn, and what its properties are."""
+
+    shapes: tuple[str, ...]
+    model: type[Drawn] = Drawn
+
+
+KINDS = {
+    "wall": Kind(("LineString", "MultiLineString", "Polygon")),
+    "room": Kind(("Polygon",), DrawnRoom),
+    "path": Kind(("Polygon",)),
+    "yard": Kind(("Polygon",)),
+    "door": Kind(("LineString",), DrawnDoor),
+    "exit": Kind(("LineString",)),
+    "zone": Kind(("Polygon",), DrawnZone),
+    "wifi": Kind(("Polygon",), DrawnWifi),
+    "robot_base": Kind(("Point",), DrawnPose),
+    "guard_post": Kind(("Point",), DrawnPose),
+    "operator_desk": Kind(("Point",), DrawnPose),
+    "camera": Kind(("Point",), DrawnCamera),
+    "base_station": Kind(("Point",), DrawnBaseStation),
+    "smoke_detector": Kind(("Point",)),
+    "heat_detector": Kind(("Point",)),
+    "co_detector": Kind(("Point",)),
+    "gas_detector": Kind(("Point",)),
+    "water_detector": Kind(("Point",)),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Feature:
+    """One thing on a plan.
+
+    Attributes:
+        kind: A key of `KINDS`.
+        shape: Shapely geometry [m].
+        properties: As written in the file.
+        fail: Makes an error at the feature's place in its file.
+    """
+
+    kind: str
+    shape: Any
+    properties: Mapping[str, Any] = field(default_factory=dict)
+    fail: Fail = ConfigError
+
+    @property
+    def drawn(self) -> Any:
+        """The properties, checked: an instance of its kind's model."""
+        given = {key: value for key, value in self.properties.items() if value is not None}
+        return validate(KINDS[self.kind].model, given, lambda text, _: self.fail(text))
+
+
+# --- reading ---------------------------------------------------------------------------
+def read_features(path: Path, frame: GeoFrame) -> Iterator[Feature]:
+    """The features of a GeoJSON file, in its order.
+
+    Raises:
+        ConfigError: not GeoJSON, an unknown kind, a shape that does not suit its kind.
+    """
+    for index, feature in enumerate(_features(path)):
+        fail = partial(_error, path, index)
+        try:
+            yield _feature(feature, frame, fail)
+        except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
+            raise fail(f"is not a GeoJSON feature: {error}") from error
+
+
+def _features(path: Path) -> list[Any]:
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except json.JSONDecodeError as error:
+        raise ConfigError(f"is not JSON: {error.msg}", path, error.lineno, error.colno) from error
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError("cannot be read", path) from error
+    except RecursionError:
+        raise ConfigError("is nested too deeply", path) from None
+    except ValueError as error:
+        raise ConfigError(f"has a value that cannot be read: {error}", path) from error
+    features = data.get("features") if isinstance(data, dict) else None
+    if not isinstance(features, list):
+        raise ConfigError("should be a GeoJSON FeatureCollection with 'features'", path, 1, 1)
+    return features
+
+
+def _error(path: Path, index: int, problem: str) -> ConfigError:
+    """The mistake in a feature; only now is the file parsed again, for its line and column."""
+    return load_yaml(path).error(f"feature {index + 1}: {problem}", ("features", index))
+
+
+def _feature(feature: Any, frame: GeoFrame, fail: Fail) -> Feature:
+    import shapely
+    from shapely.geometry import shape
+
+    properties, geometry = feature["properties"], feature["geometry"]
+    kind = properties.get("kind")
+    if kind not in KINDS:
+        raise fail(unknown("kind", kind, KINDS))
+    if geometry["type"] not in KINDS[kind].shapes:
+        allowed = " or ".join(KINDS[kind].shapes)
+        raise fail(f"a {kind} is drawn as {allowed}, not {geometry['type']}")
+    drawn: Any = shapely.transform(shape(geometry), lambda points: _to_xy(points, frame))
+    if not np.isfinite(shapely.get_coordinates(drawn)).all() or drawn.is_empty:
+        raise fail("has no usable coordinates")
+    if geometry["type"] == "Polygon" and not drawn.is_valid:
+        raise fail(f"the outline of this {kind} crosses itself")
+    return Feature(kind, drawn, properties, fail)
+
+
+def _to_xy(points: Points, frame: GeoFrame) -> Points:
+    """Metres from longitude, latitude; to the millimetre, which is what nine digits hold."""
+    return (
+        np.array([frame.to_xy(latitude, longitude) for longitude, latitude in points]).round(3)
+        + 0.0
+    )
+
+
+# --- writing ---------------------------------------------------------------------------
+def write_features(path: Path, features: Iterable[Feature], frame: GeoFrame) -> None:
+    """A GeoJSON file that `read_features` reads, one feature a line."""
+    import shapely
+    from shapely.geometry import mapping
+
+    lines = []
+    for feature in features:
+        there = shapely.transform(feature.shape, lambda points: _to_degrees(points, frame))
+        properties = {"kind": feature.kind, **feature.properties}
+        ring = feature.shape.geom_type == "LinearRing"  # which GeoJSON does not know
+        geometry = mapping(shapely.LineString(there) if ring else there)
+        lines.append(
+            json.dumps({"type": "Feature", "properties": properties, "geometry": geometry})
+        )
+    body = ",\n".join(lines)
+    text = f'{{"type": "FeatureCollection", "features": [\n{body}\n]}}\n'
+    path.write_text(text, encoding="utf-8")
+
+
+def _to_degrees(points: Points, frame: GeoFrame) -> Points:
+    """Longitude, latitude from metres."""
+    degrees = np.array([frame.to_latlon(x, y) for x, y in points.tolist()])
+    return degrees[:, ::-1].round(DIGITS)
+
+
+DOOR_REACH = 0.15  # a door opens walls this near to its line [m]
+SILL = 0.5  # floor on both sides of a door, in case the rooms drawn do not meet [m]
+BEYOND = (0.06, 0.2, 0.35, 0.5)  # how far from an exit to look for what lies there [m]
+LEAST_EXIT = 0.5  # [m]
+NOTHING = 2  # further out than rooms (0) and ground outdoors (1)
+GROUND = ("room", "path", "yard")  # where two overlap, the first of these counts
+
+
+@dataclass
+class Plan:
+    """What a site's features come to, in metres.
+
+    Attributes:
+        floor: Shapely area of rooms, outdoor ground and doorways without the solids.
+        walls: Segments `(n, 4)` [m], opened at the doors.
+        doors: Segments `(n, 4)` [m].
+        door_heights: Of each door [m].
+        rooms: Rooms, then paths, then yards.
+        solids: Corners `(k, 2)` [m] of walls drawn as areas.
+        places: Poses by kind, each with what makes an error at its place in the file.
+    """
+
+    floor: Any = None
+    walls: Points = field(default_factory=lambda: np.empty((0, 4)))
+    doors: Points = field(default_factory=lambda: np.empty((0, 4)))
+    door_heights: tuple[float, ...] = ()
+    rooms: tuple[Room, ...] = ()
+    solids: tuple[Points, ...] = ()
+    exits: tuple[Exit, ...] = ()
+    zones: tuple[Zone, ...] = ()
+    wifi: tuple[Coverage, ...] = ()
+    cameras: tuple[FixedCamera, ...] = ()
+    base_stations: tuple[BaseStation, ...] = ()
+    detectors: tuple[Detector, ...] = ()
+    places: dict[str, list[tuple[Pose, Fail]]] = field(default_factory=lambda: defaultdict(list))
+
+    def poses(self, kind: str) -> tuple[Pose, ...]:
+        """All poses of a kind, in the order of the file."""
+        return tuple(pose for pose, _ in self.places[kind])
+
+
+def read_plan(path: Path, frame: GeoFrame, ceiling: float = CEILING) -> Plan:
+    """Read a plan; `ceiling` [m] is that of rooms that do not say.
+
+    Raises:
+        ConfigError: not GeoJSON, an unknown kind, a shape that does not suit its kind.
+    """
+    plan = make_plan(read_features(path, frame), ceiling)
+    if not plan.rooms:
+        raise ConfigError("the plan has no feature of kind 'room'", path)
+    return plan
+
+
+def make_plan(features: Iterable[Feature], ceiling: float = CEILING) -> Plan:
+    """Put features together.
+
+    Raises:
+        ConfigError: a property that does not suit its kind.
+    """
+    features = tuple(features)
+    kinds: dict[str, list[Feature]] = defaultdict(list)
+    for feature in features:
+        kinds[feature.kind].append(feature)
+    plan = Plan(rooms=_rooms(kinds, ceiling))
+    lookup = Lookup(plan.rooms)
+    plan.exits = tuple(_exit(lookup, *numbered) for numbered in _numbered(kinds, "exit"))
+    plan.zones = tuple(Zone(n, _corners(f), f.drawn.use) for f, n in _numbered(kinds, "zone"))
+    plan.wifi = tuple(Coverage(n, _corners(f), f.drawn.link) for f, n in _numbered(kinds, "wifi"))
+    plan.cameras = tuple(_camera(*numbered) for numbered in _numbered(kinds, "camera"))
+    plan.base_stations = tuple(
+        BaseStation(f.shape.x, f.shape.y, f.drawn.radio, n)
+        for f, n in _numbered(kinds, "base_station")
+    )
+    plan.detectors = _detectors(features)
+    for kind in ("robot_base", "guard_post", "operator_desk"):
+        for feature in kinds[kind]:
+            plan.places[kind].append((_pose(feature), feature.fail))
+    _open_walls(plan, kinds, lookup)
+    return plan
+
+
+def _numbered(kinds: dict[str, list[Feature]], kind: str) -> list[tuple[Feature, str]]:
+    """The features of a kind, each with its name; the nameless are numbered."""
+    what = kind.replace("_", "-")
+    return [(f, f.drawn.name or f"{what}-{n}") for n, f in enumerate(kinds[kind], 1)]
+
+
+def _corners(feature: Feature) -> Points:
+    import shapely
+
+    return shapely.get_coordinates(feature.shape.exterior)[:-1]
+
+
+def _rooms(kinds: dict[str, list[Feature]], ceiling: float) -> tuple[Room, ...]:
+    """Rooms need names of their own; paths and yards may go without."""
+    rooms: list[Room] = []
+    for kind in GROUND:
+        for number, feature in enumerate(kinds[kind], 1):
+            drawn = feature.drawn
+            name = drawn.name or (None if kind == "room" else f"{kind.title()} {number}")
+            if name is None or any(name == room.name for room in rooms):
+                raise feature.fail(f"a {kind} needs a name of its own, not {name!r}")
+            height = getattr(drawn, "ceiling_m", None) or ceiling
+            outdoor, paved = kind != "room", kind != "yard"
+            rooms.append(Room(name, _corners(feature), height, outdoor, paved))
+    return tuple(rooms)
+
+
+def _pose(feature: Feature) -> Pose:
+    return Pose(feature.shape.x, feature.shape.y, math.radians(feature.drawn.heading_deg))
+
+
+def _camera(feature: Feature, name: str) -> FixedCamera:
+    drawn = feature.drawn
+    return FixedCamera(*_pose(feature), math.radians(drawn.field_of_view_deg), drawn.range_m, name)
+
+
+def _detectors(features: Iterable[Feature]) -> tuple[Detector, ...]:
+    """In the order of the file, numbered by kind."""
+    found: list[Detector] = []
+    for feature in features:
+        if feature.kind.endswith("_detector"):
+            sensor = feature.kind.removesuffix("_detector")
+            number = 1 + sum(other.kind == sensor for other in found)
+            name = feature.drawn.name or f"{sensor}-{number}"
+            found.append(Detector(name, sensor, feature.shape.x, feature.shape.y))
+    return tuple(found)
+
+
+def _exit(rooms: Lookup[Room], feature: Feature, name: str) -> Exit:
+    """Out is the side further out: rooms, ground outdoors, nothing drawn; if alike, the left."""
+    x1, y1, x2, y2 = _ends(feature.shape)
+    width = math.hypot(x2 - x1, y2 - y1)
+    if width < LEAST_EXIT:
+        raise feature.fail(f"an exit is at least {LEAST_EXIT:g} m wide, not {width:g} m")
+    x, y, left = (x1 + x2) / 2, (y1 + y2) / 2, math.atan2(x2 - x1, y1 - y2)
+    right = math.remainder(left + math.pi, math.tau)
+    outwards = right if _how_far_out(rooms, x, y, right) > _how_far_out(rooms, x, y, left) else left
+    return Exit(x, y, outwards, width, name)
+
+
+def _ends(line: Any) -> list[float]:
+    """The first and the last point of a line: x1, y1, x2, y2 [m]."""
+    return [float(value) for value in np.ravel(line.coords)[[0, 1, -2, -1]]]
+
+
+def _how_far_out(rooms: Lookup[Room], x: float, y: float, heading: float) -> int:
+    """What lies beyond a door: 0 a room, 1 ground outdoors, 2 nothing drawn."""
+    for far in BEYOND:
+        px, py = x + far * math.cos(heading), y + far * math.sin(heading)
+        room = rooms.at(px, py)
+        if room is not None:
+            return int(room.outdoor)
+    return NOTHING
+
+
+def _open_walls(plan: Plan, kinds: dict[str, list[Feature]], rooms: Lookup[Room]) -> None:
+    """Open the walls at the doors and find the floor.
+
+    An exit opens the wall only where ground is drawn beyond it: nobody drives off the plan.
+    """
+    import shapely
+
+    walls = [feature.shape for feature in kinds["wall"]]
+    solids = [wall for wall in walls if wall.geom_type == "Polygon"]
+    drawn = shapely.union_all([wall for wall in walls if wall.geom_type != "Polygon"])
+    exits = [
+        feature.shape
+        for feature, way in zip(kinds["exit"], plan.exits, strict=True)
+        if _how_far_out(rooms, way.x, way.y, way.heading) < NOTHING
+    ]
+    doors = [feature.shape for feature in kinds["door"]] + exits
+    doorways = [door.buffer(DOOR_REACH, cap_style="flat") for door in doors]
+    opened = shapely.difference(drawn, shapely.union_all(doorways))
+    plan.walls = np.vstack([segments(shapely.line_merge(opened)), *map(segments, solids)])
+    plan.doors = np.array([_ends(door.shape) for door in kinds["door"]]).reshape(-1, 4)
+    plan.door_heights = tuple(door.drawn.height_m for door in kinds["door"])
+    plan.solids = tuple(shapely.get_coordinates(solid.exterior) for solid in solids)
+    ground = [shapely.Polygon(room.polygon) for room in plan.rooms]
+    sills = [door.buffer(SILL, cap_style="flat") for door in doors]
+    plan.floor = shapely.difference(shapely.union_all(ground + sills), shapely.union_all(solids))

@@ -1,0 +1,105 @@
+import pytest
+import synthetic_study
+
+from dva_sim.experiments.analysis.hypothesis_tests import judged
+from dva_sim.experiments.report.test_tables import comparison_table, hypothesis_table
+
+PLAIN = {"part": "drive", "measure": "drive_time_s", "factor": "pattern"}
+COST = PLAIN | {"contrast": ["req-rep", "latest-wins"], "over": "link.delay_s"}
+SAME = PLAIN | {"contrast": ["pub-sub", "latest-wins"], "within": {"link.delay_s": 0.0}}
+
+
+@pytest.fixture(scope="module")
+def runs():
+    """Request/reply costs 40 s more at 1 s of delay, and 2.5 s at 250 ms."""
+    rows = synthetic_study.drive_rows(10, 2, effect_s=40.0, missed=0.0)
+    return synthetic_study.columns(rows)
+
+
+def study(**claims):
+    return synthetic_study.manifest(10, 2)["study"] | claims
+
+
+def test_a_comparison_is_made_at_each_level_it_runs_over(runs):
+    found = judged(study(comparisons={"cost": COST}), runs).compared
+    assert [c.at["link.delay_s"] for c in found] == [0.0, 0.05, 0.1, 0.25, 0.5, 1.0]
+    last = found[-1]
+    assert last.difference.mean == pytest.approx(40.0, abs=2.0)
+    assert last.p == pytest.approx(2 / 2**10)  # of 10 persons all went the same way
+    assert last.adjusted == pytest.approx(6 * last.p)  # the smallest of six
+    assert last.correlation > 0.9
+
+
+def test_the_table_of_comparisons_says_how_many_tests_there_are(runs):
+    declared = study(comparisons={"cost": COST, "same": SAME | {"family": "aside"}})
+    found = judged(declared, runs)
+    table = comparison_table(found)
+    assert len(table.rows) == 7
+    assert table.rows[5][-1] == "✓ yes"
+    assert "main: 6; aside: 1" in table.note
+
+
+def test_a_comparison_of_levels_that_were_not_run_is_said_not_to_have_been(runs):
+    found = judged(study(comparisons={"x": SAME | {"contrast": ["pub-sub", "tcp"]}}), runs)
+    assert found.compared[0].difference is None
+    assert comparison_table(found).rows[0][3] == "not run"
+
+
+@pytest.mark.parametrize(
+    ("claim", "verdict"),
+    [
+        ({"direction": "above", "margin": 20.0}, "held"),
+        ({"direction": "above", "margin": 60.0}, "did not hold"),
+        ({"direction": "below"}, "did not hold"),
+        ({"direction": "same", "margin": 5.0}, "did not hold"),
+        ({"direction": "same", "margin": 5.0, "comparison": "same"}, "held"),
+        ({"direction": "above", "comparison": "same"}, "open"),
+    ],
+)
+def test_a_hypothesis_is_judged_by_its_margin(runs, claim, verdict):
+    declared = study(comparisons={"same": SAME}, hypotheses={"h": claim})
+    (tested,) = judged(declared, runs).tested
+    assert tested.verdict == verdict
+
+
+def test_the_table_of_hypotheses_sets_claims_beside_what_came_out(runs):
+    declared = study(
+        hypotheses={"h": {"text": "Waiting costs.", "direction": "above", "margin": 2}}
+    )
+    row = hypothesis_table(judged(declared, runs).tested).rows[0]
+    assert row[0] == "h: Waiting costs."
+    assert row[1].endswith(
+        "profile default, one-way delay 1\N{NO-BREAK SPACE}s: above 2.0\N{NO-BREAK SPACE}s"
+    )
+    assert row[5] == "✓ held"
+
+
+def test_levels_that_a_comparison_does_not_name_are_averaged(runs):
+    (found,) = judged(study(comparisons={"same": SAME}), runs).compared
+    here = (runs["part"] == "drive") & (runs["link.delay_s"] == 0.0) & ~runs["is_reference"]
+    both_profiles = {
+        pattern: runs["drive_time_s"][here & (runs["pattern"] == pattern)].mean()
+        for pattern in ("pub-sub", "latest-wins")
+    }
+    expected = both_profiles["pub-sub"] - both_profiles["latest-wins"]
+    assert found.difference.mean == pytest.approx(expected, abs=1e-9)
+
+
+def test_hypotheses_and_comparisons_of_a_family_share_its_chance_of_a_false_alarm(runs):
+    claim = {"direction": "above", "margin": 2.0}
+    alone = judged(study(hypotheses={"h": claim}), runs).tested[0]
+    assert alone.adjusted == pytest.approx(alone.p)
+    beside = judged(study(comparisons={"cost": COST}, hypotheses={"h": claim}), runs)
+    assert beside.tested[0].p == alone.p
+    assert beside.tested[0].adjusted == pytest.approx(7 * alone.p)  # the smallest of 6 + 1
+    apart = study(comparisons={"cost": COST | {"family": "aside"}}, hypotheses={"h": claim})
+    assert judged(apart, runs).tested[0].adjusted == pytest.approx(alone.p)
+
+
+def test_what_speaks_against_hypotheses_is_adjusted_too(runs):
+    """The true cost is 40 s: no claim of at least 41 s holds, and a few such refute no sooner."""
+    claims = {f"h{n}": {"direction": "above", "margin": 41.0} for n in range(4)}
+    found = judged(study(hypotheses=claims), runs).tested
+    alone = judged(study(hypotheses={"h0": claims["h0"]}), runs).tested[0]
+    assert 0.0 < alone.p_against < 1.0
+    assert [t.against for t in found] == pytest.approx([min(1.0, 4 * alone.p_against)] * 4)

@@ -1,0 +1,246 @@
+"""Conditions that a comparison fails by: how they are read, and when they hold."""
+
+import math
+
+import numpy as np
+import pytest
+from small_study import cheap, study_in
+
+from dva_sim.experiments.analysis.compare import Comparison, judge
+from dva_sim.experiments.analysis.fail_conditions import Bound, parse
+from dva_sim.experiments.execution.runner import run_study
+from dva_sim.experiments.results.results import Results
+from dva_sim.kernel.errors import ConfigError
+
+
+def later(job):
+    """Drives of request/reply take 10 s more; every second round trip is gone."""
+    tables = cheap(job)
+    run = tables["runs"][0]
+    run["drive_time_s"] += 10.0 * (dict(job.cell).get("pattern") == "req-rep")
+    run["round_trip_s"] = float("nan")
+    return tables
+
+
+@pytest.fixture(scope="module")
+def sides(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("study")
+    study = study_in(folder)
+    outs = [run_study(study, folder / e.__name__, jobs=1, episode=e) for e in (cheap, later)]
+    return [Results.load(out) for out in outs]
+
+
+@pytest.fixture(scope="module")
+def comparison(sides):
+    return Comparison(*sides)
+
+
+# --- reading -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "bound"),
+    [
+        ("p95(response_s) > 1.05x", Bound(1.05, "times")),
+        ("p95(response_s)>1.05 x", Bound(1.05, "times")),
+        ("mean(response_s) > 3 s", Bound(3.0, "absolute")),
+        ("mean(response_s) > 3", Bound(3.0, "absolute")),
+        ("mean(response_s) > +500 ms", Bound(0.5, "more")),
+        ("mean(response_s) < -0.5", Bound(-0.5, "more")),
+        ("mean(events.response_s) > 2 min", Bound(120.0, "absolute")),
+        ("share(confirmed) < 95 %", Bound(0.95, "absolute")),
+        ("share(confirmed) < -2%", Bound(-0.02, "more")),
+        ("max(jams) >= 1e2", Bound(100.0, "absolute")),
+        ("mean(contact_impulse_n_s) > +1 N", None),
+    ],
+)
+def test_a_bound_is_a_factor_a_difference_or_a_value_in_the_unit_of_the_measure(text, bound):
+    if bound is None:
+        with pytest.raises(ConfigError, match="unit 'N' does not fit; units: N s"):
+            parse(text)
+    else:
+        assert parse(text).bound == bound
+
+
+def test_a_condition_is_read_word_by_word():
+    gate = parse("share(events.response_s > 60 s) per link.delay_s >= 1.5x")
+    assert (gate.statistic, gate.measure, gate.per) == (
+        "share",
+        "events.response_s",
+        "link.delay_s",
+    )
+    assert gate.test == (">", 60.0)
+    assert gate.sign == ">="
+
+
+@pytest.mark.parametrize("word", ["'gave up'", '"gave up"', "gave_up"])
+def test_a_share_can_be_of_a_word(word):
+    assert parse(f"share(outcome != {word}) < 1").test == ("!=", word.strip("'\""))
+
+
+@pytest.mark.parametrize(
+    ("text", "column"),
+    [
+        ("average(response_s) > 3", 1),
+        ("p95(response_s > 1.05x", 16),
+        ("p95(response_s) > 3 m", 21),
+        ("  max(jams) ; 1", 13),
+        ("p95(response_s)  ", 18),
+    ],
+)
+def test_a_mistake_is_told_with_its_place(text, column):
+    with pytest.raises(ConfigError, match=f", column {column}: "):
+        parse(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        ("", "expected a statistic, and then it ends"),
+        ("p95", r"expected '\(', and then it ends"),
+        ("p95 response_s > 3", r"expected '\(', not 'response_s'"),
+        ("p95(response_s > 1.05x", r"expected '\)', not '>'"),
+        ("p0(response_s) > 3", "statistic 'p0' is unknown; known: mean, median, min"),
+        ("average(response_s) > 3", "'average' is unknown"),
+        ("p95(response_s) = 3", "'=' has no meaning here"),
+        ("p95(response_s) == 3", "expected '>' or '>=' or '<' or '<=', not '=='"),
+        ("p95(response_s) > fast", "expected a number, not 'fast'"),
+        ("p95(response_s) > 3 m", "unit 'm' does not fit; units: s, ms, min, h"),
+        ("p95(response_s) > +1.05x", "unit 'x' does not fit"),
+        ("p95(response_s) > 3 s s", "'s' is too much"),
+        ("p95(response_s) per > 3", "expected a factor or cell, not '>'"),
+        ("__import__('os').system('ls') > 1", r"'__import__' is unknown"),
+        ("max(jams) > 1; max(contacts) > 1", "';' has no meaning here"),
+    ],
+)
+def test_a_mistake_is_told_with_what_was_expected(text, problem):
+    with pytest.raises(ConfigError, match=problem) as told:
+        parse(text)
+    assert f"--fail-if {text!r}" in str(told.value)
+    assert "\n" not in str(told.value)
+
+
+# --- judging -----------------------------------------------------------------------------------
+
+
+def times(results, part, pattern=None):
+    runs = results.runs
+    chosen = (runs["part"] == part) & (runs["cell"] >= 0)
+    if pattern is not None:
+        chosen &= runs["pattern"] == pattern
+    return runs["drive_time_s"][chosen]
+
+
+@pytest.mark.parametrize(
+    ("name", "statistic"),
+    [
+        ("mean", np.mean),
+        ("median", np.median),
+        ("min", np.min),
+        ("max", np.max),
+        ("p90", lambda values: np.percentile(values, 90)),
+    ],
+)
+def test_statistics_are_over_all_runs_of_a_part(sides, comparison, name, statistic):
+    verdicts = comparison.judge(f"{name}(drive_time_s) > 1x")
+    assert [verdict.part for verdict in verdicts] == ["drive", "story"]
+    for verdict in verdicts:
+        assert verdict.first == pytest.approx(statistic(times(sides[0], verdict.part)))
+        assert verdict.second == pytest.approx(statistic(times(sides[1], verdict.part)))
+
+
+def test_a_group_of_cells_can_fail_where_the_whole_does_not(comparison):
+    assert not any(v.holds for v in comparison.judge("mean(drive_time_s) > +6 s"))
+    each = comparison.judge("mean(drive_time_s) per pattern > +6 s")
+    assert {v.levels[0][1] for v in each if v.holds} == {"req-rep"}
+    assert {v.levels[0][1] for v in each if not v.holds} == {"latest-wins"}
+    assert len(comparison.judge("mean(drive_time_s) per cell > +6 s")) == 8
+
+
+@pytest.mark.parametrize(
+    ("condition", "holds"),
+    [
+        ("mean(drive_time_s) > +4.9 s", True),  # 10 s in half of the cells
+        ("mean(drive_time_s) > +5.1 s", False),
+        ("mean(drive_time_s) >= 1x", True),
+        ("mean(drive_time_s) < 1x", False),
+        ("max(contacts) > 4", False),
+        ("max(contacts) >= 4", True),
+        ("share(confirmed) > +0", False),
+        ("share(outcome == 'confirmed') < 1", False),  # of those that have an outcome
+        ("missing(outcome) > 0", True),
+    ],
+)
+def test_a_condition_holds_when_the_second_folder_is_beyond_its_bound(comparison, condition, holds):
+    verdicts = judge(parse(condition), comparison)
+    assert {verdict.holds for verdict in verdicts if verdict.part == "drive"} == {holds}
+
+
+def test_a_share_of_values_beyond_a_bound(sides, comparison):
+    limit = float(np.median(times(sides[0], "drive")))
+    verdict = comparison.judge(f"share(drive_time_s > {limit!r}) > 50 %")[0]
+    assert verdict.first == 0.5
+
+
+def test_what_is_missing_is_told_beside_what_was_found(comparison):
+    verdict = comparison.judge("missing(round_trip_s) > +0")[0]
+    assert verdict.holds
+    assert verdict.second == 1.0
+    assert verdict.missing == (verdict.first, 1.0)
+
+
+def crashes(job):
+    """Whoever is first never comes to an end."""
+    if job.person == 0:
+        raise RuntimeError("fell")
+    return cheap(job)
+
+
+def never_arrives(job):
+    """Of whoever is first no time is known, and all others take a second more."""
+    tables = cheap(job)
+    run = tables["runs"][0]
+    run["drive_time_s"] = math.nan if job.person == 0 else run["drive_time_s"] + 1.0
+    return tables
+
+
+def against(folder, episode):
+    """The small study, and the same with other episodes."""
+    study = study_in(folder)
+    return Comparison(
+        *(
+            Results.load(run_study(study, folder / e.__name__, jobs=1, episode=e))
+            for e in (cheap, episode)
+        )
+    )
+
+
+def test_runs_that_crashed_in_the_second_folder_do_not_pass(tmp_path):
+    comparison = against(tmp_path, crashes)
+    with pytest.raises(ConfigError, match=r"in part drive 8 runs of the second folder failed"):
+        comparison.judge("p95(drive_time_s) > 1.05x")
+    drive = comparison.judge("missing(drive_time_s) > 0 %")[0]
+    assert (drive.first, drive.second, drive.holds) == (0.0, 1 / 3, True)
+
+
+def test_pairs_with_a_value_on_both_sides_are_held_against_each_other(tmp_path):
+    comparison = against(tmp_path, never_arrives)
+    drive = comparison.judge("mean(drive_time_s) > +0.9 s")[0]
+    assert drive.second - drive.first == pytest.approx(1.0)
+    assert drive.missing == (0.0, 1 / 3)
+    whole = comparison.judge("mean(drive_time_s) > 0 s")[0]
+    assert whole.second == pytest.approx(drive.second)
+
+
+@pytest.mark.parametrize(
+    ("condition", "problem"),
+    [
+        ("mean(round_trip_s) > 1.05x", "no run of the second folder has a value"),
+        ("mean(speed_mps) > 1", "measure 'speed_mps' is not in both"),
+        ("mean(outcome) > 1", "outcome is in words"),
+        ("mean(drive_time_s) per phone > 1", "factor 'phone' is not common to both"),
+    ],
+)
+def test_what_cannot_be_decided_does_not_pass(comparison, condition, problem):
+    with pytest.raises(ConfigError, match=problem):
+        comparison.judge(condition)

@@ -1,0 +1,105 @@
+import pytest
+import synthetic_study
+
+from dva_sim.experiments.analysis.layout import finding_of, view_of
+from dva_sim.experiments.analysis.robustness import robustness_of, sentences
+from dva_sim.experiments.report.figures.contrast import repeats
+from dva_sim.experiments.report.figures.style import styled
+
+EFFECTS = {
+    ("pursuit", 0): 20.0,
+    ("pursuit", 1): 5.0,
+    ("adaptive", 0): 1.0,
+    ("adaptive", 1): -4.0,
+}
+
+
+OWN = {"operator": {"strategy": "pursuit"}}
+
+
+def read(effects, effect_s=12.0, rows=None, scenario=OWN):
+    runs = synthetic_study.columns(synthetic_study.drive_rows(8, 2, effect_s, missed=0.0))
+    study = synthetic_study.manifest(8, 2)["study"] | synthetic_study.CLAIMS
+    view = view_of(study, runs)
+    table = synthetic_study.columns(synthetic_study.repeat_rows(effects) if rows is None else rows)
+    return view, robustness_of(study, table, view, finding_of(view), scenario)
+
+
+def test_shares_count_the_repeats_with_known_signs():
+    _, found = read(EFFECTS)
+    (stop,) = found.stops
+    assert (stop.same_sign, stop.clear, stop.relevant, stop.negligible) == (2, 2, 1, 1)
+    assert (found.persons, found.trials, found.sets) == (4, 2, 1)
+
+
+def test_signs_are_compared_with_the_studys_own():
+    _, found = read(EFFECTS, effect_s=-30.0)
+    (stop,) = found.stops
+    assert (stop.same_sign, stop.clear, stop.relevant, stop.negligible) == (1, 1, 1, 1)
+
+
+def test_each_repeat_has_its_effect_and_an_interval_around_it():
+    _, found = read(EFFECTS)
+    for repeat in found.stops[0].repeats:
+        effect = EFFECTS[repeat.strategy, repeat.parameters]
+        assert repeat.mean == pytest.approx(effect + 0.15)  # persons 0 to 3 add 0.1 s each
+        assert repeat.low < repeat.mean < repeat.high
+
+
+def test_a_repeat_without_a_pair_is_left_out():
+    rows = synthetic_study.repeat_rows(EFFECTS)
+    half = [r for r in rows if (r["parameters"], r["pattern"]) != (1, "req-rep")]
+    _, found = read(EFFECTS, rows=half)
+    assert len(found.stops[0].repeats) == 2
+
+
+def test_the_studys_own_model_is_no_evidence_for_itself():
+    for own, counted in (("pursuit", 2), ("adaptive", 2), ("two_point", 3)):
+        _, found = read(EFFECTS, scenario={"operator": {"strategy": own}})
+        (stop,) = found.stops
+        assert stop.same_sign == counted
+        assert [r.strategy for r in stop.repeats if r.is_own] == [own] * (own != "two_point")
+
+
+def test_repeats_at_delays_at_which_nobody_was_watched_are_told_and_drawn_hollow():
+    rows = [
+        row | {"loop_delay_mean_s": 1.4, "delay_human_s": 0.2}
+        for row in synthetic_study.repeat_rows(EFFECTS)
+    ]
+    view, found = read(EFFECTS, rows=rows)
+    assert {(r.strategy, r.is_beyond) for r in found.stops[0].repeats} == {
+        ("pursuit", True),
+        ("adaptive", False),
+    }
+    told = sentences(found)[-1].replace("\N{NO-BREAK SPACE}", " ")
+    assert "1 of 3 (33 %) are extrapolated: no published experiment covers that delay" in told
+    with styled():
+        assert "Hollow: extrapolated" in repeats(view, found).caption
+        assert "Hollow" not in repeats(*read(EFFECTS)).caption
+
+
+def test_the_sentences_give_shares_and_reach():
+    _, found = read(EFFECTS)
+    what, told = (s.replace("\N{NO-BREAK SPACE}", " ") for s in sentences(found))
+    assert "(4 persons, 2 trials each" in what
+    assert told == (
+        "At one-way delay 1 s the sign holds in 2 of 3 (67 %) repeats, in 2 of them with its "
+        "whole interval; in 1 of 3 (33 %) the effect exceeds the smallest that matters, in 1 it "
+        "is below that either way. Effects run from −3.8 to 5.1 s. The sign is another "
+        "under adaptive (1 of 2)."
+    )
+
+
+def test_the_figure_shows_the_repeats_and_is_the_same_when_drawn_again():
+    view, found = read(EFFECTS)
+    with styled():
+        first, again = repeats(view, found), repeats(view, found)
+    assert first.svg == again.svg
+    assert first.png[:4] == b"\x89PNG"
+
+
+def test_a_study_without_repeats_has_none():
+    runs = synthetic_study.columns(synthetic_study.drive_rows(4, 1))
+    study = synthetic_study.manifest(4, 1)["study"]
+    view = view_of(study, runs)
+    assert robustness_of(study, {}, view, finding_of(view), OWN) is None

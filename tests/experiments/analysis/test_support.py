@@ -1,0 +1,84 @@
+import numpy as np
+import pytest
+
+from dva_sim.experiments.analysis.paired_effects import Factor, Part, View
+from dva_sim.experiments.analysis.published_operators import ranges, support_of_part
+from dva_sim.experiments.report.cell_table import cell_table
+
+DELAY = Factor("link.delay_s", (0.0, 0.5, 5.0))
+STRATEGY = Factor("operator.strategy", ("pursuit", "adaptive"))
+
+
+def part_of(*, extra=(), human=0.3):
+    """A person and trial for each cell; the loop is twice the delay of the link and 0.1 s more."""
+    cells = [(delay, name) for delay in DELAY.levels for name in STRATEGY.levels]
+    count = len(cells)
+    delays = np.array([delay for delay, _ in cells])
+    table = {
+        "part": np.array(["drive"] * count),
+        "is_reference": np.zeros(count, dtype=bool),
+        "person": np.zeros(count, dtype=int),
+        "trial": np.zeros(count, dtype=int),
+        "seed": np.zeros(count, dtype=int),
+        "link.delay_s": delays,
+        "operator.strategy": np.array([name for _, name in cells]),
+        "drive_time_s": 40 + delays,
+        "loop_delay_mean_s": 2 * delays + 0.1 + human,
+        "delay_human_s": np.full(count, human),
+    }
+    return Part(table | dict(extra), "drive", [DELAY, STRATEGY])
+
+
+def test_the_loop_without_the_person_decides_not_the_link():
+    found = support_of_part(part_of(human=0.3), {})
+    np.testing.assert_allclose(found.delays[:, 0], [0.1, 1.1, 10.1])
+    np.testing.assert_allclose(
+        support_of_part(part_of(human=0.9), {}).delays, found.delays, atol=1e-12
+    )
+
+
+def test_each_strategy_has_the_support_of_its_own_data():
+    assert ranges("pursuit")[-1][1] < 1.1 < ranges("adaptive")[-1][1]
+    found = support_of_part(part_of(), {})
+    assert found.outside.tolist() == [[False, False], [True, False], [True, True]]
+
+
+def test_between_two_ranges_nobody_was_watched():
+    part = part_of(extra={"loop_delay_mean_s": np.repeat([0.5, 1.0, 1.4], 2) + 0.3}.items())
+    found = support_of_part(part, {})
+    assert found.outside[:, 1].tolist() == [True, False, False]
+    assert "adaptive: 0 to 0.225 s, pointing" in found.words
+    assert ", and 1 to 1.5 s, move-and-wait" in found.words
+
+
+def test_a_strategy_that_no_data_speak_of_is_an_extrapolation_everywhere():
+    part = part_of()
+    one = Part(part.treated, "drive", [DELAY])
+    found = support_of_part(one, {"operator": {"strategy": "mine.py:Mine"}})
+    assert found.outside.all()
+    assert found.words == "mine.py:Mine: no published data"
+
+
+def test_nothing_is_said_where_nobody_drives():
+    part = part_of(extra={"loop_delay_mean_s": np.full(6, np.nan)}.items())
+    assert support_of_part(part, {}) is None
+
+
+def test_the_table_marks_the_cells_and_explains_the_mark():
+    part = part_of()
+    table = cell_table(part, "drive_time_s", support=support_of_part(part, {}))
+    assert [row[-1] for row in table.rows] == [
+        *("0.10", "0.10"),
+        *("1.1\N{NO-BREAK SPACE}†", "1.1"),
+        *("10.1\N{NO-BREAK SPACE}†", "10.1\N{NO-BREAK SPACE}†"),
+    ]
+    assert "† Extrapolated: beyond these delays" in table.note
+    assert "pursuit: 0 to 0.225 s, pointing" in table.note
+
+
+@pytest.mark.parametrize(("panel", "stops"), [("pursuit", [1, 2]), ("adaptive", [2])])
+def test_figures_hatch_the_stops_of_each_panel(panel, stops):
+    part = part_of()
+    outside = support_of_part(part, {}).outside
+    view = View(part, "drive_time_s", None, DELAY, None, {}, outside=outside)
+    assert view.stops_outside({"operator.strategy": panel}) == stops

@@ -1,0 +1,176 @@
+"""What a results folder may have come to, and what is said of it: one line each time."""
+
+from __future__ import annotations
+
+import functools
+import os
+import shutil
+import signal
+import sys
+from pathlib import Path
+
+import patience
+import pytest
+import small_study as kit
+
+from dva_sim.experiments.execution import limit, scheduling
+from dva_sim.experiments.execution.checkpoint import FILE
+from dva_sim.experiments.execution.dry_run import dry_run
+from dva_sim.experiments.execution.runner import run_study
+from dva_sim.experiments.report.report import write_report
+from dva_sim.experiments.results.results import Results
+from dva_sim.kernel.errors import ConfigError, DvaSimError
+
+TESTS = Path(kit.__file__).parent
+
+
+@pytest.fixture
+def out(tmp_path: Path) -> Path:
+    return run_study(kit.study_in(tmp_path), tmp_path / "out", jobs=1, episode=kit.cheap)
+
+
+def never(job: object) -> kit.Tables:
+    raise AssertionError("run again")
+
+
+@pytest.mark.parametrize("damage", ["tables/runs.parquet", "manifest.json", "machine.json"])
+def test_what_is_damaged_or_gone_is_made_again_from_the_journal(
+    tmp_path: Path, out: Path, damage: str
+) -> None:
+    whole = kit.files(out)
+    for change in (lambda file: file.write_bytes(b"PAR1 no more"), Path.unlink):
+        change(out / damage)
+        run_study(kit.study_in(tmp_path), out, jobs=1, episode=never)
+        assert kit.files(out) == whole
+        assert (out / "machine.json").read_text().startswith("{")
+
+
+def test_a_damaged_table_is_told_with_its_file(out: Path) -> None:
+    (out / "tables" / "runs.parquet").write_bytes(b"PAR1 no more")
+    with pytest.raises(ConfigError, match=r"runs\.parquet: is damaged, edited or of other results"):
+        Results.load(out).table("runs")
+
+
+def test_a_table_of_other_results_is_no_evidence_for_these(tmp_path: Path, out: Path) -> None:
+    other = run_study(
+        kit.study_in(tmp_path, "seed=4"), tmp_path / "other", jobs=1, episode=kit.cheap
+    )
+    shutil.copy(other / "tables" / "runs.parquet", out / "tables" / "runs.parquet")
+    with pytest.raises(ConfigError, match="of other results"):
+        write_report(out)
+
+
+def test_a_damaged_journal_is_told_with_what_to_do(tmp_path: Path, out: Path) -> None:
+    content = bytearray((out / FILE).read_bytes())
+    content[100:3000] = b"\xff" * 2900
+    (out / FILE).write_bytes(content)
+    with pytest.raises(ConfigError, match=r"or damaged .*; move it away to begin anew"):
+        run_study(kit.study_in(tmp_path), out, jobs=1, episode=kit.cheap)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is always full")
+def test_a_disk_that_fills_up_at_the_manifest_is_told(
+    tmp_path: Path, out: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = kit.files(out)
+
+    def instead(folder: Path) -> None:
+        (folder / f".manifest.json.{os.getpid()}").symlink_to("/dev/full")
+
+    with monkeypatch.context() as patch:
+        patch.setattr("dva_sim.experiments.execution.runner._tidy", instead)
+        with pytest.raises(DvaSimError, match=r"manifest\.json cannot be written: No space left"):
+            run_study(kit.study_in(tmp_path), out, jobs=1, episode=never)
+    assert kit.files(run_study(kit.study_in(tmp_path), out, jobs=1, episode=never)) == whole
+
+
+def test_what_a_killed_runner_left_behind_is_removed(tmp_path: Path, out: Path) -> None:
+    (out / ".tables-abc").mkdir()
+    (out / ".tables-abc" / "runs.duckdb").write_bytes(b"half")
+    (out / ".manifest.json.123").write_text("{")
+    run_study(kit.study_in(tmp_path), out, jobs=1, episode=never)
+    assert [path.name for path in out.iterdir() if path.name.startswith(".")] == []
+
+
+def test_a_folder_that_cannot_be_written_is_told(tmp_path: Path, out: Path) -> None:
+    """In a mount namespace, since nobody keeps root from writing otherwise."""
+    words = ["unshare", "--map-root-user", "--mount"]
+    program = (
+        "import subprocess, sys, small_study as kit\n"
+        "from dva_sim.kernel.errors import DvaSimError\n"
+        "from pathlib import Path\n"
+        "folder = Path(sys.argv[1])\n"
+        "study = kit.load_study(folder / 'study.yaml')\n"
+        "subprocess.run(['mount', '-t', 'tmpfs', 'none', folder / 'empty'], check=True)\n"
+        "subprocess.run(['mount', '--bind', folder, folder], check=True)\n"
+        "subprocess.run(['mount', '-o', 'remount,bind,ro', folder], check=True)\n"
+        "for out in ('new', 'out'):\n"
+        "    try: kit.run_study(study, folder / out, jobs=1, episode=kit.cheap)\n"
+        "    except DvaSimError as error: print(error)\n"
+        "from dva_sim.experiments.execution.dry_run import dry_run\n"
+        "print(dry_run(study, folder / 'out').done)\n"
+    )
+    (tmp_path / "empty").mkdir()
+    can = shutil.which("unshare") and patience.run(
+        [*words, "mount", "-t", "tmpfs", "none", tmp_path / "empty"], capture_output=True
+    )
+    if not can or can.returncode:
+        pytest.skip("this system lets nobody but root mount a folder read-only")
+    ran = patience.run(
+        [*words, sys.executable, "-c", program, tmp_path],
+        capture_output=True,
+        text=True,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(map(str, (TESTS.parent, TESTS)))},
+        check=True,
+    )
+    new, old, done = ran.stdout.splitlines()
+    assert new == f"{tmp_path / 'new'} cannot be written: Read-only file system"
+    assert old.startswith(f"{out / FILE}: cannot be written")
+    assert old.endswith("is the folder read-only?")
+    assert int(done) == kit.RUNS
+
+
+def test_a_worker_that_was_stopped_is_ended_and_its_runs_are_made_by_another(
+    tmp_path: Path, out: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if not Path("/proc/self/stat").exists():
+        pytest.skip("this system does not tell which processes are stopped")
+    monkeypatch.setattr(scheduling, "_LOOK_S", 0.2)
+    mark = tmp_path / "mark"
+    again = run_study(
+        kit.study_in(tmp_path),
+        tmp_path / "again",
+        jobs=2,
+        episode=functools.partial(kit.stopped_once, mark),
+    )
+    assert mark.exists()
+    assert kit.files(again) == kit.files(out)
+
+
+def ticks(count: int, limit_s: float) -> None:
+    with limit.limited(limit_s, may_exit=False):
+        for _ in range(count):
+            signal.raise_signal(signal.SIGALRM)
+
+
+def test_time_in_which_a_process_was_stopped_does_not_count_as_its_runs() -> None:
+    """A process that was stopped for an hour finds one signal waiting, not 3600."""
+    ticks(1, limit_s=3600.0)
+    with pytest.raises(limit.RunTooLong, match="more than its 60 s"):
+        ticks(60, limit_s=60.0)
+
+
+def test_a_dry_run_of_another_study_in_the_folder_is_refused(tmp_path: Path, out: Path) -> None:
+    with pytest.raises(ConfigError, match="holds another study"):
+        dry_run(kit.study_in(tmp_path, "seed=4"), out)
+
+
+def test_the_tables_lock_ends_with_the_runner_that_holds_it(tmp_path: Path, out: Path) -> None:
+    def full(*_: object) -> None:
+        raise DvaSimError("the disk is full")
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("dva_sim.experiments.execution.runner.write_tables", full)
+        with pytest.raises(DvaSimError, match="full"):
+            run_study(kit.study_in(tmp_path), out, jobs=1, episode=never)
+    run_study(kit.study_in(tmp_path), out, jobs=1, episode=never)

@@ -1,0 +1,317 @@
+import functools
+import json
+import math
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+import small_study as kit
+from patience import PATIENCE_S
+
+from dva_sim.experiments.execution import scheduling
+from dva_sim.experiments.execution.dry_run import dry_run
+from dva_sim.experiments.execution.runner import run_study
+from dva_sim.experiments.results import manifest
+from dva_sim.experiments.results.results import Results
+from dva_sim.kernel.errors import ConfigError
+
+TESTS = Path(kit.__file__).parent
+
+
+@pytest.fixture
+def plain(tmp_path: Path) -> dict[str, bytes]:
+    """The files of the small study, run in one process without interruption."""
+    return kit.files(
+        run_study(kit.study_in(tmp_path), tmp_path / "plain", jobs=1, episode=kit.cheap)
+    )
+
+
+def test_the_tables_hold_every_run_with_design_and_measures(tmp_path):
+    study = kit.study_in(tmp_path)
+    results = Results.load(run_study(study, tmp_path / "out", jobs=1, episode=kit.cheap))
+    runs = results.table("runs")
+    assert list(runs)[:9] == [
+        *("part", "cell", "config", "pattern", "link.delay_s"),
+        *("is_reference", "person", "trial", "seed"),
+    ]
+    assert len(runs["seed"]) == kit.RUNS
+    delays = np.where(runs["is_reference"], 0, runs["link.delay_s"])
+    expected = [math.sqrt(seed) + d for seed, d in zip(runs["seed"].tolist(), delays, strict=True)]
+    assert runs["drive_time_s"].tolist() == expected
+    assert set(runs["pattern"][runs["is_reference"]]) == {None}
+    assert np.isnan(runs["link.delay_s"][runs["is_reference"]]).all()
+    assert (runs["confirmed"] == (runs["seed"] % 3 > 0)).all()
+    assert (np.isnan(runs["round_trip_s"]) == (runs["seed"] % 2 == 1)).all()
+    assert [o is None for o in runs["outcome"]] == (runs["seed"] % 3 == 0).tolist()
+
+
+def test_rows_stand_in_the_order_of_the_design(tmp_path):
+    run_study(kit.study_in(tmp_path), tmp_path / "out", jobs=1, episode=kit.cheap)
+    runs = Results.load(tmp_path / "out").table("runs")
+    columns = zip(*(runs[c].tolist() for c in ("part", "cell", "person", "trial")), strict=True)
+    order = list(columns)
+    assert order == sorted(order)
+
+
+def test_a_table_can_be_read_for_one_part(tmp_path):
+    run_study(kit.study_in(tmp_path), tmp_path / "out", jobs=1, episode=kit.cheap)
+    tracks = Results.load(tmp_path / "out").table("tracks", part="story")
+    assert set(tracks["part"]) == {"story"}
+    assert len(tracks["t_s"]) == 3 * 12
+
+
+def test_the_manifest_says_what_was_asked_and_changed(tmp_path):
+    study = kit.study_in(tmp_path, "persons=2", "robot.processing_s=0.2")
+    results = Results.load(run_study(study, tmp_path / "out", jobs=1, episode=kit.cheap))
+    assert results.manifest["question"] == "Which is quicker?"
+    assert results.manifest["set"] == ["persons=2", "robot.processing_s=0.2"]
+    assert results.manifest["scenarios"]["drive"]["robot"]["processing_s"] == 0.2
+    assert results.factors == {"pattern": ["req-rep", "latest-wins"], "link.delay_s": [0, 0.25]}
+    assert results.study["answer"]["contrast"] == ["req-rep", "latest-wins"]
+    assert results.failures == []
+
+
+def test_two_processes_write_the_same_bytes_as_one(tmp_path, plain):
+    seen = []
+    out = run_study(
+        kit.study_in(tmp_path),
+        tmp_path / "two",
+        jobs=2,
+        episode=kit.cheap,
+        progress=lambda done, total: seen.append((done, total)),
+    )
+    assert kit.files(out) == plain
+    assert seen[0] == (0, kit.RUNS)
+    assert seen[-1] == (kit.RUNS, kit.RUNS)
+
+
+def test_a_finished_study_is_not_run_again(tmp_path, plain):
+    def never(job: object) -> kit.Tables:
+        raise AssertionError("run again")
+
+    out = run_study(kit.study_in(tmp_path), tmp_path / "plain", jobs=1, episode=never)
+    assert kit.files(out) == plain
+
+
+@pytest.fixture
+def started() -> Iterator[Callable[[Path, Path], subprocess.Popen[str]]]:
+    """Starts runners in processes of their own; none of them outlives the test."""
+    runners: list[subprocess.Popen[str]] = []
+
+    def start(study: Path, out: Path) -> subprocess.Popen[str]:
+        runner = subprocess.Popen(
+            [sys.executable, "-m", "small_study", str(study), str(out), "2"],
+            stdout=subprocess.PIPE,
+            text=True,
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(map(str, (TESTS.parent, TESTS)))},
+            cwd=study.parent,
+        )
+        runners.append(runner)
+        return runner
+
+    try:
+        yield start
+    finally:
+        for runner in runners:
+            runner.kill()
+            runner.wait()
+            runner.stdout.close()
+
+
+def stopped(runner: subprocess.Popen[str], when: int, how: signal.Signals) -> str:
+    """Stop a runner once it has done some runs; what it and its processes said in the end."""
+    assert runner.stdout is not None
+    for line in runner.stdout:
+        if int(line) >= when:
+            break
+    runner.send_signal(how)
+    return runner.communicate(timeout=PATIENCE_S)[0]  # only returns when its workers are gone too
+
+
+def test_a_runner_killed_again_and_again_ends_with_the_same_bytes(tmp_path, plain, started):
+    study, out = kit.write_study(tmp_path), tmp_path / "killed"
+    for when in (3, 20):
+        runner = started(study, out)
+        stopped(runner, when, signal.SIGKILL)
+        assert runner.returncode == -signal.SIGKILL
+    done = dry_run(kit.study_in(tmp_path), out).done
+    assert 20 <= done < kit.RUNS
+    assert kit.files(run_study(kit.study_in(tmp_path), out, jobs=1, episode=kit.cheap)) == plain
+
+
+def test_repeats_go_on_after_a_kill_too_and_end_with_the_same_bytes(tmp_path, started):
+    study, out = kit.write_study(tmp_path, kit.REPEATED), tmp_path / "killed"
+    whole = run_study(kit.load_study(study), tmp_path / "whole", jobs=1, episode=kit.cheap)
+    stopped(started(study, out), kit.RUNS + 4, signal.SIGKILL)
+    assert kit.RUNS < dry_run(kit.load_study(study), out).done < kit.REPEATED_RUNS
+    again = run_study(kit.load_study(study), out, jobs=2, episode=kit.cheap)
+    assert kit.files(again) == kit.files(whole)
+    assert "robustness.parquet" in kit.files(whole)
+
+
+def test_ctrl_c_keeps_what_is_done_and_says_how_to_go_on(tmp_path, plain, started):
+    study, out = kit.write_study(tmp_path), tmp_path / "stopped"
+    runner = started(study, out)
+    said = stopped(runner, 3, signal.SIGINT)
+    assert runner.returncode == 130
+    assert "of 42 runs, which are kept; the same command goes on from there" in said
+    assert 3 <= dry_run(kit.study_in(tmp_path), out).done < kit.RUNS
+    assert kit.files(run_study(kit.study_in(tmp_path), out, jobs=1, episode=kit.cheap)) == plain
+
+
+def test_two_runners_on_one_folder_do_not_disturb_each_other(tmp_path, plain, started):
+    study, out = kit.write_study(tmp_path), tmp_path / "shared"
+    pair = [started(study, out) for _ in range(2)]
+    for runner in pair:
+        runner.communicate(timeout=PATIENCE_S)
+    assert [runner.returncode for runner in pair] == [0, 0]
+    assert kit.files(out) == plain
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_a_run_that_fails_is_named_and_the_others_go_on(tmp_path, jobs):
+    study = kit.study_in(tmp_path)
+    out = run_study(study, tmp_path / "out", jobs=jobs, episode=kit.unlucky)
+    results = Results.load(out)
+    (failure,) = results.failures
+    assert failure["error"] == "RuntimeError: the robot fell into a hole"
+    assert (failure["part"], failure["cell"], failure["person"], failure["trial"]) == (
+        *("drive", -1, 1, 0),
+    )
+    assert len(results.table("runs")["seed"]) == kit.RUNS - 1
+
+
+def test_a_failed_run_is_tried_again_the_next_time(tmp_path, plain):
+    study = kit.study_in(tmp_path)
+    run_study(study, tmp_path / "out", jobs=1, episode=kit.unlucky)
+    assert dry_run(study, tmp_path / "out").done == kit.RUNS - 1
+    assert kit.files(run_study(study, tmp_path / "out", jobs=1, episode=kit.cheap)) == plain
+
+
+def test_a_run_that_kills_its_process_again_and_again_fails_and_the_others_go_on(tmp_path):
+    out = run_study(kit.study_in(tmp_path), tmp_path / "out", jobs=2, episode=kit.deadly)
+    results = Results.load(out)
+    (failure,) = results.failures
+    assert "killed the process it ran in, again" in failure["error"]
+    assert (failure["part"], failure["cell"], failure["person"]) == ("story", 2, 1)
+    assert len(results.table("runs")["seed"]) == kit.RUNS - 1
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_a_run_that_stalls_ends_as_a_failure_at_its_limit(tmp_path, jobs):
+    study = kit.study_in(tmp_path)
+    out = run_study(study, tmp_path / "out", jobs=jobs, episode=kit.stalls, limit_s=1.0)
+    (failure,) = Results.load(out).failures
+    assert failure["error"] == "RunTooLong: took more than its 1 s"
+    assert (failure["part"], failure["cell"], failure["person"]) == ("story", 2, 1)
+
+
+def test_a_run_that_no_exception_reaches_is_ended_with_its_process(tmp_path, monkeypatch):
+    monkeypatch.setattr(scheduling, "_LOOK_S", 0.2)
+    study = kit.study_in(tmp_path)
+    out = run_study(study, tmp_path / "out", jobs=2, episode=kit.never_comes_back, limit_s=1.0)
+    (failure,) = Results.load(out).failures
+    assert "beyond its limit" in failure["error"]
+    assert len(Results.load(out).table("runs")["seed"]) == kit.RUNS - 1
+
+
+def test_a_worker_killed_once_changes_nothing(tmp_path, plain):
+    mark = tmp_path / "mark"
+    episode = functools.partial(kit.deadly_once, mark)
+    out = run_study(kit.study_in(tmp_path), tmp_path / "out", jobs=2, episode=episode)
+    assert mark.exists()
+    assert kit.files(out) == plain
+
+
+@pytest.mark.parametrize(
+    ("tables", "told"),
+    [
+        ({"runs": [{"seed": 1}]}, "name the design"),
+        ({"runs": [{"pattern": 1}]}, "name the design"),
+        ({"../runs": []}, "should be letters"),
+        ({"runs": [{"x": [1]}]}, "should hold numbers"),
+        ({"runs": [{"x": {1}}]}, "cannot be kept"),
+    ],
+)
+def test_tables_that_cannot_be_kept_are_failures(tmp_path, tables, told):
+    study = kit.study_in(tmp_path)
+    out = run_study(study, tmp_path / "out", jobs=1, episode=lambda _: tables)
+    assert told in Results.load(out).failures[-1]["error"]
+
+
+def test_numpy_numbers_are_kept_as_numbers(tmp_path):
+    rows = [{"n": np.int64(2), "x": np.float32(0.5), "ok": np.bool_(True)}]
+    out = run_study(
+        kit.study_in(tmp_path), tmp_path / "out", jobs=1, episode=lambda _: {"runs": rows}
+    )
+    runs = Results.load(out).table("runs", part="story")
+    assert [runs[c].dtype.kind for c in ("n", "x", "ok")] == ["i", "f", "b"]
+    assert runs["x"][0] == 0.5
+
+
+def test_the_folder_of_another_study_is_refused(tmp_path, plain):
+    for settings in (["seed=4"], ["robot.processing_s=0.3"]):
+        with pytest.raises(ConfigError, match="holds another study"):
+            run_study(
+                kit.study_in(tmp_path, *settings), tmp_path / "plain", jobs=1, episode=kit.cheap
+            )
+    assert kit.files(tmp_path / "plain") == plain
+
+
+def test_a_folder_whose_runs_were_made_with_another_numpy_is_refused(tmp_path, plain, monkeypatch):
+    monkeypatch.setattr(manifest, "version", lambda name: f"other {name}")
+    with pytest.raises(ConfigError, match="the program or its libraries were changed"):
+        run_study(kit.study_in(tmp_path), tmp_path / "plain", jobs=1, episode=kit.cheap)
+    assert kit.files(tmp_path / "plain") == plain
+
+
+def test_results_of_another_study_without_a_journal_are_refused_too(tmp_path, plain):
+    (tmp_path / "plain" / "journal.sqlite").unlink()
+    with pytest.raises(ConfigError, match="holds another study"):
+        run_study(kit.study_in(tmp_path, "seed=4"), tmp_path / "plain", episode=kit.cheap)
+
+
+def test_a_file_cannot_be_a_results_folder(tmp_path):
+    study = kit.study_in(tmp_path)
+    with pytest.raises(ConfigError, match="is a file"):
+        run_study(study, tmp_path / "study.yaml", jobs=1, episode=kit.cheap)
+
+
+def test_a_dry_run_counts_and_writes_nothing(tmp_path):
+    plan = dry_run(kit.study_in(tmp_path), tmp_path / "out")
+    assert (plan.runs, plan.done, plan.cells, plan.estimate_s) == (kit.RUNS, 0, 9, None)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_dry_run_of_a_study_half_done_estimates_the_rest(tmp_path):
+    study = kit.study_in(tmp_path)
+    run_study(study, tmp_path / "out", jobs=1, episode=kit.unlucky)
+    plan = dry_run(study, tmp_path / "out", jobs=1)
+    assert plan.done == kit.RUNS - 1
+    assert plan.tried == 0  # the runs that are done tell it
+    assert plan.estimate_s > 0
+
+
+def test_times_and_costs_stay_apart_from_the_results(tmp_path, plain):
+    machine = json.loads((tmp_path / "plain" / "machine.json").read_text())
+    assert machine["jobs"] == 1
+    assert set(machine["cpu_s_per_run"]) == {
+        *("drive/-1", *(f"drive/{i}" for i in range(4)), *(f"story/{i}" for i in range(4)))
+    }
+
+
+def test_a_folder_without_results_is_refused_by_name(tmp_path):
+    with pytest.raises(ConfigError, match="holds no finished results"):
+        Results.load(tmp_path)
+    with pytest.raises(ConfigError, match="is not a folder"):
+        Results.load(tmp_path / "nowhere")
+
+
+def test_a_table_that_was_not_written_is_refused_with_those_there_are(tmp_path, plain):
+    with pytest.raises(ConfigError, match="no table 'events'; tables: runs, tracks"):
+        Results.load(tmp_path / "plain").table("events")

@@ -1,0 +1,67 @@
+"""What an answer depends on, told beside it."""
+
+import pytest
+import synthetic_study
+
+from dva_sim.experiments.report.summary import Reading
+from dva_sim.experiments.results.results import Results
+
+STRATEGY = {"operator": {"strategy": "adaptive"}, "phone": {"profile": "default"}}
+
+
+def reading(tmp_path, rows=None, study=None, **tables):
+    facts = synthetic_study.manifest(6, 2)
+    facts["study"] |= study or {}
+    facts["scenarios"] = dict.fromkeys(("drive", "story"), synthetic_study.SCENARIO | STRATEGY)
+    runs = synthetic_study.drive_rows(6, 2, effect_s=30.0, missed=0.0) if rows is None else rows
+    folder = synthetic_study.write(tmp_path / "r", {"runs": runs, **tables}, facts)
+    return Reading(Results.load(folder))
+
+
+def told(found):
+    return {about: words.replace("\N{NO-BREAK SPACE}", " ") for about, words in found.items()}
+
+
+def test_persons_are_simulated_and_how_they_steer_is_said(tmp_path):
+    persons = told(reading(tmp_path).answer.depends)["Persons"]
+    assert persons == (
+        "6 simulated, 2 trials each; no human took part. They steer by the strategy adaptive; "
+        "with another, not tried here, the difference may be smaller or larger."
+    )
+
+
+def test_who_chooses_to_move_and_wait_did_so_for_a_share_of_the_time(tmp_path):
+    rows = synthetic_study.drive_rows(6, 2, effect_s=30.0, missed=0.0)
+    for row in rows:
+        row["move_and_wait_share"] = 0.86 if row["pattern"] == "req-rep" else 0.54
+    persons = told(reading(tmp_path, rows).answer.depends)["Persons"]
+    assert (
+        "strategy adaptive, here by moving and waiting for 86 % of the time under REQ/REP and "
+        "54 % of the time under latest-wins PUB/SUB;" in persons
+    )
+
+
+def test_other_models_of_persons_say_how_far_the_effect_reaches(tmp_path):
+    effects = {("pursuit", 0): 20, ("pursuit", 1): 5, ("adaptive", 0): 1, ("adaptive", 1): -4}
+    claims = {"robustness": synthetic_study.CLAIMS["robustness"]}
+    found = reading(tmp_path, study=claims, robustness=synthetic_study.repeat_rows(effects))
+    persons = told(found.answer.depends)["Persons"]
+    assert "the sign is the same in 2 of 3, and the difference at 1 s runs from" in persons
+
+
+def test_the_answer_under_the_other_settings_that_were_run_stands_beside_it(tmp_path):
+    found = reading(tmp_path)
+    settings = told(found.answer.depends)["Settings"]
+    assert settings.startswith("The answer is for profile default. The difference at a one-way")
+    assert "with profile dissertation." in settings
+    assert settings.endswith("Not varied: phone default.")
+
+
+def test_a_study_without_a_contrast_depends_on_nothing_that_can_be_told(tmp_path):
+    assert reading(tmp_path, study={"answer": None}).answer.depends == {}
+
+
+@pytest.mark.parametrize("parts", [{"drive": {"replications": 3}}, {"drive": {}}])
+def test_a_part_may_have_trials_of_its_own(tmp_path, parts):
+    expected = parts["drive"].get("replications", 2)
+    assert reading(tmp_path, study={"parts": parts}).trials_of("drive") == expected

@@ -1,0 +1,385 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import synthetic_study
+from matplotlib.figure import Figure
+
+from dva_sim.experiments.analysis.answer import Finding
+from dva_sim.experiments.analysis.paired_effects import Factor, Part, View
+from dva_sim.experiments.analysis.predictions import Cadence
+from dva_sim.experiments.analysis.statistics import band
+from dva_sim.experiments.report.figures.budget import delay_budget
+from dva_sim.experiments.report.figures.contrast import contrast
+from dva_sim.experiments.report.figures.effect import _band, command_rate, differences
+from dva_sim.experiments.report.figures.factorial import effects, heat_map
+from dva_sim.experiments.report.figures.outcomes import Events, fates, outcomes, responses
+from dva_sim.experiments.report.figures.palette import ONE, apart, columns_of
+from dva_sim.experiments.report.figures.scatter import trend
+from dva_sim.experiments.report.figures.site_map import Ways
+from dva_sim.experiments.report.figures.style import (
+    fit_to,
+    is_to_scale,
+    log_axis,
+    panel_grid,
+    panel_name,
+    panels,
+    place_of,
+    styled,
+)
+from dva_sim.experiments.report.figures.tradeoff import tradeoff
+
+DELAY = Factor("link.delay_s", (0.0, 0.05, 0.1, 0.25, 0.5, 1.0))
+PATTERN = Factor("pattern", ("req-rep", "pub-sub", "latest-wins"))
+PROFILE = Factor("profile", ("default", "dissertation"))
+
+
+@pytest.fixture(scope="module")
+def view():
+    runs = synthetic_study.columns(synthetic_study.drive_rows(2, 1))
+    part = Part(runs, "drive", [PATTERN, DELAY, PROFILE])
+    return View(part, "drive_time_s", PATTERN, DELAY, None, {"profile": "default"})
+
+
+def test_lock_step_falls_behind_where_round_trip_and_processing_fill_the_period():
+    wanted = Cadence(period_s=0.1, processing_s=0.05)
+    assert wanted.boundary_s == pytest.approx(0.025)
+    assert wanted.lock_step_rate(wanted.boundary_s) == pytest.approx(10.0)
+    assert wanted.lock_step_rate(0.0) == pytest.approx(10.0)
+    assert wanted.lock_step_rate(1.0) == pytest.approx(1 / 2.05)
+
+
+def test_a_delay_lies_between_the_evenly_spaced_levels_around_it():
+    assert place_of(DELAY, 0.025) == pytest.approx(0.5)
+    assert place_of(DELAY, 0.75) == pytest.approx(4.5)
+
+
+@pytest.mark.parametrize("delay", [-0.01, 1.5])
+def test_a_boundary_outside_the_levels_has_no_place(delay):
+    assert place_of(DELAY, delay) is None
+
+
+def test_a_panel_where_no_run_went_on_takes_nothing_from_the_others(view):
+    runs = {**view.part.treated, "is_reference": np.zeros(len(view.part.treated["part"]), bool)}
+    rate = np.where(runs["profile"] == "default", 8.0, np.nan)
+    part = Part(runs | {"command_rate_hz": rate}, "drive", view.part.factors)
+    both = View(part, "drive_time_s", PATTERN, DELAY, None, {})
+    assert [panel["profile"] for panel in both.shown] == ["default", "dissertation"]
+    with styled():
+        assert command_rate(both, lambda panel: None) is not None
+
+
+def test_names_of_lines_that_end_together_are_moved_apart_within_the_axes():
+    placed = apart([0.95, 0.96, 0.97], gap=0.1)
+    assert np.diff(placed).min() == pytest.approx(0.1)
+    assert max(placed) == pytest.approx(1.0)
+
+
+def test_every_event_has_a_fate_even_one_nobody_foresaw():
+    outcome = np.array(["confirmed", "confirmed", "expired", "open", "stolen"])
+    kind = np.array(["robot", "guard", "robot", "none", "none"])
+    assert fates(outcome, kind).tolist() == [
+        "confirmed by a robot",
+        "confirmed by a guard",
+        "expired",
+        "open",
+        "other",
+    ]
+
+
+def test_shares_of_outcomes_add_up_to_one(view):
+    rows = synthetic_study.columns(synthetic_study.story_rows(4))
+    events = Events(rows, "story", view)
+    mask = events.under({"profile": "default"}, "req-rep", 1.0)
+    assert mask.sum() == 8
+    assert sum(events.shares(mask).values()) == pytest.approx(1.0)
+
+
+def test_a_way_is_found_by_its_pattern_delay_and_profile(view):
+    rows = synthetic_study.track_rows()
+    ways = Ways(synthetic_study.columns(rows), view)
+    (way,) = ways.under("pub-sub", 0.25)
+    wanted = [
+        (r["x_m"], r["y_m"])
+        for r in rows
+        if (r["pattern"], r["link.delay_s"], r["profile"]) == ("pub-sub", 0.25, "default")
+        and not r["is_reference"]
+    ]
+    np.testing.assert_array_equal(way, wanted)
+    assert len(ways.reference()) == 1
+
+
+@pytest.mark.parametrize(
+    ("ends", "numbers"),
+    [
+        ((0.05, 0.7), ["0.05", "0.1", "0.2", "0.5"]),
+        ((0.3, 0.45), ["0.3", "0.4"]),
+        ((0.001, 10.0), ["0.001", "0.01", "0.1", "1", "10"]),
+        ((0.02, 30.0), ["0.02", "0.05", "0.1", "0.2", "0.5", "1", "2", "5", "10", "20"]),
+    ],
+)
+def test_a_logarithmic_axis_has_plain_numbers_at_round_places_only(ends, numbers):
+    figure = Figure()
+    axes = figure.subplots()
+    axes.plot([0, 1], ends)
+    log_axis(axes)
+    figure.draw_without_rendering()
+    low, high = axes.get_ylim()
+    ticks = axes.yaxis.get_major_ticks()
+    shown = [t.label1.get_text() for t in ticks if low <= t.get_loc() <= high]
+    assert shown == numbers
+    assert axes.yaxis.get_minorticklocs().size == 0
+
+
+def test_four_settings_stand_two_by_two_with_the_answers_levels_first():
+    runs = synthetic_study.columns(synthetic_study.drive_rows(2, 1))
+    part = Part(runs, "drive", [PATTERN, Factor("link.delay_s", (0.0, 0.25)), PROFILE])
+    view = View(part, "drive_time_s", PATTERN, None, None, {"link.delay_s": 0.25})
+    assert [panel_name(panel).replace("\N{NO-BREAK SPACE}", " ") for panel in view.shown] == [
+        "250 ms, default",
+        "250 ms, dissertation",
+        "0 ms, default",
+        "0 ms, dissertation",
+    ]
+    _, axes = panel_grid(view, 3.0)
+    assert [ax.get_subplotspec().rowspan.start for ax in axes] == [0, 0, 1, 1]
+
+
+def test_bands_end_where_nothing_is_possible_and_do_not_flatten_the_lines():
+    few = np.array([[40.0, 60.0], [80.0, 90.0]])  # two persons, so bands of hundreds of seconds
+    _, ((ax,),) = panels(1, 1, 3.0)
+    _band(ax, band(few), ONE, 0.0, (0.0, 240.0))
+    heights = ax.collections[0].get_paths()[0].vertices[:, 1]
+    assert (heights.min(), heights.max()) == (0.0, 240.0)
+    assert "are cut" in fit_to(ax, few.ravel())
+    assert ax.get_ylim() == pytest.approx((32.5, 97.5))
+
+
+def test_narrow_bands_are_shown_whole():
+    _, ((ax,),) = panels(1, 1, 3.0)
+    many = np.linspace([40.0, 45.0], [60.0, 65.0], 24)
+    _band(ax, band(many), ONE, 0.0, (0.0, 240.0))
+    before = ax.get_ylim()
+    assert fit_to(ax, many.ravel()) == ""
+    assert ax.get_ylim() == before
+
+
+def test_nobody_who_never_came_has_a_panel_and_one_fate_needs_no_picture(view):
+    rows = synthetic_study.columns(synthetic_study.story_rows(4))
+    rows["responder_kind"] = np.full(len(rows["part"]), "robot")
+    rows["outcome"] = np.full(len(rows["part"]), "confirmed")
+    events = Events(rows, "story", view)
+    assert list(events.kinds_of_times()) == ["Robot arrives", "Robot confirms"]
+    assert outcomes(view, events) is None
+    drawn = responses(view, events)
+    assert f"all {len(events):,} were confirmed by a robot" in drawn.caption
+
+
+def test_bars_of_a_lower_panel_are_not_cut_by_the_first(view):
+    columns = ("delay_uplink_s", "delay_downlink_s")
+    runs = {**view.part.treated, "is_reference": np.zeros(len(view.part.treated["part"]), bool)}
+    longer = np.where(runs["profile"] == "dissertation", 3.0, 1.0)
+    part = Part(runs | {name: runs[name] * longer for name in columns}, "drive", view.part.factors)
+    with styled():
+        drawn = delay_budget(replace(view, part=part))
+    longest = max(ax.get_xlim()[1] for ax in drawn.figure.axes)
+    rows = [row.split(",") for row in drawn.csv.decode().splitlines()]
+    stages = [i for i, name in enumerate(rows[0]) if name.startswith("delay_")]
+    highest = max(sum(float(row[i]) for i in stages) for row in rows[1:])
+    assert highest > 6.0
+    assert longest > highest
+
+
+def two_factor_view(effect):
+    """Robot minus guard at 4 x 3 settings, for 8 persons of whom none differs from the others."""
+    rng = np.random.default_rng(1)
+    ratio, mobilisation = Factor("ratio", (0.5, 1.0, 2.0, 4.0)), Factor("wait_s", (0.0, 20.0, 40.0))
+    team = Factor("team", ("robot", "guard"))
+    rows = [
+        {"part": "d", "person": person, "trial": 0, "seed": person, "is_reference": False}
+        | {"team": who, "ratio": r, "wait_s": w}
+        | {"response_s": 60.0 + effect(r, w) * (who == "robot") + rng.normal(0, 0.5)}
+        for person in range(8)
+        for who in team.levels
+        for r in ratio.levels
+        for w in mobilisation.levels
+    ]
+    part = Part(synthetic_study.columns(rows), "d", [team, ratio, mobilisation])
+    return View(part, "response_s", team, ratio, ("robot", "guard"), {})
+
+
+def test_the_heat_map_draws_the_line_where_the_effect_turns_round():
+    with styled():
+        drawn = heat_map(two_factor_view(lambda ratio, wait: 10 * np.log2(ratio) - 0.5 * wait))
+    assert "Thick line: where the mean difference is zero" in drawn.caption
+    rows = drawn.csv.decode().splitlines()
+    assert rows[0] == "wait_s,ratio,mean_s,band_low_s,band_high_s"
+    assert len(rows) == 1 + 12
+
+
+def test_a_heat_map_without_a_change_of_sign_has_no_line():
+    with styled():
+        drawn = heat_map(two_factor_view(lambda ratio, wait: 30.0 + wait))
+    assert "zero nowhere" in drawn.caption
+
+
+def test_a_second_factor_of_two_levels_needs_no_heat_map(view):
+    assert heat_map(view) is None
+
+
+def test_main_effects_and_interactions_are_those_put_in():
+    with styled():
+        drawn = effects(two_factor_view(lambda ratio, wait: 2.0 * ratio + 0.1 * wait))
+    rows = [row.split(",") for row in drawn.csv.decode().splitlines()[1:]]
+    found = {(name, to): float(mean) for name, _, to, mean, *_ in rows}
+    assert found["team", "robot"] == pytest.approx(2.0 * 1.875 + 0.1 * 20, abs=0.3)
+    assert found["team x ratio", "robot x 4.0"] == pytest.approx(2.0 * 3.5, abs=0.5)
+    assert found["ratio x wait_s", "4.0 x 40.0"] == pytest.approx(0.0, abs=0.6)
+
+
+def test_the_tradeoff_needs_an_exposure_that_varies():
+    view = two_factor_view(lambda ratio, wait: 5.0)
+    assert tradeoff(view) is None
+    exposed = np.where(view.part.treated["team"] == "guard", 40.0, 2.0)
+    part = Part(view.part.treated | {"person_exposure_s": exposed}, "d", view.part.factors)
+    with styled():
+        drawn = tradeoff(replace(view, part=part))
+    assert drawn.title == "The trade-off: response time against time of people in danger"
+
+
+def of_links(view, count):
+    """The same runs, with links that have names where delays were."""
+    names = ("ideal", "far", "wifi", "lossy", "narrow", "cellular-at-the-edge")[:count]
+    runs = {**view.part.treated, "is_reference": np.zeros(len(view.part.treated["part"]), bool)}
+    link = np.array([names[DELAY.levels.index(d)] for d in runs["link.delay_s"].tolist()])
+    factors = [PATTERN, Factor("link", names), PROFILE]
+    part = Part(runs | {"link": link}, "drive", factors)
+    contrast = ("req-rep", "latest-wins")
+    return View(part, "drive_time_s", PATTERN, factors[1], contrast, {"profile": "default"})
+
+
+def test_lines_lead_from_number_to_number_and_never_from_word_to_word(view):
+    def joined(view):
+        with styled():
+            figure = differences(view, lambda panel: None).figure
+        return [line for line in figure.axes[0].lines if len(line.get_xdata()) == 6 and solid(line)]
+
+    def solid(line):
+        return line.get_linestyle() == "-"
+
+    assert len(joined(replace(view, contrast=("req-rep", "latest-wins")))) == 2
+    assert joined(of_links(view, 6)) == []
+
+
+def overlapping(figure, texts):
+    """Pairs of texts that are drawn over each other."""
+    figure.draw_without_rendering()
+    boxes = [t.get_window_extent() for t in texts if t.get_text() and t.get_visible()]
+    return [
+        (a, b)
+        for i, a in enumerate(boxes)
+        for b in boxes[:i]
+        if a.x0 < b.x1 and b.x0 < a.x1 and a.y0 < b.y1 and b.y0 < a.y1
+    ]
+
+
+def test_who_does_not_drive_has_no_delay_budget(view):
+    runs = {**view.part.treated, "is_reference": np.zeros(len(view.part.treated["part"]), bool)}
+    guards = runs["pattern"] == "pub-sub"
+    stages = {k: np.where(guards, np.nan, v) for k, v in runs.items() if k.startswith("delay_")}
+    part = Part(runs | stages, "drive", view.part.factors)
+    with styled():
+        figure = delay_budget(replace(view, part=part)).figure
+    titles = [ax.get_title("left").rpartition(", ")[2] for ax in figure.axes]
+    assert titles == ["REQ/REP", "latest-wins"] * 2
+
+
+def test_names_of_six_links_stand_clear_of_each_other_beside_the_delay_budget(view):
+    with styled():
+        figure = delay_budget(of_links(view, 6)).figure
+    axes = [ax for ax in figure.axes if ax.get_visible()]
+    names = list(axes[0].get_yticklabels())
+    assert [text.get_text() for text in names][::5] == ["ideal", "cellular-at-the-edge"]
+    assert overlapping(figure, [*names, *(ax._left_title for ax in axes)]) == []
+
+
+@pytest.mark.parametrize(
+    ("lengths", "columns"),
+    [([8, 13, 19], 3), ([8, 13, 19, 6, 19, 9, 11], 5), ([120, 3], 1), ([], 1)],
+)
+def test_a_key_has_as_many_columns_as_fit_the_width(lengths, columns):
+    assert columns_of(lengths) == columns
+
+
+def test_an_axis_says_when_its_levels_are_not_as_far_apart_as_their_places():
+    assert is_to_scale(Factor("robot.count", (1, 2, 3)))
+    assert is_to_scale(Factor("link", ("near", "far")))
+    assert not is_to_scale(DELAY)
+
+
+def test_the_trend_of_points_is_made_of_means_with_the_scatter_of_their_points():
+    x = np.arange(48.0)
+    middle, mean, half = trend(x, np.where(x % 2, 3.0, 1.0) + (x > 23))
+    assert middle[:2] == pytest.approx([2.5, 8.5])
+    assert mean == pytest.approx([2, 2, 2, 2, 3, 3, 3, 3])
+    # Three at 1 and three at 3: a standard deviation of 1.0954 over 2.4495, times 2.5706.
+    assert half == pytest.approx(np.full(8, 1.1496), abs=1e-4)
+
+
+def test_eleven_points_are_too_few_for_a_trend():
+    assert trend(np.arange(11.0), np.arange(11.0))[0].size == 0
+
+
+# --- the figure that answers -------------------------------------------------------------------
+
+
+def answered(over="link.delay_s", levels=(0.0, 0.5, 1.0), means=(0.0, 5.0, 9.0), **changes):
+    """A finding of 8 persons, with a band of 2 s on either side."""
+    mean = np.array(means)
+    found = Finding(
+        measure="drive_time_s",
+        in_excess=False,
+        factor="pattern",
+        first="req-rep",
+        second="latest-wins",
+        over=over,
+        levels=levels,
+        within={},
+        mean=mean,
+        low=mean - 2.0,
+        high=mean + 2.0,
+        persons=8,
+    )
+    return replace(found, **changes)
+
+
+def drawn_answer(found):
+    with styled():
+        return contrast(found, np.tile(found.mean, (found.persons, 1)))
+
+
+def test_the_figure_that_answers_shows_the_band_and_fills_what_differs_from_zero():
+    drawn = drawn_answer(answered())
+    ax = drawn.figure.axes[0]
+    marks = [line for line in ax.lines if line.get_marker() == "o"]
+    filled, hollow = (m.get_xdata().tolist() for m in marks)
+    assert (filled, hollow) == ([1, 2], [0])
+    assert [text.get_text() for text in ax.texts] == ["0", "+5.0", "+9.0"]
+    assert drawn.csv.decode().splitlines()[2] == "0.5,5,3,7"
+    assert drawn.caption.startswith("Above zero REQ/REP takes longer. Mark: mean of 8 persons")
+
+
+def test_a_contrast_that_runs_over_nothing_has_one_mark():
+    drawn = drawn_answer(answered("", (None,), (3.0,)))
+    assert [text.get_text() for text in drawn.figure.axes[0].texts] == ["+3.0"]
+    assert "band" not in drawn.caption
+
+
+def test_without_an_interval_no_figure_answers():
+    nothing = np.full(3, np.nan)
+    assert drawn_answer(answered(low=nothing, high=nothing)) is None
+
+
+def test_what_is_too_small_to_matter_is_grey_if_it_can_be_seen():
+    assert "Grey" in drawn_answer(answered(smallest_effect=2.0)).caption
+    assert "Grey" not in drawn_answer(answered(smallest_effect=0.01)).caption

@@ -1,0 +1,81 @@
+import pytest
+import synthetic_study
+
+from dva_sim.experiments.report.method import remarks
+from dva_sim.experiments.report.summary import Reading
+from dva_sim.experiments.results.results import Results
+
+PERSONS = 4
+
+
+def reading(tmp_path, study=None, **facts):
+    """Of a study of four persons, though its file may say that there are six."""
+    whole = synthetic_study.manifest(6, 2, **facts)
+    whole["study"] |= study or {}
+    rows = [r for r in synthetic_study.drive_rows(PERSONS, 2) if r["profile"] != "dissertation"]
+    return Reading(Results.load(synthetic_study.write(tmp_path / "r", {"runs": rows}, whole)))
+
+
+def test_the_persons_are_those_that_were_run(tmp_path):
+    assert remarks(reading(tmp_path))[0] == "Simulated persons: 4; trials of each: 2."
+
+
+@pytest.mark.parametrize(
+    ("key", "why", "words"),
+    [
+        ("stop", "enough", "4 (stopped after 2 of 6 batches: every interval asked for was narrow"),
+        ("budget_s", "budget", "4 (stopped after 2 of 6 batches: the time by the clock was spent"),
+        ("stop", None, "4 (all 6 batches, the most that was allowed)"),
+    ],
+)
+def test_what_decided_the_number_of_persons_is_told(tmp_path, key, why, words):
+    stopped = {"rounds": 2, "of": 6, "why": why}
+    told = remarks(reading(tmp_path, {key: {"half_width": 1.0}}, stopped=stopped))[0]
+    assert f"Simulated persons: {words}" in told
+
+
+def test_parts_with_trials_of_their_own_are_told_apart(tmp_path):
+    parts = {"drive": {"replications": 5}, "story": {"replications": None}}
+    told = remarks(reading(tmp_path, {"parts": parts}))[0]
+    assert told.endswith("trials of each: 5 in drive, 2 in story.")
+
+
+@pytest.mark.parametrize(
+    ("versions", "words"),
+    [
+        (
+            {"dva-sim": "0.7.0", "fingerprint": "ab12", "commit": "0123456789abcdef"},
+            "Made with dva-sim 0.7.0, simulating code ab12, commit 0123456789ab.",
+        ),
+        (
+            {"dva-sim": "0.7.0", "commit": "0123456789abcdef", "dirty": True},
+            "Made with dva-sim 0.7.0, commit 0123456789ab with changes that are not committed.",
+        ),
+        (
+            {"dva-sim": "0.7.0", "commit": None, "dirty": None},
+            "Made with dva-sim 0.7.0; its commit is not known: it did not run from a checkout.",
+        ),
+    ],
+)
+def test_the_program_is_told_and_what_is_not_known_of_it(tmp_path, versions, words):
+    assert remarks(reading(tmp_path, versions=versions))[-1] == words
+
+
+def test_tests_are_told_where_there_are_any(tmp_path):
+    claims = {"hypotheses": {"h": {"direction": "above"}}}
+    claims["comparisons"] = {"c": synthetic_study.manifest(6, 2)["study"]["answer"]}
+    told = " ".join(remarks(reading(tmp_path, claims)))
+    assert "Hypotheses are judged by a one-sided test against their margin" in told
+    assert "Comparisons are tested two-sided by permutation" in told
+
+
+def test_without_claims_no_test_is_told(tmp_path):
+    told = " ".join(remarks(reading(tmp_path)))
+    assert "one-sided" not in told
+    assert "permutation" not in told
+
+
+def test_with_fewer_than_six_persons_nothing_is_drawn_anew(tmp_path):
+    assert "With as few persons as here it is Student's alone" in " ".join(
+        remarks(reading(tmp_path))
+    )

@@ -1,0 +1,93 @@
+import itertools
+import re
+
+import numpy as np
+import pytest
+import synthetic_study
+from page_words import words
+from small_study import SHIFT
+
+from dva_sim.experiments.analysis.shift_effects import pooled
+from dva_sim.experiments.report.report import write_report
+from dva_sim.simulation.shift import build, measures, simulate_timed
+
+POLICIES = ["random", "nearest_idle", "min_eta"]
+RATES = [1, 3]
+FACTS = {
+    "study": {
+        "question": "Who should go?",
+        "persons": 3,
+        "replications": 1,
+        "factors": {"dispatch.policy": POLICIES, "intensity": RATES},
+        "answer": {
+            "part": "shift",
+            "measure": "response_mean_s",
+            "factor": "dispatch.policy",
+            "contrast": ["random", "min_eta"],
+            "over": "intensity",
+            "smallest_effect_s": 5.0,
+        },
+    },
+    "scenarios": {"shift": build(SHIFT).model_dump(mode="json")},
+    "set": [],
+}
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory):
+    tables = {"runs": [], "events": []}
+    for policy, rate, shift in itertools.product(POLICIES, RATES, range(3)):
+        changes = {"dispatch.policy": policy, "intensity": rate}
+        made = measures.tables(simulate_timed(build(SHIFT, changes), shift))
+        design = {"part": "shift", "person": shift, "trial": 0, "seed": shift}
+        for name, rows in tables.items():
+            rows += [design | changes | {"is_reference": False} | row for row in made[name]]
+    folder = tmp_path_factory.mktemp("study") / "results"
+    return write_report(synthetic_study.write(folder, tables, FACTS))
+
+
+def test_the_answer_names_both_sides_of_the_trade(report):
+    text = words(report)
+    assert re.search(r"at a load of 0\.\d+|at any load tried", text)
+    assert "people stand in danger to find out what it is" in text
+    assert "Shifts: 3 simulated, independent of each other." in text
+    assert "simulated person" not in text
+
+
+def test_the_figures_of_dispatch_take_the_place_of_those_of_driving(report):
+    page = report.read_text(encoding="utf-8")
+    names = ["answer", "trade", "stages", "fates", "way", "percentiles", "burden"]
+    assert re.findall(r'<figure id="(\w+)"', page) == names
+    assert {path.stem for path in (report.parent / "figures").glob("*.csv")} == set(names)
+
+
+def test_conditions_and_method_are_those_of_shifts(report):
+    text = words(report)
+    assert "team 2 guards and 1 robot" in text
+    assert "30 per hour times intensity, 30 % false" in text
+    assert "escalated after waiting 120 s" in text
+    assert "Intervals are over independent shifts" in text
+    assert "wheel slip" not in text
+
+
+def test_every_cell_of_policy_and_rate_has_its_row(report):
+    rows = re.findall(r"<tr.*?</tr>", report.read_text(encoding="utf-8"))
+    assert len([row for row in rows if row.count("<td") > 10]) == 3 * 2
+
+
+def test_made_again_it_has_the_same_bytes(report):
+    files = [report, *sorted((report.parent / "figures").iterdir())]
+    before = [path.read_bytes() for path in files]
+    write_report(report.parent)
+    assert [path.read_bytes() for path in files] == before
+
+
+def test_a_percentile_that_too_few_events_reach_is_infinite():
+    events = {
+        "response_s": np.array([10.0, 20.0, 30.0, np.nan]),
+        "person": np.array([0, 0, 1, 1]),
+    }
+    value, low, high = pooled(events, [0.5, 0.9], 600)
+    assert value.tolist() == [20, np.inf]
+    assert low[0] == 10
+    assert high[0] == np.inf or high[0] == 30

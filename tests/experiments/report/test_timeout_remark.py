@@ -1,0 +1,81 @@
+"""A report says in which conditions a request that is sent again has time for its reply."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from dva_sim.experiments.analysis.conditions import conditions, timeout_remark
+from dva_sim.experiments.analysis.layout import keys_of
+
+SCENARIO = {
+    "command": {"timeout_s": 9.0},
+    "robot": {"processing_s": 0.05},
+    "link": {"delay_s": 0.0, "up": None},
+}
+
+
+def said(factors: dict[str, list[Any]], treatments: dict[str, Any] | None = None) -> str:
+    study = {"factors": factors, "treatments": treatments or {}}
+    return timeout_remark({"drive": SCENARIO}, study).replace("\N{NO-BREAK SPACE}", " ")
+
+
+def test_nine_seconds_are_enough_for_a_second_each_way() -> None:
+    assert said({"link.delay_s": [0.0, 1.0]}) == (
+        "The time-out is above four round trips and the processing time in every condition "
+        "(8.05 s at most)."
+    )
+
+
+def test_conditions_with_too_short_a_time_out_are_named() -> None:
+    """Needed are 0.45, 0.85 and 1.65 s."""
+    text = said({"command.timeout_s": [0.6, 1.2, 2.4], "link.delay_s": [0.05, 0.1, 0.2]})
+    where = "600 ms with round trips of 200 ms, 400 ms; 1.2 s with round trips of 400 ms. There"
+    assert where in text
+    assert text.endswith("In all others it is above.")
+
+
+def test_where_all_are_too_short_there_are_no_others() -> None:
+    text = said({"command.timeout_s": [0.3], "link.delay_s": [0.1]})
+    assert "300 ms with round trips of 200 ms" in text
+    assert "others" not in text
+
+
+def test_what_a_treatment_changes_counts_only_together() -> None:
+    """0.6 s stands with 10 ms each way alone, so that it is enough."""
+    near = {"command.timeout_s": 0.6, "link.delay_s": 0.01}
+    text = said({"place": ["near", "far"]}, {"place": {"near": near, "far": {"link.delay_s": 1.0}}})
+    assert text.startswith("The time-out is above")
+
+
+def test_each_direction_counts_with_its_own_delay() -> None:
+    """0.3 s up and 0.1 s down: 1.65 s, and not 0.85 s."""
+    factors: dict[str, list[Any]] = {"command.timeout_s": [1.0], "link.delay_s": [0.1]}
+    assert "with round trips of 400 ms" in said(factors | {"link.up.delay_s": [0.3]})
+    assert said(factors).startswith("The time-out is above")
+
+
+def test_the_mean_of_a_law_of_processing_counts() -> None:
+    law = {"law": "lognormal", "mean_s": 1.0}
+    factors: dict[str, list[Any]] = {"place": ["slow"]}
+    assert "900 ms with round trips of 0" in said(
+        factors, {"place": {"slow": {"robot.processing_s": law, "command.timeout_s": 0.9}}}
+    )
+
+
+def test_where_nobody_asks_nothing_is_said() -> None:
+    assert timeout_remark({"drive": {"link": {"delay_s": 0.1}}}, {}) == ""
+
+
+def test_in_a_range_the_farthest_end_counts() -> None:
+    """Four round trips of 600 ms, and 200 ms."""
+    ranges = {"link.delay_s": {"low": 0.0, "high": 0.3}, "link.loss": {"low": 0.0, "high": 0.1}}
+    ranges["robot.processing_s"] = {"low": 0.02, "high": 0.2}
+    study = {"factors": {"point": list(range(8))}, "design": {"sobol": 8, "ranges": ranges}}
+    told = timeout_remark({"drive": SCENARIO}, study)
+    assert told.endswith("in every condition (2.6\N{NO-BREAK SPACE}s at most).")
+
+
+def test_what_lies_in_a_range_is_said_to_vary() -> None:
+    design = {"sobol": 8, "ranges": {"link.delay_s": {"low": 0.0, "high": 0.3}}}
+    factors = keys_of({"factors": {"point": list(range(8))}, "design": design})
+    assert ("one-way delay", ["varied"]) in conditions({"drive": SCENARIO}, factors)

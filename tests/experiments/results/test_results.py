@@ -1,0 +1,109 @@
+"""A results folder as Python sees it: tables as columns, their dictionary, and what is missing."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+import synthetic_study as synthetic
+from small_study import cheap, study_in
+
+from dva_sim.experiments.execution.runner import run_study
+from dva_sim.experiments.results.results import Frame, Results
+from dva_sim.kernel.errors import ConfigError
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("study")
+    return Results.load(run_study(study_in(folder), folder / "out", jobs=1, episode=cheap))
+
+
+def test_runs_come_as_columns_of_the_same_length(results):
+    assert results.runs.rows == 42
+    assert set(results.runs["part"]) == {"drive", "story"}
+    assert {len(column) for column in results.runs.values()} == {42}
+
+
+def test_what_is_missing_is_nan_in_numbers_and_none_in_words(results):
+    runs = results.runs
+    odd = runs["seed"] % 2 == 1
+    assert np.isnan(runs["round_trip_s"][odd]).all()
+    assert {runs["outcome"][i] for i in np.flatnonzero(runs["seed"] % 3 == 0)} == {None}
+
+
+def test_one_part_of_a_table_can_be_had_alone(results):
+    assert results.table("runs", part="story").rows == 12
+
+
+def test_rows_are_chosen_by_a_mask(results):
+    runs = results.runs
+    assert runs.where(runs["is_reference"]).rows == 6
+
+
+def test_the_columns_are_explained_with_their_units(results):
+    told = {c.name: (c.unit, c.meaning) for c in results.columns("tracks")}
+    assert told["t_s"] == ("s", "time of the run")
+    assert told["pattern"] == ("", "factor of the study: the scenario key pattern")
+    assert told["link.delay_s"][0] == "s"
+
+
+def test_a_table_that_is_not_there_is_told_with_those_that_are(results):
+    with pytest.raises(ConfigError, match="no table 'events'; tables: runs, tracks"):
+        results.table("events")
+
+
+def test_sql_can_be_asked_of_a_table(results):
+    means = results.runs.to_duckdb().aggregate("part, avg(round_trip_s) AS mean", "part")
+    row = dict(means.fetchall())
+    times = results.table("runs", part="story")["round_trip_s"]
+    assert row["story"] == pytest.approx(np.nanmean(times))
+
+
+def test_pandas_is_needed_only_by_who_asks_for_it(monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "pandas", None)
+    with pytest.raises(ModuleNotFoundError, match="pandas"):
+        Frame({"t_s": np.array([1.0])}).to_pandas()
+
+
+def test_a_notebook_shows_a_table_with_what_is_missing_left_empty():
+    frame = Frame(
+        {"t_s": np.array([0.125, math.nan]), "who": np.array(["a<b", None], dtype=object)}
+    )
+    html = frame._repr_html_()
+    assert "<th>t_s</th><th>who</th>" in html
+    assert "<tr><td>0.125</td><td>a&lt;b</td></tr><tr><td></td><td></td></tr>" in html
+    assert "2 rows" in html
+
+
+def test_a_notebook_shows_the_answer_of_a_study(tmp_path):
+    rows = {"runs": synthetic.drive_rows(persons=6, trials=2)}
+    folder = synthetic.write(tmp_path / "out", rows, synthetic.manifest(6, 2))
+    results = Results.load(folder)
+    html = results._repr_html_()
+    assert "REQ/REP or PUB/SUB for driving a robot by tilt, as delay grows?" in html
+    assert results.answer.lead.startswith("With profile default, REQ/REP takes")
+    assert results.answer.lead in html
+    assert "444 runs" in html
+
+
+def test_a_study_that_is_not_finished_is_told_as_such(tmp_path):
+    (tmp_path / "journal.sqlite").touch()
+    with pytest.raises(ConfigError, match="not finished"):
+        Results.load(tmp_path)
+
+
+def test_a_folder_of_something_else_is_refused(tmp_path):
+    with pytest.raises(ConfigError, match="holds no finished results"):
+        Results.load(tmp_path)
+    (tmp_path / "manifest.json").write_text(json.dumps({"name": "a web page"}))
+    with pytest.raises(ConfigError, match="not the manifest of a study"):
+        Results.load(tmp_path)
+
+
+def test_a_table_of_runs_that_has_gone_is_told(tmp_path):
+    study = study_in(tmp_path)
+    out = run_study(study, tmp_path / "out", jobs=1, episode=cheap)
+    (out / "tables" / "runs.parquet").unlink()
+    with pytest.raises(ConfigError, match=r"has no table 'runs'; tables: tracks"):
+        _ = Results.load(out).runs

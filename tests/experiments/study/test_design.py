@@ -1,0 +1,98 @@
+import hashlib
+from collections import defaultdict
+
+from small_study import REPEATED, RUNS, STUDY, study_in
+
+from dva_sim.experiments.study import cell_grid
+from dva_sim.experiments.study.hashing import inputs
+
+
+def test_every_person_drives_every_trial_in_every_cell_and_once_in_the_reference(tmp_path):
+    jobs = cell_grid.jobs(study_in(tmp_path))
+    assert len(jobs) == RUNS
+    assert sum(job.is_reference for job in jobs) == 3 * 2
+    assert len({job.key for job in jobs}) == RUNS
+
+
+def test_jobs_come_by_part_cell_person_and_trial(tmp_path):
+    jobs = cell_grid.jobs(study_in(tmp_path))
+    order = [(job.part, job.index, job.person, job.trial) for job in jobs]
+    assert order == sorted(order)
+
+
+def test_the_seed_depends_on_part_person_and_trial_but_not_on_the_cell(tmp_path):
+    seeds = defaultdict(set)
+    for job in cell_grid.jobs(study_in(tmp_path)):
+        seeds[job.part, job.person, job.trial].add(job.seed)
+    assert all(len(found) == 1 for found in seeds.values())
+    assert len(set().union(*seeds.values())) == len(seeds)
+
+
+def test_more_persons_or_levels_leave_the_runs_there_are_unchanged(tmp_path):
+    few = {job.key for job in cell_grid.jobs(study_in(tmp_path))}
+    many = {job.key for job in cell_grid.jobs(study_in(tmp_path, "persons=5"))}
+    wide = {job.key for job in cell_grid.jobs(study_in(tmp_path, "link.delay_s=[0, 0.1, 0.25]"))}
+    assert few < many
+    assert few < wide
+
+
+def test_the_scenario_knows_its_levels_its_person_and_its_population(tmp_path):
+    for job in cell_grid.jobs(study_in(tmp_path)):
+        assert job.scenario.operator.person == job.person
+        assert job.scenario.operator.population_seed == 3
+        if not job.is_reference:
+            assert job.scenario.pattern == dict(job.cell)["pattern"]
+            assert job.scenario.link.delay_s == dict(job.cell)["link.delay_s"]
+
+
+def test_the_reference_is_the_base_scenario_with_its_own_changes(tmp_path):
+    cell = cell_grid.cells(study_in(tmp_path))[0]
+    assert cell.index == cell_grid.REFERENCE
+    assert cell.levels == ()
+    assert cell.scenario.operator.strategy == "oracle"
+    assert cell.scenario.link.delay_s == 0
+
+
+def test_no_two_clusters_share_an_operator(tmp_path):
+    first = {}
+    for job in cell_grid.jobs(study_in(tmp_path, "operator.count=2")):
+        first[job.person] = job.scenario.operator.person
+    assert first == {0: 0, 1: 2, 2: 4}
+
+
+def test_a_configurations_hash_is_the_same_for_equal_scenarios_only(tmp_path):
+    cells = cell_grid.cells(study_in(tmp_path, "parts.drive.scenario=one.yaml"))
+    by_part = defaultdict(list)
+    for cell in cells:
+        by_part[cell.part].append(cell.config)
+    assert by_part["drive"][1:] == by_part["story"]
+    assert len(set(by_part["drive"])) == 5
+
+
+def test_a_study_without_factors_has_one_cell(tmp_path):
+    text = STUDY.split("factors:")[0] + "parts: {only: {scenario: one.yaml}}\n"
+    jobs = cell_grid.jobs(study_in(tmp_path, text=text))
+    assert [(job.index, job.cell) for job in jobs] == [(0, ())] * 6
+
+
+def inputs_of(study):
+    return inputs(cell.scenario for cell in cell_grid.cells(study))
+
+
+def test_files_that_a_scenario_names_are_known_by_their_contents(tmp_path):
+    trace = tmp_path / "cell.up"
+    study = study_in(tmp_path, f"link.trace_up={trace}")
+    assert inputs_of(study) == {}
+    found = []
+    for text in ("1\n2\n", "1\n3\n"):
+        trace.write_text(text)
+        found.append(inputs_of(study)[str(trace)])
+    assert found[0] != found[1]
+
+
+def test_seeds_are_what_they_always_were(tmp_path):
+    """Results that were begun with an older program go on, and old answers can be run again."""
+    jobs = cell_grid.jobs(study_in(tmp_path, text=REPEATED))
+    assert [job.seed for job in jobs[:2]] == [1289764452063391784, 6791902960423926731]
+    seeds = [(job.part, job.index, *job.cell, job.person, job.trial, job.seed) for job in jobs]
+    assert hashlib.sha256(repr(seeds).encode()).hexdigest()[:16] == "d04fb4f22a6c0684"

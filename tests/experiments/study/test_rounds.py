@@ -1,0 +1,80 @@
+"""A study that may stop early: the same rounds, and so the same bytes, after any interruption."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+import small_study as kit
+
+from dva_sim.experiments.execution.runner import run_study
+from dva_sim.experiments.results.results import Results
+from dva_sim.experiments.study.cell_grid import Job
+
+STOP = "stop: {part: drive, measure: drive_time_s, half_width: 0.1, batch_persons: 2, "
+TEXT = kit.STUDY + STOP + "most_persons: 40}\n"
+
+
+def steady(job: Job) -> kit.Tables:
+    """Anything up to a second longer than the reference run, whoever drives."""
+    return {"runs": [{"drive_time_s": 0.0 if job.is_reference else (job.seed % 1000) / 1000}]}
+
+
+def stopped(folder: Path) -> dict[str, Any]:
+    return dict(Results.load(folder).manifest["stopped"])
+
+
+def test_a_study_stops_after_the_round_that_is_enough(tmp_path: Path) -> None:
+    study = kit.study_in(tmp_path, text=TEXT)
+    out = run_study(study, tmp_path / "out", jobs=1, episode=steady)
+    how = stopped(out)
+    assert how["why"] == "enough"
+    assert 1 < how["rounds"] < how["of"] == 20
+    runs = Results.load(out).table("runs", part="drive")
+    assert set(runs["person"].tolist()) == set(range(3 + 2 * (how["rounds"] - 1)))
+
+
+def test_an_interrupted_study_stops_after_the_same_round(tmp_path: Path) -> None:
+    study = kit.study_in(tmp_path, text=TEXT)
+    plain = run_study(study, tmp_path / "plain", jobs=1, episode=steady)
+    last = Results.load(plain).manifest["runs"]
+
+    for at in (5, 44, 60, last - 1):
+
+        def interrupt(done: int, total: int, at: int = at) -> None:
+            if done == at:
+                raise KeyboardInterrupt
+
+        with pytest.raises(KeyboardInterrupt, match=f"after {at} of"):
+            run_study(study, tmp_path / "out", jobs=1, episode=steady, progress=interrupt)
+    out = run_study(study, tmp_path / "out", jobs=1, episode=steady)
+    assert kit.files(out) == kit.files(plain)
+
+
+def test_a_study_that_never_has_enough_runs_all_its_rounds(tmp_path: Path) -> None:
+    text = TEXT.replace("half_width: 0.1", "half_width: 0.0001").replace("40", "7")
+    study = kit.study_in(tmp_path, text=text)
+    out = run_study(study, tmp_path / "out", jobs=1, episode=steady)
+    assert stopped(out) == {"rounds": 3, "of": 3, "why": None}
+
+
+def test_a_spent_budget_ends_after_a_whole_round_and_stays_ended(tmp_path: Path) -> None:
+    study = kit.study_in(tmp_path, text=kit.STUDY + "budget_s: 0.000001\n")
+    seen = []
+    out = run_study(
+        study, tmp_path / "out", jobs=1, episode=steady, progress=lambda *now: seen.append(now)
+    )
+    assert stopped(out) == {"rounds": 1, "of": 2, "why": "budget"}
+    assert seen[-1] == (28, 28)  # two persons of three
+    first = kit.files(out)
+    assert kit.files(run_study(study, out, jobs=1, episode=steady)) == first
+    assert json.loads(first["manifest.json"])["status"]["reproducible"] is False
+
+
+def test_a_budget_that_is_not_spent_changes_nothing_but_the_label(tmp_path: Path) -> None:
+    study = kit.study_in(tmp_path, text=kit.STUDY + "budget_s: 3600\n")
+    out = run_study(study, tmp_path / "out", jobs=1, episode=steady)
+    assert stopped(out) == {"rounds": 2, "of": 2, "why": None}
+    assert len(Results.load(out).table("runs")["seed"]) == kit.RUNS

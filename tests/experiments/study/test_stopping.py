@@ -1,0 +1,180 @@
+"""When a study stops: decided on whole batches, in seed order, on what was measured."""
+
+import math
+
+import numpy as np
+import pytest
+from small_study import REPEATED, STUDY, study_in, write_study
+
+from dva_sim.experiments.analysis.statistics import mean_interval
+from dva_sim.experiments.study import cell_grid, stopping
+from dva_sim.experiments.study.cell_grid import REFERENCE
+from dva_sim.experiments.study.study import load_study
+from dva_sim.kernel.errors import ConfigError
+
+STOP = (
+    "stop: {half_width: 1.0, measure: drive_time_s, part: drive, batch_persons: 4, "
+    "most_persons: 10}\n"
+)
+ON_ANSWER = "stop: {half_width: 1.0, comparison: answer, batch_persons: 2, most_persons: 8}\n"
+
+
+def persons_of(batches):
+    return [sorted({job.person for job in batch}) for batch in batches]
+
+
+def rows_of(study, time_of, persons):
+    """Rows as the runs of some persons would leave them."""
+    return [
+        {
+            "part": job.part,
+            "cell": job.index,
+            **dict(job.cell),
+            "is_reference": job.is_reference,
+            "person": job.person,
+            "trial": job.trial,
+            "drive_time_s": time_of(job),
+        }
+        for job in cell_grid.jobs(study)
+        if job.person < persons
+    ]
+
+
+def test_a_study_that_nothing_stops_is_one_batch(tmp_path):
+    jobs = cell_grid.jobs(study_in(tmp_path))
+    assert stopping.rounds(study_in(tmp_path), jobs) == [jobs]
+    assert not stopping.is_enough(study_in(tmp_path), [])
+
+
+def test_the_first_batch_is_the_studys_persons_and_others_follow_up_to_the_most(tmp_path):
+    study = study_in(tmp_path, text=STUDY + STOP)
+    batches = stopping.rounds(study, cell_grid.jobs(study))
+    assert persons_of(batches) == [[0, 1, 2], [3, 4, 5, 6], [7, 8, 9]]
+
+
+def test_batches_hold_every_job_once_and_repeats_come_with_their_persons(tmp_path):
+    study = study_in(tmp_path, text=REPEATED + STOP)
+    jobs = cell_grid.jobs(study)
+    batches = stopping.rounds(study, jobs)
+    assert sorted(job.key for batch in batches for job in batch) == sorted(j.key for j in jobs)
+    assert {job.person for job in batches[0] if job.is_repeat} == {0, 1}
+
+
+def test_what_is_run_first_is_what_a_study_of_so_many_persons_runs(tmp_path):
+    few = cell_grid.jobs(study_in(tmp_path))
+    study = study_in(tmp_path, text=STUDY + STOP)
+    first = stopping.rounds(study, cell_grid.jobs(study))[0]
+    assert [job.key for job in first] == [job.key for job in few]
+
+
+def test_a_budget_alone_makes_small_batches(tmp_path):
+    study = study_in(tmp_path, "persons=5", text=STUDY + "budget_s: 60\n")
+    assert persons_of(stopping.rounds(study, cell_grid.jobs(study))) == [[0, 1], [2, 3], [4]]
+
+
+def noisy(job):
+    """Persons differ by a second or so, trials by less."""
+    rng = np.random.default_rng([job.person, job.trial, job.index + 1])
+    return 40 + rng.normal(0, 1.5)
+
+
+def test_the_width_is_that_of_the_mean_in_every_cell_over_the_reference(tmp_path):
+    study = study_in(tmp_path, text=STUDY + STOP)
+    rows = rows_of(study, noisy, 6)
+    found = stopping.half_widths(study, study.stop, rows)
+    aside = {
+        (row["person"], row["trial"]): row["drive_time_s"]
+        for row in rows
+        if row["part"] == "drive" and row["cell"] == REFERENCE
+    }
+    cell = [row for row in rows if row["part"] == "drive" and row["cell"] == 2]
+    excess = [row["drive_time_s"] - aside[row["person"], row["trial"]] for row in cell]
+    expected = mean_interval(excess, [row["person"] for row in cell])
+    assert len(found) == 4
+    assert found[2] == pytest.approx((expected.high - expected.low) / 2)
+
+
+def test_it_is_enough_once_every_width_is_below_the_bound(tmp_path):
+    def spread(scale):
+        return lambda job: 40 + scale * (noisy(job) - 40)
+
+    study = study_in(tmp_path, text=STUDY + STOP)
+    assert stopping.is_enough(study, rows_of(study, spread(0.1), 6))
+    assert not stopping.is_enough(study, rows_of(study, spread(3), 6))
+
+    def one_wide_cell(job):
+        return spread(3 if job.part == "drive" and job.index == 3 else 0.1)(job)
+
+    assert not stopping.is_enough(study, rows_of(study, one_wide_cell, 6))
+
+
+@pytest.mark.parametrize("text", [STUDY + STOP, STUDY + ON_ANSWER])
+def test_where_all_persons_are_alike_the_first_batch_is_enough(tmp_path, text):
+    study = study_in(tmp_path, text=text)
+    rows = rows_of(study, lambda job: 40.0 + job.index, 3)
+    assert (stopping.half_widths(study, study.stop, rows) == 0).all()
+    assert stopping.is_enough(study, rows)
+
+
+def test_a_contrast_is_paired_so_what_a_person_brings_along_does_not_count(tmp_path):
+    study = study_in(tmp_path, text=STUDY + ON_ANSWER)
+
+    def persons_differ_patterns_hardly(job):
+        effect = 5 if dict(job.cell).get("pattern") == "req-rep" else 0
+        return 100 * job.person + 10 * job.trial + effect + 0.01 * noisy(job)
+
+    rows = rows_of(study, persons_differ_patterns_hardly, 6)
+    assert (stopping.half_widths(study, study.stop, rows) < 0.1).all()
+    assert stopping.is_enough(study, rows)
+
+
+def test_a_contrast_has_a_width_at_every_level_it_runs_over(tmp_path):
+    study = study_in(tmp_path, text=STUDY + ON_ANSWER)
+    assert stopping.half_widths(study, study.stop, rows_of(study, noisy, 6)).shape == (2,)
+
+
+def test_with_one_person_or_without_values_nothing_is_enough(tmp_path):
+    study = study_in(tmp_path, text=STUDY + STOP)
+    assert not stopping.is_enough(study, rows_of(study, lambda _: 40.0, 1))
+    assert not stopping.is_enough(study, rows_of(study, lambda _: math.nan, 6))
+    assert not stopping.is_enough(study, [])
+
+
+def test_failed_runs_are_left_out(tmp_path):
+    study = study_in(tmp_path, text=STUDY + ON_ANSWER)
+    rows = [row for row in rows_of(study, noisy, 8) if (row["person"], row["cell"]) != (3, 1)]
+    assert np.isfinite(stopping.half_widths(study, study.stop, rows)).all()
+
+
+@pytest.mark.parametrize(
+    ("stop", "told"),
+    [
+        ("{half_width: 1, batch_persons: 2, most_persons: 9}", "22:1: stop: should name a compar"),
+        (
+            "{half_width: 1, comparison: answer, part: drive, batch_persons: 2, most_persons: 9}",
+            "22:1: stop: should name a comparison, or a measure and its part",
+        ),
+        (
+            "{half_width: 1, comparison: other, batch_persons: 2, most_persons: 9}",
+            "22:23: 'other' is not a comparison; there are: answer",
+        ),
+        (
+            "{half_width: 1, comparison: answer, batch_persons: 2, most_persons: 2}",
+            "22:61: most_persons should be at least the first batch, persons: 3",
+        ),
+        (
+            "{half_width: 1, part: drove, measure: contacts, batch_persons: 2, most_persons: 9}",
+            "22:23: stop.part 'drove' is not a part; did you mean 'drive'?",
+        ),
+        (
+            "{half_width: 1, part: drive, measure: time_s, batch_persons: 2, most_persons: 9}",
+            "22:36: measure 'time_s' is unknown",
+        ),
+        ("{half_width: 0, comparison: answer, batch_persons: 1, most_persons: 9}", "22:8: stop."),
+    ],
+)
+def test_a_rule_that_makes_no_sense_is_refused_where_it_stands(tmp_path, stop, told):
+    path = write_study(tmp_path, STUDY + f"stop: {stop}\n")
+    with pytest.raises(ConfigError) as caught:
+        cell_grid.cells(load_study(path))
+    assert str(caught.value).startswith(f"{path}:{told}")

@@ -1,0 +1,52 @@
+"""One run under two patterns: told, and drawn as it is asked for."""
+
+from io import StringIO
+from pathlib import Path
+
+import pytest
+from PIL import Image
+from rich.console import Console
+
+from dva_sim.cli.episode_output import episode
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.recordings.pictures import Wanted
+
+SHORT = ["horizon_s=12", "link.delay_s=0.1"]
+
+
+def told(pictures: Wanted | None = None, patterns: str = "req-rep,latest-wins") -> str:
+    said = StringIO()
+    where = Console(file=said, width=120)
+    episode("drive-to-event", 2, SHORT, patterns, pictures or Wanted(), None, where)
+    return said.getvalue()
+
+
+def test_without_any_picture_both_stories_are_told_and_how_they_ended_beside_each_other() -> None:
+    said = told()
+    assert said.count("operator-1  shall drive robot-1 to event 1") == 2
+    headings = ("req-rep, 100 ms each way", "latest-wins, 100 ms each way", "side by side")
+    places = [said.index(f" {heading}") for heading in headings]
+    assert places == sorted(places)
+    assert said[places[-1] :].splitlines()[1:] == [
+        "REQ/REP              not confirmed within 12 s",
+        "latest-wins PUB/SUB  not confirmed within 12 s",
+    ]
+
+
+def test_a_still_and_a_strip_show_both(tmp_path: Path) -> None:
+    said = told(Wanted(still=tmp_path / "one.png", strip=tmp_path / "more.png", panels=2))
+    assert "Still: " in said
+    assert "Strip: " in said
+    with Image.open(tmp_path / "one.png") as one, Image.open(tmp_path / "more.png") as more:
+        assert one.width == more.width == 1680
+        assert more.height > 1.5 * one.height  # a row for each moment
+
+
+def test_a_camera_is_one_of_one_run() -> None:
+    eye = Wanted(still=Path("eye.png"), camera="robot-1")
+    with pytest.raises(ConfigError, match="--camera shows one run; it does not go with --side-by-"):
+        told(eye)
+
+
+def test_the_same_pattern_may_stand_on_both_sides() -> None:
+    assert told(patterns="pub-sub,pub-sub").count("plain PUB/SUB") == 2

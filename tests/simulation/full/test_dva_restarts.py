@@ -1,0 +1,84 @@
+"""A DVA that is killed while events are open, and started anew from its memory."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from dva_sim.core.events import Event, State
+from dva_sim.core.store import Memory
+from dva_sim.simulation.full.control_room import add_dva
+from dva_sim.simulation.full.dva_server import DvaAgent
+from dva_sim.simulation.full.run import Run
+from dva_sim.simulation.full.safety_checks import broken_event_rules
+from dva_sim.simulation.full.stage import DVA
+from dva_sim.simulation.scenario import build
+
+EVENTS = [
+    {"kind": "fire", "at_s": 5, "reported": True, "hazard": {"growth": "slow"}},
+    {"kind": "gas_leak", "at_s": 10, "reported": True},
+    {"kind": "flood", "at_s": 15, "reported": True},
+]
+HORIZON, DEADLINE = 900.0, 600.0
+
+
+class Killed:
+    """A run whose DVA dies at some times and is back some seconds later."""
+
+    def __init__(self, folder: Path, times: list[float], away: float, **changes: object) -> None:
+        team = {"guard": {"count": 2}, "robot": {"count": 1}, "operator": {"count": 1}}
+        dispatch = {"containment": True, "escalate_after_s": DEADLINE}
+        data = {**team, "events": EVENTS, "dispatch": dispatch, "horizon_s": HORIZON}
+        self.run = Run(build(data, changes), seed=2)
+        self.file = folder / "dva.sqlite"
+        self.dva = self._start()
+        clock = self.run.clock
+        for time in times:
+            clock.call_at(time, self._kill)
+            clock.call_at(time + away, self._back)
+        clock.run(HORIZON)
+
+    def _start(self) -> DvaAgent:
+        dva = add_dva(self.run.stage, memory=Memory(self.file))
+        dva.start()
+        return dva
+
+    def _kill(self) -> None:
+        """From now on nobody hears of it, and it hears nobody."""
+        self.run.network.leave(DVA)
+        self.dva.device.ask = lambda *_, **__: None  # type: ignore[method-assign]
+        self.dva._memory = None
+
+    def _back(self) -> None:
+        self.dva = self._start()
+        self.run.network.come_back(DVA)
+
+    @property
+    def events(self) -> list[Event]:
+        book = self.dva.desk.book
+        return sorted((*book.open.values(), *book.closed.values()), key=lambda e: e.number)
+
+
+@pytest.mark.parametrize("time", [11.0, 17.0, 30.0, 60.0, 90.0, 120.0])
+def test_every_event_is_dealt_with_once_whenever_the_dva_is_killed(
+    tmp_path: Path, time: float
+) -> None:
+    killed = Killed(tmp_path, [time], away=5.0)
+    assert [e.kind for e in killed.events] == ["fire", "gas_leak", "flood"]
+    assert [e.state for e in killed.events] == [State.CONTAINED] * 3
+    assert sorted(killed.run.field.contained) == [0, 1, 2]
+    assert list(broken_event_rules(killed.dva.desk.book, DEADLINE, HORIZON)) == []
+
+
+def test_a_dva_that_is_killed_again_and_again_loses_nothing(tmp_path: Path) -> None:
+    killed = Killed(tmp_path, [12.0, 25.0, 41.0, 66.0, 93.0, 128.0], away=3.0)
+    assert [e.kind for e in killed.events] == ["fire", "gas_leak", "flood"]
+    assert [e.state for e in killed.events] == [State.CONTAINED] * 3
+    assert killed.dva.desk.book.total == 3
+
+
+def test_neither_kills_nor_a_link_that_loses_leave_an_event_hanging(tmp_path: Path) -> None:
+    killed = Killed(tmp_path, [20.0, 70.0], 4.0, **{"link.loss": 0.1, "link.delay_s": 0.1})
+    assert len(killed.events) == 3
+    assert not any(e.open for e in killed.events)

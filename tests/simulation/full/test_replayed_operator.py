@@ -1,0 +1,19 @@
+"""Who repeats what an operator did sends the same, so that the difference is what one costs."""
+
+from __future__ import annotations
+
+import pytest
+from replayed_operator import replay, taped
+
+from dva_sim.simulation import scenario as scenarios
+
+
+@pytest.mark.parametrize("profile", ["default", "dissertation"])
+def test_a_run_with_its_commands_repeated_is_the_same_run(profile: str) -> None:
+    changes = {"pattern": "latest-wins", "phone.profile": profile}
+    scenario = scenarios.build(scenarios.load("drive-to-event"), changes)
+    tape, full = taped(scenario, 1)
+    bare = replay(scenario, 1, tape)
+    assert bare.duration == full.duration > 30.0
+    assert bare.recorder.counters == full.recorder.counters
+    assert bare.recorder.tracks == full.recorder.tracks

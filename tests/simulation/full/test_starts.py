@@ -1,0 +1,70 @@
+"""Robots and guards can begin a given way from the event, wherever it is."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.simulation import scenario as scenarios
+from dva_sim.simulation.full import measures, simulate
+from dva_sim.simulation.full.run import Run
+from dva_sim.simulation.scenario import Scenario
+
+GUARD_ALONE = {"robot": {"count": 0}, "operator": {"count": 0}}
+
+
+def drill(**parts: Any) -> Scenario:
+    """A reported fire somewhere in the institute."""
+    fire = {"events": [{"kind": "fire", "reported": True}]}
+    return scenarios.build({**fire, **parts}, {})
+
+
+def way_of(run: Run, place: tuple[float, float]) -> float:
+    """From a place to the event [m]."""
+    return run.stage.planner.distance(place, run.field.incidents[0].hazard.position)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_guard_begins_as_far_from_the_event_as_it_is_told(seed: int) -> None:
+    guard = {"count": 1, "way_m": 12.0}
+    run = Run(drill(guard=guard, **GUARD_ALONE), seed)
+    assert way_of(run, run.field.guards[0].walking.place) == pytest.approx(12.0, abs=0.5)
+
+
+def test_robots_begin_as_far_from_the_event_and_apart_from_each_other_and_the_guard() -> None:
+    run = Run(drill(robot={"count": 3, "way_m": 9.0}, guard={"count": 1, "way_m": 9.0}), 4)
+    bodies = [robot.body for robot in run.field.robots.values()]
+    places = [(b.x, b.y) for b in bodies] + [run.field.guards[0].walking.place]
+    assert [way_of(run, place) for place in places] == pytest.approx([9.0] * 4, abs=0.5)
+    gaps = [math.dist(a, b) for n, a in enumerate(places) for b in places[:n]]
+    assert min(gaps) >= 1.5
+
+
+def test_a_longer_way_begins_elsewhere_with_the_same_event_and_the_same_person() -> None:
+    near, far = (
+        simulate(drill(guard={"count": 1, "way_m": way}, **GUARD_ALONE), 3) for way in (6.0, 24.0)
+    )
+    assert near.incidents[0].hazard.position == far.incidents[0].hazard.position
+    times = [measures.run_row(run)["response_mean_s"] for run in (near, far)]
+    assert 18.0 / 2.2 < times[1] - times[0] < 18.0 / 0.6  # the same mobilisation, the same pace
+
+
+def test_a_way_that_is_longer_than_any_on_the_site_is_refused_with_the_longest_there_is() -> None:
+    with pytest.raises(ConfigError, match="no place 500 m from the event for guard-1"):
+        Run(drill(guard={"count": 1, "way_m": 500.0}, **GUARD_ALONE), 1)
+
+
+def test_guards_get_ready_in_the_time_the_scenario_says_with_the_spread_of_their_profile() -> None:
+    at_once, late = (
+        simulate(drill(guard={"count": 1, "mobilisation_s": m}, **GUARD_ALONE), 2)
+        for m in (1.0, 90.0)
+    )
+    waits = [
+        measures.event_rows(run)[0]["t_departed_s"] - measures.event_rows(run)[0]["t_assigned_s"]
+        for run in (at_once, late)
+    ]
+    assert waits[1] - waits[0] == pytest.approx(89.0 * waits[1] / 90.0, rel=0.02)
+    assert scenarios.guard_profile(late.scenario).mobilisation_s.spread == 0.45

@@ -1,0 +1,127 @@
+"""Mistakes in a timed scenario are told where they are, with what would be right."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from dva_sim.kernel.config import load_yaml
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.simulation.shift import build, rehearse_timed
+
+GOOD: dict[str, Any] = {
+    "model": "timed",
+    "responders": [{"name": "guard"}],
+    "demand": [{"between": 10}],
+}
+AREA = {"area": {"width_m": 10, "height_m": 10}}
+SITE = {"site": {"name": "caparica"}}
+ROBOT = {"name": "robot", "kind": "robot"}
+
+
+@pytest.mark.parametrize(
+    ("wrong", "told"),
+    [
+        ({"demand": [{}]}, "one of between, sources and batch"),
+        ({"demand": [{"between": 0}]}, "between should be longer than 0 s"),
+        ({"demand": [{"between": 1, "batch": {"count": 1}}]}, "one of between, sources and batch"),
+        ({"demand": [{"between": 1, "zones": {"hall": 1}}]}, "zone 'hall' is unknown; known: here"),
+        ({"demand": [{"between": 1}, {"between": 2}]}, "two streams 'fire'"),
+        ({"demand": [{"between": 1, "notice": "detectors"}]}, "'detectors' needs a site"),
+        ({"demand": [{"between": {"law": "exponential"}}]}, "missing key"),
+        ({"responders": [ROBOT]}, "robots need an operator"),
+        (
+            {"responders": [ROBOT | {"after": "recall"}], "operators": {"count": 1}},
+            "driven back by its operator",
+        ),
+        ({"responders": [{"name": "a"}, {"name": "a"}]}, "two responders 'a'"),
+        ({"responders": [{"name": "a", "base": "hall"}]}, "place 'hall' is unknown"),
+        ({"responders": [{"name": "a", "base": "post"}]}, "place 'post' is unknown"),
+        (AREA | SITE, "a site or an area, not both"),
+        ({"zones": {"a": [0, 0, 1, 1]}}, "zones belong to an area"),
+        (AREA | {"zones": {"a": [2, 0, 1, 1]}}, "xmin, ymin, xmax, ymax"),
+        (AREA | {"travel": "path"}, "travel 'path' needs a site"),
+        ({"travel": "straight"}, "needs a site or an area"),
+        ({"warm_up_s": 9, "horizon_s": 8}, "warm_up_s 9 should be before horizon_s 8"),
+        ({"dispatch": {"policy": "min_etta"}}, "policy"),
+        ({"dispatch": {"policy": "min_eta", "options": {"a": 1}}}, "option"),
+        ({"dispatch": {"preferences": {"here": ["guide"]}}}, "responder 'guide' is unknown"),
+        ({"dispatch": {"contaiment": True}}, "did you mean 'containment'"),
+        (
+            {
+                "demand": [{"between": 1, "repeats": {"share": 0.5}}],
+                "dispatch": {"merge_distance_m": 0},
+            },
+            "repeats need dispatch.merge_distance_m",
+        ),
+        (
+            {
+                "responders": [ROBOT],
+                "operators": {"count": 1},
+                "dispatch": {"containment": True},
+            },
+            "containment needs guards",
+        ),
+    ],
+)
+def test_a_mistake_is_told_in_one_line(wrong: dict[str, Any], told: str) -> None:
+    with pytest.raises(ConfigError) as problem:
+        build(GOOD | wrong)
+    assert told in str(problem.value)
+    assert "\n" not in str(problem.value)
+
+
+def test_a_mistake_in_a_file_has_its_line_and_column(tmp_path: Path) -> None:
+    file = tmp_path / "shift.yaml"
+    file.write_text(
+        "model: timed\nresponders: [{name: guard}]\ndemand:\n"
+        "  - between: {law: exponential, mean_s: -3}\n"
+    )
+    with pytest.raises(ConfigError) as problem:
+        build(load_yaml(file))
+    assert (problem.value.line, problem.value.column) == (4, 33)
+    assert "above 0" in str(problem.value)
+
+
+def test_a_wrong_policy_in_a_file_has_its_line(tmp_path: Path) -> None:
+    file = tmp_path / "shift.yaml"
+    file.write_text(
+        "model: timed\nresponders: [{name: guard}]\ndemand: [{between: 3}]\n"
+        "dispatch:\n  policy: fastest\n"
+    )
+    with pytest.raises(ConfigError) as problem:
+        build(load_yaml(file))
+    assert problem.value.line == 5
+    assert "fastest" in str(problem.value)
+
+
+def test_changes_reach_into_lists_by_number() -> None:
+    scenario = build(GOOD, {"responders.0.count": 3, "demand.0.between": 7, "horizon_s": 60})
+    assert scenario.names == ["guard-1", "guard-2", "guard-3"]
+    assert scenario.demand[0].between.mean == 7
+
+
+@pytest.mark.parametrize("key", ["responders.4.count", "responders.x.count", "demand.0.kind.x"])
+def test_a_change_of_what_is_not_there_is_refused(key: str) -> None:
+    with pytest.raises(ConfigError):
+        build(GOOD, {key: 1})
+
+
+def test_a_site_with_too_few_posts_is_told_before_anything_runs() -> None:
+    scenario = build(GOOD | SITE | {"responders": [{"name": "guard", "base": "post-9"}]})
+    with pytest.raises(ConfigError, match="post-9"):
+        rehearse_timed(scenario, 1)
+
+
+@pytest.mark.parametrize("never", [None, float("inf")])
+def test_an_event_may_wait_forever(never: float | None) -> None:
+    scenario = build(GOOD | {"dispatch": {"escalate_after_s": never}})
+    assert scenario.dispatch.escalate_after_s == never
+
+
+def test_the_oracle_refuses_what_no_plan_of_tours_describes() -> None:
+    scenario = build(GOOD | {"dispatch": {"policy": "oracle"}})
+    with pytest.raises(ConfigError, match="after: return"):
+        rehearse_timed(scenario, 1)

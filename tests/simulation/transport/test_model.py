@@ -1,0 +1,95 @@
+"""The model `transports` as a study and the command line see it."""
+
+from __future__ import annotations
+
+import io
+import math
+
+import pytest
+from rich.console import Console
+
+from dva_sim.cli.shift_output import tell_session
+from dva_sim.experiments.study.study import load_study
+from dva_sim.kernel import resources
+from dva_sim.kernel.config import Document, load_yaml
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.simulation.models import model_of
+from dva_sim.simulation.transport import build, simulate_transports
+
+SHORT = {
+    "warm_up_s": 5,
+    "measure_s": 10,
+    "drive.task.points_m": [[0, 0], [6, 0], [9, 3]],
+    "drive.practice": 0,
+    "drive.horizon_s": 100,
+}
+BTP = {
+    "kind": "btp",
+    "header_bytes": 12,
+    "tolerance_s": 0.02,
+    "widen": 1.25,
+    "narrow": 1.1,
+}
+
+
+def shipped() -> Document:
+    return load_yaml(resources.find("congested-link", "experiments/scenarios"))
+
+
+def test_a_run_has_every_measure_that_a_study_may_ask_for():
+    model = model_of(shipped())
+    tables = model.tables(model.build(shipped(), SHORT), 3, with_tracks=False)
+    assert set(tables["runs"][0]) == set(model.measures())
+    assert all(math.isfinite(value) for value in tables["runs"][0].values())
+
+
+def test_the_same_seed_and_person_give_the_same_run_and_others_do_not():
+    scenario = build(shipped(), SHORT)
+    other = model_of(shipped()).played_by(scenario, 5)
+    assert simulate_transports(scenario, 3) == simulate_transports(scenario, 3)
+    assert simulate_transports(other, 3)["flows"] == simulate_transports(scenario, 3)["flows"]
+    assert simulate_transports(other, 3)["runs"] != simulate_transports(scenario, 3)["runs"]
+
+
+def test_who_sees_a_picture_per_second_drives_slower():
+    fresh = build(shipped(), SHORT | {"bulk.up": 0, "bulk.down": 0})
+    rare = build(shipped(), SHORT | {"bottleneck.rate_bps": 4e4, "transport": {"kind": "tcp"}})
+    times = [simulate_transports(s, 3)["runs"][0]["movement_time_s"] for s in (fresh, rare)]
+    assert times[1] > 1.5 * times[0]
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"transport": BTP}, "missing key 'transport.longest_gap_s'"),
+        ({"transport.kind": "rtnp"}, "missing key 'transport.header_bytes'"),
+        ({"transport.king": "udp"}, "unknown key 'transport.king'"),
+        ({"drive.plant.speed_mps": None}, "what is driven in a course needs plant.speed_mps"),
+        ({"drive.task.kind": "reach"}, "drive.task"),
+        ({"operator.strategy": "nobody"}, "nobody"),
+    ],
+)
+def test_a_mistake_is_told(changes, told):
+    with pytest.raises(ConfigError, match=told):
+        build(shipped(), changes)
+
+
+def test_no_option_of_a_law_that_could_not_be_read_has_a_default():
+    for kind in ("trinomial", "irtp", "btp", "rtnp"):
+        with pytest.raises(ConfigError, match="missing key"):
+            build(shipped(), {"transport": {"kind": kind}})
+
+
+def test_the_command_line_tells_flows_ages_and_the_drive():
+    text = io.StringIO()
+    tell_session(build(shipped(), SHORT), 3, Console(file=text, width=100))
+    for word in ("bulk 1", "delivered", "round trip", "drive: done in"):
+        assert word in text.getvalue()
+
+
+def test_the_shipped_study_sets_every_number_that_no_paper_gave():
+    study = load_study("transports")
+    model = model_of(shipped())
+    for name, changes in study.treatments["transport"].items():
+        scenario = model.build(shipped(), changes)
+        assert scenario.transport.kind in name

@@ -1,0 +1,287 @@
+"""`dva-sim check` and `dva-sim schema` as users call them."""
+
+import os
+import re
+import tracemalloc
+from pathlib import Path
+
+import pytest
+from command_line import call
+
+from dva_sim.cli import check_output
+from dva_sim.cli import emulated_link as emulator
+from dva_sim.experiments.study import cell_grid
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.validation.network.emulator.self_check import Finding
+
+ROOT = Path(__file__).parents[2]
+SAMPLES = ROOT / "protocol" / "samples"
+GOOD = SAMPLES / "valid" / "set-teleop.xml"
+FLOOD = "events: [{{kind: flood, hazard: {{{}}}}}]\n"
+LEAK = "events: [{{kind: gas_leak, hazard: {{draught: 1, {}}}}}]\n"
+BOMB = "a: &a [x, x]\n" + "".join(
+    f"{new}: &{new} [*{old}, *{old}]\n"
+    for old, new in zip("abcdefghijklmnopqrstu", "bcdefghijklmnopqrstuv", strict=True)
+)
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def check(here, capsys):
+    """Writes texts into files, checks them, gives the exit code and the lines printed."""
+
+    def run(*names, **texts):
+        for name, text in texts.items():
+            (here / name.replace("__", ".")).write_text(text)
+        code = check_output.check(names or [name.replace("__", ".") for name in texts])
+        said = capsys.readouterr()
+        return code, [*said.err.splitlines(), *said.out.splitlines()]
+
+    return run
+
+
+@pytest.mark.parametrize("every", [20, pytest.param(1, marks=pytest.mark.soak)])
+def test_all_that_is_shipped_is_valid(check, every, monkeypatch):
+    """Of a study every twentieth cell is built, or each of hundreds."""
+    chosen = cell_grid.to_rehearse
+    monkeypatch.setattr(cell_grid, "to_rehearse", lambda *study: chosen(*study)[::every])
+    files = [*ROOT.glob("experiments/**/*.yaml"), *ROOT.glob("agents/**/*.yaml")]
+    files += [*ROOT.glob("worlds/*.yaml"), *ROOT.glob("worlds/*.geojson")]
+    files += [*SAMPLES.glob("valid/*.xml")]
+    code, lines = check(*map(str, files))
+    assert code == 0
+    assert lines[-1] == f"{len(files)} files: {len(files)} valid"
+    kinds = {line.split(": ")[1] for line in lines[:-1] if ": warning: " not in line}
+    agents = {"robot", "phone", "accelerometer", "guard", "bystanders", "operators"}
+    agents |= {"bands of operators", "tuned values"}
+    runs = {"study", "scenario", "timed scenario", "validation cases", "targets", "split", "task"}
+    runs |= {"transports", "measurements"}
+    assert kinds == {"site", "plan", "message"} | runs | agents
+
+
+def test_the_kind_is_told_by_the_keys_wherever_the_file_lies(check):
+    code, lines = check(
+        a__yaml=(ROOT / "agents/people/operators.yaml").read_text(),
+        b__yaml=(ROOT / "agents/robots/servrobot.yaml").read_text(),
+        c__yaml="horizon_s: 5\n",
+        d__yaml="question: what?\nparts: {drive: {scenario: c.yaml}}\n",
+        e__txt=GOOD.read_text(),
+    )
+    assert code == 0
+    assert lines == [
+        "a.yaml: operators: valid",
+        "b.yaml: robot: valid",
+        "c.yaml: scenario: valid",
+        "d.yaml: study: valid",
+        "e.txt: message: valid",
+        "5 files: 5 valid",
+    ]
+
+
+def test_the_place_tells_the_kind_where_the_keys_do_not(check, here):
+    folder = here / "experiments" / "scenarios"
+    folder.mkdir(parents=True)
+    (folder / "plain.yaml").write_text("description: As it comes.\n")
+    code, lines = check("experiments/scenarios/plain.yaml")
+    assert (code, lines[0]) == (0, "experiments/scenarios/plain.yaml: scenario: valid")
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("horizon_s: 5\nrobots: {}\n", "2:1: unknown key 'robots'; did you mean 'robot'?"),
+        ("link:\n  delay_s: 0.1\n  los: 0.1\n", "3:3: unknown key 'link.los'; did you mean 'loss'"),
+        ("link:\n  loss: much\n", "2:3: link.loss: should be a number"),
+        ("events:\n  - kind: fire\n  - {kind: gas_leak, at_s: soon}\n", "3:22: events.1.at_s: "),
+        ("robot: {count: 1}\nrobot: {count: 2}\n", "2:1: found duplicate key"),
+        ("robot: {count: 1\n", "2:1: "),
+        ("robot:\n  count: 1\n  profile: tank\n", "3:3: robot.profile 'tank' is unknown; known:"),
+        ("horizon_s: 5\noperator:\n  population: crowd\n", "3:3: operator.population 'crowd'"),
+        ("events:\n- {kind: fire, room: Attic}\n", "2:16: site 'caparica' has no room 'Attic'"),
+        ("horizon_s: 5\nrobot: {count: 9}\n", "2:9: site 'caparica' has 3 robot bases"),
+        ("link:\n  trace_up: no.up\n", "2:3: 'no.up': trace cannot be read"),
+        ("site:\n  map: no.yaml\n", "2:3: site 'no.yaml' not found"),
+        ("horizon_s: 5\nsite: {name: campus, map: m.yaml}\n", "2:1: site: site.map and site.name"),
+        ("horizon_s: 5\nsite: {map: m.yaml, options: {seed: 2}}\n", "2:1: site: site.options are"),
+        ("robot: {profile: [servrobot, pibot]}\n", "1:1: robot: robot.profile names 2 robots, rob"),
+        ("robot: {sensors: [{name: gas, low: 1}]}\n", "1:19: robot.sensors.0: low 1 of gas is not"),
+        (FLOOD.format("inflow: 11"), "1:10: events.0: inflow of a flood is at most 10, not 11"),
+        (FLOOD.format("inflow: 1e400"), "1:10: events.0: inflow of a flood is a positive number, "),
+        (LEAK.format("supply_x: 900"), "1:27: supply of a draught (900, 0) is not on the site, w"),
+        (LEAK.format("exhaust_y: -9"), "1:27: exhaust of a draught (0, -9) is not on the site, w"),
+        ("dispatch: {policy: dice}\n", "1:12: policy 'dice' is unknown"),
+        ("question: what?\nparts:\n  a:\n    scenario: lost\n", "4:5: scenario 'lost' not found"),
+        ("question: what?\nparts: {a: {scenario: fire-drill, x: 1}}\n", "2:35: unknown key 'parts"),
+        ("name: x\nplan: no.geojson\norigin: {latitude: 1, longitude: 1}\n", "2:1: plan 'no.geo"),
+        ("mass_kg: 60\nradius_m: wide\n", "2:1: radius_m: should be a number"),
+        ("tremor_deg: 1\nfilter: mean\n", "2:1: filter 'mean' is unknown; known: median, "),
+        ("mapping: leaky\nmapping_options: {leak: 1}\n", "1:1: mapping 'leaky' has no option 'l"),
+        ("noise_mg: 1\nrange_g: 0.5\n", "2:1: range_g: should be at least"),
+        ("image: no.pgm\nresolution: 1\norigin: [0, 0, 0]\noccupied_thresh: 0.6\n", "1:1: missing"),
+        ("colour: blue\n", "1:1: cannot be recognised; should be a message (.xml), a plan"),
+        ("- 1\n", "1:1: should be a mapping"),
+        ("", "1:1: is empty"),
+        ("horizon_s: 2001-13-32\n", "1:1: has a value that cannot be read"),
+        ("horizon_s: " + "[" * 1000, "1:1: is nested too deeply"),
+        ("horizon_s: &a [*a]\n", "1:1: horizon_s: should be a number"),
+        (BOMB, "1:1: has more than 20000 values"),
+    ],
+)  # fmt: skip
+def test_a_mistake_is_told_in_one_line_at_its_place(check, text, said):
+    code, lines = check(f__yaml=text)
+    assert code == 1
+    assert lines[0].startswith(f"f.yaml:{said}")
+    assert len(lines) == 3
+    assert lines[1].endswith(": invalid, 1 problem")
+    assert lines[2] == "1 file: 1 invalid"
+
+
+def test_a_study_is_checked_with_its_scenarios(check):
+    study = "question: what?\nfactors:\n  robot.count: [1, 9]\nparts: {a: {scenario: s.yaml}}\n"
+    code, lines = check("study.yaml", study__yaml=study, s__yaml="horizon_s: 5\n")
+    assert code == 1
+    assert lines[0].startswith("study.yaml:3:3: site 'caparica' has 3 robot bases")
+    code, lines = check("study.yaml", s__yaml="horizon_s: 5\nlink: {los: 1}\n")
+    assert code == 1
+    assert lines[0].startswith("s.yaml:2:8: unknown key 'link.los'")
+    assert lines[1] == "study.yaml: study: invalid, 1 problem"
+
+
+def test_a_plan_is_checked_alone_and_with_its_site(check):
+    plan = '{"type": "FeatureCollection", "features": [\n{"properties": {"kind": "moat"}}]}'
+    site = "name: x\nplan: p.geojson\norigin: {latitude: 1, longitude: 1}\n"
+    code, lines = check(p__geojson=plan, x__yaml=site, q__geojson="{", r__geojson="[" * 200_000)
+    assert code == 1
+    assert [line[:13] for line in lines[:8:2]] == [
+        "p.geojson:2:1",
+        "p.geojson:2:1",
+        "q.geojson:1:2",
+        "r.geojson:1:1",
+    ]
+
+
+def test_a_ros_map_is_checked_with_its_image(check, here):
+    keys = "resolution: 0.2\norigin: [0, 0, 0]\noccupied_thresh: 0.6\nfree_thresh: 0.2\n"
+    (here / "free.pgm").write_bytes(b"P5\n40 40\n255\n" + b"\xfe" * 1600)
+    (here / "wall.pgm").write_bytes(b"P5\n40 40\n255\n" + b"\x00" * 1600)
+    (here / "huge.pgm").write_bytes(b"P5\n100000 100000\n255\n")
+    images = ("free", "wall", "huge", "none")
+    code, lines = check(**{f"{image}__yaml": f"image: {image}.pgm\n{keys}" for image in images})
+    assert code == 1
+    assert lines[0] == "free.yaml: ROS map: valid"
+    assert lines[1].startswith("wall.yaml:1:1: has no known-free floor")
+    assert lines[3].startswith("huge.yaml:1:1: image 'huge.pgm' cannot be read: Image size")
+    assert lines[5].startswith("none.yaml:1:1: image 'none.pgm' not found")
+
+
+def test_binary_files_are_refused(check, here):
+    for name in ("a.xml", "a.yaml", "a.geojson", "a.pgm", "a"):
+        (here / name).write_bytes(bytes(range(256)) * 100)
+    code, lines = check("a.xml", "a.yaml", "a.geojson", "a.pgm", "a")
+    assert code == 1
+    assert lines[-1] == "5 files: 5 invalid"
+
+
+def test_a_huge_file_is_not_read(check, here):
+    names = ("huge.xml", "huge.yaml", "huge.geojson", "huge")
+    for name in names:
+        with (here / name).open("wb") as file:
+            file.write(b"<")
+            file.truncate(100_000_000)
+    tracemalloc.start()
+    code, lines = check(*names)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 20e6
+    assert code == 1
+    told = [line for line in lines if line.startswith("huge.") and ":1:" in line]
+    assert told[0] == "huge.xml:1:8193: is too long; a message has at most 8192 bytes"
+    assert told[1].startswith("huge.yaml:1:1: is too large")
+    assert told[2].startswith("huge.geojson:1:1: is too large")
+
+
+def test_what_is_no_file_gives_exit_code_2_and_the_rest_is_still_checked(check, here):
+    (here / "folder.xml").mkdir()
+    os.mkfifo(here / "pipe.xml")
+    code, lines = check("lost.yaml", "folder.xml", "pipe.xml", str(GOOD), "x" * 5000)
+    assert code == 2
+    assert lines[:3] == [
+        "error: lost.yaml: is not there",
+        "error: folder.xml: is a folder; give the files in it",
+        "error: pipe.xml: is not a file; a message may come through -",
+    ]
+    assert lines[4] == f"{GOOD}: message: valid"
+    assert lines[5] == "5 files: 1 valid, 4 not read"
+
+
+@pytest.mark.skipif(not Path("/proc/self/mem").exists(), reason="needs a file that gives an error")
+def test_an_unreadable_file_is_told(check):
+    assert check("/proc/self/mem")[1][0].startswith("error: /proc/self/mem: cannot be read: ")
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")
+def test_a_forbidden_file_is_told(check, here):
+    (here / "secret.xml").touch(mode=0)
+    code, lines = check("secret.xml")
+    assert (code, lines[0]) == (2, "error: secret.xml: cannot be read: Permission denied")
+
+
+def test_one_line_stays_one_line_whatever_the_file_holds(check, here):
+    name = "two\nlines\udcff.xml"
+    (here / name).write_text(GOOD.read_text().replace("0.56", "0&#10;5\u2028é"))
+    code, lines = check(name)
+    assert (code, len(lines)) == (1, 3)
+    assert lines[0].startswith("two\\nlines\\udcff.xml:12:9: TurnRate '0\\n5\\u2028é' is not valid")
+
+
+def test_many_problems_do_not_flood_the_terminal(check):
+    _, lines = check(many__xml="<msg>" + "<!-- -->" * 200 + "</msg>")
+    assert len(lines) == 52
+    assert lines[50].endswith("invalid, 200 problems, the first 50 shown")
+
+
+def test_the_commands_end_with_the_exit_code(here):
+    good = GOOD.read_text()
+    assert call("check", GOOD).returncode == 0
+    assert call("check", "lost.xml").returncode == 2
+    assert call("check").returncode == 2
+    refused = call("check", "-", said=good.replace("0.56", "fast"))
+    assert refused.returncode == 1
+    assert refused.stdout.startswith("-:12:9: TurnRate 'fast' is not valid; should be a number")
+    assert refused.stderr == ""
+    assert call("check", "-", said=good).stdout.startswith("-: message: valid")
+
+
+def test_the_printed_schema_can_be_written_to_a_file(here):
+    printed = call("schema", "message")
+    assert printed.stdout.encode() == (ROOT / "protocol" / "dva.xsd").read_bytes()
+    assert call("schema", "site").stdout.startswith('{\n  "$schema"')
+    wrong = call("schema", "sites")
+    assert wrong.returncode == 2
+    assert re.fullmatch(r"error: no schema 'sites'; did you mean 'site'\?.*\n", wrong.stderr)
+
+
+def test_the_word_link_asks_for_the_emulated_link(check, monkeypatch):
+    monkeypatch.setattr(emulator, "why_no_packets", lambda: "")
+    for found, code in ((50.2, 0), (52.0, 1)):
+        finding = Finding("delay, median", "ms", 50.0, found, 1.0)
+        monkeypatch.setattr(emulator, "check_link", lambda finding=finding: [finding])
+        ended, lines = check("link")
+        assert ended == code
+        assert lines[0].endswith("MISSED" if code else "ok")
+
+
+def test_there_is_one_emulated_link_without_names_and_options():
+    for names, options in ((["link", "wifi"], []), (["link"], ["delay_s=1"])):
+        with pytest.raises(ConfigError, match="there is one link"):
+            check_output.check(names, options)
+
+
+def test_a_file_named_link_is_asked_for_by_its_path(check):
+    code, lines = check("./link")
+    assert (code, lines[-1]) == (2, "1 file: 1 not read")

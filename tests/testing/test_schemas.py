@@ -1,0 +1,260 @@
+"""The printed schemas accept what is shipped, and refuse what the program refuses."""
+
+import json
+from pathlib import Path
+
+import pytest
+from lxml import etree
+
+from dva_sim.experiments.study.study import load_study
+from dva_sim.kernel.config import load_yaml
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.testing.files import schema_text
+
+ROOT = Path(__file__).parents[2]
+SHIPPED = {
+    "study": sorted(set(ROOT.glob("experiments/*.yaml")) - set(ROOT.rglob("*.registration.yaml"))),
+    "scenario": sorted(ROOT.glob("experiments/scenarios/*.yaml")),
+    "cases": [ROOT / "experiments/validation/dispatch.yaml"],
+    "site": sorted(ROOT.glob("worlds/*.yaml")),
+    "agent": sorted(ROOT.glob("agents/*/*.yaml")),
+}
+TYPES = {
+    "object": dict,
+    "array": list,
+    "string": str,
+    "boolean": bool,
+    "null": type(None),
+    "integer": int,
+    "number": (int, float),
+}
+
+
+SILENT = {"$schema", "$defs", "title", "description", "default", "discriminator"}
+
+ONLY_FOR = {
+    (int, float): {"minimum", "maximum", "exclusiveMinimum", "exclusiveMaximum"},
+    str: {"minLength", "maxLength"},
+    list: {"items", "prefixItems", "minItems", "maxItems", "uniqueItems"},
+    dict: {"properties", "required", "additionalProperties", "minProperties", "maxProperties"},
+}  # keywords that say nothing of values of another type
+
+
+class Validator:
+    """As much of JSON Schema as the printed ones use; any other keyword fails the test."""
+
+    def __init__(self, schema):
+        self.schema = schema
+
+    def accepts(self, data, schema=None):
+        schema = self.schema if schema is None else schema
+        keywords = schema.keys() - SILENT
+        for kind, words in ONLY_FOR.items():
+            keywords -= words if not isinstance(data, kind) else set()
+        return all(getattr(self, "_" + word.strip("$"))(data, schema) for word in sorted(keywords))
+
+    def _ref(self, data, schema):
+        return self.accepts(data, self.schema["$defs"][schema["$ref"].rpartition("/")[2]])
+
+    def _anyOf(self, data, schema):  # noqa: N802
+        return any(self.accepts(data, inner) for inner in schema["anyOf"])
+
+    def _oneOf(self, data, schema):  # noqa: N802
+        return sum(self.accepts(data, inner) for inner in schema["oneOf"]) == 1
+
+    def _not(self, data, schema):
+        return not self.accepts(data, schema["not"])
+
+    def _uniqueItems(self, data, schema):  # noqa: N802
+        return all(item not in data[:i] for i, item in enumerate(data))
+
+    def _maxProperties(self, data, schema):  # noqa: N802
+        return len(data) <= schema["maxProperties"]
+
+    def _type(self, data, schema):
+        flag = isinstance(data, bool) and schema["type"] in ("integer", "number")
+        return isinstance(data, TYPES[schema["type"]]) and not flag
+
+    def _enum(self, data, schema):
+        return data in schema["enum"]
+
+    def _const(self, data, schema):
+        return data == schema["const"]
+
+    def _minimum(self, data, schema):
+        return data >= schema["minimum"]
+
+    def _maximum(self, data, schema):
+        return data <= schema["maximum"]
+
+    def _exclusiveMinimum(self, data, schema):  # noqa: N802
+        return data > schema["exclusiveMinimum"]
+
+    def _exclusiveMaximum(self, data, schema):  # noqa: N802
+        return data < schema["exclusiveMaximum"]
+
+    def _minLength(self, data, schema):  # noqa: N802
+        return len(data) >= schema["minLength"]
+
+    def _maxLength(self, data, schema):  # noqa: N802
+        return len(data) <= schema["maxLength"]
+
+    def _minItems(self, data, schema):  # noqa: N802
+        return len(data) >= schema["minItems"]
+
+    def _maxItems(self, data, schema):  # noqa: N802
+        return len(data) <= schema["maxItems"]
+
+    def _minProperties(self, data, schema):  # noqa: N802
+        return len(data) >= schema["minProperties"]
+
+    def _items(self, data, schema):
+        return all(self.accepts(item, schema["items"]) for item in data)
+
+    def _prefixItems(self, data, schema):  # noqa: N802
+        return all(map(self.accepts, data, schema["prefixItems"]))
+
+    def _required(self, data, schema):
+        return set(schema["required"]) <= data.keys()
+
+    def _properties(self, data, schema):
+        known = schema["properties"]
+        return all(self.accepts(data[key], known[key]) for key in data if key in known)
+
+    def _additionalProperties(self, data, schema):  # noqa: N802
+        others = [value for key, value in data.items() if key not in schema.get("properties", {})]
+        allowed = schema["additionalProperties"]
+        if isinstance(allowed, bool):
+            return allowed or not others
+        return all(self.accepts(value, allowed) for value in others)
+
+
+def validator(kind):
+    schema = json.loads(schema_text(kind))
+    assert schema["$schema"] == "https://json-schema.org/draft/2020-12/schema"
+    return Validator(schema)
+
+
+@pytest.mark.parametrize("kind", SHIPPED)
+def test_shipped_files_follow_the_printed_schema(kind):
+    assert SHIPPED[kind]
+    for path in SHIPPED[kind]:
+        assert validator(kind).accepts(load_yaml(path).data), path
+
+
+@pytest.mark.parametrize("kind", SHIPPED)
+def test_a_file_with_a_key_that_nobody_knows_does_not_follow_it(kind):
+    for path in SHIPPED[kind]:
+        assert not validator(kind).accepts(load_yaml(path).data | {"colour": "blue"})
+
+
+def test_ranges_and_choices_are_in_the_schema():
+    scenario = validator("scenario")
+    assert scenario.accepts({"pattern": "pub-sub", "link": {"loss": 0.1}})
+    assert not scenario.accepts({"pattern": "post"})
+    assert not scenario.accepts({"link": {"loss": 1}})
+    assert not scenario.accepts({"robot": {"count": 0.5}})
+    assert not validator("study").accepts({"question": "what?"})
+
+
+NEW_KEYS = """\
+question: what?
+persons: 4
+parts: {it: {scenario: drive-to-event}}
+factors: {pattern: [req-rep, latest-wins]}
+design:
+  sobol: 8
+  ranges: {link.delay_s: [0, 1], link.loss: {low: 0.001, high: 0.1, scale: log}}
+comparisons:
+  far: {part: it, measure: contacts, factor: pattern, contrast: [req-rep, latest-wins]}
+hypotheses:
+  costs: {comparison: far, direction: above, margin: 0.5}
+stop: {half_width: 1, comparison: far, batch_persons: 2, most_persons: 9}
+budget_s: 60
+record: worst
+full: {persons: 8}
+"""
+
+
+def accepts_study(tmp_path, text):
+    path = tmp_path / "study.yaml"
+    path.write_text(text)
+    return validator("study").accepts(load_yaml(path).data)
+
+
+def test_what_a_study_may_say_of_designs_claims_and_stops_is_in_the_schema(tmp_path):
+    assert accepts_study(tmp_path, NEW_KEYS)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("sobol: 8", "sobol: eight"),
+        ("[0, 1]", "[0, 1, 2]"),
+        ("scale: log", "scale: square"),
+        ("direction: above", "direction: up"),
+        ("batch_persons: 2", "batch: 2"),
+        ("record: worst", "record: best"),
+        ("budget_s: 60", "budget_s: 0"),
+        ("measure: contacts, ", ""),
+        ("sobol: 8", "sobol: 6"),
+        ("sobol: 8", "sobol: true"),
+        ("sobol: 8", 'sobol: "8"'),
+        ("sobol: 8\n", "rows: [{link.loss: 0}]\n"),
+        ("sobol: 8\n", "sobol: 8\n  latin_hypercube: 8\n"),
+        ("  sobol: 8\n", ""),
+        ("latest-wins]}\nhyp", "latest-wins], within: 3}\nhyp"),
+        ("pattern: [req-rep, latest-wins]", "pattern: [req-rep, req-rep]"),
+        ("direction: above, margin: 0.5", "direction: same"),
+        ("direction: above, margin: 0.5", "direction: same, margin: 0"),
+        ("comparison: far, batch", "batch"),
+        ("comparison: far, batch", "measure: contacts, batch"),
+        ("comparison: far, batch", "comparison: far, measure: contacts, part: it, batch"),
+    ],
+)
+def test_a_mistake_there_follows_neither_the_schema_nor_the_program(tmp_path, old, new):
+    assert old in NEW_KEYS
+    text = NEW_KEYS.replace(old, new)
+    assert not accepts_study(tmp_path, text)
+    with pytest.raises(ConfigError):
+        load_study(tmp_path / "study.yaml")
+
+
+def test_what_follows_the_schema_is_taken_by_the_program(tmp_path):
+    (tmp_path / "study.yaml").write_text(NEW_KEYS)
+    assert load_study(tmp_path / "study.yaml").design.sobol == 8
+
+
+def test_the_schema_tells_what_each_key_of_a_study_means():
+    schema = json.loads(schema_text("study"))
+    for name in ("Contrast", "Design", "Hypothesis", "Part", "Span", "Stop", "Tuning"):
+        model = schema["$defs"][name]
+        assert "Attributes" not in model["description"]
+        assert all(key.get("description") for key in model["properties"].values()), name
+    assert all(key.get("description") for key in schema["properties"].values())
+    assert schema["$defs"]["Span"]["properties"]["scale"]["description"] == (
+        "`linear`, `log` for even ratios, or `whole` for whole numbers."
+    )
+
+
+def test_every_kind_of_agent_is_named():
+    schema = json.loads(schema_text("agent"))
+    named = {inner["$ref"].rpartition("/")[2] for inner in schema["anyOf"]}
+    people = {"GuardProfile", "BystanderProfile", "Population", "Bands"}
+    assert named == {"RobotProfile", "PhoneProfile", "AccelerometerPart"} | people
+    assert all(schema["$defs"][name]["title"] == name for name in named)
+
+
+def test_the_printed_xsd_is_the_schema_and_accepts_the_samples():
+    text = schema_text("message")
+    assert text == (ROOT / "protocol" / "dva.xsd").read_text(encoding="utf-8")
+    schema = etree.XMLSchema(etree.fromstring(text.encode()))
+    samples = sorted(ROOT.glob("protocol/samples/valid/*.xml"))
+    assert samples
+    for path in samples:
+        schema.assertValid(etree.parse(path))
+
+
+def test_a_schema_of_nothing_is_refused_with_what_there_is():
+    with pytest.raises(ConfigError, match="did you mean 'site'"):
+        schema_text("sites")

@@ -1,0 +1,271 @@
+"""What every filter and mapping promises: kept by all that are shipped, missed by the bad ones."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from dva_sim.agents.tilt import (
+    Filter,
+    PhoneProfile,
+    known_filters,
+    known_mappings,
+    load_filter,
+    load_mapping,
+    try_phone,
+)
+from dva_sim.agents.tilt.filters import NoFilter
+from dva_sim.agents.tilt.guarded import GuardedFilter
+from dva_sim.agents.tilt.mappings import Absolute, Differential
+from dva_sim.cli import check_output
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.testing.tilt import try_filter, try_mapping
+
+STICKS = {
+    "median20-copy": ("sticks where only 6 of 20 samples are fresh: 0 for 2",),
+    "median20-inplace": ("sticks where only 6 of 20 samples are fresh: 8 for 2",),
+}
+
+
+@pytest.mark.parametrize("name", [*known_filters(), "faithful.py:Faithful"])
+def test_every_filter_that_is_shipped_keeps_its_promises(name: str) -> None:
+    outcome = try_filter(load_filter(name), slow=60.0)
+    assert (outcome.broken, outcome.warnings) == ((), STICKS.get(name, ()))
+
+
+@pytest.mark.parametrize("name", [*known_mappings(), "cubic.py:Cubic"])
+def test_every_mapping_that_is_shipped_keeps_its_promises(name: str) -> None:
+    outcome = try_mapping(load_mapping(name), slow=60.0)
+    assert (outcome.broken, outcome.warnings) == ((), ())
+
+
+class Numberless(NoFilter):
+    def value(self):
+        level, turn = super().value()
+        return (math.nan if level > 8 else level), turn
+
+
+class Eager(NoFilter):
+    def value(self):
+        level, turn = super().value()
+        return 1.5 * level, turn
+
+
+class Biased(NoFilter):
+    def value(self):
+        return 0.1, 0.0
+
+
+class Sum(Filter):
+    total = 0.0
+
+    def add(self, sample):
+        self.total = 0.999 * self.total + 0.001 * sample[0] if sample[0] > 0 else self.total
+
+    def value(self):
+        return self.total, 0.0
+
+
+class Shared(NoFilter):
+    seen: list = []  # noqa: RUF012 - the fault under test
+
+    def add(self, sample):
+        self.seen.append(sample)
+
+    def value(self):
+        return self.seen[-1] if self.seen[:1] else (0.0, 0.0)
+
+
+class Forgetful(NoFilter):
+    def value(self):
+        given, self._sample = self._sample, (0.0, 0.0)
+        return given
+
+
+class Older(NoFilter):
+    @property
+    def age(self):
+        return 3.0
+
+
+class Undated(NoFilter):
+    @property
+    def age(self):
+        return math.nan if self._sample[0] else 0.0
+
+
+class Leaving(NoFilter):
+    def add(self, sample):
+        raise SystemExit(3)
+
+
+class Raising(NoFilter):
+    def add(self, sample):
+        raise ZeroDivisionError("oh")
+
+
+@pytest.mark.parametrize(
+    ("kind", "told"),
+    [
+        (Numberless, "answers what is no number: level nan, "),
+        (Eager, "leaves the range of its input: level "),
+        (Biased, "is not zero before the first sample: level 0.1, 0 deg/s"),
+        (Sum, "does not come to what stands for ten minutes: "),
+        (Shared, "shares memory with other copies, or draws random numbers: value 1"),
+        (Forgetful, "changes when it is asked, though it has no batch: sample 1"),
+        (Older, "is not as old as it says: 0.0 samples behind a rising input; age says 3.0"),
+        (Undated, "is not as old as it says: 0.0 samples behind a rising input; age is nan"),
+        (Leaving, "raises: SystemExit: 3 (test_tilt.py:"),
+        (Raising, "raises: ZeroDivisionError: oh (test_tilt.py:"),
+    ],
+)
+def test_a_promise_that_a_filter_breaks_is_told_in_a_plain_line(kind, told) -> None:
+    outcome = try_filter(kind, slow=60.0)
+    assert any(line.startswith(told) for line in outcome.broken), outcome.broken
+
+
+class Unlimited(Absolute):
+    def command(self, level, turn, dt):
+        return level, turn
+
+
+class Restless(Differential):
+    def command(self, level, turn, dt):
+        return super().command(level, 1.01 * turn + 0.1 * self._turn, dt)
+
+
+class Rolling(Absolute):
+    def command(self, level, turn, dt):
+        return super().command(level + 1.0, turn, dt)
+
+
+class Remembering(Differential):
+    def begin(self):
+        """Forgets nothing."""
+
+
+class Silent(Differential):
+    integrates = False
+
+
+class Wrong(Absolute):
+    def tilt_for(self, wanted, shown, within):
+        return wanted[0], 0.5 * wanted[1]
+
+
+class Stepwise(Differential):
+    def command(self, level, turn, dt):
+        return super().command(level, turn, 0.03)
+
+
+class OneSided(Absolute):
+    def command(self, level, turn, dt):
+        return super().command(level, max(turn, -5.0), dt)
+
+
+@pytest.mark.parametrize(
+    ("kind", "told"),
+    [
+        (Unlimited, "leaves the limits of a command: level "),
+        (Restless, "turns faster and faster at rest: after level 3, -12 deg/s"),
+        (Rolling, "drives at rest: level 1 after level 8, 25 deg/s"),
+        (Remembering, "remembers the drive before: after begin() it answers differently"),
+        (Silent, "depends on readings before, though it does not integrate: in other order"),
+        (Wrong, "does not get where tilt_for tilts to: level 5, 10 deg/s when level 5, 20 deg/s "),
+        (
+            Stepwise,
+            "integrates by steps, not by time: level 5.7, 30 deg/s after 68 half steps, ",
+        ),
+        (OneSided, "turns left and right differently: for level 3.8, 11.4 deg/s"),
+    ],
+)
+def test_a_promise_that_a_mapping_breaks_is_told_in_a_plain_line(kind, told) -> None:
+    outcome = try_mapping(kind, slow=60.0)
+    assert any(line.startswith(told) for line in outcome.broken), outcome.broken
+
+
+def test_what_ends_the_program_when_made_or_asked_is_told_in_a_line(tmp_path, capsys):
+    path = tmp_path / "leaving.py"
+    path.write_text(
+        "import sys\n"
+        "from dva_sim.agents.tilt import Filter\n"
+        "class Made(Filter):\n"
+        "    def __init__(self, period): sys.exit('made')\n"
+        "    def add(self, sample): pass\n"
+        "    def value(self): return 0.0, 0.0\n"
+        "class Told(Filter):\n"
+        "    def __init__(self, period): pass\n"
+        "    def add(self, sample): sys.exit('told')\n"
+        "    def value(self): return 0.0, 0.0\n"
+        "class Aged(Told):\n"
+        "    age = property(lambda self: sys.exit('asked'))\n"
+    )
+    names = [f"{path}:{name}" for name in ("Made", "Told", "Aged")]
+    assert check_output.check(["filter", *names]) == 1
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].endswith("Made' cannot be made: SystemExit: made")
+    assert lines[1].endswith("Told: raises: SystemExit: told (leaving.py:9)")
+    assert lines[3].endswith("Aged' cannot be made: SystemExit: asked")
+    assert lines[4] == "3 filters: 3 invalid"
+
+
+@pytest.mark.parametrize(
+    ("says", "told"),
+    [
+        ("batch = 0", "its batch is 0; should be None or a whole number, 1 to 1000"),
+        ("batch = -3", "its batch is -3; should be None or"),
+        ("batch = 1001", "its batch is 1001; should be None or"),
+        ("batch = 2.5", "its batch is 2.5; should be None or"),
+        ("batch = True", "its batch is True; should be None or"),
+        ("batch = 'x'", "its batch is 'x'; should be None or"),
+        ("age = 'old'", "its age is 'old'; should be a number of samples, at least 0"),
+        ("age = -1", "its age is -1; should be a number"),
+        ("age = float('inf')", "its age is inf; should be a number"),
+    ],
+)
+def test_a_filter_that_no_phone_could_work_with_is_refused_wherever_it_is_named(
+    tmp_path, capsys, says, told
+):
+    path = tmp_path / "odd.py"
+    path.write_text(
+        "from dva_sim.agents.tilt.filters import NoFilter\n"
+        f"class Odd(NoFilter):\n    {says}\n"
+        "    def add(self, sample): super().add(sample)\n"
+    )
+    line = f"filter '{path}:Odd': {told}"
+    assert check_output.check(["filter", f"{path}:Odd"]) == 1
+    assert capsys.readouterr().out.startswith(f"{path}:Odd: {line}")
+    with pytest.raises(ConfigError) as caught:
+        try_phone(PhoneProfile(filter=f"{path}:Odd"))
+    assert str(caught.value).startswith(line)
+    with pytest.raises(ConfigError, match=r"its (batch|age) is"):
+        GuardedFilter(load_class(path), 1 / 34)
+
+
+def load_class(path):
+    found: dict = {}
+    exec(path.read_text(), found)
+    return found["Odd"](1 / 34)
+
+
+def test_filters_and_mappings_are_checked_by_name_and_by_file(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "bad.py").write_text(
+        "from dva_sim.agents.tilt import Filter\n"
+        "class Bad(Filter):\n"
+        "    def add(self, sample): pass\n"
+        "    def value(self): return 1.0, 0.0\n"
+    )
+    assert check_output.check(["filter", "median", "faithful.py:Faithful"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    said = "median: filter: valid; 40 runs, "
+    assert any(line.startswith(said) for line in lines)  # a busy machine has warnings, too
+    assert lines[-1] == "2 filters: 2 valid"
+    assert check_output.check(["filter", "bad.py:Bad"]) == 1
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "bad.py:Bad: is not zero before the first sample: level 1, 0 deg/s"
+    assert check_output.check(["mapping", "leaky", "cubic.py:Cubic"], []) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == "2 mappings: 2 valid"
+    assert check_output.check(["mapping", "leaky"], ["leak_s=-1"]) == 1
+    assert "option 'leak_s' is -1; should be above 0" in capsys.readouterr().out

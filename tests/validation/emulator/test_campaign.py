@@ -1,0 +1,121 @@
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from dva_sim.network.condition import Condition
+from dva_sim.validation.network.emulator import campaign
+from dva_sim.validation.network.emulator.campaign import (
+    COLUMNS,
+    Progress,
+    Row,
+    describe_machine,
+    job_of,
+    measure_all,
+)
+from dva_sim.validation.network.emulator.cell import Job, Outcome
+from dva_sim.validation.network.emulator.running import EmulatorError
+
+SLOW, FAST = Condition("pub", 10), Condition("pub", 50)
+Play = Callable[[Condition, int], None]
+
+
+@pytest.fixture
+def played(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, int]]:
+    """What was measured, by a machine that answers at once."""
+    return pretend(monkeypatch, lambda condition, seed: None)
+
+
+def pretend(monkeypatch: pytest.MonkeyPatch, play: Play) -> list[tuple[str, int]]:
+    calls: list[tuple[str, int]] = []
+
+    def measure(condition: Condition, seed: int, link: str) -> Row:
+        play(condition, seed)
+        calls.append((condition.label, seed))
+        return dict.fromkeys(COLUMNS, "1") | condition.to_row()
+
+    def run_job(job: Job) -> Outcome:
+        return Outcome(way="root")
+
+    monkeypatch.setattr(campaign, "measure", measure)
+    monkeypatch.setattr(campaign, "run_job", run_job)
+    return calls
+
+
+def test_every_condition_comes_once_before_any_comes_twice(
+    tmp_path: Path, played: list[tuple[str, int]]
+) -> None:
+    assert measure_all([SLOW, FAST], [1, 2], tmp_path / "own.csv") == []
+    labels = [SLOW.label, FAST.label]
+    assert played == [(label, seed) for seed in (1, 2) for label in labels]
+
+
+def test_a_row_says_what_it_is_of(tmp_path: Path, played: list[tuple[str, int]]) -> None:
+    measure_all([SLOW], [7], tmp_path / "own.csv", group="blind")
+    header, row = (tmp_path / "own.csv").read_text().splitlines()
+    assert header.startswith("cell,group,seed,cond_id,pattern,hz,")
+    assert row.startswith(f"blind_pub10_d0_j0_l0_r0_p5_s7,blind,7,{SLOW.hash},pub,10,")
+
+
+def test_what_is_there_is_not_measured_again(tmp_path: Path, played: list[tuple[str, int]]) -> None:
+    measure_all([SLOW], [1, 2], tmp_path / "own.csv")
+    told: list[Progress] = []
+    measure_all([SLOW, FAST], [1, 2], tmp_path / "own.csv", told.append)
+    assert played[2:] == [(FAST.label, 1), (FAST.label, 2)]
+    assert [(progress.done, progress.total) for progress in told] == [(2, 4), (3, 4), (4, 4)]
+    assert told[0].left_s > told[1].left_s > told[2].left_s == 0
+
+
+def test_a_campaign_that_is_stopped_goes_on_where_it_was(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stop_at_the_second(condition: Condition, seed: int) -> None:
+        if seed == 2:
+            raise KeyboardInterrupt
+
+    pretend(monkeypatch, stop_at_the_second)
+    with pytest.raises(KeyboardInterrupt):
+        measure_all([SLOW], [1, 2, 3], tmp_path / "own.csv")
+    again = pretend(monkeypatch, lambda condition, seed: None)
+    measure_all([SLOW], [1, 2, 3], tmp_path / "own.csv")
+    assert again == [(SLOW.label, 2), (SLOW.label, 3)]
+    assert len((tmp_path / "own.csv").read_text().splitlines()) == 4
+
+
+def test_a_run_that_fails_is_told_and_the_others_go_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail_once(condition: Condition, seed: int) -> None:
+        if seed == 1:
+            raise EmulatorError("there was no handshake within 60 s")
+
+    pretend(monkeypatch, fail_once)
+    told: list[Progress] = []
+    failures = measure_all([SLOW], [1, 2], tmp_path / "own.csv", told.append)
+    assert failures == [f"own_{SLOW.label}_s1: there was no handshake within 60 s"]
+    assert (told[-1].done, told[-1].total) == (1, 2)
+
+
+def test_a_campaign_stops_when_nothing_works(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(condition: Condition, seed: int) -> None:
+        raise EmulatorError("the robot failed")
+
+    pretend(monkeypatch, fail)
+    told: list[Progress] = []
+    with pytest.raises(EmulatorError, match="the robot failed"):
+        measure_all([SLOW], range(100), tmp_path / "own.csv", told.append)
+    assert len(told) == 3
+
+
+def test_two_conditions_with_one_seed_do_not_share_their_luck() -> None:
+    assert job_of(SLOW, 1).seed != job_of(FAST, 1).seed != job_of(FAST, 2).seed
+
+
+def test_the_description_of_a_machine_names_nobody() -> None:
+    machine = describe_machine("packets", "root", True)
+    text = " ".join(str(value) for value in machine.values())
+    assert "/" not in text
+    assert machine["libzmq"]
+    assert machine["cores"]

@@ -1,0 +1,111 @@
+"""The command on a few conditions: what it tells, writes and finds out."""
+
+import csv
+
+import pytest
+
+from dva_sim.cli import validate as commands
+from dva_sim.cli import validate_network
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.validation.network import comparison, result_page
+from dva_sim.validation.network.comparison import Setting, compare
+from dva_sim.validation.network.judging import grouped
+from dva_sim.validation.network.reference import load_plan, load_runs
+
+LABELS = (
+    *("req10_d100_j0_l0_r0_p5_T2500", "pub50_d0_j0_l0_r64_p5", "pub10_d50_j0_l5_r0_p5"),
+    *("req10_d50_j0_l5_r0_p5_T2500", "req10_d100_j20_l5_r0_p5_T2500"),
+    "pub50_d100_j0_l0_r0_p100",
+)
+QUICK = Setting(seed=1, quick=True)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _few_runs():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(comparison, "QUICK_RUNS", 12)
+        patch.setattr(comparison, "QUICK_CONTROL_RUNS", 6)
+        yield
+
+
+@pytest.fixture(scope="module")
+def runs():
+    every = load_runs({"reference": load_plan().reference})
+    return [run for run in every if run.condition.label in LABELS]
+
+
+@pytest.fixture(scope="module")
+def compared(runs):
+    return compare(grouped(runs), QUICK)
+
+
+def test_each_condition_is_judged_by_its_kind(compared):
+    kinds = {group.condition.label: group.kind for group in compared.groups}
+    assert kinds["req10_d100_j0_l0_r0_p5_T2500"] == "lossless"
+    assert kinds["pub50_d0_j0_l0_r64_p5"] == "overload"
+    assert kinds["req10_d100_j20_l5_r0_p5_T2500"] == "single"
+    assert kinds["pub10_d50_j0_l5_r0_p5"] == "pooled"
+
+
+def test_what_is_exact_lies_in_its_band(compared):
+    for kind in ("lossless", "overload"):
+        assert compared.of_kind(kind)
+        assert compared.passes_bands(kind)
+
+
+def test_models_that_are_too_simple_are_found_out(compared):
+    assert set(compared.controls) == {"message by message", "datagrams"}
+    assert compared.fooled == []
+    assert compared.controls["datagrams"].rms > 5
+
+
+def test_what_is_missing_is_counted(compared):
+    every, pooled = compared.missing
+    assert pooled == 38
+    assert every == 150 - len(compared.judged)
+
+
+def test_a_row_of_the_table_shows_measured_and_predicted(compared):
+    [row] = result_page.table(compared, "lossless")
+    told = dict(zip(result_page.HEADS, row, strict=True))
+    assert told["depth"] == "message"
+    assert told["age [ms]"].startswith("105.3 → 105.1 |")
+    assert told["verdict"] == "passes"
+
+
+def test_the_command_writes_the_same_bytes_again(runs, tmp_path, capsys):
+    few = [run for run in runs if "l5" not in run.condition.label]
+    for name in ("a", "b"):
+        assert validate_network.judge_runs(few, {}, tmp_path / name, QUICK) == 0
+    assert "conditions are judged" in capsys.readouterr().out
+    first, second = tmp_path / "a", tmp_path / "b"
+    files = [path.relative_to(first) for path in first.rglob("*") if path.is_file()]
+    assert {str(f) for f in files} >= {"index.html", "network.csv", "figures/scatter.png"}
+    for file in files:
+        assert (first / file).read_bytes() == (second / file).read_bytes()
+    rows = list(csv.DictReader((first / "network.csv").read_text().splitlines()))
+    assert {row["verdict"] for row in rows} <= {"inside", "shown only"}
+
+
+def test_the_number_of_processes_changes_nothing(runs):
+    one = [run for run in runs if run.condition.label == "req10_d50_j0_l5_r0_p5_T2500"]
+    alone, together = (
+        compare(grouped(one), Setting(quick=True, workers=workers)) for workers in (1, 2)
+    )
+    assert [s.z for s in alone.pooled.scored] == [s.z for s in together.pooled.scored]
+
+
+def test_a_mechanism_that_is_left_out_has_its_line(runs):
+    one = [run for run in runs if run.condition.label == "pub10_d50_j0_l5_r0_p5"]
+    found = compare(grouped(one), Setting(quick=True, ablate=True))
+    names = [name for name, *_ in result_page.ablation(found)]
+    assert {"nothing", "datagrams", "tail-loss probe", "RACK"} <= set(names)
+
+
+def test_options_of_others_are_refused():
+    with pytest.raises(ConfigError, match="--strategy is for `validate operators`"):
+        commands.validate("network", None, strategy="adaptive")
+    with pytest.raises(ConfigError, match="--ablate, --live and --measure are for"):
+        commands.validate("dispatch", None, sockets=commands.Sockets(ablate=True))
+    with pytest.raises(ConfigError, match="should be dispatch, operators or network"):
+        commands.validate("sockets", None)

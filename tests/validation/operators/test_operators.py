@@ -1,0 +1,102 @@
+"""The command, on few persons: what it writes, and that who knows no delay fails."""
+
+import csv
+
+import pytest
+
+from dva_sim.cli import validate_operators
+from dva_sim.cli.validate import validate
+from dva_sim.experiments.analysis.published_operators import lines_of, load_split, load_targets
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.validation.operators.experiments import EXPERIMENTS
+from dva_sim.validation.operators.judging import judge, outcome_of
+from dva_sim.validation.operators.play import Setting, measured, play_experiments
+
+LINES = lines_of(load_targets(), load_split())
+
+
+def played(strategy, *names, persons=3):
+    chosen = [e for e in EXPERIMENTS if e.name in names]
+    setting = Setting(strategy, persons=persons, quick=True)
+    found = measured(chosen, play_experiments(chosen, setting), seed=1)
+    return {v.line.id: v for v in judge(LINES, found)}, found
+
+
+def test_an_operator_on_whom_delay_has_no_effect_fails_whatever_else_it_does():
+    """The negative control: of ten held-out lines it misses all eight that a delay is part of."""
+    verdicts, found = played("oracle", "lag", "latency", "waiting", "excavator")
+    assert found["S7/75"].value == pytest.approx(1.0)
+    assert found["S17/increase"].value == pytest.approx(0.0)
+    held_out = {v.line.id: v.word for v in verdicts.values() if v.line.kind == "held-out"}
+    without_delay = {"S11/mean", "S11/variance"}  # the steering law, not played here
+    assert len(held_out) == 10
+    assert {held_out[line] for line in held_out.keys() - without_delay} == {"misses"}
+    assert not outcome_of(list(verdicts.values()), load_split().rule).passes
+
+
+def test_delay_costs_three_persons_time_also_in_the_worst_of_their_intervals():
+    _, found = played("adaptive", "lag", "excavator")
+    assert found["S7/75"].low > 1.0
+    assert found["S8/slope"].low > 1.0
+    assert found["S17/increase"].low > 0.1
+
+
+def test_the_same_seed_gives_the_same_numbers_and_another_one_other_persons():
+    one, again = (played("adaptive", "latency", persons=2)[1] for _ in range(2))
+    assert one == again
+    chosen = [e for e in EXPERIMENTS if e.name == "latency"]
+    other = play_experiments(chosen, Setting("adaptive", seed=2, persons=2, quick=True))
+    assert chosen[0].measure(other["latency"])["S12/more"] != one["S12/more"].value
+
+
+def test_the_number_of_processes_changes_nothing():
+    chosen = [e for e in EXPERIMENTS if e.name == "latency"]
+    alone, together = (
+        play_experiments(chosen, Setting("adaptive", persons=2, quick=True, workers=workers))
+        for workers in (1, 2)
+    )
+    for cell, trials in alone["latency"].items():
+        assert (trials["movement_time_s"] == together["latency"][cell]["movement_time_s"]).all()
+
+
+def test_an_unknown_strategy_is_refused_before_anything_is_played(monkeypatch):
+    monkeypatch.setattr(
+        validate_operators, "play_exact", lambda *given: pytest.fail("it was played")
+    )
+    with pytest.raises(ConfigError, match="'telepathy'"):
+        validate("operators", None, quick=True, jobs=1, strategy="telepathy")
+
+
+@pytest.mark.parametrize(
+    ("what", "options", "words"),
+    [
+        ("robots", {}, "should be dispatch, operators or network"),
+        ("operators", {"cases": "mine.yaml"}, "--cases is for `validate dispatch`"),
+        ("dispatch", {"strategy": "pursuit"}, "--strategy is for `validate operators`"),
+    ],
+)
+def test_what_does_not_belong_together_is_refused(what, options, words):
+    with pytest.raises(ConfigError, match=words):
+        validate(what, None, **options)
+
+
+@pytest.mark.soak
+def test_what_is_written_is_the_same_bytes_each_time(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(validate_operators, "QUICK_PERSONS", 3)
+    for name in ("one", "two"):
+        assert validate("operators", tmp_path / name, quick=True, jobs=2, strategy="oracle") == 4
+    assert "negative" not in capsys.readouterr().err
+    files = sorted(p.relative_to(tmp_path / "one") for p in (tmp_path / "one").rglob("*.*"))
+    assert {f.name for f in files} >= {
+        "operators.csv",
+        "operators.parquet",
+        "steered.csv",
+        "index.html",
+    }
+    pictures = {"overview", "lag", "tilt", "steering", "waiting", "frames", "tracking"}
+    assert {f.stem for f in files if f.suffix == ".svg"} == pictures | {"loops", "median"}
+    for file in files:
+        assert (tmp_path / "one" / file).read_bytes() == (tmp_path / "two" / file).read_bytes()
+    rows = list(csv.DictReader((tmp_path / "one/operators.csv").read_text().splitlines()))
+    assert [row["line"] for row in rows] == [line.id for line in LINES]
+    assert {row["verdict"] for row in rows} == {"passes", "misses", "shown only"}

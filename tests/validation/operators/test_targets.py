@@ -1,0 +1,127 @@
+"""The files of targets and of the split: complete, consistent, and true to where they come from."""
+
+import csv
+import json
+from pathlib import Path
+
+import pytest
+
+from dva_sim.experiments.analysis.published_operators import (
+    SplitFile,
+    TargetFile,
+    lines_of,
+    load_split,
+    load_targets,
+    ranges,
+)
+from dva_sim.kernel import resources
+from dva_sim.kernel.config import validate
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.validation.operators.exact import EXACT
+
+_COMPARISONS = ("first", "second", "third")
+SHARED = Path(__file__).parents[4] / "shared/targets/operator.json"
+LINES = {line.id: line for line in lines_of(load_targets(), load_split())}
+
+
+def targets(tag="V", **line):
+    check = {"metric": "m", "tag": tag, "source": "s", "lines": {"one": {"what": "w", **line}}}
+    return {"tags": {"V": "seen", "M": "memory"}, "support": {}, "checks": {"T": check}}
+
+
+def split(**groups):
+    rest = {"exact": {}, "fit": {}, "held_out": {}, "memory": {}}
+    rule = {"exact": 1.0, "held_out": 0.8}
+    return validate(SplitFile, {"rule": rule, "strategy": "pursuit", **rest, **groups})
+
+
+def test_the_shipped_split_assigns_every_check_once():
+    kinds = load_split().kinds()
+    assert kinds.keys() == load_targets().checks.keys()
+    counts = {kind: list(kinds.values()).count(kind) for kind in set(kinds.values())}
+    assert counts == {"exact": 11, "held-out": 6, "fitted": 2, "remembered": 2}
+
+
+def test_only_one_publication_may_be_fitted_to():
+    assert load_split().fit == {"mackenzie-teather-2012": ("S9", "S10")}
+
+
+def test_ten_lines_are_held_out_so_two_may_miss():
+    held_out = [line for line in LINES.values() if line.kind == "held-out"]
+    assert len(held_out) == 10
+
+
+@pytest.mark.parametrize("check", [c for c in EXACT if c != "S16b"])  # that one: see test_exact
+def test_an_exact_check_simulates_the_lines_that_its_target_has(check):
+    expected = {line.name for line in LINES.values() if line.check == check}
+    assert EXACT[check](1).keys() == expected
+
+
+@pytest.mark.skipif(not SHARED.is_file(), reason="../shared is not there")
+def test_the_embedded_targets_are_those_of_the_shared_file():
+    told = {check["id"]: check for check in json.loads(SHARED.read_text())["checks"]}
+    assert told.keys() == load_targets().checks.keys()
+    assert {n: c["tag"] for n, c in told.items()} == {
+        n: c.tag for n, c in load_targets().checks.items()
+    }
+    for name, check in told.items():
+        band = check.get("band")
+        if isinstance(band, list):
+            own = [line for line in LINES.values() if line.check == name and line.has_band]
+            assert [(line.low, line.high) for line in own] == [tuple(band)], name
+    for lag, time in told["S7"]["target"].items():
+        assert LINES[f"S7/time-{lag}"].target == time
+    for lag, (low, high) in told["S7"]["ratio_band"].items():
+        assert (LINES[f"S7/{lag}"].low, LINES[f"S7/{lag}"].high) == (low, high)
+    for line, share in (("S12/less", "-16.7"), ("S12/more", "16.7")):
+        assert [LINES[line].low, LINES[line].high] == told["S12"]["band"][share]
+    assert LINES["S13/linear"].low == told["S13"]["min_R2"]
+    assert LINES["S17/increase"].target == told["S17"]["target"]
+
+
+def test_a_check_assigned_twice_is_refused():
+    with pytest.raises(ConfigError, match="'T' is assigned twice"):
+        split(fit={"a": ("T",)}, held_out={"b": ("T",)}).kinds()
+
+
+def test_a_check_that_is_not_assigned_is_refused():
+    with pytest.raises(ConfigError, match="does not say what T is for"):
+        lines_of(validate(TargetFile, targets(low=1)), split())
+
+
+def test_what_is_known_from_memory_cannot_be_held_out():
+    with pytest.raises(ConfigError, match="T is known from memory: it cannot be held-out"):
+        lines_of(validate(TargetFile, targets("V,M", low=1)), split(held_out={"a": ("T",)}))
+
+
+@pytest.mark.parametrize(
+    "band",
+    [{}, {"above": 1}, {"low": 2, "high": 1}, {"beside": True}]
+    + [{"beside": True, "target": 1, limit: 1} for limit in ("low", "above")],
+)
+def test_a_line_that_everything_or_nothing_passes_is_refused(band):
+    with pytest.raises(ConfigError):
+        validate(TargetFile, targets(**band))
+
+
+def test_a_tag_without_a_meaning_is_refused():
+    with pytest.raises(ConfigError, match="tag 'X' of T is unknown; known: V, M"):
+        validate(TargetFile, targets("X", low=1))
+
+
+def test_what_each_comparison_found_is_kept_line_by_line():
+    path = resources.find("operators", "experiments/validation").with_name("operators-history.csv")
+    rows = {r["line"]: r for r in csv.DictReader(path.read_text(encoding="utf-8").splitlines())}
+    assert rows.keys() == {line.id for line in LINES.values() if line.kind != "beside"}
+    held_out = [line for line in LINES.values() if line.kind == "held-out"]
+    passed = [sum(line.holds(float(rows[line.id][n])) for line in held_out) for n in _COMPARISONS]
+    assert passed == [7, 9, 8]
+
+
+def test_people_were_watched_up_to_a_delay_of_one_and_a_half_seconds():
+    assert ranges("adaptive") == ((0.0, 0.225), (1.0, 1.5))  # nobody was watched in between
+    assert ranges("pursuit") == ((0.0, 0.225),)
+
+
+def test_of_the_oracle_nothing_was_published():
+    assert ranges("oracle") == ()

@@ -1,0 +1,255 @@
+"""Verdicts, the rule, and the aggregation of trials, on numbers that can be worked out by hand."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dva_sim.experiments.analysis.published_operators import lines_of, load_split, load_targets
+from dva_sim.validation.operators import experiments as of
+from dva_sim.validation.operators import result_page
+from dva_sim.validation.operators.judging import (
+    Found,
+    Trials,
+    certain,
+    collect,
+    judge,
+    mean,
+    outcome_of,
+    with_intervals,
+)
+
+LINES = {line.id: line for line in lines_of(load_targets(), load_split())}
+RULE = load_split().rule
+
+
+def middle(line):
+    """A value that passes in a line with two ends."""
+    return certain(0.5 * (line.low + line.high))
+
+
+def verdict(line, value):
+    return judge([line], {line.id: certain(value)})[0]
+
+
+def trials(person=(0, 1), **columns):
+    arrays = {name: np.array(values, float) for name, values in columns.items()}
+    return Trials(np.array(person), arrays)
+
+
+def timed(*times):
+    return trials(person=range(len(times)), movement_time_s=times)
+
+
+def test_a_value_in_its_band_passes_and_one_beyond_it_misses():
+    line = LINES["S17/increase"]
+    assert verdict(line, 0.39).word == verdict(line, 0.59).word == "passes"
+    assert verdict(line, 0.60).word == "misses"
+
+
+def test_a_target_changed_to_a_wrong_number_makes_the_verdict_a_miss():
+    wrong = replace(LINES["S16/slow"], target=500.0, low=495.0, high=505.0)
+    assert verdict(LINES["S16/slow"], 600.0).word == "passes"
+    assert verdict(wrong, 600.0).word == "misses"
+
+
+@pytest.mark.parametrize(("line", "sign"), [("S12/less", -1), ("S12/more", 1), ("S7/25", 1)])
+def test_where_the_sign_counts_no_effect_misses_and_so_does_an_interval_that_holds_none(line, sign):
+    for value, other_end, word in ((0.0, 0.0, "misses"), (2, -1, "misses"), (2, 1, "passes")):
+        ends = sorted(1 + 0.01 * sign * share for share in (other_end, 3))
+        found = Found(1 + 0.01 * sign * value, *ends, 24)
+        assert judge([LINES[line]], {line: found})[0].word == word
+
+
+def test_a_line_beside_the_others_is_shown_without_a_band():
+    shown = verdict(LINES["S7/time-25"], 2000.0)
+    assert (shown.word, shown.inside) == ("shown only", False)
+    assert result_page.words(shown)[2:] == ["934 ms", "2000 ms", "shown only"]
+
+
+def test_a_publication_passes_as_a_whole_if_all_its_lines_do():
+    held_out = [line for line in LINES.values() if line.kind == "held-out"]
+    values = {line.id: middle(line) for line in held_out}
+    assert outcome_of(judge(held_out, values), RULE).publications == (5, 5)
+    values["S8/slope"] = values["S7/75"] = certain(0.0)  # both of one publication
+    assert outcome_of(judge(held_out, values), RULE).publications == (4, 5)
+
+
+@pytest.mark.parametrize("line", ["S9/dwell", "S14/crossover"])
+def test_what_was_fitted_to_or_remembered_is_shown_only_wherever_it_lies(line):
+    assert verdict(LINES[line], 1.2).word == verdict(LINES[line], 99.0).word == "shown only"
+    assert verdict(LINES[line], 1.2).inside
+    assert not verdict(LINES[line], 99.0).inside
+
+
+def test_what_was_not_simulated_misses():
+    (missing,) = judge([LINES["S1/critical"]], {})
+    assert missing.word == "misses"
+
+
+@pytest.mark.parametrize(("misses", "passes"), [(0, True), (2, True), (3, False)])
+def test_eight_of_ten_held_out_lines_are_enough(misses, passes):
+    held_out = [line for line in LINES.values() if line.kind == "held-out"]
+    values = {line.id: middle(line) for line in held_out}
+    values |= {line.id: certain(-99.0) for line in held_out[:misses]}
+    outcome = outcome_of(judge(held_out, values), RULE)
+    assert outcome.held_out == (10 - misses, 10)
+    assert outcome.passes == passes
+
+
+def test_a_single_exact_line_that_misses_fails_it_all():
+    exact = [line for line in LINES.values() if line.kind == "exact"]
+    values = {line.id: certain(line.high if line.low is None else line.low) for line in exact}
+    assert outcome_of(judge(exact, values), RULE).passes
+    values["S16/slow"] = certain(650.0)
+    assert not outcome_of(judge(exact, values), RULE).passes
+
+
+def test_the_headline_says_both_shares_and_what_is_asked_for():
+    held_out = [line for line in LINES.values() if line.kind == "held-out"]
+    outcome = outcome_of(judge(held_out, {line.id: certain(-9.0) for line in held_out}), RULE)
+    assert result_page.headline(outcome) == (
+        "0 of 0 exact lines and 0 of 10 held-out lines (0 %) pass; "
+        "0 of 5 held-out publications pass in all their lines. "
+        "Asked for are all exact ones and 80 % of the held-out ones: failed."
+    )
+
+
+def test_words_give_target_band_and_unit():
+    assert result_page.published(LINES["S9/dwell"]) == "1.2 (0.95 to 1.45) bit/s"
+    assert result_page.published(LINES["S16c/30"]) == "at least 120 min"
+    assert result_page.published(LINES["S16c/300"]) == "at most 3 min"
+    assert result_page.published(LINES["S12/less"]) == "0.83 to 1, surely below 1"
+    assert result_page.simulated(verdict(LINES["S16c/30"], math.inf)) == "never"
+
+
+def test_a_value_at_the_edge_of_what_was_tried_says_so():
+    line = LINES["S15/c"]
+    assert result_page.simulated(verdict(line, 6.0)) == "6, at the edge of what was tried"
+    assert result_page.simulated(verdict(line, 2.0)) == "2"
+
+
+def test_fires_and_people_on_foot_stand_under_a_heading_of_their_own():
+    verdicts = judge(list(LINES.values()), {})
+    exact = {title: own for title, own in result_page.grouped(verdicts) if "exact" in title}
+    assert [title.partition(":")[0] for title in exact] == [
+        "Operators and phones",
+        "Fires, alarms and people on foot",
+    ]
+    assert [len(own) for own in exact.values()] == [9, 19]
+
+
+def test_how_they_steered_is_told_cell_by_cell_where_it_differs():
+    lag = {name: trials(move_and_wait_share=(0, 0)) for name in ("8.3", "25")}
+    reach = {"0": lag["25"], "1.5": trials(move_and_wait_share=(0.5, 1.0))}
+    told = result_page.steered({"steering": lag, "excavator": reach})
+    assert [(name, shares.replace("\N{NO-BREAK SPACE}", " ")) for name, shares in told] == [
+        ("steering", "0 % everywhere"),
+        ("excavator, by delay [s]", "0: 0 %, 1.5: 75 %"),
+    ]
+
+
+def test_a_person_with_many_trials_counts_as_much_as_one_with_few():
+    assert mean(trials(person=(0, 0, 0, 1), movement_time_s=(1, 1, 1, 3)), _T) == 2.0
+
+
+def test_trials_without_a_number_are_left_out_of_a_mean():
+    assert mean(trials(movement_time_s=(2.0, math.nan)), _T) == 2.0
+
+
+def test_rows_become_columns_of_their_numbers():
+    rows = [(3, [{"a": 1, "b": "word"}, {"a": None, "b": "word"}]), (5, [{"a": 2.5, "b": "w"}])]
+    found = collect(rows)
+    assert found.person.tolist() == [3, 3, 5]
+    assert found["a"][[0, 2]].tolist() == [1.0, 2.5]
+    assert math.isnan(found["a"][1])
+    assert "b" not in found.columns
+
+
+def test_an_interval_spans_what_other_persons_would_give():
+    cells = {"one": timed(*range(100))}
+    measure = lambda cells: {"m": mean(cells["one"], _T)}  # noqa: E731
+    found = with_intervals(measure, cells, np.random.default_rng(1))["m"]
+    assert found.value == 49.5
+    assert found.high - found.low == pytest.approx(2 * 1.96 * 28.87 / 10, rel=0.1)
+
+
+def test_persons_are_drawn_with_all_their_trials_in_every_cell():
+    same = trials(person=(0, 0, 1, 1), movement_time_s=(1, 2, 5, 9))
+    cells = {"a": same, "b": same}
+    ratio = lambda c: {"r": mean(c["a"], _T) / mean(c["b"], _T)}  # noqa: E731
+    found = with_intervals(ratio, cells, np.random.default_rng(1))["r"]
+    assert found.low == found.high == 1.0
+
+
+_T = "movement_time_s"
+
+
+def test_the_slope_on_lag_is_that_of_the_publications_model():
+    """MT = 0.2 + (0.15 + 0.001 LAG) ID: at 4 bits a millisecond costs 4 ms."""
+    bits = np.array([2.0, 3.0, 4.0, 5.0])
+    cells = {
+        lag: trials(
+            person=[0] * 4, id_bits=bits, movement_time_s=0.2 + (0.15 + 0.001 * float(lag)) * bits
+        )
+        for lag in of.LAGS_S
+    }
+    assert of.lag_slope(cells) == pytest.approx(4.0)
+    assert of.lag_values(cells)["S7/75"] == pytest.approx(
+        (0.2 + 0.225 * 3.5) / (0.2 + 0.1583 * 3.5)
+    )
+
+
+def test_throughput_is_the_mean_over_persons_and_conditions():
+    own = trials(person=(0, 1, 0, 1), id_bits=(2, 2, 3, 3), movement_time_s=(1, 2, 1, 3))
+    assert of.throughput(own) == pytest.approx((2 / 1 + 2 / 2 + 3 / 1 + 3 / 3) / 4)
+
+
+def test_a_slope_of_three_seconds_a_second_agrees_with_three_waits():
+    cells = {
+        str(d): trials(movement_time_s=(2 + 3 * d,) * 2, waits=(3, 3)) for d in (1.0, 2.0, 3.0)
+    }
+    assert of.wait_values(cells) == pytest.approx({"S13/linear": 1.0, "S13/slope": 0.0})
+
+
+def test_times_that_no_delay_changes_lie_on_no_line():
+    cells = {str(d): trials(movement_time_s=(2, 2), waits=(1, 1)) for d in (1.0, 2.0, 3.0)}
+    found = of.wait_values(cells)
+    assert math.isnan(found["S13/linear"])
+    assert found["S13/slope"] == pytest.approx(-1.0)
+
+
+def test_who_waits_less_than_every_other_trial_has_no_slope_that_agrees():
+    for waits, is_none in ((0, True), (1, False)):
+        times = {d: (2 + 0.5 * d,) * 2 for d in (1.0, 2.0, 3.0)}
+        cells = {str(d): trials(movement_time_s=t, waits=(0, waits)) for d, t in times.items()}
+        assert math.isnan(of.wait_values(cells)["S13/slope"]) == is_none
+
+
+def test_frame_rates_that_act_as_half_a_frame_of_delay_collapse_at_a_half():
+    cells = {
+        of.frame_cell(rate, delay): timed(
+            1 + 2 * (delay + 0.5 / rate), 1 + 2 * (delay + 0.5 / rate)
+        )
+        for rate in of.FRAME_RATES
+        for delay in of.FRAME_DELAYS_S
+    }
+    assert of.frame_values(cells) == pytest.approx({"S15/c": 0.5, "S15/collapse": 1.0})
+
+
+def test_every_line_that_is_not_exact_is_measured_by_one_experiment():
+    """Names only: the experiments themselves are played elsewhere."""
+    measured = {
+        "lag": {i for i in LINES if i.startswith(("S7/", "S8/"))},
+        "tilt": {i for i in LINES if i.startswith(("S9/", "S10/"))},
+        "steering": {"S11/mean", "S11/variance"},
+        "latency": {"S12/less", "S12/more"},
+        "waiting": {"S13/linear", "S13/slope"},
+        "excavator": {"S17/increase"},
+        "tracking": {"S14/crossover", "S14/margin"},
+        "frames": {"S15/c", "S15/collapse"},
+    }
+    assert [e.name for e in of.EXPERIMENTS] == list(measured)
+    persons = {i for i, line in LINES.items() if line.kind != "exact"}
+    assert set().union(*measured.values()) == persons
