@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 from functools import cache
 
 from dva_sim.agents.robot.camera import HazardSpot, Observation, View
-from dva_sim.agents.robot.local_loops import Surrounded
 from dva_sim.agents.robot.manoeuvres import Seen
 from dva_sim.agents.robot.missions import PERIOD, Errand, Pilot, Step
+from dva_sim.agents.robot.robot import Surrounded
 from dva_sim.kernel.clock import Clock
 from dva_sim.worlds.drives import DriveSpec
 from dva_sim.worlds.geo import Pose

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from dva_sim.agents.operator.operator import OperatorAgent
-from dva_sim.agents.people.exposure import Air, clean_air
+from dva_sim.agents.people.evacuation import Air, clean_air
 from dva_sim.agents.people.guard import GuardAgent
 from dva_sim.agents.people.locomotion import RADIUS
 from dva_sim.agents.people.profiles import Walker

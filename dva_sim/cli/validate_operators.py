@@ -10,8 +10,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from dva_sim.agents.operator.published import lines_of, load_split, load_targets
 from dva_sim.agents.operator.strategies import try_strategy
-from dva_sim.experiments.analysis.published_operators import lines_of, load_split, load_targets
 from dva_sim.kernel.errors import ExitCode
 from dva_sim.validation.frame import WIDTH, console, progress_bar, say
 from dva_sim.validation.operators import result_page

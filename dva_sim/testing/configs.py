@@ -11,10 +11,10 @@ from typing import Any, Final
 from PIL import Image
 
 from dva_sim.agents.operator.person import Population
+from dva_sim.agents.operator.published import TargetFile, load_split
 from dva_sim.agents.people.profiles import BystanderProfile, GuardProfile
 from dva_sim.agents.robot.profile import read_robot
 from dva_sim.agents.tilt import AccelerometerPart, PhoneProfile, try_phone
-from dva_sim.experiments.analysis.published_operators import TargetFile, load_split
 from dva_sim.experiments.execution.job import contradictions_in
 from dva_sim.experiments.study import cell_grid
 from dva_sim.experiments.study.documents import FileKind, blamed_in

@@ -31,11 +31,11 @@ from dva_sim.worlds.bodies import (
     set_force,
     set_velocity,
 )
-from dva_sim.worlds.drives import DriveSpec as DriveSpec
+from dva_sim.worlds.drives import DriveSpec
 from dva_sim.worlds.geo import GeoFrame, Pose
 from dva_sim.worlds.layout import Site
 from dva_sim.worlds.maps import FREE, rasterise
-from dva_sim.worlds.robot_body import RobotBody as RobotBody
+from dva_sim.worlds.robot_body import RobotBody
 
 RELAXATION: Final = 0.5  # of a person's velocity towards the wanted one [s]
 MOST_PUSH: Final = 3.0  # force of a person's legs by mass [m/s^2]; assumed

@@ -38,12 +38,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.experiments.analysis.published_operators import (
-    Line,
-    lines_of,
-    load_split,
-    load_targets,
-)
+from dva_sim.agents.operator.published import Line, lines_of, load_split, load_targets
 from dva_sim.experiments.study.robustness_grid import latin_hypercube
 from dva_sim.kernel.streams import Streams
 from dva_sim.validation.operators.experiments import EXPERIMENTS

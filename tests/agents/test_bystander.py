@@ -14,8 +14,7 @@ from dva_sim.agents.operator.person import Trait
 from dva_sim.agents.people import evacuation
 from dva_sim.agents.people.bystander import APART, BystanderAgent, draw_places, nothing_seen
 from dva_sim.agents.people.escape import UNTENABLE, choose_escape, is_untenable, refuges_of
-from dva_sim.agents.people.evacuation import AT_LATEST, THROUGH
-from dva_sim.agents.people.exposure import PERIOD, clean_air
+from dva_sim.agents.people.evacuation import AT_LATEST, PERIOD, THROUGH, clean_air
 from dva_sim.agents.people.profiles import BystanderProfile, Occupant
 from dva_sim.kernel.config import load_yaml, validate
 from dva_sim.kernel.resources import find

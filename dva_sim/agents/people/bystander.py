@@ -27,8 +27,7 @@ from typing import Final
 import numpy as np
 
 from dva_sim.agents.device import do_nothing
-from dva_sim.agents.people.evacuation import OnFoot, WayOut
-from dva_sim.agents.people.exposure import Air, Exposure, clean_air
+from dva_sim.agents.people.evacuation import Air, Exposure, OnFoot, WayOut, clean_air
 from dva_sim.agents.people.profiles import Occupant
 from dva_sim.agents.people.walking import Walking
 from dva_sim.kernel.clock import Clock

@@ -19,8 +19,7 @@ from functools import partial
 from itertools import takewhile
 
 from dva_sim.agents.device import STATUS, Device, do_nothing
-from dva_sim.agents.people.evacuation import OnFoot, WayOut
-from dva_sim.agents.people.exposure import Air, Exposure, clean_air
+from dva_sim.agents.people.evacuation import Air, Exposure, OnFoot, WayOut, clean_air
 from dva_sim.agents.people.guard_protocol import Errand, GuardDuty
 from dva_sim.agents.people.profiles import Walker
 from dva_sim.agents.people.walking import Walking

@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.experiments.analysis.statistics import LEVEL, Interval, paired_difference, person_means
 from dva_sim.experiments.results.results import Array, Results
 from dva_sim.experiments.study.cell_grid import REFERENCE
 from dva_sim.experiments.study.schema import REPEATS, Level
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.statistics import LEVEL, Interval, paired_difference, person_means
 
 Levels = tuple[tuple[str, Level], ...]
 _NOT = object()

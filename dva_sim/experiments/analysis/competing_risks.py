@@ -24,13 +24,8 @@ from dva_sim.experiments.analysis.paired_effects import (
     as_floats,
     codes_of,
 )
-from dva_sim.experiments.analysis.statistics import (
-    Interval,
-    cumulative_incidence,
-    paired_difference,
-    share_interval,
-)
 from dva_sim.experiments.study.schema import Level
+from dva_sim.statistics import Interval, cumulative_incidence, paired_difference, share_interval
 
 CONFIRMED, CLEARED, NOTHING = "confirmed", "cleared", "nothing"
 RIGHT = (CONFIRMED, CLEARED)

@@ -16,7 +16,8 @@ import numpy as np
 
 from dva_sim.experiments.analysis.layout import layout_of
 from dva_sim.experiments.analysis.paired_effects import Floats, Part, Setting, Table
-from dva_sim.experiments.analysis.statistics import (
+from dva_sim.experiments.study.schema import ANSWER, POINT, Contrast, Hypothesis, Level
+from dva_sim.statistics import (
     LEVEL,
     EffectSize,
     Interval,
@@ -28,7 +29,6 @@ from dva_sim.experiments.analysis.statistics import (
     paired_difference,
     permutation_test,
 )
-from dva_sim.experiments.study.schema import ANSWER, POINT, Contrast, Hypothesis, Level
 
 Verdict = Literal["held", "did not hold", "open", "not run"]
 _ALPHA = 1 - LEVEL

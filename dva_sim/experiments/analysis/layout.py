@@ -20,10 +20,10 @@ from dva_sim.experiments.analysis.paired_effects import (
     plain_level,
     present,
 )
-from dva_sim.experiments.analysis.statistics import Interval, band
 from dva_sim.experiments.study.labels import brief
 from dva_sim.experiments.study.schema import POINT, TUNING, Level
 from dva_sim.kernel.units import unit_of
+from dva_sim.statistics import Interval, band
 
 _NEVER_NEGATIVE = ("s", "m", "Hz", "bit/s", "N s")
 ROW = "row"  # name of the factor whose levels are the rows of a list

@@ -19,11 +19,11 @@ import numpy as np
 
 from dva_sim.experiments.analysis.layout import interval_of
 from dva_sim.experiments.analysis.paired_effects import Setting, View
-from dva_sim.experiments.analysis.statistics import Interval
 from dva_sim.experiments.study.labels import level_name, measure_of, number, quantity, setting
 from dva_sim.experiments.study.schema import TUNING, Level, Prediction, Range
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.units import unit_of
+from dva_sim.statistics import Interval
 
 Verdict = Literal["held", "did not hold", "open", "not judged"]
 _SAME_RUNS = "the same runs: tuning chose the value it had"

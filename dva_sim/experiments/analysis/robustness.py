@@ -10,9 +10,9 @@ import numpy as np
 
 from dva_sim.experiments.analysis.answer import Finding
 from dva_sim.experiments.analysis.conditions import get
+from dva_sim.experiments.analysis.extrapolation import support_of_part
 from dva_sim.experiments.analysis.layout import interval_of
 from dva_sim.experiments.analysis.paired_effects import Factor, Part, Table, View
-from dva_sim.experiments.analysis.published_operators import support_of_part
 from dva_sim.experiments.study.labels import (
     factor_name,
     level_name,

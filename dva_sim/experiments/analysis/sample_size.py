@@ -23,19 +23,10 @@ from dva_sim.experiments.analysis.hypothesis_tests import (
 )
 from dva_sim.experiments.analysis.layout import view_of
 from dva_sim.experiments.analysis.paired_effects import Floats, Setting, Table, View
-from dva_sim.experiments.analysis.statistics import (
-    LEVEL,
-    MOST_PERSONS,
-    Band,
-    Interval,
-    Law,
-    band,
-    law_of,
-    mean_interval,
-)
 from dva_sim.experiments.study.labels import level_name, measure_of, quantity, setting
 from dva_sim.experiments.study.schema import ANSWER, Contrast, Hypothesis
 from dva_sim.kernel.units import unit_of
+from dva_sim.statistics import LEVEL, MOST_PERSONS, Band, Interval, Law, band, law_of, mean_interval
 
 POWERS = (0.8, 0.9)
 _ALPHA = 1 - LEVEL

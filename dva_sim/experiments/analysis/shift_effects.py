@@ -18,10 +18,10 @@ from dva_sim.experiments.analysis.paired_effects import (
     nan_mean,
     person_means,
 )
-from dva_sim.experiments.analysis.statistics import LEVEL, Band, band
 from dva_sim.experiments.study.labels import setting
 from dva_sim.simulation.shift.bounds import Floats, share_of_the_way
 from dva_sim.simulation.shift.measures import FOLLOW_S
+from dva_sim.statistics import LEVEL, Band, band
 
 POLICY, INTENSITY = "dispatch.policy", "intensity"
 FLOOR, BEST, CALIBRATED = "random", "oracle", "nearest_idle"

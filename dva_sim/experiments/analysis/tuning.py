@@ -9,7 +9,6 @@ from typing import Any
 
 from dva_sim import __version__
 from dva_sim.experiments.analysis.paired_effects import Factor, Floats, Part
-from dva_sim.experiments.analysis.statistics import mean_interval
 from dva_sim.experiments.execution.runner import Progress, run_study
 from dva_sim.experiments.execution.scheduling import LIMIT_S, Episode
 from dva_sim.experiments.report.cell_table import CellTable
@@ -31,6 +30,7 @@ from dva_sim.experiments.study.study import Study
 from dva_sim.experiments.study.tuned_values import Basis, Chosen, Seen, Tuned, choose
 from dva_sim.kernel.config import validate
 from dva_sim.kernel.errors import ConfigError, RunsFailed
+from dva_sim.statistics import mean_interval
 
 _DIGITS = 6  # of what was seen, in the file
 

@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dva_sim.experiments.analysis.paired_effects import Floats, View, nan_mean, person_means
-from dva_sim.experiments.analysis.statistics import Components, components
 from dva_sim.experiments.report.cell_table import CellTable
 from dva_sim.experiments.study.labels import factor_name, level_name, number, percent
 from dva_sim.experiments.study.schema import POINT
 from dva_sim.kernel.units import unit_of
+from dva_sim.statistics import Components, components
 
 if TYPE_CHECKING:
     from dva_sim.experiments.analysis.answer import Finding

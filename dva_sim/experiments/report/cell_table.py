@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from dva_sim.experiments.analysis.extrapolation import Support
 from dva_sim.experiments.analysis.paired_effects import Floats, Part, Setting, plain_level, present
-from dva_sim.experiments.analysis.published_operators import Support
-from dva_sim.experiments.analysis.statistics import mean_interval
 from dva_sim.experiments.study.labels import (
     factor_name,
     level_name,
@@ -20,6 +19,7 @@ from dva_sim.experiments.study.labels import (
     with_unit,
 )
 from dva_sim.kernel.units import unit_of
+from dva_sim.statistics import mean_interval
 
 
 @dataclass(frozen=True)

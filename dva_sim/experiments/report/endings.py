@@ -9,7 +9,6 @@ import numpy as np
 from dva_sim.experiments.analysis.answer import Finding, place_of
 from dva_sim.experiments.analysis.competing_risks import CLEARED, CONFIRMED, NOTHING, Ended, Endings
 from dva_sim.experiments.analysis.paired_effects import Setting, View
-from dva_sim.experiments.analysis.statistics import Interval
 from dva_sim.experiments.report.cell_table import CellTable
 from dva_sim.experiments.study.labels import (
     capital,
@@ -22,6 +21,7 @@ from dva_sim.experiments.study.labels import (
     setting,
 )
 from dva_sim.experiments.study.schema import Level
+from dva_sim.statistics import Interval
 
 
 def sentences(endings: Endings, view: View, finding: Finding | None) -> list[str]:

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from dva_sim.experiments.analysis.statistics import VarianceReduction, variance_reduction
 from dva_sim.experiments.report import shift_page as dispatch_page
 from dva_sim.experiments.report import transport_page
 from dva_sim.experiments.report.summary import Reading
 from dva_sim.experiments.study.labels import capital, number
 from dva_sim.experiments.study.schema import POINT
+from dva_sim.statistics import VarianceReduction, variance_reduction
 
 _FEW = 6  # persons: with fewer nothing can be drawn anew
 

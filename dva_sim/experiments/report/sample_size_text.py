@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from dva_sim.experiments.analysis.answer import Finding
 from dva_sim.experiments.analysis.paired_effects import Floats, View
 from dva_sim.experiments.analysis.sample_size import POWERS, Count, Plan
-from dva_sim.experiments.analysis.statistics import MOST_PERSONS, quantile_interval
 from dva_sim.experiments.report.cell_table import CellTable
 from dva_sim.experiments.study.labels import level_name, number, quantity
+from dva_sim.statistics import MOST_PERSONS, quantile_interval
 
 
 def few_that_weigh(finding: Finding, view: View) -> str:

@@ -16,10 +16,11 @@ from typing import Any
 
 import numpy as np
 
-from dva_sim.experiments.analysis import statistics
+from dva_sim import statistics
 from dva_sim.experiments.analysis.answer import Answer, Finding, answer, at, places, telling_stop
 from dva_sim.experiments.analysis.competing_risks import Endings, horizon_of, with_endings
 from dva_sim.experiments.analysis.conditions import get
+from dva_sim.experiments.analysis.extrapolation import support_of_part
 from dva_sim.experiments.analysis.hypothesis_tests import Judgement, judged
 from dva_sim.experiments.analysis.kept_episodes import Episode, Tables, typical_and_worst
 from dva_sim.experiments.analysis.layout import (
@@ -41,11 +42,9 @@ from dva_sim.experiments.analysis.paired_effects import (
     as_floats,
     present,
 )
-from dva_sim.experiments.analysis.published_operators import support_of_part
 from dva_sim.experiments.analysis.robustness import Robustness, robustness_of
 from dva_sim.experiments.analysis.sample_size import Plan, plans
 from dva_sim.experiments.analysis.shift_effects import Shifts, is_dispatch
-from dva_sim.experiments.analysis.statistics import band
 from dva_sim.experiments.analysis.tuning import tuning_warning
 from dva_sim.experiments.report import shift_page as dispatch_page
 from dva_sim.experiments.report import transport_page
@@ -64,6 +63,7 @@ from dva_sim.experiments.study.labels import (
 )
 from dva_sim.experiments.study.schema import POINT, REPEATS, STRATEGY, TUNING
 from dva_sim.experiments.study.status import status_of
+from dva_sim.statistics import band
 
 _WAITING = "move_and_wait_share"
 _MOST_SETTINGS = 3  # told one by one

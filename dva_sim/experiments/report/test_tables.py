@@ -18,7 +18,6 @@ from dva_sim.experiments.analysis.hypothesis_tests import (
     judged,
 )
 from dva_sim.experiments.analysis.paired_effects import Setting, Table
-from dva_sim.experiments.analysis.statistics import LEVEL, Interval
 from dva_sim.experiments.report.cell_table import CellTable
 from dva_sim.experiments.study.hashing import fingerprint_of_judges
 from dva_sim.experiments.study.labels import (
@@ -32,6 +31,7 @@ from dva_sim.experiments.study.labels import (
 )
 from dva_sim.experiments.study.schema import POINT
 from dva_sim.kernel.units import unit_of
+from dva_sim.statistics import LEVEL, Interval
 
 # A mark beside the word: neither needs a colour.
 _VERDICTS: dict[Verdict, str] = {

@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from dva_sim.agents.operator.person import Population
+from dva_sim.agents.operator.published import SplitFile, TargetFile
 from dva_sim.agents.people.profiles import BystanderProfile, GuardProfile
 from dva_sim.agents.robot.profile import RobotProfile
 from dva_sim.agents.tilt import AccelerometerPart, PhoneProfile
-from dva_sim.experiments.analysis.published_operators import SplitFile, TargetFile
 from dva_sim.experiments.study.registration import Registration
 from dva_sim.experiments.study.robustness_grid import Bands
 from dva_sim.experiments.study.study import Study

@@ -67,6 +67,7 @@ _CODE = (
     "network",
     "protocol",
     "simulation",
+    "statistics",
     "worlds",
     "kernel/clock.py",
     "kernel/recorder.py",
@@ -78,7 +79,7 @@ _JUDGES = (
     "experiments/analysis/hypothesis_tests.py",
     "experiments/analysis/paired_effects.py",
     "experiments/analysis/layout.py",
-    "experiments/analysis/statistics",
+    "statistics",
 )
 _EDITED = ("agents", "protocol", "worlds")
 _SUFFIXES = {".yaml", ".geojson", ".xsd", ".pgm", ".png", ".py"}

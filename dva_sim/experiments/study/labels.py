@@ -7,8 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from dva_sim.experiments.study.schema import Level
-from dva_sim.kernel.units import ending_of
-from dva_sim.kernel.units import unit_of as unit_of
+from dva_sim.kernel.units import ending_of, unit_of
 
 _FACTORS = {
     "pattern": "messaging pattern",

@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.experiments.analysis.statistics import band, mean_interval
 from dva_sim.experiments.study.cell_grid import Job
 from dva_sim.experiments.study.designs import together
 from dva_sim.experiments.study.schema import Contrast, Level, Stop
 from dva_sim.experiments.study.study import Study
+from dva_sim.statistics import band, mean_interval
 
 _BATCH_IN_BUDGET = 2  # persons, where a budget alone ends a study
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from dva_sim.agents.people.bystander import BystanderAgent, draw_places
 from dva_sim.agents.people.escape import refuges_of
-from dva_sim.agents.people.exposure import Air, clean_air
+from dva_sim.agents.people.evacuation import Air, clean_air
 from dva_sim.agents.people.guard import GuardAgent
 from dva_sim.agents.people.locomotion import RADIUS
 from dva_sim.agents.people.profiles import Occupant, Walker

@@ -35,12 +35,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dva_sim.core.dispatch import load_policy
-from dva_sim.experiments.analysis.statistics import Band, band
 from dva_sim.simulation.shift.demand import Incident
 from dva_sim.simulation.shift.recording import TimedRecording
 from dva_sim.simulation.shift.responders import Unit
 from dva_sim.simulation.shift.simulation import Shift
 from dva_sim.simulation.shift.travel import Place
+from dva_sim.statistics import Band, band
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]

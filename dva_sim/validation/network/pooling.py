@@ -18,8 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.experiments.analysis.statistics import holm
 from dva_sim.network.condition import Condition
+from dva_sim.statistics import holm
 from dva_sim.validation.network.judging import MEASURES, Cell, Measure, reason_against
 
 Floats = NDArray[np.float64]

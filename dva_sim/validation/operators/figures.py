@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dva_sim.experiments.analysis.published_operators import Kind, Line
+from dva_sim.agents.operator.published import Kind, Line
 from dva_sim.experiments.report.figures.palette import FAINT, INK, SOFT
 from dva_sim.experiments.report.figures.style import Drawn, finish, panels, styled
 from dva_sim.simulation.task.measures import fit_line

@@ -14,7 +14,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.experiments.analysis.published_operators import Kind, Line, RuleConfig
+from dva_sim.agents.operator.published import Kind, Line, RuleConfig
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from dva_sim.experiments.analysis.published_operators import Kind, Line
+from dva_sim.agents.operator.published import Kind, Line
 from dva_sim.validation.frame import Row, render, write_all
 from dva_sim.validation.operators.experiments import TRIED
 from dva_sim.validation.operators.figures import draw_all

@@ -8,8 +8,8 @@ from scipy import stats
 from dva_sim.experiments.analysis.hypothesis_tests import judged
 from dva_sim.experiments.analysis.layout import finding_of, view_of
 from dva_sim.experiments.analysis.sample_size import _of_answer, plans
-from dva_sim.experiments.analysis.statistics import mean_interval
 from dva_sim.experiments.report.sample_size_text import few_that_weigh, plan_lines, plan_table
+from dva_sim.statistics import mean_interval
 
 PATTERNS = ["req-rep", "latest-wins"]
 CONTRAST = {"part": "drive", "measure": "drive_time_s", "factor": "pattern", "contrast": PATTERNS}

@@ -3,7 +3,7 @@ import synthetic_study
 
 from dva_sim.experiments.analysis.layout import view_of
 from dva_sim.experiments.analysis.predictions import judge_all, verdict_of
-from dva_sim.experiments.analysis.statistics import Interval
+from dva_sim.statistics import Interval
 
 
 def interval(low, high):

@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
 
+from dva_sim.agents.operator.published import ranges
+from dva_sim.experiments.analysis.extrapolation import support_of_part
 from dva_sim.experiments.analysis.paired_effects import Factor, Part, View
-from dva_sim.experiments.analysis.published_operators import ranges, support_of_part
 from dva_sim.experiments.report.cell_table import cell_table
 
 DELAY = Factor("link.delay_s", (0.0, 0.5, 5.0))

@@ -8,7 +8,6 @@ from matplotlib.figure import Figure
 from dva_sim.experiments.analysis.answer import Finding
 from dva_sim.experiments.analysis.paired_effects import Factor, Part, View
 from dva_sim.experiments.analysis.predictions import Cadence
-from dva_sim.experiments.analysis.statistics import band
 from dva_sim.experiments.report.figures.budget import delay_budget
 from dva_sim.experiments.report.figures.contrast import contrast
 from dva_sim.experiments.report.figures.effect import _band, command_rate, differences
@@ -28,6 +27,7 @@ from dva_sim.experiments.report.figures.style import (
     styled,
 )
 from dva_sim.experiments.report.figures.tradeoff import tradeoff
+from dva_sim.statistics import band
 
 DELAY = Factor("link.delay_s", (0.0, 0.05, 0.1, 0.25, 0.5, 1.0))
 PATTERN = Factor("pattern", ("req-rep", "pub-sub", "latest-wins"))

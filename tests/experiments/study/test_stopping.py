@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from small_study import REPEATED, STUDY, study_in, write_study
 
-from dva_sim.experiments.analysis.statistics import mean_interval
 from dva_sim.experiments.study import cell_grid, stopping
 from dva_sim.experiments.study.cell_grid import REFERENCE
 from dva_sim.experiments.study.study import load_study
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.statistics import mean_interval
 
 STOP = (
     "stop: {half_width: 1.0, measure: drive_time_s, part: drive, batch_persons: 4, "

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from dva_sim.experiments.analysis.published_operators import lines_of, load_split, load_targets
+from dva_sim.agents.operator.published import lines_of, load_split, load_targets
 from dva_sim.validation.operators import delayed_loops
 from dva_sim.validation.operators.exact import EXACT
 

@@ -4,9 +4,9 @@ import csv
 
 import pytest
 
+from dva_sim.agents.operator.published import lines_of, load_split, load_targets
 from dva_sim.cli import validate_operators
 from dva_sim.cli.validate import validate
-from dva_sim.experiments.analysis.published_operators import lines_of, load_split, load_targets
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.validation.operators.experiments import EXPERIMENTS
 from dva_sim.validation.operators.judging import judge, outcome_of

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from dva_sim.experiments.analysis.published_operators import (
+from dva_sim.agents.operator.published import (
     SplitFile,
     TargetFile,
     lines_of,

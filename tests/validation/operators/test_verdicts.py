@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dva_sim.experiments.analysis.published_operators import lines_of, load_split, load_targets
+from dva_sim.agents.operator.published import lines_of, load_split, load_targets
 from dva_sim.validation.operators import experiments as of
 from dva_sim.validation.operators import result_page
 from dva_sim.validation.operators.judging import (

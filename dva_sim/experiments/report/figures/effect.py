@@ -21,7 +21,6 @@ from dva_sim.experiments.analysis.paired_effects import (
     present,
 )
 from dva_sim.experiments.analysis.predictions import Cadence
-from dva_sim.experiments.analysis.statistics import Band, band
 from dva_sim.experiments.report.figures.palette import (
     FAINT,
     INK,
@@ -52,6 +51,7 @@ from dva_sim.experiments.report.figures.style import (
 )
 from dva_sim.experiments.study.labels import capital, factor_name, level_name, measure_name
 from dva_sim.experiments.study.schema import Level
+from dva_sim.statistics import Band, band
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dva_sim.experiments.analysis.paired_effects import MOST_PANELS, Factor, Floats, Setting, View
-from dva_sim.experiments.analysis.statistics import Effect, band, factorial_effects
 from dva_sim.experiments.report.figures.palette import DIVERGING, INK, PAPER, SOFT
 from dva_sim.experiments.report.figures.style import (
     Drawn,
@@ -27,6 +26,7 @@ from dva_sim.experiments.report.figures.style import (
 )
 from dva_sim.experiments.study.labels import capital, factor_name, level_name, measure_name, number
 from dva_sim.experiments.study.schema import Level
+from dva_sim.statistics import Effect, band, factorial_effects
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -10,7 +10,6 @@ import numpy as np
 
 from dva_sim.experiments.analysis.layout import layout_of
 from dva_sim.experiments.analysis.paired_effects import Floats, Part, Setting, View, nan_mean
-from dva_sim.experiments.analysis.statistics import SobolIndex, sobol_indices
 from dva_sim.experiments.report.figures.palette import INK, ONE, PAPER, SOFT, Look, legend, looks
 from dva_sim.experiments.report.figures.style import (
     Drawn,
@@ -25,6 +24,7 @@ from dva_sim.experiments.report.figures.style import (
 from dva_sim.experiments.study.labels import capital, factor_name, level_name, measure_name, setting
 from dva_sim.experiments.study.labels import with_unit as head_of
 from dva_sim.experiments.study.schema import POINT, Level
+from dva_sim.statistics import SobolIndex, sobol_indices
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -16,9 +16,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from dva_sim.experiments.analysis.paired_effects import Factor, Floats, Setting, View
-from dva_sim.experiments.report.figures.palette import FAINT as FAINT
-from dva_sim.experiments.report.figures.palette import INK as INK
-from dva_sim.experiments.report.figures.palette import SOFT as SOFT
+from dva_sim.experiments.report.figures.palette import FAINT, INK, SOFT
 from dva_sim.experiments.study.labels import brief, capital, factor_name, level_name, measure_name
 from dva_sim.experiments.study.schema import Level
 from dva_sim.kernel.units import ending_of, unit_of

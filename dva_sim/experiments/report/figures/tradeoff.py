@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dva_sim.experiments.analysis.paired_effects import Floats, Setting, View, person_means, present
-from dva_sim.experiments.analysis.statistics import Band, band
 from dva_sim.experiments.report.figures.palette import legend, looks
 from dva_sim.experiments.report.figures.style import (
     Drawn,
@@ -21,6 +20,7 @@ from dva_sim.experiments.report.figures.style import (
 )
 from dva_sim.experiments.study.labels import factor_name, level_name, measure_name
 from dva_sim.experiments.study.schema import Level
+from dva_sim.statistics import Band, band
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

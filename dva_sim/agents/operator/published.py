@@ -1,13 +1,7 @@
 """What operators are compared with, and which of it may be fitted to: two files, read together.
 
-Which delays published data cover; beyond them, what operators do is an extrapolation.
-
-Which cells lie beyond the delays at which people were watched: extrapolations, marked so.
-
-What counts is the delay of the loop as measured in the cell without the person's own share, not
-the delay of the link: that is what published experiments report. Marked are cells and repeats
-whose runs tell that delay (`loop_delay_mean_s`), which is those of scenarios with robots. Tasks do
-not tell it, so that nothing of theirs is marked, however long their links are.
+Which delays these data cover is said here as well: beyond them, what simulated operators do is
+an extrapolation.
 """
 
 from __future__ import annotations
@@ -15,15 +9,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from dva_sim.experiments.analysis.conditions import get
-from dva_sim.experiments.analysis.paired_effects import Floats, Part, nan_mean
-from dva_sim.experiments.study.schema import STRATEGY
 from dva_sim.kernel import resources
 from dva_sim.kernel.config import Config, load_yaml, validate
 from dva_sim.kernel.errors import ConfigError
@@ -325,66 +314,3 @@ def supports_of(strategy: str) -> tuple[SupportConfig, ...]:
 def ranges(strategy: str) -> tuple[tuple[float, float], ...]:
     """From which to which delays of the loop people were watched [s]."""
     return tuple((support.low_s, support.high_s) for support in supports_of(strategy))
-
-
-LOOP = "loop_delay_mean_s"
-PERSONAL = ("delay_human_s", "delay_hand_s")
-
-Marks = NDArray[np.bool_]
-
-
-@dataclass(frozen=True)
-class Support:
-    """The delays of a part's cells, and which of them no published data cover.
-
-    Attributes:
-        delays: Of the loop without the person, for each cell `(levels of factor 1, ...)` [s]; nan
-            where nobody drives.
-        outside: Which of them lie outside.
-        words: What is covered, for each strategy.
-    """
-
-    delays: Floats
-    outside: Marks
-    words: str
-
-
-def support_of_part(part: Part, scenario: Mapping[str, Any]) -> Support | None:
-    """What published data cover of a part; None where nobody's loop has a delay.
-
-    Args:
-        part: The runs.
-        scenario: The part's before any factor changed it, for the strategy.
-    """
-    strategies = _strategies(part, scenario)
-    if not part.has(LOOP) or not strategies:
-        return None
-    runs = part.grid(LOOP)
-    for column in PERSONAL:
-        runs = runs - np.nan_to_num(part.grid(column))
-    delays = nan_mean(runs.reshape(*runs.shape[:-2], -1), axis=-1)
-    outside = np.isfinite(delays)
-    for name in strategies:
-        for low, high in ranges(name):
-            outside &= ~(_has(part, name) & (delays >= low) & (delays <= high))
-    return Support(delays, outside, "; ".join(map(_told, strategies)))
-
-
-def _strategies(part: Part, scenario: Mapping[str, Any]) -> tuple[str, ...]:
-    factor = next((f for f in part.factors if f.name == STRATEGY), None)
-    names = factor.levels if factor else (get(scenario, STRATEGY),)
-    return tuple(str(name) for name in names if name is not None)
-
-
-def _has(part: Part, strategy: str) -> Marks:
-    """Which cells are driven by a strategy."""
-    has = [setting.get(STRATEGY, strategy) == strategy for setting in part.settings()]
-    return np.array(has).reshape([len(f.levels) for f in part.factors])
-
-
-def _told(strategy: str) -> str:
-    told = [
-        f"{known.low_s:g} to {known.high_s:g} s, {' '.join(known.why.split())}"
-        for known in supports_of(strategy)
-    ]
-    return f"{strategy}: {', and '.join(told) or 'no published data'}"

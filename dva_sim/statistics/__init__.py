@@ -54,31 +54,19 @@ function from 64 points they hold in 94 to 99 % (200 studies, one person) and 95
 studies, 24 persons).
 """
 
-from dva_sim.experiments.analysis.statistics.bands import Band, band
-from dva_sim.experiments.analysis.statistics.effect_sizes import EffectSize, effect_size
-from dva_sim.experiments.analysis.statistics.incidence import Incidence, cumulative_incidence
-from dva_sim.experiments.analysis.statistics.means import (
-    Components,
-    components,
-    mean_interval,
-    paired_difference,
+from dva_sim.statistics.bands import Band, band
+from dva_sim.statistics.effect_sizes import MOST_PERSONS, EffectSize, Law, effect_size, law_of
+from dva_sim.statistics.means import Components, components, mean_interval, paired_difference
+from dva_sim.statistics.pairing import VarianceReduction, pair_correlation, variance_reduction
+from dva_sim.statistics.persons import LEVEL, Interval, bootstrap_interval, person_means
+from dva_sim.statistics.proportions import (
+    Incidence,
+    cumulative_incidence,
+    quantile_interval,
+    share_interval,
 )
-from dva_sim.experiments.analysis.statistics.pairing import (
-    VarianceReduction,
-    pair_correlation,
-    variance_reduction,
-)
-from dva_sim.experiments.analysis.statistics.persons import LEVEL, Interval, person_means
-from dva_sim.experiments.analysis.statistics.resampling import bootstrap_interval
-from dva_sim.experiments.analysis.statistics.sample_size import MOST_PERSONS, Law, law_of
-from dva_sim.experiments.analysis.statistics.sensitivity import (
-    Effect,
-    SobolIndex,
-    factorial_effects,
-    sobol_indices,
-)
-from dva_sim.experiments.analysis.statistics.shares import quantile_interval, share_interval
-from dva_sim.experiments.analysis.statistics.tests import (
+from dva_sim.statistics.sensitivity import Effect, SobolIndex, factorial_effects, sobol_indices
+from dva_sim.statistics.tests import (
     Equivalence,
     PermutationTest,
     equivalence,

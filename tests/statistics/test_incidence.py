@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from dva_sim.experiments.analysis.statistics import cumulative_incidence, share_interval
+from dva_sim.statistics import cumulative_incidence, share_interval
 
 
 def test_a_case_worked_by_hand():

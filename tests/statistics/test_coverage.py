@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from dva_sim.experiments.analysis.statistics import (
+from dva_sim.experiments.study.study import load_study
+from dva_sim.statistics import (
     band,
     effect_size,
     factorial_effects,
@@ -12,7 +13,6 @@ from dva_sim.experiments.analysis.statistics import (
     share_interval,
     variance_reduction,
 )
-from dva_sim.experiments.study.study import load_study
 
 STUDY = load_study("req-rep-vs-pub-sub")
 PERSONS, TRIALS = STUDY.persons, STUDY.replications

@@ -15,14 +15,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dva_sim.experiments.analysis.statistics.bands import LEAST_ERROR, reach
-from dva_sim.experiments.analysis.statistics.persons import (
-    LEVEL,
-    Floats,
-    Interval,
-    draws,
-    paired_means,
-)
+from dva_sim.statistics.bands import LEAST_ERROR, reach
+from dva_sim.statistics.persons import LEVEL, Floats, Interval, draws, paired_means
 
 RESAMPLES = 1000  # each takes as many jackknife steps as there are persons
 

@@ -37,13 +37,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dva_sim.experiments.analysis.statistics.persons import (
-    LEVEL,
-    RESAMPLES,
-    Floats,
-    draws,
-    students_t,
-)
+from dva_sim.statistics.persons import LEVEL, RESAMPLES, Floats, draws, students_t
 
 FEWEST_TO_RESAMPLE = 6  # below, 5 % of the draws repeat one person only and have no spread
 LEAST_ERROR = 0.25  # of the sample's standard error, in any draw

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from dva_sim.experiments.analysis.statistics import sobol_indices
-from dva_sim.experiments.analysis.statistics.persons import draws
+from dva_sim.statistics import sobol_indices
+from dva_sim.statistics.persons import draws
 
 NAMES = ("x", "y", "z")
 

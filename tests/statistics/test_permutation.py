@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from dva_sim.experiments.analysis.statistics import permutation_test
+from dva_sim.statistics import permutation_test
 
 
 def test_three_persons_who_agree_are_one_of_eight_by_luck():

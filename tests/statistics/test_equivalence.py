@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from dva_sim.experiments.analysis.statistics import equivalence, one_sided_test, paired_difference
+from dva_sim.statistics import equivalence, one_sided_test, paired_difference
 
 
 def test_five_persons_give_the_two_t_tests_of_scipy():

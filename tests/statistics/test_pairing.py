@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from dva_sim.experiments.analysis.statistics import pair_correlation, variance_reduction
+from dva_sim.statistics import pair_correlation, variance_reduction
 
 
 def test_pairs_correlate_as_much_as_they_share():

@@ -3,7 +3,7 @@ import itertools
 import numpy as np
 import pytest
 
-from dva_sim.experiments.analysis.statistics import holm
+from dva_sim.statistics import holm
 
 
 def test_the_smallest_is_multiplied_by_their_number_the_next_by_one_less():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from dva_sim.experiments.analysis.statistics import factorial_effects
+from dva_sim.statistics import factorial_effects
 
 PATTERNS, DELAYS, FILTERS = ["push", "pull"], [0.0, 0.5, 1.0], ["none", "median"]
 

@@ -13,15 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dva_sim.experiments.analysis.statistics.bands import band
-from dva_sim.experiments.analysis.statistics.persons import (
-    LEVEL,
-    RESAMPLES,
-    Floats,
-    Interval,
-    draws,
-    person_means,
-)
+from dva_sim.statistics.bands import band
+from dva_sim.statistics.persons import LEVEL, RESAMPLES, Floats, Interval, draws, person_means
 
 
 @dataclass(frozen=True)

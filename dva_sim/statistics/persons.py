@@ -1,21 +1,92 @@
-"""Any statistic of the runs, with persons drawn anew together with all their trials."""
+"""The simulated person as the cluster: what every interval here rests on.
+
+Any statistic of the runs, with persons drawn anew together with all their trials.
+"""
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dva_sim.experiments.analysis.statistics.persons import (
-    LEVEL,
-    RESAMPLES,
-    Floats,
-    Interval,
-    draws,
-    students_t,
-)
+Floats = NDArray[np.float64]
+
+LEVEL = 0.95
+RESAMPLES = 4000
+
+
+@dataclass(frozen=True)
+class Interval:
+    """An estimate with its interval.
+
+    Attributes:
+        mean: The estimate (a mean, a quantile, a share, a ratio ...).
+        low: Lower end; nan where there are too few persons.
+        high: Upper end.
+        n_persons: How many persons it rests on.
+    """
+
+    mean: float
+    low: float
+    high: float
+    n_persons: int
+
+    @property
+    def half_width(self) -> float:
+        """Half the distance between the ends; nan where there are none."""
+        return (self.high - self.low) / 2
+
+
+def person_means(values: ArrayLike, person: ArrayLike) -> tuple[NDArray[Any], Floats]:
+    """Each person's mean over the trials that gave a number.
+
+    Args:
+        values: One value per run `(n,)`, nan where missing.
+        person: Who drove it `(n,)`.
+
+    Returns:
+        The persons `(m,)`, sorted, and their means `(m,)`; nobody without a value.
+    """
+    numbers, who = np.asarray(values, dtype=float), np.asarray(person)
+    there = np.isfinite(numbers)
+    persons, code = np.unique(who[there], return_inverse=True)
+    totals = np.bincount(code, weights=numbers[there], minlength=len(persons))
+    return persons, totals / np.bincount(code, minlength=len(persons))
+
+
+def paired_means(a: ArrayLike, b: ArrayLike, person: ArrayLike) -> tuple[Floats, Floats]:
+    """Each person's means of two treatments, over the trials that gave both.
+
+    Returns:
+        Means of `a` `(m,)` and of `b` `(m,)`, person by person.
+    """
+    first, second = np.asarray(a, dtype=float), np.asarray(b, dtype=float)
+    both = np.isfinite(first) & np.isfinite(second)
+    one = person_means(np.where(both, first, np.nan), person)[1]
+    return one, person_means(np.where(both, second, np.nan), person)[1]
+
+
+def students_t(level: float, n: int) -> float:
+    """Student's two-sided quantile for `n` persons; nan with fewer than two."""
+    from scipy import special
+
+    return float(special.stdtrit(n - 1, (1 + level) / 2)) if n > 1 else math.nan
+
+
+@functools.lru_cache(maxsize=8)
+def draws(persons: int, seed: int, resamples: int) -> Floats:
+    """How often each person is drawn when as many are drawn anew, `(resamples, persons)`."""
+    rng = np.random.Generator(np.random.PCG64(seed))
+    chances = np.full(persons, 1 / persons)
+    weights = rng.multinomial(persons, chances, size=resamples).astype(float)
+    weights.flags.writeable = False
+    return weights
+
 
 _EDGE = 1e-4  # nearest to 0 and 1 that a share of draws is taken for
 

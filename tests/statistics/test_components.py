@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from dva_sim.experiments.analysis.statistics import components
+from dva_sim.statistics import components
 
 
 def test_a_case_worked_by_hand():

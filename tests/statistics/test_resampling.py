@@ -5,9 +5,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from dva_sim.experiments.analysis.statistics import bootstrap_interval
-from dva_sim.experiments.analysis.statistics.persons import draws
-from dva_sim.experiments.analysis.statistics.resampling import tails
+from dva_sim.statistics import bootstrap_interval
+from dva_sim.statistics.persons import draws, tails
 
 
 def test_the_tails_are_as_wide_as_makes_a_normal_mean_students():

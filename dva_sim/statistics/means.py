@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dva_sim.experiments.analysis.statistics.bands import band
-from dva_sim.experiments.analysis.statistics.persons import LEVEL, RESAMPLES, Interval, person_means
+from dva_sim.statistics.bands import band
+from dva_sim.statistics.persons import LEVEL, RESAMPLES, Interval, person_means
 
 
 def mean_interval(

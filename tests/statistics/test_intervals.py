@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from dva_sim.experiments.analysis import statistics
+from dva_sim import statistics
 
 
 def test_a_persons_mean_leaves_out_missing_runs_and_missing_persons():

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy import special, stats
 
-from dva_sim.experiments.analysis.statistics import effect_size
-from dva_sim.experiments.analysis.statistics.persons import draws
+from dva_sim.statistics import effect_size
+from dva_sim.statistics.persons import draws
 
 
 def test_sizes_are_means_over_spreads_with_hedges_correction():
