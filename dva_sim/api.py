@@ -19,7 +19,8 @@ from typing import TYPE_CHECKING, Any
 
 from dva_sim.experiments.analysis.compare import Comparison as Comparison
 from dva_sim.experiments.results.data_dictionary import describe
-from dva_sim.experiments.results.results import Frame, Results, frame_of, plain
+from dva_sim.experiments.results.results import Frame, frame_of, plain
+from dva_sim.experiments.results.results import Results as Results
 from dva_sim.experiments.study.documents import mistakes_of
 from dva_sim.experiments.study.overrides import Settings, pairs_of
 from dva_sim.experiments.study.study import Variant
