@@ -1,6 +1,4 @@
-"""Single runs for programs and notebooks, played now or read from a recording.
-
-What the command line does, for programs and notebooks: `import dva_sim; dva_sim.run(...)`.
+"""What the command line does, for programs and notebooks: `import dva_sim; dva_sim.run(...)`.
 
 Commands and options have the same names, and the results are the same bytes; a limit in seconds
 is `limit_s`, and `--dry-run` a function. Only `show` prints, so nothing is quiet, verbose or JSON;
@@ -9,36 +7,33 @@ mistakes are `DvaSimError`. A script needs no `if __name__ == "__main__"` around
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dva_sim.experiments.analysis.compare import Comparison as Comparison
-from dva_sim.experiments.results.data_dictionary import describe
 from dva_sim.experiments.results.results import Frame, frame_of, plain
-from dva_sim.experiments.results.results import Results as Results
-from dva_sim.experiments.study.documents import mistakes_of
+from dva_sim.experiments.results.results import Results as ResultsData
 from dva_sim.experiments.study.overrides import Settings, pairs_of
-from dva_sim.experiments.study.study import Variant
 from dva_sim.kernel.errors import RunsFailed
-from dva_sim.kernel.key_changes import parse_changes
 from dva_sim.kernel.suggestions import listed
-from dva_sim.simulation import scenario as scenarios
-from dva_sim.simulation.models import AnyScenario, Tables, model_of, tables_of
-from dva_sim.simulation.scenario import Scenario, contradictions
+from dva_sim.simulation.models import AnyScenario, Tables, model_for
+from dva_sim.testing.file_kinds import mistakes_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from dva_sim.experiments.analysis.answer import Answer
     from dva_sim.experiments.execution.dry_run import DryRun
-    from dva_sim.experiments.study.cell_grid import Cell
-    from dva_sim.experiments.study.registration import Registration
+    from dva_sim.experiments.execution.run_request import RunRequest
+    from dva_sim.experiments.report.summary import Reading
+    from dva_sim.experiments.study.cell_grid import DesignCell
+    from dva_sim.experiments.study.registration import Preregistration
     from dva_sim.experiments.study.study import Study
-    from dva_sim.experiments.study.tuned_values import Tuned
+    from dva_sim.experiments.study.tuning import TunedValues
     from dva_sim.recordings.pictures import Wanted
 
 
@@ -59,7 +54,7 @@ class Episode:
     @property
     def warnings(self) -> list[str]:
         """What in the scenario does not go together, each in a sentence."""
-        return contradictions(self.scenario) if isinstance(self.scenario, Scenario) else []
+        return model_for(self.scenario).contradictions(self.scenario)
 
     @property
     def measures(self) -> dict[str, Any]:
@@ -75,11 +70,11 @@ class Episode:
         return "\n".join((head, f"measures: {some}", f"tables: {tables}"))
 
     def _repr_html_(self) -> str:
-        told = describe("runs", list(self.measures), [self.scenario.model], [])
+        meaning = {c.name: c.meaning for c in model_for(self.scenario).columns["runs"]}
         rows = [
-            f"<tr><td>{escape(c.name)}</td><td>{escape(plain(self.measures[c.name]))}</td>"
-            f"<td>{escape(c.meaning)}</td></tr>"
-            for c in told
+            f"<tr><td>{escape(name)}</td><td>{escape(plain(value))}</td>"
+            f"<td>{escape(meaning.get(name, ''))}</td></tr>"
+            for name, value in self.measures.items()
         ]
         return f"<table>{''.join(rows)}</table>"
 
@@ -119,37 +114,29 @@ def episode(
     Raises:
         ConfigError: there is none, it is not valid with these changes, or it cannot be drawn so.
     """
-    wanted = _wanted(video, still, strip, at, panels, camera, inset)
-    sides = None if side_by_side is None else _joined(side_by_side)
-    kept, pairs = None if record is None else Path(record), pairs_of(set)
-    with mistakes_of(str(scenario), pairs, seed):
-        built, tables = _played(str(scenario), pairs, seed, wanted, sides, kept)
-    return Episode(built, seed, {name: frame_of(rows) for name, rows in tables.items()})
-
-
-def _played(
-    scenario: str,
-    pairs: list[str],
-    seed: int,
-    wanted: Wanted,
-    sides: str | None,
-    kept: Path | None,
-) -> tuple[AnyScenario, Tables]:
-    """The scenario as it was run, and its rows by table."""
-    from dva_sim.cli import episode_output
+    from dva_sim.experiments.report.episode import EpisodeRequest
+    from dva_sim.simulation.full import Recording
     from dva_sim.simulation.full.measures import track_rows
 
-    document = scenarios.load(scenario)
-    model = model_of(document)
-    built = model.build(document, parse_changes(pairs))
-    run = None
-    if wanted.any or sides is not None or kept is not None:
-        run = episode_output.episode(
-            scenario, seed, pairs, sides, wanted, kept, episode_output.nowhere()
+    pairs = pairs_of(set)
+    with mistakes_of(str(scenario), pairs, seed):
+        request = EpisodeRequest(
+            str(scenario),
+            seed,
+            pairs,
+            side_by_side=None if side_by_side is None else _joined(side_by_side),
+            pictures=_wanted(video, still, strip, at, panels, camera, inset),
+            record=None if record is None else Path(record),
         )
-    if run is None:
-        return built, model.tables(built, seed, with_tracks=True)
-    return run.scenario, tables_of(run) | {"tracks": track_rows(run)}
+        runs = [request.play(each) for each in request.scenarios()]
+        list(request.write(runs))
+    run, kept = runs[0], runs[0].kept
+    tracks = {"tracks": track_rows(kept)} if isinstance(kept, Recording) else {}
+    return _episode(run.scenario, seed, run.tables | tracks)
+
+
+def _episode(scenario: AnyScenario, seed: int, tables: Tables) -> Episode:
+    return Episode(scenario, seed, {name: frame_of(rows) for name, rows in tables.items()})
 
 
 def replay(
@@ -169,13 +156,12 @@ def replay(
     Raises:
         ConfigError: not a recording, or what is asked for is not in it.
     """
-    from dva_sim.cli import episode_output
+    from dva_sim.experiments.report.episode import open_recording, write_replay
 
     wanted = _wanted(video, still, strip, at, panels, camera, inset)
-    bag = None if ros2 is None else Path(ros2)
-    opened = episode_output.replay(Path(file), wanted, bag, episode_output.nowhere())
-    run, tables = opened.playback, opened.tables or {}
-    return Episode(run.scenario, run.seed, {name: frame_of(rows) for name, rows in tables.items()})
+    opened = open_recording(Path(file), wanted)
+    list(write_replay(opened, wanted, None if ros2 is None else Path(ros2)))
+    return _episode(opened.playback.scenario, opened.playback.seed, opened.tables or {})
 
 
 def _wanted(
@@ -200,7 +186,42 @@ def _joined(words: object) -> str:
     return ",".join(map(str, several))
 
 
-Folder = Results | str | Path
+class Results(ResultsData):
+    """What a study left behind, and what it says."""
+
+    _offers = "answer, failures, machine, report()"
+
+    @cached_property
+    def reading(self) -> Reading:
+        """What the runs say, in words and tables."""
+        from dva_sim.experiments.report.summary import Reading
+
+        return Reading(self)
+
+    @property
+    def answer(self) -> Answer:
+        """The answer to the question in words, with its interval, and what must be known of it."""
+        return self.reading.answer
+
+    def report(self) -> Path:
+        """Make `report.html` and `figures/` in the folder.
+
+        Raises:
+            DvaSimError: the disk is full or refuses to be written.
+        """
+        return report(self)
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: question, answer, and how many runs stand behind it."""
+        depends = (f"{about}: {words}" for about, words in self.answer.depends.items())
+        notes = "".join(f"<p>{escape(note)}</p>" for note in (*depends, *self.answer.notes))
+        failed = f", {len(self.failures)} failed" if self.failures else ""
+        runs = f"<p>{self.runs.rows} runs{failed}, in {escape(str(self.folder))}</p>"
+        lead = f"<p><b>{escape(self.answer.lead)}</b></p>"
+        return f"<h3>{escape(self.question)}</h3>{lead}{notes}{runs}"
+
+
+Folder = ResultsData | str | Path
 
 
 def run(
@@ -242,20 +263,29 @@ def run(
             kept as recordings and could not.
         KeyboardInterrupt: the finished runs are kept, and the same call goes on.
     """
-    from dva_sim.experiments.execution.kept_recordings import record_study
-    from dva_sim.experiments.execution.runner import run_study
+    from dva_sim.experiments.report.figures.registry import load_figures
+    from dva_sim.experiments.report.report import write_report
 
-    variant = Variant.of(quick=quick, full=full, pilot=pilot)
-    asked, folder, cells = _asked(study, out, pairs_of(set, seed), variant)
-    options: dict[str, Any] = {"jobs": jobs, "scheduler": scheduler, "cells": cells}
-    with _without_main():
-        run_study(asked, folder, progress=progress, limit_s=limit_s, **options)
-        problems = record_study(asked, folder, jobs=jobs, limit_s=limit_s)
-    results = load(folder)
+    request = _request(
+        study,
+        out,
+        pairs_of(set, seed),
+        quick=quick,
+        full=full,
+        pilot=pilot,
+        jobs=jobs,
+        scheduler=scheduler,
+        limit_s=limit_s,
+    )
+    asked, cells = _rehearsed(request)
+    figures = load_figures(asked.figures, asked.folder)
+    request.run(asked, cells, progress)
+    problems = request.record(asked)
+    results = load(request.folder)
     if report:
-        results.report()
+        write_report(request.folder, figures=figures)
     if problems:
-        raise RunsFailed(f"{folder}: {'; '.join(problems)}; the results are complete")
+        raise RunsFailed(f"{request.folder}: {'; '.join(problems)}; the results are complete")
     return results
 
 
@@ -275,24 +305,31 @@ def dry_run(
     Raises:
         DvaSimError: a mistake in what was asked for.
     """
-    from dva_sim.experiments.execution.dry_run import dry_run as planned
-    from dva_sim.experiments.execution.job import run_job
+    from dva_sim.experiments.execution.scheduling import run_job
 
-    variant = Variant.of(quick=quick, full=full, pilot=pilot)
-    asked, folder, cells = _asked(study, out, pairs_of(set, seed), variant)
-    return planned(asked, folder, jobs=jobs, probe=run_job, cells=cells)
+    request = _request(
+        study, out, pairs_of(set, seed), quick=quick, full=full, pilot=pilot, jobs=jobs
+    )
+    asked, cells = _rehearsed(request)
+    return request.plan(asked, cells, run_job)
 
 
-def _asked(
-    study: str | Path, out: str | Path | None, pairs: list[str], variant: Variant
-) -> tuple[Study, Path, list[Cell]]:
-    """A study without mistakes, the folder of its results, and its configurations."""
-    from dva_sim.experiments.execution.job import rehearse_all
-    from dva_sim.experiments.study.study import load_study
+def _request(
+    study: str | Path, out: str | Path | None, pairs: list[str], **options: Any
+) -> RunRequest:
+    from dva_sim.experiments.execution.run_request import RunRequest
 
-    asked = load_study(study, pairs, version=variant.version, pilot=variant.pilot)
-    folder = Path(out) if out is not None else variant.folder(str(study))
-    return asked, folder, rehearse_all(asked)
+    return RunRequest(study, None if out is None else Path(out), pairs, **options)
+
+
+def _rehearsed(request: RunRequest) -> tuple[Study, list[DesignCell]]:
+    """A study without mistakes, and its configurations."""
+    from dva_sim.experiments.execution.dry_run import rehearse_all
+    from dva_sim.testing.file_kinds import open_study
+
+    variant = request.variant
+    asked = open_study(request.study, request.changes, version=variant.version, pilot=variant.pilot)
+    return asked, rehearse_all(asked)
 
 
 def new(name: str | Path) -> Path:
@@ -301,12 +338,12 @@ def new(name: str | Path) -> Path:
     Raises:
         DvaSimError: there is such a file, or it cannot be written.
     """
-    from dva_sim.experiments.study.new_study import write_study
+    from dva_sim.experiments.study.study_file import write_study
 
     return write_study(str(name))
 
 
-def register(study: str | Path, *, full: bool = False, again: bool = False) -> Registration:
+def register(study: str | Path, *, full: bool = False, again: bool = False) -> Preregistration:
     """Fix a study's hypotheses and size before it is run; the run then confirms or refutes them.
 
     Args:
@@ -319,9 +356,9 @@ def register(study: str | Path, *, full: bool = False, again: bool = False) -> R
     """
     from dva_sim.experiments.study.registration import register as write_down
     from dva_sim.experiments.study.registration import registration_of
-    from dva_sim.experiments.study.study import load_study
+    from dva_sim.testing.file_kinds import open_study
 
-    asked = load_study(study, version="full" if full else None)
+    asked = open_study(study, version="full" if full else None)
     write_down(asked, again)
     found = registration_of(asked)
     assert found is not None
@@ -334,34 +371,40 @@ def tune(
     *,
     jobs: int | None = None,
     progress: Callable[[int, int], object] | None = None,
-) -> Tuned:
+) -> TunedValues:
     """Choose what a study has tuned, on persons who take no part in it, and keep it beside it.
 
     Raises:
         DvaSimError: the study tunes nothing, or runs failed.
     """
-    from dva_sim.cli.study_output import folder_of_tuning
     from dva_sim.experiments.analysis.tuning import tune as try_all
-    from dva_sim.experiments.study.study import load_study
-    from dva_sim.experiments.study.tuned_values import save_tuned
+    from dva_sim.experiments.study.tuning import folder_of_tuning, save_tuned
+    from dva_sim.testing.file_kinds import open_study
 
-    asked = load_study(study)
+    asked = open_study(study)
     folder = Path(out) if out is not None else folder_of_tuning(str(study))
-    with _without_main():
-        tuned = try_all(asked, folder, jobs=jobs, progress=progress)
+    tuned = try_all(asked, folder, jobs=jobs, progress=progress)
     save_tuned(asked, tuned)
     return tuned
 
 
-def report(folder: Folder, *, pdf: bool = False) -> Path:
+def report(folder: Folder, *, pdf: bool = False, figure: str | Sequence[str] = ()) -> Path:
     """Make the report of a results folder again, or of a study under way so far; its page.
 
+    Args:
+        folder: Of the results.
+        pdf: Make `report.pdf` too.
+        figure: A figure of one's own, such as `mine.py:Mine`, or several.
+
     Raises:
-        DvaSimError: no results there, or a disk that cannot be written.
+        DvaSimError: no results there, no such figure, or a disk that cannot be written.
     """
+    from dva_sim.experiments.report.figures.registry import load_figures
     from dva_sim.experiments.report.report import write_report
 
-    return write_report(folder.folder if isinstance(folder, Results) else Path(folder), pdf)
+    path = folder.folder if isinstance(folder, ResultsData) else Path(folder)
+    wanted = [figure] if isinstance(figure, str) else figure
+    return write_report(path, pdf, figures=load_figures(wanted))
 
 
 def show(
@@ -374,9 +417,9 @@ def show(
     Raises:
         ConfigError: no results there, or no such table.
     """
-    from dva_sim.cli import results_output
+    from dva_sim.experiments.report import terminal
 
-    results_output.show(_so_far(folder), table, columns, rows)
+    terminal.show(_so_far(folder), table, columns, rows)
 
 
 def export(
@@ -425,30 +468,11 @@ def compare(first: Folder, second: Folder) -> Comparison:
     return Comparison(_results(first), _results(second))
 
 
-def _so_far(folder: Folder) -> Results:
-    from dva_sim.experiments.execution.partial_results import load_so_far
+def _so_far(folder: Folder) -> ResultsData:
+    from dva_sim.experiments.execution.checkpoint import load_so_far
 
-    return folder if isinstance(folder, Results) else load_so_far(folder)
-
-
-def _results(folder: Folder) -> Results:
-    return folder if isinstance(folder, Results) else load(folder)
+    return folder if isinstance(folder, ResultsData) else load_so_far(folder)
 
 
-@contextmanager
-def _without_main() -> Iterator[None]:
-    """Hide the caller's script from processes that begin meanwhile.
-
-    They would run it again to find what it defines, and none of that is needed: without a guard
-    in the script, they would start the same study anew.
-    """
-    main: dict[str, Any] = vars(sys.modules["__main__"])
-    hidden: dict[str, Any] = {}
-    for name in ("__file__", "__spec__"):
-        if name in main:
-            hidden[name] = main.pop(name)
-    main["__spec__"] = None
-    try:
-        yield
-    finally:
-        main.update(hidden)
+def _results(folder: Folder) -> ResultsData:
+    return folder if isinstance(folder, ResultsData) else load(folder)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dva_sim.agents.operator.person import Person, Population, median_person
+from dva_sim.agents.observation import Observation
 from dva_sim.agents.operator.strategies import (
     Intent,
     PathView,
@@ -19,7 +19,7 @@ from dva_sim.agents.operator.strategies import (
     Strategy,
     View,
 )
-from dva_sim.agents.robot.camera import Observation
+from dva_sim.agents.person import Person, Population, median_person
 from dva_sim.agents.route_following import Route
 
 ROBOT = Reach(speed=0.5, turn_rate=math.pi / 6)

@@ -25,7 +25,7 @@ import small_study as kit
 from dva_sim.experiments.execution import runner
 from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.report.report import write_report
-from dva_sim.experiments.study.cell_grid import Job
+from dva_sim.experiments.study.cell_grid import StudyJob
 from dva_sim.kernel.errors import DvaSimError
 
 KILLS_EACH = 40
@@ -39,7 +39,7 @@ def run(out: Path, study: Any) -> None:
     run_study(study, out, jobs=1, episode=reportable)
 
 
-def reportable(job: Job) -> kit.Tables:
+def reportable(job: StudyJob) -> kit.Tables:
     """What a report is made of: ways of nobody cannot be drawn."""
     return {"runs": kit.cheap(job)["runs"]}
 

@@ -11,15 +11,15 @@ from pathlib import Path
 import pytest
 from patience import PATIENCE_S, becomes
 
-from dva_sim.validation.network.emulator.cell import Job
-from dva_sim.validation.network.emulator.running import EmulatorError, run_job
+from dva_sim.validation.network.emulator.cell import EmulatedJob
+from dva_sim.validation.network.emulator.process import EmulatorError, run_job
 
 
 @cache
 def missing(rootless: bool = False) -> str:
     """Why there is no emulated link here; empty where there is one."""
     try:
-        run_job(Job("nothing", rootless=rootless))
+        run_job(EmulatedJob("nothing", rootless=rootless))
     except EmulatorError as error:
         return str(error)
     return ""

@@ -7,9 +7,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cache
 
-from dva_sim.agents.robot.camera import HazardSpot, Observation, View
-from dva_sim.agents.robot.manoeuvres import Seen
-from dva_sim.agents.robot.missions import PERIOD, Errand, Pilot, Step
+from dva_sim.agents.observation import Observation
+from dva_sim.agents.robot.camera import FieldOfView, HazardSpot
+from dva_sim.agents.robot.manoeuvres import Sensed
+from dva_sim.agents.robot.missions import PERIOD, MissionGoal, Pilot, PilotStep
 from dva_sim.agents.robot.robot import Surrounded
 from dva_sim.kernel.clock import Clock
 from dva_sim.worlds.drives import DriveSpec
@@ -22,7 +23,7 @@ from dva_sim.worlds.site import load_site
 
 Point = tuple[float, float]
 CAMERA_ANGLE, CAMERA_RANGE = math.radians(70.0), 6.0
-EMPTY = Errand(((0.0, 0.0),))  # for a robot that somebody else drives
+EMPTY = MissionGoal(((0.0, 0.0),))  # for a robot that somebody else drives
 
 
 @cache
@@ -42,7 +43,7 @@ class Robot:
     body: RobotBody
     around: Surrounded
     pilot: Pilot
-    told: list[tuple[float, Step]] = field(default_factory=list)
+    told: list[tuple[float, PilotStep]] = field(default_factory=list)
     speeds: list[float] = field(default_factory=list)
 
     @property
@@ -91,14 +92,21 @@ class Fleet:
         self,
         number: int,
         start: tuple[float, float, float],
-        errand: Errand,
+        errand: MissionGoal,
         spec: DriveSpec | None = None,
     ) -> Robot:
         """Robot number so-and-so, with an errand."""
         body = self.world.add_robot(f"robot-{number}", spec or DriveSpec(), Pose(*start))
         planner = map_of_caparica(body.radius)
         around = Surrounded(Clock(), self.world, body, planner)
-        pilot = Pilot(errand, planner, around.guard, body.name, around.reach, body.turning_radius)
+        pilot = Pilot(
+            errand,
+            planner,
+            around.guard,
+            name=body.name,
+            reach=around.reach,
+            turning_radius=body.turning_radius,
+        )
         robot = Robot(body, around, pilot)
         self.robots.append(robot)
         return robot
@@ -132,14 +140,14 @@ class Fleet:
         if not robot.told or robot.told[-1][1][1:] != step[1:]:
             robot.told.append((self.now, step))
 
-    def _seen(self, robot: Robot) -> Seen:
+    def _seen(self, robot: Robot) -> Sensed:
         body, pose = robot.body, robot.body.pose()
         sees = map_of_caparica().line_of_sight
-        view = View(CAMERA_ANGLE, CAMERA_RANGE, sees)
+        view = FieldOfView(CAMERA_ANGLE, CAMERA_RANGE, sees)
         hazards = view.look(pose.x, pose.y, pose.heading, self.hazards)
         seen = Observation(0, *pose, body.speed, body.turn_rate, hazards)
         nearby = robot.around.nearby()
-        return Seen(self.now, seen, nearby, body.jammed, self._charge(self.now))
+        return Sensed(self.now, seen, nearby, body.jammed, self._charge(self.now))
 
     def _measure(self) -> None:
         """The smallest gap between any two that move about."""

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import shapely
 
-from dva_sim.agents.people.locomotion import RADIUS
+from dva_sim.agents.people.pedestrian_avoidance import RADIUS
 from dva_sim.agents.people.walking import Walking
 from dva_sim.kernel.clock import Clock
 from dva_sim.worlds.geo import GeoFrame, Pose
@@ -66,7 +66,9 @@ class People:
         number = len(self.walkings)
         pose = Pose(*place, 0.0)
         body = self.world.add_person(f"person-{number}", pose, radius=RADIUS)
-        walking = Walking(self.clock, self.planner, self.world, body, speed, self.site.doors)
+        walking = Walking(
+            self.clock, self.planner, self.world, body, speed=speed, doors=self.site.doors
+        )
         self.walkings.append(walking)
         if goal is not None:
             now = lambda: self.clock.now  # noqa: E731

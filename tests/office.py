@@ -10,12 +10,11 @@ from numpy.typing import NDArray
 
 from dva_sim.core.assignments import Rules
 from dva_sim.core.dispatch import MinEta, Policy
-from dva_sim.core.dva import Desk
+from dva_sim.core.dva import Dva
 from dva_sim.core.events import Event, State
-from dva_sim.core.outbox import Send
 from dva_sim.core.permissions import Access, Permissions
-from dva_sim.core.sessions import Sessions
-from dva_sim.core.travel_times import Ground, Start
+from dva_sim.core.sessions import Send, Sessions
+from dva_sim.core.travel_times import SiteKnowledge, Start
 from dva_sim.protocol import messages as m
 
 Floats = NDArray[np.float64]
@@ -56,7 +55,7 @@ class Office:
         self,
         policy: Policy | None = None,
         rules: Rules | None = None,
-        ground: Ground | None = None,
+        ground: SiteKnowledge | None = None,
         access: Access | None = None,
     ) -> None:
         self.policy, self.ground, self.access = policy or MinEta(), ground, access
@@ -69,11 +68,19 @@ class Office:
         self.stands(GUARD, 0)
         self.status(ROBOT, 10)
 
-    def new_desk(self) -> Desk:
+    def new_desk(self) -> Dva:
         """A desk of the same kind that knows nobody yet."""
         sessions = Sessions(Permissions(lambda: 7))
         rng = np.random.default_rng(1)
-        return Desk(self.policy, crow, self.rules, rng, sessions, self.ground, self.access)
+        return Dva(
+            self.policy,
+            crow,
+            self.rules,
+            rng=rng,
+            sessions=sessions,
+            ground=self.ground,
+            access=self.access,
+        )
 
     # --- what devices say --------------------------------------------------------------
 

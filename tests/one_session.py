@@ -10,15 +10,15 @@ from typing import NamedTuple
 
 from patience import PATIENCE_S
 
-from dva_sim.agents.operator.command_sender import topic_of
+from dva_sim.agents.device import command_topic
 from dva_sim.agents.operator.scripted import Ask, Pause, Script, ScriptedOperator, drill
 from dva_sim.agents.robot.controller import Decision, RobotController
-from dva_sim.agents.robot.decision_log import Trace
+from dva_sim.agents.robot.decision_log import DecisionLog
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.recorder import Recorder
 from dva_sim.kernel.streams import Streams
 from dva_sim.network.link import ConstantRate, Link, LinkConfig
-from dva_sim.network.patterns import Requester, Transport
+from dva_sim.network.messaging import Requester, Transport
 from dva_sim.network.realtime import LiveClock
 from dva_sim.network.sockets import SocketNetwork
 from dva_sim.network.virtual import VirtualNetwork
@@ -57,7 +57,7 @@ class Witness:
     """In the place of a robot's trace, or before it: notes each decision."""
 
     controller: RobotController
-    trace: Trace | None = None
+    trace: DecisionLog | None = None
     decisions: list[Decided] = field(default_factory=list)
 
     def decided(
@@ -108,14 +108,14 @@ def published(operator: ScriptedOperator, witness: Witness) -> Script:
     A robot that is not driven hears no commands, so the one after the emergency goes nowhere.
     """
     device, steps, reply = operator.device, drill(operator), None
-    wanted = partial(device.network.ready, OPERATOR, topic_of(ROBOT), 1)
+    wanted = partial(device.network.ready, OPERATOR, command_topic(ROBOT), 1)
     driving, sent = False, 0
     while (step := _next(steps, reply)) is not None:
         if isinstance(step, Ask) and isinstance(step.body, m.SetTeleOp):
             if not driving:
                 continue
             data = device.outbox.encode(ROBOT, step.body, device.clock.now, step.session)
-            device.network.publish(OPERATOR, topic_of(ROBOT), data, len(data))
+            device.network.publish(OPERATOR, command_topic(ROBOT), data, len(data))
             sent += 1
             while witness.count("SetTeleOp") < sent:
                 yield Pause(STEP / 10)
@@ -179,7 +179,7 @@ def _act_out(stage: Stage, way: Way, trace: Path | None = None) -> list[Decided]
     field_ = Field(stage)
     field_.populate()
     robot = field_.robots[ROBOT]
-    witness = Witness(robot.controller, trace and Trace(trace, robot.controller))
+    witness = Witness(robot.controller, trace and DecisionLog(trace, robot.controller))
     robot.trace = witness  # type: ignore[assignment]
     operator = ScriptedOperator(stage.device("operator", 1), lambda o: way(o, witness))
     operator.start()

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
+from dva_sim.agents.observation import no_smoke
 from dva_sim.agents.operator.operator import OperatorAgent
-from dva_sim.agents.people.evacuation import Air, clean_air
+from dva_sim.agents.people.evacuation import AirAt, clean_air
 from dva_sim.agents.people.guard import GuardAgent
-from dva_sim.agents.people.locomotion import RADIUS
+from dva_sim.agents.people.pedestrian_avoidance import RADIUS
 from dva_sim.agents.people.profiles import Walker
 from dva_sim.agents.people.walking import Walking
-from dva_sim.agents.robot.camera import no_smoke
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.recorder import Recorder
 from dva_sim.kernel.streams import Streams
@@ -92,7 +92,7 @@ class PretendedDva:
         self,
         position: Point = POST,
         walker: Walker = WALKER,
-        air: Air = clean_air,
+        air: AirAt = clean_air,
         refuges: Sequence[Point] = (),
         smoke: Callable[[Point, Point], float] = no_smoke,
     ) -> GuardAgent:
@@ -100,9 +100,19 @@ class PretendedDva:
         device, planner, world = self.stage.device("guard", 1), self.stage.planner, self.field.world
         body = world.add_person("guard-1", Pose(*position, 0.0), radius=RADIUS)
         doors = self.stage.site.doors
-        walking = Walking(self.network.clock, planner, world, body, walker.speed, doors)
+        walking = Walking(self.network.clock, planner, world, body, speed=walker.speed, doors=doors)
         there, contained = lambda kind, *_: kind in self.there, self._contained
-        guard = GuardAgent(device, walker, planner, walking, there, contained, air, refuges, smoke)
+        guard = GuardAgent(
+            device,
+            walker,
+            planner,
+            walking,
+            is_there=there,
+            contain=contained,
+            air=air,
+            refuges=refuges,
+            smoke=smoke,
+        )
         device.register(guard.start)
         self.run_for(1.0)
         return guard

@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
-from dva_sim.agents.operator.drive import Drive
+from dva_sim.agents.observation import Observation
+from dva_sim.agents.operator.drive import Teleoperation
 from dva_sim.agents.operator.supervision import Work
-from dva_sim.agents.robot.camera import Observation
 from dva_sim.agents.tilt import Phone, TiltCommand
 from dva_sim.simulation.full import Recording, control_room, simulate
 from dva_sim.simulation.scenario import Scenario
@@ -42,7 +42,7 @@ def taped(scenario: Scenario, seed: int) -> tuple[Tape, Recording]:
             tape.next_looks.append(super().next_look(now, rate_hz))
             return tape.next_looks[-1]
 
-    class TapedDrive(Drive):
+    class TapedDrive(Teleoperation):
         def _arrive(self) -> None:
             tape.arrivals.append(self._clock.now)
             super()._arrive()
@@ -76,7 +76,7 @@ def replay(scenario: Scenario, seed: int, tape: Tape) -> Recording:
         def next_look(self, now: float, rate_hz: float) -> float:
             return self._next_looks.popleft()
 
-    class Sender(Drive):
+    class Sender(Teleoperation):
         """Takes frames for the tick of the newest one alone."""
 
         def begin(self) -> None:
@@ -96,8 +96,8 @@ def replay(scenario: Scenario, seed: int, tape: Tape) -> Recording:
 
 
 @contextmanager
-def _in_the_room(phone: type, drive: type[Drive]) -> Iterator[None]:
+def _in_the_room(phone: type, drive: type[Teleoperation]) -> Iterator[None]:
     with pytest.MonkeyPatch.context() as room:
         room.setattr(control_room, "Phone", phone)
-        room.setattr(control_room, "Drive", drive)
+        room.setattr(control_room, "Teleoperation", drive)
         yield

@@ -20,9 +20,9 @@ from multiprocessing import get_context
 from pathlib import Path
 
 import dva_sim
-from dva_sim.experiments.execution.job import run_job
+from dva_sim.experiments.execution.scheduling import run_job
 from dva_sim.experiments.study.cell_grid import cells, jobs
-from dva_sim.experiments.study.study import load_study
+from dva_sim.experiments.study.study_file import load_study
 
 ROOT = Path(__file__).parent.parent
 RECORDED = ("drive-to-event", "fire-drill")

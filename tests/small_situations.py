@@ -14,12 +14,32 @@ RNG = np.random.default_rng(1)
 
 def look(event=1, kind="flood", severity=0.5, since=0.0, engaged=None, auction=None):
     """A task to confirm."""
-    return Task(event, kind, "confirm", True, severity, 0.9, since, since, engaged, auction)
+    return Task(
+        event=event,
+        kind=kind,
+        stage="confirm",
+        due=True,
+        severity=severity,
+        confidence=0.9,
+        detected=since,
+        waiting_since=since,
+        engaged=engaged,
+        auction=auction,
+    )
 
 
 def act(event=1, kind="fire", due=True, severity=0.5, since=0.0):
     """A task to contain."""
-    return Task(event, kind, "contain", due, severity, 0.9, since, since)
+    return Task(
+        event=event,
+        kind=kind,
+        stage="contain",
+        due=due,
+        severity=severity,
+        confidence=0.9,
+        detected=since,
+        waiting_since=since,
+    )
 
 
 def situation(team, eta, tasks=None, now=100.0, operators=9, distance=None, **more):
@@ -35,7 +55,15 @@ def situation(team, eta, tasks=None, now=100.0, operators=9, distance=None, **mo
     tasks = tuple(tasks or [look(number) for number in range(1, len(eta) + 1)])
     for array in (eta, distance):
         array.setflags(write=False)
-    return Situation(now, tasks, tuple(responders), distance, eta, operators=operators, **more)
+    return Situation(
+        now=now,
+        tasks=tasks,
+        responders=tuple(responders),
+        distance=distance,
+        eta=eta,
+        operators=operators,
+        **more,
+    )
 
 
 def cover(eta, reach, demand, bound_for=()):

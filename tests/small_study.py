@@ -11,11 +11,12 @@ import threading
 import time
 from pathlib import Path
 
-from dva_sim.experiments.execution.checkpoint import Tables
 from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.results.results import Results
-from dva_sim.experiments.study.cell_grid import Job
-from dva_sim.experiments.study.study import Study, load_study
+from dva_sim.experiments.study.cell_grid import StudyJob
+from dva_sim.experiments.study.study import Study
+from dva_sim.experiments.study.study_file import load_study
+from dva_sim.simulation.models import Tables
 
 STUDY = """\
 question: Which is quicker?
@@ -83,7 +84,7 @@ def study_in(folder: Path, *settings: str, text: str = STUDY) -> Study:
     return load_study(write_study(folder, text), settings)
 
 
-def cheap(job: Job) -> Tables:
+def cheap(job: StudyJob) -> Tables:
     """Rows of every kind, with awkward floats, from the seed alone."""
     time = math.sqrt(job.seed) + job.scenario.link.delay_s
     run = {
@@ -97,13 +98,13 @@ def cheap(job: Job) -> Tables:
     return {"runs": [run], "tracks": track}
 
 
-def slower(job: Job) -> Tables:
+def slower(job: StudyJob) -> Tables:
     """The same at a cost that leaves time to be interrupted."""
     sum(math.sin(i) for i in range(200_000))
     return cheap(job)
 
 
-def busy(job: Job) -> Tables:
+def busy(job: StudyJob) -> Tables:
     """The same after a tenth of a second of CPU time."""
     end = time.thread_time() + BUSY_S
     while time.thread_time() < end:
@@ -111,21 +112,21 @@ def busy(job: Job) -> Tables:
     return cheap(job)
 
 
-def unlucky(job: Job) -> Tables:
+def unlucky(job: StudyJob) -> Tables:
     """One run of the reference fails."""
     if job.is_reference and (job.person, job.trial) == (1, 0):
         raise RuntimeError("the robot fell\ninto a hole")
     return cheap(job)
 
 
-def deadly(job: Job) -> Tables:
+def deadly(job: StudyJob) -> Tables:
     """One run always takes its process with it."""
     if job.part == "story" and job.index == 2 and job.person == 1:
         os.kill(os.getpid(), signal.SIGKILL)
     return cheap(job)
 
 
-def deadly_once(mark: Path, job: Job) -> Tables:
+def deadly_once(mark: Path, job: StudyJob) -> Tables:
     """One run takes its process with it, the first time only."""
     if job.part == "story" and job.index == 2 and job.person == 1 and not mark.exists():
         mark.touch()
@@ -133,7 +134,7 @@ def deadly_once(mark: Path, job: Job) -> Tables:
     return cheap(job)
 
 
-def stopped_once(mark: Path, job: Job) -> Tables:
+def stopped_once(mark: Path, job: StudyJob) -> Tables:
     """One run stops its process, the first time only, and nobody lets it go on."""
     if job.part == "story" and job.index == 2 and job.person == 1 and not mark.exists():
         mark.touch()
@@ -141,7 +142,7 @@ def stopped_once(mark: Path, job: Job) -> Tables:
     return cheap(job)
 
 
-def stalls(job: Job) -> Tables:
+def stalls(job: StudyJob) -> Tables:
     """One run never ends, and takes every exception for its own."""
     while job.part == "story" and job.index == 2 and job.person == 1:
         try:
@@ -151,7 +152,7 @@ def stalls(job: Job) -> Tables:
     return cheap(job)
 
 
-def never_comes_back(job: Job) -> Tables:
+def never_comes_back(job: StudyJob) -> Tables:
     """One run waits below Python, where no exception reaches it."""
     if job.part == "story" and job.index == 2 and job.person == 1:
         signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGALRM})

@@ -15,14 +15,14 @@ from typing import Any
 import zmq
 from patience import PATIENCE_S
 
-from dva_sim.agents.device import Device
+from dva_sim.agents.device import AgentDevice
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.recorder import Recorder
 from dva_sim.kernel.streams import Streams
 from dva_sim.network.connections import Connector
 from dva_sim.network.keys import KeyRing
 from dva_sim.network.link import ConstantRate, Link, LinkConfig
-from dva_sim.network.patterns import (
+from dva_sim.network.messaging import (
     OnReply,
     Request,
     Requester,
@@ -315,13 +315,19 @@ def echo(request: Request) -> None:
 
 def small_device(
     world: World, id_tag: str, timeout: float = PATIENT, network: Transport | None = None
-) -> Device:
+) -> AgentDevice:
     """A real device, with no more around it than it needs."""
-    lisbon = GeoFrame(38.66, -9.2)
-    address, label = "127.0.0.1:5600", f"device {id_tag[-2:]}"
-    network = network or world.network
-    return Device(
-        id_tag, label, "Device", address, DVA, network, Recorder(), lisbon, timeout, 3, {}
+    return AgentDevice(
+        id_tag=id_tag,
+        label=f"device {id_tag[-2:]}",
+        device_type="Device",
+        address="127.0.0.1:5600",
+        dva=DVA,
+        network=network or world.network,
+        recorder=Recorder(),
+        frame=GeoFrame(38.66, -9.2),
+        timeout=timeout,
+        attempts=3,
     )
 
 

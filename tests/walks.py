@@ -21,13 +21,12 @@ from dva_sim.core.dispatch import (
     Relocation,
     Situation,
 )
-from dva_sim.core.dva import Desk
+from dva_sim.core.dva import Dva
 from dva_sim.core.events import ACT_STEPS, STEPS, Event, State
-from dva_sim.core.outbox import Send
 from dva_sim.core.permissions import Access, AccessRule, Permissions
-from dva_sim.core.sessions import Sessions
-from dva_sim.core.store import Memory
-from dva_sim.core.travel_times import Ground, Station
+from dva_sim.core.sessions import Send, Sessions
+from dva_sim.core.store import Store
+from dva_sim.core.travel_times import SiteKnowledge, WaitingPlace
 from dva_sim.protocol import messages as m
 
 KINDS = {"Guard": 3, "Robot": 2, "TeleOp": 2, "Sensor": 2}
@@ -39,9 +38,9 @@ DEVICES = {
 POLICY_NAMES = sorted(POLICIES.keys() - {"oracle"} | {"chaos"})
 EPOCH = 2.0**20  # with times in eighths of a second no digit is lost
 LOOKS = (State.ASSIGNED, State.ON_SCENE)
-GROUND = Ground(
+GROUND = SiteKnowledge(
     None,
-    tuple(Station(str(at), east(at)) for at in (0, 50, 100)),
+    tuple(WaitingPlace(str(at), east(at)) for at in (0, 50, 100)),
     np.array([[9.0, 80, 160], [80, 9, 80], [160, 80, 9]]),
     np.array([0.2, 0.3, 0.5]),
 )
@@ -95,17 +94,25 @@ class Walk:
         self.now, self.numbers = 0.0, dict.fromkeys(DEVICES, 0)
         self.alive = dict.fromkeys(DEVICES, True)
         self.in_flight: list[Send] = []
-        self.desk, self.memory = self._desk(), Memory(self.file, EPOCH)
+        self.desk, self.memory = self._desk(), Store(self.file, EPOCH)
         for device in DEVICES:
             self._register(device)
             self._status(device)
         self._take([])
 
-    def _desk(self) -> Desk:
+    def _desk(self) -> Dva:
         sessions = Sessions(Permissions(lambda: self.luck.randrange(2**32)))
         rng = np.random.default_rng(self.luck.randrange(2**31))
         holds = AccessRule(until=self.access_until)
-        desk = Desk(self._policy(), crow, self.rules, rng, sessions, GROUND, Access((holds,)))
+        desk = Dva(
+            self._policy(),
+            crow,
+            self.rules,
+            rng=rng,
+            sessions=sessions,
+            ground=GROUND,
+            access=Access((holds,)),
+        )
         _watch(desk)
         return desk
 
@@ -259,7 +266,7 @@ class Walk:
         """The desk is killed, and a new one goes on from the file."""
         before = snapshot(self.desk)
         self.memory.close()
-        self.desk, self.memory = self._desk(), Memory(self.file, EPOCH)
+        self.desk, self.memory = self._desk(), Store(self.file, EPOCH)
         self.memory.recall(self.desk, self.now)
         after = snapshot(self.desk)
         assert after == before, {k: (before[k], after[k]) for k in after if after[k] != before[k]}
@@ -289,7 +296,7 @@ class Walk:
             self._check_event(event, after)
         looked = [e.responder for e in book.open.values() if e.state in LOOKS]
         assert len(looked) == len(set(looked)), after
-        assert not desk.dispatcher.lookout._bound_for.keys() & set(desk.orders.engaged), after
+        assert not desk.dispatcher.situations._bound_for.keys() & set(desk.orders.engaged), after
 
     def _check_event(self, event: Event, after: str) -> None:
         engaged = self.desk.orders.engaged
@@ -376,7 +383,7 @@ STEPS_OF_A_WALK = {
 }
 
 
-def _watch(desk: Desk) -> None:
+def _watch(desk: Dva) -> None:
     """Nobody gets an order who has one."""
     confirm, act, orders = desk.orders.confirm, desk.orders.act, desk.orders
 
@@ -398,7 +405,7 @@ def _watch(desk: Desk) -> None:
     desk.orders.confirm, desk.orders.act = watched_confirm, watched_act  # type: ignore[method-assign]
 
 
-def snapshot(desk: Desk) -> dict[str, Any]:
+def snapshot(desk: Dva) -> dict[str, Any]:
     """All that a desk must know again after it was killed."""
     book, permissions = desk.book, desk.sessions.permissions
     return {

@@ -3,9 +3,7 @@
 `dva-sim check operator stepwise.py:Stepwise` tells whether it keeps what every operator promises.
 """
 
-from dva_sim.agents.operator.person import Person
-from dva_sim.agents.operator.strategies import Intent, Reach, Strategy, View, gain_at
-from dva_sim.agents.route_following import Route
+from dva_sim.agents.operator.strategies import Intent, Person, Reach, Route, Strategy, View, gain_at
 from dva_sim.kernel.errors import ConfigError
 
 

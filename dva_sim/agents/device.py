@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 from itertools import islice
 
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.recorder import Recorder
-from dva_sim.network.patterns import Request, Requester, Transport
+from dva_sim.network.messaging import Request, Requester, Transport
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode, encode
 from dva_sim.protocol.errors import ProtocolError
@@ -19,6 +19,7 @@ HEARTBEAT = "heartbeat|"  # topics; the bar ends each, so that none begins anoth
 STATUS = "status|"
 HEARTBEAT_PERIOD = 2.0  # [s]
 REGISTER_AGAIN = 2.0  # pause after a registration that was not answered, or refused [s]
+LONGEST_BID = 1e6  # no offer to go somewhere is longer [s]
 RENEW_PERIOD = 10.0  # from one registration to the next [s]
 
 Handler = Callable[[m.Message], m.Reply]
@@ -33,8 +34,8 @@ def do_nothing(*_: object) -> None:
     """For callers who need no answer."""
 
 
-@dataclass
-class Device:
+@dataclass(kw_only=True)
+class AgentDevice:
     """An agent's share in the system.
 
     Attributes:
@@ -55,6 +56,7 @@ class Device:
 
     id_tag: str
     label: str
+    _: KW_ONLY
     device_type: str
     address: str
     dva: str
@@ -63,7 +65,7 @@ class Device:
     frame: GeoFrame
     timeout: float
     attempts: int
-    labels: dict[str, str]
+    labels: dict[str, str] = field(default_factory=dict)
     time_of_day: tuple[float, bool] = (NOON, False)
     silent: bool = False
     outbox: Outbox = field(init=False)
@@ -260,3 +262,8 @@ class Device:
     def _bad_message(self, error: ProtocolError) -> bytes:
         body = m.Reply(0, error.code, error.reason[:256])
         return self.outbox.encode(self.dva, body, self.clock.now)
+
+
+def command_topic(robot: str) -> str:
+    """Topic of the commands for a robot; the bar ends it, so that no topic begins another."""
+    return f"{robot}|"

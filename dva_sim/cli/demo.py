@@ -12,10 +12,12 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
 
-from dva_sim.cli import study_output
-from dva_sim.cli.episode_output import episode, say
+from dva_sim.cli import study_runs
+from dva_sim.cli.console import say
+from dva_sim.cli.episodes import episode
+from dva_sim.experiments.execution.run_request import RunRequest
+from dva_sim.experiments.report.episode import EpisodeRequest
 from dva_sim.experiments.results.results import Results
-from dva_sim.experiments.study.study import Variant
 from dva_sim.kernel.errors import DvaSimError, ExitCode
 from dva_sim.recordings.pictures import Wanted
 
@@ -51,10 +53,11 @@ def demo(out: Path, jobs: int | None) -> ExitCode:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise DvaSimError(f"{out} cannot be written: {error.strerror}") from None
-    episode(SCENARIO, SEED, [DELAY], PATTERNS, Wanted(still=out / PICTURE), None)
+    picture = Wanted(still=out / PICTURE)
+    episode(EpisodeRequest(SCENARIO, SEED, [DELAY], side_by_side=PATTERNS, pictures=picture))
     say("")
     with _film_under_way(out / FILM):
-        code = study_output.run(STUDY, [], out, study_output.Workers(jobs), Variant("quick"))
+        code = study_runs.run(RunRequest(STUDY, out, quick=True, jobs=jobs))
     if code in (ExitCode.OK, ExitCode.RUNS_FAILED):
         _tell(out, time.monotonic() - began)
     return code

@@ -8,15 +8,19 @@ from typing import Annotated
 import typer
 from typer import Argument, Option
 
-from dva_sim.cli.completing import one_of
-from dva_sim.cli.mistakes import print_json
-from dva_sim.cli.options import Jobs, Json, Quiet, Verbose, whole
-from dva_sim.kernel.verbosity import loudness
+from dva_sim.cli.options import Jobs, Json, Quiet, Verbose, one_of, whole
+from dva_sim.cli.verbosity import loudness, print_json
+from dva_sim.kernel.suggestions import either
+from dva_sim.testing.kinds import TRIALS
 
-_LISTED = (
-    *("studies", "scenarios", "tasks", "sites", "robots", "phones", "accelerometers", "people"),
-    *("patterns", "policies", "operators", "filters", "mappings", "drives"),
-)
+_TRIED = either(TRIALS)
+
+
+def _listed(incomplete: str) -> list[str]:
+    """Completes a kind of things that can be listed."""
+    from dva_sim.cli import names  # late: start-up
+
+    return one_of(*names.kinds())(incomplete)
 
 
 def list_(
@@ -24,7 +28,7 @@ def list_(
         str | None,
         Argument(
             metavar="KIND",
-            autocompletion=one_of(*_LISTED),
+            autocompletion=_listed,
             help="Only this kind, such as studies.",
         ),
     ] = None,
@@ -50,19 +54,19 @@ def list_(
 def plugins(as_json: Json = False) -> None:
     """Say what can be added to the program, and how.
 
-    Policies, operators, filters, mappings and drives are classes in a file of yours, or offered by
-    an installed package; it says which there are, and how one is named.
+    Policies, operators, filters and others are classes in a file of yours, or offered by an
+    installed package; it says which there are, and how one is named.
 
     Examples:
         dva-sim plugins  # all kinds
         dva-sim plugins --json  # for other programs
     """
-    from dva_sim.cli import names, plugin_names
+    from dva_sim.cli import names
 
     if as_json:
-        print_json(plugin_names.as_json())
+        print_json(names.plugins_as_json())
     else:
-        names.tell(plugin_names.lines())
+        names.tell(names.plugin_lines())
 
 
 def check(
@@ -71,7 +75,7 @@ def check(
         Argument(
             metavar="FILE...",
             help="Messages, studies, scenarios, sites, plans, maps, agents; - reads a message. "
-            "Or policy, robot, operator, filter or mapping, and names of such or mine.py:Mine. "
+            f"Or {_TRIED}, and names of such or mine.py:Mine. "
             "Or link: the emulated one.",
         ),
     ],
@@ -82,8 +86,8 @@ def check(
 ) -> None:
     """Tell of each file whether it is valid, and if not, where and why.
 
-    Of a policy, a robot, an operator, a filter or a mapping: whether it keeps its promises. Of the
-    emulated link: whether real packets cross it as it is told.
+    Of what users bring, such as a policy or a robot: whether it keeps its promises. Of the emulated
+    link: whether real packets cross it as it is told.
 
     Examples:
         dva-sim check message.xml my-study.yaml worlds/*.yaml  # files of any kind
@@ -91,9 +95,9 @@ def check(
         dva-sim check policy agents/policies/patrol.py:Patrol  # does it keep its promises?
         dva-sim check link  # does the emulated link do what it is told?
     """
-    from dva_sim.cli import check_output
+    from dva_sim.cli import checks
 
-    raise typer.Exit(check_output.check(files, set_ or []))
+    raise typer.Exit(checks.check(files, set_ or []))
 
 
 def schema(
@@ -113,9 +117,9 @@ def schema(
     Examples:
         dva-sim schema scenario > scenario.schema.json  # for an editor
     """
-    from dva_sim.cli import check_output
+    from dva_sim.cli import checks
 
-    check_output.print_schema(kind)
+    checks.print_schema(kind)
 
 
 def validate(
@@ -162,11 +166,19 @@ def validate(
         dva-sim validate operators -o evidence  # against published experiments
         dva-sim validate network --live --quick  # against sockets of this machine
     """
+    from dva_sim.cli import validation
 
-    from dva_sim.cli.validate import Sockets
-    from dva_sim.cli.validate import validate as run
-
-    sockets = Sockets(ablate, live, measure)
     with loudness(quiet, verbose):
-        code = run(what, out, cases, quick, jobs, seed, strategy, sockets)
+        code = validation.validate(
+            what,
+            out,
+            case_file=cases,
+            strategy=strategy,
+            quick=quick,
+            jobs=jobs,
+            seed=seed,
+            ablate=ablate,
+            live=live,
+            measure=measure,
+        )
     raise typer.Exit(code)

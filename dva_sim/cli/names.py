@@ -1,4 +1,7 @@
-"""Everything that can be named, with what it is: files that users edit, and classes by name."""
+"""All that can be named: files that users edit, and classes that they may add to the program.
+
+`dva-sim list` and `dva-sim plugins` print it, for people or as JSON.
+"""
 
 from __future__ import annotations
 
@@ -11,12 +14,78 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from dva_sim.cli.plugin_names import KINDS
 from dva_sim.kernel import resources
 from dva_sim.kernel.config import parse_scalar
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.plugins import Plugins
 from dva_sim.kernel.suggestions import hint
+from dva_sim.testing.kinds import TRIALS, plural
+
+_CHECKED = {trial.load_plugins().kind: trial.kind for trial in TRIALS.values()}
+KINDS: Final[dict[str, Plugins[Any]]] = {
+    plural(plugins.kind): plugins for plugins in (trial.load_plugins() for trial in TRIALS.values())
+}
+"""Kinds of plug-ins by what several are called."""
+
+
+def plugins_as_json() -> dict[str, Any]:
+    """Each kind with its key, its group of entry points, its class, and what there is of it."""
+    return {
+        several: {
+            "key": plugins.key,
+            "entry_points": plugins.group,
+            "class": plugins.public,
+            "method": plugins.needs,
+            "shipped": sorted(plugins.shipped.keys() - plugins.hidden),
+            "installed": [
+                {"name": entry.name, "value": entry.value, "package": _package(entry)}
+                for entry in plugins.installed()
+            ],
+            "files": [str(path) for path in plugins.files()],
+        }
+        for several, plugins in KINDS.items()
+    }
+
+
+def plugin_lines() -> Iterator[str]:
+    """The same for people."""
+    for number, (several, plugins) in enumerate(KINDS.items()):
+        yield f"{chr(10) if number else ''}{several}"
+        for title, told in _facts(plugins):
+            yield f"  {title:<13} {told}"
+
+
+def _facts(plugins: Plugins[Any]) -> Iterator[tuple[str, str]]:
+    yield "key", _key(plugins)
+    yield "a file", f"{plugins.key}: {_named(plugins)}, looked for beside the configuration, here, "
+    yield "", f"and in {plugins.folder}"
+    yield "entry points", f"{plugins.group}, for installed packages"
+    yield "class", f"derived from {plugins.public}, with {plugins.needs}"
+    yield "try it", f"dva-sim check {_CHECKED[plugins.kind]} mine.py:Mine"
+    yield "shipped", ", ".join(sorted(plugins.shipped.keys() - plugins.hidden))
+    told = [f"{entry.name} ({_package(entry)})" for entry in plugins.installed()]
+    yield "installed", ", ".join(told) or "none"
+    yield "files there", ", ".join(_near_path(path) for path in plugins.files()) or "none"
+
+
+def _key(plugins: Plugins[Any]) -> str:
+    where = {"drive": "a robot profile", "figure": "a study, a list", "measure": "a study, a list"}
+    return f"{plugins.key} of {where.get(plugins.kind, 'a scenario')}"
+
+
+def _named(plugins: Plugins[Any]) -> str:
+    return "[mine.py:Mine]" if plugins.kind in ("figure", "measure") else "mine.py:Mine"
+
+
+def _package(entry: Any) -> str:
+    return f"{entry.dist.name} {entry.dist.version}" if entry.dist else entry.value
+
+
+def _near_path(path: Path) -> str:
+    """A path as one would write it here."""
+    here = Path.cwd()
+    return str(path.relative_to(here)) if path.is_relative_to(here) else str(path)
+
 
 _HEAD = re.compile(r"^(?:description|question):.*\n(?:[ \t]+.*\n|[ \t]*\n)*", re.MULTILINE)
 
@@ -33,16 +102,8 @@ FILES: Final = {
 """Kinds of files by what several are called, and the folder of each."""
 
 
-PATTERNS: Final = {
-    "req-rep": "One command at a time: the next waits for the answer to the last.",
-    "pipelined": "Requests, of which `command.window` may be unanswered at once.",
-    "pub-sub": "Commands are published, and the robot works off all of them in order.",
-    "latest-wins": "Commands are published, and the robot takes the newest alone.",
-}
-
-
 @dataclass(frozen=True)
-class Entry:
+class NamedThing:
     """One thing that can be named.
 
     Attributes:
@@ -56,7 +117,12 @@ class Entry:
     file: str | None = None
 
 
-def everything(kind: str | None = None) -> dict[str, list[Entry]]:
+def kinds() -> list[str]:
+    """What can be listed, in the order in which it is."""
+    return [*FILES, *KINDS]
+
+
+def everything(kind: str | None = None) -> dict[str, list[NamedThing]]:
     """All that can be named, by kind.
 
     Args:
@@ -66,7 +132,6 @@ def everything(kind: str | None = None) -> dict[str, list[Entry]]:
         ConfigError: there is no such kind.
     """
     makers: dict[str, Any] = {name: _files(name, folder) for name, folder in FILES.items()}
-    makers["patterns"] = (Entry(name, told) for name, told in PATTERNS.items())
     makers |= {several: _classes(plugins) for several, plugins in KINDS.items()}
     if kind is not None and kind not in makers:
         raise ConfigError(f"there is no list of {kind!r}; {hint(kind, makers, 'there are')}")
@@ -94,10 +159,10 @@ def tell(told: Iterable[str]) -> None:
         print(line if width is None or len(line) <= width else f"{line[: width - 3].rstrip()}...")
 
 
-def _files(kind: str, folder: str) -> Iterator[Entry]:
+def _files(kind: str, folder: str) -> Iterator[NamedThing]:
     prefix = "tasks/" if kind == "tasks" else ""
     for name, path in sorted(resources.available(folder).items()):
-        yield Entry(f"{prefix}{name}", _described(path), str(path))
+        yield NamedThing(f"{prefix}{name}", _described(path), str(path))
 
 
 def _described(path: Path) -> str:
@@ -110,10 +175,10 @@ def _described(path: Path) -> str:
     return _first(" ".join(str(next(iter(found.values()), "")).split())) if found else ""
 
 
-def _classes(plugins: Plugins[Any]) -> Iterator[Entry]:
+def _classes(plugins: Plugins[Any]) -> Iterator[NamedThing]:
     offered = {entry.name: f"of {entry.value}" for entry in plugins.installed()}
     for name in plugins.known():
-        yield Entry(name, _documented(plugins.shipped, name) or offered.get(name, ""))
+        yield NamedThing(name, _documented(plugins.shipped, name) or offered.get(name, ""))
 
 
 def _documented(shipped: Mapping[str, Any], name: str) -> str:

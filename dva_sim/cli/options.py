@@ -1,6 +1,7 @@
-"""Numbers on the command line, and what is said of words that are none of those wanted.
+"""Options that several commands have: one name, one form, one meaning and one completion for each.
 
-Options that several commands have: one name, one form and one meaning for each.
+Numbers are read here too, so that a wrong one is told with what would be right. Nothing heavy is
+imported: every command begins here.
 """
 
 from __future__ import annotations
@@ -14,7 +15,34 @@ from typing import Annotated
 import typer
 from typer import Argument, Option
 
-from dva_sim.cli.completing import SCENARIOS, STUDIES
+Completer = Callable[[str], list[str]]
+
+
+def names_in(*folders: str) -> Completer:
+    """Completes the names of files in some folders, wherever those lie."""
+
+    def complete(incomplete: str) -> list[str]:
+        from dva_sim.kernel.resources import available
+
+        found = [
+            f"{'tasks/' if folder.endswith('/tasks') else ''}{name}"
+            for folder in folders
+            for name in available(folder)
+        ]
+        return sorted(name for name in found if name.startswith(incomplete))
+
+    return complete
+
+
+def one_of(*words: str) -> Completer:
+    """Completes one of some words."""
+    return lambda incomplete: [word for word in words if word.startswith(incomplete)]
+
+
+STUDIES = names_in("experiments")
+SCENARIOS = names_in("experiments/scenarios", "experiments/scenarios/tasks")
+SITES = names_in("worlds")
+
 
 MOST_SEED = 2**63 - 1
 _NUMBER = re.compile(r"[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)(e[+-]?[0-9]+)?", re.IGNORECASE)
@@ -56,7 +84,7 @@ StudyName = Annotated[
 ScenarioName = Annotated[
     str, Argument(metavar="SCENARIO", autocompletion=SCENARIOS, help="A scenario by name or path.")
 ]
-Folder = Annotated[Path, Argument(metavar="FOLDER", help="A results folder.")]
+ResultsFolder = Annotated[Path, Argument(metavar="FOLDER", help="A results folder.")]
 
 Sets = Annotated[
     list[str] | None,
@@ -75,7 +103,9 @@ Jobs = Annotated[
 Quiet = Annotated[bool, Option("-q", "--quiet", help="Print mistakes alone.")]
 Verbose = Annotated[bool, Option("-v", "--verbose", help="Print more than usual.")]
 Json = Annotated[bool, Option("--json", help="Print JSON, for other programs.")]
-Seed = Annotated[int, Option("--seed", metavar="N", parser=whole(), help="The run's random seed.")]
+RunSeed = Annotated[
+    int, Option("--seed", metavar="N", parser=whole(), help="The run's random seed.")
+]
 Results = Annotated[
     Path | None,
     Option("-o", "--out", metavar="FOLDER", help="Results folder; default: results/STUDY."),

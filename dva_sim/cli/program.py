@@ -15,7 +15,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from dva_sim.cli import files, results, runs, site, studies
-from dva_sim.cli.mistakes import UsageError, in_a_line, name_of
+from dva_sim.cli.usage_errors import UsageError, in_a_line, name_of
 from dva_sim.kernel.errors import DvaSimError, ExitCode, error_line
 from dva_sim.kernel.suggestions import hint
 
@@ -23,7 +23,7 @@ HELP = {"help_option_names": ["-h", "--help"]}
 _EXAMPLES = "\nExamples:\n"
 
 
-class Command(TyperCommand):
+class CommandWithExamples(TyperCommand):
     """A command whose docstring ends in examples, each `call  # what it does`.
 
     Attributes:
@@ -67,7 +67,7 @@ class Command(TyperCommand):
                 formatter.write(f"  {call}\n")
 
 
-class Group(TyperGroup):
+class PanelGroup(TyperGroup):
     """A group whose commands stand under the headings of their panels."""
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
@@ -104,7 +104,7 @@ class ReaderGone(DvaSimError):
     exit_code = ExitCode.READER_GONE
 
 
-class Program(Group):
+class DvaSimProgram(PanelGroup):
     """The program itself, whose help ends with the exit codes."""
 
     def invoke(self, ctx: Any) -> Any:
@@ -136,12 +136,12 @@ _PANELS: dict[str, tuple[Callable[..., None], ...]] = {
 }
 
 
-def _typer(cls: type[Group], help: str) -> typer.Typer:
+def _typer(cls: type[PanelGroup], help: str) -> typer.Typer:
     return typer.Typer(
         cls=cls,
         help=help,
         no_args_is_help=True,
-        add_completion=cls is Program,
+        add_completion=cls is DvaSimProgram,
         context_settings=HELP,
         rich_markup_mode=None,  # a third of the time that help takes
         pretty_exceptions_enable=False,
@@ -168,17 +168,17 @@ def _program(
 
 
 def _assembled() -> typer.Typer:
-    program = _typer(Program, "")
+    program = _typer(DvaSimProgram, "")
     program.callback()(_program)
     for panel, commands in _PANELS.items():
         for command in commands:
             name = command.__name__.rstrip("_")
-            program.command(name, cls=Command, rich_help_panel=panel, context_settings=HELP)(
-                command
-            )
-    sites = _typer(Group, "Draw a site, or write it as files to edit.")
+            program.command(
+                name, cls=CommandWithExamples, rich_help_panel=panel, context_settings=HELP
+            )(command)
+    sites = _typer(PanelGroup, "Draw a site, or write it as files to edit.")
     for command in (site.show, site.export):
-        sites.command(cls=Command, context_settings=HELP)(command)
+        sites.command(cls=CommandWithExamples, context_settings=HELP)(command)
     program.add_typer(sites, name="site", rich_help_panel=panel)
     return program
 

@@ -8,36 +8,41 @@ from typing import Annotated
 import typer
 from typer import Argument, Option
 
-from dva_sim.cli.mistakes import print_json
-from dva_sim.cli.options import Folder, Json, Quiet, Verbose, whole
-from dva_sim.kernel.verbosity import loudness
+from dva_sim.cli.options import Json, Quiet, ResultsFolder, Verbose, whole
+from dva_sim.cli.verbosity import WRITTEN, loudness, print_json, tell_files
 
 
 def report(
-    folder: Folder,
+    folder: ResultsFolder,
     pdf: Annotated[bool, Option("--pdf", help="As PDF too, for print.")] = False,
+    figure: Annotated[
+        list[str] | None,
+        Option("--figure", metavar="FILE:CLASS", help="With a figure of one's own; repeatable."),
+    ] = None,
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
     """Make the report of a results folder again.
 
     It is a page, its figures, and the numbers in them. Of a study that still runs, the page
-    says what is known so far.
+    says what is known so far. Figures of one's own, which a study names in its file, are drawn
+    when it is run; afterwards they are drawn where --figure names them.
 
     Examples:
         dva-sim report results/req-rep-vs-pub-sub --pdf  # and report.pdf for print
+        dva-sim report small --figure risk.py:Risk  # with a figure of one's own
     """
-    from dva_sim.cli.verbose_details import WRITTEN, tell_files
+    from dva_sim.experiments.report.figures.registry import load_figures
     from dva_sim.experiments.report.report import write_report
 
     with loudness(quiet, verbose):
-        page = write_report(folder, pdf)
+        page = write_report(folder, pdf, figures=load_figures(figure or ()))
         tell_files(folder, *WRITTEN)
         typer.echo(f"Report: {page}{' and report.pdf' if pdf else ''}")
 
 
 def show(
-    folder: Folder,
+    folder: ResultsFolder,
     table: Annotated[str | None, Option(metavar="NAME", help="Show the rows of a table.")] = None,
     rows: Annotated[
         int,
@@ -59,12 +64,13 @@ def show(
         dva-sim show small --columns  # what the columns of every table mean
         dva-sim show small --json  # the same for other programs
     """
-    from dva_sim.cli import results_json, results_output
-    from dva_sim.experiments.execution.partial_results import load_so_far
+    from dva_sim.cli import results_json
+    from dva_sim.experiments.execution.checkpoint import load_so_far
+    from dva_sim.experiments.report import terminal
 
     results = load_so_far(folder)
     if not as_json:
-        results_output.show(results, table, columns, rows)
+        terminal.show(results, table, columns, rows)
     elif columns:
         print_json(results_json.columns(results, [] if table is None else [table]))
     else:
@@ -76,7 +82,7 @@ def show(
 
 
 def export(
-    folder: Folder,
+    folder: ResultsFolder,
     out: Annotated[
         Path,
         Option(
@@ -100,9 +106,11 @@ def export(
         dva-sim export small -o small.csv  # one row for each run
         dva-sim export small -o tables --format parquet  # every table
     """
-    from dva_sim.cli import results_output
+    from dva_sim.experiments.results.export import export as write
+    from dva_sim.experiments.results.results import Results
 
-    results_output.export(folder, out, table or [], form, overwrite)
+    for path in write(Results.load(folder), out, table or [], form, overwrite):
+        print(path)
 
 
 def compare(
@@ -135,8 +143,14 @@ def compare(
         dva-sim compare a b --fail-if 'mean(drive_time_s) per cell > +0.5 s'  # B minus A
         dva-sim compare a b --fail-if 'share(confirmed) < 95 %'  # of B alone
     """
-    from dva_sim.cli import results_output
+    from dva_sim.cli import comparison
 
-    asked = results_output.Asked(measure or [], by or [], fail_if or [])
-    tell = print_json if as_json else None
-    raise typer.Exit(results_output.compare(first, second, asked, tell))
+    code = comparison.compare(
+        first,
+        second,
+        measures=measure or [],
+        by=by or [],
+        fail_if=fail_if or [],
+        as_json=as_json,
+    )
+    raise typer.Exit(code)

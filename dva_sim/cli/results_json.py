@@ -9,12 +9,13 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from dva_sim.experiments.analysis.answer import Finding
-from dva_sim.experiments.analysis.compare import Comparison, Verdict
+from dva_sim.experiments.analysis.compare import Comparison, GateVerdict
 from dva_sim.experiments.analysis.compare_rows import Difference, Levels
 from dva_sim.experiments.analysis.layout import interval_of, layout_of
-from dva_sim.experiments.analysis.paired_effects import Part
+from dva_sim.experiments.analysis.paired_effects import RunGrid
+from dva_sim.experiments.report.summary import Reading
+from dva_sim.experiments.results.manifest import status_of
 from dva_sim.experiments.results.results import Results
-from dva_sim.experiments.study.status import status_of
 from dva_sim.kernel.units import unit_of
 
 Data = dict[str, Any]
@@ -22,15 +23,15 @@ Data = dict[str, Any]
 
 def shown(results: Results) -> Data:
     """The answer, what it rests on, and every cell."""
-    status, reading, study = status_of(results.manifest), results.reading, results.study
+    status, reading, study = status_of(results.manifest), Reading(results), results.study
     return {
         "folder": str(results.folder),
         "question": results.question,
         "status": {"kind": status.kind, "why": list(status.why)},
         "partial": results.manifest.get("partial"),
         "answer": {
-            "lead": results.answer.lead,
-            "notes": list(results.answer.notes),
+            "lead": reading.answer.lead,
+            "notes": list(reading.answer.notes),
             "finding": _finding(reading.finding),
         },
         "warnings": list(reading.warnings),
@@ -39,7 +40,7 @@ def shown(results: Results) -> Data:
         "persons": reading.persons,
         "replications": study.get("replications"),
         "seed": study.get("seed"),
-        "cells": list(_cells(results)),
+        "cells": list(_cells(reading)),
         "tables": results.tables,
         "program": _program(results),
     }
@@ -78,7 +79,7 @@ def compared(
     comparison: Comparison,
     measures: Sequence[str],
     by: Sequence[str],
-    verdicts: Sequence[Verdict],
+    verdicts: Sequence[GateVerdict],
 ) -> Data:
     """How two results differ, and what a gate makes of it; differences are B minus A.
 
@@ -123,14 +124,14 @@ def _finding(found: Finding | None) -> Data | None:
     }
 
 
-def _cells(results: Results) -> Iterator[Data]:
+def _cells(reading: Reading) -> Iterator[Data]:
     """Every cell with its mean of the answer's measure, over persons, and its 95 % interval."""
-    view = results.reading.view
+    view = reading.view
     if view is None:
         return
-    runs, factors = layout_of(results.study, results.reading.runs, are_points_trials=False)
+    runs, factors = layout_of(reading.study, reading.runs, are_points_trials=False)
     for name in dict.fromkeys(str(part) for part in runs["part"]):
-        part = Part(runs, name, factors)
+        part = RunGrid(runs, name, factors)
         made, grid = part.grid("seed"), part.grid(view.measure)
         for setting in part.settings():
             count = int((part.where(made, setting) == part.where(made, setting)).sum())
@@ -187,7 +188,7 @@ def _difference(row: Difference) -> Data:
     }
 
 
-def _gate(text: str, verdicts: Sequence[Verdict]) -> Data:
+def _gate(text: str, verdicts: Sequence[GateVerdict]) -> Data:
     own = [verdict for verdict in verdicts if verdict.gate.text == text]
     return {
         "condition": text,

@@ -8,31 +8,31 @@ from typing import Annotated
 import typer
 from typer import Argument, Option
 
-from dva_sim.cli.completing import one_of
 from dva_sim.cli.options import (
     At,
     Camera,
     Inset,
     Panels,
     Quiet,
+    RunSeed,
     ScenarioName,
-    Seed,
     Sets,
     Still,
     Strip,
     Verbose,
     Video,
     number,
+    one_of,
     whole,
 )
-from dva_sim.kernel.verbosity import loudness
+from dva_sim.cli.verbosity import loudness
 
 _MOST_PORT = 64_999
 
 
 def episode(
     scenario: ScenarioName,
-    seed: Seed = 1,
+    seed: RunSeed = 1,
     set_: Sets = None,
     video: Video = None,
     still: Still = None,
@@ -60,13 +60,14 @@ def episode(
         dva-sim episode evacuation --strip fire.png  # several moments in one figure
         dva-sim episode fire-drill --record drill.mcap  # for `dva-sim replay` and viewers
     """
-    from dva_sim.cli import episode_output
-    from dva_sim.experiments.study.documents import mistakes_of
+    from dva_sim.cli import episodes
+    from dva_sim.experiments.report.episode import EpisodeRequest
     from dva_sim.recordings.pictures import Wanted
+    from dva_sim.testing.file_kinds import mistakes_of
 
-    pictures = Wanted(video, still, strip, at, panels, camera, inset)
-    with loudness(quiet, verbose), mistakes_of(scenario, set_ or [], seed):
-        episode_output.episode(scenario, seed, set_ or [], side_by_side, pictures, record)
+    pictures, changes = Wanted(video, still, strip, at, panels, camera, inset), set_ or []
+    with loudness(quiet, verbose), mistakes_of(scenario, changes, seed):
+        episodes.episode(EpisodeRequest(scenario, seed, changes, side_by_side, pictures, record))
 
 
 def replay(
@@ -90,11 +91,11 @@ def replay(
         dva-sim replay drill.mcap --strip drill.png  # several moments in one figure
         dva-sim replay drill.mcap --ros2 bag  # for the tools of ROS 2
     """
-    from dva_sim.cli import episode_output
+    from dva_sim.cli import episodes
     from dva_sim.recordings.pictures import Wanted
 
     with loudness(quiet, verbose):
-        episode_output.replay(file, Wanted(video, still, strip, at, panels, camera, inset), ros2)
+        episodes.replay(file, Wanted(video, still, strip, at, panels, camera, inset), ros2)
 
 
 def live(
@@ -158,7 +159,7 @@ def live(
             help="How long; default: to the scenario's horizon.",
         ),
     ] = None,
-    seed: Seed = 1,
+    seed: RunSeed = 1,
     set_: Sets = None,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -172,18 +173,18 @@ def live(
         dva-sim live drive-to-event --operators scripted  # fixed commands, an emergency
         dva-sim live drive-to-event --only dva --dva 192.168.1.10:5600  # one part here
     """
-    from dva_sim.cli import live_output
-    from dva_sim.live.options import Options
+    from dva_sim.cli import live_screen
+    from dva_sim.live.options import LiveOptions
 
     changes = tuple(set_ or ())
-    options = Options(
+    options = LiveOptions(
         scenario, changes, seed, operators, host, dva, port, keys, record, state, seconds
     )
     with loudness(quiet, verbose):
         if only is None:
-            live_output.run_all(options)
+            live_screen.run_all(options)
         else:
-            live_output.run_one(only, options, which)
+            live_screen.run_one(only, options, which)
 
 
 def keys(
@@ -200,6 +201,6 @@ def keys(
         dva-sim keys keys drive-to-event  # for each device of the scenario
         dva-sim keys keys dva robot-1 operator-1  # for these devices
     """
-    from dva_sim.cli.live_output import make_keys
+    from dva_sim.cli.live_screen import make_keys
 
     typer.echo(make_keys(folder, names))

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from typer import Argument, Option
 
-from dva_sim.cli.completing import SITES
-from dva_sim.cli.options import whole
+from dva_sim.cli.options import SITES, whole
+
+if TYPE_CHECKING:
+    from dva_sim.worlds.layout import Site
 
 SiteName = Annotated[
     str,
@@ -42,9 +45,12 @@ def show(
         dva-sim site show campus --coverage  # writes campus.png
         dva-sim site show office-block --set seed=7 -o block.png  # a generated site
     """
-    from dva_sim.cli import site_output
+    from dva_sim.worlds.view import write_poster  # late: start-up
 
-    site_output.show(name, out, set_ or [], coverage, width)
+    site = _open(name, set_ or [])
+    file = out or Path(f"{Path(name).stem}.png")
+    write_poster(site, file, coverage, width)
+    print(f"{describe(site)}\n{file}")
 
 
 def export(
@@ -57,6 +63,48 @@ def export(
     Examples:
         dva-sim site export caparica -o mine  # into the folder mine
     """
-    from dva_sim.cli import site_output
+    from dva_sim.worlds.site_export import write_site  # late: start-up
 
-    site_output.export(name, out, set_ or [])
+    site = _open(name, set_ or [])
+    print(f"{describe(site)}\n{write_site(site, out)}")
+
+
+def _open(name: str, changes: Sequence[str]) -> Site:
+    """A site by name or path, or that of a ROS map.
+
+    Raises:
+        ConfigError: it cannot be read, or takes no options.
+    """
+    from dva_sim.kernel import resources  # late: start-up
+    from dva_sim.kernel.config import load_yaml
+    from dva_sim.kernel.errors import ConfigError
+    from dva_sim.kernel.key_changes import parse_changes
+    from dva_sim.worlds.site import load_site, map_site
+
+    options = parse_changes(changes)
+    path = resources.find(name, "worlds", is_asked=True)
+    if "image" not in load_yaml(path).data:
+        return load_site(name, options)
+    if options:
+        raise ConfigError(f"map {name!r} is not generated and takes no options")
+    return map_site(path, seed=1, robots=0, guards=0)
+
+
+def describe(site: Site) -> str:
+    """What a site is, in a line."""
+    xmin, ymin, xmax, ymax = site.extent
+    indoor = sum(not room.outdoor for room in site.rooms)
+    parts = {
+        "rooms": indoor,
+        "paths and yards": len(site.rooms) - indoor,
+        "doors": len(site.doors),
+        "exits": len(site.exits),
+        "robot bases": len(site.robot_bases),
+        "guard posts": len(site.guard_posts),
+        "operator desks": len(site.operator_desks),
+        "detectors": len(site.detectors),
+        "cameras": len(site.cameras),
+        "wall segments": len(site.walls),
+    }
+    told = ", ".join(f"{number} {what}" for what, number in parts.items() if number)
+    return f"{site.name}: {xmax - xmin:.1f} m x {ymax - ymin:.1f} m, {told}"

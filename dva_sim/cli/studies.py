@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -9,7 +10,7 @@ import typer
 from typer import Option
 
 from dva_sim.cli.options import Jobs, Quiet, Results, Sets, StudyName, Verbose, number, whole
-from dva_sim.kernel.verbosity import loudness
+from dva_sim.cli.verbosity import loudness
 
 
 def demo(
@@ -77,17 +78,25 @@ def run(
         dva-sim run req-rep-vs-pub-sub --set persons=4 -j 2 -o small  # smaller, two processes
         dva-sim run mine.yaml --set 'link.delay_s=[0, 0.5]'  # other levels of a factor
     """
-    from dva_sim.cli import study_output
-    from dva_sim.experiments.study.study import Variant
+    from dva_sim.cli import study_runs
+    from dva_sim.experiments.execution.run_request import RunRequest
 
-    changes = [*(set_ or []), *([f"seed={seed}"] if seed is not None else [])]
-    variant = Variant.of(quick=quick, full=full, pilot=pilot)
-    workers = study_output.Workers(jobs, scheduler, limit)
+    request = RunRequest(
+        study,
+        out,
+        changes=[*(set_ or []), *([f"seed={seed}"] if seed is not None else [])],
+        quick=quick,
+        full=full,
+        pilot=pilot,
+        jobs=jobs,
+        scheduler=scheduler,
+        limit_s=limit,
+    )
     with loudness(quiet, verbose):
         if dry_run:
-            study_output.plan(study, changes, out, workers, variant)
+            study_runs.plan(request)
             return
-        code = study_output.run(study, changes, out, workers, variant)
+        code = study_runs.run(request)
     raise typer.Exit(code)
 
 
@@ -101,7 +110,7 @@ def new(
     Examples:
         dva-sim new mine  # writes mine.yaml here
     """
-    from dva_sim.experiments.study.new_study import told, write_study
+    from dva_sim.experiments.study.study_file import write_study
 
     typer.echo(told(write_study(name)))
 
@@ -122,9 +131,9 @@ def register(
         dva-sim register mine.yaml  # writes mine.registration.yaml beside it
     """
     from dva_sim.experiments.study.registration import register as write_down
-    from dva_sim.experiments.study.study import load_study
+    from dva_sim.testing.file_kinds import open_study
 
-    typer.echo(write_down(load_study(study, version="full" if full else None), again))
+    typer.echo(write_down(open_study(study, version="full" if full else None), again))
 
 
 def tune(
@@ -141,8 +150,29 @@ def tune(
     Examples:
         dva-sim tune filters  # writes tuned/filters.yaml beside it
     """
-    from dva_sim.cli import study_output
+    from dva_sim.cli import study_runs
 
     with loudness(quiet, verbose):
-        code = study_output.tune(study, out, jobs)
+        code = study_runs.tune(study, out, jobs)
     raise typer.Exit(code)
+
+
+def told(path: Path) -> str:
+    """What to do next with a new study."""
+    steps = (
+        ("check", "finds mistakes"),
+        ("run --dry-run", "how many runs that is, and how long they take"),
+        ("register", "fixes its hypotheses, so that the run confirms or refutes them"),
+        ("run", "makes the runs and the report"),
+    )
+    commands = [" ".join(["dva-sim", *_with_file(step, path)]) for step, _ in steps]
+    width = max(map(len, commands))
+    lines = [f"  {c:{width}}  # {why}" for c, (_, why) in zip(commands, steps, strict=True)]
+    ready = f"Wrote {path}. It works as it stands; its comments say what can be changed. Next:"
+    return "\n".join([ready, *lines])
+
+
+def _with_file(step: str, path: Path) -> list[str]:
+    """The words of a command, the file behind the first."""
+    verb, *options = step.split()
+    return [verb, shlex.quote(str(path)), *options]

@@ -1,6 +1,6 @@
-"""Who is at what: a guard or a robot at one event, an operator at as many as it has robots.
+"""Who is at what, and the rules that hold whatever a policy advises.
 
-The rules that hold whatever a policy advises.
+A guard or a robot is at one event, an operator at as many as it has robots.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dva_sim.core.events import Event
 
 
 @dataclass
-class Engaged:
+class Assignments:
     """What each device works on, also while it still winds up a closed event.
 
     How many events a device may be at is for those who give orders; here none is lost.
@@ -63,7 +63,7 @@ class Engaged:
         return len(self._events)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Rules:
     """What the DVA insists on.
 

@@ -14,7 +14,7 @@ from dva_sim.core.events import Event, EventBook, State
 
 
 @dataclass
-class Auction:
+class RunningAuction:
     """One task on offer.
 
     Attributes:
@@ -37,11 +37,11 @@ class Auctions:
     """
 
     bid_within: float
-    running: dict[int, Auction] = field(default_factory=dict)
+    running: dict[int, RunningAuction] = field(default_factory=dict)
 
     def announce(self, event: int, asked: Sequence[str], now: float) -> float:
         """Begin an auction; how long bids are taken [s]."""
-        self.running[event] = Auction(now + self.bid_within, set(asked))
+        self.running[event] = RunningAuction(now + self.bid_within, set(asked))
         return self.bid_within
 
     def bid(self, event: int, device: str, arrival_in: float, now: float) -> bool:

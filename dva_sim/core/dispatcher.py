@@ -1,6 +1,6 @@
 """The dispatcher: asks the policy, and gives the orders that the rules allow.
 
-Robots that go their rounds while nothing happens, sent by the DVA itself.
+Robots that go their rounds while nothing happens are sent by the DVA itself (`Patrols`).
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from dva_sim.core.assignments import Engaged
+from dva_sim.core.assignments import Assignments
 from dva_sim.core.auctions import Auctions
 from dva_sim.core.dispatch import MinEta
 from dva_sim.core.dispatch.situation import (
@@ -25,11 +25,10 @@ from dva_sim.core.dispatch.situation import (
 )
 from dva_sim.core.events import State
 from dva_sim.core.orders import Orders
-from dva_sim.core.outbox import Send
-from dva_sim.core.registry import ROBOT, Entry, Registry
-from dva_sim.core.sessions import Sessions
-from dva_sim.core.situation_builder import Lookout, View, same_place
-from dva_sim.core.travel_times import Ground, Travel
+from dva_sim.core.registry import ROBOT, DeviceEntry, Registry
+from dva_sim.core.sessions import Send, Sessions
+from dva_sim.core.situation_builder import PolicyView, SituationBuilder, same_place
+from dva_sim.core.travel_times import SiteKnowledge, Travel
 from dva_sim.kernel.plugins import FAILURES
 from dva_sim.protocol import messages as m
 
@@ -48,7 +47,7 @@ class Dispatcher:
 
     Attributes:
         auctions: Who has bid what.
-        lookout: Gathers what the policy is shown.
+        situations: Gathers what the policy is shown.
         last_failure: What the policy did wrong last, in words.
     """
 
@@ -58,11 +57,11 @@ class Dispatcher:
         travel: Travel,
         orders: Orders,
         rng: np.random.Generator,
-        ground: Ground,
+        ground: SiteKnowledge,
     ) -> None:
         self.policy, self.orders = policy, orders
         self.auctions = Auctions(orders.rules.bid_within)
-        self.lookout = Lookout(policy, travel, orders, ground, self.auctions)
+        self.situations = SituationBuilder(policy, travel, orders, ground, self.auctions)
         self.last_failure = ""
         self._rng, self._ground, self._default = rng, ground, MinEta()
 
@@ -83,7 +82,7 @@ class Dispatcher:
         return sends
 
     def _decide(self, now: float) -> list[Send]:
-        view = self.lookout.look(now)
+        view = self.situations.look(now)
         return [] if view is None else self._carry_out(self._advice(view.situation), view, now)
 
     def _advice(self, situation: Situation) -> Sequence[Advice]:
@@ -97,7 +96,7 @@ class Dispatcher:
             return self._default.advise(situation, self._rng)
         return advice
 
-    def _carry_out(self, advice: Sequence[Advice], view: View, now: float) -> list[Send]:
+    def _carry_out(self, advice: Sequence[Advice], view: PolicyView, now: float) -> list[Send]:
         """Nobody is sent to two places, and nothing is given to two."""
         taken: set[int] = set()
         given: set[int] = set()
@@ -123,7 +122,7 @@ class Dispatcher:
 
     # --- what the rules allow; None: they do not -----------------------------------------
 
-    def _assign(self, choice: Assignment, view: View, now: float) -> list[Send] | None:
+    def _assign(self, choice: Assignment, view: PolicyView, now: float) -> list[Send] | None:
         """The orders that an assignment means."""
         task, event = view.situation.tasks[choice.task], view.events[choice.task]
         entry, former = view.team.entries[choice.responder], view.team.engaged[choice.responder]
@@ -139,13 +138,13 @@ class Dispatcher:
             pilot = former.operator if former else view.team.operators.pop(0).device.id_tag
         sends = self.orders.redirect(former, now) if former else []
         responder = entry.device.id_tag
-        self.lookout.forget_move(responder)
+        self.situations.forget_move(responder)
         if task.stage == "contain":
             return [*sends, self.orders.act(event, responder, now)]
         award = self.auctions.award(event.number, responder)
         return [*sends, self.orders.confirm(event, responder, pilot, now, award)]
 
-    def _announce(self, offer: Announcement, view: View, now: float) -> list[Send] | None:
+    def _announce(self, offer: Announcement, view: PolicyView, now: float) -> list[Send] | None:
         """Ask every idle responder that could go there for a bid."""
         event = view.events[offer.task]
         on_offer = event.number in self.auctions.running
@@ -162,7 +161,7 @@ class Dispatcher:
         body = m.TaskAnnouncement(event.number, event.kind, event.position, event.severity, within)
         return [Send(device, body) for device in asked]
 
-    def _relocate(self, move: Relocation, view: View, now: float) -> list[Send] | None:
+    def _relocate(self, move: Relocation, view: PolicyView, now: float) -> list[Send] | None:
         """Let an idle guard wait elsewhere, unless it is there already, or on its way there."""
         entry, cover = view.team.entries[move.responder], view.situation.cover
         assert cover is not None, "without stations there is no such advice: see _check_form"
@@ -172,7 +171,7 @@ class Dispatcher:
         eta = float(cover.eta[move.responder, move.station])  # infinite unless an idle guard's
         if not math.isfinite(eta) or cover.bound_for[move.responder] == move.station:
             return None
-        self.lookout.sends_to_wait(entry.device.id_tag, move.station, eta, now)
+        self.situations.sends_to_wait(entry.device.id_tag, move.station, eta, now)
         self.orders.counters["relocated"] += 1
         return [Send(entry.device.id_tag, m.Relocation(place))]
 
@@ -222,7 +221,7 @@ class Patrols:
     _on_round: set[str] = field(default_factory=set)
 
     def set_out(
-        self, registry: Registry, sessions: Sessions, engaged: Engaged, now: float
+        self, registry: Registry, sessions: Sessions, engaged: Assignments, now: float
     ) -> list[Send]:
         """What to tell the robots that have rested long enough."""
         sends: list[Send] = []
@@ -250,11 +249,11 @@ class Patrols:
             return []
         return [self._round(entry, body.session)]
 
-    def _with_a_beat(self, registry: Registry) -> Iterator[Entry]:
+    def _with_a_beat(self, registry: Registry) -> Iterator[DeviceEntry]:
         if self.beats:
             yield from (e for e in registry.of_type(ROBOT) if e.device.label in self.beats)
 
-    def _round(self, entry: Entry, session: int) -> Send:
+    def _round(self, entry: DeviceEntry, session: int) -> Send:
         """Round after round, until somebody else takes the robot."""
         self._on_round.add(entry.device.id_tag)
         return Send(entry.device.id_tag, m.Patrol(self.beats[entry.device.label], 0), session)

@@ -1,4 +1,4 @@
-"""The DVA's desk: takes each message with the time, returns the reply and what else to send."""
+"""The DVA: takes each message with the time, returns the reply and what else to send."""
 
 from __future__ import annotations
 
@@ -12,21 +12,20 @@ from dva_sim.core.dispatch import Policy
 from dva_sim.core.dispatcher import Dispatcher, Patrols
 from dva_sim.core.events import EventBook, State
 from dva_sim.core.orders import Orders
-from dva_sim.core.outbox import Send
 from dva_sim.core.permissions import Access
-from dva_sim.core.registry import GUARD, OPERATOR, ROBOT, Entry, Registry
-from dva_sim.core.sessions import Sessions
-from dva_sim.core.travel_times import Ground, Travel
+from dva_sim.core.registry import GUARD, OPERATOR, ROBOT, DeviceEntry, Registry
+from dva_sim.core.sessions import Send, Sessions
+from dva_sim.core.travel_times import SiteKnowledge, Travel
 from dva_sim.protocol import messages as m
 
 LIST_BYTES = 7000  # of a device list, the rest of the message apart [B]
 DEVICE_BYTES = 175  # of one device without its label, at most [B]
 MOST_LISTED = 64
 
-Answer = tuple[m.Reply, list[Send]]
+Reaction = tuple[m.Reply, list[Send]]
 
 
-class Desk:
+class Dva:
     """The DVA core.
 
     Args:
@@ -53,16 +52,17 @@ class Desk:
         policy: Policy,
         travel: Travel,
         rules: Rules,
+        *,
         rng: np.random.Generator,
         sessions: Sessions,
-        ground: Ground | None = None,
+        ground: SiteKnowledge | None = None,
         access: Access | None = None,
         patrols: Patrols | None = None,
     ) -> None:
         self.sessions, self.access = sessions, access or Access()
         self.registry, self.book = Registry(), EventBook(rules.merge_distance)
         self.orders = Orders(rules, self.registry, self.book, sessions)
-        self.dispatcher = Dispatcher(policy, travel, self.orders, rng, ground or Ground())
+        self.dispatcher = Dispatcher(policy, travel, self.orders, rng, ground or SiteKnowledge())
         self.counters: Counter[str] = self.orders.counters
         self.refused = 0
         self._rules, self._patrols = rules, patrols or Patrols()
@@ -71,7 +71,7 @@ class Desk:
 
     # --- what comes in -----------------------------------------------------------------
 
-    def handle(self, message: m.Message, now: float) -> Answer:
+    def handle(self, message: m.Message, now: float) -> Reaction:
         """Take a request; the reply goes to the sender, the rest where it says."""
         reply, sends = self._handle(message, now)
         return reply, self._and_revocations(sends)
@@ -102,7 +102,7 @@ class Desk:
             self.dispatcher.auctions.no_bid(body.event_id, send.to)
             sends = self.dispatcher.decide(now)
         elif isinstance(body, m.Relocation):
-            self.dispatcher.lookout.forget_move(send.to)
+            self.dispatcher.situations.forget_move(send.to)
         else:
             self.sessions.undelivered(send)
         return self._and_revocations(sends)
@@ -134,11 +134,11 @@ class Desk:
         return self._and_revocations(self.orders.again())
 
     def close(self) -> list[Send]:
-        """The desk closes: all sessions are over."""
+        """The DVA closes: all sessions are over."""
         self.sessions.take_back_everything()
         return self._and_revocations([])
 
-    def _handle(self, message: m.Message, now: float) -> Answer:
+    def _handle(self, message: m.Message, now: float) -> Reaction:
         body, source = message.body, message.source
         if isinstance(body, m.Registration):
             return self._register(message, body, now)
@@ -158,7 +158,7 @@ class Desk:
             case m.PermissionRevocation():
                 return self._give_back(message, body)
             case m.GetDeviceList():
-                return self._ok(message, m.DeviceList(self._shown()))
+                return self._ok(message, [], m.DeviceList(self._shown()))
             case _:
                 name = type(body).__name__
                 return self._refuse(message, m.NOT_SUPPORTED, f"{name} is not for the DVA")
@@ -169,7 +169,7 @@ class Desk:
 
     # --- who is there ------------------------------------------------------------------
 
-    def _register(self, message: m.Message, body: m.Registration, now: float) -> Answer:
+    def _register(self, message: m.Message, body: m.Registration, now: float) -> Reaction:
         known = self.registry.entries.get(message.source)
         sends: list[Send] = []
         if known is not None and known.device.device_type != body.device_type:
@@ -181,19 +181,19 @@ class Desk:
         if entry is None:
             return self._refuse(message, m.BUSY, "the registry is full")
         entry.registrations.append((message.message_id, message.timestamp))
-        return self._ok(message)[0], sends
+        return self._ok(message, sends)
 
     def _gone(self, device: str, now: float) -> list[Send]:
         """A device is there no more: what it held is free, what it did is open to others."""
         self.sessions.take_back_all(device)
-        self.dispatcher.lookout.forget_move(device)
+        self.dispatcher.situations.forget_move(device)
         return self.orders.abandon(device, now)
 
     # --- who may do what ---------------------------------------------------------------
 
     def _permission(
-        self, message: m.Message, asker: Entry, body: m.PermissionRequest, now: float
-    ) -> Answer:
+        self, message: m.Message, asker: DeviceEntry, body: m.PermissionRequest, now: float
+    ) -> Reaction:
         robot = self.registry.entries.get(body.device)
         if robot is None or robot.device.device_type != ROBOT:
             return self._refuse(message, m.UNKNOWN_DEVICE, f"no robot {body.device}")
@@ -211,17 +211,17 @@ class Desk:
         if granted is None:
             return self._refuse(message, m.BUSY, f"robot {body.device} is held by another")
         content, sends = granted
-        return self._ok(message, content)[0], sends
+        return self._ok(message, sends, content)
 
     def _serves_another(self, robot: str, asker: str) -> bool:
         engaged = self.orders.engaged
         return any(not engaged.is_at(asker, event) for event in engaged.all(robot))
 
-    def _give_back(self, message: m.Message, body: m.PermissionRevocation) -> Answer:
+    def _give_back(self, message: m.Message, body: m.PermissionRevocation) -> Reaction:
         """A holder needs its permission no longer; only its own."""
         if body.holder != message.source or not self.sessions.give_back(body):
             return self._refuse(message, m.BAD_SESSION, "that session is not yours, or is over")
-        return self._ok(message)
+        return self._ok(message, [])
 
     def check_access(self, now: float) -> None:
         """Permissions in use end with the rule that allowed them."""
@@ -239,7 +239,7 @@ class Desk:
 
     # --- what happens ------------------------------------------------------------------
 
-    def _report(self, message: m.Message, body: m.EventReport, now: float) -> Answer:
+    def _report(self, message: m.Message, body: m.EventReport, now: float) -> Reaction:
         if body.event_id is None:
             return self._sighting(message, body, now)
         event = self.book.get(body.event_id)
@@ -250,9 +250,9 @@ class Desk:
         sends = self.orders.found(event, message.source, body.finding, now)
         if event.waits_for is not None:
             sends = sends + self.dispatcher.decide(now)
-        return self._ok(message)[0], sends
+        return self._ok(message, sends)
 
-    def _sighting(self, message: m.Message, body: m.EventReport, now: float) -> Answer:
+    def _sighting(self, message: m.Message, body: m.EventReport, now: float) -> Reaction:
         """Somebody who was not sent sees something, or sees it no longer."""
         if body.finding == "refuted":
             return self._withdrawal(message, body, now)
@@ -265,18 +265,18 @@ class Desk:
         else:
             self.book.merge(event, body.severity)
         self.book.note_source(event, message.source, body.confidence)
-        return self._ok(message)[0], self.dispatcher.decide(now)
+        return self._ok(message, self.dispatcher.decide(now))
 
-    def _withdrawal(self, message: m.Message, body: m.EventReport, now: float) -> Answer:
+    def _withdrawal(self, message: m.Message, body: m.EventReport, now: float) -> Reaction:
         """What all who reported it have taken back, before anybody was sent, is over."""
         source, sends = message.source, list[Send]()
         for event in self.book.reported_by(source, body.kind, body.position):
             self.book.take_back(event, source)
             if event.state is State.PENDING and not event.sources:
                 sends += self.orders.expire(event, now)
-        return self._ok(message)[0], sends
+        return self._ok(message, sends)
 
-    def _progress(self, message: m.Message, body: m.OrderProgress, now: float) -> Answer:
+    def _progress(self, message: m.Message, body: m.OrderProgress, now: float) -> Reaction:
         event = self.orders.engaged.find(message.source, body.event_id)
         if event is None or not self.orders.has_order(event, message.source):
             text = f"device {message.source} has no order for event {body.event_id}"
@@ -289,14 +289,14 @@ class Desk:
         elif body.state in ("done", "failed", "declined"):
             sends = self.orders.ends(event, message.source, body.state, now)
             sends += self.dispatcher.decide(now)
-        return self._ok(message)[0], sends
+        return self._ok(message, sends)
 
-    def _bid(self, message: m.Message, body: m.TaskBid, now: float) -> Answer:
+    def _bid(self, message: m.Message, body: m.TaskBid, now: float) -> Reaction:
         auctions = self.dispatcher.auctions
         if not auctions.bid(body.event_id, message.source, body.arrival_in, now):
             text = f"no bid was asked for on event {body.event_id}, or it comes too late"
             return self._refuse(message, m.UNKNOWN_EVENT, text)
-        return self._ok(message)[0], self.dispatcher.decide(now)
+        return self._ok(message, self.dispatcher.decide(now))
 
     # --- answers -----------------------------------------------------------------------
 
@@ -324,10 +324,14 @@ class Desk:
                 yield entry.device
 
     @staticmethod
-    def _ok(message: m.Message, content: m.DeviceList | m.Permission | None = None) -> Answer:
-        return m.Reply(message.message_id, m.OK, "", content), []
+    def _ok(
+        message: m.Message,
+        sends: list[Send],
+        content: m.DeviceList | m.Permission | None = None,
+    ) -> Reaction:
+        return m.Reply(message.message_id, m.OK, "", content), sends
 
-    def _refuse(self, message: m.Message, code: int, text: str) -> Answer:
+    def _refuse(self, message: m.Message, code: int, text: str) -> Reaction:
         self.refused += 1
         return m.Reply(message.message_id, code, text), []
 

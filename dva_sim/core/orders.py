@@ -6,11 +6,10 @@ import math
 from collections import Counter
 from dataclasses import dataclass, field
 
-from dva_sim.core.assignments import Engaged, Rules
+from dva_sim.core.assignments import Assignments, Rules
 from dva_sim.core.events import NEXT, Event, EventBook, State
-from dva_sim.core.outbox import Send
 from dva_sim.core.registry import Registry
-from dva_sim.core.sessions import Sessions
+from dva_sim.core.sessions import Send, Sessions
 from dva_sim.protocol import messages as m
 
 OVER = "done"  # said by the DVA to who has an order: it is over, stop
@@ -18,7 +17,7 @@ OVER = "done"  # said by the DVA to who has an order: it is over, stop
 
 @dataclass
 class Orders:
-    """All orders of a desk.
+    """All orders of the DVA.
 
     Attributes:
         engaged: What each device is working on.
@@ -29,7 +28,7 @@ class Orders:
     registry: Registry
     book: EventBook
     sessions: Sessions
-    engaged: Engaged = field(default_factory=Engaged)
+    engaged: Assignments = field(default_factory=Assignments)
     counters: Counter[str] = field(default_factory=Counter)
     _pauses: list[float] = field(default_factory=list)
 
@@ -81,7 +80,7 @@ class Orders:
         return self._stand_down(event)
 
     def again(self) -> list[Send]:
-        """Every order that stands, to be said again by a desk that was started anew."""
+        """Every order that stands, to be said again by a DVA that was started anew."""
         sends = []
         for event in self.book.open.values():
             if event.state in (State.ASSIGNED, State.ON_SCENE) and event.responder is not None:

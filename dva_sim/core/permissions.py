@@ -1,13 +1,14 @@
-"""Who may act on which robot: one holder at a time, each with a session as fencing token.
+"""Who may act on which robot, and who may ask for it.
 
-Who may ask for what: the rules of access, apart from who holds what at the moment.
+There is one holder at a time, whose session is a fencing token (`Permissions`); the rules of
+access say what a device may ask for, whoever holds what at the moment (`Access`).
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 from typing import Literal, TypeVar
 
 from dva_sim.core.registry import OPERATOR
@@ -36,6 +37,7 @@ class Grant:
     holder: str
     level: str
     session: int
+    _: KW_ONLY
     sensors: tuple[str, ...] = ()
     address: str | None = None
 
@@ -82,7 +84,7 @@ class Permissions:
         asked = holder, level, sensors
         same = held is not None and (held.holder, held.level, held.sensors) == asked
         session = held.session if held is not None and same else self._new_session(only_sensors)
-        grant = Grant(robot, holder, level, session, sensors, address)
+        grant = Grant(robot, holder, level, session, sensors=sensors, address=address)
         self.changes += grant != held
         if only_sensors:
             self.observers[robot, holder] = grant
@@ -144,7 +146,7 @@ LEVELS: tuple[Level, ...] = ("teleoperation", "missions", "both", "sensors")
 _INCLUDES = {"both": {"teleoperation", "missions"}}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class AccessRule:
     """What some devices may do with some robots, for a time.
 

@@ -14,7 +14,7 @@ MAX_DEVICES = 20_000
 
 
 @dataclass(slots=True)
-class Entry:
+class DeviceEntry:
     """One registered device.
 
     Attributes:
@@ -60,19 +60,21 @@ class Registry:
 
     silent_after: float = 10.0
     most: int = MAX_DEVICES
-    entries: dict[str, Entry] = field(default_factory=dict)
+    entries: dict[str, DeviceEntry] = field(default_factory=dict)
     version: int = 0
-    _of_type: dict[str, dict[str, Entry]] = field(default_factory=lambda: defaultdict(dict))
-    _located: dict[str, dict[str, Entry]] = field(default_factory=lambda: defaultdict(dict))
-    _heard: OrderedDict[str, Entry] = field(default_factory=OrderedDict)  # longest quiet first
-    _changed: dict[str, Entry] = field(default_factory=dict)
+    _of_type: dict[str, dict[str, DeviceEntry]] = field(default_factory=lambda: defaultdict(dict))
+    _located: dict[str, dict[str, DeviceEntry]] = field(default_factory=lambda: defaultdict(dict))
+    _heard: OrderedDict[str, DeviceEntry] = field(
+        default_factory=OrderedDict
+    )  # longest quiet first
+    _changed: dict[str, DeviceEntry] = field(default_factory=dict)
 
-    def register(self, id_tag: str, request: Registration, now: float) -> Entry | None:
+    def register(self, id_tag: str, request: Registration, now: float) -> DeviceEntry | None:
         """Enter a device, or renew its entry; None if the registry is full."""
         device = Device(id_tag, request.label, request.device_type, request.address)
         entry = self.entries.get(id_tag)
         if entry is None:
-            return self.add(Entry(device, now)) if len(self.entries) < self.most else None
+            return self.add(DeviceEntry(device, now)) if len(self.entries) < self.most else None
         if entry.device != device:
             entry.device = device
             self._changed[id_tag] = entry
@@ -80,7 +82,7 @@ class Registry:
         self.heard(id_tag, now)
         return entry
 
-    def add(self, entry: Entry) -> Entry:
+    def add(self, entry: DeviceEntry) -> DeviceEntry:
         """Enter a device that was not known."""
         device, entry.place = entry.device, len(self.entries)
         self.entries[device.id_tag] = self._of_type[device.device_type][device.id_tag] = entry
@@ -88,7 +90,7 @@ class Registry:
         self.version += 1
         return entry
 
-    def heard(self, id_tag: str, now: float) -> Entry | None:
+    def heard(self, id_tag: str, now: float) -> DeviceEntry | None:
         """Note a sign of life; None if the device is not registered."""
         entry = self.entries.get(id_tag)
         if entry is not None:
@@ -98,13 +100,13 @@ class Registry:
             self._heard.move_to_end(id_tag)
         return entry
 
-    def locate(self, entry: Entry, position: Position) -> None:
+    def locate(self, entry: DeviceEntry, position: Position) -> None:
         """Note where a device is."""
         if entry.position is None:
             self._located[entry.device.device_type][entry.device.id_tag] = entry
         entry.position = position
 
-    def fallen_silent(self, now: float) -> list[Entry]:
+    def fallen_silent(self, now: float) -> list[DeviceEntry]:
         """Devices that have been quiet for longer than the time-out since the last call."""
         gone = []
         while self.next_silence() <= now:
@@ -122,15 +124,15 @@ class Registry:
             return math.inf
         return math.nextafter(longest.last_heard + self.silent_after, math.inf)  # not before
 
-    def of_type(self, device_type: str) -> Iterable[Entry]:
+    def of_type(self, device_type: str) -> Iterable[DeviceEntry]:
         """Registered devices of a type that are not silent, in order of registration."""
         return (e for e in self._of_type[device_type].values() if not e.silent)
 
-    def located(self, device_type: str) -> Collection[Entry]:
+    def located(self, device_type: str) -> Collection[DeviceEntry]:
         """Devices of a type of which is known where they are, in any order, silent ones too."""
         return self._located[device_type].values()
 
-    def changes(self) -> list[Entry]:
+    def changes(self) -> list[DeviceEntry]:
         """The devices that registered, or moved to another address, since this was last asked."""
         changed, self._changed = self._changed, {}
         return list(changed.values())

@@ -4,9 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from dva_sim.core.outbox import Send
 from dva_sim.core.permissions import Grant, Permissions
 from dva_sim.protocol import messages as m
+
+
+@dataclass(frozen=True, slots=True)
+class Send:
+    """A message that the DVA wants delivered: to whom, what, and in which session."""
+
+    to: str
+    body: m.Body
+    session: int = 0
+
 
 MOST_UNTOLD = 1000
 

@@ -1,4 +1,4 @@
-"""The lookout: gathers what is known at one moment for the policy that has to decide."""
+"""Gathers what is known at one moment for the policy that has to decide."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from dva_sim.core.auctions import Auctions
 from dva_sim.core.dispatch.situation import Cover, Policy, Responder, Situation, Task
 from dva_sim.core.events import Event, State
 from dva_sim.core.orders import Orders
-from dva_sim.core.registry import GUARD, OPERATOR, ROBOT, Entry
-from dva_sim.core.travel_times import Floats, Ground, Start, Travel
+from dva_sim.core.registry import GUARD, OPERATOR, ROBOT, DeviceEntry
+from dva_sim.core.travel_times import Floats, SiteKnowledge, Start, Travel
 from dva_sim.protocol import messages as m
 
 CONSIDERED = 1000  # tasks that one decision looks at, those detected longest ago
@@ -27,12 +27,12 @@ _place = operator.attrgetter("place")
 
 
 @dataclass
-class Team:
+class KnownTeam:
     """Who can go: the entries behind `Situation.responders`, and the operators' free hands."""
 
-    entries: list[Entry]
+    entries: list[DeviceEntry]
     engaged: list[Event | None]
-    operators: list[Entry]
+    operators: list[DeviceEntry]
 
     def idle(self) -> set[str]:
         """Ids of those who do nothing."""
@@ -49,16 +49,16 @@ class Team:
 
 
 @dataclass
-class View:
-    """What a policy is shown, and the desk's own things behind it, in the same places."""
+class PolicyView:
+    """What a policy is shown, and the core's own things behind it, in the same places."""
 
     situation: Situation
     events: list[Event]
-    team: Team
+    team: KnownTeam
 
 
 @dataclass
-class Lookout:
+class SituationBuilder:
     """Knows who can go, what there is to do, and how far it is.
 
     Attributes:
@@ -72,11 +72,11 @@ class Lookout:
     policy: Policy
     travel: Travel
     orders: Orders
-    ground: Ground
+    ground: SiteKnowledge
     auctions: Auctions
     _bound_for: dict[str, tuple[int, float]] = field(default_factory=dict)  # station, until
 
-    def look(self, now: float) -> View | None:
+    def look(self, now: float) -> PolicyView | None:
         """What there is to decide; None if there is nothing, or nobody to send."""
         if not self.orders.book.open and not self.policy.relocates:
             return None
@@ -87,7 +87,7 @@ class Lookout:
         if not team.entries:
             return None
         self.auctions.forget_useless(team.idle())
-        return View(self._situation(events, team, now), events, team)
+        return PolicyView(self._situation(events, team, now), events, team)
 
     # --- who is on the way to wait somewhere ---------------------------------------------
 
@@ -131,7 +131,7 @@ class Lookout:
             return False
         return self.orders.registry.entries[event.responder].position is not None
 
-    def _team(self, now: float) -> Team:
+    def _team(self, now: float) -> KnownTeam:
         registry = self.orders.registry
         entries = self._free(registry.located(GUARD), now)
         robots = self._free(registry.located(ROBOT), now)
@@ -143,9 +143,9 @@ class Lookout:
             for event in filter(self._is_under_way, self.orders.book.open.values()):
                 entries.append(self.orders.registry.entries[event.responder or ""])
                 engaged.append(event)
-        return Team(entries, engaged, operators)
+        return KnownTeam(entries, engaged, operators)
 
-    def _free(self, entries: Iterable[Entry], now: float) -> list[Entry]:
+    def _free(self, entries: Iterable[DeviceEntry], now: float) -> list[DeviceEntry]:
         """Those who may be given an order, in order of registration."""
         is_held, engaged = self.orders.sessions.is_held, self.orders.engaged
         free = [
@@ -156,7 +156,7 @@ class Lookout:
         ]
         return sorted(free, key=_place)
 
-    def _hands(self, operators: Iterable[Entry], now: float) -> list[Entry]:
+    def _hands(self, operators: Iterable[DeviceEntry], now: float) -> list[DeviceEntry]:
         """Operators who may be given a robot, each as often as it may; the least busy first."""
         span, count = self.orders.rules.operator_span, self.orders.engaged.count
         hands = [
@@ -167,7 +167,7 @@ class Lookout:
         ]
         return [entry for _, _, entry in sorted(hands, key=operator.itemgetter(0, 1))]
 
-    def _situation(self, events: list[Event], team: Team, now: float) -> Situation:
+    def _situation(self, events: list[Event], team: KnownTeam, now: float) -> Situation:
         rows = {id(e): row for row, e in enumerate(events)}
         columns = {id(e): c for c, e in enumerate(team.engaged) if e is not None}
         tasks = tuple(self._task(e, columns.get(id(e))) for e in events)
@@ -181,35 +181,35 @@ class Lookout:
         ranks = [preference(e.position, names) for e in events] if preference and events else []
         bids = self.auctions.bids(events, names, now) if self.policy.auctions else np.empty((0, 0))
         return Situation(
-            now,
-            tasks,
-            responders,
-            _sealed(distance),
-            _sealed(eta),
-            _sealed(np.array(ranks, dtype=np.float64) if ranks else np.empty((0, 0))),
-            _sealed(bids),
-            len(team.operators),
-            self._cover(team, now) if self.policy.relocates else None,
+            now=now,
+            tasks=tasks,
+            responders=responders,
+            distance=_sealed(distance),
+            eta=_sealed(eta),
+            preference=_sealed(np.array(ranks, dtype=np.float64) if ranks else np.empty((0, 0))),
+            bids=_sealed(bids),
+            operators=len(team.operators),
+            cover=self._cover(team, now) if self.policy.relocates else None,
         )
 
     def _task(self, event: Event, engaged: int | None) -> Task:
         # While somebody is under way to look, what is left to give is standing by.
         confirm = event.state is State.PENDING or engaged is not None
         return Task(
-            event.number,
-            event.kind,
-            "confirm" if confirm else "contain",
-            confirm or event.state is State.CONFIRMED,
-            event.severity,
-            event.confidence,
-            event.times["detected"],
-            event.waiting_since,
-            engaged,
-            self.auctions.stage(event.number),
+            event=event.number,
+            kind=event.kind,
+            stage="confirm" if confirm else "contain",
+            due=confirm or event.state is State.CONFIRMED,
+            severity=event.severity,
+            confidence=event.confidence,
+            detected=event.times["detected"],
+            waiting_since=event.waiting_since,
+            engaged=engaged,
+            auction=self.auctions.stage(event.number),
         )
 
     def _ways(
-        self, events: list[Event], tasks: Sequence[Task], team: Team
+        self, events: list[Event], tasks: Sequence[Task], team: KnownTeam
     ) -> tuple[Floats, Floats]:
         starts = team.starts()
         goals = [e.position for e in events]
@@ -222,7 +222,7 @@ class Lookout:
                 _leave_out_who_failed(event, starts, distance[row], eta[row])
         return distance, eta
 
-    def _cover(self, team: Team, now: float) -> Cover | None:
+    def _cover(self, team: KnownTeam, now: float) -> Cover | None:
         """Where idle guards could wait, and where they are on their way to already."""
         ground = self.ground
         if not ground.stations:

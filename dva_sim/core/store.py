@@ -15,17 +15,14 @@ from collections import deque
 from collections.abc import Iterable
 from dataclasses import fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from dva_sim.core.dva import Dva
 from dva_sim.core.events import KEPT_CLOSED, Event, State
 from dva_sim.core.permissions import Grant
-from dva_sim.core.registry import Entry
+from dva_sim.core.registry import DeviceEntry
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.protocol.messages import Device, PermissionRevocation, Position
-
-if TYPE_CHECKING:
-    from dva_sim.core.dva import Desk
-
 
 FORMAT = 1
 OPEN_WITHIN = 1.0  # that long somebody else may have the file to itself when it is opened [s]
@@ -46,12 +43,12 @@ _PLAIN: tuple[str, ...] = (
 )
 
 
-class Memory:
+class Store:
     """The file that a DVA writes down what it must not forget in.
 
     Args:
         file: Made if it does not exist.
-        epoch: Added to the desk's time, so that times of different lives agree [s].
+        epoch: Added to the DVA's time, so that times of different lives agree [s].
 
     Raises:
         ConfigError: the file cannot be opened, or is something else.
@@ -62,7 +59,7 @@ class Memory:
         self._sessions: dict[str, dict[str, str]] = {"grants": {}, "untold": {}}
         self._session_changes = 0
         self._events: dict[int, Event] = {}
-        self._devices: dict[str, Entry] = {}
+        self._devices: dict[str, DeviceEntry] = {}
         self._path = file
         try:
             self._file = sqlite3.connect(file, isolation_level=None, timeout=OPEN_WITHIN)
@@ -104,20 +101,20 @@ class Memory:
 
     # --- to the file -------------------------------------------------------------------
 
-    def keep(self, desk: Desk, changed: Iterable[Event], now: float) -> str | None:
+    def keep(self, dva: Dva, changed: Iterable[Event], now: float) -> str | None:
         """Write down what has changed; what went wrong, in words, or None.
 
         What cannot be written, to a full disk for example, is tried again with the next change.
         """
         self._events |= {event.number: event for event in changed}
-        self._devices |= {entry.device.id_tag: entry for entry in desk.registry.changes()}
-        changes = _session_changes(desk)
+        self._devices |= {entry.device.id_tag: entry for entry in dva.registry.changes()}
+        changes = _session_changes(dva)
         if not (self._events or self._devices or changes != self._session_changes):
             return None
-        sessions = self._sessions if changes == self._session_changes else _of_sessions(desk)
+        sessions = self._sessions if changes == self._session_changes else _of_sessions(dva)
         try:
             self._file.execute("BEGIN IMMEDIATE")
-            self._write(desk, sessions)
+            self._write(dva, sessions)
             self._file.execute("COMMIT")
         except sqlite3.Error as error:
             if self._file.in_transaction:
@@ -127,10 +124,10 @@ class Memory:
         self._session_changes = changes
         return None
 
-    def _write(self, desk: Desk, sessions: dict[str, dict[str, str]]) -> None:
+    def _write(self, dva: Dva, sessions: dict[str, dict[str, str]]) -> None:
         put = self._file.executemany
         events = (
-            (e.number, e.open, json.dumps(_of_event(e, desk, self.epoch)))
+            (e.number, e.open, json.dumps(_of_event(e, dva, self.epoch)))
             for e in self._events.values()
         )
         put("INSERT OR REPLACE INTO events VALUES (?, ?, ?)", events)
@@ -143,13 +140,13 @@ class Memory:
             )
             new = now.items() - before.items()
             put(f"INSERT OR REPLACE INTO {table} VALUES (?, ?)", sorted(new))
-        count = desk.sessions.permissions.count
+        count = dva.sessions.permissions.count
         put("INSERT OR REPLACE INTO about VALUES (?, ?)", [("sessions", count)])
 
     # --- from the file -----------------------------------------------------------------
 
-    def recall(self, desk: Desk, now: float) -> bool:
-        """Tell a new desk what an earlier one knew; whether there was anything.
+    def recall(self, dva: Dva, now: float) -> bool:
+        """Tell a new DVA what an earlier one knew; whether there was anything.
 
         Devices count as heard just now: each has its time-out to show that it is there.
 
@@ -157,29 +154,29 @@ class Memory:
             ConfigError: what the file holds makes no sense.
         """
         try:
-            found = self._recall(desk, now)
+            found = self._recall(dva, now)
         except (sqlite3.Error, ValueError, KeyError, TypeError) as error:
             raise self._useless(error) from None
-        desk.check_access(now)
+        dva.check_access(now)
         return found
 
-    def _recall(self, desk: Desk, now: float) -> bool:
+    def _recall(self, dva: Dva, now: float) -> bool:
         for (data,) in self._file.execute("SELECT data FROM devices ORDER BY rowid"):
-            desk.registry.add(_entry(json.loads(data), now))
-        found = bool(desk.registry.entries)
+            dva.registry.add(_entry(json.loads(data), now))
+        found = bool(dva.registry.entries)
         for state, count in self._counts().items():
-            desk.book.counts[state] += count
+            dva.book.counts[state] += count
         for (data,) in self._file.execute(_RECENT, (KEPT_CLOSED,)):
             found = True
             kept = json.loads(data)
             event = _event(kept, self.epoch)
-            desk.book.restore(event)
+            dva.book.restore(event)
             for name in kept["engaged"]:
-                desk.orders.engaged.begin(name, event)
-        desk.book.total = sum(desk.book.counts.values())
-        self._recall_sessions(desk)
-        desk.registry.changes()
-        desk.book.changes()
+                dva.orders.engaged.begin(name, event)
+        dva.book.total = sum(dva.book.counts.values())
+        self._recall_sessions(dva)
+        dva.registry.changes()
+        dva.book.changes()
         return found
 
     def _counts(self) -> dict[State, int]:
@@ -188,15 +185,15 @@ class Memory:
         )
         return {State(state): count for state, count in rows}
 
-    def _recall_sessions(self, desk: Desk) -> None:
-        permissions = desk.sessions.permissions
+    def _recall_sessions(self, dva: Dva) -> None:
+        permissions = dva.sessions.permissions
         for table, kept in self._sessions.items():
             kept |= self._file.execute(f"SELECT session, data FROM {table} ORDER BY rowid")
         for data in self._sessions["grants"].values():
             permissions.restore(_grant(json.loads(data)))
         for data in self._sessions["untold"].values():
-            desk.sessions.tell_robot(PermissionRevocation(*json.loads(data)))
-        self._session_changes = _session_changes(desk)
+            dva.sessions.tell_robot(PermissionRevocation(*json.loads(data)))
+        self._session_changes = _session_changes(dva)
         permissions.count = max(permissions.count, self._about("sessions"))
 
     def _about(self, name: str) -> int:
@@ -216,8 +213,8 @@ SELECT data FROM (
 """
 
 
-def _of_event(event: Event, desk: Desk, epoch: float) -> dict[str, Any]:
-    engaged = desk.orders.engaged
+def _of_event(event: Event, dva: Dva, epoch: float) -> dict[str, Any]:
+    engaged = dva.orders.engaged
     people = (event.responder, event.operator, event.actor)
     return {name: getattr(event, name) for name in _PLAIN} | {
         "state": event.state.value,
@@ -242,14 +239,14 @@ def _event(kept: dict[str, Any], epoch: float) -> Event:
     )
 
 
-def _session_changes(desk: Desk) -> int:
-    return desk.sessions.permissions.changes + desk.sessions.changes
+def _session_changes(dva: Dva) -> int:
+    return dva.sessions.permissions.changes + dva.sessions.changes
 
 
-def _of_sessions(desk: Desk) -> dict[str, dict[str, str]]:
+def _of_sessions(dva: Dva) -> dict[str, dict[str, str]]:
     """What holds, and which robots have not heard of what is over, by session."""
-    grants = desk.sessions.permissions.all()
-    untold = [(s, send.body) for s, send in desk.sessions.untold.items()]
+    grants = dva.sessions.permissions.all()
+    untold = [(s, send.body) for s, send in dva.sessions.untold.items()]
     return {
         "grants": {str(g.session): json.dumps(_plain(g)) for g in grants},
         "untold": {
@@ -266,13 +263,13 @@ def _plain(value: Device | Grant | PermissionRevocation) -> list[Any]:
 
 def _grant(kept: list[Any]) -> Grant:
     robot, holder, level, session, sensors, address = kept
-    return Grant(robot, holder, level, session, tuple(sensors), address)
+    return Grant(robot, holder, level, session, sensors=tuple(sensors), address=address)
 
 
-def _of_entry(entry: Entry) -> dict[str, Any]:
+def _of_entry(entry: DeviceEntry) -> dict[str, Any]:
     return {"device": _plain(entry.device), "registrations": list(entry.registrations)}
 
 
-def _entry(kept: dict[str, Any], now: float) -> Entry:
+def _entry(kept: dict[str, Any], now: float) -> DeviceEntry:
     said = deque(((i, t) for i, t in kept["registrations"]), maxlen=8)
-    return Entry(Device(*kept["device"]), now, registrations=said)
+    return DeviceEntry(Device(*kept["device"]), now, registrations=said)

@@ -44,7 +44,7 @@ class Travel(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Station:
+class WaitingPlace:
     """A place where idle guards may wait."""
 
     name: str
@@ -52,7 +52,7 @@ class Station:
 
 
 @dataclass(frozen=True)
-class Ground:
+class SiteKnowledge:
     """Knowledge of the place that does not change.
 
     Attributes:
@@ -64,6 +64,6 @@ class Ground:
     """
 
     preference: Callable[[m.Position, Sequence[str]], Sequence[float]] | None = None
-    stations: tuple[Station, ...] = ()
+    stations: tuple[WaitingPlace, ...] = ()
     reach: Floats = field(default_factory=lambda: np.empty((0, 0)))
     demand: Floats = field(default_factory=lambda: np.empty(0))

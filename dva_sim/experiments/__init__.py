@@ -1,1 +1,5 @@
-"""Studies: what is varied, how it is run, and what can be concluded from it."""
+"""Experiments: a study is asked, run, kept, analysed and reported, a room for each step.
+
+A room may import those before it (`study`, `results`, `execution`, `analysis`, `report`), and what
+simulates. Begin reading at `study/study.py`; `api.run` shows the steps in order.
+"""

@@ -1,8 +1,8 @@
-"""Which key somebody meant: one beside it, one elsewhere in the file, or one by another name.
+"""Read YAML 1.2 and check it against a pydantic model; mistakes are told by line and column.
 
-What is wrong with plain data, in words: what pydantic found, said without Python.
-
-Read YAML 1.2 and check it against a pydantic model; mistakes are told by line and column.
+What pydantic finds is said in words without Python: what is wrong, and what would be right. An
+unknown key is answered with the one that was meant: beside it, elsewhere in the file, or by another
+name. `Key` and `AlsoCalled` say at a field how a key is called.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from dva_sim.kernel.suggestions import either, guess, listed, plain_name, unknow
 from dva_sim.kernel.units import as_number
 
 KeyPath = tuple[str | int, ...]
+Scalar = bool | int | float | str | None
 
 _DEPTH = 4  # of keys in keys
 _MEANT = 3  # keys of one name that are told
@@ -47,6 +48,45 @@ class AlsoCalled:
 
     def __init__(self, *names: str) -> None:
         object.__setattr__(self, "names", names)
+
+
+@dataclass(frozen=True, eq=False)
+class Key:
+    """How a key is called where people read it: `Annotated[float, Key("one-way delay")]`.
+
+    Attributes:
+        title: As a factor of a study.
+        stated: In the table of what was the same for all that is compared: whether it is there,
+            or the words for it there.
+        zero: What is not there at a level of zero: `delay` gives `without delay`; whether it is
+            what the title says.
+        inner: The same of keys below it whose names depend on this place.
+    """
+
+    title: str = ""
+    stated: bool | str = True
+    zero: bool | str = False
+    inner: Mapping[str, Key] = field(default_factory=dict)
+
+    @property
+    def condition(self) -> str:
+        """Its words in a table of conditions; empty if it has no place there."""
+        return self.stated if isinstance(self.stated, str) else self.title if self.stated else ""
+
+    @property
+    def absent(self) -> str:
+        """What is not there at a level of zero; empty if that is not said so."""
+        return self.zero if isinstance(self.zero, str) else self.title if self.zero else ""
+
+
+def keys_said_of(model: Any) -> dict[str, Key]:
+    """Every dotted key of a model that says how it is called, in the order of the model."""
+    said: dict[str, Key] = {}
+    for path, info in _walk(model, "", _DEPTH):
+        for key in (m for m in info.metadata if isinstance(m, Key)):
+            said |= {path: said.get(path, key)} if key.title else {}
+            said |= {f"{path}.{name}": inner for name, inner in key.inner.items()}
+    return said
 
 
 def meant(path: KeyPath, value: Any, *models: Any) -> str:

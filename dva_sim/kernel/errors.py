@@ -101,3 +101,7 @@ def error_line(problem: object) -> str:
     return ERROR + "".join(
         c if c.isprintable() else c.encode("unicode_escape").decode() for c in text
     )
+
+
+class RunTooLong(BaseException):
+    """A run has taken too long. No `Exception`, so that no policy takes it for its own."""

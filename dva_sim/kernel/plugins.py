@@ -9,6 +9,7 @@ import sys
 import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import ModuleType
@@ -38,6 +39,7 @@ class Plugins(Generic[T]):
         needs: A method that a class must define, as it is written in a message.
         public: Where users import `base` from.
         hidden: Shipped names that a configuration cannot use.
+        finish: What is done with one of a user's that was made, such as holding it in limits.
     """
 
     kind: str
@@ -49,6 +51,7 @@ class Plugins(Generic[T]):
     needs: str
     public: str
     hidden: frozenset[str] = frozenset()
+    finish: Callable[[T], T] | None = None
 
     def known(self) -> list[str]:
         """Names that a configuration can use: shipped and installed ones; files come on top."""
@@ -64,12 +67,37 @@ class Plugins(Generic[T]):
         found = [path for root in resources.roots() for path in (root / self.folder).glob("*.py")]
         return sorted({path.resolve(): None for path in found})
 
-    def find(self, name: str, base: Path | None = None) -> Callable[..., T]:
+    def load(
+        self,
+        name: str | Callable[..., T],
+        options: Mapping[str, Any] | None = None,
+        base: Path | None = None,
+    ) -> Callable[..., T]:
+        """What makes one of a name, from what one of its kind is always given.
+
+        Args:
+            name: As for `find`.
+            options: Keyword arguments of its constructor, besides what it is given.
+            base: As for `find`.
+
+        Raises:
+            ConfigError: as `find`; a bad option is told when it is made, as by `make`.
+        """
+        factory, own, word = self.find(name, base), dict(options or {}), word_of(name)
+        finish = None if factory in self.shipped.values() else self.finish
+
+        def made(*given: Any) -> T:
+            one = self.make(word, factory, own, *given)
+            return one if finish is None else self.ask(word, partial(finish, one))
+
+        return made
+
+    def find(self, name: str | Callable[..., T], base: Path | None = None) -> Callable[..., T]:
         """The class that a name means.
 
         Args:
             name: A shipped name, a class in a file such as `mine.py:Mine`, or the name under
-                which an installed package offers one.
+                which an installed package offers one. Or the class itself.
             base: Folder that a file is looked for in first; then the working folder, and
                 `folder`.
 
@@ -77,7 +105,20 @@ class Plugins(Generic[T]):
             ConfigError: there is none, or its file or package cannot be loaded, or it is of
                 another kind. The line says what would be right.
         """
+        if not isinstance(name, str):
+            return self._right_class(word_of(name), name) if isinstance(name, type) else name
         return self.shipped.get(name) or self._from_file(name, base) or self._installed(name)
+
+    def located(self, name: str, base: Path | None = None) -> str:
+        """The same name, with the whole path of the file if it is in one; see `find`.
+
+        Raises:
+            ConfigError: there is no such file.
+        """
+        file, colon, wanted = name.rpartition(":")
+        if not colon or not file.endswith(".py"):
+            return name
+        return f"{self._find_file(name, file, base)}:{wanted}"
 
     def make(
         self, name: str, factory: Callable[..., T], options: Mapping[str, Any], *given: Any
@@ -199,6 +240,22 @@ class Guard:
     def _count(self, problem: str) -> None:
         self.failures += 1
         self.first_failure = self.first_failure or problem
+
+
+def word_of(name: object) -> str:
+    """What a name or a class is called in messages."""
+    return name if isinstance(name, str) else getattr(name, "__qualname__", repr(name))
+
+
+def stamp_of(name: str) -> int:
+    """When the file of `file.py:Class` was last changed [ns]; 0 for a name without a file."""
+    file = Path(name.rpartition(":")[0])
+    return file.stat().st_mtime_ns if file.is_file() else 0
+
+
+def resolved(name: str) -> Any:
+    """What `module:function` means: how a lower room names what a higher one has."""
+    return EntryPoint(name=name, group="", value=name).load()
 
 
 def said(error: BaseException) -> str:

@@ -16,7 +16,7 @@ REGISTRATION = ".registration.yaml"  # ending of a file that belongs to the stud
 _RESULTS = "manifest.json"  # of a results folder
 
 
-class Kind(NamedTuple):
+class FolderKind(NamedTuple):
     """What is found in one folder.
 
     Attributes:
@@ -29,14 +29,14 @@ class Kind(NamedTuple):
 
 
 KINDS: Final = {
-    "experiments": Kind("study", "dva-sim run"),
-    "experiments/scenarios": Kind("scenario", "dva-sim episode"),
-    "experiments/validation": Kind("file"),
-    "worlds": Kind("site", "dva-sim site show"),
-    "agents/robots": Kind("robot"),
-    "agents/phones": Kind("phone"),
-    "agents/accelerometers": Kind("accelerometer"),
-    "agents/people": Kind("profile of people"),
+    "experiments": FolderKind("study", "dva-sim run"),
+    "experiments/scenarios": FolderKind("scenario", "dva-sim episode"),
+    "experiments/validation": FolderKind("file"),
+    "worlds": FolderKind("site", "dva-sim site show"),
+    "agents/robots": FolderKind("robot"),
+    "agents/phones": FolderKind("phone"),
+    "agents/accelerometers": FolderKind("accelerometer"),
+    "agents/people": FolderKind("profile of people"),
 }
 
 
@@ -103,7 +103,7 @@ class _Missing(NamedTuple):
 
     @property
     def kind(self) -> str:
-        return KINDS.get(self.folder, Kind(Path(self.folder).name.removesuffix("s"))).word
+        return KINDS.get(self.folder, FolderKind(Path(self.folder).name.removesuffix("s"))).word
 
     def is_folder(self) -> str:
         """That it is the name of a folder, and what to do with it."""
@@ -134,7 +134,7 @@ class _Missing(NamedTuple):
         told = hint(Path(self.name).stem, self.known, "available")
         return f"{self.kind} {self.name!r} not found; {told}"
 
-    def _try(self, kind: Kind, name: str) -> str:
+    def _try(self, kind: FolderKind, name: str) -> str:
         return f"; try: {kind.command} {name}" if kind.command and self.is_asked else ""
 
 

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 from dva_sim.kernel.errors import DvaSimError, error_line
-from dva_sim.live.options import PATHS, Options
+from dva_sim.live.options import PATHS, LiveOptions
 from dva_sim.live.process import Teller, run_part
 
 
@@ -21,7 +21,7 @@ def main(argument: str) -> int:
     try:
         run_part(
             told["part"],
-            Options(**options),
+            LiveOptions(**options),
             Teller(sys.stdout).say,
             told["number"],
             told["epoch"],

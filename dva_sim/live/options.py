@@ -19,7 +19,7 @@ OPERATORS = ("simulated", "scripted")
 
 
 @dataclass(frozen=True)
-class Options:
+class LiveOptions:
     """What to run, where to listen, whom to reach.
 
     Attributes:

@@ -14,14 +14,14 @@ from typing import Any, Protocol
 
 from dva_sim.agents.operator.operator import OperatorAgent
 from dva_sim.agents.operator.scripted import ScriptedOperator, drill
-from dva_sim.agents.robot.decision_log import Trace
+from dva_sim.agents.robot.decision_log import DecisionLog
 from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.core.events import Event
 from dva_sim.core.permissions import LOW_BITS, Permissions
-from dva_sim.core.store import Memory
+from dva_sim.core.store import Store
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import either
-from dva_sim.live.options import PARTS, Options
+from dva_sim.live.options import PARTS, LiveOptions
 from dva_sim.simulation.full.control_room import add_dva, add_operator
 from dva_sim.simulation.full.field import Field
 from dva_sim.simulation.full.stage import Stage
@@ -34,7 +34,7 @@ RATE_OVER = 5.0  # rates are of so many last seconds [s]
 Row = dict[str, Any]
 
 
-class Part(Protocol):
+class LivePart(Protocol):
     """What a process of a live run does."""
 
     def rows(self) -> list[Row]:
@@ -70,14 +70,14 @@ class DvaPart:
         ConfigError: the file for its memory cannot be used.
     """
 
-    def __init__(self, stage: Stage, options: Options) -> None:
+    def __init__(self, stage: Stage, options: LiveOptions) -> None:
         # Sessions that no one can guess, and higher than in any earlier life of the DVA, as
         # long as that handed out no more than so many a second and the clock was not set back.
         count = int((time.time() - SESSION_EPOCH) * SESSIONS_PER_SECOND)
         permissions = Permissions(lambda: secrets.randbits(LOW_BITS), count=count)
         memory = None
         if options.state is not None:
-            memory = Memory(options.state, epoch=time.time() - stage.clock.now)
+            memory = Store(options.state, epoch=time.time() - stage.clock.now)
         self._agent = add_dva(stage, permissions, memory, keep_events=False)
         self._agent.desk.registry.most = _devices_that_fit()
         self._agent.start()
@@ -88,7 +88,7 @@ class DvaPart:
         self._beats: dict[str, Rate] = {}
 
     def rows(self) -> list[Row]:
-        """See `Part`: what everybody told the DVA."""
+        """See `LivePart`: what everybody told the DVA."""
         now, desk = self._stage.clock.now, self._agent.desk
         rows, engaged = [], desk.orders.engaged
         for id_tag, entry in desk.registry.entries.items():
@@ -111,7 +111,7 @@ class DvaPart:
         return [{"number": e.number, "kind": e.kind, "state": str(e.state)} for e in self._events()]
 
     def settled(self) -> bool:
-        """See `Part`."""
+        """See `LivePart`."""
         book = self._agent.desk.book
         return self._scripted or (book.total > self._settled_before and not book.open)
 
@@ -121,11 +121,11 @@ class DvaPart:
         return [*book.closed.values(), *book.open.values()]
 
     def has_company(self) -> bool:
-        """See `Part`: some device has registered."""
+        """See `LivePart`: some device has registered."""
         return bool(self._agent.desk.registry.entries)
 
     def finish(self) -> None:
-        """See `Part`: nobody drives any longer by our permission."""
+        """See `LivePart`: nobody drives any longer by our permission."""
         self._agent.close()
 
 
@@ -140,13 +140,13 @@ def _devices_that_fit() -> int:
 class WorldPart:
     """Robots, guards, hazards and the physics of a site."""
 
-    def __init__(self, stage: Stage, options: Options) -> None:
+    def __init__(self, stage: Stage, options: LiveOptions) -> None:
         self._stage = stage
         self._field = Field(stage)
         self._field.populate()
         self._field.schedule_incidents()
         self._commands: dict[str, Rate] = {}
-        self._traces: list[Trace] = []
+        self._traces: list[DecisionLog] = []
         if options.record is not None:
             self._record(options.record)
 
@@ -156,13 +156,13 @@ class WorldPart:
             folder.mkdir(parents=True, exist_ok=True)
             for robot in self._field.robots.values():
                 path = folder / f"{robot.device.label}.trace.jsonl"
-                robot.trace = Trace(path, robot.controller)
+                robot.trace = DecisionLog(path, robot.controller)
                 self._traces.append(robot.trace)
         except OSError as error:
             raise ConfigError(f"cannot be written: {error.strerror}", error.filename) from error
 
     def rows(self) -> list[Row]:
-        """See `Part`: how robots and guards are."""
+        """See `LivePart`: how robots and guards are."""
         now = self._stage.clock.now
         self._field.world.advance_to(now)
         robots = [self._robot_row(robot, now) for robot in self._field.robots.values()]
@@ -186,19 +186,19 @@ class WorldPart:
         }
 
     def settled(self) -> bool:
-        """See `Part`: everything that will be noticed was reported, and every robot is idle."""
+        """See `LivePart`: everything that will be noticed was reported, and every robot is idle."""
         detected = [i.detected for i in self._field.incidents if i.detected < math.inf]
         reported = self._stage.clock.now > max(detected, default=0.0) + 2.0
         return reported and all(r.controller.owner is None for r in self._field.robots.values())
 
     def has_company(self) -> bool:
-        """See `Part`: the DVA has answered one of those who are out here."""
+        """See `LivePart`: the DVA has answered one of those who are out here."""
         robots = [robot.device for robot in self._field.robots.values()]
         devices = [*robots, *(guard.device for guard in self._field.guards)]
         return any(device.round_trips for device in devices)
 
     def finish(self) -> None:
-        """See `Part`."""
+        """See `LivePart`."""
         for trace in self._traces:
             trace.close()
 
@@ -206,7 +206,7 @@ class WorldPart:
 class OperatorPart:
     """One operator: a simulated person, or one who follows a script."""
 
-    def __init__(self, stage: Stage, options: Options, number: int) -> None:
+    def __init__(self, stage: Stage, options: LiveOptions, number: int) -> None:
         self._stage, self._sent = stage, Rate()
         if options.operators == "scripted":
             self._agent: OperatorAgent | ScriptedOperator = ScriptedOperator(
@@ -217,7 +217,7 @@ class OperatorPart:
             self._agent = add_operator(stage, number)
 
     def rows(self) -> list[Row]:
-        """See `Part`: what the operator does, and how the phone finds the link."""
+        """See `LivePart`: what the operator does, and how the phone finds the link."""
         now, agent = self._stage.clock.now, self._agent
         row: Row = {"label": agent.device.label, "doing": agent.activity}
         sent = agent.asked if isinstance(agent, ScriptedOperator) else self._commands_sent()
@@ -230,19 +230,19 @@ class OperatorPart:
         return sum(drive.sent for drive in self._stage.recorder.drives)
 
     def settled(self) -> bool:
-        """See `Part`."""
+        """See `LivePart`."""
         return self._agent.activity in ("done", "waiting")
 
     def has_company(self) -> bool:
-        """See `Part`: the DVA has answered."""
+        """See `LivePart`: the DVA has answered."""
         return bool(self._agent.device.round_trips)
 
     def finish(self) -> None:
-        """See `Part`: a robot that is still driven is told to stop."""
+        """See `LivePart`: a robot that is still driven is told to stop."""
         self._agent.put_down()
 
 
-def make_part(name: str, stage: Stage, options: Options, number: int) -> Part:
+def make_part(name: str, stage: Stage, options: LiveOptions, number: int) -> LivePart:
     """The part of that name; `number` says which operator.
 
     Raises:
@@ -254,7 +254,7 @@ def make_part(name: str, stage: Stage, options: Options, number: int) -> Part:
         count = stage.scenario.operator.count
         has = f"the scenario has {count or 'no'} operator{'s' * (count != 1)}"
         raise ConfigError(f"--number {number}: {has}")
-    makers: dict[str, Callable[[], Part]] = {
+    makers: dict[str, Callable[[], LivePart]] = {
         "dva": lambda: DvaPart(stage, options),
         "world": lambda: WorldPart(stage, options),
         "operator": lambda: OperatorPart(stage, options, number),

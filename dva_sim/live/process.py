@@ -15,8 +15,8 @@ from typing import Any, TextIO
 
 from dva_sim.kernel.errors import RunsFailed
 from dva_sim.kernel.recorder import Recorder
-from dva_sim.live.options import Options
-from dva_sim.live.parts import DvaPart, Part, make_part
+from dva_sim.live.options import LiveOptions
+from dva_sim.live.parts import DvaPart, LivePart, make_part
 from dva_sim.network.keys import KeyRing
 from dva_sim.network.realtime import LiveClock
 from dva_sim.network.sockets import SocketNetwork, split_address
@@ -39,11 +39,11 @@ class Report:
         part: `dva`, `world` or `operator`.
         number: Which operator.
         time: Since the start of the run [s].
-        rows: See `Part.rows`.
+        rows: See `LivePart.rows`.
         events: The events, from the DVA.
         story: New lines of the timeline: time [s], who, what, kind.
         counters: What was refused or dropped so far, by reason.
-        settled: See `Part.settled`.
+        settled: See `LivePart.settled`.
         dva: Address of the DVA, from the DVA.
         lateness: The longest that an event had to wait for the processor [s].
     """
@@ -62,7 +62,7 @@ class Report:
 
 def run_part(
     name: str,
-    options: Options,
+    options: LiveOptions,
     say: Callable[[Report], object],
     number: int = 1,
     epoch: float | None = None,
@@ -117,7 +117,7 @@ def run_part(
 
 
 def _refuse_to_be_alone(
-    name: str, part: Part, dva: str | None, waited: float, ending: _ending
+    name: str, part: LivePart, dva: str | None, waited: float, ending: _ending
 ) -> None:
     if ending.is_asked or part.has_company():
         return
@@ -137,7 +137,7 @@ def _time_of_day(clock: LiveClock) -> tuple[float, bool]:
     return whole + started % 1.0, True
 
 
-def _joining(network: SocketNetwork, options: Options, name: str) -> Callable[[str, int], str]:
+def _joining(network: SocketNetwork, options: LiveOptions, name: str) -> Callable[[str, int], str]:
     """Gives each new device of this process two ports, and its address."""
     given = options.port
 
@@ -157,7 +157,7 @@ class _Reporter:
     """Collects the reports of a part; each line of the story is told once."""
 
     def __init__(
-        self, name: str, number: int, stage: Stage, part: Part, network: SocketNetwork
+        self, name: str, number: int, stage: Stage, part: LivePart, network: SocketNetwork
     ) -> None:
         self._name, self._number, self._stage = name, number, stage
         self._part, self._network = part, network

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from typing import IO
 
 from dva_sim.kernel.errors import ERROR, DvaSimError, ExitCode, RunsFailed
-from dva_sim.live.options import PATHS, Options
+from dva_sim.live.options import PATHS, LiveOptions
 from dva_sim.live.process import Report
 from dva_sim.simulation.scenario import Scenario
 
@@ -62,7 +62,7 @@ class Supervisor:
         hear: Takes each report of each part.
     """
 
-    def __init__(self, options: Options, hear: Callable[[str, Report], object]) -> None:
+    def __init__(self, options: LiveOptions, hear: Callable[[str, Report], object]) -> None:
         self._options, self._hear = options, hear
         self._children: list[_Child] = []
         self._selector = selectors.DefaultSelector()

@@ -1,1 +1,5 @@
-"""How bytes travel: links, reliable streams on them, and the messaging patterns on top."""
+"""How bytes travel: links, reliable streams on them, and the messaging patterns on top.
+
+It may import the protocol and the kernel. Begin with `messaging`, which says what every transport
+promises, then `virtual` and `sockets`, which keep it; `patterns` is how commands make use of it.
+"""

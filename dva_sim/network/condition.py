@@ -37,8 +37,12 @@ EMULATOR_RESULTS = (
 )
 """What the emulated link tells about itself: a is the operator, b the robot."""
 
+COLUMN_WORDS = {"req": "req-rep", "pub": "pub-sub", "dealer": "pipelined"}
+"""Patterns as tables, plans and labels of measurements write them, and what they are called."""
+
+_WRITTEN = {name: word for word, name in COLUMN_WORDS.items()}
 _CHOICES = {
-    "pattern": ("req", "pub", "dealer"),
+    "pattern": tuple(_WRITTEN),
     "conflate": ("none", "op", "rob", "both"),
     "cc": ("cubic", "reno", "bbr"),
 }
@@ -51,9 +55,10 @@ class Condition:
     """One cell of the comparison; times in ms because the tables are.
 
     Attributes:
-        pattern: `req` REQ/REP, `pub` PUB/SUB, `dealer` DEALER/ROUTER.
-        hz: Wanted command rate. REQ sends the next command at the later of the end of the last
-            one and its issue + 1/hz; PUB and DEALER keep a fixed grid.
+        pattern: `req-rep`, `pub-sub`, or `pipelined` without a window; the words of tables
+            (`COLUMN_WORDS`) are understood, too.
+        hz: Wanted command rate. `req-rep` sends the next command at the later of the end of the
+            last one and its issue + 1/hz; the others keep a fixed grid.
         proc_ms: The robot's service time.
         timeout_ms: REQ: after it the socket is closed and the same command goes over a new one.
         attempts: REQ: so many times in all, then an alert and the next command.
@@ -97,14 +102,17 @@ class Condition:
     burst_pkts: float | None = None
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "pattern", COLUMN_WORDS.get(self.pattern, self.pattern))
         for name, known in _CHOICES.items():
             if getattr(self, name) not in known:
                 raise ConfigError(unknown(name, getattr(self, name), known))
         given = [value is not None for value in (self.timeout_ms, self.attempts)]
-        if given != [self.pattern == "req"] * 2:
-            raise ConfigError("timeout_ms and attempts belong to pattern req, and only to it")
-        if self.conflate != "none" and self.pattern != "pub":
-            raise ConfigError(f"conflate {self.conflate!r} belongs to pattern pub, and only to it")
+        if given != [self.pattern == "req-rep"] * 2:
+            raise ConfigError("timeout_ms and attempts belong to pattern req-rep, and only to it")
+        if self.conflate != "none" and self.pattern != "pub-sub":
+            raise ConfigError(
+                f"conflate {self.conflate!r} belongs to pattern pub-sub, and only to it"
+            )
         for name, problem in _out_of_range(self):
             raise ConfigError(f"{name} {getattr(self, name):g} {problem}")
 
@@ -115,7 +123,7 @@ class Condition:
         The subscriber's handshake ends half a round trip later, and its subscription needs
         another half; with as much again as four small packets take on the link, and 5 ms.
         """
-        if self.pattern != "pub" or not self.wait_hs:
+        if self.pattern != "pub-sub" or not self.wait_hs:
             return 0.0
         round_trip = 2e-3 * self.delay_ms * (1.0 + self.jitter_frac)
         return round_trip + 4 * 120 * 8 / (1e3 * self.rate_kbit) + 0.005
@@ -124,7 +132,7 @@ class Condition:
     def label(self) -> str:
         """A name that a person can read; it leaves out what is as usual."""
         rate = 0 if math.isinf(self.rate_kbit) else self.rate_kbit
-        text = f"{self.pattern}{self.hz:g}_d{self.delay_ms:g}_j{100 * self.jitter_frac:g}"
+        text = f"{_WRITTEN[self.pattern]}{self.hz:g}_d{self.delay_ms:g}_j{100 * self.jitter_frac:g}"
         text += f"_l{100 * self.loss:g}_r{rate:g}_p{self.proc_ms:g}"
         return text + "".join(f"_{part}" for part in _unusual(self))
 
@@ -136,7 +144,8 @@ class Condition:
 
     def to_row(self) -> dict[str, str]:
         """The columns of the condition as a table holds them."""
-        return {name: _written(name, getattr(self, name)) for name in CONDITION}
+        row = {name: _written(name, getattr(self, name)) for name in CONDITION}
+        return row | {"pattern": _WRITTEN[self.pattern]}
 
     @classmethod
     def from_row(cls, row: Mapping[str, Any]) -> Condition:

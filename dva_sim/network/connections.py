@@ -17,7 +17,7 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import Field
 
 from dva_sim.kernel.clock import Clock
-from dva_sim.kernel.config import AlsoCalled, Config
+from dva_sim.kernel.config import AlsoCalled, Config, Key
 from dva_sim.network.link import Link
 from dva_sim.network.stream import Connection
 from dva_sim.network.tcp import TcpOptions
@@ -142,10 +142,14 @@ class ZeromqConfig(Config):
             (`ZMQ_CONFLATE`).
     """
 
-    high_water_mark: Annotated[int, Field(ge=1, le=1_000_000), AlsoCalled("hwm")] = HIGH_WATER_MARK
-    send_buffer_bytes: _Buffer = None
-    receive_buffer_bytes: _Buffer = None
-    conflate: Literal["none", "publisher", "subscriber", "both"] = "none"
+    high_water_mark: Annotated[
+        int, Field(ge=1, le=1_000_000), AlsoCalled("hwm"), Key("high-water mark")
+    ] = HIGH_WATER_MARK
+    send_buffer_bytes: Annotated[_Buffer, Key("send buffer")] = None
+    receive_buffer_bytes: Annotated[_Buffer, Key("receive buffer")] = None
+    conflate: Annotated[
+        Literal["none", "publisher", "subscriber", "both"], Key("kept of what waits")
+    ] = "none"
 
     @property
     def conflates_sender(self) -> bool:

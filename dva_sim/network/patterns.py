@@ -1,235 +1,248 @@
-"""Messaging patterns behind one promise, whatever carries them.
+"""Messaging patterns: how the commands of a drive travel from the phone's app to a robot.
 
-A `Transport` is a set of nodes that can ask each other (request/reply) and tell each other
-(publish/subscribe). `dva_sim.network.virtual` keeps the promise in virtual time,
-`dva_sim.network.sockets` over ZeroMQ sockets; agents know only what stands here.
+A pattern is an object. Its attributes say what everybody else has to know of it: what it is called,
+whether the robot subscribes, which of the commands that wait the robot obeys. Its methods are what
+the app does with each command. Whoever lists patterns or names one looks here.
 """
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+import inspect
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, Final, Protocol
 
 from dva_sim.kernel.clock import Clock
-
-QUEUE_LIMIT = 1000  # requests waiting at one requester
-ROUND_TRIPS_KEPT = 100_000
-
-Answer = Callable[[bytes], object]
+from dva_sim.kernel.plugins import Plugins
 
 
-class Request(NamedTuple):
-    """A request that has arrived.
-
-    Attributes:
-        data: Its bytes.
-        answer: Takes the bytes of the reply; once, now or later.
-        sender: Id of the device whose key opened the connection; None without keys.
-    """
-
-    data: bytes
-    answer: Answer
-    sender: str | None = None
-
-
-Service = Callable[[Request], object]
-
-
-class Subscription(Protocol):
-    """What one node wants to hear of another."""
-
-    def close(self) -> None:
-        """Leave; nothing more is delivered."""
-
-    def pause(self) -> None:
-        """Take nothing more for now: what comes waits on the way, at last at the publisher."""
-
-    def resume(self) -> None:
-        """Take what has waited, and what comes."""
-
-
-class Wire(Protocol):
-    """A connection to the service of a peer, made anew by closing it and opening another."""
-
-    def send(self, tag: int, data: bytes) -> None:
-        """Send a request as soon as the connection is open; its reply comes with the tag."""
-
-    def close(self) -> None:
-        """Forget what is under way: no reply is delivered any more."""
-
-
-OnReply = Callable[[int, bytes], object]
-
-
-class Transport(Protocol):
-    """What carries messages between nodes; a node is named by the id of its device."""
+class Command(Protocol):
+    """A command as the app made it from the tilt; only the line knows how to write it."""
 
     @property
-    def clock(self) -> Clock:
-        """The clock that all who use this transport share."""
-
-    def introduce(self, node: str, address: str) -> None:
-        """Say where a node is found, as in its registration."""
-
-    def serve(self, node: str, service: Service) -> None:
-        """Let `service` take the requests to `node`."""
-
-    def connect(self, node: str, peer: str, on_reply: OnReply, pipelined: bool) -> Wire:
-        """Open a connection from `node` to the service of `peer`."""
-
-    def publish(self, node: str, topic: str, payload: Any, size: int) -> None:
-        """Send a payload, which counts as `size` bytes [B], to the subscribers of a topic."""
-
-    def ready(self, node: str, topic: str, size: int) -> bool:
-        """Whether somebody wants a topic, and `size` more bytes [B] would not have to wait."""
-
-    def subscribe(
-        self, node: str, publisher: str, topic: str, handler: Callable[[Any], object]
-    ) -> Subscription:
-        """Hand what `publisher` publishes to `handler`: topics that begin with `topic`.
-
-        Topics end in `|`, so that none begins another.
-        """
+    def time(self) -> float:
+        """When it was made [s]."""
 
 
-@dataclass
-class _Asked:
-    """A request that waits or is under way."""
+class Line(Protocol):
+    """What a pattern has of a drive: a way to the robot, and an app that counts and alerts.
 
-    tag: int
-    data: bytes
-    on_reply: Callable[[bytes], object]
-    on_failure: Callable[[], object]
-    attempts: int = 0
-    sent_at: float = 0.0
-
-
-class Requester:
-    """Asks one peer; each request is answered, or fails after a number of attempts.
-
-    With a window of 1 it is a REQ socket: the next request goes when the last one is
-    answered, and after a time-out the connection is closed and opened anew. A wider window
-    is a DEALER: so many requests may be under way at once, over one connection.
-    The same bytes are sent again after a time-out, so a receiver can tell a repetition.
-
-    Args:
-        transport: Carries the messages.
-        node: Who asks.
-        peer: Who answers.
-        timeout: How long to wait for a reply [s].
+    Attributes:
+        clock: The run's.
+        rate_hz: Wanted commands per second.
+        timeout: How long to wait for an answer [s].
         attempts: How often a request is sent before it has failed.
-        window: How many requests may be unanswered at once.
+        window: How many requests may be unanswered at once, where a pattern allows more than one.
     """
 
-    def __init__(
-        self,
-        transport: Transport,
-        node: str,
-        peer: str,
-        timeout: float,
-        attempts: int = 3,
-        window: int = 1,
+    clock: Clock
+    rate_hz: float
+    timeout: float
+    attempts: int
+    window: int
+
+    def open_requests(
+        self, window: int = 1, *, timeout: float | None = None, attempts: int | None = None
     ) -> None:
-        self._transport, self._clock = transport, transport.clock
-        self.node, self.peer = node, peer
-        self._timeout, self._attempts, self._window = timeout, attempts, window
-        self._queue: deque[_Asked] = deque()
-        self._open: dict[int, _Asked] = {}
-        self._deadlines: deque[tuple[float, int, int]] = deque()  # when [s], tag, attempt
-        self._wire: Wire | None = None
-        self._last_tag = 0
-        self.timeouts = self.failures = self.overflows = 0
-        self.round_trips: deque[float] = deque(maxlen=ROUND_TRIPS_KEPT)
+        """Connect to the robot's service: a REQ socket, or a DEALER for a window above 1.
+
+        Args:
+            window: How many requests may be unanswered at once.
+            timeout: Of a request [s]; None: as configured.
+            attempts: Of a request; None: as configured.
+        """
 
     @property
     def busy(self) -> bool:
         """Whether a further request would have to wait."""
-        return len(self._open) >= self._window
-
-    def open(self) -> None:
-        """Connect now, as a socket does, so that the first request need not wait for it."""
-        if self._wire is None:
-            self._wire = self._transport.connect(
-                self.node, self.peer, self._on_reply, pipelined=self._window > 1
-            )
 
     def request(
         self,
-        data: bytes,
-        on_reply: Callable[[bytes], object],
-        on_failure: Callable[[], object] = lambda: None,
+        command: Command,
+        then: Callable[[bytes], object],
+        failed: Callable[[], object],
     ) -> None:
-        """Send `data` as soon as the window allows."""
-        if len(self._queue) >= QUEUE_LIMIT:
-            self.overflows += 1
-            on_failure()
+        """Send a command to be answered: `then` gets the reply; `failed` is told of none."""
+
+    def publish(self, command: Command) -> None:
+        """Publish a command on the robot's topic, to be heard or not."""
+
+    def newest(self, command: Command) -> Command:
+        """What the phone says now, if the app keeps sending; else the command itself."""
+
+    def supersede(self, command: Command) -> None:
+        """A command is not sent, since a newer one took its place: it is counted."""
+
+    def code_of(self, reply: bytes) -> int | None:
+        """The code in a reply, see `dva_sim.protocol.messages`; None if it cannot be read."""
+
+    def lost(self, why: str = "") -> None:
+        """Nobody obeys any more: the app alerts, and the drive ends."""
+
+
+class Pattern(ABC):
+    """How commands travel. Users derive from it; each drive has a copy of its own.
+
+    An emergency and all other requests never pass through here.
+
+    Attributes:
+        title: What it is called in reports; one without is called by its name.
+        label: The same where there is little room.
+        colour: Of its lines in figures, as `report/figures/palette.py` calls it.
+        sockets: That carry the commands, the app's first. In virtual time the same connections
+            are modelled.
+        when_slow: What becomes of commands when the robot, or the link, cannot keep up.
+        answered: Whether the app learns that nobody obeys: it alerts when the time-outs of all
+            attempts have passed, and the time in which it asks for an answer.
+        in_step: Whether a command waits for the answer to the one before.
+        published: Whether commands are published, so that the robot subscribes to them when a
+            drive begins. It takes requests in any case.
+        newest_wins: Whether the robot obeys only the newest published command that waits.
+    """
+
+    title: str = ""
+    label: str = ""
+    colour: str = ""
+    sockets: str = ""
+    when_slow: str = ""
+    answered: bool = False
+    in_step: bool = False
+    published: bool = False
+    newest_wins: bool = False
+    line: Line
+
+    def begin(self, line: Line) -> None:
+        """A drive begins: open what is needed."""
+        self.line = line
+
+    @abstractmethod
+    def offer(self, command: Command) -> None:
+        """The app has made a command: send it, keep it for later, or supersede it."""
+
+
+class Requested(Pattern):
+    """Requests: the next command goes when one of those under way has been answered.
+
+    What the phone says meanwhile is superseded by what it says last. After the last attempt
+    without an answer the app alerts: the link is lost.
+    """
+
+    answered = True
+    waiting: Command | None = None
+
+    def begin(self, line: Line) -> None:
+        """See `Pattern`."""
+        super().begin(line)
+        line.open_requests()
+
+    def offer(self, command: Command) -> None:
+        """See `Pattern`."""
+        if not self.line.busy:
+            self.line.request(command, self._answered, self.line.lost)
             return
-        self._last_tag += 1
-        self._queue.append(_Asked(self._last_tag, data, on_reply, on_failure))
-        self._fill()
+        if self.waiting is not None:
+            self.line.supersede(self.waiting)
+        self.waiting = command
 
-    def close(self) -> None:
-        """Forget everything, without a word to those who wait."""
-        self._queue.clear()
-        self._open.clear()
-        self._disconnect()
+    def _answered(self, _: bytes) -> None:
+        """A command that waited goes now: the newest value if the app keeps sending anyway."""
+        waiting, self.waiting = self.waiting, None
+        if waiting is not None:
+            self.offer(self.line.newest(waiting))
 
-    def _fill(self) -> None:
-        while self._queue and not self.busy:
-            asked = self._queue.popleft()
-            asked.sent_at = self._clock.now
-            self._open[asked.tag] = asked
-            self._attempt(asked)
 
-    def _attempt(self, asked: _Asked) -> None:
-        """Send a request, over a new connection if there is none."""
-        asked.attempts += 1
-        self._deadlines.append((self._clock.now + self._timeout, asked.tag, asked.attempts))
-        if len(self._deadlines) == 1:
-            self._clock.call_at(self._deadlines[0][0], self._look_at_deadlines)
-        self.open()
-        assert self._wire is not None
-        self._wire.send(asked.tag, asked.data)
+class ReqRep(Requested):
+    """Request and reply: the app sends its next command only when the last one was answered."""
 
-    def _disconnect(self) -> None:
-        if self._wire is not None:
-            self._wire.close()
-        self._wire = None
+    title, label, colour = "REQ/REP", "REQ/REP", "vermilion"
+    sockets, when_slow = "REQ to ROUTER", "commands become rarer"
+    in_step = True
 
-    def _on_reply(self, tag: int, reply: bytes) -> None:
-        asked = self._open.pop(tag, None)
-        if asked is None:
-            return  # doubled, or to a request that was given up
-        self.round_trips.append(self._clock.now - asked.sent_at)
-        asked.on_reply(reply)
-        self._fill()
 
-    def _look_at_deadlines(self) -> None:
-        """The first deadline is reached; those of what was answered meanwhile need no event.
+class Pipelined(Requested):
+    """Requests of which several may be unanswered at a time.
 
-        One event for all: a timer for each request costs more than the request.
-        """
-        _, tag, attempt = self._deadlines[0]
-        self._expire(tag, attempt)
-        self._deadlines.popleft()
-        while self._deadlines and self._deadlines[0][1] not in self._open:
-            self._deadlines.popleft()
-        if self._deadlines:
-            self._clock.call_at(self._deadlines[0][0], self._look_at_deadlines)
+    How many is `command.window` of the scenario.
+    """
 
-    def _expire(self, tag: int, attempt: int) -> None:
-        asked = self._open.get(tag)
-        if asked is None or asked.attempts != attempt:
-            return
-        self.timeouts += 1
-        if self._window == 1:
-            self._disconnect()
-        if attempt < self._attempts:
-            self._attempt(asked)
-            return
-        self.failures += 1
-        del self._open[tag]
-        asked.on_failure()
-        self._fill()
+    title, label, colour = "pipelined requests", "pipelined requests", "purple"
+    sockets = "DEALER to ROUTER"
+    when_slow = "commands become older, by a window at most"
+
+    def begin(self, line: Line) -> None:
+        """See `Pattern`."""
+        self.line = line
+        line.open_requests(line.window)
+
+
+class PubSub(Pattern):
+    """Publish and subscribe: the app sends without waiting, and the robot applies every command."""
+
+    title, label, colour = "plain PUB/SUB", "plain PUB/SUB", "blue"
+    sockets, when_slow = "XPUB to SUB", "commands queue without bound"
+    published = True
+
+    def offer(self, command: Command) -> None:
+        """See `Pattern`: send and forget."""
+        self.line.publish(command)
+
+
+class LatestWins(PubSub):
+    """Publish and subscribe, but the robot applies only the newest command that it has."""
+
+    title, label, colour = "latest-wins PUB/SUB", "latest-wins", "green"
+    when_slow = "commands are skipped"
+    newest_wins = True
+
+
+PATTERNS: Final[dict[str, type[Pattern]]] = {
+    "req-rep": ReqRep,
+    "pipelined": Pipelined,
+    "pub-sub": PubSub,
+    "latest-wins": LatestWins,
+}
+"""The shipped ones, by the names that a scenario uses."""
+
+PLUGINS: Final = Plugins(
+    "pattern",
+    Pattern,  # type: ignore[type-abstract]
+    PATTERNS,
+    folder="protocol/patterns",
+    group="dva_sim.patterns",
+    key="pattern",
+    needs="offer(command)",
+    public="dva_sim.network.patterns.Pattern",
+)
+
+
+def meaning_of(kind: type[Pattern]) -> str:
+    """What a pattern does: the first sentence of its docstring, without its full stop."""
+    first = " ".join((inspect.getdoc(kind) or "").partition("\n\n")[0].split())
+    return first[:1].lower() + first[1:].removesuffix(".")
+
+
+def known_patterns() -> list[str]:
+    """Names that a scenario can use: shipped and installed ones; files come on top."""
+    return PLUGINS.known()
+
+
+def load_pattern(
+    name: str | Callable[..., Pattern],
+    options: Mapping[str, Any] | None = None,
+    base: Path | None = None,
+) -> Callable[[], Pattern]:
+    """What makes the pattern that `name` means, one for each drive.
+
+    Args:
+        name: A shipped name, a class in a file such as `mine.py:Mine`, or the name under which
+            an installed package offers one (entry point, `dva_sim.patterns`).
+        options: Keyword arguments of its constructor.
+        base: Folder that a file is looked for in first; then the working folder, and
+            `protocol/patterns`.
+
+    Raises:
+        ConfigError: there is none of that name, its file or package cannot be loaded, or it is
+            not a pattern; a bad option is told when it is made.
+    """
+    return PLUGINS.load(name, options, base)

@@ -1,6 +1,4 @@
-"""Single sockets: what each kind of ZeroMQ socket does for the patterns.
-
-The patterns over ZeroMQ sockets, in real time.
+"""Asking and telling over ZeroMQ sockets, in real time.
 
 Each node of this process has two sockets of its own: a ROUTER for the requests to it, on the
 port it registers with, and an XPUB for what it publishes, on the next port. Peers connect to
@@ -19,7 +17,7 @@ import zmq
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.network.connections import ZeromqConfig
 from dva_sim.network.keys import KeyRing
-from dva_sim.network.patterns import OnReply, Request, Service
+from dva_sim.network.messaging import OnReply, Request, Service
 from dva_sim.network.realtime import LiveClock
 from dva_sim.network.security import Refusal, Security, Socket, user_of
 

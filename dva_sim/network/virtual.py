@@ -9,7 +9,7 @@ from typing import Any
 from dva_sim.kernel.clock import Clock
 from dva_sim.network.connections import AnyConnection, Connector
 from dva_sim.network.link import Link
-from dva_sim.network.patterns import OnReply, Request, Service
+from dva_sim.network.messaging import OnReply, Request, Service
 from dva_sim.network.zmtp import ZmtpConnection
 
 FRAMING = 9  # ZMTP header of a frame above 255 bytes; the few shorter messages count the same [B]

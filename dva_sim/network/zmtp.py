@@ -1,13 +1,7 @@
-"""Queues of messages with a high-water mark, as a ZeroMQ socket has one for each connection.
+"""A ZeroMQ connection over TCP: greeting, framing, pipes, encoder and decoder.
 
-Who writes learns of what was read only in steps of the low-water mark, half of the high one:
-so a full pipe stays full until half of it has been read.
-
-References:
-    ZeroMQ's documentation of ZMQ_SNDHWM, ZMQ_RCVHWM and ZMQ_CONFLATE; that the low-water
-    mark is half of the high one was measured.
-
-A ZeroMQ connection over TCP: greeting, framing, pipes, encoder and decoder.
+A pipe is a queue with a high-water mark. Who writes learns of what was read only in steps of the
+low-water mark, half of the high one: so a full pipe stays full until half of it has been read.
 
 A message waits in the pipe until the encoder takes it into a batch, the batch until TCP's send
 buffer has room, and its bytes until TCP may send them: in order, all of it. At the other end
@@ -16,6 +10,8 @@ closes, and in the end the sender's pipe is full. Only byte counts travel; which
 a message is noted here.
 
 References:
+    ZeroMQ's documentation of ZMQ_SNDHWM, ZMQ_RCVHWM and ZMQ_CONFLATE; that the low-water
+    mark is half of the high one was measured.
     ZMTP 3.1, rfc.zeromq.org/spec/37: greeting, version negotiation, NULL mechanism, framing.
 """
 

@@ -17,26 +17,26 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Sequence
 from functools import cache, lru_cache
-from pathlib import Path
 from typing import Final
 
 from lxml import etree
 
-from dva_sim.kernel.resources import roots
 from dva_sim.protocol import messages as m
+from dva_sim.protocol import schema
 from dva_sim.protocol.errors import ProtocolError
 from dva_sim.protocol.messages import BAD_MESSAGE, Message
+from dva_sim.protocol.schema import bounds, choices
 from dva_sim.protocol.xml_reader import read
 from dva_sim.protocol.xml_writer import DECLARATION, write
 
-MAX_UINT32: Final = 2**32 - 1
-MAX_SESSION: Final = 2**64 - 1
-MAX_TICK: Final = 2**53 - 1
+MAX_UINT32: Final = bounds("Natural")[1]
+MAX_SESSION: Final = bounds("SessionID")[1]
+MAX_TICK: Final = bounds("Tick")[1]
 
 _Groups = Sequence[bytes]
 
-_DEVICE_ID = "(" + ":".join(["[0-9A-F]{2}"] * 6) + ")"
-_CLOCK = r"((?:[01][0-9]|2[0-3]):[0-5][0-9]:[0-5][0-9](?:\.[0-9]{1,9})?)"
+_DEVICE_ID = f"({schema.pattern('DeviceID')})"
+_CLOCK = f"({schema.pattern('Timestamp')})"
 _POSITIVE = "([1-9][0-9]{0,9})"
 _NATURAL = "(0|[1-9][0-9]{0,9})"
 _SESSION = "(0|[1-9][0-9]{0,19})"
@@ -44,7 +44,7 @@ _TICK = "(0|[1-9][0-9]{0,15})"
 _CODE = "(0|[1-9][0-9]{0,2})"
 _TEXT = "([ -%'-;=?-~]{0,256})"
 _NAME = "([ -%'-;=?-~]{1,64})"
-_MODE = "(Idle|Mission|Teleoperation)"
+_MODE = f"({'|'.join(choices('Mode'))})"
 
 
 def _real(whole: str) -> str:
@@ -266,8 +266,7 @@ def _end_of_declaration(data: bytes) -> int:
 @cache
 def _names() -> frozenset[bytes]:
     """All names of elements in the schema."""
-    elements = etree.parse(_schema_path()).iter("{http://www.w3.org/2001/XMLSchema}element")
-    return frozenset(element.get("name", "").encode() for element in elements)
+    return frozenset(name.encode() for name in schema.names())
 
 
 @cache
@@ -275,7 +274,7 @@ def _parser() -> etree.XMLParser:
     """The one parser, with the schema attached; lxml locks it for each document."""
     # An encoding given here wins over what the document says, which has been checked by sight.
     return etree.XMLParser(
-        schema=etree.XMLSchema(file=str(_schema_path())),
+        schema=etree.XMLSchema(file=str(schema.schema_file())),
         encoding="UTF-8",
         resolve_entities=False,
         no_network=True,
@@ -284,12 +283,6 @@ def _parser() -> etree.XMLParser:
         remove_comments=True,
         remove_pis=True,
     )
-
-
-def _schema_path() -> Path:
-    """The schema that came with the program: one in the working folder must not replace it."""
-    program = roots()[1:]
-    return next(p for root in program if (p := root / "protocol" / "dva.xsd").is_file())
 
 
 def _one_line(error: etree.XMLSyntaxError) -> str:

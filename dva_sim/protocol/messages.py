@@ -8,7 +8,7 @@ as `70:1A:04:F9:81:D6`, with capital letters, so that one device has one spellin
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Literal, get_args
 
 OK: Final = 0
 BAD_MESSAGE: Final = 1
@@ -40,6 +40,10 @@ CODE_NAMES: Final = {
     NOT_SUPPORTED: "not supported",
 }
 """Reply codes in words, for logs and for the text of a reply."""
+
+EventKind = Literal["fire", "gas_leak", "flood"]
+EVENT_KINDS: Final[tuple[str, ...]] = get_args(EventKind)
+"""What messages call what happens; whatever else happens is told of as one of these."""
 
 
 @dataclass(frozen=True, slots=True)

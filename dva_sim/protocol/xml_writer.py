@@ -1,7 +1,7 @@
 """Bodies to XML: a check per simple type of the schema, then a template per element.
 
-Every value passes the check that mirrors its type in `protocol/dva.xsd`, so that what leaves
-here is valid by construction; templates are six times faster than building trees.
+Every value passes a check made from its type in `protocol/dva.xsd`, so that what leaves here is
+valid by construction; templates are six times faster than building trees.
 """
 
 from __future__ import annotations
@@ -12,7 +12,9 @@ from functools import lru_cache
 from typing import Any, Final
 
 from dva_sim.protocol import messages as m
+from dva_sim.protocol import schema
 from dva_sim.protocol.errors import ProtocolError
+from dva_sim.protocol.schema import bounds, choices, length, most
 
 DECLARATION: Final = '<?xml version="1.0" encoding="UTF-8" standalone="yes"?>'
 
@@ -21,7 +23,9 @@ def _bad(reason: str) -> ProtocolError:
     return ProtocolError(m.BAD_MESSAGE, reason)
 
 
-def _real(name: str, low: float, high: float) -> Callable[[float], str]:
+def _real(name: str, kind: str) -> Callable[[float], str]:
+    low, high = bounds(kind)
+
     def write(value: float) -> str:
         if low <= value <= high:
             # float() because a numpy scalar spells its own type in its repr.
@@ -31,7 +35,9 @@ def _real(name: str, low: float, high: float) -> Callable[[float], str]:
     return write
 
 
-def _integer(name: str, low: int, high: int) -> Callable[[int], str]:
+def _integer(name: str, kind: str) -> Callable[[int], str]:
+    low, high = bounds(kind)
+
     def write(value: int) -> str:
         if low <= value <= high:
             return f"{value:d}"
@@ -56,56 +62,57 @@ def _string(name: str, pattern: str, form: str) -> Callable[[str], str]:
     return write
 
 
-def _choice(name: str, *values: str) -> Callable[[str], str]:
-    return _string(name, "|".join(values), " or ".join(values))
+def _text_of(name: str, kind: str, form: str) -> Callable[[str], str]:
+    """Text that has a length; `form` says what characters it has."""
+    least, most_ = length(kind)
+    told = f"{least} to {most_} {form}" if least else f"up to {most_} {form}"
+    return _string(name, f"(?=(?s:.{{{least},{most_}}})\\Z){schema.pattern(kind)}", told)
 
 
-_UINT32 = 2**32 - 1
-_UINT64 = 2**64 - 1
-_OCTET = "(?:25[0-5]|2[0-4][0-9]|1[0-9]{2}|[1-9]?[0-9])"
-_PORT = "(?:6553[0-4]|655[0-2][0-9]|65[0-4][0-9]{2}|6[0-4][0-9]{3}|[1-5][0-9]{4}|[1-9][0-9]{0,3})"
-_CHARACTER = "[^\x00-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]"
+def _choice(name: str, kind: str) -> Callable[[str], str]:
+    return _string(name, "|".join(choices(kind)), " or ".join(choices(kind)))
 
-_device_id = _string("an id", "[0-9A-F]{2}(?::[0-9A-F]{2}){5}", "like 70:1A:04:F9:81:D6")
-_clock = _string(
-    "Timestamp", r"(?:[01][0-9]|2[0-3])(?::[0-5][0-9]){2}(?:\.[0-9]{1,9})?", "HH:MM:SS"
-)
-_name = _string("a name", _CHARACTER + "{1,64}", "1 to 64 printable characters")
-_text = _string("Text", _CHARACTER + "{0,256}", "up to 256 printable characters")
-_address = _string(
-    "IpAddr", rf"{_OCTET}(?:\.{_OCTET}){{3}}(?::{_PORT})?", "like 192.168.1.48 or with :port"
-)
-_url = _string("CameraUrl", "[!-~]{1,256}", "1 to 256 ASCII characters without spaces")
-_mode = _choice("Mode", "Idle", "Mission", "Teleoperation")
-_level = _choice("Level", "teleoperation", "missions", "both", "sensors")
-_kind = _choice("Kind", "fire", "gas_leak", "flood")
-_finding = _choice("Finding", "detected", "confirmed", "refuted", "contained")
-_task = _choice("Task", "confirm", "contain", "stand_by")
-_mission_state = _choice(
-    "MissionState", "none", "under_way", "waiting", "replanning", "done", "failed"
-)
-_state = _choice("State", "accepted", "declined", "departed", "arrived", "failed", "done")
 
-_message_id = _integer("MessageID", 1, _UINT32)
-_answers = _integer("Answers", 0, _UINT32)
-_session_id = _integer("SessionID", 0, _UINT64)
-_session = _integer("Session", 1, _UINT64)
-_event_id = _integer("EventID", 1, _UINT32)
-_code = _integer("Code", 0, 999)
-_tick = _integer("a tick", 0, 2**53 - 1)
-_mission_id = _integer("MissionID", 0, _UINT32)
-_laps = _integer("Laps", 0, 1000)
-_waypoints_left = _integer("WaypointsLeft", 0, 64)
+_device_id = _string("an id", schema.pattern("DeviceID"), "like 70:1A:04:F9:81:D6")
+_clock = _string("Timestamp", schema.pattern("Timestamp"), "HH:MM:SS")
+_name = _text_of("a name", "Name", "printable characters")
+_text = _text_of("Text", "Text", "printable characters")
+_address = _string("IpAddr", schema.pattern("Address"), "like 192.168.1.48 or with :port")
+_url = _text_of("CameraUrl", "Url", "ASCII characters without spaces")
+_mode = _choice("Mode", "Mode")
+_level = _choice("Level", "Level")
+_kind = _choice("Kind", "EventKind")
+_finding = _choice("Finding", "Finding")
+_task = _choice("Task", "Task")
+_mission_state = _choice("MissionState", "MissionState")
+_state = _choice("State", "OrderState")
 
-_speed = _real("Speed", -100.0, 100.0)
-_turn_rate = _real("TurnRate", -100.0, 100.0)
-_heading = _real("Heading", -1e6, 1e6)
-_latitude = _real("Latitude", -90.0, 90.0)
-_longitude = _real("Longitude", -180.0, 180.0)
-_unit = _real("Severity and Confidence", 0.0, 1.0)
-_frequency = _real("Frequency", 0.0, 1000.0)
-_duration = _real("a duration", 0.0, 1e6)
-_measured = _real("Value", -1e8, 1e8)
+_message_id = _integer("MessageID", "Positive")
+_answers = _integer("Answers", "Natural")
+_session_id = _integer("SessionID", "SessionID")
+_session = _integer("Session", "Session")
+_event_id = _integer("EventID", "Positive")
+_code = _integer("Code", "Code")
+_tick = _integer("a tick", "Tick")
+_mission_id = _integer("MissionID", "Natural")
+_laps = _integer("Laps", "Laps")
+_waypoints_left = _integer("WaypointsLeft", "WaypointsLeft")
+
+_speed = _real("Speed", "Speed")
+_turn_rate = _real("TurnRate", "TurnRate")
+_heading = _real("Heading", "Heading")
+_latitude = _real("Latitude", "Latitude")
+_longitude = _real("Longitude", "Longitude")
+_unit = _real("Severity and Confidence", "Fraction")
+_frequency = _real("Frequency", "Frequency")
+_duration = _real("a duration", "Duration")
+_measured = _real("Value", "Measured")
+
+_VALUES = most("SensorValue", "Value")
+_WAYPOINTS = most("GoTo", "Waypoint")
+_SENSORS = most("SensorInfo", "Sensor")
+_NAMES = most("PermissionRequest", "SensorName")
+_DEVICES = most("DeviceList", "Device")
 
 
 def _write_position(at: m.Position, tag: str = "Position") -> str:
@@ -149,8 +156,8 @@ def _write_person_status(body: m.PersonStatus) -> str:
 
 
 def _write_sensor_value(body: m.SensorValue) -> str:
-    if not 1 <= len(body.values) <= 360:
-        raise _bad(f"SensorValue must have 1 to 360 values, not {len(body.values)}")
+    if not 1 <= len(body.values) <= _VALUES:
+        raise _bad(f"SensorValue must have 1 to {_VALUES} values, not {len(body.values)}")
     values = "".join([f"<Value>{_measured(value)}</Value>" for value in body.values])
     return (
         f"<Sensor><SensorValue><SensorName>{_name(body.sensor)}</SensorName>"
@@ -164,8 +171,8 @@ def _write_go_to(body: m.GoTo) -> str:
 
 
 def _write_waypoints(waypoints: tuple[m.Position, ...]) -> str:
-    if not 1 <= len(waypoints) <= 64:
-        raise _bad(f"a mission must have 1 to 64 waypoints, not {len(waypoints)}")
+    if not 1 <= len(waypoints) <= _WAYPOINTS:
+        raise _bad(f"a mission must have 1 to {_WAYPOINTS} waypoints, not {len(waypoints)}")
     return "".join(_write_position(at, "Waypoint") for at in waypoints)
 
 
@@ -210,8 +217,8 @@ def _write_permission_request(body: m.PermissionRequest) -> str:
 
 
 def _write_sensor_names(names: tuple[str, ...]) -> str:
-    if len(names) > 16:
-        raise _bad(f"at most 16 sensors fit into a message, not {len(names)}")
+    if len(names) > _NAMES:
+        raise _bad(f"at most {_NAMES} sensors fit into a message, not {len(names)}")
     return "".join(f"<SensorName>{_name(name)}</SensorName>" for name in names)
 
 
@@ -301,8 +308,8 @@ def _write_reply(body: m.Reply) -> str:
 
 
 def _write_device_list(content: m.DeviceList) -> str:
-    if len(content.devices) > 64:
-        raise _bad(f"DeviceList must have at most 64 devices, not {len(content.devices)}")
+    if len(content.devices) > _DEVICES:
+        raise _bad(f"DeviceList must have at most {_DEVICES} devices, not {len(content.devices)}")
     devices = "".join(
         f"<Device><IdTag>{_device_id(device.id_tag)}</IdTag>{_write_registration(device)}</Device>"
         for device in content.devices
@@ -311,8 +318,8 @@ def _write_device_list(content: m.DeviceList) -> str:
 
 
 def _write_sensor_info(content: m.SensorInfo) -> str:
-    if len(content.sensors) > 16:
-        raise _bad(f"SensorInfo must have at most 16 sensors, not {len(content.sensors)}")
+    if len(content.sensors) > _SENSORS:
+        raise _bad(f"SensorInfo must have at most {_SENSORS} sensors, not {len(content.sensors)}")
     sensors = "".join(
         f"<Sensor><SensorName>{_name(sensor.name)}</SensorName>"
         f"<Unit>{_name(sensor.unit)}</Unit></Sensor>"

@@ -19,18 +19,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.agents.robot.camera import Frame
+from dva_sim.agents.observation import CameraFrame
 from dva_sim.kernel.recorder import Sent, TrackPoint
 from dva_sim.recordings import messages
-from dva_sim.recordings.messages import FRAME, HERE, XML, Message
+from dva_sim.recordings.messages import FRAME, HERE, XML, ChannelMessage
 from dva_sim.simulation.full import Playback
-from dva_sim.worlds.hazards import Raster
+from dva_sim.worlds.hazards import Hazard, Raster
 
 POSE, ACTIVITY, FIX, SEEN = "pose", "activity", "fix", "seen"  # last parts of topics
 ALIVE_S = 1.0  # who stands still is told of so often, on whole multiples [s]
 
 
-def poses(playback: Playback) -> Iterator[Message]:
+def poses(playback: Playback) -> Iterator[ChannelMessage]:
     """Where everybody is: a pose for each who moves, and all of a moment in one transform."""
     tracks = playback.recorder.tracks.items()
     every = heapq.merge(
@@ -42,7 +42,7 @@ def poses(playback: Playback) -> Iterator[Message]:
         for name, p in moved:
             yield _pose(name, POSE, p)
         transforms = [_transform(name, p) for name, p in moved]
-        yield Message(time, "/tf", "foxglove.FrameTransforms", {"transforms": transforms})
+        yield ChannelMessage(time, "/tf", "foxglove.FrameTransforms", {"transforms": transforms})
 
 
 def sparse(track: Sequence[TrackPoint]) -> Iterator[TrackPoint]:
@@ -59,23 +59,23 @@ def sparse(track: Sequence[TrackPoint]) -> Iterator[TrackPoint]:
             yield here
 
 
-def activities(playback: Playback) -> Iterator[Message]:
+def activities(playback: Playback) -> Iterator[ChannelMessage]:
     """What everybody does, told when it changes."""
     for name, track in playback.recorder.tracks.items():
         for mode, points in groupby(track, key=lambda p: p.mode):
             time = next(points).time
             content = {"timestamp": messages.stamp(time), "activity": mode}
-            yield Message(time, f"/{name}/{ACTIVITY}", "dva_sim.Activity", content)
+            yield ChannelMessage(time, f"/{name}/{ACTIVITY}", "dva_sim.Activity", content)
 
 
-def beliefs(playback: Playback) -> Iterator[Message]:
+def beliefs(playback: Playback) -> Iterator[ChannelMessage]:
     """Where operators take the robots to be that they drive."""
     for robot, views in playback.recorder.views.items():
         for seen in views:
             yield _pose(playback.labels[robot], SEEN, seen)
 
 
-def fixes(playback: Playback) -> Iterator[Message]:
+def fixes(playback: Playback) -> Iterator[ChannelMessage]:
     """Where the robots are on earth, once a second."""
     for robot in playback.radii:
         name = playback.labels[robot]
@@ -91,16 +91,16 @@ def fixes(playback: Playback) -> Iterator[Message]:
                 "position_covariance": [0.0] * 9,
                 "position_covariance_type": 0,
             }
-            yield Message(p.time, f"/{name}/{FIX}", "foxglove.LocationFix", content)
+            yield ChannelMessage(p.time, f"/{name}/{FIX}", "foxglove.LocationFix", content)
 
 
-def _pose(name: str, what: str, p: TrackPoint) -> Message:
+def _pose(name: str, what: str, p: TrackPoint) -> ChannelMessage:
     content = {
         "timestamp": messages.stamp(p.time),
         "frame_id": FRAME,
         "pose": messages.pose(p.x, p.y, p.heading),
     }
-    return Message(p.time, f"/{name}/{what}", "foxglove.PoseInFrame", content)
+    return ChannelMessage(p.time, f"/{name}/{what}", "foxglove.PoseInFrame", content)
 
 
 def _transform(name: str, p: TrackPoint) -> dict[str, Any]:
@@ -113,29 +113,29 @@ def _transform(name: str, p: TrackPoint) -> dict[str, Any]:
     }
 
 
-FIELDS = {"fire": ("smoke", "heat"), "gas_leak": ("gas",), "flood": ("water",)}
+GRIDS = "/fields/"
 PERIOD_S = 2.0  # between two grids [s]
 CELL = 0.5  # [m]
 MOST_CELLS = 20_000  # of a grid; on a larger site cells are larger
 DIGITS = 11  # of the 23 binary ones of a number: one part in 4000, and half the file
 
 
-def grids(playback: Playback) -> Iterator[Message]:
+def grids(playback: Playback) -> Iterator[ChannelMessage]:
     """All fields of the hazards there are, as far as they are not zero."""
-    kinds = {i.kind for i in playback.incidents if not i.false_alarm}
-    whats = [what for kind in sorted(kinds) for what in FIELDS[kind]]
+    real = sorted((i for i in playback.incidents if not i.false_alarm), key=lambda i: i.kind)
+    whats = dict.fromkeys(what for incident in real for what in incident.hazard.shows)
     west, south, east, north = playback.site.extent
     cell = max(CELL, ((east - west) * (north - south) / MOST_CELLS) ** 0.5)
-    starts = [i.start for i in playback.incidents if not i.false_alarm]
+    first = min((incident.start for incident in real), default=math.inf)
     for number in range(int(playback.duration / PERIOD_S) + 1):
         time = number * PERIOD_S
-        for what in whats if time > min(starts) else ():
+        for what in whats if time > first else ():
             raster = playback.surroundings.raster(what, time, cell)
             if raster.values.max() > 0:
                 yield _grid(what, time, cell, raster)
 
 
-def _grid(what: str, time: float, cell: float, raster: Raster) -> Message:
+def _grid(what: str, time: float, cell: float, raster: Raster) -> ChannelMessage:
     rows, columns = np.nonzero(raster.values > 0)
     low, left = int(rows.min()), int(columns.min())
     part = raster.values[low : rows.max() + 1, left : columns.max() + 1]
@@ -151,7 +151,7 @@ def _grid(what: str, time: float, cell: float, raster: Raster) -> Message:
         "fields": [{"name": what, "offset": 0, "type": 7}],
         "data": base64.b64encode(_shortened(part).tobytes()).decode(),
     }
-    return Message(time, f"/fields/{what}", "foxglove.Grid", content)
+    return ChannelMessage(time, f"{GRIDS}{what}", "foxglove.Grid", content)
 
 
 def _shortened(values: NDArray[np.float64]) -> NDArray[np.float32]:
@@ -161,17 +161,17 @@ def _shortened(values: NDArray[np.float64]) -> NDArray[np.float32]:
     return (bits & mask).view("<f4")
 
 
+HAZARDS = "/hazards"
 TOPIC, SCHEMA = "/scene", "foxglove.SceneUpdate"
 WALL, INK, EXIT = "#3a3f47", "#2b3038", "#2f7d32"
 BODIES = {"robot": "#2f7fd0", "guard": "#2f7d32", "bystander": "#8c6d5a"}
-HAZARDS = {"fire": "#d1332e", "gas_leak": "#b59a00", "flood": "#2a7fb8"}
 TALL = {"robot": 0.5, "guard": 1.75, "bystander": 1.7}  # as drawn [m]
 PERSON = 0.25  # radius [m]
 STEP_S = 1.0  # between updates of a hazard [s]
 LEAST_GROWTH = 0.05  # less is not drawn anew [m]
 
 
-def bodies(playback: Playback) -> Iterator[Message]:
+def bodies(playback: Playback) -> Iterator[ChannelMessage]:
     """Everybody, in a frame that moves with them; those who leave vanish."""
     tracks = playback.recorder.tracks
     for name, track in tracks.items():
@@ -181,7 +181,7 @@ def bodies(playback: Playback) -> Iterator[Message]:
         yield _removal(time, name)
 
 
-def ground(playback: Playback) -> Iterator[Message]:
+def ground(playback: Playback) -> Iterator[ChannelMessage]:
     """The site, which stands still."""
     site, middles = playback.site, [(r.name, r.polygon.mean(axis=0)) for r in playback.site.rooms]
     lines = [_lines(site.walls.tolist(), WALL), _lines([e.ends for e in site.exits], EXIT)]
@@ -190,7 +190,7 @@ def ground(playback: Playback) -> Iterator[Message]:
     yield _update(0.0, entity | {"texts": texts})
 
 
-def hazards(playback: Playback) -> Iterator[Message]:
+def hazards(playback: Playback) -> Iterator[ChannelMessage]:
     """What is real, from when it begins until it is dealt with or the run ends."""
     for number, incident in enumerate(playback.incidents):
         if incident.false_alarm:
@@ -201,14 +201,12 @@ def hazards(playback: Playback) -> Iterator[Message]:
             radius = incident.hazard.radius(time)
             if radius - drawn >= LEAST_GROWTH:
                 drawn = radius
-                yield _update(
-                    time, _disc(name, time, incident.kind, incident.hazard.position, radius)
-                )
+                yield _update(time, _disc(name, time, incident.hazard, radius))
         if until < playback.duration:
             yield _removal(until, name)
 
 
-def states(playback: Playback) -> Iterator[Message]:
+def states(playback: Playback) -> Iterator[ChannelMessage]:
     """The same hazards as numbers, once a second."""
     for number, incident in enumerate(playback.incidents):
         until = min(playback.contained.get(number, math.inf), playback.duration)
@@ -225,7 +223,7 @@ def states(playback: Playback) -> Iterator[Message]:
                 "danger_radius_m": round(incident.hazard.danger_radius(time), 3),
                 "severity": round(incident.hazard.severity(time), 4),
             }
-            yield Message(time, "/hazards", "dva_sim.Hazard", content)
+            yield ChannelMessage(time, HAZARDS, "dva_sim.Hazard", content)
 
 
 def _steps(start: float, end: float) -> Iterator[float]:
@@ -233,13 +231,13 @@ def _steps(start: float, end: float) -> Iterator[float]:
     return (start + number * STEP_S for number in range(count))
 
 
-def _update(time: float, entity: dict[str, Any]) -> Message:
-    return Message(time, TOPIC, SCHEMA, {"deletions": [], "entities": [entity]})
+def _update(time: float, entity: dict[str, Any]) -> ChannelMessage:
+    return ChannelMessage(time, TOPIC, SCHEMA, {"deletions": [], "entities": [entity]})
 
 
-def _removal(time: float, name: str) -> Message:
+def _removal(time: float, name: str) -> ChannelMessage:
     deletion = {"timestamp": messages.stamp(time), "type": 0, "id": name}
-    return Message(time, TOPIC, SCHEMA, {"deletions": [deletion], "entities": []})
+    return ChannelMessage(time, TOPIC, SCHEMA, {"deletions": [deletion], "entities": []})
 
 
 def _entity(time: float, name: str, frame: str, **parts: list[Any]) -> dict[str, Any]:
@@ -273,11 +271,10 @@ def _body(playback: Playback, name: str, time: float) -> dict[str, Any]:
     )
 
 
-def _disc(
-    name: str, time: float, kind: str, place: tuple[float, float], radius: float
-) -> dict[str, Any]:
-    paint = messages.colour(HAZARDS[kind], 0.5)
-    return _entity(time, name, FRAME, cylinders=[_cylinder(radius, 0.05, paint, *place)])
+def _disc(name: str, time: float, hazard: Hazard, radius: float) -> dict[str, Any]:
+    paint = messages.colour(hazard.colour, 0.5)
+    cylinder = _cylinder(radius, 0.05, paint, *hazard.position)
+    return _entity(time, name, FRAME, cylinders=[cylinder])
 
 
 def _cylinder(
@@ -318,7 +315,7 @@ SCREEN, COMMANDS, CAMERA = "screen", "commands", "camera"  # last parts of topic
 LEVELS = {"safety": 3, "mode": 1, "link": 1}  # of Foxglove's log; all else is for information
 
 
-def told(playback: Playback) -> Iterator[Message]:
+def told(playback: Playback) -> Iterator[ChannelMessage]:
     """The timeline."""
     for moment in playback.recorder.timeline:
         content = {
@@ -330,18 +327,18 @@ def told(playback: Playback) -> Iterator[Message]:
             "line": 0,
             "kind": moment.kind,
         }
-        yield Message(moment.time, STORY, "foxglove.Log", content)
+        yield ChannelMessage(moment.time, STORY, "foxglove.Log", content)
 
 
-def said(playback: Playback) -> Iterator[Message]:
+def said(playback: Playback) -> Iterator[ChannelMessage]:
     """All messages as they went onto the network; of a camera's frame, what it stands for."""
     names = names_of(playback.labels)
     for sent in playback.recorder.traffic or ():
-        if isinstance(sent.payload, Frame):
+        if isinstance(sent.payload, CameraFrame):
             yield _frame(sent, names)
         else:
             topic = f"{MESSAGES}/{names[sent.source]}/{names[sent.destination]}"
-            yield Message(sent.time, topic, XML, sent.payload)
+            yield ChannelMessage(sent.time, topic, XML, sent.payload)
 
 
 def names_of(labels: Mapping[str, str]) -> dict[str, str]:
@@ -354,7 +351,7 @@ def names_of(labels: Mapping[str, str]) -> dict[str, str]:
     return names
 
 
-def shown(playback: Playback) -> Iterator[Message]:
+def shown(playback: Playback) -> Iterator[ChannelMessage]:
     """The frames that come onto the operators' screens."""
     labels = playback.labels
     for number, drive in enumerate(playback.recorder.drives):
@@ -366,10 +363,10 @@ def shown(playback: Playback) -> Iterator[Message]:
                 "captured_s": frame.captured,
             }
             topic = f"/{labels[drive.operator]}/{SCREEN}"
-            yield Message(frame.time, topic, "dva_sim.Shown", content)
+            yield ChannelMessage(frame.time, topic, "dva_sim.Shown", content)
 
 
-def commanded(playback: Playback) -> Iterator[Message]:
+def commanded(playback: Playback) -> Iterator[ChannelMessage]:
     """What the phones make of the tilt."""
     labels = playback.labels
     for number, drive in enumerate(playback.recorder.drives):
@@ -382,10 +379,10 @@ def commanded(playback: Playback) -> Iterator[Message]:
                 "turn_rate_rad_s": round(turn_rate, 5),
             }
             topic = f"/{labels[drive.operator]}/{COMMANDS}"
-            yield Message(time, topic, "dva_sim.Command", content)
+            yield ChannelMessage(time, topic, "dva_sim.Command", content)
 
 
-def applied(playback: Playback) -> Iterator[Message]:
+def applied(playback: Playback) -> Iterator[ChannelMessage]:
     """What the robots make of the commands."""
     for drive in playback.recorder.drives:
         for a in drive.applied:
@@ -398,11 +395,11 @@ def applied(playback: Playback) -> Iterator[Message]:
                 "captured_s": messages.finite(a.captured),
             }
             topic = f"/{playback.labels[drive.robot]}/applied"
-            yield Message(a.time, topic, "dva_sim.Applied", content)
+            yield ChannelMessage(a.time, topic, "dva_sim.Applied", content)
 
 
-def _frame(sent: Sent, names: Mapping[str, str]) -> Message:
-    frame: Frame = sent.payload
+def _frame(sent: Sent, names: Mapping[str, str]) -> ChannelMessage:
+    frame: CameraFrame = sent.payload
     seen = frame.observation
     content: dict[str, Any] = {
         "timestamp": messages.stamp(sent.time),
@@ -417,4 +414,4 @@ def _frame(sent: Sent, names: Mapping[str, str]) -> Message:
             {"kind": h.kind, "x_m": round(h.x, 2), "y_m": round(h.y, 2)} for h in seen.hazards
         ],
     }
-    return Message(sent.time, f"/{names[sent.source]}/{CAMERA}", "dva_sim.Frame", content)
+    return ChannelMessage(sent.time, f"/{names[sent.source]}/{CAMERA}", "dva_sim.Frame", content)

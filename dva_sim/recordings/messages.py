@@ -1,10 +1,10 @@
-"""What a recording's messages are made of: time stamps, poses, colours, one message.
-
-The shapes of a recording's JSON messages, as JSON Schema.
+"""What a recording's messages are made of: time stamps, poses, colours; and their JSON Schemas.
 
 Where Foxglove has a message type for something, its name and fields are used, so that viewers
 know what to draw; the others begin with `dva_sim.`. Times are whole seconds and nanoseconds of
-virtual time since the start of the run; lengths are metres, angles radians.
+virtual time since the start of the run; lengths are metres, angles radians. The schemas stand
+here, and are not taken from Foxglove's SDK: it has them for Protobuf only, in 54 MB; as JSON a
+recording can be read with any tool, and with the eye.
 
 References:
     Foxglove, "Message schemas", and MCAP, "Specification": names, fields and encodings.
@@ -13,6 +13,7 @@ References:
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 NS = 1_000_000_000
@@ -26,7 +27,7 @@ HERE = {
 XML = "xml"  # in the place of a schema's name: the content is bytes of the protocol
 
 
-class Message(NamedTuple):
+class ChannelMessage(NamedTuple):
     """One message of a recording.
 
     Attributes:
@@ -87,244 +88,157 @@ def finite(value: float) -> float | None:
 
 Schema = dict[str, Any]
 
-NUMBER: Schema = {"type": "number"}
-MAYBE: Schema = {"type": ["number", "null"]}
-TEXT: Schema = {"type": "string"}
-FLAG: Schema = {"type": "boolean"}
-COUNT: Schema = {"type": "integer", "minimum": 0}
-BYTES: Schema = {"type": "string", "contentEncoding": "base64"}
+_NUMBER: Schema = {"type": "number"}
+_WORDS: dict[str, Schema] = {
+    "number": _NUMBER,
+    "maybe": {"type": ["number", "null"]},
+    "text": {"type": "string"},
+    "flag": {"type": "boolean"},
+    "count": {"type": "integer", "minimum": 0},
+    "nsec": {"type": "integer", "minimum": 0, "maximum": 999_999_999},
+    "bytes": {"type": "string", "contentEncoding": "base64"},
+    "none": {"type": "array", "maxItems": 0},
+    "nine": {"type": "array", "items": _NUMBER, "minItems": 9, "maxItems": 9},
+}
+"""Types of fields by the word that stands for them below; the types made there come on top."""
+
+# A type a paragraph: its name, what it tells, then its fields. `a b: type` are two fields, `type*`
+# is a list, `A=0 B=1` are named values. A type is known by its last word to those after it.
+_PARTS = """
+time | Virtual time since the start of the run
+sec: count; nsec: nsec
+
+duration | A span of time; zero for without end
+sec: count; nsec: nsec
+
+foxglove.Vector3 | A vector or point [m]
+x y z: number
+
+foxglove.Vector2 | Lengths along x and y [m]
+x y: number
+
+foxglove.Quaternion | An orientation
+x y z w: number
+
+foxglove.Color | Red, green, blue and opacity, 0 to 1
+r g b a: number
+
+foxglove.Point3 | A point [m]
+x y z: number
+
+foxglove.Pose | Where and how turned
+position: Vector3; orientation: Quaternion
+
+foxglove.FrameTransform | Where a body's own frame lies in another
+timestamp: time; parent_frame_id child_frame_id: text; translation: Vector3; rotation: Quaternion
+
+foxglove.LinePrimitive | Lines between points
+type: LINE_STRIP=0 LINE_LOOP=1 LINE_LIST=2; pose: Pose; thickness: number; scale_invariant: flag;
+points: Point3*; color: Color; colors: Color*; indices: count*
+
+foxglove.CylinderPrimitive | An upright cylinder or cone
+pose: Pose; size: Vector3; bottom_scale top_scale: number; color: Color
+
+foxglove.ArrowPrimitive | An arrow along x
+pose: Pose; shaft_length shaft_diameter head_length head_diameter: number; color: Color
+
+foxglove.TextPrimitive | Words in the scene
+pose: Pose; billboard: flag; font_size: number; scale_invariant: flag; color: Color; text: text
+
+foxglove.KeyValuePair | A remark
+key value: text
+
+foxglove.SceneEntity | Something to draw; takes the place of what had the same id
+timestamp: time; frame_id id: text; lifetime: duration; frame_locked: flag; metadata: KeyValuePair*;
+arrows: ArrowPrimitive*; cubes spheres: none; cylinders: CylinderPrimitive*; lines: LinePrimitive*;
+triangles: none; texts: TextPrimitive*; models: none
+
+foxglove.SceneEntityDeletion | Something to draw no longer
+timestamp: time; type: MATCHING_ID=0 ALL=1; id: text
+
+foxglove.PackedElementField | One number of a cell
+name: text; offset: count; type: FLOAT32=7
+
+dva_sim.SeenHazard | In view
+kind: text; x_m y_m: number
+"""
+_MESSAGES = """
+foxglove.Log | A line of the story; `kind` is event, order, drive, mode, link or safety
+timestamp: time; level: DEBUG=1 INFO=2 WARNING=3; message name file: text; line: count; kind: text
+
+foxglove.PoseInFrame | Where somebody is, or is believed to be
+timestamp: time; frame_id: text; pose: Pose
+
+foxglove.FrameTransforms | Where those are who moved
+transforms: FrameTransform*
+
+foxglove.LocationFix | Where a robot is on earth [deg], its height unknown
+timestamp: time; frame_id: text; latitude longitude altitude: number; position_covariance: nine;
+position_covariance_type: UNKNOWN=0
+
+foxglove.SceneUpdate | What is drawn: the site, everybody on it, what burns, leaks or floods
+deletions: SceneEntityDeletion*; entities: SceneEntity*
+
+foxglove.Grid | A hazard as a field over the floor; cells outside are zero
+timestamp: time; frame_id: text; pose: Pose; column_count: count; cell_size: Vector2;
+row_stride cell_stride: count; fields: PackedElementField*; data: bytes
+
+foxglove.GeoJSON | The plan of the site
+geojson: text
+
+dva_sim.Activity | What somebody does from now on: a robot's mode, what a guard or bystander is \
+about
+timestamp: time; activity: text
+
+dva_sim.Shown | A frame comes onto an operator's screen; `drive` counts the drives of the run from 0
+timestamp: time; drive: count; robot: text; captured_s: number
+
+dva_sim.Command | The phone makes a command from the tilt; `drive` counts the drives of the run \
+from 0
+timestamp: time; drive: count; robot: text; speed_m_s turn_rate_rad_s: number
+
+dva_sim.Applied | A command takes effect at the robot; the times on its way, and of the picture \
+behind it
+timestamp: time; made_s sent_s arrived_s: number; until_s captured_s: maybe
+
+dva_sim.Frame | A camera's frame sets out to somebody: what a person makes of it stands for the \
+picture
+timestamp: time; to: text; size_bytes: count; captured_s x_m y_m heading_rad visibility_m: number;
+hazards: SeenHazard*
+
+dva_sim.Hazard | What burns, leaks or floods, once a second while it goes on; `number` counts from 1
+timestamp: time; number: count; kind room: text; x_m y_m radius_m danger_radius_m severity: number
+"""
 
 
-def _object(title: str, what: str, /, **fields: Schema) -> Schema:
-    return {
-        "title": title,
-        "description": what,
-        "type": "object",
-        "properties": fields,
-        "required": list(fields),
-    }
+def _read(text: str, known: dict[str, Schema]) -> dict[str, Schema]:
+    """The types of a text by their full names, and with what is known by their last words."""
+    types: dict[str, Schema] = {}
+    for paragraph in text.strip().split("\n\n"):
+        head, _, body = paragraph.partition("\n")
+        title, _, told = head.partition(" | ")
+        fields: dict[str, Schema] = {}
+        for group in body.split(";"):
+            names, _, kind = group.partition(":")
+            fields |= dict.fromkeys(names.split(), _type(kind.strip(), known))
+        types[title] = known[title.rpartition(".")[2]] = {
+            "title": title,
+            "description": told,
+            "type": "object",
+            "properties": fields,
+            "required": list(fields),
+        }
+    return types
 
 
-def _list(items: Schema) -> Schema:
-    return {"type": "array", "items": items}
+def _type(kind: str, known: Mapping[str, Schema]) -> Schema:
+    if "=" in kind:
+        values = [value.split("=") for value in kind.split()]
+        return {"oneOf": [{"title": name, "const": int(number)} for name, number in values]}
+    if kind.endswith("*"):
+        return {"type": "array", "items": known[kind[:-1]]}
+    return known[kind]
 
 
-def _numbers(title: str, what: str, names: str) -> Schema:
-    return _object(title, what, **dict.fromkeys(names, NUMBER))
-
-
-def _one_of(**values: int) -> Schema:
-    return {"oneOf": [{"title": name, "const": value} for name, value in values.items()]}
-
-
-_NSEC = {"type": "integer", "minimum": 0, "maximum": 999_999_999}
-TIME = _object("time", "Virtual time since the start of the run", sec=COUNT, nsec=_NSEC)
-DURATION = _object("duration", "A span of time; zero for without end", sec=COUNT, nsec=_NSEC)
-VECTOR = _numbers("foxglove.Vector3", "A vector or point [m]", "xyz")
-PLANAR = _numbers("foxglove.Vector2", "Lengths along x and y [m]", "xy")
-QUATERNION = _numbers("foxglove.Quaternion", "An orientation", "xyzw")
-COLOUR = _numbers("foxglove.Color", "Red, green, blue and opacity, 0 to 1", "rgba")
-POSE = _object("foxglove.Pose", "Where and how turned", position=VECTOR, orientation=QUATERNION)
-
-_TRANSFORM = _object(
-    "foxglove.FrameTransform",
-    "Where a body's own frame lies in another",
-    timestamp=TIME,
-    parent_frame_id=TEXT,
-    child_frame_id=TEXT,
-    translation=VECTOR,
-    rotation=QUATERNION,
-)
-_LINES = _object(
-    "foxglove.LinePrimitive",
-    "Lines between points",
-    type=_one_of(LINE_STRIP=0, LINE_LOOP=1, LINE_LIST=2),
-    pose=POSE,
-    thickness=NUMBER,
-    scale_invariant=FLAG,
-    points=_list(_numbers("foxglove.Point3", "A point [m]", "xyz")),
-    color=COLOUR,
-    colors=_list(COLOUR),
-    indices=_list(COUNT),
-)
-_CYLINDER = _object(
-    "foxglove.CylinderPrimitive",
-    "An upright cylinder or cone",
-    pose=POSE,
-    size=VECTOR,
-    bottom_scale=NUMBER,
-    top_scale=NUMBER,
-    color=COLOUR,
-)
-_ARROW = _object(
-    "foxglove.ArrowPrimitive",
-    "An arrow along x",
-    pose=POSE,
-    shaft_length=NUMBER,
-    shaft_diameter=NUMBER,
-    head_length=NUMBER,
-    head_diameter=NUMBER,
-    color=COLOUR,
-)
-_WORDS = _object(
-    "foxglove.TextPrimitive",
-    "Words in the scene",
-    pose=POSE,
-    billboard=FLAG,
-    font_size=NUMBER,
-    scale_invariant=FLAG,
-    color=COLOUR,
-    text=TEXT,
-)
-_ENTITY = _object(
-    "foxglove.SceneEntity",
-    "Something to draw; takes the place of what had the same id",
-    timestamp=TIME,
-    frame_id=TEXT,
-    id=TEXT,
-    lifetime=DURATION,
-    frame_locked=FLAG,
-    metadata=_list(_object("foxglove.KeyValuePair", "A remark", key=TEXT, value=TEXT)),
-    arrows=_list(_ARROW),
-    cubes={"type": "array", "maxItems": 0},
-    spheres={"type": "array", "maxItems": 0},
-    cylinders=_list(_CYLINDER),
-    lines=_list(_LINES),
-    triangles={"type": "array", "maxItems": 0},
-    texts=_list(_WORDS),
-    models={"type": "array", "maxItems": 0},
-)
-_DELETION = _object(
-    "foxglove.SceneEntityDeletion",
-    "Something to draw no longer",
-    timestamp=TIME,
-    type=_one_of(MATCHING_ID=0, ALL=1),
-    id=TEXT,
-)
-_ELEMENT = _object(
-    "foxglove.PackedElementField",
-    "One number of a cell",
-    name=TEXT,
-    offset=COUNT,
-    type=_one_of(FLOAT32=7),
-)
-
-_FOXGLOVE = (
-    _object(
-        "foxglove.Log",
-        "A line of the story; `kind` is event, order, drive, mode, link or safety",
-        timestamp=TIME,
-        level=_one_of(DEBUG=1, INFO=2, WARNING=3),
-        message=TEXT,
-        name=TEXT,
-        file=TEXT,
-        line=COUNT,
-        kind=TEXT,
-    ),
-    _object(
-        "foxglove.PoseInFrame",
-        "Where somebody is, or is believed to be",
-        timestamp=TIME,
-        frame_id=TEXT,
-        pose=POSE,
-    ),
-    _object(
-        "foxglove.FrameTransforms",
-        "Where those are who moved",
-        transforms=_list(_TRANSFORM),
-    ),
-    _object(
-        "foxglove.LocationFix",
-        "Where a robot is on earth [deg], its height unknown",
-        timestamp=TIME,
-        frame_id=TEXT,
-        latitude=NUMBER,
-        longitude=NUMBER,
-        altitude=NUMBER,
-        position_covariance={"type": "array", "items": NUMBER, "minItems": 9, "maxItems": 9},
-        position_covariance_type=_one_of(UNKNOWN=0),
-    ),
-    _object(
-        "foxglove.SceneUpdate",
-        "What is drawn: the site, everybody on it, what burns, leaks or floods",
-        deletions=_list(_DELETION),
-        entities=_list(_ENTITY),
-    ),
-    _object(
-        "foxglove.Grid",
-        "A hazard as a field over the floor; cells outside are zero",
-        timestamp=TIME,
-        frame_id=TEXT,
-        pose=POSE,
-        column_count=COUNT,
-        cell_size=PLANAR,
-        row_stride=COUNT,
-        cell_stride=COUNT,
-        fields=_list(_ELEMENT),
-        data=BYTES,
-    ),
-    _object("foxglove.GeoJSON", "The plan of the site", geojson=TEXT),
-)
-_OWN = (
-    _object(
-        "dva_sim.Activity",
-        "What somebody does from now on: a robot's mode, what a guard or bystander is about",
-        timestamp=TIME,
-        activity=TEXT,
-    ),
-    _object(
-        "dva_sim.Shown",
-        "A frame comes onto an operator's screen; `drive` counts the drives of the run from 0",
-        timestamp=TIME,
-        drive=COUNT,
-        robot=TEXT,
-        captured_s=NUMBER,
-    ),
-    _object(
-        "dva_sim.Command",
-        "The phone makes a command from the tilt; `drive` counts the drives of the run from 0",
-        timestamp=TIME,
-        drive=COUNT,
-        robot=TEXT,
-        speed_m_s=NUMBER,
-        turn_rate_rad_s=NUMBER,
-    ),
-    _object(
-        "dva_sim.Applied",
-        "A command takes effect at the robot; the times on its way, and of the picture behind it",
-        timestamp=TIME,
-        made_s=NUMBER,
-        sent_s=NUMBER,
-        arrived_s=NUMBER,
-        until_s=MAYBE,
-        captured_s=MAYBE,
-    ),
-    _object(
-        "dva_sim.Frame",
-        "A camera's frame sets out to somebody: what a person makes of it stands for the picture",
-        timestamp=TIME,
-        to=TEXT,
-        size_bytes=COUNT,
-        captured_s=NUMBER,
-        x_m=NUMBER,
-        y_m=NUMBER,
-        heading_rad=NUMBER,
-        visibility_m=NUMBER,
-        hazards=_list(_object("dva_sim.SeenHazard", "In view", kind=TEXT, x_m=NUMBER, y_m=NUMBER)),
-    ),
-    _object(
-        "dva_sim.Hazard",
-        "What burns, leaks or floods, once a second while it goes on; `number` counts from 1",
-        timestamp=TIME,
-        number=COUNT,
-        kind=TEXT,
-        room=TEXT,
-        x_m=NUMBER,
-        y_m=NUMBER,
-        radius_m=NUMBER,
-        danger_radius_m=NUMBER,
-        severity=NUMBER,
-    ),
-)
-
-SCHEMAS: dict[str, Schema] = {schema["title"]: schema for schema in (*_FOXGLOVE, *_OWN)}
+_read(_PARTS, _WORDS)
+SCHEMAS = _read(_MESSAGES, _WORDS)

@@ -22,12 +22,17 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.recorder import DriveLog, Moment, Recorder, Sent, Shown, TrackPoint
 from dva_sim.recordings import channels, messages, writing
 from dva_sim.recordings.messages import XML
+from dva_sim.recordings.recorded_hazards import (
+    RecordedHazard,
+    RecordedSurroundings,
+    Said,
+    recorded_hazard,
+)
 from dva_sim.recordings.writing import ABOUT, DIGEST, FORMAT, RUN, SCENARIO, SITE, TABLES, digest
 from dva_sim.simulation.full import Ending, Playback
-from dva_sim.simulation.full.hazards import Incident
+from dva_sim.simulation.full.hazards import RunHazard
 from dva_sim.simulation.scenario import Scenario
-from dva_sim.worlds.hazards import Surroundings
-from dva_sim.worlds.hazards.registry import KINDS
+from dva_sim.worlds.hazards import KINDS, Surroundings
 from dva_sim.worlds.layout import Site
 
 LARGEST = 2**31  # of one record [B]; what claims to be larger is damaged
@@ -146,10 +151,9 @@ class _Raw:
             raise _Damaged(CUT if self.is_cut else "is damaged: something is missing or changed")
 
     def _take(self, record: Any, channels: dict[int, Any]) -> None:
-        from mcap.records import Attachment, Channel, Metadata
-        from mcap.records import Message as Said
+        from mcap.records import Attachment, Channel, Message, Metadata
 
-        if isinstance(record, Said):
+        if isinstance(record, Message):
             channel = channels[record.channel_id]
             is_xml = channel.message_encoding == XML
             self.time = record.log_time / messages.NS
@@ -173,7 +177,8 @@ def _opened(raw: _Raw) -> Opened:
     scenario = Scenario.model_validate(json.loads(raw.files[SCENARIO]))
     files = {n.removeprefix(SITE): d for n, d in raw.files.items() if n.startswith(SITE)}
     site = writing.unpack(files, scenario, run["seed"])
-    incidents = [_incident(entry) for entry in run["incidents"]]
+    told = raw.said.get(channels.HAZARDS, [])
+    incidents = [_incident(n, entry, told) for n, entry in enumerate(run["incidents"], 1)]
     contained = {int(number): time for number, time in run["contained_s"].items()}
     playback = Playback(
         scenario=scenario,
@@ -181,7 +186,7 @@ def _opened(raw: _Raw) -> Opened:
         site=site,
         recorder=_recorder(raw, run),
         incidents=incidents,
-        surroundings=_surroundings(site, incidents, contained),
+        surroundings=_surroundings(raw, site, incidents, contained),
         labels=run["labels"],
         radii=run["radii_m"],
         duration=raw.time if raw.is_cut else run["duration_s"],
@@ -199,12 +204,15 @@ def _tables(data: bytes) -> dict[str, list[dict[str, Any]]]:
     }
 
 
-def _incident(entry: Mapping[str, Any]) -> Incident:
-    settings = dict(entry["hazard"])
-    settings["position"] = tuple(settings["position"])
+def _incident(number: int, entry: Mapping[str, Any], told: Said) -> RunHazard:
     detected = inf if entry["detected_s"] is None else entry["detected_s"]
-    hazard = KINDS[entry["kind"]](**settings)
-    return Incident(
+    if "described" in entry:
+        hazard = recorded_hazard(number, entry, told)
+    else:
+        settings = dict(entry["hazard"])
+        place = tuple(settings.pop("position"))
+        hazard = KINDS[entry["kind"]](place, settings.pop("start"), **settings)
+    return RunHazard(
         entry["kind"], entry["room"], entry["start_s"], detected, None, hazard, entry["false_alarm"]
     )
 
@@ -214,10 +222,19 @@ def _ending(entry: Mapping[str, Any]) -> Ending:
 
 
 def _surroundings(
-    site: Any, incidents: list[Incident], contained: dict[int, float]
+    raw: _Raw, site: Site, incidents: list[RunHazard], contained: dict[int, float]
 ) -> Surroundings:
+    """The fields of the hazards: solved again, but with a hazard that is not ours as recorded."""
     real = [number for number, incident in enumerate(incidents) if not incident.false_alarm]
-    surroundings = Surroundings(site, [incidents[number].hazard for number in real])
+    hazards = [incidents[number].hazard for number in real]
+    if any(isinstance(hazard, RecordedHazard) for hazard in hazards):
+        grids = {
+            topic.removeprefix(channels.GRIDS): said
+            for topic, said in raw.said.items()
+            if topic.startswith(channels.GRIDS)
+        }
+        return RecordedSurroundings(site, hazards, grids)
+    surroundings = Surroundings(site, hazards)
     for number, time in contained.items():
         surroundings.contain(real.index(number), time)
     return surroundings
@@ -328,7 +345,7 @@ class Lapse:
     site: Site
     tracks: Columns
     told: Columns
-    incidents: tuple[Incident, ...]
+    incidents: tuple[RunHazard, ...]
     contained: dict[int, float]
     duration: float
 

@@ -5,7 +5,6 @@ A run as an MCAP file: the same run makes the same bytes, and a file is whole or
 
 from __future__ import annotations
 
-import dataclasses
 import hashlib
 import io
 import json
@@ -23,10 +22,12 @@ from dva_sim import __version__
 from dva_sim.kernel import resources
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.recordings import channels, messages
-from dva_sim.recordings.messages import SCHEMAS, XML, Message
+from dva_sim.recordings.messages import SCHEMAS, XML, ChannelMessage
 from dva_sim.simulation.full import Playback
+from dva_sim.simulation.full.hazards import RunHazard
 from dva_sim.simulation.full.run import FILM_PERIOD
 from dva_sim.simulation.scenario import Scenario, site_of
+from dva_sim.worlds.hazards import KINDS
 from dva_sim.worlds.layout import Site
 from dva_sim.worlds.maps import FREE, OCCUPIED, UNKNOWN, UNKNOWN_SHADE
 from dva_sim.worlds.site_export import write_site
@@ -88,6 +89,7 @@ def _map_files(site: Site) -> dict[str, bytes]:
 FORMAT = 1  # of what is attached; a reader refuses a later one
 ABOUT, DIGEST = "dva-sim", "digest"  # name of the metadata, and of one entry of it
 RUN, SCENARIO, TABLES, SITE = "run.json", "scenario.json", "tables.json", "site/"
+DESCRIBED = ("title", "shows", "colour", "mark")  # of a hazard whose class a reader does not load
 CHUNK = 256 * 1024  # what a file that was cut short loses at most, unpacked [B]
 
 Tables = Mapping[str, Any]
@@ -138,7 +140,7 @@ def whole_file(path: Path) -> Iterator[IO[bytes]]:
         part.unlink(missing_ok=True)
 
 
-def every_message(playback: Playback) -> Iterator[Message]:
+def every_message(playback: Playback) -> Iterator[ChannelMessage]:
     """All messages of a recording, grouped by what they tell, not by time."""
     yield from channels.ground(playback)
     yield from channels.activities(playback)
@@ -180,7 +182,7 @@ def _add_messages(writer: Any, playback: Playback, files: Mapping[str, bytes]) -
     every = [_packed(message) for message in every_message(playback)]
     if plan is not None:
         every.insert(
-            0, _packed(Message(0.0, "/plan", "foxglove.GeoJSON", {"geojson": plan.decode()}))
+            0, _packed(ChannelMessage(0.0, "/plan", "foxglove.GeoJSON", {"geojson": plan.decode()}))
         )
     every.sort(key=lambda entry: entry[0])
     for time, topic, schema, data in every:
@@ -188,7 +190,7 @@ def _add_messages(writer: Any, playback: Playback, files: Mapping[str, bytes]) -
         writer.add_message(channel, time, data, time, channels.count(channel))
 
 
-def _packed(message: Message) -> tuple[int, str, str, bytes]:
+def _packed(message: ChannelMessage) -> tuple[int, str, str, bytes]:
     content = message.content if message.schema == XML else _json(message.content)
     return messages.nanoseconds(message.time), message.topic, message.schema, content
 
@@ -276,14 +278,18 @@ def facts(playback: Playback) -> dict[str, Any]:
     }
 
 
-def _incident(incident: Any) -> dict[str, Any]:
+def _incident(incident: RunHazard) -> dict[str, Any]:
+    hazard = incident.hazard
+    described = {name: getattr(hazard, name) for name in DESCRIBED}
+    is_shipped = type(hazard) is KINDS[incident.kind]
     return {
         "kind": incident.kind,
         "room": incident.room,
         "start_s": incident.start,
         "detected_s": messages.finite(incident.detected),
         "false_alarm": incident.false_alarm,
-        "hazard": dataclasses.asdict(incident.hazard),
+        "hazard": hazard.model_dump(mode="json"),
+        **({} if is_shipped else {"described": described}),
     }
 
 

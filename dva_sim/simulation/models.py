@@ -1,250 +1,360 @@
-"""The models that a scenario can be played in, as a study sees them.
+"""The models that a scenario can be played in, side by side behind one interface.
 
 `full`: bodies, cameras, persons with phones and every byte on the network. `timed`: travel and
 service times only, a thousand times faster; the DVA's core is the same in both. `task`: one
 person at a task of the literature, with the operators and hands of the full model. `transports`:
-a session of teleoperation beside TCP flows on one congested link, and a drive over it.
+a session of teleoperation beside TCP flows on one congested link, and a drive over it. Users add
+their own: a class derived from `Model` in a file or an installed package, named in a scenario.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Protocol
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, ClassVar, Final, Generic, TypeVar
 
-from dva_sim.kernel.config import Document
+from dva_sim.kernel import key_changes
+from dva_sim.kernel.config import Config, Document, Fail
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.measure import Columns, names_of
+from dva_sim.kernel.plugins import Plugins, stamp_of
 from dva_sim.kernel.suggestions import unknown
+from dva_sim.simulation import full, shift, task, transport
 from dva_sim.simulation import scenario as scenarios
-from dva_sim.simulation.scenario import Scenario
-from dva_sim.simulation.shift import scenario as timed
-from dva_sim.simulation.shift.scenario import TimedScenario
+from dva_sim.simulation.full import measures as of_full
+from dva_sim.simulation.full import workload
+from dva_sim.simulation.run_measures import RunMeasure, values_of
+from dva_sim.simulation.scenario import Scenario, contradictions
+from dva_sim.simulation.shift import TimedScenario
+from dva_sim.simulation.shift import measures as of_shift
+from dva_sim.simulation.shift import scenario as shifts
+from dva_sim.simulation.task import TaskScenario
+from dva_sim.simulation.task import measures as of_task
 from dva_sim.simulation.task import scenario as tasks
-from dva_sim.simulation.task.scenario import TaskScenario
+from dva_sim.simulation.transport import TransportScenario
+from dva_sim.simulation.transport import measures as of_transport
 from dva_sim.simulation.transport import scenario as transports
-from dva_sim.simulation.transport.scenario import TransportScenario
 
-if TYPE_CHECKING:
-    from dva_sim.simulation.full import Recording
-
-
-AnyScenario = Scenario | TimedScenario | TaskScenario | TransportScenario
-SCENARIOS: dict[str, type[AnyScenario]] = {
-    "full": Scenario,
-    "timed": TimedScenario,
-    "task": TaskScenario,
-    "transports": TransportScenario,
-}
 Tables = dict[str, list[dict[str, Any]]]
 
 
-class Model(Protocol):
-    """What a study does with a scenario."""
+class OwnScenario(Config):
+    """A scenario of a user's own model, to be derived from; its other keys are the model's.
 
-    def measures(self, scenario: AnyScenario | None = None) -> tuple[str, ...]:
-        """Columns of the runs that a study may ask for: of some scenario, or of a certain one."""
+    It is sent to other processes by the name of its model, which they load by themselves.
 
-    def build(self, source: Document, changes: Mapping[str, Any]) -> AnyScenario:
+    Attributes:
+        model: Name of the model, `mine.py:Mine`.
+    """
+
+    model: str
+    description: str = ""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """What another process makes it from."""
+        return _restored, (self.model, self.model_dump())
+
+
+def _restored(model: str, data: dict[str, Any]) -> Any:
+    return model_named(model).scenario.model_validate(data)
+
+
+AnyScenario = Scenario | TimedScenario | TaskScenario | TransportScenario | OwnScenario
+
+
+S = TypeVar("S", bound=AnyScenario)
+Operated = TypeVar("Operated", Scenario, TaskScenario, TransportScenario)
+
+
+class Model(Generic[S]):
+    """What a study does with a scenario.
+
+    A user's model defines `scenario`, `columns`, `simulate` and `rows`; the rest is as here.
+
+    Attributes:
+        name: Set when it is loaded: a file's with its whole path.
+        scenario: What its scenarios are; a user's derives from `OwnScenario`.
+        columns: Every column of its tables. `runs` has one row for each run.
+        is_recorded: Whether its runs can be kept as recordings, filmed and run side by side.
+        teller: What tells one run in the terminal, as `module:function` of a `Played` run and a
+            console.
+        still: What draws one run, likewise; empty if there is nothing to see.
+    """
+
+    name = ""
+    scenario: type[S]
+    columns: ClassVar[Columns]
+    is_recorded = False
+    teller = "dva_sim.cli.stories:tell_any"
+    still = ""
+
+    def simulate(self, scenario: S, seed: int) -> Any:
+        """Run a scenario; what is left of the run, to be measured."""
+        raise NotImplementedError
+
+    def rows(self, recording: Any, with_tracks: bool = False) -> Tables:
+        """What is measured of a run, by table."""
+        raise NotImplementedError
+
+    def complete(self, scenario: S, error: Fail) -> S:
+        """Judge what the keys alone do not tell, and add what follows from them.
+
+        Raises:
+            ConfigError: made by `error` from a problem and a key.
+        """
+        return scenario
+
+    def build(self, source: Document | Mapping[str, Any], changes: Mapping[str, Any]) -> S:
         """The scenario of a file, with some keys changed.
 
         Raises:
             ConfigError: it is not valid.
         """
+        return key_changes.build(self.scenario, source, changes, self.complete, self._sign)
 
-    def set_by_study(self, seed: int) -> dict[str, Any]:
-        """Keys that the study itself sets."""
+    def _sign(self, data: dict[str, Any], folders: Sequence[Path]) -> None:
+        """A scenario names its model so that it is found from anywhere."""
+        data["model"] = self.name
 
-    def team(self, scenario: AnyScenario) -> int:
-        """How many persons of the population a run takes."""
+    def measures(self, scenario: S | None = None) -> tuple[str, ...]:
+        """Columns of the runs that a study may ask for: of some scenario, or of a certain one."""
+        return names_of(self.columns["runs"])
 
-    def played_by(self, scenario: AnyScenario, person: int) -> AnyScenario:
-        """The scenario with a certain person, by index in the population."""
+    def tables(
+        self,
+        scenario: S,
+        seed: int,
+        with_tracks: bool,
+        measures: Sequence[RunMeasure] = (),
+    ) -> Tables:
+        """Simulate; rows by table, that of the run with the user's own measures.
 
-    def rehearse(self, scenario: AnyScenario, seed: int) -> None:
+        Raises:
+            ConfigError: a measure of the user's gives no answer that is one.
+        """
+        recording = self.simulate(scenario, seed)
+        tables = self.rows(recording, with_tracks)
+        own = values_of(measures, recording, scenario.model)
+        if twins := tables["runs"][0].keys() & own.keys():
+            raise ConfigError(f"the model {scenario.model!r} has a column {min(twins)!r} itself")
+        tables["runs"][0] |= own
+        return tables
+
+    def rehearse(self, scenario: S, seed: int) -> None:
         """Find what cannot work before anything runs.
 
         Raises:
             ConfigError: what cannot be read or placed.
         """
 
-    def tables(self, scenario: AnyScenario, seed: int, with_tracks: bool) -> Tables:
-        """Simulate; rows by table."""
+    def contradictions(self, scenario: S) -> list[str]:
+        """What in a scenario does not go together, each in a sentence."""
+        return []
 
-
-def model_of(document: Document) -> Model:
-    """The model that a scenario file asks for.
-
-    Raises:
-        ConfigError: there is no such model.
-    """
-    name = document.data.get("model", "full")
-    if not isinstance(name, str) or name not in MODELS:
-        raise document.error(unknown("model", name, MODELS), ("model",))
-    return MODELS[name]
-
-
-def model_for(scenario: AnyScenario) -> Model:
-    """The model of a scenario that has been read."""
-    return MODELS[scenario.model]
-
-
-def tables_of(recording: Recording) -> Tables:
-    """What is measured of a run of the full model, but for its tracks."""
-    from dva_sim.simulation.full import measures, workload
-
-    return {
-        "runs": [measures.run_row(recording)],
-        "events": measures.event_rows(recording),
-        "people": measures.people_rows(recording),
-        "operators": workload.operator_rows(recording),
-    }
-
-
-class _Full:
-    def measures(self, scenario: AnyScenario | None = None) -> tuple[str, ...]:
-        from dva_sim.simulation.full import measures
-
-        return (
-            measures.measures_of(scenario) if isinstance(scenario, Scenario) else measures.MEASURES
-        )
-
-    def build(self, source: Document, changes: Mapping[str, Any]) -> Scenario:
-        return scenarios.build(source, changes)
-
+    # Persons of a population: names for independent runs where a model has none.
     def set_by_study(self, seed: int) -> dict[str, Any]:
-        return {"operator.population_seed": seed}
-
-    def team(self, scenario: AnyScenario) -> int:
-        assert isinstance(scenario, Scenario)
-        return scenario.operator.count
-
-    def played_by(self, scenario: AnyScenario, person: int) -> Scenario:
-        assert isinstance(scenario, Scenario)
-        operator = scenario.operator.model_copy(update={"person": person})
-        return scenario.model_copy(update={"operator": operator})
-
-    def rehearse(self, scenario: AnyScenario, seed: int) -> None:
-        from dva_sim.simulation.full import rehearse
-
-        assert isinstance(scenario, Scenario)
-        rehearse(scenario, seed)
-
-    def tables(self, scenario: AnyScenario, seed: int, with_tracks: bool) -> Tables:
-        from dva_sim.simulation.full import measures, simulate
-
-        assert isinstance(scenario, Scenario)
-        recording = simulate(scenario, seed)
-        tracks = {"tracks": measures.track_rows(recording)} if with_tracks else {}
-        return tables_of(recording) | tracks
-
-
-class _Timed:
-    """Its persons are but names for independent runs."""
-
-    def measures(self, scenario: AnyScenario | None = None) -> tuple[str, ...]:
-        from dva_sim.simulation.shift.measures import MEASURES, measures_of
-
-        return measures_of(scenario) if isinstance(scenario, TimedScenario) else MEASURES
-
-    def build(self, source: Document, changes: Mapping[str, Any]) -> TimedScenario:
-        return timed.build(source, changes)
-
-    def set_by_study(self, seed: int) -> dict[str, Any]:
+        """Keys that the study itself sets."""
         return {}
 
-    def team(self, scenario: AnyScenario) -> int:
+    def team(self, scenario: S) -> int:
+        """How many persons of the population a run takes."""
         return 1
 
-    def played_by(self, scenario: AnyScenario, person: int) -> AnyScenario:
+    def played_by(self, scenario: S, person: int) -> S:
+        """The scenario with a certain person, by index in the population."""
         return scenario
 
-    def rehearse(self, scenario: AnyScenario, seed: int) -> None:
-        from dva_sim.simulation.shift import rehearse_timed
 
-        assert isinstance(scenario, TimedScenario)
-        rehearse_timed(scenario, seed)
+class _Operated(Model[Operated]):
+    """Persons are drawn from a population that the study's seed decides."""
 
-    def tables(self, scenario: AnyScenario, seed: int, with_tracks: bool) -> Tables:
-        from dva_sim.simulation.shift import simulate_timed
-        from dva_sim.simulation.shift.measures import tables
+    def set_by_study(self, seed: int) -> dict[str, Any]:
+        return {"operator.population_seed": seed}
 
-        assert isinstance(scenario, TimedScenario)
-        return tables(simulate_timed(scenario, seed))
+    def played_by(self, scenario: Operated, person: int) -> Operated:
+        operator = scenario.operator.model_copy(update={"person": person})
+        return scenario.model_copy(update={"operator": operator})
 
 
-class _Task:
-    """A run is a block of trials of one person; `trials` has a row for each."""
+class _Full(_Operated[Scenario]):
+    """Robots, people, phones and every byte on the network."""
 
-    def measures(self, scenario: AnyScenario | None = None) -> tuple[str, ...]:
-        from dva_sim.simulation.task.measures import MEASURES, measures_of
+    scenario = Scenario
+    columns: ClassVar[Columns] = {
+        "runs": of_full.RUN_COLUMNS,
+        "events": of_full.EVENT_COLUMNS,
+        "people": of_full.PEOPLE_COLUMNS,
+        "operators": workload.OPERATOR_COLUMNS,
+        "tracks": of_full.TRACK_COLUMNS,
+    }
+    is_recorded = True
+    teller = "dva_sim.cli.stories:tell_full"
 
-        return measures_of(scenario) if isinstance(scenario, TaskScenario) else MEASURES
+    def measures(self, scenario: Scenario | None = None) -> tuple[str, ...]:
+        return super().measures() if scenario is None else of_full.measures_of(scenario)
 
-    def build(self, source: Document, changes: Mapping[str, Any]) -> TaskScenario:
+    def build(self, source: Document | Mapping[str, Any], changes: Mapping[str, Any]) -> Scenario:
+        return scenarios.build(source, changes)
+
+    def team(self, scenario: Scenario) -> int:
+        return scenario.operator.count
+
+    def rehearse(self, scenario: Scenario, seed: int) -> None:
+        full.rehearse(scenario, seed)
+
+    def contradictions(self, scenario: Scenario) -> list[str]:
+        return contradictions(scenario)
+
+    def simulate(self, scenario: Scenario, seed: int) -> full.Recording:
+        return full.simulate(scenario, seed)
+
+    def rows(self, recording: full.Recording, with_tracks: bool = False) -> Tables:
+        tracks = {"tracks": of_full.track_rows(recording)} if with_tracks else {}
+        return of_full.tables_of(recording) | tracks
+
+
+class _Timed(Model[TimedScenario]):
+    """Whole shifts of the DVA, responders as travel and service times."""
+
+    scenario = TimedScenario
+    columns: ClassVar[Columns] = {
+        "runs": of_shift.RUN_COLUMNS,
+        "events": of_shift.EVENT_COLUMNS,
+        "responders": of_shift.RESPONDER_COLUMNS,
+    }
+    teller = "dva_sim.cli.stories:tell_shift"
+
+    def measures(self, scenario: TimedScenario | None = None) -> tuple[str, ...]:
+        return super().measures() if scenario is None else of_shift.measures_of(scenario)
+
+    def build(
+        self, source: Document | Mapping[str, Any], changes: Mapping[str, Any]
+    ) -> TimedScenario:
+        return shifts.build(source, changes)
+
+    def rehearse(self, scenario: TimedScenario, seed: int) -> None:
+        shift.rehearse_timed(scenario, seed)
+
+    def simulate(self, scenario: TimedScenario, seed: int) -> shift.TimedRecording:
+        return shift.simulate_timed(scenario, seed)
+
+    def rows(self, recording: shift.TimedRecording, with_tracks: bool = False) -> Tables:
+        return of_shift.tables(recording)
+
+
+class _Task(_Operated[TaskScenario]):
+    """A block of trials of one person at a task of the literature."""
+
+    scenario = TaskScenario
+    columns: ClassVar[Columns] = {"runs": of_task.RUN_COLUMNS, "trials": of_task.TRIAL_COLUMNS}
+    teller = "dva_sim.cli.stories:tell_task"
+    still = "dva_sim.experiments.report.figures.trial:draw_trial"
+
+    def measures(self, scenario: TaskScenario | None = None) -> tuple[str, ...]:
+        return super().measures() if scenario is None else of_task.measures_of(scenario)
+
+    def build(
+        self, source: Document | Mapping[str, Any], changes: Mapping[str, Any]
+    ) -> TaskScenario:
         return tasks.build(source, changes)
 
-    def set_by_study(self, seed: int) -> dict[str, Any]:
-        return {"operator.population_seed": seed}
+    def rehearse(self, scenario: TaskScenario, seed: int) -> None:
+        task.rehearse(scenario)
 
-    def team(self, scenario: AnyScenario) -> int:
-        return 1
+    def simulate(self, scenario: TaskScenario, seed: int) -> list[of_task.Row]:
+        return task.play(scenario, seed)
 
-    def played_by(self, scenario: AnyScenario, person: int) -> TaskScenario:
-        assert isinstance(scenario, TaskScenario)
-        operator = scenario.operator.model_copy(update={"person": person})
-        return scenario.model_copy(update={"operator": operator})
-
-    def rehearse(self, scenario: AnyScenario, seed: int) -> None:
-        from dva_sim.simulation.task import rehearse
-
-        assert isinstance(scenario, TaskScenario)
-        rehearse(scenario)
-
-    def tables(self, scenario: AnyScenario, seed: int, with_tracks: bool) -> Tables:
-        from dva_sim.simulation.task import play
-        from dva_sim.simulation.task.measures import run_row
-
-        assert isinstance(scenario, TaskScenario)
-        trials = play(scenario, seed)
-        return {"runs": [run_row(trials)], "trials": trials}
+    def rows(self, recording: list[of_task.Row], with_tracks: bool = False) -> Tables:
+        return {"runs": [of_task.run_row(recording)], "trials": recording}
 
 
-class _Transports:
-    """A run is the network first, and then one drive of one person over it."""
+class _Transports(_Operated[TransportScenario]):
+    """A session beside TCP flows on a congested link, and one drive of one person over it."""
 
-    def measures(self, scenario: AnyScenario | None = None) -> tuple[str, ...]:
-        from dva_sim.simulation.transport.measures import MEASURES
+    scenario = TransportScenario
+    columns: ClassVar[Columns] = {
+        "runs": of_transport.RUN_COLUMNS,
+        "flows": of_transport.FLOW_COLUMNS,
+    }
+    teller = "dva_sim.cli.stories:tell_session"
 
-        return MEASURES
-
-    def build(self, source: Document, changes: Mapping[str, Any]) -> TransportScenario:
+    def build(
+        self, source: Document | Mapping[str, Any], changes: Mapping[str, Any]
+    ) -> TransportScenario:
         return transports.build(source, changes)
 
-    def set_by_study(self, seed: int) -> dict[str, Any]:
-        return {"operator.population_seed": seed}
+    def rehearse(self, scenario: TransportScenario, seed: int) -> None:
+        transport.rehearse(scenario)
 
-    def team(self, scenario: AnyScenario) -> int:
-        return 1
+    def simulate(self, scenario: TransportScenario, seed: int) -> transport.SessionRecording:
+        return transport.simulate_session(scenario, seed)
 
-    def played_by(self, scenario: AnyScenario, person: int) -> TransportScenario:
-        assert isinstance(scenario, TransportScenario)
-        operator = scenario.operator.model_copy(update={"person": person})
-        return scenario.model_copy(update={"operator": operator})
-
-    def rehearse(self, scenario: AnyScenario, seed: int) -> None:
-        from dva_sim.simulation.transport import rehearse
-
-        assert isinstance(scenario, TransportScenario)
-        rehearse(scenario)
-
-    def tables(self, scenario: AnyScenario, seed: int, with_tracks: bool) -> Tables:
-        from dva_sim.simulation.transport import simulate_transports
-
-        assert isinstance(scenario, TransportScenario)
-        return simulate_transports(scenario, seed)
+    def rows(self, recording: transport.SessionRecording, with_tracks: bool = False) -> Tables:
+        return transport.tables(recording)
 
 
-MODELS: dict[str, Model] = {
-    "full": _Full(),
-    "timed": _Timed(),
-    "task": _Task(),
-    "transports": _Transports(),
+SHIPPED: Final[dict[str, type[Model[Any]]]] = {
+    "full": _Full,
+    "timed": _Timed,
+    "task": _Task,
+    "transports": _Transports,
 }
+MODELS: Final[dict[str, Model[Any]]] = {name: model() for name, model in SHIPPED.items()}
+"""Ours, by name: what a results folder or a recording may name."""
+
+PLUGINS: Final = Plugins[Model[Any]](
+    kind="model",
+    base=Model,
+    shipped=SHIPPED,
+    folder="experiments/models",
+    group="dva_sim.models",
+    key="model",
+    needs="simulate(scenario, seed)",
+    public="dva_sim.simulation.models.Model",
+)
+
+
+def model_of(document: Document) -> Model[Any]:
+    """The model that a scenario file asks for; a file that it names is loaded.
+
+    Raises:
+        ConfigError: there is no such model, or it cannot be loaded.
+    """
+    name = document.data.get("model", "full")
+    if not isinstance(name, str):
+        raise document.error(unknown("model", name, MODELS), ("model",))
+    try:
+        return model_named(PLUGINS.located(name, document.file.parent))
+    except ConfigError as error:
+        if error.file is not None:
+            raise
+        raise document.error(error.problem, ("model",)) from None
+
+
+def model_for(scenario: AnyScenario) -> Model[Any]:
+    """The model of a scenario that has been read."""
+    return model_named(scenario.model)
+
+
+def model_named(name: str) -> Model[Any]:
+    """A shipped model, an installed one, or one in a file that is named with its whole path.
+
+    Raises:
+        ConfigError: there is none, or it cannot be loaded or made.
+    """
+    return MODELS[name] if name in MODELS else _loaded(name, stamp_of(name))
+
+
+@lru_cache(maxsize=32)
+def _loaded(name: str, stamp: int) -> Model[Any]:
+    """One object for each state of a file, so that its scenarios are of one class."""
+    model = PLUGINS.make(name, PLUGINS.find(name), {})
+    model.name = name
+    return model
+
+
+def measured_names() -> set[str]:
+    """Every column of every table of our models."""
+    return {column.name for model in MODELS.values() for columns in model.columns.values()
+            for column in columns}  # fmt: skip

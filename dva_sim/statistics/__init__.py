@@ -55,16 +55,25 @@ studies, 24 persons).
 """
 
 from dva_sim.statistics.bands import Band, band
-from dva_sim.statistics.effect_sizes import MOST_PERSONS, EffectSize, Law, effect_size, law_of
+from dva_sim.statistics.effect_sizes import (
+    MOST_PERSONS,
+    EffectSize,
+    IntervalLaw,
+    effect_size,
+    law_of,
+)
+from dva_sim.statistics.incidence import (
+    CUT,
+    Incidence,
+    IncidenceAtHorizon,
+    cumulative_incidence,
+    first_of,
+    incidence,
+)
 from dva_sim.statistics.means import Components, components, mean_interval, paired_difference
 from dva_sim.statistics.pairing import VarianceReduction, pair_correlation, variance_reduction
 from dva_sim.statistics.persons import LEVEL, Interval, bootstrap_interval, person_means
-from dva_sim.statistics.proportions import (
-    Incidence,
-    cumulative_incidence,
-    quantile_interval,
-    share_interval,
-)
+from dva_sim.statistics.proportions import quantile_interval, share_interval
 from dva_sim.statistics.sensitivity import Effect, SobolIndex, factorial_effects, sobol_indices
 from dva_sim.statistics.tests import (
     Equivalence,
@@ -76,6 +85,7 @@ from dva_sim.statistics.tests import (
 )
 
 __all__ = [
+    "CUT",
     "LEVEL",
     "MOST_PERSONS",
     "Band",
@@ -84,8 +94,9 @@ __all__ = [
     "EffectSize",
     "Equivalence",
     "Incidence",
+    "IncidenceAtHorizon",
     "Interval",
-    "Law",
+    "IntervalLaw",
     "PermutationTest",
     "SobolIndex",
     "VarianceReduction",
@@ -96,7 +107,9 @@ __all__ = [
     "effect_size",
     "equivalence",
     "factorial_effects",
+    "first_of",
     "holm",
+    "incidence",
     "law_of",
     "mean_interval",
     "one_sided_test",

@@ -114,7 +114,7 @@ MOST_PERSONS = 10_000
 
 
 @dataclass(frozen=True)
-class Law:
+class IntervalLaw:
     """How far an interval reaches from its mean, by the number of persons.
 
     Attributes:
@@ -156,7 +156,7 @@ class Law:
 
 def law_of(
     values: ArrayLike, person: ArrayLike, reach: float | None = None, level: float = LEVEL
-) -> Law | None:
+) -> IntervalLaw | None:
     """The law that a study's own interval follows; None where its persons are all alike.
 
     Args:
@@ -170,7 +170,7 @@ def law_of(
     means = person_means(values, person)[1]
     if len(means) < 2 or not np.ptp(means) > 0:
         return None
-    plain = Law(float(means.std(ddof=1)), len(means), level)
+    plain = IntervalLaw(float(means.std(ddof=1)), len(means), level)
     if reach is None:
         return plain
-    return Law(plain.spread, plain.persons, level, reach / plain.reach(len(means)))
+    return IntervalLaw(plain.spread, plain.persons, level, reach / plain.reach(len(means)))

@@ -10,22 +10,22 @@ from typing import Any, Final
 
 from PIL import Image
 
-from dva_sim.agents.operator.person import Population
 from dva_sim.agents.operator.published import TargetFile, load_split
 from dva_sim.agents.people.profiles import BystanderProfile, GuardProfile
+from dva_sim.agents.person import Population
 from dva_sim.agents.robot.profile import read_robot
 from dva_sim.agents.tilt import AccelerometerPart, PhoneProfile, try_phone
-from dva_sim.experiments.execution.job import contradictions_in
+from dva_sim.experiments.execution.dry_run import contradictions_in
 from dva_sim.experiments.study import cell_grid
-from dva_sim.experiments.study.documents import FileKind, blamed_in
 from dva_sim.experiments.study.registration import departures, load_registration
 from dva_sim.experiments.study.robustness_grid import Bands
-from dva_sim.experiments.study.study import Study, load_study
-from dva_sim.experiments.study.tuned_values import Tuned
+from dva_sim.experiments.study.study import Study
+from dva_sim.experiments.study.study_file import load_study
+from dva_sim.experiments.study.tuning import TunedValues
 from dva_sim.kernel.config import Config, Document, validate
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.simulation.models import model_of
-from dva_sim.simulation.scenario import Scenario, build, contradictions
+from dva_sim.testing.file_kinds import FileKind, blamed_in
 from dva_sim.testing.promises import Problem
 from dva_sim.validation.dispatch.cases import load_cases
 from dva_sim.validation.network.reference import load_plan
@@ -51,7 +51,10 @@ def doubts(kind: FileKind, document: Document) -> list[str]:
     """What does not go together in a valid study or scenario."""
     if kind.model is Study:
         return contradictions_in(cell_grid.cells(load_study(document.file)))
-    return contradictions(build(document)) if kind.model is Scenario else []
+    if CHECKS[kind.name] is not _check_scenario:
+        return []
+    model = model_of(document)
+    return model.contradictions(model.build(document, {}))
 
 
 def check_plan(path: Path) -> list[Problem]:
@@ -186,6 +189,7 @@ CHECKS: Final[dict[str, Check]] = {
     "timed scenario": _check_scenario,
     "task": _check_scenario,
     "transports": _check_scenario,
+    "own scenario": _check_scenario,
     "validation cases": _check_cases,
     "targets": _check_model(TargetFile),
     "measurements": _check_plan,
@@ -200,6 +204,6 @@ CHECKS: Final[dict[str, Check]] = {
     "operators": _check_model(Population),
     "bands of operators": _check_model(Bands),
     "registration": _check_registration,
-    "tuned values": _check_model(Tuned),
+    "tuned values": _check_model(TunedValues),
 }
 """How files of each kind are checked, by the names of `experiments.documents`."""

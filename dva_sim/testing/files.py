@@ -1,7 +1,4 @@
-"""One file: what kind it is of, and what is wrong with it.
-
-The schemas that files follow: the XSD of messages, JSON Schemas of configurations.
-"""
+"""One file: what kind it is of, what is wrong with it, and which schema such files follow."""
 
 from __future__ import annotations
 
@@ -16,7 +13,8 @@ from typing import Any, Final
 from dva_sim.kernel.config import Document, load_yaml
 from dva_sim.kernel.errors import ConfigError, DvaSimError
 from dva_sim.kernel.suggestions import hint
-from dva_sim.testing.messages import READ_BYTES, check_message, schema_file
+from dva_sim.protocol.schema import schema_file
+from dva_sim.testing.messages import READ_BYTES, check_message
 from dva_sim.testing.promises import Problem, not_text
 
 YAML_BYTES: Final = 256 * 1024
@@ -39,7 +37,7 @@ class NotReadError(DvaSimError):
 
 
 @dataclass(frozen=True)
-class Verdict:
+class FileVerdict:
     """What was found: the kind of a file, its problems, and what does not go together in it.
 
     It is valid if it has no problems.
@@ -50,7 +48,7 @@ class Verdict:
     doubts: Sequence[str] = ()
 
 
-def check_file(path: Path) -> Verdict:
+def check_file(path: Path) -> FileVerdict:
     """Judge one file.
 
     Raises:
@@ -58,12 +56,12 @@ def check_file(path: Path) -> Verdict:
     """
     kind = _SUFFIXES.get(path.suffix.lower()) or _by_content(_read(path, READ_BYTES))
     if kind == "message":
-        return Verdict(kind, check_message(_read(path, READ_BYTES)))
+        return FileVerdict(kind, check_message(_read(path, READ_BYTES)))
     if kind == "plan":
         return _check_plan(path)
     if kind == "configuration":
         return _check_yaml(path)
-    return Verdict("unknown", [Problem(1, 1, _UNKNOWN)])
+    return FileVerdict("unknown", [Problem(1, 1, _UNKNOWN)])
 
 
 def _by_content(head: bytes) -> str | None:
@@ -101,26 +99,26 @@ def _flawed(path: Path, limit: int) -> list[Problem]:
     return [problem] if problem else []
 
 
-def _check_plan(path: Path) -> Verdict:
+def _check_plan(path: Path) -> FileVerdict:
     from dva_sim.testing.configs import check_plan
 
-    return Verdict("plan", _flawed(path, PLAN_BYTES) or check_plan(path))
+    return FileVerdict("plan", _flawed(path, PLAN_BYTES) or check_plan(path))
 
 
-def _check_yaml(path: Path) -> Verdict:
+def _check_yaml(path: Path) -> FileVerdict:
     """A message needs none of what reads configurations: it is imported here."""
-    from dva_sim.experiments.study.documents import recognise
     from dva_sim.testing.configs import check_config, doubts
+    from dva_sim.testing.file_kinds import recognise
 
     problems = _flawed(path, YAML_BYTES)
     document, problem = (None, problems[0]) if problems else _parse(path)
     if document is None:
-        return Verdict("configuration", [problem] if problem else [])
+        return FileVerdict("configuration", [problem] if problem else [])
     kind = recognise(document)
     if kind is None:
-        return Verdict("unknown", [Problem(1, 1, _UNKNOWN)])
+        return FileVerdict("unknown", [Problem(1, 1, _UNKNOWN)])
     problems = check_config(kind, document)
-    return Verdict(kind.name, problems, () if problems else doubts(kind, document))
+    return FileVerdict(kind.name, problems, () if problems else doubts(kind, document))
 
 
 def _parse(path: Path) -> tuple[Document | None, Problem | None]:
@@ -168,8 +166,8 @@ def _json_schema(kind: str) -> dict[str, Any]:
     """From the models that read the files; an agent may be of any of seven kinds."""
     from pydantic import TypeAdapter
 
-    from dva_sim.agents.operator.person import Population
     from dva_sim.agents.people.profiles import BystanderProfile, GuardProfile
+    from dva_sim.agents.person import Population
     from dva_sim.agents.robot.profile import RobotProfile
     from dva_sim.agents.tilt import AccelerometerPart, PhoneProfile
     from dva_sim.experiments.study.robustness_grid import Bands

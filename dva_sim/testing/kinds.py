@@ -1,123 +1,166 @@
-"""Kinds of things that are tried rather than read: what `check` may be told to try, by name."""
+"""Kinds of things that are tried rather than read: what `check` may be told to try, by word.
+
+An index, not the things: modules are named, and imported when one of their kind is asked for.
+To add a kind, add its `Trial` here, and the module that its `check` names.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
-from typing import Any, Final
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Final
 
-from dva_sim.testing.promises import Outcome
-
-Options = Mapping[str, Any]
+if TYPE_CHECKING:
+    from dva_sim.kernel.plugins import Plugins
+    from dva_sim.testing.promises import Outcome
 
 
 @dataclass(frozen=True)
-class Trial:
+class CheckedKind:
     """How one kind is tried.
 
     Attributes:
-        many: What several are called.
-        known: Names that are shipped or installed.
-        run: Tries the one of a name with options; raises ConfigError if it cannot be had.
-        ways: How it was tried, in words.
+        kind: The word for one: `dva-sim check KIND NAME`.
+        plugins: Where its `Plugins` are: `module:NAME`.
+        check: What tries one, by name or as a class, with options: `module:function`.
+        told: How it was tried, in words, with `{tries}`, and `{ms}` or `{us}` of the slowest.
+        folder: Of the files that are named, where it is not the class itself that is.
     """
 
-    many: str
-    known: Callable[[], Iterable[str]]
-    run: Callable[[str, Options], Outcome]
-    ways: Callable[[Outcome], str]
+    kind: str
+    plugins: str
+    check: str
+    told: str
+    folder: str = ""
+
+    @property
+    def many(self) -> str:
+        """What several are called."""
+        return plural(self.kind)
+
+    def load_plugins(self) -> Plugins[Any]:
+        """What users may add of this kind."""
+        found: Plugins[Any] = _named(self.plugins)
+        return found
+
+    def known(self) -> list[str]:
+        """Names that are shipped or installed."""
+        from dva_sim.kernel.resources import available  # late: start-up
+
+        return sorted(available(self.folder)) if self.folder else self.load_plugins().known()
+
+    def run(self, name: str, options: Mapping[str, Any]) -> Outcome:
+        """Try the one of a name.
+
+        Raises:
+            ConfigError: it cannot be had.
+        """
+        from dva_sim.testing.promises import BrokenPromises  # late: start-up
+
+        try:
+            outcome: Outcome = self.load_check()(name, options)
+        except BrokenPromises as error:
+            return error.outcome
+        return outcome
+
+    def load_check(self) -> Callable[..., Outcome]:
+        """What users call in tests of their own."""
+        found: Callable[..., Outcome] = _named(self.check)
+        return found
+
+    def ways(self, outcome: Outcome) -> str:
+        """How it was tried, in words."""
+        slowest = outcome.slowest
+        return self.told.format(tries=outcome.tries, ms=1e3 * slowest, us=1e6 * slowest)
 
 
-# Each is imported when it is asked for: `check` of a file needs none of them.
-def _policies() -> Iterable[str]:
-    from dva_sim.core.dispatch import known_policies
-
-    return known_policies()
+def plural(kind: str) -> str:
+    """What several of a kind are called."""
+    return f"{kind.removesuffix('y')}ies" if kind.endswith("y") else f"{kind}s"
 
 
-def _try_policy(name: str, options: Options) -> Outcome:
-    from dva_sim.core.dispatch import load_policy
-    from dva_sim.testing.policies import try_policy
-
-    return try_policy(partial(load_policy, name, options))
-
-
-def _robots() -> Iterable[str]:
-    from dva_sim.kernel.resources import available
-
-    return sorted(available("agents/robots"))
+def _named(place: str) -> Any:
+    """What `module:name` names."""
+    module, _, name = place.partition(":")
+    return getattr(import_module(module), name)
 
 
-def _try_robot(name: str, options: Options) -> Outcome:
-    """A profile; or motors in a file, in the body that a profile has if it says nothing else."""
-    from dva_sim.agents.robot.profile import RobotProfile, load_robot
-    from dva_sim.testing.robots import try_robot
-
-    profile = RobotProfile(drive=name) if ".py" in name else load_robot(name)
-    changed = profile.model_copy(update={"options": {**profile.options, **options}})
-    return try_robot(changed.drive_spec())
-
-
-def _operators() -> Iterable[str]:
-    from dva_sim.agents.operator.strategies import known_strategies
-
-    return known_strategies()
-
-
-def _try_operator(name: str, options: Options) -> Outcome:
-    from dva_sim.agents.operator.strategies import load_strategy
-    from dva_sim.testing.operators import try_operator
-
-    return try_operator(load_strategy(name, options))
-
-
-def _filters() -> Iterable[str]:
-    from dva_sim.agents.tilt import known_filters
-
-    return known_filters()
-
-
-def _try_filter(name: str, options: Options) -> Outcome:
-    from dva_sim.agents.tilt import load_filter
-    from dva_sim.testing.tilt import try_filter
-
-    return try_filter(load_filter(name, options))
-
-
-def _mappings() -> Iterable[str]:
-    from dva_sim.agents.tilt import known_mappings
-
-    return known_mappings()
-
-
-def _try_mapping(name: str, options: Options) -> Outcome:
-    from dva_sim.agents.tilt import load_mapping
-    from dva_sim.testing.tilt import try_mapping
-
-    return try_mapping(load_mapping(name, options))
-
-
-def _decisions(outcome: Outcome) -> str:
-    return f"{outcome.tries} situations, slowest decision {1000 * outcome.slowest:.1f} ms"
-
-
-def _drives(outcome: Outcome) -> str:
-    return f"{outcome.tries} drives, {1e6 * outcome.slowest:.0f} microseconds a tick"
-
-
-def _steering(outcome: Outcome) -> str:
-    return f"{outcome.tries} drives, {1e6 * outcome.slowest:.0f} microseconds a frame"
-
-
-def _readings(outcome: Outcome) -> str:
-    return f"{outcome.tries} runs, {1e6 * outcome.slowest:.1f} microseconds a reading"
-
-
-TRIALS: Final[dict[str, Trial]] = {
-    "policy": Trial("policies", _policies, _try_policy, _decisions),
-    "robot": Trial("robots", _robots, _try_robot, _drives),
-    "operator": Trial("operators", _operators, _try_operator, _steering),
-    "filter": Trial("filters", _filters, _try_filter, _readings),
-    "mapping": Trial("mappings", _mappings, _try_mapping, _readings),
+TRIALS: Final[dict[str, CheckedKind]] = {
+    trial.kind: trial
+    for trial in (
+        CheckedKind(
+            "pattern",
+            "dva_sim.network.patterns:PLUGINS",
+            "dva_sim.testing.patterns:check_pattern",
+            "{tries} drives, {us:.0f} microseconds a command",
+        ),
+        CheckedKind(
+            "policy",
+            "dva_sim.core.dispatch:PLUGINS",
+            "dva_sim.testing.policies:check_policy",
+            "{tries} situations, slowest decision {ms:.1f} ms",
+        ),
+        CheckedKind(
+            "operator",
+            "dva_sim.agents.operator.strategies.loading:PLUGINS",
+            "dva_sim.testing.operators:check_operator",
+            "{tries} drives, {us:.0f} microseconds a frame",
+        ),
+        CheckedKind(
+            "filter",
+            "dva_sim.agents.tilt.filters:PLUGINS",
+            "dva_sim.testing.tilt:check_filter",
+            "{tries} runs, {us:.1f} microseconds a reading",
+        ),
+        CheckedKind(
+            "mapping",
+            "dva_sim.agents.tilt.mappings:PLUGINS",
+            "dva_sim.testing.tilt:check_mapping",
+            "{tries} runs, {us:.1f} microseconds a reading",
+        ),
+        CheckedKind(
+            "hazard",
+            "dva_sim.worlds.hazards.registry:PLUGINS",
+            "dva_sim.testing.hazards:check_hazard",
+            "{tries} questions, {us:.0f} microseconds an answer",
+        ),
+        CheckedKind(
+            "measure",
+            "dva_sim.simulation.run_measures:PLUGINS",
+            "dva_sim.testing.measures:check_measure",
+            "{tries} runs, {ms:.1f} ms an answer",
+        ),
+        CheckedKind(
+            "model",
+            "dva_sim.simulation.models:PLUGINS",
+            "dva_sim.testing.models:check_model",
+            "{tries} runs, slowest {ms:.0f} ms",
+        ),
+        CheckedKind(
+            "figure",
+            "dva_sim.experiments.report.figures.registry:PLUGINS",
+            "dva_sim.testing.figures:check_figure",
+            "{tries} drawings, slowest {ms:.0f} ms",
+        ),
+        CheckedKind(
+            "measure",
+            "dva_sim.simulation.run_measures:PLUGINS",
+            "dva_sim.testing.measures:check_measure",
+            "{tries} answers, slowest {ms:.1f} ms",
+        ),
+        CheckedKind(
+            "model",
+            "dva_sim.simulation.models:PLUGINS",
+            "dva_sim.testing.models:check_model",
+            "{tries} runs, slowest {ms:.0f} ms",
+        ),
+        CheckedKind(
+            "robot",
+            "dva_sim.worlds.drives:PLUGINS",
+            "dva_sim.testing.robots:check_robot",
+            "{tries} drives, {us:.0f} microseconds a tick",
+            folder="agents/robots",
+        ),
+    )
 }

@@ -1,6 +1,6 @@
-"""What the value of an element should look like, in words, read from the schema itself.
+"""Messages: the codec judges, and only what it has refused is searched for the place.
 
-Messages: the codec judges, and only what it has refused is searched for the place.
+What the value of an element should look like is said in words, read from the schema itself.
 """
 
 from __future__ import annotations
@@ -9,71 +9,42 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
 from typing import Any, Final
 from xml.parsers import expat
 
 from lxml import etree
 
-from dva_sim.kernel.resources import roots
 from dva_sim.protocol.codec import MAX_BYTES, decode
 from dva_sim.protocol.errors import ProtocolError
+from dva_sim.protocol.schema import WHOLE, facets, schema_file, types_of
 from dva_sim.testing.promises import Problem, at, not_text
-
-_XS: Final = "{http://www.w3.org/2001/XMLSchema}"
-_WHOLE: Final = {"xs:unsignedInt": str(2**32 - 1), "xs:unsignedLong": str(2**64 - 1)}
-
-
-def schema_file() -> Path:
-    """The schema of the program; one in the working folder does not judge messages."""
-    found = (root / "protocol" / "dva.xsd" for root in roots()[1:])
-    return next(path for path in found if path.is_file())
 
 
 @cache
 def form_of(element: str) -> str | None:
     """What an element should hold; None if it holds elements, or different things by place."""
-    tree = etree.parse(schema_file())
-    types = {e.get("type") for e in tree.iter(f"{_XS}element") if e.get("name") == element}
+    types = types_of(element)
     if len(types) != 1:
         return None
-    facets = _facets(tree, str(types.pop()))
-    return _in_words(facets) if facets else None
+    found = facets(str(types.pop()))
+    return _in_words(found) if found else None
 
 
-def _facets(tree: etree._ElementTree, name: str) -> dict[str, list[str]]:
-    """All that restricts a simple type, the narrowest first, and `base`, what it starts from."""
-    facets: dict[str, list[str]] = {}
-    while (restriction := _restriction(tree, name)) is not None:
-        for facet in restriction.iterchildren(f"{_XS}*"):
-            facets.setdefault(etree.QName(facet).localname, []).append(str(facet.get("value")))
-        name = str(restriction.get("base"))
-        facets["base"] = [name]
-    return facets
-
-
-def _restriction(tree: etree._ElementTree, name: str) -> etree._Element | None:
-    for simple in tree.getroot().iterchildren(f"{_XS}simpleType"):
-        if simple.get("name") == name:
-            return simple.find(f"{_XS}restriction")
-    return None
-
-
-def _in_words(facets: dict[str, list[str]]) -> str:
-    if "enumeration" in facets:
-        *others, last = facets["enumeration"]
+def _in_words(known: dict[str, list[str]]) -> str:
+    if "enumeration" in known:
+        *others, last = known["enumeration"]
         return f"one of {', '.join(others)} or {last}" if others else last
-    base = facets["base"][0]
-    if base in _WHOLE or "minInclusive" in facets:
-        low = facets.get("minInclusive", ["0"])[0]
-        high = facets.get("maxInclusive", [_WHOLE.get(base, "any")])[0]
-        kind = "a whole number" if base in _WHOLE else "a number"
+    base = known["base"][0]
+    if base in WHOLE or "minInclusive" in known:
+        low = known.get("minInclusive", ["0"])[0]
+        high = known.get("maxInclusive", [WHOLE.get(base, "any")])[0]
+        kind = "a whole number" if base in WHOLE else "a number"
         return f"{kind} from {low} to {high}, in the digits 0 to 9"
-    if "maxLength" in facets:
-        shortest, longest = facets.get("minLength", ["0"])[0], facets["maxLength"][0]
+    if "maxLength" in known:
+        shortest, longest = known.get("minLength", ["0"])[0], known["maxLength"][0]
         length = f"{shortest} to {longest} characters"
-        return f"{length} of the form {facets['pattern'][0]}" if "pattern" in facets else length
-    return "of the form " + " and ".join(facets["pattern"])
+        return f"{length} of the form {known['pattern'][0]}" if "pattern" in known else length
+    return "of the form " + " and ".join(known["pattern"])
 
 
 READ_BYTES: Final = MAX_BYTES + 1

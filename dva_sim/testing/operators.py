@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from dva_sim.agents.operator.person import Person, Population, draw_person, median_person
+from dva_sim.agents.observation import Observation
 from dva_sim.agents.operator.strategies import (
     Driver,
-    Guarded,
+    GuardedStrategy,
     Intent,
     PathView,
     PointView,
@@ -21,11 +21,12 @@ from dva_sim.agents.operator.strategies import (
     Sighting,
     Strategy,
     View,
+    load_strategy,
 )
-from dva_sim.agents.robot.camera import Observation
+from dva_sim.agents.person import Person, Population, draw_person, median_person
 from dva_sim.agents.route_following import Route
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.testing.promises import Case, Outcome, line, part_by_part
+from dva_sim.testing.promises import Case, Outcome, kept, line, part_by_part
 
 FRAME: Final = 0.1  # from one picture to the next [s]
 ROBOTS: Final = (Reach(0.5, math.pi / 6), Reach(0.8, 1.4, 0.56))  # one turns on the spot
@@ -51,6 +52,22 @@ LOOKS: Final = 400  # things seen at random
 FAR: Final = (0.0, 1e-9, 1.0, 40.0, 1e4, -1e4)  # [m], or [rad]
 WAITS: Final = (0.0, 0.02, 0.1, 5.0)  # between two pictures [s]
 GUESSES: Final = (0.0, 0.05, 0.4, 3.0, 60.0)  # of the delay [s]
+
+
+def check_operator(
+    operator: str | Callable[..., Driver], options: Mapping[str, Any] | None = None
+) -> Outcome:
+    """See that a way of steering keeps what all promise.
+
+    Args:
+        operator: A strategy by name, as in a scenario, or its class.
+        options: Keyword arguments of its constructor, besides person and reach.
+
+    Raises:
+        BrokenPromises: it does not; a line for each promise.
+        ConfigError: there is none of that name, or it cannot be made with these options.
+    """
+    return kept(try_operator(load_strategy(operator, options)))
 
 
 def try_operator(
@@ -120,7 +137,7 @@ class _Trial:
         made = self._make(person, reach)
         if not isinstance(made, Strategy):
             raise ConfigError("is told the truth, and sees nothing: there is nothing to try")
-        return made.strategy if isinstance(made, Guarded) else made
+        return made.strategy if isinstance(made, GuardedStrategy) else made
 
     # --- whatever is seen --------------------------------------------------------------
 

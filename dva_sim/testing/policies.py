@@ -1,14 +1,15 @@
-"""Situations to try a policy in: ordinary ones, and all the corners that a run can come to.
+"""What every policy promises, tried in some hundred situations.
 
-What every policy promises, tried in some hundred situations.
+They are ordinary ones, and all the corners that a run can come to.
 """
 
 from __future__ import annotations
 
 import operator
 import time
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from functools import partial
 from itertools import cycle, islice
 from typing import Any, Final, Literal
 
@@ -24,11 +25,12 @@ from dva_sim.core.dispatch import (
     Responder,
     Situation,
     Task,
+    load_policy,
 )
 from dva_sim.kernel.plugins import FAILURES
-from dva_sim.testing.promises import Case, Outcome, line, said
+from dva_sim.protocol.messages import EVENT_KINDS
+from dva_sim.testing.promises import Case, Outcome, kept, line, said
 
-_KINDS: Final = ("fire", "gas_leak", "flood")
 _PLACE: Final = 400.0  # edge of the site [m]
 _PACE: Final = {"guard": (1.3, 20.0), "robot": (0.35, 4.0)}  # [m/s], mobilisation [s]
 
@@ -113,15 +115,15 @@ def _situation(kind: _Draw, policy: Policy, rng: np.random.Generator) -> Situati
     bids = np.where(rng.random(shape) < kind.bids, eta + rng.uniform(-5.0, 5.0, shape), np.nan)
     bids[[task.auction is None for task in tasks]] = np.nan
     return Situation(
-        now,
-        tasks,
-        team,
-        _read_only(distance),
-        _read_only(eta),
-        _read_only(ranks if kind.listed else np.empty((0, 0))),
-        _read_only(bids if policy.auctions else np.empty((0, 0))),
-        _number(kind.operators, rng),
-        _cover(team, rng) if policy.relocates else None,
+        now=now,
+        tasks=tasks,
+        responders=team,
+        distance=_read_only(distance),
+        eta=_read_only(eta),
+        preference=_read_only(ranks if kind.listed else np.empty((0, 0))),
+        bids=_read_only(bids if policy.auctions else np.empty((0, 0))),
+        operators=_number(kind.operators, rng),
+        cover=_cover(team, rng) if policy.relocates else None,
     )
 
 
@@ -147,14 +149,14 @@ def _tasks(kind: _Draw, now: float, auctions: bool, rng: np.random.Generator) ->
         auction = _auction(kind, event, rng) if auctions and not contain else None
         tasks.append(
             Task(
-                event,
-                _KINDS[int(rng.integers(len(_KINDS)))],
-                "contain" if contain else "confirm",
-                not contain or bool(rng.random() < 0.5),
-                severity,
-                float(np.round(rng.random(), 2)),
-                when,
-                min(now, when + 10.0 * float(rng.integers(3)) * (not kind.tied)),
+                event=event,
+                kind=EVENT_KINDS[int(rng.integers(len(EVENT_KINDS)))],
+                stage="contain" if contain else "confirm",
+                due=not contain or bool(rng.random() < 0.5),
+                severity=severity,
+                confidence=float(np.round(rng.random(), 2)),
+                detected=when,
+                waiting_since=min(now, when + 10.0 * float(rng.integers(3)) * (not kind.tied)),
                 auction=auction,
             )
         )
@@ -181,11 +183,7 @@ def _engage(
     looks = [t for t in rng.permutation(len(tasks)).tolist() if tasks[t].stage == "confirm"]
     share = rng.random(len(team)) < kind.under_way
     for r, t in zip(np.flatnonzero(share).tolist(), looks, strict=False):
-        old = tasks[t]
-        open_tasks[t] = Task(
-            *(old.event, old.kind, old.stage, old.due, old.severity, old.confidence),
-            *(old.detected, old.waiting_since, r, old.auction),
-        )
+        open_tasks[t] = replace(tasks[t], engaged=r)
         busy[r] = Responder(team[r].device, team[r].kind, t)
     return tuple(open_tasks), tuple(busy)
 
@@ -239,6 +237,22 @@ def _read_only(array: Floats) -> Floats:
 SITUATIONS: Final = 200
 SLOW: Final = 0.1  # [s] of one decision; above that an episode is no longer fast
 TOO_MANY_ROBOTS: Final = "sends more robots than operators are free; the core drops the rest"
+
+
+def check_policy(
+    policy: str | Callable[..., Policy], options: Mapping[str, Any] | None = None
+) -> Outcome:
+    """See that a policy keeps what every policy promises.
+
+    Args:
+        policy: By name, as in a scenario, or its class.
+        options: Keyword arguments of its constructor.
+
+    Raises:
+        BrokenPromises: it does not; a line for each promise.
+        ConfigError: there is none of that name, or it cannot be made with these options.
+    """
+    return kept(try_policy(partial(load_policy, policy, options)))
 
 
 def try_policy(

@@ -1,7 +1,4 @@
-"""How something that users bring kept what all of its kind promise.
-
-What is wrong in a file, and where.
-"""
+"""What came of trying something that users bring, and problems that were found in a file."""
 
 from __future__ import annotations
 
@@ -29,6 +26,29 @@ class Outcome:
     warnings: tuple[str, ...]
     tries: int
     slowest: float
+
+
+class BrokenPromises(AssertionError):
+    """Something breaks what all of its kind promise; a line for each promise.
+
+    Attributes:
+        outcome: All that came of trying it.
+    """
+
+    def __init__(self, outcome: Outcome) -> None:
+        super().__init__("\n".join(outcome.broken))
+        self.outcome = outcome
+
+
+def kept(outcome: Outcome) -> Outcome:
+    """What came of it, if all promises were kept.
+
+    Raises:
+        BrokenPromises: they were not.
+    """
+    if outcome.broken:
+        raise BrokenPromises(outcome)
+    return outcome
 
 
 def part_by_part(parts: Iterable[Callable[[], Iterable[Case]]]) -> Iterator[Case]:

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Final
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Final
 
 import numpy as np
 
-from dva_sim.testing.promises import Case, Outcome, line, part_by_part
-from dva_sim.worlds.drives import LONGEST_TICK, Drive, DriveSpec, Guarded
+from dva_sim.agents.robot.profile import RobotProfile, load_robot
+from dva_sim.testing.promises import Case, Outcome, kept, line, part_by_part
+from dva_sim.worlds.drives import LONGEST_TICK, Drive, DriveSpec, GuardedDrive, load_drive
 from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.physics import World, hall
 
@@ -23,6 +24,28 @@ SLOW: Final = 50e-6  # [s] of one answer; above that an episode is no longer fas
 SLACK: Final = 1e-9  # of limits, for rounding
 CREEP: Final = 0.01  # backwards, while motors come to rest [m/s]
 HOSTILE: Final = (math.nan, math.inf, -math.inf, 1e308, -1e308, -1.0, 1e-300, 0.0, 9.0)
+
+
+def check_robot(
+    robot: str | Callable[..., Drive], options: Mapping[str, Any] | None = None
+) -> Outcome:
+    """See that a robot's motors keep what all promise, alone and in its body.
+
+    Args:
+        robot: A profile, by name or path; or motors, as a profile names them or as a class,
+            in the body of a profile that says nothing else.
+        options: Of the motors.
+
+    Raises:
+        BrokenPromises: they do not; a line for each promise.
+        ConfigError: there is none of that name, or it cannot be made with these options.
+    """
+    if callable(robot):
+        usual = RobotProfile().drive_spec()
+        return kept(try_robot(replace(usual, drive=load_drive(robot, options))))
+    profile = RobotProfile(drive=robot) if ".py" in robot else load_robot(robot)
+    changed = profile.model_copy(update={"options": {**profile.options, **(options or {})}})
+    return kept(try_robot(changed.drive_spec()))
 
 
 def try_robot(spec: DriveSpec, seed: int = 1, slow: float = SLOW) -> Outcome:
@@ -91,7 +114,7 @@ class _Trial:
     def _new(self) -> Drive:
         """The motors themselves."""
         drive = self.spec.drive(self.spec)
-        return drive.drive if isinstance(drive, Guarded) else drive
+        return drive.drive if isinstance(drive, GuardedDrive) else drive
 
     def _command(self) -> tuple[float, float]:
         """Something within the limits; often one of the limits, or nothing."""

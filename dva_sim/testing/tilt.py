@@ -5,15 +5,15 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterator, Sequence
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
-from dva_sim.agents.tilt import Filter, Mapping
+from dva_sim.agents.tilt import Filter, Mapping, filters, load_filter, load_mapping
 from dva_sim.agents.tilt.calibration import LEVELS, MAX_TURN_DEG
-from dva_sim.agents.tilt.filters import check_filter, is_age
+from dva_sim.agents.tilt.filters import is_age
 from dva_sim.kernel.plugins import FAILURES
-from dva_sim.testing.promises import Case, Outcome, line, said
+from dva_sim.testing.promises import Case, Outcome, kept, line, said
 
 Pair = tuple[float, float]
 Part = Callable[[], Iterator[Case]]
@@ -29,6 +29,34 @@ NEAR: Final = 0.02  # of the full range: as good as there
 HOSTILE: Final = (0.0, 1e-300, -1e-300, 1e3, -1e3, 1e9, -1e9)
 
 
+def check_filter(
+    filter_: str | Callable[..., Filter], options: dict[str, Any] | None = None
+) -> Outcome:
+    """See that a filter keeps what all promise.
+
+    Args:
+        filter_: By name, as a phone names it, or its class.
+        options: Keyword arguments of its constructor, besides the time between samples.
+
+    Raises:
+        BrokenPromises: it does not; a line for each promise.
+        ConfigError: there is none of that name, or no phone could work with it.
+    """
+    return kept(try_filter(load_filter(filter_, options)))
+
+
+def check_mapping(
+    mapping: str | Callable[..., Mapping], options: dict[str, Any] | None = None
+) -> Outcome:
+    """See that a mapping keeps what all promise; see `check_filter`.
+
+    Raises:
+        BrokenPromises: it does not; a line for each promise.
+        ConfigError: there is none of that name, or it cannot be made with these options.
+    """
+    return kept(try_mapping(load_mapping(mapping, options)))
+
+
 def try_filter(make: Callable[[float], Filter], seed: int = 1, slow: float = SLOW) -> Outcome:
     """Try a filter, sample by sample; one that works in batches, batch by batch.
 
@@ -40,7 +68,7 @@ def try_filter(make: Callable[[float], Filter], seed: int = 1, slow: float = SLO
     Raises:
         ConfigError: it cannot be made, or no phone could work with it.
     """
-    check_filter(make(PERIOD))
+    filters.check_filter(make(PERIOD))
     trial = _FilterTrial(lambda: make(PERIOD), np.random.default_rng(seed))
     return _outcome(trial.parts, trial.sticks, trial.took, slow)
 

@@ -1,5 +1,6 @@
-"""The evidence: what is simulated beside what is known.
+"""The evidence: what is simulated beside what is known, of dispatch, of operators, of the network.
 
-`dispatch` plays worlds whose answer is known exactly, `operators` the tasks of published
-experiments; both are told, written and drawn in the same way.
+Each kind judges by a rule of its own, which its `result_page` states, and puts its lines into
+words; `frame` shows all of them alike. The room may import everything below `testing`, and prints
+nothing. Begin reading at `frame`, then at `dispatch.checks`.
 """

@@ -1,6 +1,6 @@
-"""What a validation leaves behind: a table as CSV and Parquet, figures, and a page.
+"""What every validation comes to, and what it leaves behind: tables, figures and a page.
 
-How validations speak to the terminal.
+Each kind judges by rules of its own and puts its lines into words; from there on all are alike.
 """
 
 from __future__ import annotations
@@ -8,13 +8,10 @@ from __future__ import annotations
 import base64
 import csv
 import io
-from collections.abc import Sequence
-from functools import partial
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from dva_sim.experiments.report.figures import Drawn
 from dva_sim.kernel.errors import DvaSimError
@@ -23,58 +20,116 @@ Row = dict[str, Any]
 _KINDS = {str: "VARCHAR", float: "DOUBLE", int: "BIGINT", bool: "BOOLEAN"}
 
 
-def write_all(
-    folder: Path, tables: dict[str, list[Row]], drawn: Sequence[Drawn], page: str
-) -> Path:
-    """Write everything; the page's path.
+@dataclass(frozen=True)
+class ResultSheet:
+    """Lines that are read together: what is compared, with what, and mostly a verdict at the end.
 
-    Args:
-        folder: Made if it is not there.
-        tables: Rows by name, each with the same keys; a table `NAME` becomes `NAME.csv` and
-            `NAME.parquet`.
-        drawn: Figures.
-        page: HTML.
-
-    Raises:
-        DvaSimError: the folder cannot be written.
+    Attributes:
+        title: Above it; empty for none.
+        heads: Of the columns.
+        rows: As words. On a page a row of two stands across all columns: a title and its source.
+        words: Columns that are read as words, not as numbers: these stand left.
+        text: What has to be known to read it.
+        wraps: Whether long cells may take several lines.
+        merged: Whether the first cell is told once for all rows that share it.
+        widths: In a terminal [characters]; None shares what is left. Empty: as needed.
     """
-    try:
-        (folder / "figures").mkdir(parents=True, exist_ok=True)
-        for table, rows in tables.items():
-            (folder / f"{table}.csv").write_text(_csv(rows), encoding="utf-8", newline="")
-            _write_parquet(folder / f"{table}.parquet", rows)
-        for figure in drawn:
-            (folder / "figures" / f"{figure.name}.svg").write_bytes(figure.svg)
-            (folder / "figures" / f"{figure.name}.png").write_bytes(figure.png)
-        path = folder / "index.html"
-        path.write_text(page, encoding="utf-8", newline="\n")
-    except OSError as error:
-        raise DvaSimError(f"{folder} cannot be written: {error.strerror or error}") from None
-    return path
+
+    title: str
+    heads: tuple[str, ...]
+    rows: Sequence[Sequence[str]]
+    words: frozenset[int] = frozenset()
+    text: str = ""
+    wraps: bool = False
+    merged: bool = False
+    widths: tuple[int | None, ...] = ()
+
+    @property
+    def lines(self) -> list[Sequence[str]]:
+        """The rows that have a cell in each column."""
+        return [row for row in self.rows if len(row) == len(self.heads)]
 
 
-def render(template: str, drawn: Sequence[Drawn], **filled: Any) -> str:
-    """A page from a template, with the look of all pages and its figures inside.
+@dataclass(frozen=True)
+class ValidationResult:
+    """What a validation found.
 
-    Args:
-        template: File name among the templates of reports.
-        drawn: Figures; the template gets them as pairs of figure and data URI.
-        filled: What else the template asks for.
+    Attributes:
+        name: `dispatch`, `operators` or `network`: of its table, and of its page's method.
+        headline: What it comes to.
+        passes: Whether all that is asked for holds.
+        notes: What belongs to the headline, each in a sentence.
+        conditions: How it was found, by name.
+        sheets: What the page shows, in order.
+        told: What a terminal shows, in order.
+        draw: Draws the figures, which takes a while.
+        tables: Rows by name, each with the same keys.
+        rule: Numbers that the page's method names.
     """
-    import jinja2
 
-    loader = jinja2.PackageLoader("dva_sim.validation", "templates")
-    environment = jinja2.Environment(
-        loader=loader, autoescape=True, trim_blocks=True, undefined=jinja2.StrictUndefined
-    )
-    report = jinja2.PackageLoader("dva_sim.experiments.report")
-    study = report.get_source(environment, "report.html.j2")[0]
-    style = study.partition("<style>")[2].partition("</style>")[0]
-    figures = [(figure, _data_uri(figure.svg)) for figure in drawn]
-    return environment.get_template(template).render(style=style, figures=figures, **filled)
+    name: str
+    headline: str
+    passes: bool
+    notes: Sequence[str]
+    conditions: Mapping[str, str]
+    sheets: Sequence[ResultSheet]
+    told: Sequence[ResultSheet]
+    draw: Callable[[], Sequence[Drawn]]
+    tables: Mapping[str, Sequence[Row]]
+    rule: tuple[float, ...] = ()
+
+    def write(self, folder: Path) -> Path:
+        """Write everything; the page's path.
+
+        A table `NAME` becomes `NAME.csv` and `NAME.parquet`, a figure an SVG and a PNG.
+
+        Args:
+            folder: Made if it is not there.
+
+        Raises:
+            DvaSimError: the folder cannot be written.
+        """
+        try:
+            (folder / "figures").mkdir(parents=True, exist_ok=True)
+            drawn = self.draw()
+            for table, rows in self.tables.items():
+                (folder / f"{table}.csv").write_text(_csv(rows), encoding="utf-8", newline="")
+                _write_parquet(folder / f"{table}.parquet", rows)
+            for figure in drawn:
+                (folder / "figures" / f"{figure.name}.svg").write_bytes(figure.svg)
+                (folder / "figures" / f"{figure.name}.png").write_bytes(figure.png)
+            path = folder / "index.html"
+            path.write_text(self.page(drawn), encoding="utf-8", newline="\n")
+        except OSError as error:
+            raise DvaSimError(f"{folder} cannot be written: {error.strerror or error}") from None
+        return path
+
+    def page(self, drawn: Sequence[Drawn]) -> str:
+        """Everything on one page, with figures inside and the look of all reports."""
+        import jinja2  # late: start-up
+
+        loader = jinja2.PackageLoader("dva_sim.validation", "templates")
+        environment = jinja2.Environment(
+            loader=loader, autoescape=True, trim_blocks=True, undefined=jinja2.StrictUndefined
+        )
+        environment.filters["data_uri"] = _data_uri
+        report = jinja2.PackageLoader("dva_sim.experiments.report")
+        study = report.get_source(environment, "report.html.j2")[0]
+        style = study.partition("<style>")[2].partition("</style>")[0]
+        template = environment.get_template(f"{self.name}.html.j2")
+        return template.render(style=style, found=self, drawn=drawn)
 
 
-def _csv(rows: list[Row]) -> str:
+def short_number(value: float | None) -> str:
+    """Four digits that count, without an exponent; a dash where there is none."""
+    if value is None or value != value:
+        return "–"
+    if abs(value) == float("inf"):
+        return "∞"
+    return f"{value:.0f}" if abs(value) >= 1000 else f"{value:.4g}"
+
+
+def _csv(rows: Sequence[Row]) -> str:
     text = io.StringIO()
     writer = csv.DictWriter(text, list(rows[0]) if rows else [], lineterminator="\n")
     writer.writeheader()
@@ -82,9 +137,9 @@ def _csv(rows: list[Row]) -> str:
     return text.getvalue()
 
 
-def _write_parquet(path: Path, rows: list[Row]) -> None:
+def _write_parquet(path: Path, rows: Sequence[Row]) -> None:
     """One thread, rows in their order: the same bytes each time."""
-    import duckdb
+    import duckdb  # late: start-up
 
     columns = ", ".join(f'"{name}" {_kind(rows, name)}' for name in rows[0])
     config: dict[str, str | bool | int | float | list[str]]
@@ -98,7 +153,7 @@ def _write_parquet(path: Path, rows: list[Row]) -> None:
         connection.execute("COPY checks TO $1 (FORMAT parquet, COMPRESSION zstd)", [str(path)])
 
 
-def _kind(rows: list[Row], name: str) -> str:
+def _kind(rows: Sequence[Row], name: str) -> str:
     """The type of a column, by its first value that is there."""
     values = (row[name] for row in rows if row[name] is not None)
     return _KINDS[type(next(values, 0.0))]
@@ -106,15 +161,3 @@ def _kind(rows: list[Row], name: str) -> str:
 
 def _data_uri(svg: bytes) -> str:
     return f"data:image/svg+xml;base64,{base64.b64encode(svg).decode()}"
-
-
-WIDTH = 110  # of a table at least, also in a file
-
-console = Console(highlight=False)
-say = partial(console.print, soft_wrap=True)
-
-
-def progress_bar() -> Progress:
-    """A bar that says what is under way, how much of it is done, and for how long."""
-    words = TextColumn("{task.description}")
-    return Progress(words, BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), console=console)

@@ -1,1 +1,5 @@
-"""Where a run takes place: sites, maps, paths, moving bodies and hazards."""
+"""Where runs take place: sites, maps, physics, hazards, and what robots' cameras make of them.
+
+It knows no agents, no network and no DVA; of messages it knows the words alone. Begin with
+`layout.py`, what a site is, and `site.py`, sites by name.
+"""

@@ -104,7 +104,7 @@ set_velocity, set_spin = lib.cpBodySetVelocity, lib.cpBodySetAngularVelocity
 set_force, set_torque = lib.cpBodySetForce, lib.cpBodySetTorque
 
 
-class Asked(Generic[T]):
+class AskedFor(Generic[T]):
     """What is asked of a body: what holds now, and what will from later ticks on.
 
     What was asked for first still has its tick, however soon something newer follows.

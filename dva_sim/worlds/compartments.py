@@ -24,7 +24,7 @@ NEAR = 0.05  # rooms this near to each other touch [m]
 PROBES = (0.06, 0.2, 0.35, 0.5)  # how far from a door to look for its rooms [m]
 
 
-class Partition(NamedTuple):
+class FloorPartition(NamedTuple):
     """Compartments, what joins them, and for each cell of the grid whose it is, or `NOWHERE`."""
 
     compartments: tuple[Compartment, ...]
@@ -33,14 +33,12 @@ class Partition(NamedTuple):
 
 
 # --- drawn sites -----------------------------------------------------------------------
-
-
 def of_rooms(
     grid: OccupancyGrid,
     rooms: Sequence[Room],
     walls: Floats,
     ways: Sequence[tuple[Sequence[float], float, str]],
-) -> Partition:
+) -> FloorPartition:
     """One compartment for each room that is not outdoors.
 
     Args:
@@ -54,7 +52,7 @@ def of_rooms(
     lookup = Lookup(rooms)
     doors = [opening for way in ways for opening in _passage(lookup, *way)]
     borders = _borders(indoor, walls, [ends for ends, _, _ in ways])
-    return Partition(tuple(compartments), (*doors, *borders), _labels(grid, indoor))
+    return FloorPartition(tuple(compartments), (*doors, *borders), _labels(grid, indoor))
 
 
 def _area(polygon: Floats) -> float:
@@ -147,9 +145,7 @@ def _labels(grid: OccupancyGrid, rooms: Sequence[Room]) -> Labels:
 
 
 # --- bare maps -------------------------------------------------------------------------
-
-
-def of_floor(grid: OccupancyGrid, floor: NDArray[np.bool_]) -> Partition:
+def of_floor(grid: OccupancyGrid, floor: NDArray[np.bool_]) -> FloorPartition:
     """Blocks of a floor without rooms, about `BLOCK` wide, parted where a wall parts them.
 
     Args:
@@ -162,7 +158,7 @@ def of_floor(grid: OccupancyGrid, floor: NDArray[np.bool_]) -> Partition:
         Compartment(f"block {number}", float(size), CEILING, None)
         for number, size in enumerate(sizes, 1)
     )
-    return Partition(blocks, tuple(_seams(grid, labels, blocks)), labels)
+    return FloorPartition(blocks, tuple(_seams(grid, labels, blocks)), labels)
 
 
 def _pieces(floor: NDArray[np.bool_], resolution: float) -> Labels:

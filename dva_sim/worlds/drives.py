@@ -142,7 +142,7 @@ class ThreeWay(Drive):
         return along, ((now_speed + along * dt) * curvature - now_turn_rate) / dt
 
 
-class Guarded(Guard, Drive):
+class GuardedDrive(Guard, Drive):
     """A drive of a user, kept within the limits of its robot whatever it answers.
 
     Both accelerations stay within their limits, and so do the speed and the turn rate that they
@@ -249,16 +249,16 @@ PLUGINS: Final = Plugins(
     key="drive",
     needs="accelerations(speed, turn_rate, now_speed, now_turn_rate, dt)",
     public="dva_sim.worlds.drives.Drive",
+    finish=lambda drive: GuardedDrive(drive),
 )
 
-
-def known_drives() -> list[str]:
-    """Names that a profile can use: shipped and installed ones; files come on top."""
-    return PLUGINS.known()
+known_drives = PLUGINS.known
 
 
 def load_drive(
-    name: str, options: Mapping[str, Any] | None = None, base: Path | None = None
+    name: str | Callable[..., Drive],
+    options: Mapping[str, Any] | None = None,
+    base: Path | None = None,
 ) -> Callable[[DriveSpec], Drive]:
     """What makes the motors that `name` means; those of users are kept within the limits.
 
@@ -273,12 +273,6 @@ def load_drive(
         ConfigError: there is none of that name, its file or package cannot be loaded, or it is
             not a drive; a bad option is told when it is made.
     """
-    factory, given = PLUGINS.find(name, base), dict(options or {})
-    if name in DRIVES and not given:
-        return factory
-
-    def make(spec: DriveSpec) -> Drive:
-        drive = PLUGINS.make(name, factory, given, spec)
-        return drive if name in DRIVES else Guarded(drive)
-
-    return make
+    if isinstance(name, str) and name in DRIVES and not options:
+        return DRIVES[name]
+    return PLUGINS.load(name, options, base)

@@ -28,12 +28,12 @@ from dva_sim.worlds.site_parts import (
     DOOR_HEIGHT,
     QUALITIES,
     BaseStation,
-    Coverage,
     Detector,
     Exit,
     FixedCamera,
     LinkQuality,
     Lookup,
+    RadioCoverage,
     Room,
     Zone,
 )
@@ -44,7 +44,7 @@ Fail = Callable[[str], ConfigError]
 DIGITS = 9  # of a coordinate [deg]: a tenth of a millimetre
 
 
-class Drawn(BaseModel):
+class DrawnFeature(BaseModel):
     """Properties of a feature; what an editor adds of its own is left alone."""
 
     model_config = ConfigDict(extra="ignore", frozen=True, allow_inf_nan=False)
@@ -52,25 +52,25 @@ class Drawn(BaseModel):
     name: Annotated[str | None, BeforeValidator(lambda v: v if v is None else str(v))] = None
 
 
-class DrawnRoom(Drawn):
+class DrawnRoom(DrawnFeature):
     """A room; without a height of its own it has the site's."""
 
     ceiling_m: Annotated[float, Field(ge=1.5, le=50)] | None = None
 
 
-class DrawnDoor(Drawn):
+class DrawnDoor(DrawnFeature):
     """A door."""
 
     height_m: Annotated[float, Field(ge=1.5, le=10)] = DOOR_HEIGHT
 
 
-class DrawnPose(Drawn):
+class DrawnPose(DrawnFeature):
     """A place with a heading, counter-clockwise from east."""
 
     heading_deg: float = 0.0
 
 
-class DrawnZone(Drawn):
+class DrawnZone(DrawnFeature):
     """A part of the floor with a rule or a purpose."""
 
     use: Literal["restricted", "charging", "assembly"] = "restricted"
@@ -83,13 +83,13 @@ class DrawnCamera(DrawnPose):
     range_m: Annotated[float, Field(gt=0, le=500)] = 15.0
 
 
-class DrawnBaseStation(Drawn):
+class DrawnBaseStation(DrawnFeature):
     """An antenna."""
 
     radio: Literal["wifi", "lte", "nr"] = "wifi"
 
 
-class DrawnWifi(Drawn):
+class DrawnWifi(DrawnFeature):
     """The quality of a link: a word, numbers, or a word and the numbers that differ from it."""
 
     quality: Literal["good", "fair", "poor", "none"] | None = None
@@ -115,32 +115,32 @@ class DrawnWifi(Drawn):
         return QUALITIES[self.quality or "good"]._replace(**self.numbers)
 
 
-class Kind(NamedTuple):
+class FeatureKind(NamedTuple):
     """How a kind of feature is drawn, and what its properties are."""
 
     shapes: tuple[str, ...]
-    model: type[Drawn] = Drawn
+    model: type[DrawnFeature] = DrawnFeature
 
 
 KINDS = {
-    "wall": Kind(("LineString", "MultiLineString", "Polygon")),
-    "room": Kind(("Polygon",), DrawnRoom),
-    "path": Kind(("Polygon",)),
-    "yard": Kind(("Polygon",)),
-    "door": Kind(("LineString",), DrawnDoor),
-    "exit": Kind(("LineString",)),
-    "zone": Kind(("Polygon",), DrawnZone),
-    "wifi": Kind(("Polygon",), DrawnWifi),
-    "robot_base": Kind(("Point",), DrawnPose),
-    "guard_post": Kind(("Point",), DrawnPose),
-    "operator_desk": Kind(("Point",), DrawnPose),
-    "camera": Kind(("Point",), DrawnCamera),
-    "base_station": Kind(("Point",), DrawnBaseStation),
-    "smoke_detector": Kind(("Point",)),
-    "heat_detector": Kind(("Point",)),
-    "co_detector": Kind(("Point",)),
-    "gas_detector": Kind(("Point",)),
-    "water_detector": Kind(("Point",)),
+    "wall": FeatureKind(("LineString", "MultiLineString", "Polygon")),
+    "room": FeatureKind(("Polygon",), DrawnRoom),
+    "path": FeatureKind(("Polygon",)),
+    "yard": FeatureKind(("Polygon",)),
+    "door": FeatureKind(("LineString",), DrawnDoor),
+    "exit": FeatureKind(("LineString",)),
+    "zone": FeatureKind(("Polygon",), DrawnZone),
+    "wifi": FeatureKind(("Polygon",), DrawnWifi),
+    "robot_base": FeatureKind(("Point",), DrawnPose),
+    "guard_post": FeatureKind(("Point",), DrawnPose),
+    "operator_desk": FeatureKind(("Point",), DrawnPose),
+    "camera": FeatureKind(("Point",), DrawnCamera),
+    "base_station": FeatureKind(("Point",), DrawnBaseStation),
+    "smoke_detector": FeatureKind(("Point",)),
+    "heat_detector": FeatureKind(("Point",)),
+    "co_detector": FeatureKind(("Point",)),
+    "gas_detector": FeatureKind(("Point",)),
+    "water_detector": FeatureKind(("Point",)),
 }
 
 
@@ -266,7 +266,7 @@ GROUND = ("room", "path", "yard")  # where two overlap, the first of these count
 
 
 @dataclass
-class Plan:
+class FloorPlan:
     """What a site's features come to, in metres.
 
     Attributes:
@@ -287,7 +287,7 @@ class Plan:
     solids: tuple[Points, ...] = ()
     exits: tuple[Exit, ...] = ()
     zones: tuple[Zone, ...] = ()
-    wifi: tuple[Coverage, ...] = ()
+    wifi: tuple[RadioCoverage, ...] = ()
     cameras: tuple[FixedCamera, ...] = ()
     base_stations: tuple[BaseStation, ...] = ()
     detectors: tuple[Detector, ...] = ()
@@ -298,7 +298,7 @@ class Plan:
         return tuple(pose for pose, _ in self.places[kind])
 
 
-def read_plan(path: Path, frame: GeoFrame, ceiling: float = CEILING) -> Plan:
+def read_plan(path: Path, frame: GeoFrame, ceiling: float = CEILING) -> FloorPlan:
     """Read a plan; `ceiling` [m] is that of rooms that do not say.
 
     Raises:
@@ -310,7 +310,7 @@ def read_plan(path: Path, frame: GeoFrame, ceiling: float = CEILING) -> Plan:
     return plan
 
 
-def make_plan(features: Iterable[Feature], ceiling: float = CEILING) -> Plan:
+def make_plan(features: Iterable[Feature], ceiling: float = CEILING) -> FloorPlan:
     """Put features together.
 
     Raises:
@@ -320,11 +320,13 @@ def make_plan(features: Iterable[Feature], ceiling: float = CEILING) -> Plan:
     kinds: dict[str, list[Feature]] = defaultdict(list)
     for feature in features:
         kinds[feature.kind].append(feature)
-    plan = Plan(rooms=_rooms(kinds, ceiling))
+    plan = FloorPlan(rooms=_rooms(kinds, ceiling))
     lookup = Lookup(plan.rooms)
     plan.exits = tuple(_exit(lookup, *numbered) for numbered in _numbered(kinds, "exit"))
     plan.zones = tuple(Zone(n, _corners(f), f.drawn.use) for f, n in _numbered(kinds, "zone"))
-    plan.wifi = tuple(Coverage(n, _corners(f), f.drawn.link) for f, n in _numbered(kinds, "wifi"))
+    plan.wifi = tuple(
+        RadioCoverage(n, _corners(f), f.drawn.link) for f, n in _numbered(kinds, "wifi")
+    )
     plan.cameras = tuple(_camera(*numbered) for numbered in _numbered(kinds, "camera"))
     plan.base_stations = tuple(
         BaseStation(f.shape.x, f.shape.y, f.drawn.radio, n)
@@ -413,7 +415,7 @@ def _how_far_out(rooms: Lookup[Room], x: float, y: float, heading: float) -> int
     return NOTHING
 
 
-def _open_walls(plan: Plan, kinds: dict[str, list[Feature]], rooms: Lookup[Room]) -> None:
+def _open_walls(plan: FloorPlan, kinds: dict[str, list[Feature]], rooms: Lookup[Room]) -> None:
     """Open the walls at the doors and find the floor.
 
     An exit opens the wall only where ground is drawn beyond it: nobody drives off the plan.

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import hint
-from dva_sim.worlds.compartments import NOWHERE, Partition, of_floor, of_rooms
+from dva_sim.worlds.compartments import NOWHERE, FloorPartition, of_floor, of_rooms
 from dva_sim.worlds.geo import GeoFrame, Pose
 from dva_sim.worlds.maps import FREE, OccupancyGrid
 from dva_sim.worlds.site_parts import (
@@ -21,12 +21,12 @@ from dva_sim.worlds.site_parts import (
     DOOR_HEIGHT,
     BaseStation,
     Compartment,
-    Coverage,
     Detector,
     Exit,
     FixedCamera,
     Lookup,
     Opening,
+    RadioCoverage,
     Room,
     Zone,
 )
@@ -80,7 +80,7 @@ class Site:
     zones: tuple[Zone, ...] = ()
     cameras: tuple[FixedCamera, ...] = ()
     base_stations: tuple[BaseStation, ...] = ()
-    wifi: tuple[Coverage, ...] = ()
+    wifi: tuple[RadioCoverage, ...] = ()
     ceiling: float = CEILING
     _cache: dict[object, NDArray[np.int64]] = field(default_factory=dict, repr=False)
 
@@ -89,7 +89,7 @@ class Site:
         room = self._rooms.at(x, y)
         return None if room is None else room.name
 
-    def link_quality(self, x: float, y: float) -> Coverage | None:
+    def link_quality(self, x: float, y: float) -> RadioCoverage | None:
         """The coverage drawn around a point [m], the later over the earlier; None for none."""
         return self._wifi.at(x, y)
 
@@ -98,7 +98,7 @@ class Site:
         return Lookup(self.rooms)
 
     @cached_property
-    def _wifi(self) -> Lookup[Coverage]:
+    def _wifi(self) -> Lookup[RadioCoverage]:
         return Lookup(self.wifi[::-1])
 
     @cached_property
@@ -131,7 +131,7 @@ class Site:
         return None if label == NOWHERE else label
 
     @cached_property
-    def partition(self) -> Partition:
+    def partition(self) -> FloorPartition:
         """Compartments, openings, and whose each cell of the grid is."""
         if not self.rooms:
             return _blocks(self.grid)
@@ -224,6 +224,6 @@ def _side(a: Floats, b: Floats) -> frozenset[tuple[float, ...]]:
 
 
 @lru_cache(maxsize=4)
-def _blocks(grid: OccupancyGrid) -> Partition:
+def _blocks(grid: OccupancyGrid) -> FloorPartition:
     """Sites of one bare map differ in their bases only."""
     return of_floor(grid, grid.floor(FOOTPRINT))

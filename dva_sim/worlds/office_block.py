@@ -31,7 +31,7 @@ WISHES = ((3.0, 3.9), (4.8, 6.5), (7.0, 9.5))  # widths that rooms would like to
 ODDS = (0.55, 0.30, 0.15)  # of these
 
 
-class Cell(NamedTuple):
+class FloorCell(NamedTuple):
     """A rectangle [m] that becomes a room.
 
     Attributes:
@@ -100,7 +100,7 @@ class Layout:
     corridors: tuple[Box, ...]
     crossings: tuple[tuple[Box, ...], ...]
     lobby: Box
-    cells: tuple[Cell, ...]
+    cells: tuple[FloorCell, ...]
 
 
 def tenths(value: float) -> float:
@@ -161,7 +161,7 @@ def _cells(
     crossings: tuple[tuple[Box, ...], ...],
     lobby: Box,
     rng: np.random.Generator,
-) -> Iterator[Cell]:
+) -> Iterator[FloorCell]:
     """Rooms south and north of each corridor, from west to east."""
     last = len(corridors) - 1
     across = [(pieces[0][0], pieces[0][2]) for pieces in crossings]
@@ -173,7 +173,7 @@ def _cells(
             for start, end in zip(bounds[::2], bounds[1::2], strict=True):
                 cuts = _cuts(start, end, rng)
                 for x1, x2 in itertools.pairwise(cuts):
-                    yield Cell(x1, y1, x2, y2, wing, door_north, facade)
+                    yield FloorCell(x1, y1, x2, y2, wing, door_north, facade)
 
 
 def _cuts(start: float, end: float, rng: np.random.Generator) -> list[float]:
@@ -206,42 +206,42 @@ class Use(NamedTuple):
     name: str
     door: float
     detectors: tuple[str, ...]
-    furniture: Callable[[Cell], Iterator[Box]]
+    furniture: Callable[[FloorCell], Iterator[Box]]
 
 
-def _nothing(_: Cell) -> Iterator[Box]:
+def _nothing(_: FloorCell) -> Iterator[Box]:
     yield from ()
 
 
-def _desk(cell: Cell) -> Iterator[Box]:
+def _desk(cell: FloorCell) -> Iterator[Box]:
     """One desk or two at the window."""
     side = tenths((cell.width - min(cell.width - 1.2, 3.2)) / 2)
     yield cell.box(side, side, cell.depth - 0.8, 0.0)
 
 
-def _table(cell: Cell) -> Iterator[Box]:
+def _table(cell: FloorCell) -> Iterator[Box]:
     """Something large in the middle that one can walk around."""
     if cell.width >= 3.4 and cell.depth >= 3.4:
         yield cell.box(1.2, 1.2, 1.2, 1.2)
 
 
-def _counter(cell: Cell) -> Iterator[Box]:
+def _counter(cell: FloorCell) -> Iterator[Box]:
     yield cell.box(0.0, 0.0, cell.depth - 0.7, 0.0)
 
 
-def _cubicles(cell: Cell) -> Iterator[Box]:
+def _cubicles(cell: FloorCell) -> Iterator[Box]:
     yield cell.box(0.0, 0.0, cell.depth - 1.5, 0.0)
 
 
-def _flight(cell: Cell) -> Iterator[Box]:
+def _flight(cell: FloorCell) -> Iterator[Box]:
     """A flight of stairs along one side; past it lies the way out."""
     yield cell.box(0.0, cell.width - 1.3, 1.6, 0.9)
 
 
-def _rows(size: float, aisle: float) -> Callable[[Cell], Iterator[Box]]:
+def _rows(size: float, aisle: float) -> Callable[[FloorCell], Iterator[Box]]:
     """Rows away from the door: benches, racks, shelves, islands of desks."""
 
-    def rows(cell: Cell) -> Iterator[Box]:
+    def rows(cell: FloorCell) -> Iterator[Box]:
         count = int((cell.width - aisle) / (size + aisle))
         if cell.depth < 3.6 or count < 1:
             yield from _desk(cell)
@@ -280,13 +280,13 @@ MOST_BAYS = 4
 MEDIUM_FROM, LARGE_FROM = 20.0, 36.0  # [m^2]
 
 
-def assign(layout: Layout, bases: int) -> list[tuple[Cell, Use, str]]:
+def assign(layout: Layout, bases: int) -> list[tuple[FloorCell, Use, str]]:
     """A use and a name for every cell, in the order of the cells.
 
     Stairs stand at the facades, as they lead out; robots get the largest rooms near the
     lobby; one of each of `SINGLE` is spread over the house; all others go by their size.
     """
-    left, uses = list(layout.cells), dict[Cell, tuple[Use, str]]()
+    left, uses = list(layout.cells), dict[FloorCell, tuple[Use, str]]()
     for use, name, wish in _needs(layout):
         if use is not ROBOT_BAY or sum(_capacity(c, *uses[c]) for c in uses) < bases:
             cell = min(left, key=wish, default=None)
@@ -301,7 +301,7 @@ def assign(layout: Layout, bases: int) -> list[tuple[Cell, Use, str]]:
     ]
 
 
-def _needs(layout: Layout) -> Iterator[tuple[Use, str, Callable[[Cell], float]]]:
+def _needs(layout: Layout) -> Iterator[tuple[Use, str, Callable[[FloorCell], float]]]:
     """What a house needs: a use, a name, and what makes a cell unfit for it."""
     for number in range(1, MOST_BAYS + 1):
         name = ROBOT_BAY.name if number == 1 else f"{ROBOT_BAY.name} {number}"
@@ -314,16 +314,16 @@ def _needs(layout: Layout) -> Iterator[tuple[Use, str, Callable[[Cell], float]]]
         yield use, use.name, partial(_unfit_for_one, x)
 
 
-def _capacity(cell: Cell, use: Use, _: str) -> int:
+def _capacity(cell: FloorCell, use: Use, _: str) -> int:
     return len(stands(cell)) if use is ROBOT_BAY else 0
 
 
-def _unfit_for_stairs(north: bool, x: float, cell: Cell) -> float:
+def _unfit_for_stairs(north: bool, x: float, cell: FloorCell) -> float:
     elsewhere = not cell.facade or cell.door_north == north
     return 1000 * elsewhere + abs((cell.x1 + cell.x2) / 2 - x) + 3 * cell.width
 
 
-def _unfit_for_one(x: float, cell: Cell) -> float:
+def _unfit_for_one(x: float, cell: FloorCell) -> float:
     return abs((cell.x1 + cell.x2) / 2 - x) + abs(cell.area - 22) / 2
 
 
@@ -336,7 +336,7 @@ def _stairwells(layout: Layout) -> Iterator[tuple[bool, float]]:
         yield False, layout.width * (number + 1) / count
 
 
-def _by_size(cell: Cell, numbers: Iterator[int]) -> tuple[Use, str]:
+def _by_size(cell: FloorCell, numbers: Iterator[int]) -> tuple[Use, str]:
     """Any other room; its number tells the corridor."""
     number = next(numbers)
     if cell.area >= LARGE_FROM:
@@ -348,7 +348,7 @@ def _by_size(cell: Cell, numbers: Iterator[int]) -> tuple[Use, str]:
     return use, f"{use.name} {number}"
 
 
-def stands(bay: Cell) -> list[tuple[float, float]]:
+def stands(bay: FloorCell) -> list[tuple[float, float]]:
     """Where robots stand in a bay [m]: rows from the wall opposite to its door."""
     columns = 1 + int((bay.width - 2 * BASE_WALL) / BASE_GAP + 1e-6)
     rows = 1 + int((bay.depth - BASE_WALL - APPROACH) / BASE_GAP + 1e-6)
@@ -441,7 +441,7 @@ def _ways(layout: Layout) -> Iterator[Feature]:
     yield _feature("room", _box(layout.lobby), name="Lobby")
 
 
-def _exits(layout: Layout, rooms: Iterable[tuple[Cell, Use, str]]) -> Iterator[Feature]:
+def _exits(layout: Layout, rooms: Iterable[tuple[FloorCell, Use, str]]) -> Iterator[Feature]:
     """At both ends of every corridor, in the lobby, and past every flight of stairs."""
     for number, (_, low, width, high) in enumerate(layout.corridors, 1):
         for x, side in ((0.0, "West"), (width, "East")):
@@ -458,7 +458,9 @@ def _exits(layout: Layout, rooms: Iterable[tuple[Cell, Use, str]]) -> Iterator[F
 
 
 # --- rooms -----------------------------------------------------------------------------
-def _rooms(rooms: Iterable[tuple[Cell, Use, str]], rng: np.random.Generator) -> Iterator[Feature]:
+def _rooms(
+    rooms: Iterable[tuple[FloorCell, Use, str]], rng: np.random.Generator
+) -> Iterator[Feature]:
     for cell, use, name in rooms:
         outline = _box((cell.x1, cell.y1, cell.x2, cell.y2))
         yield _feature("room", outline, name=name)
@@ -473,21 +475,21 @@ def _rooms(rooms: Iterable[tuple[Cell, Use, str]], rng: np.random.Generator) -> 
             yield _feature("zone", outline, name=name, use="restricted")
 
 
-def _door(cell: Cell, use: Use, rng: np.random.Generator) -> Feature:
+def _door(cell: FloorCell, use: Use, rng: np.random.Generator) -> Feature:
     width = min(use.door, tenths(cell.width - 0.8))
     x = tenths(rng.uniform(cell.x1 + 0.4, cell.x2 - 0.4 - width))
     ends = _line((x, cell.door_y), (tenths(x + width), cell.door_y))
     return _feature("door", ends)
 
 
-def _clear_of_the_door(cell: Cell) -> float:
+def _clear_of_the_door(cell: FloorCell) -> float:
     """Where no furniture stands: a metre from the corridor [m]."""
     return cell.y2 - 1.0 if cell.door_north else cell.y1 + 1.0
 
 
 # --- who and what is in the house ------------------------------------------------------
 def _people_and_robots(
-    block: OfficeBlock, layout: Layout, rooms: list[tuple[Cell, Use, str]]
+    block: OfficeBlock, layout: Layout, rooms: list[tuple[FloorCell, Use, str]]
 ) -> Iterator[Feature]:
     bays = [cell for cell, _, name in rooms if name.startswith("Robot bay")]
     spots = [(bay, spot) for bay in bays for spot in stands(bay)]

@@ -25,7 +25,7 @@ from dva_sim.worlds.bodies import (
     PERSON,
     ROBOT,
     WALL,
-    Asked,
+    AskedFor,
     Body,
     Timing,
     set_force,
@@ -62,7 +62,7 @@ class PersonBody(Body):
         shape.friction, shape.elasticity, shape.collision_type = 0.0, 0.0, self.kind
         super().__init__(world, name, body, shape)
         self.radius, self._mass, self._circle = radius, mass, shape
-        self._asked = Asked((0.0, 0.0))
+        self._asked = AskedFor((0.0, 0.0))
 
     def walk(self, vx: float, vy: float) -> None:
         """Want to walk with this velocity [m/s] from the next tick on, until told otherwise.

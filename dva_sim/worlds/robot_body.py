@@ -14,7 +14,7 @@ from dva_sim.worlds.bodies import (
     GRIP,
     PERSON,
     ROBOT,
-    Asked,
+    AskedFor,
     Body,
     Contacts,
     G,
@@ -36,7 +36,7 @@ REST: Final = 8.0  # time constants after which nothing is left of a speed of 1 
 TRACK: Final = 0.5  # wheels stand that share of the radius off the middle; assumed
 
 
-class SetPoint(NamedTuple):
+class TickTarget(NamedTuple):
     """What the motors are asked for, before tick `end`."""
 
     speed: float
@@ -44,7 +44,7 @@ class SetPoint(NamedTuple):
     end: float
 
 
-STOP = SetPoint(0.0, 0.0, math.inf)
+STOP = TickTarget(0.0, 0.0, math.inf)
 
 
 class Lock:
@@ -112,7 +112,7 @@ class RobotBody(Body):
         self.spec, self.radius, self._drive = spec, spec.radius, spec.drive(spec)
         self.distance, self.work, self._grip = 0.0, 0.0, GRIP
         self._powered = True
-        self._asked = Asked(STOP)
+        self._asked = AskedFor(STOP)
         self._people, self._jam = Contacts(), Jam()
         self._mass, self._moment = spec.mass, body.moment
         self._arm = TRACK * spec.radius
@@ -204,7 +204,7 @@ class RobotBody(Body):
             speed = min(max(speed, 0.0), spec.max_speed)
             turn_rate = min(max(turn_rate, -spec.max_turn_rate), spec.max_turn_rate)
             speed, turn_rate = self._drive.set_point(speed, turn_rate)
-            self._asked.put(start, SetPoint(speed, turn_rate, world.tick_at(until)))
+            self._asked.put(start, TickTarget(speed, turn_rate, world.tick_at(until)))
         world.wake(self)
 
     def push(self, tick: int, dt: float) -> bool:

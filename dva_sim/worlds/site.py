@@ -22,7 +22,7 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.streams import Streams
 from dva_sim.kernel.suggestions import hint
 from dva_sim.worlds.geo import GeoFrame, Pose
-from dva_sim.worlds.geojson import Plan, make_plan, read_plan
+from dva_sim.worlds.geojson import FloorPlan, make_plan, read_plan
 from dva_sim.worlds.layout import FOOTPRINT, STANDING, Site
 from dva_sim.worlds.maps import OccupancyGrid, load_ros_map, outline, rasterise
 from dva_sim.worlds.office_block import OfficeBlock, office_block
@@ -183,7 +183,7 @@ def _load_site(path: Path, options: str) -> Site:
 
 def _plan(
     config: SiteFile, document: Document, frame: GeoFrame, options: Mapping[str, Any]
-) -> Plan:
+) -> FloorPlan:
     if config.generate is not None:
         wanted = _with_options(config.name, config.generate, options)
         return make_plan(office_block(wanted), config.ceiling_m)
@@ -205,7 +205,7 @@ def _with_options(name: str, block: OfficeBlock, options: Mapping[str, Any]) -> 
     return validate(OfficeBlock, data, lambda text, _: ConfigError(f"site {name!r}: {text}"))
 
 
-def _site(config: SiteFile, frame: GeoFrame, plan: Plan) -> Site:
+def _site(config: SiteFile, frame: GeoFrame, plan: FloorPlan) -> Site:
     site = Site(
         name=config.name,
         frame=frame,

@@ -18,7 +18,7 @@ DOOR_HEIGHT = 2.1  # of a door that does not say [m]
 
 
 @dataclass(frozen=True, eq=False)
-class Area:
+class NamedArea:
     """A named part of the plane: its corners `(k, 2)` [m]."""
 
     name: str
@@ -45,7 +45,7 @@ class Area:
         return float(xmin), float(ymin), float(xmax), float(ymax)
 
 
-T = TypeVar("T", bound=Area)
+T = TypeVar("T", bound=NamedArea)
 
 
 class Lookup(Generic[T]):
@@ -78,7 +78,7 @@ class Lookup(Generic[T]):
 
 
 @dataclass(frozen=True, eq=False)
-class Room(Area):
+class Room(NamedArea):
     """A named part of the floor, or of the ground outdoors.
 
     Attributes:
@@ -93,7 +93,7 @@ class Room(Area):
 
 
 @dataclass(frozen=True, eq=False)
-class Zone(Area):
+class Zone(NamedArea):
     """A part of the floor with a rule or a purpose: `use` is restricted, charging or assembly."""
 
     use: str = "restricted"
@@ -132,7 +132,7 @@ QUALITIES = {
 
 
 @dataclass(frozen=True, eq=False)
-class Coverage(Area):
+class RadioCoverage(NamedArea):
     """Where the radio link has a quality of its own."""
 
     quality: LinkQuality = QUALITIES["good"]

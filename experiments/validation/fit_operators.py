@@ -38,11 +38,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.agents.operator.published import Line, lines_of, load_split, load_targets
+from dva_sim.agents.operator.published import TargetLine, lines_of, load_split, load_targets
 from dva_sim.experiments.study.robustness_grid import latin_hypercube
 from dva_sim.kernel.streams import Streams
+from dva_sim.validation.operators.experiment_runs import OperatorsSetting, play_experiments
 from dva_sim.validation.operators.experiments import EXPERIMENTS
-from dva_sim.validation.operators.play import Setting, play_experiments
 
 HERE = Path(__file__).parent
 PEOPLE = HERE.parents[1] / "agents/people"
@@ -63,7 +63,7 @@ Loss = Callable[[Traits, int], tuple[float, dict[str, float]]]
 """The loss of a set of medians with the persons of a seed, and the values of the lines."""
 
 
-def loss(lines: list[Line], setting: Setting) -> tuple[float, dict[str, float]]:
+def loss(lines: list[TargetLine], setting: OperatorsSetting) -> tuple[float, dict[str, float]]:
     """Sum of squares, each line by half the width of its band; and the values of the lines."""
     experiments = [e for e in EXPERIMENTS if e.name == FITTED]
     played = play_experiments(experiments, setting)
@@ -71,7 +71,7 @@ def loss(lines: list[Line], setting: Setting) -> tuple[float, dict[str, float]]:
     return sum(miss(line, values[line.id]) ** 2 for line in lines), values
 
 
-def miss(line: Line, value: float) -> float:
+def miss(line: TargetLine, value: float) -> float:
     """How far off a value is, in half widths of the band."""
     assert line.low is not None
     assert line.high is not None
@@ -180,7 +180,7 @@ def main() -> None:
     split = load_split()
     lines = [line for line in lines_of(load_targets(), split) if line.kind == "fitted"]
     workers = parser.parse_args().jobs
-    setting = Setting(split.strategy, persons=PERSONS, quick=True, workers=workers)
+    setting = OperatorsSetting(split.strategy, persons=PERSONS, quick=True, workers=workers)
     tried = search(lambda traits, seed: loss(lines, replace(setting, traits=traits, seed=seed)))
     write_down(tried)
     print("best:", medians_of(tried))

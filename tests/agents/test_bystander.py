@@ -10,12 +10,20 @@ import numpy as np
 import pytest
 from halls import People, hall, two_rooms
 
-from dva_sim.agents.operator.person import Trait
 from dva_sim.agents.people import evacuation
 from dva_sim.agents.people.bystander import APART, BystanderAgent, draw_places, nothing_seen
-from dva_sim.agents.people.escape import UNTENABLE, choose_escape, is_untenable, refuges_of
-from dva_sim.agents.people.evacuation import AT_LATEST, PERIOD, THROUGH, clean_air
+from dva_sim.agents.people.evacuation import (
+    AT_LATEST,
+    PERIOD,
+    THROUGH,
+    UNTENABLE,
+    choose_escape,
+    clean_air,
+    is_untenable,
+    refuges_of,
+)
 from dva_sim.agents.people.profiles import BystanderProfile, Occupant
+from dva_sim.agents.person import Trait
 from dva_sim.kernel.config import load_yaml, validate
 from dva_sim.kernel.resources import find
 from dva_sim.kernel.streams import Streams
@@ -50,14 +58,14 @@ class Building(People):
             self.clock,
             Occupant(speed, premovement, moves, Trait(median=30.0)),
             walking,
-            self.planner,
-            places or [place],
-            self.refuges,
-            np.random.default_rng(len(self.bystanders)),
-            air,
-            sees,
-            lambda: self.world.remove(walking.body),
-            self.told.append,
+            planner=self.planner,
+            places=places or [place],
+            refuges=self.refuges,
+            luck=np.random.default_rng(len(self.bystanders)),
+            air=air,
+            sees=sees,
+            leaves=lambda: self.world.remove(walking.body),
+            tell=self.told.append,
         )
         made.start()
         self.bystanders.append(made)

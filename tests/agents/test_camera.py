@@ -9,16 +9,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dva_sim.agents.robot.camera import CLEAR, Frame, HazardSpot, Observation, SeenHazard, View
+from dva_sim.agents.observation import CLEAR, CameraFrame, Observation, SeenHazard
+from dva_sim.agents.robot.camera import FieldOfView, HazardSpot
 
 FIRE = SeenHazard("fire", 4.0, 5.0, 1.5, 0.6, 1.0)
-FRAME = Frame(Observation(86_320, 1.0, 2.0, 0.5, 0.4, -0.1, (FIRE,), 2.5), 12.5)
+FRAME = CameraFrame(Observation(86_320, 1.0, 2.0, 0.5, 0.4, -0.1, (FIRE,), 2.5), 12.5)
 
 
 def test_a_frame_has_the_size_of_a_picture_and_comes_back_whole() -> None:
     data = FRAME.pack(12_000)
     assert len(data) == 12_000
-    assert Frame.unpack(data) == FRAME
+    assert CameraFrame.unpack(data) == FRAME
 
 
 @pytest.mark.parametrize(
@@ -40,25 +41,25 @@ def test_a_frame_has_the_size_of_a_picture_and_comes_back_whole() -> None:
     ],
 )
 def test_what_is_no_frame_is_none(data: bytes) -> None:
-    assert Frame.unpack(data) is None
+    assert CameraFrame.unpack(data) is None
 
 
 @given(st.binary(max_size=200))
 def test_any_bytes_are_a_frame_or_none(data: bytes) -> None:
-    assert Frame.unpack(data) is None or isinstance(Frame.unpack(data), Frame)
+    assert CameraFrame.unpack(data) is None or isinstance(CameraFrame.unpack(data), CameraFrame)
 
 
 @pytest.mark.parametrize(
-    ("kind", "depth", "seen"),
-    [("gas_leak", 2.9, True), ("gas_leak", 3.1, False), ("fire", 50.0, True)],
+    ("shines", "depth", "seen"), [(False, 2.9, True), (False, 3.1, False), (True, 50.0, True)]
 )
-def test_smoke_hides_everything_but_that_it_burns(kind: str, depth: float, seen: bool) -> None:
-    view = View(math.radians(70), 6.0, lambda a, b: True, lambda a, b: depth)
-    assert bool(view.look(0.0, 0.0, 0.0, [HazardSpot(kind, 3.0, 0.0, 0.5)])) is seen
+def test_smoke_hides_everything_but_what_shines(shines: bool, depth: float, seen: bool) -> None:
+    view = FieldOfView(math.radians(70), 6.0, lambda a, b: True, lambda a, b: depth)
+    spot = HazardSpot("fire", 3.0, 0.0, 0.5, shines)
+    assert bool(view.look(0.0, 0.0, 0.0, [spot])) is seen
 
 
 def test_a_hazard_of_1_m_across_looks_19_degrees_wide_from_3_m_and_9_5_from_6_m() -> None:
-    view = View(math.radians(70), 6.0, lambda a, b: True)
+    view = FieldOfView(math.radians(70), 6.0, lambda a, b: True)
     for distance, degrees in ((3.0, 18.9), (6.0, 9.5)):
         (seen,) = view.look(0.0, 0.0, 0.0, [HazardSpot("gas_leak", distance, 0.0, 0.5)])
         assert math.degrees(seen.angle) == pytest.approx(degrees, abs=0.05)
@@ -66,18 +67,20 @@ def test_a_hazard_of_1_m_across_looks_19_degrees_wide_from_3_m_and_9_5_from_6_m(
 
 
 def test_smoke_takes_contrast_by_its_optical_depth() -> None:
-    view = View(math.radians(70), 6.0, lambda a, b: True, lambda a, b: 0.5 * math.dist(a, b))
+    view = FieldOfView(math.radians(70), 6.0, lambda a, b: True, lambda a, b: 0.5 * math.dist(a, b))
     (seen,) = view.look(0.0, 0.0, 0.0, [HazardSpot("gas_leak", 4.0, 0.0, 0.5)])
     assert seen.contrast == pytest.approx(math.exp(-2.0))
 
 
 @pytest.mark.parametrize(("extinction", "far"), [(0.0, CLEAR), (0.5, 6.0), (3.0, 1.0)])
 def test_visibility_is_3_over_the_extinction(extinction: float, far: float) -> None:
-    view = View(1.2, 6.0, lambda a, b: True, lambda a, b: extinction * math.dist(a, b))
+    view = FieldOfView(1.2, 6.0, lambda a, b: True, lambda a, b: extinction * math.dist(a, b))
     assert view.visibility(1.0, 2.0, 0.7) == pytest.approx(far)
 
 
 def test_clean_air_beyond_a_wall_does_not_make_thick_smoke_thinner() -> None:
     """Smoke of 4 /m to x = 1 m, none beyond: over 6 m on average 0.67 /m."""
     depth = lambda a, b: 4.0 * (min(b[0], 1.0) - min(a[0], 1.0))  # noqa: E731
-    assert View(1.2, 6.0, lambda a, b: True, depth).visibility(0.0, 0.0, 0.0) == pytest.approx(0.75)
+    assert FieldOfView(1.2, 6.0, lambda a, b: True, depth).visibility(
+        0.0, 0.0, 0.0
+    ) == pytest.approx(0.75)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from dva_sim.agents.device import Device
-from dva_sim.network.patterns import Request
+from dva_sim.agents.device import AgentDevice
+from dva_sim.network.messaging import Request
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode, encode
 from dva_sim.simulation import scenario as scenarios
@@ -16,7 +16,7 @@ ME, ROBOT, THIEF = id_of("operator", 1), id_of("robot", 1), "02:00:00:03:00:66"
 
 
 @pytest.fixture
-def device() -> Device:
+def device() -> AgentDevice:
     """An operator's device on a network where nobody else is heard."""
     run = Run(scenarios.build(scenarios.load("drive-to-event")), 1)
     return run.stage.device("operator", 1)
@@ -32,7 +32,7 @@ def code(reply: bytes) -> int:
     return body.code
 
 
-def test_what_an_impostor_was_told_is_not_for_the_one_it_played(device: Device) -> None:
+def test_what_an_impostor_was_told_is_not_for_the_one_it_played(device: AgentDevice) -> None:
     acted: list[m.Message] = []
 
     def act(message: m.Message) -> m.Reply:
@@ -57,7 +57,7 @@ def test_what_an_impostor_was_told_is_not_for_the_one_it_played(device: Device) 
     ],
     ids=["garbage", "of another device", "no reply", "to another request"],
 )
-def test_a_request_with_a_bad_answer_has_failed(device: Device, answer: bytes) -> None:
+def test_a_request_with_a_bad_answer_has_failed(device: AgentDevice, answer: bytes) -> None:
     """Else whoever asked would wait for ever, and a device would never register."""
     device.network.serve(DVA, lambda request: request.answer(answer))
     ended: list[str] = []
@@ -66,7 +66,7 @@ def test_a_request_with_a_bad_answer_has_failed(device: Device, answer: bytes) -
     assert ended == ["no"]
 
 
-def test_an_answer_to_what_could_not_be_read_is_taken(device: Device) -> None:
+def test_an_answer_to_what_could_not_be_read_is_taken(device: AgentDevice) -> None:
     def refuse(request: Request) -> None:
         request.answer(
             encode(m.Message(ME, 1, DVA, "12:00:00", 0, m.Reply(0, m.BAD_MESSAGE, "cannot")))
@@ -79,7 +79,9 @@ def test_an_answer_to_what_could_not_be_read_is_taken(device: Device) -> None:
     assert codes == [m.BAD_MESSAGE]
 
 
-def test_a_message_to_another_device_is_refused_unless_it_is_an_emergency(device: Device) -> None:
+def test_a_message_to_another_device_is_refused_unless_it_is_an_emergency(
+    device: AgentDevice,
+) -> None:
     acted: list[m.Body] = []
 
     def act(message: m.Message) -> m.Reply:
@@ -92,13 +94,13 @@ def test_a_message_to_another_device_is_refused_unless_it_is_an_emergency(device
     assert acted == [m.Emergency()]
 
 
-def test_a_reason_too_long_for_a_reply_leaves_its_code(device: Device) -> None:
+def test_a_reason_too_long_for_a_reply_leaves_its_code(device: AgentDevice) -> None:
     """Else whoever finds a way to make one could end the receiver."""
     refuse = lambda message: m.Reply(message.message_id, m.BUSY, "x" * 300)  # noqa: E731
     assert code(device.answer(request(m.GetDeviceList()), refuse)) == m.BUSY
 
 
-def test_the_requests_of_others_do_not_make_a_reply_forgotten(device: Device) -> None:
+def test_the_requests_of_others_do_not_make_a_reply_forgotten(device: AgentDevice) -> None:
     acted: list[str] = []
 
     def act(message: m.Message) -> m.Reply:

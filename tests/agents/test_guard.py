@@ -10,7 +10,7 @@ import pytest
 from pretended_dva import GUARD, POST, WALKER, PretendedDva
 
 from dva_sim.agents.people.guard import STAND_BY_FOR, STAND_OFF, GuardAgent
-from dva_sim.agents.people.guard_protocol import AWARD_WITHIN, MOST_ANNOUNCED, GuardDuty
+from dva_sim.agents.people.guard_protocol import AWARD_WITHIN, MOST_ANNOUNCED, GuardProtocol
 from dva_sim.agents.people.profiles import GuardProfile, Walker
 from dva_sim.kernel.config import load_yaml, validate
 from dva_sim.kernel.resources import find
@@ -582,7 +582,7 @@ def test_guards_walk_as_fast_as_weidmann_found_within_three_per_cent() -> None:
 # --- the decider alone -----------------------------------------------------------------
 
 
-def decide(duty: GuardDuty, body: m.Body, now: float = 0.0) -> int:
+def decide(duty: GuardProtocol, body: m.Body, now: float = 0.0) -> int:
     return duty.handle(m.Message(GUARD, 1, duty.dva, "12:00:00", 0, body), now).code
 
 
@@ -592,13 +592,13 @@ def announcement(event: int) -> m.TaskAnnouncement:
 
 def test_an_announcement_is_forgotten_a_minute_after_the_time_for_bids() -> None:
     for wait, code in ((2.0 + AWARD_WITHIN, m.OK), (2.1 + AWARD_WITHIN, m.UNKNOWN_EVENT)):
-        duty = GuardDuty("02:00:00:00:00:01", 10.0)
+        duty = GuardProtocol("02:00:00:00:00:01", 10.0)
         decide(duty, announcement(7))
         assert decide(duty, m.TaskAward(7), wait) == code
 
 
 def test_of_many_announcements_the_newest_32_are_remembered() -> None:
-    duty = GuardDuty("02:00:00:00:00:01", 10.0)
+    duty = GuardProtocol("02:00:00:00:00:01", 10.0)
     for event in range(1, 1001):
         decide(duty, announcement(event))
     assert len(duty._announced) == MOST_ANNOUNCED == 32

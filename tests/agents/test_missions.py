@@ -16,7 +16,7 @@ from fleet import Fleet, Robot, caparica
 from dva_sim.agents.robot.camera import HazardSpot
 from dva_sim.agents.robot.collision_guard import PERSONAL
 from dva_sim.agents.robot.manoeuvres import INSPECT_FOR, LOOK_FROM
-from dva_sim.agents.robot.missions import GIVE_UP_AFTER, MOST_JAMS, NEAR, RESERVE, Errand
+from dva_sim.agents.robot.missions import GIVE_UP_AFTER, MOST_JAMS, NEAR, RESERVE, MissionGoal
 from dva_sim.agents.robot.profile import RobotProfile
 from dva_sim.protocol import messages as m
 from dva_sim.worlds.layout import Site
@@ -26,8 +26,8 @@ SOUTH_OF_DOOR, NORTH_OF_DOOR = (33.15, 16.0), (33.15, 20.5)
 EASTWARD, NORTHWARD, WESTWARD, SOUTHWARD = 0.0, math.pi / 2, math.pi, -math.pi / 2
 
 
-def to(*goals: tuple[float, float], laps: int = 1) -> Errand:
-    return Errand(goals, laps)
+def to(*goals: tuple[float, float], laps: int = 1) -> MissionGoal:
+    return MissionGoal(goals, laps)
 
 
 def closed(*doors: tuple[float, float, float, float]) -> Site:
@@ -84,11 +84,13 @@ def test_a_message_becomes_an_errand() -> None:
     to_xy = lambda latitude, longitude: (10 * latitude, 10 * longitude)  # noqa: E731
     one, two = m.Position(1.0, 2.0), m.Position(3.0, 4.0)
     base = (5.0, 6.0)
-    assert Errand.of(m.GoTo((one, two)), to_xy, base) == Errand(((10.0, 20.0), (30.0, 40.0)))
-    assert Errand.of(m.Patrol((one,), 0), to_xy, base) == Errand(((10.0, 20.0),), laps=0)
-    assert Errand.of(m.ReturnToBase(), to_xy, base) == Errand((base,), home=True)
-    look = Errand.of(m.Inspect(3, "flood", two), to_xy, base)
-    assert look == Errand(((30.0, 40.0),), event="flood")
+    assert MissionGoal.of(m.GoTo((one, two)), to_xy, base) == MissionGoal(
+        ((10.0, 20.0), (30.0, 40.0))
+    )
+    assert MissionGoal.of(m.Patrol((one,), 0), to_xy, base) == MissionGoal(((10.0, 20.0),), laps=0)
+    assert MissionGoal.of(m.ReturnToBase(), to_xy, base) == MissionGoal((base,), home=True)
+    look = MissionGoal.of(m.Inspect(3, "flood", two), to_xy, base)
+    assert look == MissionGoal(((30.0, 40.0),), event="flood")
 
 
 CAR = RobotProfile(
@@ -275,7 +277,7 @@ def test_a_battery_that_is_nearly_empty_ends_a_mission_but_not_the_way_home() ->
     assert robot.end == ("failed", "battery")
     assert robot.when("failed") == pytest.approx(5.0, abs=0.15)
     fleet = Fleet(charge=lambda now: low)
-    robot = fleet.robot(1, (*WEST, EASTWARD), Errand(((10.0, 12.0),), home=True))
+    robot = fleet.robot(1, (*WEST, EASTWARD), MissionGoal(((10.0, 12.0),), home=True))
     fleet.run(60.0)
     assert robot.end == ("done", "")
 
@@ -286,8 +288,8 @@ def test_a_battery_that_is_nearly_empty_ends_a_mission_but_not_the_way_home() ->
 def test_an_inspection_ends_where_the_event_is_seen_and_faces_it() -> None:
     fleet = Fleet()
     place = (10.0, 20.0)  # in the workshop, whose door is at (6.05, 13.2)
-    fleet.hazards = [HazardSpot("fire", *place, 0.5)]
-    robot = fleet.robot(1, (*EAST, WESTWARD), Errand((place,), event="fire"))
+    fleet.hazards = [HazardSpot("fire", *place, 0.5, shines=True)]
+    robot = fleet.robot(1, (*EAST, WESTWARD), MissionGoal((place,), event="fire"))
     fleet.run(120.0)
     state, reason = robot.end
     assert (state, reason) == ("waiting", "fire in view")
@@ -300,7 +302,7 @@ def test_an_inspection_ends_where_the_event_is_seen_and_faces_it() -> None:
 def test_an_inspection_with_nothing_in_view_goes_near_looks_all_around_and_ends_by_itself() -> None:
     fleet = Fleet()
     place = (10.0, 20.0)
-    robot = fleet.robot(1, (6.05, 12.0, NORTHWARD), Errand((place,), event="fire"))
+    robot = fleet.robot(1, (6.05, 12.0, NORTHWARD), MissionGoal((place,), event="fire"))
     headings: list[float] = []
     fleet.run(400.0, lambda: headings.append(robot.body.pose().heading))
     assert robot.end == ("done", "nothing in view")
@@ -312,8 +314,11 @@ def test_an_inspection_with_nothing_in_view_goes_near_looks_all_around_and_ends_
 def test_something_else_at_the_place_is_not_the_event() -> None:
     fleet = Fleet()
     place = (10.0, 20.0)
-    fleet.hazards = [HazardSpot("flood", *place, 0.5), HazardSpot("fire", 2.0, 15.0, 0.5)]
-    robot = fleet.robot(1, (6.05, 12.0, NORTHWARD), Errand((place,), event="fire"))
+    fleet.hazards = [
+        HazardSpot("flood", *place, 0.5),
+        HazardSpot("fire", 2.0, 15.0, 0.5, shines=True),
+    ]
+    robot = fleet.robot(1, (6.05, 12.0, NORTHWARD), MissionGoal((place,), event="fire"))
     fleet.run(100.0)
     assert robot.end == ("waiting", "nothing in view")
 

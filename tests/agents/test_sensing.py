@@ -10,9 +10,9 @@ from dva_sim.agents.robot.sensors import (
     FASTEST,
     LEASE,
     MOST,
-    SensorDesk,
     SensorPort,
-    topic_of_sensor,
+    SensorSubscriptions,
+    sensor_topic,
 )
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode
@@ -38,9 +38,9 @@ class Bench:
             "slow": SensorPort("s", lambda now: (now,), fastest=2.0),
             "lagging": SensorPort("s", self._note, lags=True),
         }
-        self.desk = SensorDesk(device, ports, lambda now: round(now * 1000))
+        self.desk = SensorSubscriptions(device, ports, lambda now: round(now * 1000))
         self.got: list[tuple[float, m.SensorValue]] = []
-        topic = topic_of_sensor("time", READER)
+        topic = sensor_topic("time", READER)
         self.run.network.subscribe(READER, ROBOT, topic, self._hear)
         self.clock.run(1.0)
 

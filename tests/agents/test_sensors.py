@@ -14,7 +14,7 @@ from dva_sim.agents.robot.sensors import (
     BLOCK,
     KINDS,
     FaultConfig,
-    Sensor,
+    RobotSensor,
     SensorConfig,
     Values,
     make_ports,
@@ -26,15 +26,15 @@ from dva_sim.worlds.hazards import Conditions
 from dva_sim.worlds.lidar import Lidar
 
 
-def sensor(source: Callable[[float], Values], seed: int = 1, **config: object) -> Sensor:
+def sensor(source: Callable[[float], Values], seed: int = 1, **config: object) -> RobotSensor:
     """A thermometer without noise or lag, but for what is said."""
     plain = {"name": "temperature", "noise": 0.0, "lag_s": 0.0, "resolution": 0.001}
-    return Sensor(
+    return RobotSensor(
         SensorConfig.model_validate(plain | config), source, lambda what: Streams(seed).fresh(what)
     )
 
 
-def readings(made: Sensor, times: list[float]) -> list[Values]:
+def readings(made: RobotSensor, times: list[float]) -> list[Values]:
     return [made.read(time) for time in times]
 
 

@@ -11,9 +11,9 @@ import pytest
 from elsewhere import told_here_and_elsewhere
 from halls import People, gap, hall, two_rooms
 
-from dva_sim.agents.people.locomotion import RADIUS, FreeBody, OpenGround
 from dva_sim.agents.people.pedestrian_avoidance import (
     BERTH,
+    RADIUS,
     RELAXATION,
     Courtesy,
     Door,
@@ -24,22 +24,54 @@ from dva_sim.agents.people.pedestrian_avoidance import (
     middles_of,
     velocity,
 )
-from dva_sim.agents.people.walking import (
-    ARRIVED,
-    FASTEST,
-    GIVE_UP,
-    SLOWEST,
-    TIRED,
-    Walking,
-    draw_speed,
-)
+from dva_sim.agents.people.profiles import FASTEST, SLOWEST, PaceProfile
+from dva_sim.agents.people.walking import ARRIVED, GIVE_UP, TIRED, Walking
 from dva_sim.kernel.clock import Clock
+from dva_sim.worlds.bodies import Body
 from dva_sim.worlds.drives import DriveSpec
 from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.planning import Planner
 
 CORRIDOR = 2.4  # width [m]
 SPEED = 1.34  # [m/s]
+
+
+class FreeBody:
+    """A body that nothing stops: it has at once the velocity that is wanted."""
+
+    def __init__(self, clock: Clock, x: float, y: float) -> None:
+        self._clock, self._since = clock, clock.now
+        self._x, self._y, self.radius = x, y, RADIUS
+        self.velocity = 0.0, 0.0
+
+    @property
+    def x(self) -> float:
+        return self._x + self.velocity[0] * (self._clock.now - self._since)
+
+    @property
+    def y(self) -> float:
+        return self._y + self.velocity[1] * (self._clock.now - self._since)
+
+    def walk(self, vx: float, vy: float) -> None:
+        self._x, self._y, self._since = self.x, self.y, self._clock.now
+        self.velocity = vx, vy
+
+    def take_up(self, radius: float) -> None:
+        self.radius = radius
+
+
+class OpenGround:
+    """Ground without physics, for who walks alone."""
+
+    def __init__(self) -> None:
+        self.bodies: list[Body] = []
+
+    def advance_to(self, time: float) -> None:
+        pass
+
+    def neighbours(self, x: float, y: float, within: float) -> list[tuple[Body, float]]:
+        found = [(body, math.dist((body.x, body.y), (x, y))) for body in self.bodies]
+        return sorted((f for f in found if f[1] <= within), key=lambda f: f[1])
 
 
 def wide_open(points):
@@ -140,7 +172,7 @@ def test_who_waits_stands_right_of_the_way_through_the_door_or_left_if_a_wall_is
 def test_a_population_walks_as_weidmann_found_though_nobody_is_slower_or_faster_than_people_are():
     """Weidmann 1993: 1.34 m/s, SD 0.26; within 3 % also of those whose speed was cut."""
     rng = np.random.default_rng(1)
-    speeds = np.array([draw_speed(1.34, 0.26, rng) for _ in range(20_000)])
+    speeds = np.array([PaceProfile().draw_speed(rng) for _ in range(20_000)])
     assert speeds.mean() == pytest.approx(1.34, rel=0.03)
     assert speeds.std() == pytest.approx(0.26, rel=0.03)
     assert (speeds.min(), speeds.max()) == (SLOWEST, FASTEST)
@@ -170,7 +202,12 @@ def test_a_slower_pace_takes_longer_in_proportion():
 def test_where_there_is_no_physics_the_same_walk_is_walked_by_a_body_that_moves_freely():
     site, clock, seen = hall(20, CORRIDOR), Clock(), []
     walker = Walking(
-        clock, Planner(site, 0.3), OpenGround(), FreeBody(clock, 1.0, 1.2), SPEED, site.doors
+        clock,
+        Planner(site, 0.3),
+        OpenGround(),
+        FreeBody(clock, 1.0, 1.2),
+        speed=SPEED,
+        doors=site.doors,
     )
     walker.go((19.0, 1.2), lambda: seen.append(clock.now), lambda: None)
     clock.run(5.0)
@@ -274,7 +311,7 @@ def flow_through(width, seed, count=45):
         people.world.remove(walker.body)
 
     for index in rng.permutation(len(spots))[:count]:
-        walker = people.add(spots[index], speed=draw_speed(1.34, 0.26, rng))
+        walker = people.add(spots[index], speed=PaceProfile().draw_speed(rng))
         leaves = partial(leave, walker)
         assert walker.go((8.0, 3.5), leaves, pytest.fail, lambda at: at[0] > 5.0)
     people.run_until(lambda: len(passed) == count, 120.0, 1.0)

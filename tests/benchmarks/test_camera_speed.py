@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dva_sim.worlds.camera import Camera, Figure, Smoke, Spot, encode
+from dva_sim.worlds.camera import Camera, Figure, SmokeView, encode
 from dva_sim.worlds.geo import Pose
-from dva_sim.worlds.hazards import Raster
+from dva_sim.worlds.hazards import Raster, make_hazard
 from dva_sim.worlds.site import load_site
 
 POSE = Pose(35.0, 16.0, 2.5)
 PEOPLE = [Figure("guard", 33.4, 17.6), Figure("bystander", 32.0, 16.0), Figure("robot", 30.0, 16.5)]
-FIRE = [Spot("fire", 31.5, 18.0, 1.4)]
+FIRE = [make_hazard("fire", (31.5, 18.0), -300.0)]
 SCENES: dict[str, dict[str, Any]] = {
     "empty": {},
     "people": {"figures": PEOPLE},
@@ -34,7 +34,7 @@ def test_a_picture_of_320_by_240(benchmark: Any, scene: str) -> None:
         for share in (0.05, 0.3, 0.6)
     }
     if "smoke" in options:
-        options["smoke"] = Smoke(air[0.3], air[0.6])
+        options["smoke"] = SmokeView(air[0.3], air[0.6])
     if "water" in options:
         options["water"] = air[0.05]
     camera = Camera(site)

@@ -19,13 +19,29 @@ def situation(operators):
     distance = np.abs(goals - starts).sum(axis=2)
     distance[rng.random(distance.shape) < 0.05] = np.inf
     tasks = tuple(
-        Task(e, "fire", "confirm", True, float(rng.random()), 0.9, 0.3 * e, 0.3 * e)
+        Task(
+            event=e,
+            kind="fire",
+            stage="confirm",
+            due=True,
+            severity=float(rng.random()),
+            confidence=0.9,
+            detected=0.3 * e,
+            waiting_since=0.3 * e,
+        )
         for e in range(1, TASKS + 1)
     )
     responders = tuple(
         Responder(f"device-{i}", "guard" if i < GUARDS else "robot") for i in range(team)
     )
-    return Situation(300.0, tasks, responders, distance, distance / 1.3, operators=operators)
+    return Situation(
+        now=300.0,
+        tasks=tasks,
+        responders=responders,
+        distance=distance,
+        eta=distance / 1.3,
+        operators=operators,
+    )
 
 
 PLENTY, FEW = situation(ROBOTS), situation(10)

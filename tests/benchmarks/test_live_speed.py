@@ -12,7 +12,7 @@ import pytest
 import zmq
 from benchmarks.goals import goal
 
-from dva_sim.agents.device import Device
+from dva_sim.agents.device import AgentDevice
 from dva_sim.kernel.recorder import Recorder
 from dva_sim.network.realtime import LiveClock
 from dva_sim.network.sockets import SocketNetwork
@@ -84,7 +84,7 @@ class Phone:
     def __init__(self, robot: str) -> None:
         self.network = SocketNetwork(LiveClock())
         self.network.introduce(ROBOT, robot)
-        self._device: Device = stage(self.network).device("operator", 1)
+        self._device: AgentDevice = stage(self.network).device("operator", 1)
         self._left, self.times = 0, list[float]()
         self._began = 0.0
 

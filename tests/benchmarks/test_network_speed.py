@@ -21,7 +21,7 @@ from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.streams import Streams
 from dva_sim.network.connections import Connector
 from dva_sim.network.link import ConstantRate, Link, LinkConfig
-from dva_sim.network.patterns import Request, Requester
+from dva_sim.network.messaging import Request, Requester
 from dva_sim.network.virtual import VirtualNetwork
 
 MESSAGES, AT_ONCE, ROUNDS = 20_000, 100, 7

@@ -1,11 +1,10 @@
 """The first minute: a picture and a story first, then a study, and a film beside it."""
 
-from pathlib import Path
-
 import pytest
 
 from dva_sim.cli import demo as module
 from dva_sim.cli.demo import FILM, PICTURE, STUDY, demo
+from dva_sim.experiments.execution.run_request import RunRequest
 from dva_sim.kernel.errors import DvaSimError, ExitCode
 
 SLEEPS = "import time; time.sleep(600)"
@@ -16,11 +15,11 @@ def played(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, bool]]:
     """What the demo does, in order, and whether the picture was there by then; nothing is run."""
     done: list[tuple[str, bool]] = []
 
-    def study(name: str, _: object, out: Path, *__: object) -> ExitCode:
-        done.append((name, (out / PICTURE).exists()))
+    def study(request: RunRequest) -> ExitCode:
+        done.append((request.study, (request.folder / PICTURE).exists()))
         return ExitCode.INTERRUPTED
 
-    monkeypatch.setattr(module.study_output, "run", study)
+    monkeypatch.setattr(module.study_runs, "run", study)
     return done
 
 

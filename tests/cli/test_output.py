@@ -9,9 +9,7 @@ from pathlib import Path
 import pytest
 from small_study import cheap, study_in, unlucky
 
-from dva_sim.cli import call, names, plugin_names
-from dva_sim.cli.episode_output import PATTERNS
-from dva_sim.cli.files import _LISTED
+from dva_sim.cli import call, names
 from dva_sim.experiments.execution.dry_run import _Tried
 from dva_sim.experiments.execution.runner import run_study
 from dva_sim.kernel.errors import ExitCode
@@ -54,7 +52,7 @@ def test_a_list_has_a_line_for_each_name_with_what_it_is(say):
     code, out, _ = say("list")
     lines = out.splitlines()
     assert code == 0
-    for line in ("fire-drill +Two robots, two guards", "min_eta +Oldest task", "latest-wins +Comm"):
+    for line in ("fire-drill +Two robots, two guards", "min_eta +Oldest task", "latest-wins +Publ"):
         assert any(re.match(f"  {line}", told) for told in lines)
     everything = names.everything()
     assert len(lines) == sum(len(found) + 2 for found in everything.values()) - 1
@@ -78,15 +76,16 @@ def test_a_terminal_cuts_what_it_has_no_room_for_and_a_pipe_does_not(monkeypatch
     assert capsys.readouterr().out == "x" * 37 + "...\n" + "y" * 40 + "\n"
 
 
-def test_every_kind_that_is_listed_can_be_completed_and_every_pattern_is_told():
-    assert set(_LISTED) == names.everything().keys()
-    assert names.PATTERNS.keys() == set(PATTERNS)
+def test_every_kind_that_is_listed_can_be_completed():
+    assert names.kinds() == list(names.everything())
 
 
 def test_plugins_are_told_by_kind_with_the_group_of_their_entry_points(say):
     out = say("plugins")[1]
-    page = (ROOT / "agents" / "README.md").read_text(encoding="utf-8")
-    for several, plugins in plugin_names.KINDS.items():
+    names_of_pages = ("agents/README", "protocol/README", "worlds/HAZARDS", "experiments/README")
+    pages = [ROOT / f"{name}.md" for name in names_of_pages]
+    page = "".join(path.read_text(encoding="utf-8") for path in pages)
+    for several, plugins in names.KINDS.items():
         assert f"\n{several}\n" in f"\n{out}"
         for told in (plugins.group, plugins.key, plugins.public, plugins.folder):
             assert told in out
@@ -102,7 +101,7 @@ def test_lists_and_plugins_as_json_have_stable_keys(say):
     _, out, err = say("list", "--json")
     found = json.loads(out)
     assert err == ""
-    assert list(found) == list(_LISTED)
+    assert list(found) == names.kinds()
     entries = [entry for entries in found.values() for entry in entries]
     assert {frozenset(entry) for entry in entries} == {frozenset({"name", "description", "file"})}
     plugins = json.loads(say("plugins", "--json")[1])
@@ -196,7 +195,7 @@ def test_a_dry_run_tells_every_configuration_if_asked_to(say, tmp_path, monkeypa
 
 
 def test_runs_that_failed_are_told_on_standard_error_however_quiet(say, tmp_path, monkeypatch):
-    monkeypatch.setattr("dva_sim.experiments.execution.job.run_job", one_fails)
+    monkeypatch.setattr("dva_sim.experiments.execution.runner.run_job", one_fails)
     path = study_in(tmp_path).file
     code, out, err = say("run", path, "-q", "-j", 1, "-o", tmp_path / "out")
     assert (code, out) == (ExitCode.RUNS_FAILED, "")

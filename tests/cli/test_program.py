@@ -14,7 +14,7 @@ from typer.main import get_command
 
 from dva_sim import __version__
 from dva_sim.cli import app, call
-from dva_sim.cli.program import Group
+from dva_sim.cli.program import PanelGroup
 from dva_sim.kernel.errors import ConfigError, ExitCode, RunsFailed
 
 COMMANDS = [c.name or c.callback.__name__.rstrip("_") for c in app.registered_commands]
@@ -63,7 +63,7 @@ def test_examples_use_words_and_options_that_there_are(path):
         words = list(takewhile(lambda word: word not in "<>", shlex.split(line)[1:]))
         with program.make_context("dva-sim", words) as context:
             _, command, rest = program.resolve_command(context, words)
-            while isinstance(command, Group):
+            while isinstance(command, PanelGroup):
                 command, rest = command.commands[rest[0]], rest[1:]
             command.make_context("x", rest, parent=context).close()
 
@@ -135,7 +135,7 @@ def test_what_goes_wrong_ends_in_one_line_and_its_code(monkeypatch, capsys, rais
     def fail(_):
         raise raised
 
-    monkeypatch.setattr("dva_sim.cli.check_output.print_schema", fail)
+    monkeypatch.setattr("dva_sim.cli.checks.print_schema", fail)
     assert call(["schema", "site"]) == code
     assert capsys.readouterr().err == f"{line}\n"
 

@@ -22,9 +22,9 @@ from transports import (
 )
 
 from dva_sim.agents import device
-from dva_sim.agents.operator.command_sender import topic_of
+from dva_sim.agents.device import command_topic
 from dva_sim.agents.robot.controller import Limits, Mode, RobotController
-from dva_sim.network.patterns import Request, Requester
+from dva_sim.network.messaging import Request, Requester
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode
 from dva_sim.protocol.exchange import Outbox
@@ -148,6 +148,7 @@ def test_who_speaks_for_another_is_refused_where_there_are_keys(world: World) ->
     assert robot.acts[TABLET, 1] == 1
 
 
+@pytest.mark.invariant("S5")
 def test_an_emergency_is_obeyed_whoever_it_says_it_is_from(world: World) -> None:
     robot = Acting(world)
     impostor = Asker(world.network, node=TABLET)
@@ -196,7 +197,7 @@ class DrivenRobot:
         self.decided: list[Decided] = []
         self.made: dict[int, float] = {}
         self.device.serve(self._decide)
-        network.subscribe(ROBOT, PHONE, topic_of(ROBOT), self._hear)
+        network.subscribe(ROBOT, PHONE, command_topic(ROBOT), self._hear)
         self.phone = small_device(world, PHONE)
         self._start()
 
@@ -230,7 +231,7 @@ class DrivenRobot:
 
     def publish(self) -> None:
         data = self.command()
-        self.world.network.publish(PHONE, topic_of(ROBOT), data, len(data))
+        self.world.network.publish(PHONE, command_topic(ROBOT), data, len(data))
 
     def codes(self) -> Counter[int]:
         """What was decided on commands."""
@@ -315,6 +316,7 @@ def _answers(reply: bytes) -> int:
     return body.answers
 
 
+@pytest.mark.invariant("S3")
 def test_after_an_emergency_nothing_that_was_held_back_moves_the_robot(world: World) -> None:
     robot = DrivenRobot(world)
     robot.await_publications()

@@ -67,6 +67,7 @@ def test_a_request_of_any_number_of_frames_but_one_is_a_bad_message(
     others_are_served(served)
 
 
+@pytest.mark.invariant("S11")
 def test_a_request_without_an_empty_frame_is_dropped_and_counted(served: SocketWorld) -> None:
     program = served.program(zmq.DEALER, DVA)
     for frames in ([b"x"], [b"a", b"b"], numbered(1000)):
@@ -84,6 +85,7 @@ def test_a_route_of_a_thousand_frames_is_given_back(served: SocketWorld) -> None
     assert back == [*route, b""]
 
 
+@pytest.mark.invariant("S11")
 @pytest.mark.parametrize(
     "data", [b"", b"\0", b"<msg/>", b"<!DOCTYPE x><msg/>", b"\xff" * 9000, b"x" * (LARGEST - 100)]
 )

@@ -25,8 +25,8 @@ from transports import (
     numbered,
 )
 
-from dva_sim.agents.robot.command_queue import Inbox, Letter
-from dva_sim.network.patterns import Request
+from dva_sim.agents.robot.command_queue import CommandQueue, Letter
+from dva_sim.network.messaging import Request
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import encode
 
@@ -214,7 +214,7 @@ class SlowRobot:
 
     def __init__(self, world: World, latest_wins: bool) -> None:
         self.done: list[bytes] = []
-        self.inbox = Inbox(world.clock, lambda: 0.02, self._handle, latest_wins)
+        self.inbox = CommandQueue(world.clock, lambda: 0.02, self._handle, latest_wins)
         self.listener = Listener(world, "robot|", self.inbox.published)
         self.listener.await_a_mark()
         world.serve(ROBOT, self.inbox.request)

@@ -17,7 +17,7 @@ from transports import (
     numbered,
 )
 
-from dva_sim.network.patterns import QUEUE_LIMIT, Request
+from dva_sim.network.messaging import QUEUE_LIMIT, Request
 
 pytestmark = pytest.mark.contract
 
@@ -155,6 +155,7 @@ def test_never_more_than_the_window_is_unanswered(world: World, window: int) -> 
     assert not asker.requester.busy
 
 
+@pytest.mark.invariant("S10")
 @WINDOWS
 def test_a_full_queue_refuses_at_once_and_what_waits_is_served(world: World, window: int) -> None:
     world.serve(ROBOT, echo)

@@ -21,7 +21,7 @@ from office import (
 from dva_sim.core.assignments import Rules
 from dva_sim.core.dispatch import Advice, Announcement, Assignment, Auction, Policy, Situation
 from dva_sim.core.events import State
-from dva_sim.core.outbox import Send
+from dva_sim.core.sessions import Send
 from dva_sim.protocol import messages as m
 
 OFFER = m.TaskAnnouncement(1, "fire", east(12), 0.5, 2.0)

@@ -11,7 +11,7 @@ from office import DETECTOR, GUARD, OPERATOR, OTHER_GUARD, ROBOT, Office, east
 from dva_sim.core.assignments import Rules
 from dva_sim.core.dispatch import Advice, Assignment, HazardTeam, Policy, Situation
 from dva_sim.core.events import State
-from dva_sim.core.outbox import Send
+from dva_sim.core.sessions import Send
 from dva_sim.protocol import messages as m
 
 RULES = Rules(containment=True, escalate_after=60.0)

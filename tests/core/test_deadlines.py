@@ -17,7 +17,7 @@ from office import (
 
 from dva_sim.core.assignments import Rules
 from dva_sim.core.events import State
-from dva_sim.core.outbox import Send
+from dva_sim.core.sessions import Send
 from dva_sim.protocol import messages as m
 
 MAX_ATTEMPTS = 4
@@ -35,6 +35,7 @@ def state(office: Office, event: int = 1) -> State:
 # --- waiting -------------------------------------------------------------------------------
 
 
+@pytest.mark.invariant("S6")
 def test_pending_beyond_its_deadline_means_escalated(office: Office) -> None:
     office.busy(*TEAM)
     office.fire(12, now=0.0)

@@ -23,8 +23,8 @@ from office import (
 from dva_sim.core.assignments import Rules
 from dva_sim.core.dispatch import Advice, Announcement, Assignment, Policy, Relocation, Situation
 from dva_sim.core.events import State
-from dva_sim.core.outbox import Send
-from dva_sim.core.travel_times import Ground, Station
+from dva_sim.core.sessions import Send
+from dva_sim.core.travel_times import SiteKnowledge, WaitingPlace
 from dva_sim.protocol import messages as m
 
 
@@ -99,7 +99,7 @@ def test_the_policy_sees_guards_then_robots_and_events_detected_longest_ago_firs
 
 def test_the_policy_sees_the_lists_of_the_place() -> None:
     policy = Advising(lambda _: [])
-    ground = Ground(lambda position, devices: [float(d == GUARD) for d in devices])
+    ground = SiteKnowledge(lambda position, devices: [float(d == GUARD) for d in devices])
     office = Office(policy, ground=ground)
     office.fire(12)
     assert policy.seen[-1].preference.tolist() == [[1.0, 0.0]]
@@ -165,7 +165,7 @@ def test_nobody_is_sent_where_there_is_no_way() -> None:
         return np.full_like(distance, np.inf), np.full_like(eta, np.inf)
 
     office = Office(Advising(everything))
-    office.desk.dispatcher.lookout.travel = walled
+    office.desk.dispatcher.situations.travel = walled
     assert office.fire(12) == []
     assert office.desk.counters["overruled"] == 2
 
@@ -230,7 +230,7 @@ def test_indices_of_numpy_are_as_good_as_any() -> None:
 @pytest.mark.parametrize("name", ["distance", "eta", "preference", "bids"])
 def test_what_a_policy_is_shown_it_cannot_change(name: str) -> None:
     policy = Advising(lambda _: [], auctions=True)
-    office = Office(policy, ground=Ground(lambda position, devices: [0.0] * len(devices)))
+    office = Office(policy, ground=SiteKnowledge(lambda position, devices: [0.0] * len(devices)))
     office.fire(12)
     assert not getattr(policy.seen[-1], name).flags.writeable
 
@@ -241,7 +241,7 @@ def test_what_is_known_of_the_place_a_policy_cannot_change() -> None:
         situation.cover.reach[:] = 0.0
         return []
 
-    ground = Ground(None, (Station("post", east(0)),), np.ones((1, 2)), np.full(2, 0.5))
+    ground = SiteKnowledge(None, (WaitingPlace("post", east(0)),), np.ones((1, 2)), np.full(2, 0.5))
     office = Office(Advising(spoil, relocates=True), ground=ground)
     office.tick(1.0)
     assert office.desk.counters["policy failed"] == 1
@@ -252,7 +252,7 @@ def test_a_map_that_hands_out_its_own_tables_keeps_them() -> None:
     table = np.zeros((1, 3)), np.ones((1, 3))
     office = Office(rules=Rules(containment=True))
     office.register(OTHER_GUARD, "Guard", 80)
-    office.desk.dispatcher.lookout.travel = lambda starts, goals: tuple(
+    office.desk.dispatcher.situations.travel = lambda starts, goals: tuple(
         t[:, : len(starts)] for t in table
     )
     office.fire(12)

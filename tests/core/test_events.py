@@ -78,6 +78,7 @@ def test_of_one_event_at_most_64_sources_are_told_apart() -> None:
     assert len(event.sources) == 64
 
 
+@pytest.mark.invariant("S10")
 def test_when_the_book_is_full_a_report_is_answered_busy_and_one_of_a_known_event_is_not(
     office: Office, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -139,6 +140,7 @@ def test_a_withdrawal_elsewhere_or_of_another_kind_ends_nothing() -> None:
 # --- states and times ----------------------------------------------------------------------
 
 
+@pytest.mark.invariant("S7")
 def test_an_event_runs_its_course_with_its_times_in_order(office: Office) -> None:
     office.fire(12, now=1.0)
     office.progress(OPERATOR, "departed", 3.0)
@@ -194,6 +196,7 @@ def test_a_step_that_does_not_exist_is_refused() -> None:
         book.move(event, State.CONFIRMED, 2.0)
 
 
+@pytest.mark.invariant("S6")
 def test_each_event_is_in_one_state_and_the_counts_add_up_to_all() -> None:
     book = EventBook()
     for number in range(6):

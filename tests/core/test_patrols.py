@@ -6,10 +6,9 @@ import numpy as np
 from office import DVA, GUARD, OPERATOR, ROBOT, Office, crow, east
 
 from dva_sim.core.dispatcher import REST, Patrols
-from dva_sim.core.dva import Desk
-from dva_sim.core.outbox import Send
+from dva_sim.core.dva import Dva
 from dva_sim.core.permissions import Permissions
-from dva_sim.core.sessions import Sessions
+from dva_sim.core.sessions import Send, Sessions
 from dva_sim.protocol import messages as m
 
 BEAT = (east(20), east(40))
@@ -18,11 +17,11 @@ BEAT = (east(20), east(40))
 class PatrolOffice(Office):
     """Its robot has a beat, and there is no guard in the way."""
 
-    def new_desk(self) -> Desk:
+    def new_desk(self) -> Dva:
         sessions = Sessions(Permissions(lambda: 7, own=DVA))
         beats = Patrols({"robot": BEAT})
         rng = np.random.default_rng(1)
-        return Desk(self.policy, crow, self.rules, rng, sessions, patrols=beats)
+        return Dva(self.policy, crow, self.rules, rng=rng, sessions=sessions, patrols=beats)
 
 
 def sent_out(office: Office) -> int:

@@ -17,8 +17,8 @@ from office import (
 )
 
 from dva_sim.core.events import State
-from dva_sim.core.outbox import Send
 from dva_sim.core.permissions import Access, AccessRule
+from dva_sim.core.sessions import Send
 from dva_sim.protocol import messages as m
 
 ASK = m.PermissionRequest(ROBOT, "teleoperation")

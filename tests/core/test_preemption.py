@@ -18,7 +18,7 @@ from office import (
 from dva_sim.core.assignments import Rules
 from dva_sim.core.dispatch import Advice, Assignment, Policy, Preemptive, Situation
 from dva_sim.core.events import State
-from dva_sim.core.outbox import Send
+from dva_sim.core.sessions import Send
 from dva_sim.protocol import messages as m
 
 

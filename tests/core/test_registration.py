@@ -7,8 +7,8 @@ import math
 import pytest
 from office import ADDRESS, DETECTOR, DVA, GUARD, OPERATOR, ROBOT, Office
 
-from dva_sim.core.outbox import Send
 from dva_sim.core.registry import Registry
+from dva_sim.core.sessions import Send
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import MAX_BYTES, encode
 
@@ -33,6 +33,7 @@ def listed(office: Office) -> list[str]:
     return [device.id_tag for device in content.devices]
 
 
+@pytest.mark.invariant("S11")
 def test_who_is_not_registered_is_refused_and_counted(office: Office) -> None:
     reply, sends = office.say(STRANGER, m.GetDeviceList())
     assert (reply.code, sends) == (m.NOT_REGISTERED, [])
@@ -112,6 +113,7 @@ def test_a_changed_address_is_known_from_then_on(office: Office) -> None:
     assert len(office.desk.registry.entries) == 4
 
 
+@pytest.mark.invariant("S10")
 def test_a_full_registry_refuses_strangers_and_renews_who_is_known(office: Office) -> None:
     office.desk.registry.most = 4
     assert office.say(STRANGER, AGAIN)[0].code == m.BUSY

@@ -9,14 +9,14 @@ import pytest
 from office import GUARD, OPERATOR, ROBOT, Office, east
 
 from dva_sim.core.dispatch import Advice, Coverage, MinEta, Policy, Relocation, Situation
-from dva_sim.core.outbox import Send
-from dva_sim.core.travel_times import Ground, Station
+from dva_sim.core.sessions import Send
+from dva_sim.core.travel_times import SiteKnowledge, WaitingPlace
 from dva_sim.protocol import messages as m
 
 THERE = m.Relocation(east(90))
-GROUND = Ground(
+GROUND = SiteKnowledge(
     None,
-    (Station("west", east(0)), Station("east", east(90))),
+    (WaitingPlace("west", east(0)), WaitingPlace("east", east(90))),
     np.array([[0.0, 90.0], [90.0, 0.0]]),
     np.array([0.1, 0.9]),
 )

@@ -57,9 +57,9 @@ def test_bytes_that_take_new_branches_are_kept_in_the_folder_given(tmp_path):
 @pytest.mark.parametrize(
     ("file", "right", "wrong"),
     [
-        ("canonical.py", '_real("[0-9]{1,2}")', '_real("[0-9]{1,3}")'),
+        ("codec.py", '_real("[0-9]{1,2}")', '_real("[0-9]{1,3}")'),
         ("codec.py", 'len(found) != rest.count(b"<")', "False"),
-        ("readers.py", "_float(speed), _float(turn_rate)", "_float(turn_rate), _float(speed)"),
+        ("xml_reader.py", "_float(speed), _float(turn_rate)", "_float(turn_rate), _float(speed)"),
     ],
     ids=["bound", "markup", "fields"],
 )

@@ -60,10 +60,10 @@ def test_an_unknown_key_is_told_with_the_one_that_was_meant(data, told):
         ({"robot": {"count": 3.0}}, "should be a whole number, without a point, not 3.0"),
         ({"link": 5}, "link: should be a mapping of keys to values, not 5, such as link.delay_s"),
         (
-            {"pattern": "reqrep"},
-            "pub-sub or latest-wins, not 'reqrep'; did you mean 'req-rep'?",
+            {"control": "coordinate"},
+            "direct, coordinated or supervisory, not 'coordinate'; did you mean 'coordinated'?",
         ),
-        ({"pattern": "x" * 500}, "not '" + "x" * 59 + "..."),
+        ({"control": "x" * 500}, "not '" + "x" * 59 + "..."),
         ({"link": {"delay_law": {"law": "gama"}}}, "law 'gama' is unknown; did you mean 'gamma'?"),
         ({"link": {"delay_law": {}}}, "missing key 'link.delay_law.law'"),
     ],

@@ -7,7 +7,7 @@ import pytest
 from dva_sim.cli import call
 from dva_sim.kernel.errors import RunsFailed
 from dva_sim.live import process
-from dva_sim.live.options import Options
+from dva_sim.live.options import LiveOptions
 from dva_sim.live.process import NobodyThere, run_part
 
 
@@ -27,7 +27,7 @@ def test_a_part_that_no_dva_answers_says_so_and_what_to_do(capsys, part):
 
 
 def test_a_dva_that_no_device_joins_says_so_at_its_end():
-    options = Options("drive-to-event", duration=0.2)
+    options = LiveOptions("drive-to-event", duration=0.2)
     with pytest.raises(NobodyThere, match=r"no device joined the DVA at 127\.0\.0\.1:\d+ within"):
         run_part("dva", options, lambda _: None)
     assert issubclass(NobodyThere, RunsFailed)

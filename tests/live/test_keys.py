@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from programs import Program, Programs
 
-from dva_sim.cli.live_output import make_keys
+from dva_sim.cli.live_screen import make_keys
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.keys import KeyRing
 from dva_sim.simulation.full.stage import DVA, id_of

@@ -198,6 +198,7 @@ def sessions_of_drives(trace: Path) -> set[int | None]:
     return {message.session for message in messages if isinstance(message.body, m.SetTeleOp)}
 
 
+@pytest.mark.invariant("S8")
 def test_devices_register_again_at_a_dva_that_was_killed_and_is_back(
     programs: Programs, address: str, tmp_path: Path
 ) -> None:

@@ -13,7 +13,7 @@ import pytest
 from one_session import ROBOT, over_sockets, pipelined
 
 from dva_sim.agents.robot.controller import LEASE_S, Limits, RobotController
-from dva_sim.agents.robot.decision_log import LEASE_ENDS, MISSION_ENDS, Trace, replay
+from dva_sim.agents.robot.decision_log import LEASE_ENDS, MISSION_ENDS, DecisionLog, replay
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.protocol import messages as m
 from dva_sim.simulation import scenario as scenarios
@@ -39,7 +39,7 @@ def traced(path: Path, **changes: object) -> Iterator[Run]:
     scenario = scenarios.build(scenarios.load("drive-to-event"), changes)
     run = Run(scenario, 1)
     robot = run.field.robots[ROBOT]
-    robot.trace = Trace(path, robot.controller)
+    robot.trace = DecisionLog(path, robot.controller)
     yield run
     robot.trace.close()
 
@@ -60,7 +60,7 @@ def drive(tmp_path: Path) -> Path:
     """A short trace: a grant, a start, three commands, an emergency, a refused command."""
     path = tmp_path / "robot-1.trace.jsonl"
     controller = RobotController(ROBOT, DVA, Limits(watchdog=1.0, max_age=2.0))
-    trace = Trace(path, controller)
+    trace = DecisionLog(path, controller)
     told: list[tuple[str, m.Body]] = [
         (DVA, m.PermissionGrant(PHONE, "teleoperation", 7)),
         (PHONE, m.StartTeleOp()),
@@ -152,7 +152,7 @@ def test_what_was_decided_is_on_disk_at_once(drive: Path) -> None:
     """A robot that is switched off in the middle leaves what it has decided until then."""
     controller = RobotController(ROBOT, DVA, Limits(1.0, 2.0))
     path = drive.with_name("other.jsonl")
-    trace = Trace(path, controller)
+    trace = DecisionLog(path, controller)
     message = m.Message(ROBOT, 1, PHONE, "12:00:00", 7, m.Emergency())
     trace.decided(message, 1.0, 1.0, False, controller.handle(message, 1.0, 1.0, False))
     assert kinds(path) == {"Emergency": 1}

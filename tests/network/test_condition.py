@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.network.condition import CONDITION, EMULATOR_RESULTS, RESULTS, Condition
+from dva_sim.network.condition import COLUMN_WORDS, CONDITION, EMULATOR_RESULTS, RESULTS, Condition
+from dva_sim.network.patterns import PATTERNS
 
 REFERENCE = Path(__file__).parents[2].parent / "shared" / "targets" / "network.csv"
 ASKING = Condition("req", 10, timeout_ms=2500, attempts=3, delay_ms=100, loss=0.05, rate_kbit=64)
@@ -53,8 +54,8 @@ def test_only_a_publisher_waits_for_a_subscription_after_its_handshake() -> None
 @pytest.mark.parametrize(
     ("changed", "told"),
     [
-        ({"pattern": "push"}, "pattern 'push' is unknown; known: req, pub, dealer"),
-        ({"timeout_ms": 100}, "timeout_ms and attempts belong to pattern req, and only to it"),
+        ({"pattern": "push"}, "pattern 'push' is unknown; known: req-rep, pub-sub, pipelined"),
+        ({"timeout_ms": 100}, "timeout_ms and attempts belong to pattern req-rep, and only to it"),
         ({"loss": 0.95}, "loss 0.95 should lie between 0 and 0.9"),
         ({"hz": 0}, "hz 0 should be above 0"),
         ({"proc_ms": math.inf}, "proc_ms inf should be a finite number from 0 on"),
@@ -78,3 +79,15 @@ def test_the_first_set_of_measurements_has_the_columns_and_conditions_named_here
         rows = list(csv.DictReader(file))
     assert list(rows[0])[4:] == [*CONDITION[:-1], *RESULTS, *EMULATOR_RESULTS]
     assert len({Condition.from_row(row).hash for row in rows}) == 385
+
+
+def test_patterns_are_called_as_everywhere_and_tables_keep_their_words() -> None:
+    """The measurements that are shipped were written before there was one vocabulary."""
+    for word, name in COLUMN_WORDS.items():
+        asks = {"timeout_ms": 100, "attempts": 3} if name == "req-rep" else {}
+        of_table, named = Condition(word, 10, **asks), Condition(name, 10, **asks)
+        assert of_table == named
+        assert named.pattern == name
+        assert (named.to_row()["pattern"], named.hash) == (word, of_table.hash)
+        assert named.label.startswith(f"{word}10_")
+    assert set(COLUMN_WORDS.values()) <= PATTERNS.keys()

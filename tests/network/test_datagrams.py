@@ -10,7 +10,7 @@ from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.streams import Streams
 from dva_sim.network.connections import Connector, DatagramConnection
 from dva_sim.network.link import Link, LinkConfig, make_serialiser
-from dva_sim.network.patterns import Request, Requester
+from dva_sim.network.messaging import Request, Requester
 from dva_sim.network.virtual import VirtualNetwork
 
 

@@ -9,7 +9,7 @@ import zmq
 from patience import PATIENCE_S
 
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.live.options import Options
+from dva_sim.live.options import LiveOptions
 from dva_sim.network.connections import ZeromqConfig
 from dva_sim.network.realtime import LiveClock
 from dva_sim.network.sockets import SocketNetwork
@@ -79,7 +79,7 @@ def test_every_socket_has_what_is_asked_for(network: SocketNetwork, wanted: list
 
 def refusal(*changes: str) -> str:
     with pytest.raises(ConfigError) as error:
-        Options("drive-to-event", changes).read()
+        LiveOptions("drive-to-event", changes).read()
     return str(error.value)
 
 
@@ -90,5 +90,5 @@ def test_a_live_run_refuses_what_only_virtual_time_has() -> None:
 
 def test_a_live_run_takes_marks_and_buffers() -> None:
     changes = ("zeromq.high_water_mark=2", "zeromq.send_buffer_bytes=4096")
-    zeromq = Options("drive-to-event", changes).read().zeromq
+    zeromq = LiveOptions("drive-to-event", changes).read().zeromq
     assert (zeromq.high_water_mark, zeromq.send_buffer_bytes) == (2, 4096)

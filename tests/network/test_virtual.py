@@ -7,12 +7,12 @@ from typing import Any, Literal
 
 import pytest
 
-from dva_sim.agents.robot.command_queue import Inbox, Letter
+from dva_sim.agents.robot.command_queue import CommandQueue, Letter
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.streams import Streams
 from dva_sim.network.connections import Connector, ZeromqConfig
 from dva_sim.network.link import Link, LinkConfig, make_serialiser
-from dva_sim.network.patterns import Request, Requester
+from dva_sim.network.messaging import Request, Requester
 from dva_sim.network.virtual import RECONNECT, VirtualNetwork
 
 Depth = Literal["message", "segment"]
@@ -41,7 +41,7 @@ class Robot:
     def __init__(self, net: VirtualNetwork, service: float) -> None:
         self.done: list[tuple[bytes, float]] = []
         self._clock = net.clock
-        inbox = Inbox(net.clock, lambda: service, self._handle, latest_wins=False)
+        inbox = CommandQueue(net.clock, lambda: service, self._handle, latest_wins=False)
         net.serve("robot", inbox.request)
 
     def _handle(self, letter: Letter) -> None:
@@ -82,7 +82,7 @@ def test_plain_publishing_to_a_slow_robot_queues_without_bound_and_latest_wins_d
         def handle(letter: Letter, done: list[float] = done, clock: Clock = clock) -> None:
             done.append(clock.now - float(letter.data))
 
-        inbox = Inbox(clock, lambda: 0.5, handle, latest_wins)
+        inbox = CommandQueue(clock, lambda: 0.5, handle, latest_wins)
         inbox.flow = net.subscribe("robot", "phone", "r|", inbox.published)
         for number in range(10, 210):
             at = 0.1 * number
@@ -167,7 +167,7 @@ def test_a_full_inbox_holds_up_the_publisher_instead_of_losing_commands() -> Non
     fast = {"delay_s": 0.01, "rate_bps": 1e9, "queue_bytes": 10_000_000}
     for depth, kept in (("message", 11), ("segment", 400)):
         net, done = network(depth, **fast), list[bytes]()  # type: ignore[arg-type]
-        inbox = Inbox(
+        inbox = CommandQueue(
             net.clock, lambda: 0.1, lambda letter, done=done: done.append(letter.data), False, 10
         )
         inbox.flow = net.subscribe("robot", "phone", "r|", inbox.published)

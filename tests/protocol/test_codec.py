@@ -233,9 +233,9 @@ def test_every_reply_code_has_a_name_of_its_own():
 
 
 def test_a_schema_in_the_working_folder_does_not_replace_the_programs(tmp_path, monkeypatch):
-    from dva_sim.protocol.codec import _schema_path
+    from dva_sim.protocol.schema import schema_file
 
     (tmp_path / "protocol").mkdir()
     (tmp_path / "protocol" / "dva.xsd").write_text("<anything/>")
     monkeypatch.chdir(tmp_path)
-    assert tmp_path not in _schema_path().parents
+    assert tmp_path not in schema_file().parents

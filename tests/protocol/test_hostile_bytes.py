@@ -391,6 +391,7 @@ def attack(messages):
             continue
 
 
+@pytest.mark.invariant("S10")
 @reads_proc
 @pytest.mark.parametrize("hostile", HOSTILE, ids=lambda hostile: hostile.__name__)
 def test_what_was_never_seen_before_is_not_kept(hostile):

@@ -6,7 +6,7 @@ import pytest
 from recordings.runs import drill, drive, evacuation
 
 from dva_sim.recordings import write_recording
-from dva_sim.simulation.models import tables_of
+from dva_sim.simulation.full.measures import tables_of
 
 
 @pytest.fixture(scope="session")

@@ -10,12 +10,12 @@ from matplotlib.colors import to_hex
 from recordings.runs import drill
 
 from dva_sim.experiments.analysis.kept_episodes import Tables, typical_and_worst
-from dva_sim.experiments.analysis.paired_effects import Factor, Part, View
+from dva_sim.experiments.analysis.paired_effects import Factor, RunGrid, StudyView
 from dva_sim.experiments.report.figures.palette import HAZARD, look_of
-from dva_sim.experiments.report.figures.site_map import kind_of, time_lapse
+from dva_sim.experiments.report.figures.site_map import TypicalRun, WorstRun, kind_of
 from dva_sim.experiments.report.figures.style import styled
 from dva_sim.recordings import write_recording
-from dva_sim.simulation.models import tables_of
+from dva_sim.simulation.full.measures import tables_of
 
 VALUES = [61.0, 70.0, 95.0]  # of three persons, each with a recording: the last is the worst
 
@@ -33,14 +33,14 @@ def drawn(tmp_path_factory):
         for person, value in enumerate(VALUES)
     ]
     runs = synthetic_study.columns(rows)
-    part = Part(runs, "drill", [Factor("control", ("direct",))])
-    view = View(part, "confirmation_s", None, None, None, {})
+    part = RunGrid(runs, "drill", [Factor("control", ("direct",))])
+    view = StudyView(part, "confirmation_s", None, None, None, {})
     tables = Tables(runs, {}, ["control"])
     episodes = typical_and_worst(folder, "drill", "confirmation_s", tables)
     with styled():
         return {
-            which: time_lapse(view, episode, synthetic_study.SCENARIO, which)
-            for which, episode in zip(("typical", "worst"), episodes, strict=True)
+            figure.which: figure.drawn(view, episode, synthetic_study.SCENARIO)
+            for figure, episode in zip((TypicalRun(), WorstRun()), episodes, strict=True)
         }
 
 

@@ -15,7 +15,7 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.recorder import TrackPoint
 from dva_sim.recordings.pictures import Wanted, style
 from dva_sim.recordings.pictures.film import Film, write_film
-from dva_sim.recordings.pictures.layers import Body
+from dva_sim.recordings.pictures.layers import DrawnBody
 from dva_sim.recordings.pictures.moments import Moments, verdicts
 from dva_sim.recordings.pictures.scene import Box, Names, Scene
 from dva_sim.recordings.pictures.stills import best_time, even_times, still, strip
@@ -268,7 +268,7 @@ def test_the_key_names_what_occurs_and_nothing_else(drill):
 def test_trails_fade_with_time(drive):
     ax = new_figure((6, 4)).add_subplot()
     ax.set(xlim=(0, 40), ylim=(0, 24))
-    trail = Body(ax, Moments(drive), "robot-1").show(30.0)[0]
+    trail = DrawnBody(ax, Moments(drive), "robot-1").show(30.0)[0]
     cover = np.array(trail.get_colors())[:, 3]
     assert cover[0] < cover[-1] < 0.9
     assert np.all(np.diff(cover) > 0)
@@ -281,7 +281,7 @@ def test_who_has_left_the_site_is_not_drawn_but_left_a_trail():
     ]
     moments, ax = Moments(run), new_figure((6, 4)).add_subplot()
     ax.set(xlim=(0, 40), ylim=(0, 24))
-    body = Body(ax, moments, "bystander-1")
+    body = DrawnBody(ax, moments, "bystander-1")
     assert [len(body.show(time)) for time in (3.0, 7.5, 12.0)] == [2, 2, 1]
     assert len(body.show(12.0)[0].get_segments()) == 7
     assert moments.eye("robot-1", 3.0).shape == moments.eye("robot-1", 12.0).shape
@@ -292,7 +292,7 @@ def test_a_robot_is_true_to_scale_but_never_too_small_to_see(drive, metres, true
     ax = new_figure((6, 6)).add_subplot()
     ax.set(xlim=(0, metres), ylim=(0, metres), aspect="equal")
     ax.figure.draw_without_rendering()
-    size = Body(ax, Moments(drive), "robot-1").size()
+    size = DrawnBody(ax, Moments(drive), "robot-1").size()
     assert (size > style.SMALLEST["robot"]) == true_to_scale
     assert size >= 8.5
 

@@ -16,7 +16,7 @@ from dva_sim.recordings.pictures.stills import still
 from dva_sim.recordings.reading import read_lapse
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full import simulate
-from dva_sim.simulation.models import tables_of
+from dva_sim.simulation.full.measures import tables_of
 
 RUNS = {"drive": drive, "drill": drill, "evacuation": evacuation}
 

@@ -7,7 +7,8 @@ import pytest
 from PIL import Image
 from rich.console import Console
 
-from dva_sim.cli.episode_output import episode
+from dva_sim.cli.episodes import episode
+from dva_sim.experiments.report.episode import EpisodeRequest
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.recordings.pictures import Wanted
 
@@ -17,7 +18,7 @@ SHORT = ["horizon_s=12", "link.delay_s=0.1"]
 def told(pictures: Wanted | None = None, patterns: str = "req-rep,latest-wins") -> str:
     said = StringIO()
     where = Console(file=said, width=120)
-    episode("drive-to-event", 2, SHORT, patterns, pictures or Wanted(), None, where)
+    episode(EpisodeRequest("drive-to-event", 2, SHORT, patterns, pictures or Wanted()), where)
     return said.getvalue()
 
 

@@ -12,13 +12,13 @@ import pytest
 from dva_sim.experiments.execution.kept_recordings import (
     chosen,
     name_of,
-    place_of,
+    position_of,
     record_study,
     refuse_what_cannot_be_recorded,
 )
 from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.study import cell_grid
-from dva_sim.experiments.study.study import load_study
+from dva_sim.experiments.study.study_file import load_study
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.recordings import read_recording
 
@@ -59,7 +59,7 @@ def recordings(folder) -> dict[str, bytes]:
 def names(study, values):
     """Names of the files, where the runs came to some values, in the order of the design."""
     rows = {
-        place_of(job): {study.answer.measure: value}
+        position_of(job): {study.answer.measure: value}
         for job, value in zip(cell_grid.jobs(study), values, strict=True)
     }
     return [name_of(job) for job in chosen(study, rows)]
@@ -88,7 +88,7 @@ def test_where_more_is_better_the_smallest_is_the_worst(tmp_path):
 def test_all_are_all_that_were_run(tmp_path):
     study = study_in(tmp_path, "all")
     assert len(names(study, TIMES)) == 12
-    run = {place_of(job): {} for job in cell_grid.jobs(study)[:5]}
+    run = {position_of(job): {} for job in cell_grid.jobs(study)[:5]}
     assert [name_of(job) for job in chosen(study, run)][-1] == "drive-0-0-0.mcap"
 
 

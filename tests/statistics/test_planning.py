@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from dva_sim.statistics import Law, band, law_of, mean_interval
+from dva_sim.statistics import IntervalLaw, band, law_of, mean_interval
 
 PILOT = np.array([-1.5, 0.5, 1.0])  # variance 1.75
 SKEWED = np.array([0.2, 0.4, 0.5, 0.9, 1.1, 1.4, 2.0, 9.5])
@@ -59,7 +59,7 @@ def test_that_share_of_studies_shows_the_effect():
 
 @pytest.mark.parametrize("stretch", [1.0, 1.8])
 def test_more_persons_never_make_it_less_likely_to_show_an_effect(stretch):
-    law = Law(spread=16.0, persons=8, level=0.975, stretch=stretch)
+    law = IntervalLaw(spread=16.0, persons=8, level=0.975, stretch=stretch)
     chances = [law.power(1.0, n) for n in (100, 1000, 5000, 8038, 8039, 10_000, 16_384)]
     assert chances == sorted(chances)
     assert chances[-1] > 0.99

@@ -10,7 +10,8 @@ PAGES = Path(__file__).parents[2]
 
 def test_the_operator_on_the_page_of_agents_keeps_its_promises(tmp_path: Path) -> None:
     page = (PAGES / "agents/README.md").read_text(encoding="utf-8")
-    (code,) = [part.partition("```")[0] for part in page.split("```python\n")[1:]]
+    blocks = [part.partition("```")[0] for part in page.split("```python\n")[1:]]
+    (code,) = [block for block in blocks if "class Cautious" in block]
     (tmp_path / "mine.py").write_text(code, encoding="utf-8")
     outcome = try_operator(load_strategy("mine.py:Cautious", base=tmp_path), slow=60.0)
     assert outcome.broken == ()

@@ -8,8 +8,8 @@ import pymunk
 import pytest
 
 from dva_sim.agents.robot.robot import FRAME, MISSION, RobotAgent
-from dva_sim.agents.robot.sensors import topic_of_sensor
-from dva_sim.network.patterns import Request
+from dva_sim.agents.robot.sensors import sensor_topic
+from dva_sim.network.messaging import Request
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode, encode
 from dva_sim.simulation import scenario as scenarios
@@ -124,7 +124,7 @@ def test_a_sensor_is_read_at_the_frequency_asked_for_while_it_is_permitted() -> 
         assert isinstance(body, m.SensorValue)
         values.append(body)
 
-    run.network.subscribe(DVA, ROBOT, topic_of_sensor("heat_flux", DVA), hear)
+    run.network.subscribe(DVA, ROBOT, sensor_topic("heat_flux", DVA), hear)
     told = send(run, 1.0, m.GetSensorInfo(), session=0)
     early = send(run, 1.5, m.DevSub("heat_flux", 2.0))
     send(run, 2.0, m.PermissionGrant(DVA, "sensors", 5, None, ("heat_flux",)))
@@ -282,7 +282,7 @@ def test_a_lidar_is_subscribed_to_and_sees_the_walls_of_its_bay() -> None:
         assert isinstance(body, m.SensorValue)
         scans.append(body)
 
-    run.network.subscribe(DVA, ROBOT, topic_of_sensor("lidar", DVA), hear)
+    run.network.subscribe(DVA, ROBOT, sensor_topic("lidar", DVA), hear)
     send(run, 2.0, m.PermissionGrant(DVA, "sensors", 5, None, ("lidar",)))
     too_often = send(run, 3.0, m.DevSub("lidar", 20.0))
     told = send(run, 4.0, m.DevSub("lidar", 5.0))

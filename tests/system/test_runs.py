@@ -13,7 +13,7 @@ from dva_sim.agents.operator.delay_estimation import DelayEstimate
 from dva_sim.agents.robot.controller import Decision, RobotController
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full import Recording, measures, simulate
-from dva_sim.simulation.full.measures import STAGES
+from dva_sim.simulation.full.loop_delay import STAGES
 
 NEAR = [{"kind": "fire", "room": "Main corridor", "at_s": 10, "reported": True}]
 
@@ -166,6 +166,7 @@ def test_waiting_for_the_last_reply_is_told_as_the_patterns_own_delay() -> None:
     assert measures.run_row(run(pattern="pub-sub", **slow))["delay_pattern_s"] == 0.0
 
 
+@pytest.mark.invariant("S1")
 def test_a_robot_without_watchdog_is_found_out(monkeypatch: pytest.MonkeyPatch) -> None:
     """The rules are checked from outside: a controller that trusts too long breaks S1."""
     honest = RobotController._set
@@ -203,6 +204,7 @@ def cut_link_run(pattern: str = "latest-wins", until: float = 65.0, **more: Any)
     return run(pattern=pattern, link__outages=[outage], **more)
 
 
+@pytest.mark.invariant("S8")
 @pytest.mark.parametrize("pattern", ["req-rep", "pub-sub", "latest-wins"])
 def test_when_a_dead_link_comes_back_the_event_is_confirmed_under_any_pattern(
     pattern: str,

@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 from command_line import call
 
-from dva_sim.cli import check_output
-from dva_sim.cli import emulated_link as emulator
+from dva_sim.cli import checks
 from dva_sim.experiments.study import cell_grid
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.validation.network.emulator.self_check import Finding
+from dva_sim.validation.network.emulator import process, self_check
+from dva_sim.validation.network.emulator.self_check import LinkFinding
 
 ROOT = Path(__file__).parents[2]
 SAMPLES = ROOT / "protocol" / "samples"
@@ -38,7 +38,7 @@ def check(here, capsys):
     def run(*names, **texts):
         for name, text in texts.items():
             (here / name.replace("__", ".")).write_text(text)
-        code = check_output.check(names or [name.replace("__", ".") for name in texts])
+        code = checks.check(names or [name.replace("__", ".") for name in texts])
         said = capsys.readouterr()
         return code, [*said.err.splitlines(), *said.out.splitlines()]
 
@@ -60,7 +60,7 @@ def test_all_that_is_shipped_is_valid(check, every, monkeypatch):
     agents = {"robot", "phone", "accelerometer", "guard", "bystanders", "operators"}
     agents |= {"bands of operators", "tuned values"}
     runs = {"study", "scenario", "timed scenario", "validation cases", "targets", "split", "task"}
-    runs |= {"transports", "measurements"}
+    runs |= {"transports", "measurements", "own scenario"}
     assert kinds == {"site", "plan", "message"} | runs | agents
 
 
@@ -110,8 +110,8 @@ def test_the_place_tells_the_kind_where_the_keys_do_not(check, here):
         ("horizon_s: 5\nsite: {map: m.yaml, options: {seed: 2}}\n", "2:1: site: site.options are"),
         ("robot: {profile: [servrobot, pibot]}\n", "1:1: robot: robot.profile names 2 robots, rob"),
         ("robot: {sensors: [{name: gas, low: 1}]}\n", "1:19: robot.sensors.0: low 1 of gas is not"),
-        (FLOOD.format("inflow: 11"), "1:10: events.0: inflow of a flood is at most 10, not 11"),
-        (FLOOD.format("inflow: 1e400"), "1:10: events.0: inflow of a flood is a positive number, "),
+        (FLOOD.format("inflow: 11"), "1:10: events.0: hazard 'flood': inflow: should be at most 1"),
+        (FLOOD.format("inflow: 1e400"), "1:10: events.0: hazard 'flood': inflow: should be a fi"),
         (LEAK.format("supply_x: 900"), "1:27: supply of a draught (900, 0) is not on the site, w"),
         (LEAK.format("exhaust_y: -9"), "1:27: exhaust of a draught (0, -9) is not on the site, w"),
         ("dispatch: {policy: dice}\n", "1:12: policy 'dice' is unknown"),
@@ -267,10 +267,10 @@ def test_the_printed_schema_can_be_written_to_a_file(here):
 
 
 def test_the_word_link_asks_for_the_emulated_link(check, monkeypatch):
-    monkeypatch.setattr(emulator, "why_no_packets", lambda: "")
+    monkeypatch.setattr(process, "why_no_packets", lambda: "")
     for found, code in ((50.2, 0), (52.0, 1)):
-        finding = Finding("delay, median", "ms", 50.0, found, 1.0)
-        monkeypatch.setattr(emulator, "check_link", lambda finding=finding: [finding])
+        finding = LinkFinding("delay, median", "ms", 50.0, found, 1.0)
+        monkeypatch.setattr(self_check, "check_link", lambda finding=finding: [finding])
         ended, lines = check("link")
         assert ended == code
         assert lines[0].endswith("MISSED" if code else "ok")
@@ -279,7 +279,7 @@ def test_the_word_link_asks_for_the_emulated_link(check, monkeypatch):
 def test_there_is_one_emulated_link_without_names_and_options():
     for names, options in ((["link", "wifi"], []), (["link"], ["delay_s=1"])):
         with pytest.raises(ConfigError, match="there is one link"):
-            check_output.check(names, options)
+            checks.check(names, options)
 
 
 def test_a_file_named_link_is_asked_for_by_its_path(check):

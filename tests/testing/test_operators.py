@@ -16,7 +16,7 @@ from dva_sim.agents.operator.strategies import (
     known_strategies,
     load_strategy,
 )
-from dva_sim.cli import check_output
+from dva_sim.cli import checks
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.testing.operators import try_operator
 
@@ -175,7 +175,7 @@ def test_a_strategy_that_ends_the_program_is_told_in_a_line(tmp_path, capsys):
         "class Leaving(Strategy):\n"
         "    def drive(self, route, view, stop_before): raise SystemExit(3)\n"
     )
-    assert check_output.check(["operator", f"{path}:Leaving"]) == 1
+    assert checks.check(["operator", f"{path}:Leaving"]) == 1
     lines = capsys.readouterr().out.splitlines()
     assert "SystemExit: 3 (leaving.py:3)" in lines[0]
     assert lines[-1] == "1 operator: 1 invalid"

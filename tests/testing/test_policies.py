@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dva_sim.cli import check_output
+from dva_sim.cli import checks
 from dva_sim.core.dispatch import (
     POLICIES,
     Announcement,
     Assignment,
     Instance,
     MinEta,
-    Oracle,
+    OraclePolicy,
     Policy,
     Relocation,
     load_policy,
@@ -39,7 +39,7 @@ def test_the_oracle_keeps_them_too():
     ways = np.array([[10.0, 20.0], [30.0, 5.0], [9.0, 9.0]])
     plan = solve(Instance(np.array([0.0, 10.0, 20.0]), ways, 2 * ways))
     devices = "02:00:00:01:00:00", "02:00:00:01:00:01"
-    assert not try_policy(lambda: Oracle(plan, devices), slow=60.0).broken
+    assert not try_policy(lambda: OraclePolicy(plan, devices), slow=60.0).broken
 
 
 def policy(advise, **flags):
@@ -137,12 +137,12 @@ def test_policies_are_checked_by_name_and_by_file(tmp_path, monkeypatch, capsys)
     monkeypatch.chdir(tmp_path)
     bad = "from dva_sim.core.dispatch import Policy\nclass Bad(Policy):\n"
     (tmp_path / "bad.py").write_text(bad + "    def advise(self, situation, rng): return 1 / 0\n")
-    assert check_output.check(["policy", "min_eta", "patrol.py:Patrol"]) == 0
+    assert checks.check(["policy", "min_eta", "patrol.py:Patrol"]) == 0
     lines = capsys.readouterr().out.splitlines()
     said = "min_eta: policy: valid; 200 situations, slowest decision "
     assert any(line.startswith(said) for line in lines)  # a busy machine has warnings, too
     assert lines[-1] == "2 policies: 2 valid"
-    assert check_output.check(["policy", "bad.py:Bad"]) == 1
+    assert checks.check(["policy", "bad.py:Bad"]) == 1
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == (
         "bad.py:Bad: raises: ZeroDivisionError: division by zero (bad.py:3) in situation 1 "
@@ -152,16 +152,16 @@ def test_policies_are_checked_by_name_and_by_file(tmp_path, monkeypatch, capsys)
 
 
 def test_options_are_checked_with_the_policy(capsys):
-    assert check_output.check(["policy", "preemptive"], ["margin=0"]) == 1
+    assert checks.check(["policy", "preemptive"], ["margin=0"]) == 1
     assert "option 'margin' is 0; should be a number above 0" in capsys.readouterr().out
-    with pytest.raises(ConfigError, match="--set is for policies"):
-        check_output.check(["study.yaml"], ["margin=0"])
+    with pytest.raises(ConfigError, match="--set is for patterns, policies"):
+        checks.check(["study.yaml"], ["margin=0"])
     with pytest.raises(ConfigError, match=r"which one\? mine.py:Mine, or one of auction, "):
-        check_output.check(["policy"])
+        checks.check(["policy"])
 
 
 def test_a_file_called_policy_is_named_with_its_folder(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "policy").write_text("<msg/>")
-    assert check_output.check(["./policy"]) == 1
+    assert checks.check(["./policy"]) == 1
     assert "./policy: message: invalid" in capsys.readouterr().out

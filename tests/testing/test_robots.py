@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 
 from dva_sim.agents.robot.profile import load_robot
-from dva_sim.cli import check_output
+from dva_sim.cli import checks
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.testing.robots import try_robot
-from dva_sim.worlds.drives import Differential, DriveSpec, Guarded
+from dva_sim.worlds.drives import Differential, DriveSpec, GuardedDrive
 
 ROOT = Path(__file__).parents[2]
 NAMES = sorted(path.stem for path in (ROOT / "agents/robots").glob("*.yaml"))
@@ -106,7 +106,7 @@ class Failing(Differential):
     ],
 )
 def test_a_broken_promise_is_told_in_a_plain_line(drive, said):
-    outcome = try_robot(DriveSpec(drive=lambda spec: Guarded(drive(spec))))
+    outcome = try_robot(DriveSpec(drive=lambda spec: GuardedDrive(drive(spec))))
     assert any(line.startswith(said) for line in outcome.broken), outcome.broken
 
 
@@ -114,12 +114,12 @@ def test_robots_are_checked_by_profile_and_by_file(tmp_path, monkeypatch, capsys
     monkeypatch.chdir(tmp_path)
     bad = "from dva_sim.worlds.drives import Drive\nclass Bad(Drive):\n"
     (tmp_path / "bad.py").write_text(bad + "    def accelerations(self, *a): return 1 / 0\n")
-    assert check_output.check(["robot", "servrobot", "tracked.py:Tracked"]) == 0
+    assert checks.check(["robot", "servrobot", "tracked.py:Tracked"]) == 0
     lines = capsys.readouterr().out.splitlines()
     said = "servrobot: robot: valid; 154 drives, "
     assert any(line.startswith(said) for line in lines)  # a busy machine has warnings, too
     assert lines[-1] == "2 robots: 2 valid"
-    assert check_output.check(["robot", "bad.py:Bad"]) == 1
+    assert checks.check(["robot", "bad.py:Bad"]) == 1
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "bad.py:Bad: raises: ZeroDivisionError: division by zero (bad.py:3)"
     assert lines[1].startswith("bad.py:Bad: robot: invalid, breaks 1 of its promises; ")
@@ -136,7 +136,7 @@ def test_robots_are_checked_by_profile_and_by_file(tmp_path, monkeypatch, capsys
     ],
 )
 def test_a_mistake_is_one_line(names, options, said, capsys):
-    assert check_output.check(names, options) == 1
+    assert checks.check(names, options) == 1
     out = capsys.readouterr().out
     assert said in out
     assert len(out.splitlines()) == 2
@@ -144,4 +144,4 @@ def test_a_mistake_is_one_line(names, options, said, capsys):
 
 def test_a_robot_has_to_be_named():
     with pytest.raises(ConfigError, match=r"which one\? mine.py:Mine, or one of pibot, servrobot"):
-        check_output.check(["robot"])
+        checks.check(["robot"])

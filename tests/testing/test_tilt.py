@@ -15,10 +15,9 @@ from dva_sim.agents.tilt import (
     load_mapping,
     try_phone,
 )
-from dva_sim.agents.tilt.filters import NoFilter
-from dva_sim.agents.tilt.guarded import GuardedFilter
-from dva_sim.agents.tilt.mappings import Absolute, Differential
-from dva_sim.cli import check_output
+from dva_sim.agents.tilt.filters import GuardedFilter, NoFilter
+from dva_sim.agents.tilt.mappings import AbsoluteMapping, DifferentialMapping
+from dva_sim.cli import checks
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.testing.tilt import try_filter, try_mapping
 
@@ -125,41 +124,41 @@ def test_a_promise_that_a_filter_breaks_is_told_in_a_plain_line(kind, told) -> N
     assert any(line.startswith(told) for line in outcome.broken), outcome.broken
 
 
-class Unlimited(Absolute):
+class Unlimited(AbsoluteMapping):
     def command(self, level, turn, dt):
         return level, turn
 
 
-class Restless(Differential):
+class Restless(DifferentialMapping):
     def command(self, level, turn, dt):
         return super().command(level, 1.01 * turn + 0.1 * self._turn, dt)
 
 
-class Rolling(Absolute):
+class Rolling(AbsoluteMapping):
     def command(self, level, turn, dt):
         return super().command(level + 1.0, turn, dt)
 
 
-class Remembering(Differential):
+class Remembering(DifferentialMapping):
     def begin(self):
         """Forgets nothing."""
 
 
-class Silent(Differential):
+class Silent(DifferentialMapping):
     integrates = False
 
 
-class Wrong(Absolute):
+class Wrong(AbsoluteMapping):
     def tilt_for(self, wanted, shown, within):
         return wanted[0], 0.5 * wanted[1]
 
 
-class Stepwise(Differential):
+class Stepwise(DifferentialMapping):
     def command(self, level, turn, dt):
         return super().command(level, turn, 0.03)
 
 
-class OneSided(Absolute):
+class OneSided(AbsoluteMapping):
     def command(self, level, turn, dt):
         return super().command(level, max(turn, -5.0), dt)
 
@@ -202,7 +201,7 @@ def test_what_ends_the_program_when_made_or_asked_is_told_in_a_line(tmp_path, ca
         "    age = property(lambda self: sys.exit('asked'))\n"
     )
     names = [f"{path}:{name}" for name in ("Made", "Told", "Aged")]
-    assert check_output.check(["filter", *names]) == 1
+    assert checks.check(["filter", *names]) == 1
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].endswith("Made' cannot be made: SystemExit: made")
     assert lines[1].endswith("Told: raises: SystemExit: told (leaving.py:9)")
@@ -234,7 +233,7 @@ def test_a_filter_that_no_phone_could_work_with_is_refused_wherever_it_is_named(
         "    def add(self, sample): super().add(sample)\n"
     )
     line = f"filter '{path}:Odd': {told}"
-    assert check_output.check(["filter", f"{path}:Odd"]) == 1
+    assert checks.check(["filter", f"{path}:Odd"]) == 1
     assert capsys.readouterr().out.startswith(f"{path}:Odd: {line}")
     with pytest.raises(ConfigError) as caught:
         try_phone(PhoneProfile(filter=f"{path}:Odd"))
@@ -257,15 +256,15 @@ def test_filters_and_mappings_are_checked_by_name_and_by_file(tmp_path, monkeypa
         "    def add(self, sample): pass\n"
         "    def value(self): return 1.0, 0.0\n"
     )
-    assert check_output.check(["filter", "median", "faithful.py:Faithful"]) == 0
+    assert checks.check(["filter", "median", "faithful.py:Faithful"]) == 0
     lines = capsys.readouterr().out.splitlines()
     said = "median: filter: valid; 40 runs, "
     assert any(line.startswith(said) for line in lines)  # a busy machine has warnings, too
     assert lines[-1] == "2 filters: 2 valid"
-    assert check_output.check(["filter", "bad.py:Bad"]) == 1
+    assert checks.check(["filter", "bad.py:Bad"]) == 1
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "bad.py:Bad: is not zero before the first sample: level 1, 0 deg/s"
-    assert check_output.check(["mapping", "leaky", "cubic.py:Cubic"], []) == 0
+    assert checks.check(["mapping", "leaky", "cubic.py:Cubic"], []) == 0
     assert capsys.readouterr().out.splitlines()[-1] == "2 mappings: 2 valid"
-    assert check_output.check(["mapping", "leaky"], ["leak_s=-1"]) == 1
-    assert "option 'leak_s' is -1; should be above 0" in capsys.readouterr().out
+    assert checks.check(["mapping", "leaky"], ["leak_s=-1"]) == 1
+    assert "option 'leak_s' is -1; should be a number above 0" in capsys.readouterr().out

@@ -7,9 +7,10 @@ import pytest
 import shapely
 from PIL import Image
 
-from dva_sim.worlds.camera import Camera, Figure, Smoke, Spot, encode
+from dva_sim.worlds.camera import Camera, Figure, SmokeView, encode
 from dva_sim.worlds.geo import GeoFrame, Pose
-from dva_sim.worlds.hazards import Raster
+from dva_sim.worlds.hazards import Fire, Raster
+from dva_sim.worlds.hazards.fire import HEAT_PER_AREA
 from dva_sim.worlds.layout import Site
 from dva_sim.worlds.maps import rasterise
 from dva_sim.worlds.site import load_site
@@ -40,6 +41,18 @@ def hall(ceiling=3.0, extra=(), doors=(), rooms=True):
     )
 
 
+class Steady(Fire):
+    """A fire that releases as much heat as its peak says, at once and for ever."""
+
+    def heat_release(self, time):
+        return self.peak
+
+
+def burning(x, y, radius):
+    """A fire of a radius [m]."""
+    return Steady((x, y), 0.0, peak=HEAT_PER_AREA * math.pi * radius**2 or 1e-12)
+
+
 def changed(a, b):
     """Where two pictures differ: rows and columns."""
     return np.nonzero(np.abs(a.astype(int) - b.astype(int)).max(axis=2) > 12)
@@ -52,7 +65,7 @@ def air(value):
 
 def smoke(extinction, share=1.0):
     """A layer that fills this share of the hall's height, from the ceiling down."""
-    return Smoke(air(extinction * share), air(extinction))
+    return SmokeView(air(extinction * share), air(extinction))
 
 
 def test_a_picture_has_its_size_and_eight_bits_a_colour():
@@ -121,7 +134,7 @@ def test_one_sees_through_a_door_but_not_through_its_lintel():
     wall = [(8, 0, 8, 4.4), (8, 5.6, 8, 10)]
     camera = Camera(hall(extra=wall, doors=[(8, 4.4, 8, 5.6)]))
     pose = Pose(5, 5, EAST)
-    fire = camera.picture(pose, spots=[Spot("fire", 10, 5, 1.2)])
+    fire = camera.picture(pose, hazards=[burning(10, 5, 1.2)])
     flames = fire.astype(int) - camera.picture(pose)
     rows, columns = np.nonzero(flames[:, :, 0] > 60)
     lintel = 120 - (2.1 - 1.1) * FOCAL / 3
@@ -187,7 +200,7 @@ def test_smoke_elsewhere_does_not_matter_and_near_smoke_hides_a_person():
     values = np.zeros((20, 40))
     values[:, :4] = 5.0  # behind the lens
     there = Raster(values, (0.0, 20.0, 0.0, 10.0), "1/m")
-    behind = camera.picture(pose, smoke=Smoke(there, there))
+    behind = camera.picture(pose, smoke=SmokeView(there, there))
     assert np.array_equal(behind, camera.picture(pose))
     person = [Figure("guard", 9, 5)]
     thick = [camera.picture(pose, who, smoke=smoke(3.0)) for who in ((), person)]
@@ -211,24 +224,24 @@ def test_firelight_is_warm_and_stays_in_its_room():
     camera, pose = Camera(site), Pose(2, 12, EAST)
     room = site.room_at(5, 18)
     assert room != site.room_at(2, 12)
-    hidden = camera.picture(pose, spots=[Spot("fire", 5, 18, 1.0)])
+    hidden = camera.picture(pose, hazards=[burning(5, 18, 1.0)])
     assert len(changed(hidden, camera.picture(pose))[0]) < 400  # what a door lets through
-    near = camera.picture(pose, spots=[Spot("fire", 7, 12, 0.5)]).astype(int)
+    near = camera.picture(pose, hazards=[burning(7, 12, 0.5)]).astype(int)
     floor = (near - camera.picture(pose))[230, 100:220].mean(axis=0)
     assert floor[0] > 5 > floor[2]
 
 
 def test_the_same_moment_gives_the_same_picture_and_flames_flicker():
-    fire, pose = [Spot("fire", 10, 5, 0.6)], Pose(5, 5, EAST)
-    first, second = (Camera(hall()).picture(pose, spots=fire, time=3.0) for _ in range(2))
+    fire, pose = [burning(10, 5, 0.6)], Pose(5, 5, EAST)
+    first, second = (Camera(hall()).picture(pose, hazards=fire, time=3.0) for _ in range(2))
     assert np.array_equal(first, second)
-    assert not np.array_equal(first, Camera(hall()).picture(pose, spots=fire, time=3.2))
+    assert not np.array_equal(first, Camera(hall()).picture(pose, hazards=fire, time=3.2))
 
 
 def test_a_lens_close_to_a_wall_or_outside_everything_still_gives_a_picture():
     camera = Camera(hall())
     for pose in (Pose(19.98, 5, EAST), Pose(0, 0, EAST), Pose(-50, -50, 1.0), Pose(300, 5, 0)):
-        assert camera.picture(pose, [Figure("robot", 5, 5)], [Spot("fire", 6, 5, 0.0)]).std() > 0
+        assert camera.picture(pose, [Figure("robot", 5, 5)], [burning(6, 5, 0.0)]).std() > 0
 
 
 def test_a_jpeg_is_small_and_looks_the_same():

@@ -9,7 +9,7 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.worlds.drives import (
     Differential,
     DriveSpec,
-    Guarded,
+    GuardedDrive,
     ThreeWay,
     known_drives,
     load_drive,
@@ -144,9 +144,10 @@ class Wild(Differential):
         return (math.inf, 0.0) if speed == 0 else (99.0, 0.5)
 
 
+@pytest.mark.invariant("S4")
 def test_a_drive_of_a_user_is_kept_within_the_limits_whatever_it_answers():
     spec = DriveSpec()
-    drive = Guarded(Wild(spec))
+    drive = GuardedDrive(Wild(spec))
     assert drive.set_point(0.5, 0.0) == (0.0, 0.0)
     assert drive.set_point(0.1, 0.0) == (0.5, -spec.max_turn_rate)
     assert drive.accelerations(0.5, 0.0, 0.1, 0.0, DT) == (0.5, 0.5)
@@ -171,7 +172,7 @@ class Eager(Differential):
 @pytest.mark.parametrize("kind", [Spinning, Eager])
 def test_motors_of_a_user_neither_reverse_nor_spin_beyond_the_limit_whatever_they_ask_for(kind):
     world = World(hall(20.0, 20.0), 0.04)
-    spec = DriveSpec(drive=lambda spec: Guarded(kind(spec)))
+    spec = DriveSpec(drive=lambda spec: GuardedDrive(kind(spec)))
     robot = world.add_robot("robot-1", spec, Pose(10.0, 10.0, 0.0))
     robot.drive(0.5, 0.1, 2.0)
     speeds, turn_rates = [], []
@@ -188,7 +189,7 @@ def test_motors_of_a_user_neither_reverse_nor_spin_beyond_the_limit_whatever_the
 
 
 def test_who_was_pushed_beyond_a_limit_comes_back_no_faster_than_its_accelerations_allow():
-    drive = Guarded(Differential(DriveSpec()))
+    drive = GuardedDrive(Differential(DriveSpec()))
     assert drive.accelerations(0.5, 0.0, -1.0, 0.0, DT) == (0.5, 0.0)
     assert drive.accelerations(0.5, 0.0, 2.0, 9.0, DT) == (-1.0, -1.5)
 
@@ -205,7 +206,7 @@ def answering(what):
                 raise what
             return what
 
-    return Guarded(Odd(DriveSpec()))
+    return GuardedDrive(Odd(DriveSpec()))
 
 
 @pytest.mark.parametrize(

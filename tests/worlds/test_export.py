@@ -5,7 +5,7 @@ import pytest
 import shapely
 from PIL import Image
 
-from dva_sim.cli import site_output
+from dva_sim.cli import site
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.worlds.site import load_site, map_site
 from dva_sim.worlds.site_export import write_site
@@ -66,7 +66,7 @@ def test_a_folder_that_cannot_be_made_is_told(tmp_path):
 
 def test_show_draws_a_site_and_says_what_it_is(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    site_output.show("caparica", None, [], coverage=False, width=400)
+    site.show("caparica", None, [], coverage=False, width=400)
     line, file = capsys.readouterr().out.splitlines()
     assert line == (
         "caparica: 40.0 m x 24.0 m, 15 rooms, 15 doors, 4 exits, 3 robot bases, 3 guard posts, "
@@ -78,7 +78,7 @@ def test_show_draws_a_site_and_says_what_it_is(tmp_path, monkeypatch, capsys):
 
 
 def test_show_takes_options_of_a_generated_site_and_a_file(tmp_path, capsys):
-    site_output.show(
+    site.show(
         "office-block", tmp_path / "x.png", ["width_m=24", "depth_m=12"], coverage=True, width=400
     )
     assert capsys.readouterr().out.startswith("office-block: 24.0 m x 12.0 m, ")
@@ -91,16 +91,14 @@ def test_show_refuses_options_of_a_map_and_a_format_that_nobody_knows(tmp_path):
         "image: hall.pgm\nresolution: 0.1\norigin: [0, 0, 0]\n"
         "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
     )
-    site_output.show(
-        str(tmp_path / "hall.yaml"), tmp_path / "hall.png", [], coverage=False, width=400
-    )
+    site.show(str(tmp_path / "hall.yaml"), tmp_path / "hall.png", [], coverage=False, width=400)
     with pytest.raises(ConfigError, match="is not generated and takes no options"):
-        site_output.show(str(tmp_path / "hall.yaml"), None, ["seed=1"], coverage=False, width=400)
+        site.show(str(tmp_path / "hall.yaml"), None, ["seed=1"], coverage=False, width=400)
     with pytest.raises(ConfigError, match="cannot be written"):
-        site_output.show("caparica", tmp_path / "a.hologram", [], coverage=False, width=400)
+        site.show("caparica", tmp_path / "a.hologram", [], coverage=False, width=400)
 
 
 def test_export_names_the_file_it_wrote(tmp_path, capsys):
-    site_output.export("caparica", tmp_path / "new", [])
+    site.export("caparica", tmp_path / "new", [])
     assert capsys.readouterr().out.splitlines()[1] == str(tmp_path / "new" / "caparica.yaml")
     assert (tmp_path / "new" / "caparica.geojson").is_file()

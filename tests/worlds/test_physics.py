@@ -59,6 +59,7 @@ def test_the_path_of_a_steady_turn_is_a_circle_of_radius_v_over_omega(world):
     assert math.sqrt(c + a * a + b * b) == pytest.approx(0.4 / 0.5, rel=0.01)
 
 
+@pytest.mark.invariant("S4")
 @pytest.mark.parametrize(("asked", "got"), [(9.0, 0.5), (-9.0, 0.0), (0.3, 0.3)])
 def test_speed_is_clamped_at_the_motor(world, asked, got):
     robot = in_corridor(world)
@@ -67,6 +68,7 @@ def test_speed_is_clamped_at_the_motor(world, asked, got):
     assert robot.speed == pytest.approx(got, abs=1e-4)
 
 
+@pytest.mark.invariant("S4")
 @pytest.mark.parametrize("sign", [1, -1])
 def test_turn_rate_is_clamped_at_the_motor(world, sign):
     robot = in_corridor(world)
@@ -75,6 +77,7 @@ def test_turn_rate_is_clamped_at_the_motor(world, sign):
     assert robot.turn_rate == pytest.approx(sign * math.pi / 6, abs=1e-4)
 
 
+@pytest.mark.invariant("S4")
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 def test_what_is_not_a_finite_number_means_stop(world, bad):
     robot = in_corridor(world)

@@ -6,10 +6,9 @@ import shapely
 from matplotlib.figure import Figure
 from PIL import Image
 
-from dva_sim.worlds.poster import poster
 from dva_sim.worlds.site import load_site, map_site
 from dva_sim.worlds.site_parts import FixedCamera
-from dva_sim.worlds.view import COVERAGE, EXIT, WALL, draw_site
+from dva_sim.worlds.view import COVERAGE, EXIT, WALL, draw_site, poster
 from dva_sim.worlds.view_marks import view_of
 
 

@@ -1,4 +1,4 @@
-"""One person, several screens: which robot's picture is looked at, and when the eyes move on.
+"""Where an operator sits: who it is, what is at hand, and which screen it looks at.
 
 A person looks at one screen at a time, and takes a moment to find its way into another. A robot
 that is where it was sent waits for a judgement: who has waited longest is served first, until
@@ -7,8 +7,6 @@ that is done. While none waits, the person glances from one screen to the next.
 References:
     T. B. Sheridan: Telerobotics, Automation, and Human Supervisory Control. MIT Press, 1992.
     D. R. Olsen, S. B. Wood: Fan-out: measuring human control of multiple robots. CHI 2004.
-
-Where an operator sits: who it is, what is at hand, and what it knows.
 """
 
 from __future__ import annotations
@@ -21,14 +19,15 @@ from typing import Protocol
 
 import numpy as np
 
-from dva_sim.agents.device import Device
+from dva_sim.agents.device import AgentDevice
+from dva_sim.agents.observation import Observation
 from dva_sim.agents.operator.delay_estimation import DelayEstimate
-from dva_sim.agents.operator.person import Person
 from dva_sim.agents.operator.strategies import Driver, Reach, Truth
-from dva_sim.agents.robot.camera import Observation
+from dva_sim.agents.person import Person
 from dva_sim.agents.tilt import Phone
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.recorder import DriveLog
+from dva_sim.network.patterns import Pattern
 from dva_sim.worlds.planning import Planner
 
 GLANCE = 3.0  # at a robot that only drives [s]; assumed
@@ -153,13 +152,13 @@ class Attention:
 FIRST_GUESS = 0.6  # delay a person expects before having seen any [s]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class OperatorSetup:
     """How an operator works, beside who it is.
 
     Attributes:
-        window: Of the requests that carry SetTeleOp: how many may be unanswered at once; None
-            if SetTeleOp is published instead.
+        pattern: Makes what carries the commands of a drive.
+        window: How many commands may be unanswered at once, where the pattern allows several.
         rate_hz: Wanted commands per second.
         timeout: Of a request [s].
         attempts: Of a request.
@@ -167,7 +166,8 @@ class OperatorSetup:
         guarded: Whether a collision guard may hold a robot back.
     """
 
-    window: int | None
+    pattern: Callable[[], Pattern]
+    window: int
     rate_hz: float
     timeout: float
     attempts: int
@@ -196,9 +196,10 @@ class DriverSeat:
 
     def __init__(
         self,
-        device: Device,
+        device: AgentDevice,
         person: Person,
         phone: Phone,
+        *,
         strategy: Callable[[Person, Reach], Driver],
         reach: Callable[[str], Reach],
         planner: Planner,

@@ -1,21 +1,18 @@
-"""How the phone's app sends SetTeleOp: by requests or by publishing. Nothing else differs."""
+"""The phone's app: it makes commands from the tilt, and sends them as the pattern says."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+from dva_sim.agents.device import AgentDevice, command_topic
 from dva_sim.agents.tilt import Phone, TiltCommand
-from dva_sim.kernel.recorder import DriveLog, Issued, Recorder
-from dva_sim.network.patterns import Requester, Transport
+from dva_sim.kernel.plugins import FAILURES, said
+from dva_sim.kernel.recorder import DriveLog, Issued
+from dva_sim.network.messaging import Requester
+from dva_sim.network.patterns import PATTERNS, Pattern
 from dva_sim.protocol.codec import encode
-from dva_sim.protocol.exchange import Outbox
-from dva_sim.protocol.messages import SetTeleOp
-
-
-def topic_of(robot: str) -> str:
-    """Topic of the commands for a robot; the bar ends it, so that no topic begins another."""
-    return f"{robot}|"
+from dva_sim.protocol.messages import Reply, SetTeleOp
 
 
 class Made(NamedTuple):
@@ -27,54 +24,73 @@ class Made(NamedTuple):
 
 
 class CommandSender:
-    """Looks at the phone whenever it is time and sends what it says.
+    """Looks at the phone whenever it is time, and gives the pattern what it says; see `Line`.
 
     Args:
-        network: Where messages travel.
-        outbox: Headers of the operator's messages.
+        device: The operator's.
+        pattern: This drive's.
         drive: Log of this drive; names the robot.
         session: Session of this drive.
         phone: The tilt phone.
         rate_hz: Wanted commands per second.
-        recorder: Told of each command.
+        timeout: Of a command that is to be answered [s].
+        attempts: Of the same.
+        window: How many of those may be unanswered at once.
         seen_tick: The newest robot tick on the screen [ms], if there is any.
+        on_lost: Told why, when nobody obeys any more.
+
+    Attributes:
+        drive: The log of this drive.
+        failures: How often a pattern of a user raised an error.
+        first_failure: The first of those, in a line.
     """
 
     def __init__(
         self,
-        network: Transport,
-        outbox: Outbox,
+        device: AgentDevice,
+        *,
+        pattern: Pattern,
         drive: DriveLog,
         session: int,
         phone: Phone,
         rate_hz: float,
-        recorder: Recorder,
+        timeout: float,
+        attempts: int,
+        window: int,
         seen_tick: Callable[[], int | None],
+        on_lost: Callable[[str], object],
     ) -> None:
-        self._network, self._clock, self._outbox = network, network.clock, outbox
-        self._drive, self._session, self._phone = drive, session, phone
-        self._rate, self._recorder, self._seen_tick = rate_hz, recorder, seen_tick
-        self._topic = topic_of(drive.robot)
+        self._device, self.clock, self._pattern = device, device.clock, pattern
+        self.drive, self._session, self._phone = drive, session, phone
+        self.rate_hz, self.timeout, self.attempts, self.window = rate_hz, timeout, attempts, window
+        self._seen_tick, self._on_lost = seen_tick, on_lost
+        self._topic = command_topic(drive.robot)
+        self._requester: Requester | None = None
         self._on = False
+        self.failures, self.first_failure = 0, ""
 
     def start(self) -> None:
         """Begin to send."""
         self._on = True
-        self._phone.pick_up(self._clock.now)
+        self._let(self._pattern.begin, self)
+        self._phone.pick_up(self.clock.now)
         self._look()
 
     def stop(self) -> None:
-        """Send nothing more."""
+        """Send nothing more and close the socket."""
         self._on = False
+        if self._requester is not None:
+            self.drive.timeouts = self._requester.timeouts
+            self._requester.close()
 
     def _look(self) -> None:
         if not self._on:
             return
-        now = self._clock.now
+        now = self.clock.now
         made = self._make()
         if made is not None:
-            self._offer(made)
-        self._clock.call_at(self._phone.next_look(now, self._rate), self._look)
+            self._let(self._pattern.offer, made)
+        self.clock.call_at(self._phone.next_look(now, self.rate_hz), self._look)
 
     def _make(self) -> Made | None:
         """What the phone says now, if it is worth a message.
@@ -82,74 +98,90 @@ class CommandSender:
         Nobody drives before the first picture: without its tick the robot could not bound
         the age of a command that waits for a connection to open.
         """
-        now, tick = self._clock.now, self._seen_tick()
+        now, tick = self.clock.now, self._seen_tick()
         if tick is None:
             return None
         command = self._phone.look(now)
-        self._drive.samples, self._drive.values = self._phone.samples, self._phone.values
+        self.drive.samples, self.drive.values = self._phone.samples, self._phone.values
         return None if command is None else Made(command, now, tick)
-
-    def _offer(self, made: Made) -> None:
-        raise NotImplementedError
 
     def _encode(self, made: Made) -> bytes:
         """The bytes of a command that is sent now; its tick is of when it was made."""
-        now, command = self._clock.now, made.command
+        now, command = self.clock.now, made.command
         body = SetTeleOp(command.speed, command.turn_rate, made.seen_tick)
-        message = self._outbox.message(self._drive.robot, body, now, self._session)
+        message = self._device.outbox.message(self.drive.robot, body, now, self._session)
         issued = Issued(made.time, now, command.sample_age, command.captured)
-        self._recorder.command_issued(message.source, message.message_id, issued)
-        self._drive.sent += 1
-        self._drive.commands.append((made.time, command.speed, command.turn_rate))
+        self._device.recorder.command_issued(message.source, message.message_id, issued)
+        self.drive.sent += 1
+        self.drive.commands.append((made.time, command.speed, command.turn_rate))
         return encode(message)
 
+    def _let(self, act: Callable[..., object], *given: Any) -> None:
+        """Ask the pattern; what one of a user gets wrong is counted, and the command is gone."""
+        try:
+            act(*given)
+        except FAILURES as error:
+            if type(self._pattern) in PATTERNS.values():
+                raise
+            self.failures += 1
+            self.first_failure = self.first_failure or said(error)
 
-class PublishedCommands(CommandSender):
-    """Publish/subscribe: send and forget."""
+    # --- for the pattern -----------------------------------------------------------------
 
-    def _offer(self, made: Made) -> None:
-        data = self._encode(made)
-        self._network.publish(self._outbox.source, self._topic, data, len(data))
+    def open_requests(
+        self, window: int = 1, *, timeout: float | None = None, attempts: int | None = None
+    ) -> None:
+        """See `Line`."""
+        self._requester = Requester(
+            self._device.network,
+            self._device.id_tag,
+            self.drive.robot,
+            self.timeout if timeout is None else timeout,
+            self.attempts if attempts is None else attempts,
+            window,
+        )
+        self._requester.open()
+        self.drive.round_trips = self._requester.round_trips
 
+    @property
+    def busy(self) -> bool:
+        """See `Line`."""
+        return self._asking().busy
 
-class RequestedCommands(CommandSender):
-    """Request/reply: the next command goes when the window allows, at the latest when the last
-    one is answered; so it is with one request at a time and with several under way.
+    def request(
+        self, command: Made, then: Callable[[bytes], object], failed: Callable[[], object]
+    ) -> None:
+        """See `Line`; once the drive is over nothing goes."""
+        requester = self._asking()
+        if self._on:
+            data = self._encode(command)
+            requester.request(data, lambda reply: self._let(then, reply), lambda: self._let(failed))
 
-    What the phone says meanwhile is overtaken by what it says last. After the last attempt
-    without an answer the app alerts: the link is lost.
-    """
+    def _asking(self) -> Requester:
+        if self._requester is None:
+            raise RuntimeError("asks without open_requests()")
+        return self._requester
 
-    def connect(self, requester: Requester, on_alert: Callable[[], object]) -> None:
-        """Give it its socket, and say what to do when the link is lost."""
-        self._requester, self._on_alert = requester, on_alert
-        requester.open()
-        self._drive.round_trips = requester.round_trips
-        self._pending: Made | None = None
+    def publish(self, command: Made) -> None:
+        """See `Line`; once the drive is over nothing goes."""
+        if self._on:
+            data = self._encode(command)
+            self._device.network.publish(self._device.id_tag, self._topic, data, len(data))
 
-    def stop(self) -> None:
-        """Send nothing more and close the socket."""
-        super().stop()
-        self._drive.timeouts = self._requester.timeouts
-        self._requester.close()
+    def newest(self, command: Made) -> Made:
+        """See `Line`."""
+        return (self._make() or command) if self._phone.keeps_alive else command
 
-    def _offer(self, made: Made) -> None:
-        if self._requester.busy:
-            if self._pending is not None:
-                self._drive.superseded += 1
-            self._pending = made
-            return
-        self._requester.request(self._encode(made), self._answered, self._failed)
+    def supersede(self, command: Made) -> None:
+        """See `Line`."""
+        self.drive.superseded += 1
 
-    def _answered(self, _: bytes) -> None:
-        """A command that waited goes now: the newest value if the app keeps sending anyway."""
-        pending, self._pending = self._pending, None
-        if pending is None or not self._on:
-            return
-        if self._phone.keeps_alive:
-            pending = self._make() or pending
-        self._offer(pending)
+    def code_of(self, reply: bytes) -> int | None:
+        """See `Line`."""
+        message = self._device.read(reply, self.drive.robot)
+        return message.body.code if message and isinstance(message.body, Reply) else None
 
-    def _failed(self) -> None:
-        self._drive.alerts += 1
-        self._on_alert()
+    def lost(self, why: str = "") -> None:
+        """See `Line`."""
+        self.drive.alerts += 1
+        self._on_lost(why or "no answer and no picture")

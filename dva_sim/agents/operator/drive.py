@@ -1,6 +1,7 @@
-"""What people do when their robot's collision guard holds it back: close quarters, step by step.
+"""One drive of one robot by tilting the phone: frames in, perception, intent, tilt out.
 
-One drive of one robot: frames in, perception, intent, tilt out, until the event is seen.
+It lasts until the event is seen, or nothing more can be done. A person whose robot is held back by
+its collision guard drives in close quarters for a while: slowly, step by step.
 """
 
 from __future__ import annotations
@@ -12,14 +13,10 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from dva_sim.agents.observation import KEEP_OFF, Observation
 from dva_sim.agents.operator.attention import DriverSeat
-from dva_sim.agents.operator.command_sender import (
-    CommandSender,
-    PublishedCommands,
-    RequestedCommands,
-)
+from dva_sim.agents.operator.command_sender import CommandSender
 from dva_sim.agents.operator.delay_estimation import DelayEstimate
-from dva_sim.agents.operator.person import Person
 from dva_sim.agents.operator.strategies import (
     SHORTEST,
     Intent,
@@ -31,10 +28,9 @@ from dva_sim.agents.operator.strategies import (
     gain_at,
 )
 from dva_sim.agents.operator.supervision import Work
-from dva_sim.agents.robot.camera import Observation
+from dva_sim.agents.person import Person
 from dva_sim.agents.route_following import Route
 from dva_sim.kernel.recorder import DriveLog
-from dva_sim.network.patterns import Requester
 from dva_sim.protocol import messages as m
 from dva_sim.worlds.planning import Planner
 
@@ -62,7 +58,7 @@ def roomiest(here: Point, planner: Planner) -> Point:
     return x, y
 
 
-class Careful:
+class CloseQuarters:
     """Notices that the robot is held back, and then follows a new way closely for a moment.
 
     Args:
@@ -130,11 +126,10 @@ ASKED_FOR = 1.0  # asked for less in all, it was a touch that may well have no e
 LET_GO_FOR = 1.0  # one who sees no effect levels the phone for so long, and tilts again [s]
 NEARER = 0.5  # less is no progress [m]
 ATTEMPTS = 3  # in a row without any motion: the link is lost, as after three unanswered sends
-KEEP_OFF = 1.2  # distance kept to the event [m]
 KEEP_OFF_IN_SMOKE = 0.5  # by who sees nothing from there [m]; assumed
 
 
-class Drive(Work):
+class Teleoperation(Work):
     """One drive by tilting the phone: direct control, or coordinated if the robot has a guard.
 
     Args:
@@ -162,7 +157,7 @@ class Drive(Work):
         self._seen_tick: int | None = None
         reach = seat.reach(self.robot)
         self._strategy = seat.strategy(seat.person, reach)
-        self._careful = Careful(seat.person, reach) if seat.setup.guarded else None
+        self._close_quarters = CloseQuarters(seat.person, reach) if seat.setup.guarded else None
         self._asked_since: float | None = None  # to move, without any motion seen since
         self._asked_for = self._stuck_look = 0.0
         self._stuck_after = STUCK_AFTER + 2.0 * seat.delay.value
@@ -210,30 +205,20 @@ class Drive(Work):
 
     def _make_sender(self) -> CommandSender:
         """The pattern decides how commands travel, and nothing else."""
-        seat, device, setup = self._seat, self._device, self._seat.setup
-        kind = PublishedCommands if setup.window is None else RequestedCommands
-        sender = kind(
-            device.network,
-            device.outbox,
-            self.log,
-            self.session,
-            seat.phone,
-            setup.rate_hz,
-            device.recorder,
-            lambda: self._seen_tick,
+        setup = self._seat.setup
+        return CommandSender(
+            self._device,
+            pattern=setup.pattern(),
+            drive=self.log,
+            session=self.session,
+            phone=self._seat.phone,
+            rate_hz=setup.rate_hz,
+            timeout=setup.timeout,
+            attempts=setup.attempts,
+            window=setup.window,
+            seen_tick=lambda: self._seen_tick,
+            on_lost=self.link_lost,
         )
-        if isinstance(sender, RequestedCommands):
-            assert setup.window is not None
-            requester = Requester(
-                device.network,
-                device.id_tag,
-                self.robot,
-                setup.timeout,
-                setup.attempts,
-                setup.window,
-            )
-            sender.connect(requester, self.link_lost)
-        return sender
 
     # --- seeing ------------------------------------------------------------------------
 
@@ -254,10 +239,13 @@ class Drive(Work):
             self._intend(self._steer(judged, delay, usual), judged.tick)
 
     def _count_failures(self) -> None:
-        """Count what a strategy, filter or mapping of a user got wrong; tell of the first time."""
+        """Count what a plug-in of a user got wrong; tell of the first time."""
         phone, strategy = self._seat.phone, self._strategy
         line = f"holds a phone that fails: {phone.first_failure}"
         self._note("a phone", phone.failures, line)
+        if (sender := self._sender) is not None:
+            line = f"loses commands, as its pattern fails: {sender.first_failure}"
+            self._note("a pattern", sender.failures, line)
         if isinstance(strategy, Strategy):
             line = f"lets go, as its strategy fails: {strategy.first_failure}"
             self._note("an operator", strategy.failures, line)
@@ -278,7 +266,7 @@ class Drive(Work):
             delay: What the whole delay is taken to be [s].
             usual: How the person drives otherwise, told where to stop before the end of the way.
         """
-        careful, keep = self._careful, self._keep_off(seen)
+        careful, keep = self._close_quarters, self._keep_off(seen)
         if careful is None:
             return usual(keep)
         if careful.notice(self._clock.now, seen, self._intent.speed, delay):

@@ -1,4 +1,4 @@
-"""How a person becomes sure that something is there: evidence builds up, look by look.
+"""How an operator becomes sure that an event is there, or not, from the pictures of its place.
 
 Each look at a picture says a little for or against, with noise. What speaks for it adds up; what
 speaks against it takes that away again, but not below nothing: who has long seen nothing is not
@@ -13,8 +13,6 @@ References:
     D. M. Green, J. A. Swets: Signal Detection Theory and Psychophysics. Wiley, 1966.
     A. Nuthmann: Fixation durations in scene viewing. Psychonomic Bulletin & Review 24 (2017)
     370-392 (the eyes move about three times a second).
-
-What an operator makes of the pictures from the place of an event, whoever drives the robot.
 """
 
 from __future__ import annotations
@@ -22,8 +20,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 
-from dva_sim.agents.operator.person import Person
-from dva_sim.agents.robot.camera import CLEAR, SEEN_THROUGH, Observation, SeenHazard
+from dva_sim.agents.observation import CLEAR, MATCH_WITHIN, SEEN_THROUGH, Observation, SeenHazard
+from dva_sim.agents.person import Person
 from dva_sim.worlds.planning import Planner
 
 STILL = 1.0 / 3.0  # a picture that does not change tells something for one fixation [s]
@@ -93,10 +91,9 @@ class Evidence:
 
 
 AT_PLACE = 1.5  # nearer than this one is at the place [m]
-MATCH_WITHIN = 4.0  # a hazard so near the reported place is the one reported [m]
 NEARER_AFTER = 5.0  # who could not see the place for so long looks from nearer [s]; assumed
 
-Found = tuple[str, str]
+Conclusion = tuple[str, str]
 
 
 class Looking:
@@ -119,6 +116,7 @@ class Looking:
         self,
         kind: str,
         place: tuple[float, float],
+        *,
         planner: Planner,
         person: Person,
         luck: Iterator[float],
@@ -136,7 +134,7 @@ class Looking:
         """Whether the place could not be seen for some time."""
         return self._blind > NEARER_AFTER
 
-    def look(self, now: float, seen: Observation) -> Found | None:
+    def look(self, now: float, seen: Observation) -> Conclusion | None:
         """A picture is perceived at `now` [s]: the outcome and why, once there is one."""
         gap = math.inf if self._last is None else now - self._last
         self._last = now
@@ -163,7 +161,7 @@ class Looking:
         near = (h for h in seen.hazards if math.dist((h.x, h.y), self._place) < MATCH_WITHIN)
         return next((h for h in near if h.kind == self._kind), None)
 
-    def _search(self, gap: float, seen: Observation, nothing: bool) -> Found | None:
+    def _search(self, gap: float, seen: Observation, nothing: bool) -> Conclusion | None:
         """At the place: look around for a while, if anything can be seen, then say so.
 
         Args:

@@ -8,10 +8,10 @@ are driven, all but one stand until it is their turn.
 
 from __future__ import annotations
 
+from dva_sim.agents.observation import CAMERA_SCHEME
 from dva_sim.agents.operator.attention import DriverSeat
-from dva_sim.agents.operator.drive import Drive
+from dva_sim.agents.operator.drive import Teleoperation
 from dva_sim.agents.operator.supervision import Work
-from dva_sim.agents.robot.camera import CAMERA_SCHEME
 from dva_sim.kernel.recorder import DriveLog
 from dva_sim.protocol import messages as m
 
@@ -28,14 +28,14 @@ class OperatorAgent:
 
     Args:
         seat: Who it is, and what is at hand.
-        kind: How it has robots look at events: `Drive` them, or `Supervise` their missions.
+        kind: How it has robots look at events: `Teleoperation`, or `Supervision` of missions.
         span: How many orders it has in hand at most.
 
     Attributes:
         works: What is under way, also while it is wound up, by robot.
     """
 
-    def __init__(self, seat: DriverSeat, kind: type[Work] = Drive, span: int = 1) -> None:
+    def __init__(self, seat: DriverSeat, kind: type[Work] = Teleoperation, span: int = 1) -> None:
         self.device, self._seat, self._kind, self._span = seat.device, seat, kind, span
         self.works: dict[str, Work] = {}
         self._waiting: list[tuple[float, m.Order]] = []  # since when [s]; oldest first

@@ -20,7 +20,7 @@ from dva_sim.kernel.errors import ConfigError
 FOLDER = "experiments/validation"
 TARGETS, SPLIT = "operators", "operators-split"
 
-Kind = Literal["exact", "fitted", "held-out", "remembered", "beside"]
+LineKind = Literal["exact", "fitted", "held-out", "remembered", "beside"]
 Share = Annotated[float, Field(ge=0, le=1)]
 
 
@@ -148,7 +148,7 @@ class SplitFile(Config):
     held_out: dict[str, tuple[str, ...]]
     memory: dict[str, tuple[str, ...]]
 
-    def kinds(self) -> dict[str, Kind]:
+    def kinds(self) -> dict[str, LineKind]:
         """The kind of each check.
 
         Raises:
@@ -156,14 +156,14 @@ class SplitFile(Config):
         """
         return {check: kind for check, (kind, _) in self.places().items()}
 
-    def places(self) -> dict[str, tuple[Kind, str]]:
+    def places(self) -> dict[str, tuple[LineKind, str]]:
         """The kind of each check, and the publication that it belongs to.
 
         Raises:
             ConfigError: a check that is assigned twice.
         """
-        places: dict[str, tuple[Kind, str]] = {}
-        groups: tuple[tuple[Kind, dict[str, tuple[str, ...]]], ...] = (
+        places: dict[str, tuple[LineKind, str]] = {}
+        groups: tuple[tuple[LineKind, dict[str, tuple[str, ...]]], ...] = (
             ("exact", self.exact),
             ("fitted", self.fit),
             ("held-out", self.held_out),
@@ -178,7 +178,7 @@ class SplitFile(Config):
 
 
 @dataclass(frozen=True)
-class Line:
+class TargetLine:
     """One line to judge.
 
     Attributes:
@@ -204,7 +204,7 @@ class Line:
     what: str
     source: str
     tag: str
-    kind: Kind
+    kind: LineKind
     publication: str
     unit: str
     target: float | None
@@ -259,7 +259,7 @@ def load_split(name: str = SPLIT) -> SplitFile:
     return split
 
 
-def lines_of(targets: TargetFile, split: SplitFile) -> list[Line]:
+def lines_of(targets: TargetFile, split: SplitFile) -> list[TargetLine]:
     """All lines with their kind, in the order of the file of targets.
 
     Raises:
@@ -268,7 +268,7 @@ def lines_of(targets: TargetFile, split: SplitFile) -> list[Line]:
     places = split.places()
     _complete(targets.checks, split.kinds())
     return [
-        Line(
+        TargetLine(
             check=check,
             name=name,
             metric=config.metric,
@@ -289,7 +289,7 @@ def lines_of(targets: TargetFile, split: SplitFile) -> list[Line]:
     ]
 
 
-def _complete(checks: Mapping[str, CheckConfig], kinds: Mapping[str, Kind]) -> None:
+def _complete(checks: Mapping[str, CheckConfig], kinds: Mapping[str, LineKind]) -> None:
     if missing := [name for name in checks if name not in kinds]:
         raise ConfigError(f"the split does not say what {', '.join(missing)} is for")
     if unknown := [name for name in kinds if name not in checks]:

@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Generator
 from typing import NamedTuple
 
-from dva_sim.agents.device import STATUS, Device
+from dva_sim.agents.device import STATUS, AgentDevice
 from dva_sim.protocol import messages as m
 
 
@@ -44,7 +44,7 @@ class ScriptedOperator:
         asked: How many requests were made.
     """
 
-    def __init__(self, device: Device, script: Callable[[ScriptedOperator], Script]) -> None:
+    def __init__(self, device: AgentDevice, script: Callable[[ScriptedOperator], Script]) -> None:
         self.device = device
         self.transcript: list[tuple[str, int]] = []
         self.done = False

@@ -11,12 +11,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import ClassVar
 
+from dva_sim.agents.observation import IN_VIEW, CameraFrame, Observation
 from dva_sim.agents.operator.attention import DriverSeat
 from dva_sim.agents.operator.inspection import Looking
-from dva_sim.agents.robot.camera import Frame, Observation
-from dva_sim.agents.robot.manoeuvres import IN_VIEW
 from dva_sim.kernel.recorder import DriveLog, Shown
-from dva_sim.network.patterns import Subscription
+from dva_sim.network.messaging import Subscription
 from dva_sim.protocol import messages as m
 
 BLIND_AFTER = 20.0  # [s]; without a frame for so long the link counts as lost
@@ -64,8 +63,12 @@ class Work:
         self._goal = seat.device.frame.to_xy(place.latitude, place.longitude)
         self._last_frame = self._clock.now
         self._looking = Looking(
-            *(order.kind, self._goal, seat.planner, seat.person),
-            *(seat.luck(order.event_id), self._arrive),
+            order.kind,
+            self._goal,
+            planner=seat.planner,
+            person=seat.person,
+            luck=seat.luck(order.event_id),
+            arrived=self._arrive,
         )
 
     def beginning(self) -> m.Body:
@@ -86,9 +89,9 @@ class Work:
         """The person looks at another screen."""
         self._looking.look_away()
 
-    def on_frame(self, shown: Frame | bytes) -> None:
+    def on_frame(self, shown: CameraFrame | bytes) -> None:
         """A frame is on the screen."""
-        frame = shown if isinstance(shown, Frame) else Frame.unpack(shown)
+        frame = shown if isinstance(shown, CameraFrame) else CameraFrame.unpack(shown)
         if frame is None:
             self._device.recorder.counters["refused: no picture"] += 1
             return
@@ -97,9 +100,9 @@ class Work:
         self.log.frames.append(Shown(frame.captured, now, frame.observation.tick))
         self._see(frame.observation)
 
-    def link_lost(self) -> None:
+    def link_lost(self, why: str = "no answer and no picture") -> None:
         """Three sends without an answer, or no picture: the app alerts."""
-        self.end("lost link", "no answer and no picture")
+        self.end("lost link", why)
 
     def end(self, outcome: str, why: str = "") -> None:
         """Put everything down; said once."""
@@ -135,11 +138,11 @@ class Work:
 ASK_PERIOD = 2.0  # how often the operator asks how the mission stands [s]
 
 
-class Supervise(Work):
+class Supervision(Work):
     """One inspection that a robot makes by itself, watched through its camera.
 
-    The same pictures, perceived as late and judged with the same errors, decide as in `Drive`:
-    only who steers differs.
+    The same pictures, perceived as late and judged with the same errors, decide as in
+    `Teleoperation`: only who steers differs.
     """
 
     level, verb, wish = "missions", "watches", "send"

@@ -12,9 +12,8 @@ What one does, as its `activity` tells:
 - **safe**: out.
 - **incapacitated**: it stays where it is, for everybody else to walk around.
 
-Bystanders have no device: nobody is told of them but the recorder.
-
-Where people work: places drawn in the rooms of a site.
+Bystanders have no device: nobody is told of them but the recorder. They work at places drawn in
+the rooms of a site (`draw_places`).
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ from typing import Final
 import numpy as np
 
 from dva_sim.agents.device import do_nothing
-from dva_sim.agents.people.evacuation import Air, Exposure, OnFoot, WayOut, clean_air
+from dva_sim.agents.people.evacuation import AirAt, Exposure, OnFoot, WayOut, clean_air
 from dva_sim.agents.people.profiles import Occupant
 from dva_sim.agents.people.walking import Walking
 from dva_sim.kernel.clock import Clock
@@ -90,11 +89,12 @@ class BystanderAgent(OnFoot):
         clock: Clock,
         occupant: Occupant,
         walking: Walking,
+        *,
         planner: Planner,
         places: Sequence[Point],
         refuges: Sequence[Point],
         luck: np.random.Generator,
-        air: Air = clean_air,
+        air: AirAt = clean_air,
         sees: Callable[[float, float, float], bool] = nothing_seen,
         leaves: Callable[[], object] = do_nothing,
         tell: Callable[[str], object] = do_nothing,

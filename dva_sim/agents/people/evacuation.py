@@ -1,37 +1,169 @@
-"""What a person goes through: the air around it twice a second, its dose, and its pace in it.
+"""What guards and bystanders go through in bad air, and how they get out of it.
 
-The way out of one person: chosen, looked along while it is walked, and chosen again.
+A person looks at the air around it twice a second: that adds to its dose, and sets its pace. Who
+has to leave goes to the nearest safe place, not through what nobody endures; it looks along its
+way while walking, and chooses again.
 
-What guards and bystanders have in common: legs, and what the air does to them.
+References:
+    Radiant heat of 2.5 kW/m^2, which skin stands for some minutes: ISO 13571.
+    Carbon monoxide of 1200 ppm, immediately dangerous to life: NIOSH.
+    People turn back in smoke through which they see 3 m or less, an extinction of 1 /m by
+    V = 3 / K: T. Jin, Visibility and human behavior in fire smoke, SFPE Handbook. Nobody stays
+    where gas can explode, at its lower explosive limit, or goes in; how much of it that is counts
+    only for the dose, by the oxygen lacking. The limits of air temperature and water are assumed.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Final
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from dva_sim.agents.device import do_nothing
-from dva_sim.agents.people.escape import (
-    DEADLY,
-    UNTENABLE,
-    Limit,
-    choose_escape,
-    is_deadly,
-    is_untenable,
-    strain,
-)
 from dva_sim.agents.people.walking import Walking
 from dva_sim.kernel.clock import Clock
 from dva_sim.worlds.hazards import CLEAR, Conditions, Dose, pace_in_smoke, pace_in_water
-from dva_sim.worlds.planning import Planner
+from dva_sim.worlds.layout import Site
+from dva_sim.worlds.planning import Disc, Planner
+
+UNTENABLE: Final = Conditions(
+    temperature=60.0,
+    heat_flux=2.5,
+    extinction=1.0,
+    co=1200.0,
+    gas=math.inf,
+    water=1.0,
+    explosive=1.0,
+)
+"""Any of it is more than anybody goes into, or stays in."""
+DEADLY: Final = Conditions(
+    temperature=120.0,
+    heat_flux=10.0,
+    extinction=math.inf,
+    co=math.inf,
+    gas=math.inf,
+    water=1.5,
+    explosive=math.inf,
+)
+"""Flames and what is next to them: nobody goes through, whatever the other ways are like; in
+10 kW/m^2 skin burns within seconds (ISO 13571), the rest is assumed."""
+EVERY: Final = 1.0  # a way is looked at so often [m]
+KEEPS_OFF: Final = 1.0  # around a bad place of a way [m]
+TRIES: Final = 3  # to find a way around bad places
+CLOSE: Final = 10.0  # so far one goes through bad air to the end, if it gets no worse; assumed [m]
+WITHIN: Final = 0.05  # of the line of an exit, still indoors [m]
+
+Point = tuple[float, float]
+Floats = NDArray[np.float64]
+StrainLimit = Callable[[Point], float]  # 1 and more is more than one bears
+
+
+class Escape(NamedTuple):
+    """A way out: where to, and what to keep off."""
+
+    goal: Point
+    avoid: tuple[Disc, ...] = ()
+
+
+def strain(conditions: Conditions, most: Conditions) -> float:
+    """How much of a limit it is: 1 where the first of the conditions reaches it."""
+    return max(is_ / limit for is_, limit in zip(conditions, most, strict=True))
+
+
+def is_untenable(conditions: Conditions) -> bool:
+    """Whether nobody goes there, or stays."""
+    return strain(conditions, UNTENABLE) >= 1.0
+
+
+def is_deadly(conditions: Conditions) -> bool:
+    """Whether not even who is in smoke already goes there."""
+    return strain(conditions, DEADLY) >= 1.0
+
+
+def refuges_of(site: Site) -> list[Point]:
+    """Where people of a site are safe [m]: its exits; else the guard posts; else robot bases.
+
+    An exit lies in the line of the outer wall: the place is just within.
+    """
+    if not site.exits:
+        return [(pose.x, pose.y) for pose in site.guard_posts or site.robot_bases]
+    ways = [(way, math.cos(way.heading), math.sin(way.heading)) for way in site.exits]
+    return [(way.x - WITHIN * dx, way.y - WITHIN * dy) for way, dx, dy in ways]
+
+
+def choose_escape(
+    planner: Planner, here: Point, refuges: Sequence[Point], limits: Sequence[StrainLimit]
+) -> Escape | None:
+    """The nearest refuge by the way there, on a way without bad places.
+
+    A longer way around bad places is taken if every refuge's shortest way leads through some.
+    If there is none either, less has to do: a way that keeps the limits but the first. If no
+    way keeps even the last limit there is no escape for now.
+
+    Args:
+        planner: Knows the site.
+        here: Where one is; who stands in bad air goes through no worse to the first good place.
+        refuges: Where one is safe, whatever it is like right there: outdoors is beyond [m].
+        limits: Each says how much of what one bears a place is; the strictest first.
+    """
+    for k in range(len(limits)):
+        escape = _keeping(planner, here, refuges, limits[k:])
+        if escape is not None:
+            return escape
+    return None
+
+
+def _keeping(
+    planner: Planner, here: Point, refuges: Sequence[Point], limits: Sequence[StrainLimit]
+) -> Escape | None:
+    """The nearest refuge on a way that keeps some limits, around more and more bad places."""
+    avoid: tuple[Disc, ...] = ()
+    for _ in range(TRIES):
+        ways = [(refuge, planner.path(here, refuge, avoid)) for refuge in refuges]
+        there = [(_length(way), refuge, way) for refuge, way in ways if way is not None]
+        found: dict[Point, None] = {}
+        for _, refuge, way in sorted(there, key=lambda one: one[0]):
+            judged = [_judge(way, one, CLOSE) for one in limits[:-1]]
+            judged.append(_judge(way, limits[-1], math.inf))
+            if all(will_do for will_do, _ in judged):
+                return Escape(refuge, avoid)
+            found.update((place, None) for _, bad in judged for place in bad)
+        if not found:
+            return None
+        avoid = (*avoid, *(Disc(x, y, KEEPS_OFF) for x, y in found))
+    return None
+
+
+def _judge(way: Floats, limit: StrainLimit, close: float) -> tuple[bool, list[Point]]:
+    """Whether a way keeps a limit, and the bad places to go around.
+
+    No way keeps it that is bad from begin to end, and longer than `close` [m]: only who stands
+    in what is deadly runs however far, if it gets no worse.
+    """
+    steps = max(1, round(EVERY / float(np.hypot(*(way[1] - way[0])) or EVERY)))
+    places = [(float(x), float(y)) for x, y in way[:-1:steps]]
+    strains = [float(limit(place)) for place in places]
+    leaves = (i for i, s in enumerate(strains) if s < 1.0 or s > strains[0])
+    first = next(leaves, len(places))
+    bad = [p for p, s in zip(places[first:], strains[first:], strict=True) if s >= 1.0]
+    comes_out = first < len(places) or _length(way) <= close
+    return comes_out and not bad, bad
+
+
+def _length(way: Floats) -> float:
+    """Of a way [m]."""
+    return float(np.hypot(*np.diff(way, axis=0).T).sum())
+
 
 PERIOD: Final = 0.5  # between two looks at the air [s]
 HURT: Final = 0.3
 """A dose beyond which a guard works no more; 1 stops half of all people (ISO 13571, which takes
 0.3 as what all but the most susceptible still bear)."""
 
-Air = Callable[[float, float, float], Conditions]
+AirAt = Callable[[float, float, float], Conditions]
 
 
 def clean_air(x: float, y: float, time: float) -> Conditions:
@@ -52,7 +184,7 @@ class Exposure:
         conditions: What it was like when it was looked at last.
     """
 
-    def __init__(self, clock: Clock, walking: Walking, air: Air = clean_air) -> None:
+    def __init__(self, clock: Clock, walking: Walking, air: AirAt = clean_air) -> None:
         self._clock, self._walking, self._air = clock, walking, air
         self.dose, self.conditions = Dose(), CLEAR
         self._over = self._is_outdoors = False
@@ -102,11 +234,11 @@ class Exposure:
         return is_deadly(self._air(*place, self._clock.now))
 
     @property
-    def limits(self) -> tuple[Limit, Limit]:
+    def limits(self) -> tuple[StrainLimit, StrainLimit]:
         """What to keep off: what is untenable, or where that cannot be, what is deadly."""
         return self._strain(UNTENABLE), self._strain(DEADLY)
 
-    def _strain(self, most: Conditions) -> Limit:
+    def _strain(self, most: Conditions) -> StrainLimit:
         """How much of some limit it is at a place now."""
         return lambda place: strain(self._air(*place, self._clock.now), most)
 
@@ -115,8 +247,6 @@ THROUGH: Final = 0.8  # so near to the middle of an exit one is through [m]
 CHOOSES_AGAIN: Final = 2.0  # no sooner than this after the last choice of a way [s] ...
 AT_LATEST: Final = 16.0  # ... and twice as long after each that mended nothing, up to this [s]
 LOOKS_AHEAD: Final = 6.0  # along its way, for what nobody endures [m]
-
-Point = tuple[float, float]
 
 
 class WayOut:

@@ -18,19 +18,19 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from itertools import takewhile
 
-from dva_sim.agents.device import STATUS, Device, do_nothing
-from dva_sim.agents.people.evacuation import Air, Exposure, OnFoot, WayOut, clean_air
-from dva_sim.agents.people.guard_protocol import Errand, GuardDuty
+from dva_sim.agents.device import LONGEST_BID, STATUS, AgentDevice, do_nothing
+from dva_sim.agents.observation import SEEN_THROUGH, no_smoke
+from dva_sim.agents.people.evacuation import AirAt, Exposure, OnFoot, WayOut, clean_air
+from dva_sim.agents.people.guard_protocol import Errand, GuardProtocol
 from dva_sim.agents.people.profiles import Walker
 from dva_sim.agents.people.walking import Walking
-from dva_sim.agents.robot.camera import SEEN_THROUGH, no_smoke
 from dva_sim.protocol import messages as m
+from dva_sim.worlds.hazards import KINDS
 from dva_sim.worlds.planning import Planner
 
 STATUS_PERIOD, FIRST_STATUS = 2.0, 0.5  # of where a guard is [s]
 AT_MOST = 2.0  # from where a guard sees what there is, if nothing stands between [m]
-NEAR_ENOUGH = {"fire": 3.0}  # the stream of a hand-held extinguisher carries so far; assumed [m]
-HAVE_VALVES = "gas_leak", "flood"
+EXTINGUISHED_FROM = 3.0  # the stream of a hand-held extinguisher carries so far; assumed [m]
 KEEPS_OFF = 5.0  # who shuts a valve keeps so far from what nobody endures [m]
 HERE = 1.0  # who is so near a place stands at it [m]
 STAND_OFF = 10.0
@@ -38,7 +38,6 @@ STAND_OFF = 10.0
 beyond 7 m (a greater one, set in a scenario, may be), one step may lead a metre too far, and a
 place is reported a metre or two wrong."""
 STAND_BY_FOR = 900.0  # who stands by gives up if the DVA says nothing for so long [s]
-MOST = 1e6  # no bid is longer [s]
 LOOKS_AHEAD = 1.5  # on an errand, for what nobody survives; about a second's walk [m]
 IN_SIGHT = 10.0  # from where who is driven back has seen what there is [m]
 CONFIRMED, REFUTED, CONTAINED = "confirmed", "refuted", "contained"
@@ -47,7 +46,7 @@ Point = tuple[float, float]
 
 
 class GuardAgent(OnFoot):
-    """A guard on duty: walks, looks, works and tells; what it is on is decided by `GuardDuty`.
+    """A guard on duty: walks, looks, works and tells; what it is on is decided by `GuardProtocol`.
 
     Args:
         device: Identity and ways to talk.
@@ -63,13 +62,14 @@ class GuardAgent(OnFoot):
 
     def __init__(
         self,
-        device: Device,
+        device: AgentDevice,
         walker: Walker,
         planner: Planner,
         walking: Walking,
+        *,
         is_there: Callable[[str, float, float], bool],
         contain: Callable[[str, float, float], object] = do_nothing,
-        air: Air = clean_air,
+        air: AirAt = clean_air,
         refuges: Sequence[Point] = (),
         smoke: Callable[[Point, Point], float] = no_smoke,
     ) -> None:
@@ -79,7 +79,7 @@ class GuardAgent(OnFoot):
         self._way_out = WayOut(device.clock, planner, walking, self.exposure, self._safe_places)
         self.activity = "waiting"
         self._is_there, self._contain, self._smoke = is_there, contain, smoke
-        self._duty = GuardDuty(device.dva, walker.mobilisation, self._stands_at)
+        self._protocol = GuardProtocol(device.dva, walker.mobilisation, self._stands_at)
         self.exposure.start(self._felt)
         device.serve(self._on_request)
 
@@ -95,9 +95,9 @@ class GuardAgent(OnFoot):
     # --- what the DVA says -------------------------------------------------------------
 
     def _on_request(self, message: m.Message) -> m.Reply:
-        answer = self._duty.handle(message, self.device.clock.now)
+        answer = self._protocol.handle(message, self.device.clock.now)
         if answer.changed:
-            self._take_up(self._duty.errand)
+            self._take_up(self._protocol.errand)
         if answer.bid_on is not None:
             self.device.clock.call_after(0.0, self._bid, answer.bid_on)
         return m.Reply(message.message_id, answer.code, answer.text)
@@ -111,25 +111,27 @@ class GuardAgent(OnFoot):
             return
         if errand.order is not None:
             self.device.tell(_in_words(errand.order), "order")
-        if self._duty.ready_at > self.device.clock.now:
+        if self._protocol.ready_at > self.device.clock.now:
             self.activity = "getting ready"
-        self.device.clock.call_at(self._duty.ready_at, self._depart, errand)
+        self.device.clock.call_at(self._protocol.ready_at, self._depart, errand)
 
     def _bid(self, announced: m.TaskAnnouncement) -> None:
         """Offer to go, by what only this guard knows: its pace, and where it stands now."""
-        if self._duty.order is not None:
+        if self._protocol.order is not None:
             return
         way = self._planner.distance(self.walking.place, self._xy(announced.position))
-        under_way = self._duty.errand is not None and self._duty.ready_at <= self.device.clock.now
+        under_way = (
+            self._protocol.errand is not None and self._protocol.ready_at <= self.device.clock.now
+        )
         ready = 0.0 if under_way else self._walker.usual_mobilisation
         arrival = ready + way / self._walker.speed
-        if arrival <= MOST:
+        if arrival <= LONGEST_BID:
             self.device.ask(self.device.dva, m.TaskBid(announced.event_id, arrival))
 
     # --- the way -----------------------------------------------------------------------
 
     def _depart(self, errand: Errand) -> None:
-        if errand is not self._duty.errand:
+        if errand is not self._protocol.errand:
             return
         goal, is_far_enough = self._goal(errand)
         arrived, blocked = partial(self._arrive, errand), self._cannot_pass
@@ -160,12 +162,13 @@ class GuardAgent(OnFoot):
 
     def _is_near_enough(self, order: m.Order, place: Point, at: Point) -> bool:
         """Whether what is to be looked at, or dealt with, can be so from here."""
-        has_valve = order.task == "contain" and order.kind in HAVE_VALVES
+        has_valve = order.task == "contain" and not _is_extinguished(order.kind)
         ahead = self.walking.places_ahead(1.0, KEEPS_OFF) if has_valve else []
         return any(map(self.exposure.is_bad, ahead)) or self._is_in_reach(order, place, at)
 
     def _is_in_reach(self, order: m.Order, place: Point, at: Point) -> bool:
-        return self._sees(order.kind, at, place, NEAR_ENOUGH.get(order.kind, AT_MOST))
+        within = EXTINGUISHED_FROM if _is_extinguished(order.kind) else AT_MOST
+        return self._sees(order.kind, at, place, within)
 
     def _sees(self, kind: str, at: Point, place: Point, within: float) -> bool:
         """Whether a place is so near [m], and neither wall nor thick smoke between.
@@ -174,7 +177,7 @@ class GuardAgent(OnFoot):
         """
         if math.dist(at, place) > within or not self._planner.line_of_sight(at, place):
             return False
-        return kind == "fire" or self._smoke(at, place) < SEEN_THROUGH
+        return KINDS[kind].shines or self._smoke(at, place) < SEEN_THROUGH
 
     # --- what is done there ------------------------------------------------------------
 
@@ -196,12 +199,12 @@ class GuardAgent(OnFoot):
 
     def _give_up(self, errand: Errand) -> None:
         """Nobody needs who has stood by for so long."""
-        if errand is self._duty.errand:
+        if errand is self._protocol.errand:
             self._finish("failed")
 
     def _looked(self, errand: Errand) -> None:
         order = errand.order
-        if errand is not self._duty.errand or order is None:
+        if errand is not self._protocol.errand or order is None:
             return
         if not self._is_there(order.kind, *self._xy(order.position)):
             self._report(order, REFUTED)
@@ -212,14 +215,14 @@ class GuardAgent(OnFoot):
 
     def _begin_to_contain(self, errand: Errand) -> None:
         walker, order = self._walker, errand.order
-        is_fire = order is not None and order.kind == "fire"
-        takes = walker.extinguish if is_fire else walker.contain
+        extinguished = order is not None and _is_extinguished(order.kind)
+        takes = walker.extinguish if extinguished else walker.contain
         self.activity = "containing"
         self.device.clock.call_after(takes, self._contained, errand)
 
     def _contained(self, errand: Errand) -> None:
         order = errand.order
-        if errand is self._duty.errand and order is not None:
+        if errand is self._protocol.errand and order is not None:
             self._contain(order.kind, *self._xy(order.position))
             self._report(order, CONTAINED)
 
@@ -230,10 +233,10 @@ class GuardAgent(OnFoot):
         self._finish("done", at_event=True)
 
     def _finish(self, state: str | None = None, at_event: bool = False) -> None:
-        order = self._duty.order
+        order = self._protocol.order
         if order is not None and state is not None:
             self.device.progress(order.event_id, state)
-        self._duty.is_over(at_event)
+        self._protocol.is_over(at_event)
         self.activity = "waiting"
 
     # --- what is too much --------------------------------------------------------------
@@ -246,7 +249,7 @@ class GuardAgent(OnFoot):
             self._way_out.end()
             self.activity = "incapacitated"
             self.device.tell("is incapacitated", "safety")
-        elif not self._duty.unfit and (self.exposure.is_too_much or self._is_deadly_ahead()):
+        elif not self._protocol.unfit and (self.exposure.is_too_much or self._is_deadly_ahead()):
             self._give_back("withdraws from danger")
             self.activity = "withdrawing"
             self.device.tell("withdraws", "safety")
@@ -263,12 +266,12 @@ class GuardAgent(OnFoot):
 
     def _goes_on_from(self, at: Point) -> bool:
         """Whether a place [m] is not near enough yet to what the guard is sent to."""
-        order = self._duty.order
+        order = self._protocol.order
         return order is None or not self._is_in_reach(order, self._xy(order.position), at)
 
     def _give_back(self, unfit: str) -> None:
         """Be of no more use, for that reason, to whatever the guard was on."""
-        order, self._duty.unfit = self._duty.order, unfit
+        order, self._protocol.unfit = self._protocol.order, unfit
         if order is None:
             self._finish()
         elif order.task == "confirm" and self._has_seen(order):
@@ -289,11 +292,16 @@ class GuardAgent(OnFoot):
         """At a refuge: fit for service again, unless hurt; who is at an exit steps out."""
         if any(math.dist(self.walking.place, place) < HERE for place in self._refuges):
             self.exposure.step_out()
-        self._duty.unfit = "is hurt" if self.exposure.is_hurt else ""
+        self._protocol.unfit = "is hurt" if self.exposure.is_hurt else ""
         self.activity = "hurt" if self.exposure.is_hurt else "waiting"
 
     def _xy(self, place: m.Position) -> Point:
         return self.device.frame.to_xy(place.latitude, place.longitude)
+
+
+def _is_extinguished(kind: str) -> bool:
+    """Whether what messages call so is dealt with by an extinguisher, not at a valve."""
+    return KINDS[kind].contained_by == "extinguisher"
 
 
 def _in_words(order: m.Order) -> str:

@@ -32,7 +32,7 @@ class Errand:
     order: m.Order | None = None
 
 
-class Answer(NamedTuple):
+class GuardDecision(NamedTuple):
     """What follows from a message.
 
     Attributes:
@@ -49,7 +49,7 @@ class Answer(NamedTuple):
 
 
 @dataclass
-class GuardDuty:
+class GuardProtocol:
     """The decider of one guard.
 
     Attributes:
@@ -77,12 +77,12 @@ class GuardDuty:
         """The order that the guard has."""
         return None if self.errand is None else self.errand.order
 
-    def handle(self, message: m.Message, now: float) -> Answer:
+    def handle(self, message: m.Message, now: float) -> GuardDecision:
         """Decide on a message that came at `now` [s]."""
         if message.source != self.dva:
-            return Answer(m.NOT_PERMITTED, "only the DVA gives orders")
+            return GuardDecision(m.NOT_PERMITTED, "only the DVA gives orders")
         if self.unfit and not isinstance(message.body, m.OrderProgress):
-            return Answer(m.BUSY, self.unfit)
+            return GuardDecision(m.BUSY, self.unfit)
         match message.body:
             case m.Order(device=None) as order:
                 return self._ordered(order, now)
@@ -95,64 +95,64 @@ class GuardDuty:
             case m.TaskAward(event_id=event):
                 return self._awarded(event, now)
             case _:
-                return Answer(m.NOT_SUPPORTED, "a guard takes orders to walk")
+                return GuardDecision(m.NOT_SUPPORTED, "a guard takes orders to walk")
 
     def is_over(self, at_event: bool = False) -> None:
         """The errand is done with; the guard waits where it is, which may be at the event."""
         self._stands_at = self.order.event_id if at_event and self.order else None
         self.errand = None
 
-    def _ordered(self, order: m.Order, now: float) -> Answer:
+    def _ordered(self, order: m.Order, now: float) -> GuardDecision:
         held = self.order
         if held is not None and (held.event_id, held.task) == (order.event_id, order.task):
-            return Answer(m.OK, "has it already")
+            return GuardDecision(m.OK, "has it already")
         return self._set_out(Errand(order.position, order), now)
 
-    def _stand_down(self, word: m.OrderProgress) -> Answer:
+    def _stand_down(self, word: m.OrderProgress) -> GuardDecision:
         if self.order is None or self.order.event_id != word.event_id:
-            return Answer(m.OK, "is over already")
+            return GuardDecision(m.OK, "is over already")
         self.is_over()
-        return Answer(m.OK, changed=True)
+        return GuardDecision(m.OK, changed=True)
 
-    def _relocated(self, place: m.Position, now: float) -> Answer:
+    def _relocated(self, place: m.Position, now: float) -> GuardDecision:
         if self.order is not None:
-            return Answer(m.BUSY, "has an order")
+            return GuardDecision(m.BUSY, "has an order")
         if self.errand is not None and self.errand.place == place:
-            return Answer(m.OK, "on the way there already")
+            return GuardDecision(m.OK, "on the way there already")
         if self.errand is None and self.is_at(place):
-            return Answer(m.OK, "stands there already")
+            return GuardDecision(m.OK, "stands there already")
         return self._set_out(Errand(place), now)
 
-    def _set_out(self, errand: Errand, now: float) -> Answer:
+    def _set_out(self, errand: Errand, now: float) -> GuardDecision:
         """Who is under way already, or stands there, need not get ready again."""
         order = errand.order
         if self.errand is None:
             is_there = order is not None and order.event_id == self._stands_at
             self.ready_at = now if is_there else now + self.mobilisation
         self.errand, self._stands_at = errand, None
-        return Answer(m.OK, changed=True)
+        return GuardDecision(m.OK, changed=True)
 
     # --- auctions ----------------------------------------------------------------------
 
-    def _heard(self, announcement: m.TaskAnnouncement, now: float) -> Answer:
+    def _heard(self, announcement: m.TaskAnnouncement, now: float) -> GuardDecision:
         self._forget(now)
         until = now + announcement.bid_within + AWARD_WITHIN
         self._announced[announcement.event_id] = announcement, until
         self._announced.move_to_end(announcement.event_id)
         if len(self._announced) > MOST_ANNOUNCED:
             self._announced.popitem(last=False)
-        return Answer(m.OK, bid_on=announcement if self.order is None else None)
+        return GuardDecision(m.OK, bid_on=announcement if self.order is None else None)
 
-    def _awarded(self, event: int, now: float) -> Answer:
+    def _awarded(self, event: int, now: float) -> GuardDecision:
         """As an order to look; an award comes to who has bid, so an order in between is newer."""
         held = self.order
         if held is not None and (held.event_id, held.task) == (event, "confirm"):
-            return Answer(m.OK, "has it already")
+            return GuardDecision(m.OK, "has it already")
         self._forget(now)
         if event not in self._announced:
-            return Answer(m.UNKNOWN_EVENT, f"event {event} was not announced, or long ago")
+            return GuardDecision(m.UNKNOWN_EVENT, f"event {event} was not announced, or long ago")
         if held is not None:
-            return Answer(m.BUSY, "has an order")
+            return GuardDecision(m.BUSY, "has an order")
         announced, _ = self._announced.pop(event)
         order = m.Order(event, announced.kind, announced.position, None)
         return self._set_out(Errand(order.position, order), now)

@@ -1,4 +1,4 @@
-"""How people keep out of each other's way: which way to step now, and how fast. Pure.
+"""How people keep out of each other's way, and who goes first through a door. Pure.
 
 Somebody who walks looks over a fan of directions around the one wanted. In each, the way is free
 up to where one would touch somebody, if everybody else kept on, or a wall. Two rules follow:
@@ -8,16 +8,14 @@ up to where one would touch somebody, if everybody else kept on, or a wall. Two 
 
 What touches nevertheless is left to the physics.
 
-References:
-    M. Moussaid, D. Helbing, G. Theraulaz: How simple rules determine pedestrian behavior and
-    crowd disasters. PNAS 108(17), 2011: both rules, the fan of 75 degrees, 10 m, 0.5 s.
-
-Who goes first through a door: whoever is nearer to it. Pure.
-
 Who comes to a door towards which somebody else comes from the other side, and is nearer to it,
 waits beside the way until the other is through; but for no more than `PATIENCE`. Robots are slow
 and cannot go back: one that comes through a door is waited for longer, and one that stands in it
-may only stand because it is let no farther: it is given time, too. These rules are assumed.
+may only stand because it is let no farther: it is given time, too. The rules of doors are assumed.
+
+References:
+    M. Moussaid, D. Helbing, G. Theraulaz: How simple rules determine pedestrian behavior and
+    crowd disasters. PNAS 108(17), 2011: both rules, the fan of 75 degrees, 10 m, 0.5 s.
 """
 
 from __future__ import annotations
@@ -30,9 +28,13 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.agents.people.locomotion import SIDEWAYS, Body
+from dva_sim.worlds.bodies import Body
 from dva_sim.worlds.robot_body import RobotBody
 
+RADIUS: Final = 0.2
+"""Of the disc that stands for a person, seen from above [m]: as much floor as an ellipse of
+0.46 m by 0.28 m, and a little more; assumed."""
+SIDEWAYS: Final = 0.12  # half as deep as a chest: of who squeezes through a gap; assumed [m]
 RELAXATION: Final = 0.5  # [s]
 HORIZON: Final = 10.0  # where one would be if nothing were there [m]
 REACH: Final = 3.0  # who is farther away does not count yet, indoors; assumed [m]

@@ -8,9 +8,10 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from dva_sim.agents.operator.person import Trait
-from dva_sim.agents.people.walking import draw_speed
+from dva_sim.agents.person import Trait
 from dva_sim.kernel.config import Config
+
+SLOWEST, FASTEST = 0.6, 2.2  # walking [m/s]
 
 
 class PaceProfile(Config):
@@ -29,8 +30,9 @@ class PaceProfile(Config):
     walking_sd_mps: Annotated[float, Field(ge=0)] = 0.26
 
     def draw_speed(self, rng: np.random.Generator) -> float:
-        """One person's free walking speed [m/s]."""
-        return draw_speed(self.walking_mean_mps, self.walking_sd_mps, rng)
+        """One person's free walking speed [m/s]: normal, no slower or faster than walking is."""
+        speed = rng.normal(self.walking_mean_mps, self.walking_sd_mps)
+        return float(np.clip(speed, SLOWEST, FASTEST))
 
 
 class GuardProfile(PaceProfile):

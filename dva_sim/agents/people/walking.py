@@ -5,9 +5,9 @@ often where nobody is near, the walker looks where it is and chooses the velocit
 push towards:
 
 - **Nobody near**: straight to the point a little ahead on the way.
-- **Somebody near**: by the two rules of `manners`: step aside, to the right rather than the
-  left, and slow down.
-- **In doors** one gives way, by the rules of `doorways`.
+- **Somebody near**: by the two rules of `pedestrian_avoidance`: step aside, to the right rather
+  than the left, and slow down.
+- **In doors** one gives way, by its rules of doors.
 - **Held up by a robot**, one turns sideways and squeezes past, if there is a gap.
 - **Blocked**: who has come no nearer for some seconds looks for a way around whoever stands
   there, again and again at longer intervals; who has come no nearer for `GIVE_UP` says so, and
@@ -21,14 +21,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 from typing import Final
 
-import numpy as np
-
-from dva_sim.agents.people.locomotion import RADIUS, SIDEWAYS, Body, Ground, Legs
 from dva_sim.agents.people.pedestrian_avoidance import (
+    RADIUS,
     REACH,
+    SIDEWAYS,
     Courtesy,
     Floats,
     Mover,
@@ -42,6 +41,8 @@ from dva_sim.agents.people.pedestrian_avoidance import (
 )
 from dva_sim.agents.route_following import Ahead, Route
 from dva_sim.kernel.clock import Clock
+from dva_sim.worlds.bodies import Body
+from dva_sim.worlds.physics import PersonBody, World
 from dva_sim.worlds.planning import Disc, Planner
 from dva_sim.worlds.robot_body import RobotBody
 
@@ -63,17 +64,6 @@ BESIDE: Final = 0.8  # so near one squeezes past [m]
 SIDEWAYS_SPEED: Final = 0.5  # of who squeezes past; assumed [m/s]
 STANDING: Final = 0.1  # slower than this is in the way [m/s]
 
-SLOWEST, FASTEST = 0.6, 2.2  # walking [m/s]
-
-
-def draw_speed(mean: float, sd: float, rng: np.random.Generator) -> float:
-    """One person's free walking speed: normal over persons [m/s], no slower or faster than walks.
-
-    References:
-        1.34 m/s, SD 0.26: U. Weidmann, Transporttechnik der Fussgaenger, ETH Zuerich, 1993.
-    """
-    return float(np.clip(rng.normal(mean, sd), SLOWEST, FASTEST))
-
 
 @dataclass(eq=False)
 class Walk:
@@ -88,6 +78,7 @@ class Walk:
     """
 
     goal: Point
+    _: KW_ONLY
     arrived: Callable[[], object]
     blocked: Callable[[], object]
     is_far_enough: Callable[[Point], bool]
@@ -122,8 +113,9 @@ class Walking:
         self,
         clock: Clock,
         planner: Planner,
-        ground: Ground,
-        body: Legs,
+        ground: World,
+        body: PersonBody,
+        *,
         speed: float,
         doors: Floats,
     ) -> None:
@@ -172,7 +164,15 @@ class Walking:
         now = self._clock.now
         courtesy = Courtesy(doors_on(points, self._doors))
         route, keep_off = Route(points), tuple(avoid)
-        walk = Walk(goal, arrived, blocked, is_far_enough, route, courtesy, keep_off)
+        walk = Walk(
+            goal,
+            arrived=arrived,
+            blocked=blocked,
+            is_far_enough=is_far_enough,
+            route=route,
+            courtesy=courtesy,
+            avoid=keep_off,
+        )
         walk.nearer_at, walk.looks_around = now, now + TIRED
         self._walk = walk
         self._clock.call_after(0.0, self._step, walk)

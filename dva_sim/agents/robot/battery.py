@@ -7,8 +7,8 @@ from typing import Annotated, Final
 from pydantic import Field
 
 from dva_sim.kernel.config import Config
+from dva_sim.worlds.bodies import G
 
-G: Final = 9.81  # [m/s^2]
 JOULES: Final = 3600.0  # in a watt-hour
 
 

@@ -1,9 +1,8 @@
-"""Who is near a robot, as far as its sensors can know.
+"""Who is near a robot, and the guard that slows it before contact: coordinated control.
 
-A local loop at the robot that slows before contact: coordinated control.
-
-It never makes a robot faster and never turns it: who drives stays in charge of where to go, and
-can always turn away on the spot. It knows the plan of the site and who is near, and nothing else.
+The guard is a loop at the robot. It never makes a robot faster and never turns it: who drives
+stays in charge of where to go, and can always turn away on the spot. It knows the plan of the site
+and who is near, and nothing else.
 
 References:
     T. B. Sheridan: Telerobotics, Automation, and Human Supervisory Control. MIT Press, 1992

@@ -1,6 +1,6 @@
-"""A robot's computer: one message at a time, each taking its processing time.
+"""A robot's computer: it takes one message at a time, each for its processing time.
 
-How long a robot's computer takes for a message: always the same, or by a law of chance.
+That time is always the same, or drawn from a distribution.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from pydantic import Discriminator, Field, Tag, model_validator
 
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.config import Config
-from dva_sim.network.patterns import Answer, Request
+from dva_sim.network.messaging import Answer, Request
 from dva_sim.network.zmtp import Flow
 from dva_sim.protocol.codec import decode
 from dva_sim.protocol.errors import ProtocolError
@@ -41,7 +41,7 @@ class Letter(NamedTuple):
     sender: str | None
 
 
-class Inbox:
+class CommandQueue:
     """First come, first served within a class; emergencies before control before commands.
 
     Args:
@@ -193,7 +193,7 @@ def _form(value: object) -> str:
     return "a law" if isinstance(value, Mapping | ServiceLaw) else "seconds"
 
 
-Service = Annotated[
+ServiceTime = Annotated[
     Annotated[float, Field(ge=0, le=10), Tag("seconds")] | Annotated[ServiceLaw, Tag("a law")],
     Discriminator(_form),
 ]

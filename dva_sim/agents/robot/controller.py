@@ -25,7 +25,7 @@ class Mode(StrEnum):
     TELEOPERATION = "Teleoperation"
 
 
-class SetPoint(NamedTuple):
+class TimedSetPoint(NamedTuple):
     """How to move, and until when at the latest: speed [m/s], turn rate [rad/s], time [s]."""
 
     speed: float
@@ -33,7 +33,7 @@ class SetPoint(NamedTuple):
     until: float
 
 
-STAND = SetPoint(0.0, 0.0, 0.0)
+STAND = TimedSetPoint(0.0, 0.0, 0.0)
 NO_MISSION = m.MissionStatus(0, "none", 0, "")
 Mission = m.GoTo | m.Patrol | m.Inspect | m.ReturnToBase
 
@@ -50,7 +50,7 @@ class Decision(NamedTuple):
 
     code: int
     text: str = ""
-    set_point: SetPoint | None = None
+    set_point: TimedSetPoint | None = None
     content: m.SensorInfo | m.MissionStatus | None = None
 
 
@@ -322,7 +322,7 @@ class RobotController:
         if until <= now:
             return Decision(m.STALE, "too old to obey")
         self.last_valid = now
-        return Decision(m.OK, set_point=SetPoint(body.speed, body.turn_rate, until))
+        return Decision(m.OK, set_point=TimedSetPoint(body.speed, body.turn_rate, until))
 
     def _stop(self, message: m.Message) -> Decision:
         refusal = self._refusal(message, "teleoperation") or self._order(message)

@@ -8,7 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from dva_sim.agents.robot.controller import Decision, Limits, RobotController, SetPoint
+from dva_sim.agents.robot.controller import Decision, Limits, RobotController, TimedSetPoint
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode, encode
@@ -17,7 +17,7 @@ from dva_sim.protocol.errors import ProtocolError
 LEASE_ENDS, MISSION_ENDS = "lease ends", "mission ends"
 
 
-class Trace:
+class DecisionLog:
     """Writes what one controller decides; each line is on disk before the next decision.
 
     Args:
@@ -136,7 +136,7 @@ def _ask_again(
     arrived, time = (_value(entry, name, float, int) for name in ("arrived", "now"))
     code, text = _value(entry, "code", int), _value(entry, "text", str)
     point = _value(entry, "set_point", list, type(None))
-    then = Decision(code, text, None if point is None else SetPoint(*point))
+    then = Decision(code, text, None if point is None else TimedSetPoint(*point))
     now = controller.handle(message, arrived, time, _value(entry, "moving", bool))
     return message, then, now._replace(content=None)
 

@@ -1,6 +1,7 @@
 """Short things that a robot on a mission does between two pieces of its way.
 
-Looking at the place of an event: from where, which way, and for how long.
+It gets out of a jam, steps aside for somebody, or looks at the place of an event: from where,
+which way, and for how long.
 """
 
 from __future__ import annotations
@@ -12,10 +13,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.agents.operator.strategies import Intent
-from dva_sim.agents.robot.camera import Observation, SeenHazard
+from dva_sim.agents.observation import IN_VIEW, KEEP_OFF, MATCH_WITHIN, Observation, SeenHazard
 from dva_sim.agents.robot.collision_guard import CollisionGuard, Nearby
-from dva_sim.agents.route_following import wrap
+from dva_sim.agents.route_following import Intent, wrap
 
 Floats = NDArray[np.float64]
 Point = tuple[float, float]
@@ -34,7 +34,7 @@ STILL, NOBODY_MOVES = 0.05, 4.0  # who stands [m/s] for so long will not pass [s
 PASSED = 0.10  # gap left between the way and who has passed [m]
 
 
-class Seen(NamedTuple):
+class Sensed(NamedTuple):
     """What a robot knows at a moment, by its sensors and its map.
 
     Attributes:
@@ -74,12 +74,12 @@ class Manoeuvre:
     state: str
     reason: str
 
-    def step(self, seen: Seen) -> Intent | None:
+    def step(self, seen: Sensed) -> Intent | None:
         """What to do now; None when it is over."""
         raise NotImplementedError
 
 
-class Recovery(Manoeuvre):
+class JamRecovery(Manoeuvre):
     """Out of a jam: turn on the spot to where the way is free, and drive off a little.
 
     Args:
@@ -92,13 +92,13 @@ class Recovery(Manoeuvre):
     state, reason = "replanning", "jammed"
 
     def __init__(
-        self, seen: Seen, guard: CollisionGuard, most_turn: float, tried: Sequence[float]
+        self, seen: Sensed, guard: CollisionGuard, most_turn: float, tried: Sequence[float]
     ) -> None:
         self._guard, self._turn, self._until = guard, most_turn, seen.now + LONGEST_RECOVERY
         self._start, self._turned = seen.here, False
         self.heading = self._way_out(seen, tried)
 
-    def _way_out(self, seen: Seen, tried: Sequence[float]) -> float:
+    def _way_out(self, seen: Sensed, tried: Sequence[float]) -> float:
         """The freest heading; the less to turn, the better where several are free."""
 
         def worth(heading: float) -> float:
@@ -110,7 +110,7 @@ class Recovery(Manoeuvre):
         turns = [2.0 * math.pi * number / HEADINGS for number in range(1, HEADINGS)]
         return max((seen.view.heading + turn for turn in turns), key=worth)
 
-    def step(self, seen: Seen) -> Intent | None:
+    def step(self, seen: Sensed) -> Intent | None:
         """Turn, then drive; over when far enough away, or when it takes too long."""
         if seen.now > self._until or math.dist(seen.here, self._start) > GET_AWAY:
             return None
@@ -133,13 +133,13 @@ class Aside(Manoeuvre):
     state, reason = "waiting", "somebody is in the way"
 
     def __init__(
-        self, seen: Seen, place: Point, way: Floats, radius: float, most_turn: float
+        self, seen: Sensed, place: Point, way: Floats, radius: float, most_turn: float
     ) -> None:
         self._place, self._way, self._radius = place, way, radius
         self._turn, self._until = most_turn, seen.now + LONGEST_ASIDE
         self._arrived, self._free_since, self._moved = False, math.inf, seen.now
 
-    def step(self, seen: Seen) -> Intent | None:
+    def step(self, seen: Sensed) -> Intent | None:
         """Drive there, stand, and go on when the way has been free for a moment."""
         self._free_since = min(self._free_since, seen.now) if self._is_free(seen) else math.inf
         if any(math.hypot(other.vx, other.vy) > STILL for other in seen.nearby):
@@ -155,7 +155,7 @@ class Aside(Manoeuvre):
         turn = turn_to(seen.view, bearing, self._turn)
         return turn if abs(wrap(bearing - seen.view.heading)) > 0.3 else turn._replace(speed=SLOWLY)
 
-    def _is_free(self, seen: Seen) -> bool:
+    def _is_free(self, seen: Sensed) -> bool:
         """Whether nobody is on the way ahead, or will be in a moment."""
         for other in seen.nearby:
             for ahead in (0.0, 1.0, 2.0):
@@ -166,10 +166,7 @@ class Aside(Manoeuvre):
         return True
 
 
-IN_VIEW = "in view"  # so ends what a robot says while it looks at a place
 LOOK_FROM = 4.0  # an event in view no farther than this is looked at from here [m]; assumed
-KEEP_OFF = 1.2  # from here the place is looked at, whatever is in view [m]
-MATCH_WITHIN = 4.0  # a hazard so near the place is the one to look at [m]
 FIRST_LOOK = 3.0  # with nothing in view for so long, it looks all around [s]; assumed
 LOOK_AROUND = 0.4  # turn rate meanwhile [rad/s]; assumed
 INSPECT_FOR = 120.0  # an inspection that nobody ends is done after this [s]; assumed
@@ -196,22 +193,22 @@ class Inspection:
         self._since = self._nothing_since = math.inf
         self._turned, self._heading = 0.0, 0.0
 
-    def begins(self, seen: Seen) -> bool:
+    def begins(self, seen: Sensed) -> bool:
         """Whether the robot is where it can look from; from then on it is."""
         if self._since == math.inf and self._is_at_view(seen):
             self._since = seen.now
         return self._since < math.inf
 
-    def is_over(self, seen: Seen) -> bool:
+    def is_over(self, seen: Sensed) -> bool:
         """Whether it has looked for long enough."""
         return seen.now - self._since > INSPECT_FOR
 
-    def finding(self, seen: Seen) -> str:
+    def finding(self, seen: Sensed) -> str:
         """What is in view, in words."""
         what = self._event.replace("_", " ") if self._in_view(seen) else "nothing"
         return f"{what} {IN_VIEW}"
 
-    def step(self, seen: Seen) -> Intent:
+    def step(self, seen: Sensed) -> Intent:
         """Face the event; with nothing in view, first its place, then all around, once."""
         event = self._in_view(seen)
         if event is not None:
@@ -225,14 +222,14 @@ class Inspection:
         self._heading = seen.view.heading
         return STAND if self._turned > 2.0 * math.pi else Intent(0.0, LOOK_AROUND)
 
-    def _is_at_view(self, seen: Seen) -> bool:
+    def _is_at_view(self, seen: Sensed) -> bool:
         event = self._in_view(seen)
         if event is not None and event.distance <= LOOK_FROM:
             return True
         near = math.dist(seen.here, self._place) < KEEP_OFF
         return near and self._sees(seen.here, self._place)
 
-    def _in_view(self, seen: Seen) -> SeenHazard | None:
+    def _in_view(self, seen: Sensed) -> SeenHazard | None:
         """The event, if it is in the picture."""
         found = [
             h
@@ -241,7 +238,7 @@ class Inspection:
         ]
         return min(found, key=lambda h: h.distance, default=None)
 
-    def _face(self, seen: Seen, place: Point) -> Intent:
+    def _face(self, seen: Sensed, place: Point) -> Intent:
         bearing = math.atan2(place[1] - seen.view.y, place[0] - seen.view.x)
         if abs(wrap(bearing - seen.view.heading)) < FACING:
             return STAND

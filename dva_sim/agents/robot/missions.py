@@ -1,6 +1,4 @@
-"""What a robot is sent to do, in metres, and how it drives when nobody else does.
-
-Missions: how a robot gets somewhere by itself, and what it does about who is in the way.
+"""Missions: how a robot gets somewhere by itself, and what it does about who is in the way.
 
 Pure: it is told what the robot knows at a moment, and says how to move and how the mission stands.
 The rules, in the order in which they are asked:
@@ -24,13 +22,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dva_sim.agents.operator.person import Population, median_person
-from dva_sim.agents.operator.strategies import Intent, Pursuit, Reach, View
+from dva_sim.agents.person import Population, median_person
 from dva_sim.agents.robot.avoidance import SQUEEZE, Avoidance, Blocked, pace_among
 from dva_sim.agents.robot.collision_guard import CollisionGuard, Nearby
 from dva_sim.agents.robot.controller import Mission
-from dva_sim.agents.robot.manoeuvres import STAND, Aside, Inspection, Manoeuvre, Recovery, Seen
-from dva_sim.agents.route_following import Route
+from dva_sim.agents.robot.manoeuvres import STAND, Aside, Inspection, JamRecovery, Manoeuvre, Sensed
+from dva_sim.agents.route_following import Intent, PurePursuit, Reach, Route, View
 from dva_sim.protocol import messages as m
 from dva_sim.worlds.planning import Disc, Planner
 
@@ -41,7 +38,7 @@ AUTOPILOT = replace(median_person(Population()), crossover=2.0, pace=1.0)
 
 
 @dataclass(frozen=True)
-class Errand:
+class MissionGoal:
     """A mission in metres.
 
     Attributes:
@@ -57,7 +54,9 @@ class Errand:
     home: bool = False
 
     @classmethod
-    def of(cls, mission: Mission, to_xy: Callable[[float, float], Point], base: Point) -> Errand:
+    def of(
+        cls, mission: Mission, to_xy: Callable[[float, float], Point], base: Point
+    ) -> MissionGoal:
         """The errand that a message asks for; `base` is the robot's own [m]."""
         match mission:
             case m.Inspect():
@@ -85,7 +84,7 @@ SQUEEZE_AFTER = 10.0  # [s]
 GIVE_UP_AFTER = 60.0  # [s]
 
 
-class Step(NamedTuple):
+class PilotStep(NamedTuple):
     """What follows: how to move, and how the mission stands, as in `MissionStatus`."""
 
     intent: Intent
@@ -108,9 +107,10 @@ class Pilot:
 
     def __init__(
         self,
-        errand: Errand,
+        errand: MissionGoal,
         planner: Planner,
         guard: CollisionGuard,
+        *,
         name: str,
         reach: Reach,
         turning_radius: float = 0.0,
@@ -118,7 +118,7 @@ class Pilot:
         self._errand, self._planner, self._guard, self._reach = errand, planner, guard, reach
         self._radius, self._sharpest = guard.radius, turning_radius
         self._avoidance = Avoidance(name, guard.radius, planner.room_at)
-        self._driver = Pursuit(AUTOPILOT, reach)
+        self._driver = PurePursuit(AUTOPILOT, reach)
         self._inspection = self._make_inspection()
         self._reached = 0  # waypoints so far
         self._squeezing = False
@@ -141,12 +141,12 @@ class Pilot:
         self._moved = -math.inf  # when who is in the way was last seen to move [s]
         self._progress = (math.inf, math.inf)  # the shortest way left [m], and since when [s]
 
-    def step(self, seen: Seen) -> Step:
+    def step(self, seen: Sensed) -> PilotStep:
         """What to do now."""
         if seen.charge < RESERVE and not self._errand.home:
             return self._end("failed", "battery")
         seen = self._with_patience(seen)
-        if seen.jammed and not isinstance(self._manoeuvre, Recovery):
+        if seen.jammed and not isinstance(self._manoeuvre, JamRecovery):
             return self._jam(seen)
         if self._manoeuvre is not None:
             return self._go_on_with(self._manoeuvre, seen)
@@ -165,19 +165,19 @@ class Pilot:
         """Places of the present lap still to be visited."""
         return len(self._errand.goals) - self._reached % len(self._errand.goals)
 
-    def _end(self, state: str, reason: str = "") -> Step:
-        return Step(STAND, state, 0 if state == "done" else self._left, reason)
+    def _end(self, state: str, reason: str = "") -> PilotStep:
+        return PilotStep(STAND, state, 0 if state == "done" else self._left, reason)
 
-    def _move(self, seen: Seen, intent: Intent, state: str, reason: str = "") -> Step:
+    def _move(self, seen: Sensed, intent: Intent, state: str, reason: str = "") -> PilotStep:
         """Go, but never into anything, and gently beside people."""
         pose = (*seen.here, seen.view.heading)
         speed = pace_among(seen.nearby, seen.here, self._radius, intent.speed)
         speed = self._guard.limit(pose, speed, intent.turn_rate, seen.nearby)
-        return Step(Intent(speed, intent.turn_rate), state, self._left, reason)
+        return PilotStep(Intent(speed, intent.turn_rate), state, self._left, reason)
 
     # --- on the way --------------------------------------------------------------------
 
-    def _travel(self, seen: Seen) -> Step:
+    def _travel(self, seen: Sensed) -> PilotStep:
         route = self._route or self._plan(seen)
         if route is None:
             return self._end("failed", "no way")
@@ -196,14 +196,14 @@ class Pilot:
         self._side, self._blocked_since = lane.side, math.inf
         return self._move(seen, self._drive(Route(lane.points), seen), "under_way")
 
-    def _drive(self, route: Route, seen: Seen) -> Intent:
+    def _drive(self, route: Route, seen: Sensed) -> Intent:
         """Along a way; a car drives its sharpest curve where others turn on the spot."""
         speed, turn_rate = self._driver.drive(route, View(seen.now, seen.view, PERIOD), NEAR)
         return Intent(
             max(speed, min(abs(turn_rate) * self._sharpest, self._reach.speed)), turn_rate
         )
 
-    def _plan(self, seen: Seen) -> Route | None:
+    def _plan(self, seen: Sensed) -> Route | None:
         points = self._planner.path(seen.here, self._goal, self._closed)
         if points is None and self._closed:
             self._closed = []
@@ -212,22 +212,22 @@ class Pilot:
         self._progress = math.inf, math.inf
         return self._route
 
-    def _arrive(self) -> Step:
+    def _arrive(self) -> PilotStep:
         self._reached += 1
         laps, goals = self._errand.laps, len(self._errand.goals)
         if laps and self._reached >= laps * goals:
             return self._end("done")
         self._begin_leg()
-        return Step(STAND, "under_way", self._left)
+        return PilotStep(STAND, "under_way", self._left)
 
-    def _gets_nowhere(self, seen: Seen, left: float) -> bool:
+    def _gets_nowhere(self, seen: Sensed, left: float) -> bool:
         best, since = self._progress
         if left < best - 0.1 or self._blocked_since < math.inf:
             self._progress = min(left, best), seen.now
             return False
         return seen.now - since > NO_PROGRESS
 
-    def _look(self, seen: Seen, inspection: Inspection) -> Step:
+    def _look(self, seen: Sensed, inspection: Inspection) -> PilotStep:
         """Face the event and wait for somebody who says what next."""
         finding = inspection.finding(seen)
         if inspection.is_over(seen):
@@ -236,7 +236,7 @@ class Pilot:
 
     # --- in the way --------------------------------------------------------------------
 
-    def _with_patience(self, seen: Seen) -> Seen:
+    def _with_patience(self, seen: Sensed) -> Sensed:
         """Who has waited for long goes nearer to people, until none is in sight."""
         waited = seen.now - self._blocked_since > SQUEEZE_AFTER
         people = any(o.kind == "person" for o in seen.nearby)
@@ -246,7 +246,7 @@ class Pilot:
         closer = tuple(o._replace(keep=min(o.keep, SQUEEZE)) for o in seen.nearby)
         return seen._replace(nearby=closer)
 
-    def _wait(self, seen: Seen, route: Route, along: float, blocked: Blocked) -> Step:
+    def _wait(self, seen: Sensed, route: Route, along: float, blocked: Blocked) -> PilotStep:
         """Stop short; then step aside, or look for a way around, or give up."""
         self._blocked_since = min(self._blocked_since, seen.now)
         waited = seen.now - self._blocked_since
@@ -283,7 +283,7 @@ class Pilot:
         gap = math.dist((other.x, other.y), self._goal) - other.radius
         return stands and left < CLOSE_BY and gap < self._radius + other.keep
 
-    def _lets_pass(self, seen: Seen, other: Nearby) -> bool:
+    def _lets_pass(self, seen: Sensed, other: Nearby) -> bool:
         """Whether to step aside: once for each who goes first and does not go away."""
         x, y = seen.here
         apart = math.dist(seen.here, (other.x, other.y))
@@ -292,7 +292,9 @@ class Pilot:
         can = self._sharpest == 0.0 and self._left_aside != other.name
         return can and first and not goes_away
 
-    def _step_aside(self, seen: Seen, route: Route, along: float, other: Nearby) -> Step | None:
+    def _step_aside(
+        self, seen: Sensed, route: Route, along: float, other: Nearby
+    ) -> PilotStep | None:
         way = np.array([route.point_at(along + s) for s in np.arange(-1.0, 6.0, 0.2).tolist()])
         place = self._avoidance.refuge(seen.here, way, seen.nearby)
         self._left_aside = other.name
@@ -301,7 +303,7 @@ class Pilot:
         self._manoeuvre = Aside(seen, place, way, self._radius, self._reach.turn_rate)
         return self._go_on_with(self._manoeuvre, seen)
 
-    def _way_around(self, seen: Seen) -> Step | None:
+    def _way_around(self, seen: Sensed) -> PilotStep | None:
         """Plan anew with everybody in sight as part of the map."""
         self._looked_around, before = seen.now, self._closed
         self._closed = [Disc(o.x, o.y, o.radius + o.keep + AROUND) for o in seen.nearby]
@@ -311,11 +313,11 @@ class Pilot:
             return None
         self._route = Route(points)
         self._progress = math.inf, math.inf
-        return Step(STAND, "replanning", self._left, "the way is closed")
+        return PilotStep(STAND, "replanning", self._left, "the way is closed")
 
     # --- jams --------------------------------------------------------------------------
 
-    def _jam(self, seen: Seen) -> Step:
+    def _jam(self, seen: Sensed) -> PilotStep:
         self._jams += 1
         if self._jams > MOST_JAMS:
             return self._end("failed", "jammed")
@@ -323,14 +325,14 @@ class Pilot:
         nose = self._radius + 0.1
         x, y = seen.view.x + nose * math.cos(heading), seen.view.y + nose * math.sin(heading)
         self._closed.append(Disc(x, y, 0.1))
-        recovery = Recovery(seen, self._guard, self._reach.turn_rate, [heading, *self._tried])
+        recovery = JamRecovery(seen, self._guard, self._reach.turn_rate, [heading, *self._tried])
         self._tried.append(recovery.heading)
         self._manoeuvre = recovery
         return self._go_on_with(recovery, seen)
 
-    def _go_on_with(self, manoeuvre: Manoeuvre, seen: Seen) -> Step:
+    def _go_on_with(self, manoeuvre: Manoeuvre, seen: Sensed) -> PilotStep:
         intent = manoeuvre.step(seen)
         if intent is None:
             self._manoeuvre, self._route = None, None
-            return Step(STAND, "under_way", self._left)
+            return PilotStep(STAND, "under_way", self._left)
         return self._move(seen, intent, manoeuvre.state, manoeuvre.reason)

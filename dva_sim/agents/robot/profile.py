@@ -9,7 +9,7 @@ from typing import Annotated, Any, Final
 from pydantic import Field, model_validator
 
 from dva_sim.agents.robot.battery import BatteryProfile
-from dva_sim.agents.robot.command_queue import Service
+from dva_sim.agents.robot.command_queue import ServiceTime
 from dva_sim.agents.robot.sensors import KINDS, SensorConfig
 from dva_sim.kernel import resources
 from dva_sim.kernel.config import Config, Document, load_yaml, validate
@@ -49,7 +49,7 @@ class RobotProfile(Config):
     motor_time_constant_s: Positive = 0.15
     drive: str = "differential"
     options: dict[str, Any] = Field(default_factory=dict)
-    processing_s: Service = 0.05
+    processing_s: ServiceTime = 0.05
     battery: BatteryProfile | None = None
     sensors: Annotated[tuple[SensorConfig, ...], Field(max_length=16)] = ONE_OF_EACH
 

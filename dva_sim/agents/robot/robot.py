@@ -1,6 +1,6 @@
-"""The loops that a robot runs by itself: missions, and a guard around who drives it.
+"""A robot on site: its controller bound to body, computer, camera and network.
 
-A robot on site: body, computer, camera, heartbeat.
+It runs two loops by itself: missions, and the collision guard around whoever drives it.
 """
 
 from __future__ import annotations
@@ -8,20 +8,28 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from dva_sim.agents.device import STATUS, Device
-from dva_sim.agents.operator.command_sender import topic_of
-from dva_sim.agents.operator.strategies import Reach
-from dva_sim.agents.robot.camera import Frame, HazardSpot, Observation, View
+from dva_sim.agents.device import LONGEST_BID, STATUS, AgentDevice, command_topic
+from dva_sim.agents.observation import CameraFrame, Observation
+from dva_sim.agents.robot.camera import FieldOfView, HazardSpot
 from dva_sim.agents.robot.collision_guard import CollisionGuard, Nearby, who_is_near
-from dva_sim.agents.robot.command_queue import LIMIT, Inbox, Letter
-from dva_sim.agents.robot.controller import ENDS, Decision, Mission, Mode, RobotController, SetPoint
-from dva_sim.agents.robot.decision_log import LEASE_ENDS, MISSION_ENDS, Trace
-from dva_sim.agents.robot.manoeuvres import Seen
-from dva_sim.agents.robot.missions import PERIOD, Errand, Pilot, Step
-from dva_sim.agents.robot.sensors import SensorDesk, SensorPort
+from dva_sim.agents.robot.command_queue import LIMIT, CommandQueue, Letter
+from dva_sim.agents.robot.controller import (
+    ENDS,
+    Decision,
+    Mission,
+    Mode,
+    RobotController,
+    TimedSetPoint,
+)
+from dva_sim.agents.robot.decision_log import LEASE_ENDS, MISSION_ENDS, DecisionLog
+from dva_sim.agents.robot.manoeuvres import Sensed
+from dva_sim.agents.robot.missions import PERIOD, MissionGoal, Pilot, PilotStep
+from dva_sim.agents.robot.sensors import SensorPort, SensorSubscriptions
+from dva_sim.agents.route_following import Reach
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.recorder import DriveLog
-from dva_sim.network.patterns import Subscription
+from dva_sim.network.messaging import Subscription
+from dva_sim.network.patterns import Pattern
 from dva_sim.protocol import messages as m
 from dva_sim.worlds.geo import GeoFrame
 from dva_sim.worlds.physics import World
@@ -52,7 +60,7 @@ class Surrounded:
         return who_is_near(self.world, self.body, SENSOR_REACH, self.planner.line_of_sight)
 
 
-class GuardedDrive:
+class CollisionGuardedDrive:
     """Obeys set points as far as the collision guard allows, looking again all the time.
 
     Args:
@@ -62,10 +70,10 @@ class GuardedDrive:
 
     def __init__(self, around: Surrounded, controller: RobotController) -> None:
         self._around, self._controller = around, controller
-        self._wanted = SetPoint(0.0, 0.0, 0.0)
+        self._wanted = TimedSetPoint(0.0, 0.0, 0.0)
         self._looking = False
 
-    def take(self, wanted: SetPoint) -> None:
+    def take(self, wanted: TimedSetPoint) -> None:
         """A new set point: in force at once, and guarded until it expires."""
         self._wanted = wanted
         if self._looking:
@@ -115,9 +123,14 @@ class MissionLoop:
     def begin(self, mission: Mission, frame: GeoFrame) -> None:
         """Drive a mission until it ends, or the robot is told something else."""
         body, around = self._around.body, self._around
-        errand = Errand.of(mission, frame.to_xy, self._base)
+        errand = MissionGoal.of(mission, frame.to_xy, self._base)
         pilot = Pilot(
-            errand, around.planner, around.guard, body.name, around.reach, body.turning_radius
+            errand,
+            around.planner,
+            around.guard,
+            name=body.name,
+            reach=around.reach,
+            turning_radius=body.turning_radius,
         )
         self._number += 1
         number = self._number
@@ -130,11 +143,11 @@ class MissionLoop:
 
         around.clock.every(PERIOD, step)
 
-    def _look(self) -> Seen:
+    def _look(self) -> Sensed:
         view, around = self._observe(), self._around
-        return Seen(around.clock.now, view, around.nearby(), around.body.jammed, self._charge())
+        return Sensed(around.clock.now, view, around.nearby(), around.body.jammed, self._charge())
 
-    def _obey(self, step: Step) -> None:
+    def _obey(self, step: PilotStep) -> None:
         self._around.body.drive(*step.intent, self._around.clock.now + 2 * PERIOD)
         if self._controller.mission_stands(step.state, step.left, step.reason):
             self._on_news()
@@ -142,15 +155,13 @@ class MissionLoop:
 
 FRAME = "frame|"  # topic of the camera
 MISSION = "mission|"  # topic of how missions stand
-PUBLISHED = ("pub-sub", "latest-wins")  # patterns in which nobody answers a command
 STATUS_PERIOD = 1.0  # [s]
 EXPECTED_SPEED = 0.35  # of a teleoperated robot, by which it bids, as the DVA expects it [m/s]
 EXPECTED_READY = 4.0  # until its operator begins to drive, as the DVA expects it [s]
-LONGEST_BID = 1e6  # [s]
 STANDING = 0.02  # below this the wheels count as still [m/s, rad/s]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class RobotSetup:
     """How a robot is connected.
 
@@ -169,11 +180,11 @@ class RobotSetup:
         limit: How many messages of a class may wait for its computer.
     """
 
-    pattern: str
+    pattern: Pattern
     service: Callable[[], float]
     frame_rate: float
     frame_bytes: int
-    view: View
+    view: FieldOfView
     hazards: Callable[[float], list[HazardSpot]]
     sensors: Mapping[str, SensorPort] = field(default_factory=dict)
     guarded: bool = False
@@ -205,8 +216,9 @@ class RobotAgent:
 
     def __init__(
         self,
-        device: Device,
+        device: AgentDevice,
         controller: RobotController,
+        *,
         world: World,
         body: RobotBody,
         planner: Planner,
@@ -218,20 +230,20 @@ class RobotAgent:
         self._drive_of = drive_of
         self.applied = self.refused = 0
         self.picture_age: float | None = None
-        self.trace: Trace | None = None
-        self.inbox = Inbox(
+        self.trace: DecisionLog | None = None
+        self.inbox = CommandQueue(
             device.clock,
             setup.service,
             self._handle,
-            setup.pattern == "latest-wins" or setup.conflates,
+            setup.pattern.newest_wins or setup.conflates,
             setup.limit,
         )
-        self._sensing = SensorDesk(device, setup.sensors, controller.tick)
+        self._sensing = SensorSubscriptions(device, setup.sensors, controller.tick)
         controller.sensors = tuple(m.Sensor(n, port.unit) for n, port in setup.sensors.items())
         self._commands: Subscription | None = None
         self._encoding = False
         around = Surrounded(device.clock, world, body, planner)
-        self._guarded = GuardedDrive(around, controller) if setup.guarded else None
+        self._guarded = CollisionGuardedDrive(around, controller) if setup.guarded else None
         self._missions = MissionLoop(
             around, controller, self.observe, setup.charge, self._mission_news
         )
@@ -331,7 +343,7 @@ class RobotAgent:
             self.device.ask(self.device.dva, m.TaskBid(announced.event_id, arrival))
 
     def _log_command(
-        self, message: m.Message, arrived: float, now: float, set_point: SetPoint | None
+        self, message: m.Message, arrived: float, now: float, set_point: TimedSetPoint | None
     ) -> None:
         assert isinstance(message.body, m.SetTeleOp)
         self.applied += 1
@@ -343,7 +355,7 @@ class RobotAgent:
                 drive, message.source, message.message_id, arrived, now, set_point.until
             )
 
-    def _move(self, set_point: SetPoint) -> None:
+    def _move(self, set_point: TimedSetPoint) -> None:
         if self._guarded is not None and self.controller.mode is Mode.TELEOPERATION:
             self._guarded.take(set_point)
             return
@@ -357,10 +369,10 @@ class RobotAgent:
             self._commands.close()
             self._commands = self.inbox.flow = None
             self.inbox.forget_published()
-        if mode is Mode.TELEOPERATION and self._setup.pattern in PUBLISHED:
+        if mode is Mode.TELEOPERATION and self._setup.pattern.published:
             me = self.device.id_tag
             self._commands = self.inbox.flow = self.device.network.subscribe(
-                me, source, topic_of(me), self.inbox.published
+                me, source, command_topic(me), self.inbox.published
             )
         if self.controller.mission is not None:
             self._missions.begin(self.controller.mission, self.device.frame)
@@ -372,14 +384,14 @@ class RobotAgent:
         network, me, size = self.device.network, self.device.id_tag, self._setup.frame_bytes
         if self.device.silent or self._encoding or not network.ready(me, FRAME, size):
             return
-        frame = Frame(self.observe(), self.device.clock.now)
+        frame = CameraFrame(self.observe(), self.device.clock.now)
         if self._setup.encode > 0.0:
             self._encoding = True
             self.device.clock.call_after(self._setup.encode, self._encoded, frame)
         else:
             network.publish(me, FRAME, frame, size)
 
-    def _encoded(self, frame: Frame) -> None:
+    def _encoded(self, frame: CameraFrame) -> None:
         self._encoding = False
         size = self._setup.frame_bytes
         if not self.device.silent:

@@ -1,6 +1,4 @@
-"""Sensors of a robot, and who has subscribed to them how often.
-
-Sensors of a robot: what they make of what is there, and how they fail.
+"""Sensors of a robot: what they make of what is there, how they fail, and who has subscribed.
 
 A sensor samples at its own rate, whoever listens. Between the world and the value that is
 published stand, in this order: a first-order lag, noise, the ends of its range, and its
@@ -23,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
 
-from dva_sim.agents.device import Device
+from dva_sim.agents.device import AgentDevice
 from dva_sim.kernel.config import Config
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import unknown
@@ -57,7 +55,7 @@ class SensorPort:
     lags: bool = False
 
 
-def topic_of_sensor(sensor: str, subscriber: str) -> str:
+def sensor_topic(sensor: str, subscriber: str) -> str:
     """Topic of the values of a sensor for one subscriber."""
     return f"sensor/{sensor}/{subscriber}|"
 
@@ -71,7 +69,7 @@ class _Subscribed:
     due: float
 
 
-class SensorDesk:
+class SensorSubscriptions:
     """Publishes the values of a robot's sensors to those who subscribed.
 
     Args:
@@ -81,7 +79,7 @@ class SensorDesk:
     """
 
     def __init__(
-        self, device: Device, sensors: Mapping[str, SensorPort], tick: Callable[[float], int]
+        self, device: AgentDevice, sensors: Mapping[str, SensorPort], tick: Callable[[float], int]
     ) -> None:
         self._device, self._sensors, self._tick_of = device, sensors, tick
         self._subscribed: dict[tuple[str, str], _Subscribed] = {}
@@ -139,7 +137,7 @@ class SensorDesk:
             return
         body = m.SensorValue(sensor, values, port.unit, self._tick_of(now))
         try:
-            self._device.publish(topic_of_sensor(sensor, subscriber), body)
+            self._device.publish(sensor_topic(sensor, subscriber), body)
         except ProtocolError:
             self._device.recorder.counters["sensor values that no message holds"] += 1
 
@@ -147,14 +145,14 @@ class SensorDesk:
 Floats = NDArray[np.float64]
 Values = tuple[float, ...]
 Source = Callable[[float], Values]
-Luck = Callable[[str], np.random.Generator]
+StreamsByName = Callable[[str], np.random.Generator]
 
 BLOCK = 64  # samples whose noise is drawn at once
 NonNegative = Annotated[float, Field(ge=0)]
 Positive = Annotated[float, Field(gt=0)]
 
 
-class Kind(NamedTuple):
+class SensorKind(NamedTuple):
     """A kind of sensor, as it is unless a scenario says otherwise; the numbers are assumed.
 
     Attributes:
@@ -175,13 +173,13 @@ class Kind(NamedTuple):
 
 
 KINDS = {
-    "lidar": Kind("m", 0.02, 0.001, 0.0, 99.999),
-    "temperature": Kind("degC", 0.3, 0.1, -40.0, 1000.0, lag=5.0),
-    "smoke": Kind("1/m", 0.01, 0.001, 0.0, 20.0, lag=2.0),
-    "gas": Kind("1", 0.0005, 0.0001, 0.0, 1.0, lag=10.0),
-    "heat_flux": Kind("kW/m2", 0.02, 0.01, 0.0, 200.0, lag=0.5),
-    "water": Kind("m", 0.005, 0.001, 0.0, 10.0),
-    "battery": Kind("1", 0.002, 0.001, 0.0, 1.0),
+    "lidar": SensorKind("m", 0.02, 0.001, 0.0, 99.999),
+    "temperature": SensorKind("degC", 0.3, 0.1, -40.0, 1000.0, lag=5.0),
+    "smoke": SensorKind("1/m", 0.01, 0.001, 0.0, 20.0, lag=2.0),
+    "gas": SensorKind("1", 0.0005, 0.0001, 0.0, 1.0, lag=10.0),
+    "heat_flux": SensorKind("kW/m2", 0.02, 0.01, 0.0, 200.0, lag=0.5),
+    "water": SensorKind("m", 0.005, 0.001, 0.0, 10.0),
+    "battery": SensorKind("1", 0.002, 0.001, 0.0, 1.0),
 }
 
 
@@ -248,15 +246,15 @@ class SensorConfig(Config):
             raise ValueError(f"low {kind.low:g} of {self.name} is not below high {kind.high:g}")
         return self
 
-    def as_kind(self) -> Kind:
+    def as_kind(self) -> SensorKind:
         """The kind of sensor with what is said here."""
         usual = KINDS[self.name]
         said = (self.noise, self.resolution, self.low, self.high, self.lag_s)
         pairs = zip(said, usual[1:], strict=True)
-        return Kind(usual.unit, *(other if own is None else own for own, other in pairs))
+        return SensorKind(usual.unit, *(other if own is None else own for own, other in pairs))
 
 
-class Sensor:
+class RobotSensor:
     """One sensor of one robot.
 
     Args:
@@ -265,7 +263,7 @@ class Sensor:
         luck: Streams of its own, by what they are for.
     """
 
-    def __init__(self, config: SensorConfig, source: Source, luck: Luck) -> None:
+    def __init__(self, config: SensorConfig, source: Source, luck: StreamsByName) -> None:
         self.kind, self._rate = config.as_kind(), config.rate_hz
         self._source, self._luck = source, luck
         times = {fault.kind: math.inf for fault in config.faults}
@@ -362,7 +360,7 @@ def sources_of(
 
 
 def make_ports(
-    configs: Iterable[SensorConfig], sources: Mapping[str, Source], luck: Luck
+    configs: Iterable[SensorConfig], sources: Mapping[str, Source], luck: StreamsByName
 ) -> dict[str, SensorPort]:
     """The sensors of a robot, ready to be subscribed to.
 
@@ -379,11 +377,11 @@ def make_ports(
         name = config.name
         if name in ports:
             raise ConfigError(f"sensor {name!r} is there twice")
-        sensor = Sensor(config, sources[name], _own(luck, name))
+        sensor = RobotSensor(config, sources[name], _own(luck, name))
         lags = sensor.kind.lag > 0.0
         ports[name] = SensorPort(sensor.kind.unit, sensor.read, config.rate_hz, lags)
     return ports
 
 
-def _own(luck: Luck, name: str) -> Luck:
+def _own(luck: StreamsByName, name: str) -> StreamsByName:
     return lambda what: luck(f"{name}/{what}")

@@ -1,12 +1,15 @@
-"""The tilt phone: hand, accelerometer, calibration, filter, mapping, and when a command is sent."""
+"""The tilt phone: hand, accelerometer, calibration, filter, mapping, and when a command is sent.
+
+It knows persons, and neither robots nor networks: what it gives is a command, at a time. Begin with
+`phone`; own filters and mappings derive from `Filter` and `Mapping`.
+"""
 
 from dva_sim.agents.tilt.accelerometer import Accelerometer, AccelerometerPart, load_part
 from dva_sim.agents.tilt.calibration import Calibration
 from dva_sim.agents.tilt.filters import Filter, known_filters, load_filter
 from dva_sim.agents.tilt.hand import Hand
 from dva_sim.agents.tilt.mappings import Mapping, known_mappings, load_mapping
-from dva_sim.agents.tilt.phone import Phone, TiltCommand, try_phone
-from dva_sim.agents.tilt.profile import PhoneProfile
+from dva_sim.agents.tilt.phone import Phone, PhoneProfile, TiltCommand, try_phone
 
 __all__ = [
     "Accelerometer",

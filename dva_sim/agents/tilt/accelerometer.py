@@ -113,6 +113,7 @@ class Accelerometer:
         part: AccelerometerPart,
         rng: np.random.Generator,
         own: np.random.Generator | None = None,
+        *,
         rate_hz: float | None = None,
         jitter: float = 0.0,
         block: int = 256,

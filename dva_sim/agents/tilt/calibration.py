@@ -11,6 +11,9 @@ LEVELS: Final = 10.0  # speed levels of the phone; one is SPEED_PER_LEVEL
 SPEED_PER_LEVEL: Final = 0.05  # [m/s]
 MAX_TURN_DEG: Final = 30.0  # either way, per second
 
+Reading = tuple[float, float]  # speed level, turn [deg/s]
+NEUTRAL: Final[Reading] = (0.0, 0.0)  # of a phone at rest: stand
+
 
 class Calibration:
     """From accelerations to a reading: a speed level, and a turn rate in degrees per second.
@@ -29,6 +32,7 @@ class Calibration:
     def __init__(
         self,
         reference: Triple = (0.0, 0.0, GRAVITY),
+        *,
         speed_step: float = 0.35,
         turn_step: float = 0.12,
         max_delay: float = 0.5,
@@ -37,10 +41,10 @@ class Calibration:
         self._x, self._y, self._z = reference
         self._speed_step, self._turn_step = speed_step, turn_step
 
-    def reading(self, ax: float, ay: float, az: float) -> tuple[float, float]:
+    def reading(self, ax: float, ay: float, az: float) -> Reading:
         """What is read from a sample: level, turn [deg/s]; z only tells which side is up."""
         if az * self._z < 0.0:
-            return 0.0, 0.0  # upside down against the reference: nobody steers so
+            return NEUTRAL  # upside down against the reference: nobody steers so
         return (ax - self._x) / self._speed_step, (ay - self._y) / self._turn_step
 
     def pose(self, level: float, turn: float) -> tuple[float, float]:

@@ -14,10 +14,11 @@ from numbers import Real
 from pathlib import Path
 from typing import Any, Final
 
+from dva_sim.agents.tilt.calibration import NEUTRAL, Reading
+from dva_sim.kernel import options
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.kernel.plugins import Plugins
+from dva_sim.kernel.plugins import FAILURES, Guard, Plugins, said
 
-Sample = tuple[float, float]  # speed level, turn [deg/s]
 BATCH: Final = 20  # slots of the dissertation's buffer
 MOST_BATCH: Final = 1000  # samples of a batch
 
@@ -44,11 +45,11 @@ class Filter(ABC):
         self.period = period
 
     @abstractmethod
-    def add(self, sample: Sample) -> None:
+    def add(self, sample: Reading) -> None:
         """Take the next sample."""
 
     @abstractmethod
-    def value(self) -> Sample:
+    def value(self) -> Reading:
         """The filtered value now; before the first sample, zero."""
 
     @property
@@ -90,7 +91,7 @@ class BatchMedian(Filter):
         self._filled, self._taken, self._age = 0, 0, 0.0
         self._speed, self._turn, self._rise = [0.0] * slots, [0.0] * slots, [0.0] * slots
 
-    def add(self, sample: Sample) -> None:
+    def add(self, sample: Reading) -> None:
         """See `Filter`."""
         self._taken += 1
         if self._filled < self._slots:
@@ -98,7 +99,7 @@ class BatchMedian(Filter):
             self._rise[self._filled] = self._taken
             self._filled += 1
 
-    def value(self) -> Sample:
+    def value(self) -> Reading:
         """The median of the buffer; the next batch begins."""
         self._filled = 0
         if self._in_place:
@@ -115,14 +116,14 @@ class BatchMedian(Filter):
 
 
 class InPlaceMedian(BatchMedian):
-    """The same with the buffer itself sorted."""
+    """The dissertation's median, with the buffer itself sorted."""
 
     def __init__(self, period: float) -> None:
         super().__init__(period, in_place=True)
 
 
 class CopyMedian(BatchMedian):
-    """The same with a copy of the buffer sorted."""
+    """The dissertation's median, with a copy of the buffer sorted."""
 
     def __init__(self, period: float) -> None:
         super().__init__(period)
@@ -138,20 +139,19 @@ class MovingMedian(Filter):
 
     def __init__(self, period: float, window: int = 5) -> None:
         super().__init__(period)
-        if not (isinstance(window, int) and 1 <= window <= 1000):
-            raise ConfigError(f"option 'window' is {window!r}; should be a whole number, 1 to 1000")
+        options.whole_number("window", window, 1, 1000)
         self._speed: deque[float] = deque(maxlen=window)
         self._turn: deque[float] = deque(maxlen=window)
 
-    def add(self, sample: Sample) -> None:
+    def add(self, sample: Reading) -> None:
         """See `Filter`."""
         self._speed.append(sample[0])
         self._turn.append(sample[1])
 
-    def value(self) -> Sample:
+    def value(self) -> Reading:
         """See `Filter`."""
         if not self._speed:
-            return 0.0, 0.0
+            return NEUTRAL
         return median(self._speed), median(self._turn)
 
     @property
@@ -171,22 +171,19 @@ class OnePole(Filter):
 
     def __init__(self, period: float, time_constant_s: float = 0.1) -> None:
         super().__init__(period)
-        if not (isinstance(time_constant_s, int | float) and 0.0 < time_constant_s <= 60.0):
-            raise ConfigError(
-                f"option 'time_constant_s' is {time_constant_s!r}; should be above 0, at most 60"
-            )
+        options.number("time_constant_s", time_constant_s, above=0, most=60)
         self._keep = math.exp(-period / time_constant_s)
         self._speed = self._turn = 0.0
         self._begun = False
 
-    def add(self, sample: Sample) -> None:
+    def add(self, sample: Reading) -> None:
         """See `Filter`."""
         keep = self._keep if self._begun else 0.0
         self._begun = True
         self._speed = sample[0] + (self._speed - sample[0]) * keep
         self._turn = sample[1] + (self._turn - sample[1]) * keep
 
-    def value(self) -> Sample:
+    def value(self) -> Reading:
         """See `Filter`."""
         return self._speed, self._turn
 
@@ -201,13 +198,13 @@ class NoFilter(Filter):
 
     def __init__(self, period: float) -> None:
         super().__init__(period)
-        self._sample: Sample = (0.0, 0.0)
+        self._sample = NEUTRAL
 
-    def add(self, sample: Sample) -> None:
+    def add(self, sample: Reading) -> None:
         """See `Filter`."""
         self._sample = sample
 
-    def value(self) -> Sample:
+    def value(self) -> Reading:
         """See `Filter`."""
         return self._sample
 
@@ -229,6 +226,13 @@ FILTERS: Final[dict[str, Callable[..., Filter]]] = {
     "none": NoFilter,
 }
 
+
+def _usable(filter_: Filter) -> Filter:
+    """One of a user's, if a phone could work with it."""
+    check_filter(filter_)
+    return filter_
+
+
 PLUGINS: Final = Plugins(
     "filter",
     Filter,  # type: ignore[type-abstract]
@@ -238,39 +242,38 @@ PLUGINS: Final = Plugins(
     key="phone.filter",
     needs="add(sample)",
     public="dva_sim.agents.tilt.Filter",
+    finish=_usable,
 )
 
 
-def known_filters() -> list[str]:
-    """Names that a phone can use: shipped and installed ones; files come on top."""
-    return PLUGINS.known()
+known_filters = PLUGINS.known
 
 
 def load_filter(
-    name: str, options: Mapping[str, Any] | None = None, base: Path | None = None
+    name: str | Callable[..., Filter],
+    options: Mapping[str, Any] | None = None,
+    base: Path | None = None,
 ) -> Callable[[float], Filter]:
     """What makes the filter that `name` means, told the mean time between samples [s].
 
-    Args:
-        name: A shipped name, a class in a file such as `mine.py:Mine`, or the name under which
-            an installed package offers one (entry point, `dva_sim.filters`).
-        options: Keyword arguments of its constructor, besides the period.
-        base: Folder that a file is looked for in first; then the working folder, and
-            `agents/filters`.
+    Arguments as of `Plugins.load`.
 
     Raises:
-        ConfigError: there is none of that name, its file or package cannot be loaded, or it is
-            not a filter; a bad option, `batch` or `age` is told when it is made.
+        ConfigError: as `Plugins.load`; a bad `batch` or `age` of a user's is told when it is made.
     """
-    factory, given = PLUGINS.find(name, base), dict(options or {})
+    return PLUGINS.load(name, options, base)
 
-    def make(period: float) -> Filter:
-        filter_ = PLUGINS.make(name, factory, given, period)
-        if name not in FILTERS:
-            PLUGINS.ask(name, lambda: check_filter(filter_))
-        return filter_
 
-    return make
+def load_guarded_filter(
+    name: str, chosen: Mapping[str, Any] | None = None
+) -> Callable[[float], Filter]:
+    """As `load_filter`, for a run: a user's filter is kept within what can be sent.
+
+    Raises:
+        ConfigError: as `load_filter`.
+    """
+    make = load_filter(name, chosen)
+    return make if name in FILTERS else lambda period: GuardedFilter(make(period), period)
 
 
 def check_filter(filter_: Filter) -> None:
@@ -290,3 +293,48 @@ def check_filter(filter_: Filter) -> None:
 def is_age(age: object) -> bool:
     """Whether it can be an age: a finite number, at least 0."""
     return isinstance(age, Real) and 0.0 <= float(age) < math.inf
+
+
+class GuardedFilter(Guard, Filter):
+    """A filter of a user; where it gives no answer, the reading is that of a phone at rest.
+
+    What it says after a sample that it did not take is no answer, either: it would be an old one.
+
+    Args:
+        filter_: The user's own.
+        period: Mean time between two samples [s].
+
+    Raises:
+        ConfigError: no phone could work with it.
+    """
+
+    def __init__(self, filter_: Filter, period: float) -> None:
+        check_filter(filter_)
+        super().__init__(period)
+        self._filter, self.batch = filter_, filter_.batch
+        self._took = True
+
+    def add(self, sample: Reading) -> None:
+        """See `Filter`."""
+        try:
+            self._filter.add(sample)
+            self._took = True
+        except FAILURES as error:
+            self._took = False
+            self._count(said(error))
+
+    def value(self) -> Reading:
+        """See `Filter`."""
+        return (self._answer(self._filter.value) if self._took else None) or NEUTRAL
+
+    @property
+    def age(self) -> float:
+        """See `Filter`; what is no age is none."""
+        try:
+            age = self._filter.age
+            if is_age(age):
+                return float(age)
+            self._count(f"is {age!r} samples old")
+        except FAILURES as error:
+            self._count(said(error))
+        return 0.0

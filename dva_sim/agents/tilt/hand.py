@@ -48,6 +48,7 @@ class Hand:
         self,
         lag: float,
         rng: np.random.Generator,
+        *,
         motor_noise: float = 0.0,
         tremor: float = TREMOR,
         max_tilt: float = MAX_TILT,

@@ -12,11 +12,9 @@ from collections.abc import Mapping as Options
 from pathlib import Path
 from typing import Any, Final
 
-from dva_sim.agents.tilt.calibration import LEVELS, MAX_TURN_DEG
-from dva_sim.kernel.errors import ConfigError
-from dva_sim.kernel.plugins import Plugins
-
-Pair = tuple[float, float]  # speed level, turn [deg/s]
+from dva_sim.agents.tilt.calibration import LEVELS, MAX_TURN_DEG, NEUTRAL, Reading
+from dva_sim.kernel import options
+from dva_sim.kernel.plugins import FAILURES, Guard, Plugins, said
 
 
 class Mapping(ABC):
@@ -36,7 +34,7 @@ class Mapping(ABC):
     first_failure = ""
 
     @abstractmethod
-    def command(self, level: float, turn: float, dt: float) -> Pair:
+    def command(self, level: float, turn: float, dt: float) -> Reading:
         """The command now, which is also what the display shows.
 
         Args:
@@ -49,7 +47,7 @@ class Mapping(ABC):
         """
 
     @abstractmethod
-    def tilt_for(self, wanted: Pair, shown: Pair, within: float) -> Pair:
+    def tilt_for(self, wanted: Reading, shown: Reading, within: float) -> Reading:
         """The reading that a practised hand tilts to.
 
         Args:
@@ -62,7 +60,7 @@ class Mapping(ABC):
         """A drive begins: what was integrated is forgotten."""
 
 
-class Absolute(Mapping):
+class AbsoluteMapping(Mapping):
     """The tilt is the command.
 
     Args:
@@ -74,26 +72,25 @@ class Absolute(Mapping):
     integrates = False
 
     def __init__(self, gain: float = 1.0, speed_gain: float = 1.0, dead_zone: float = 0.0) -> None:
-        self._gain, self._speed_gain = (
-            above_zero("gain", gain),
-            above_zero("speed_gain", speed_gain),
-        )
-        self._dead_level, self._dead_turn = dead_zones(dead_zone)
+        self._gain = options.number("gain", gain, above=0)
+        self._speed_gain = options.number("speed_gain", speed_gain, above=0)
+        share = options.number("dead_zone", dead_zone, least=0, below=1)
+        self._dead_level, self._dead_turn = share * LEVELS, share * MAX_TURN_DEG
 
-    def command(self, level: float, turn: float, dt: float) -> Pair:
+    def command(self, level: float, turn: float, dt: float) -> Reading:
         """See `Mapping`."""
         return limited(
             self._speed_gain * outside(level, self._dead_level),
             self._gain * outside(turn, self._dead_turn),
         )
 
-    def tilt_for(self, wanted: Pair, shown: Pair, within: float) -> Pair:
+    def tilt_for(self, wanted: Reading, shown: Reading, within: float) -> Reading:
         """See `Mapping`; the display is not needed."""
         level = beyond(wanted[0] / self._speed_gain, self._dead_level)
         return level, beyond(wanted[1] / self._gain, self._dead_turn)
 
 
-class Differential(Absolute):
+class DifferentialMapping(AbsoluteMapping):
     """Tilting makes the turn rate grow, the faster the more, up to its limit.
 
     A phone held level keeps its turn rate. The speed is absolute.
@@ -114,18 +111,18 @@ class Differential(Absolute):
         """See `Mapping`."""
         self._turn = 0.0
 
-    def command(self, level: float, turn: float, dt: float) -> Pair:
+    def command(self, level: float, turn: float, dt: float) -> Reading:
         """See `Mapping`."""
         grown = self._turn + self._gain * outside(turn, self._dead_turn) * dt
         level, self._turn = limited(self._speed_gain * outside(level, self._dead_level), grown)
         return level, self._turn
 
-    def tilt_for(self, wanted: Pair, shown: Pair, within: float) -> Pair:
+    def tilt_for(self, wanted: Reading, shown: Reading, within: float) -> Reading:
         """See `Mapping`."""
         return super().tilt_for((wanted[0], (wanted[1] - shown[1]) / within), shown, within)
 
 
-class Leaky(Differential):
+class LeakyMapping(DifferentialMapping):
     """The same, but a phone held level lets its turn rate go back to zero.
 
     Args:
@@ -143,9 +140,9 @@ class Leaky(Differential):
         leak_s: float = 1.0,
     ) -> None:
         super().__init__(gain, speed_gain, dead_zone)
-        self._leak = above_zero("leak_s", leak_s)
+        self._leak = options.number("leak_s", leak_s, above=0)
 
-    def command(self, level: float, turn: float, dt: float) -> Pair:
+    def command(self, level: float, turn: float, dt: float) -> Reading:
         """See `Mapping`; exact for a reading that stands for all of `dt`."""
         keep = math.exp(-dt / self._leak)
         steady = self._gain * outside(turn, self._dead_turn) * self._leak
@@ -153,15 +150,13 @@ class Leaky(Differential):
         level, self._turn = limited(self._speed_gain * outside(level, self._dead_level), grown)
         return level, self._turn
 
-    def tilt_for(self, wanted: Pair, shown: Pair, within: float) -> Pair:
+    def tilt_for(self, wanted: Reading, shown: Reading, within: float) -> Reading:
         """See `Mapping`: what closes the gap, and what holds the shown rate against the leak."""
         held = within * shown[1] / self._leak
         return super().tilt_for((wanted[0], wanted[1] + held), shown, within)
 
 
 # --- parts of mappings -----------------------------------------------------------------
-
-
 def outside(value: float, zone: float) -> float:
     """By how much a value is outside a zone around zero."""
     if zone == 0.0:
@@ -174,7 +169,7 @@ def beyond(value: float, zone: float) -> float:
     return value + math.copysign(zone, value) if value else 0.0
 
 
-def limited(level: float, turn: float) -> Pair:
+def limited(level: float, turn: float) -> Reading:
     """Within what a command can be: no reverse, and the limits of speed and turn rate."""
     return (
         0.0 if level < 0.0 else LEVELS if level > LEVELS else level,
@@ -182,32 +177,10 @@ def limited(level: float, turn: float) -> Pair:
     )
 
 
-def dead_zones(share: float) -> Pair:
-    """Of level and turn, for a share of the full reading.
-
-    Raises:
-        ConfigError: it is not from 0 to below 1.
-    """
-    if not (isinstance(share, int | float) and 0.0 <= share < 1.0):
-        raise ConfigError(f"option 'dead_zone' is {share!r}; should be at least 0, below 1")
-    return share * LEVELS, share * MAX_TURN_DEG
-
-
-def above_zero(option: str, value: float) -> float:
-    """An option that has to be a number above 0.
-
-    Raises:
-        ConfigError: it is not.
-    """
-    if not (isinstance(value, int | float) and 0.0 < value < math.inf):
-        raise ConfigError(f"option {option!r} is {value!r}; should be above 0")
-    return float(value)
-
-
 MAPPINGS: Final[dict[str, Callable[..., Mapping]]] = {
-    "absolute": Absolute,
-    "differential": Differential,
-    "leaky": Leaky,
+    "absolute": AbsoluteMapping,
+    "differential": DifferentialMapping,
+    "leaky": LeakyMapping,
 }
 
 PLUGINS: Final = Plugins(
@@ -222,13 +195,13 @@ PLUGINS: Final = Plugins(
 )
 
 
-def known_mappings() -> list[str]:
-    """Names that a phone can use: shipped and installed ones; files come on top."""
-    return PLUGINS.known()
+known_mappings = PLUGINS.known
 
 
 def load_mapping(
-    name: str, options: Options[str, Any] | None = None, base: Path | None = None
+    name: str | Callable[..., Mapping],
+    options: Options[str, Any] | None = None,
+    base: Path | None = None,
 ) -> Callable[[], Mapping]:
     """What makes the mapping that `name` means.
 
@@ -243,5 +216,38 @@ def load_mapping(
         ConfigError: there is none of that name, its file or package cannot be loaded, or it is
             not a mapping; a bad option is told when it is made.
     """
-    factory, given = PLUGINS.find(name, base), dict(options or {})
-    return lambda: PLUGINS.make(name, factory, given)
+    return PLUGINS.load(name, options, base)
+
+
+def load_guarded_mapping(name: str, options: Options[str, Any] | None = None) -> Mapping:
+    """Make a mapping for a run: a user's is kept within what can be sent.
+
+    Raises:
+        ConfigError: as `load_mapping`.
+    """
+    mapping = load_mapping(name, options)()
+    return mapping if name in MAPPINGS else GuardedMapping(mapping)
+
+
+class GuardedMapping(Guard, Mapping):
+    """A mapping of a user; where it gives no answer, the command is to stand."""
+
+    def __init__(self, mapping: Mapping) -> None:
+        self._mapping = mapping
+        self.integrates = bool(mapping.integrates)
+
+    def begin(self) -> None:
+        """See `Mapping`; failures are counted by drives."""
+        self.failures, self.first_failure = 0, ""
+        try:
+            self._mapping.begin()
+        except FAILURES as error:
+            self._count(said(error))
+
+    def command(self, level: float, turn: float, dt: float) -> Reading:
+        """See `Mapping`; within the limits."""
+        return limited(*(self._answer(self._mapping.command, level, turn, dt) or NEUTRAL))
+
+    def tilt_for(self, wanted: Reading, shown: Reading, within: float) -> Reading:
+        """See `Mapping`; the hand holds the phone at rest where it is told nothing."""
+        return self._answer(self._mapping.tilt_for, wanted, shown, within) or NEUTRAL

@@ -1,9 +1,9 @@
-"""How old the pictures are that a command rests on, carried along with the tilt itself.
-
-A phone in a hand: what is wanted goes in, commands come out, by a chain of small stages.
+"""A phone in a hand: what is wanted goes in, commands come out, by a chain of small stages.
 
 The way is the dissertation's: wanted -> the reading to tilt to (`Mapping.tilt_for`) -> `Hand` ->
 `Accelerometer` -> `Calibration` -> `Filter` -> `Mapping.command` -> a rule for when it is sent.
+`PhoneProfile` holds all that a study can change; `Trail` carries along how old the pictures are
+that a command rests on.
 """
 
 from __future__ import annotations
@@ -11,17 +11,89 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable
-from typing import Final, NamedTuple, Protocol
+from functools import partial
+from typing import Annotated, Any, Final, Literal, NamedTuple
 
 import numpy as np
+from pydantic import Field, model_validator
 
-from dva_sim.agents.tilt.accelerometer import Accelerometer, load_part
-from dva_sim.agents.tilt.calibration import SPEED_PER_LEVEL, Calibration
-from dva_sim.agents.tilt.filters import BATCH, FILTERS, Filter, load_filter
-from dva_sim.agents.tilt.guarded import GuardedFilter, GuardedMapping
+from dva_sim.agents.person import Person
+from dva_sim.agents.tilt.accelerometer import (
+    GRAVITY,
+    Accelerometer,
+    NonNegative,
+    Positive,
+    Triple,
+    load_part,
+)
+from dva_sim.agents.tilt.calibration import SPEED_PER_LEVEL, Calibration, Reading
+from dva_sim.agents.tilt.filters import BATCH, Filter, load_filter, load_guarded_filter
 from dva_sim.agents.tilt.hand import Hand
-from dva_sim.agents.tilt.mappings import MAPPINGS, Pair, limited, load_mapping
-from dva_sim.agents.tilt.profile import PhoneProfile
+from dva_sim.agents.tilt.mappings import limited, load_guarded_mapping, load_mapping
+from dva_sim.kernel.config import Config, Key
+
+
+class PhoneProfile(Config):
+    """A phone, how it is held, and how its app reads, filters, maps and sends.
+
+    Attributes:
+        accelerometer: Name of a part, or a file with one.
+        sample_rate_hz: Samples per second that the app gets.
+        sample_jitter: Standard deviation of the time of a sample, as a share of the time between
+            two.
+        tremor_deg: Of the hand, as apparent tilt, standard deviation.
+        max_tilt_deg: Farthest that the hand tilts the phone away from rest.
+        max_tilt_speed_deg_s: Fastest that it does.
+        reference_mps2: x, y, z of the pose that means nothing: speed zero, straight on.
+        reference_error_mps2: How far off that pose was when the owner calibrated, standard
+            deviation of x and y; the offset of the part itself is calibrated away.
+        speed_step_mps2: Acceleration along the tilt axis for one level of speed.
+        turn_step_mps2: Acceleration across it for one degree per second of turn.
+        filter: By name, or a class in a file, `mine.py:Mine`.
+        filter_options: Of the filter, such as `{window: 9}` of the median.
+        mapping: By name, or a class in a file.
+        mapping_options: Of the mapping, such as `{gain: 2}`.
+        send: `on_change` sends what differs from the last one sent when 20 samples have come or
+            `max_delay_s` has passed; `keep_alive` sends at the wanted rate always.
+        max_delay_s: Longest time between two looks at the filter (`on_change`), and between two
+            values of a filter that works in batches.
+        ideal: What the person wants becomes the command at once: a reference, not a phone.
+    """
+
+    description: str = ""
+    accelerometer: str = "mpu6050"
+    sample_rate_hz: Annotated[float, Field(gt=0, le=1000)] = 34.0
+    sample_jitter: Annotated[float, Field(ge=0, le=0.3)] = 0.1
+    tremor_deg: NonNegative = 0.25
+    max_tilt_deg: Annotated[float, Field(gt=0, le=80)] = 45.0
+    max_tilt_speed_deg_s: Positive = 200.0
+    reference_mps2: Triple = (0.0, 0.0, GRAVITY)
+    reference_error_mps2: NonNegative = 0.08
+    speed_step_mps2: Positive = 0.35
+    turn_step_mps2: Positive = 0.12
+    filter: Annotated[str, Key("filter")] = "median"
+    filter_options: Annotated[
+        dict[str, Any],
+        Key(inner={"time_constant_s": Key("time constant of the filter", stated=False)}),
+    ] = Field(default_factory=dict)
+    mapping: Annotated[str, Key("mapping")] = "absolute"
+    mapping_options: Annotated[dict[str, Any], Key(inner={"gain": Key("gain of the phone")})] = (
+        Field(default_factory=dict)
+    )
+    send: Annotated[Literal["on_change", "keep_alive"], Key("sending")] = "keep_alive"
+    max_delay_s: Annotated[
+        float, Field(gt=0, le=10), Key("longest time between two values of the phone", stated=False)
+    ] = 0.5
+    ideal: bool = False
+
+    @model_validator(mode="after")
+    def _reference_is_gravity(self) -> PhoneProfile:
+        size = sum(part * part for part in self.reference_mps2) ** 0.5
+        if not 0.8 * GRAVITY < size < 1.2 * GRAVITY:
+            raise ValueError(f"reference_mps2 should be about {GRAVITY:g} m/s^2 long, not {size:g}")
+        if self.reference_mps2[2] <= 0.0:
+            raise ValueError("reference_mps2 should have z above 0: the screen looks up")
+        return self
 
 
 class Trail:
@@ -78,26 +150,6 @@ _TIE: Final = 1e-9  # moments nearer than this are the same [s]
 _TICK: Final = 1e-6  # who looks by a clock that rounds may come so much too soon [s]
 
 
-class Holder(Protocol):
-    """What a phone needs of the person who holds it; as `Person` has it."""
-
-    @property
-    def hand_lag(self) -> float:
-        """Time constant of the hand [s]."""
-
-    @property
-    def perceptual_delay(self) -> float:
-        """From what a display shows to what the person makes of it [s]."""
-
-    @property
-    def motor_noise(self) -> float:
-        """Standard deviation of the tilt that is aimed at, as a share of it."""
-
-    @property
-    def margin(self) -> float:
-        """Crossover times delay, at which the person closes what the display lacks."""
-
-
 class TiltCommand(NamedTuple):
     """What the phone sends.
 
@@ -149,7 +201,7 @@ class Phone:
     def __init__(
         self,
         profile: PhoneProfile,
-        holder: Holder,
+        holder: Person,
         rng: np.random.Generator,
         own: np.random.Generator | None = None,
     ) -> None:
@@ -160,28 +212,24 @@ class Phone:
             load_part(profile.accelerometer),
             of_part,
             own,
-            profile.sample_rate_hz,
-            profile.sample_jitter,
+            rate_hz=profile.sample_rate_hz,
+            jitter=profile.sample_jitter,
         )
         self._hand = Hand(
             holder.hand_lag,
             of_hand,
-            holder.motor_noise,
-            math.radians(profile.tremor_deg),
-            math.radians(profile.max_tilt_deg),
-            math.radians(profile.max_tilt_speed_deg_s),
+            motor_noise=holder.motor_noise,
+            tremor=math.radians(profile.tremor_deg),
+            max_tilt=math.radians(profile.max_tilt_deg),
+            max_speed=math.radians(profile.max_tilt_speed_deg_s),
         )
         self._interval = self._accelerometer.interval
         self._period = period = self._accelerometer.period
         self._calibrate(own)
-        filters = load_filter(profile.filter, profile.filter_options)
-        own_filter = profile.filter not in FILTERS
-        self._make_filter: Callable[[], Filter] = lambda: (
-            GuardedFilter(filters(period), period) if own_filter else filters(period)
-        )
+        filters = load_guarded_filter(profile.filter, profile.filter_options)
+        self._make_filter: Callable[[], Filter] = lambda: filters(period)
         self._batch = self._make_filter().batch
-        mapping = load_mapping(profile.mapping, profile.mapping_options)()
-        self._mapping = mapping if profile.mapping in MAPPINGS else GuardedMapping(mapping)
+        self._mapping = load_guarded_mapping(profile.mapping, profile.mapping_options)
         self._watches = self._mapping.integrates
         self._within = self._time_to_close(holder)
         self._late = round(holder.perceptual_delay / period)
@@ -196,13 +244,17 @@ class Phone:
         profile, offset = self._profile, self._accelerometer.offset
         x, y, z = profile.reference_mps2
         dx, dy = own.normal(0.0, profile.reference_error_mps2, 2).tolist()
-        steps = profile.speed_step_mps2, profile.turn_step_mps2
-        measured = x + offset[0] + dx, y + offset[1] + dy, z + offset[2]
-        self._app = Calibration(measured, *steps, profile.max_delay_s)
-        self._felt = Calibration(profile.reference_mps2, *steps, profile.max_delay_s)
+        calibrated = partial(
+            Calibration,
+            speed_step=profile.speed_step_mps2,
+            turn_step=profile.turn_step_mps2,
+            max_delay=profile.max_delay_s,
+        )
+        self._app = calibrated((x + offset[0] + dx, y + offset[1] + dy, z + offset[2]))
+        self._felt = calibrated(profile.reference_mps2)
         self._rest = self._felt.pose(0.0, 0.0)
 
-    def _time_to_close(self, holder: Holder) -> float:
+    def _time_to_close(self, holder: Person) -> float:
         """In what time a gap on the display is closed [s]."""
         if self._batch is not None:
             held = min(self._app.max_delay, self._batch * self._period)
@@ -344,7 +396,7 @@ class Phone:
         self.shown = self._mapping.command(*reading, at - self._taken_at)
         self._taken_at, self._due, self._fresh = at, at + self._app.max_delay, 0
 
-    def _aim_at(self, perceived: Pair) -> Pair:
+    def _aim_at(self, perceived: Reading) -> Reading:
         """Angles away from rest that the hand aims at [rad]."""
         reading = self._mapping.tilt_for(self._wanted, perceived, self._within)
         pitch, roll = self._felt.pose(*reading)

@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from dva_sim.core.dispatch import options
 from dva_sim.core.dispatch.greedy import Free, serve, waiting
 from dva_sim.core.dispatch.situation import Advice, Cover, Floats, Policy, Relocation, Situation
+from dva_sim.kernel import options
 
 _UNREACHED = 3600.0  # what a zone counts that nobody covers [s]
 
@@ -37,8 +37,8 @@ class Coverage(Policy):
     relocates = True
 
     def __init__(self, gain_s: float = 2.0, there_s: float = 3.0) -> None:
-        self.gain_s = options.above("gain_s", gain_s, 0)
-        self.there_s = options.at_least("there_s", there_s, 0)
+        self.gain_s = options.number("gain_s", gain_s, above=0)
+        self.there_s = options.number("there_s", there_s, least=0)
 
     def advise(self, situation: Situation, rng: np.random.Generator) -> Sequence[Advice]:
         """See `Policy`."""

@@ -8,9 +8,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.core.dispatch import options
 from dva_sim.core.dispatch.greedy import waiting
 from dva_sim.core.dispatch.situation import Advice, Assignment, Floats, Policy, Situation
+from dva_sim.kernel import options
 
 _OBJECTIVES: Final = ("eta", "distance")
 
@@ -36,7 +36,7 @@ class BatchOptimal(Policy):
 
     def __init__(self, objective: str = "eta", ageing_per_s: float = 1.0) -> None:
         self.objective = options.one_of("objective", objective, _OBJECTIVES)
-        self.ageing_per_s = options.at_least("ageing_per_s", ageing_per_s, 0)
+        self.ageing_per_s = options.number("ageing_per_s", ageing_per_s, least=0)
         self.operator_worth = 0.0
 
     def advise(self, situation: Situation, rng: np.random.Generator) -> Sequence[Advice]:
@@ -80,7 +80,7 @@ class OperatorAware(BatchOptimal):
 
     def __init__(self, operator_worth_s: float = 30.0, ageing_per_s: float = 1.0) -> None:
         super().__init__("eta", ageing_per_s)
-        self.operator_worth = options.at_least("operator_worth_s", operator_worth_s, 0)
+        self.operator_worth = options.number("operator_worth_s", operator_worth_s, least=0)
 
 
 def match(cost: Floats, robots: NDArray[np.bool_], operators: int) -> list[tuple[int, int]]:

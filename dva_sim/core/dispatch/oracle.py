@@ -39,7 +39,7 @@ class Instance:
 
 
 @dataclass(frozen=True)
-class Plan:
+class OraclePlan:
     """Who goes where, and in which order.
 
     Attributes:
@@ -55,7 +55,7 @@ class Plan:
     total: float
 
 
-def solve(instance: Instance) -> Plan:
+def solve(instance: Instance) -> OraclePlan:
     """The plan with the least sum of response times, exactly.
 
     A plan is an order of events for each unit, in which it is sent as soon as the event is
@@ -76,7 +76,7 @@ class _Search:
         self.steps: tuple[_Step, ...] = ()
         self.seen: dict[tuple[int, ...], list[tuple[float, ...]]] = {}
 
-    def plan(self) -> Plan:
+    def plan(self) -> OraclePlan:
         units = self.arrival.shape[1]
         possible = tuple(np.flatnonzero(np.isfinite(self.arrival).any(axis=1)).tolist())
         self._extend(possible, (float(self.release.min(initial=0.0)),) * units, 0.0, ())
@@ -85,7 +85,9 @@ class _Search:
         for event, unit, when in self.steps:
             tours[unit].append(event)
             start[event] = when
-        return Plan(tuple(map(tuple, tours)), tuple(start), tuple(self.release.tolist()), self.best)
+        return OraclePlan(
+            tuple(map(tuple, tours)), tuple(start), tuple(self.release.tolist()), self.best
+        )
 
     def _extend(
         self,
@@ -148,7 +150,7 @@ class _Search:
         return False
 
 
-class Oracle(Policy):
+class OraclePolicy(Policy):
     """Follows a plan event by event: a reference that knows the future, not a way to work.
 
     A unit is held back while something that its plan serves earlier is open or has yet to come.
@@ -159,7 +161,7 @@ class Oracle(Policy):
         devices: Ids of the units, in the plan's order.
     """
 
-    def __init__(self, plan: Plan | None = None, devices: Sequence[str] = ()) -> None:
+    def __init__(self, plan: OraclePlan | None = None, devices: Sequence[str] = ()) -> None:
         if plan is None:
             raise ConfigError(
                 "it needs a plan made with knowledge of the future, so it cannot be named in a "

@@ -16,7 +16,7 @@ def _empty() -> Floats:
     return np.empty((0, 0))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Task:
     """Something that somebody should do about an event.
 
@@ -82,7 +82,7 @@ class Cover:
     bound_for: tuple[int | None, ...] = ()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Situation:
     """What is known at one moment.
 

@@ -7,11 +7,11 @@ from typing import Final
 
 import numpy as np
 
-from dva_sim.core.dispatch import options
 from dva_sim.core.dispatch.greedy import Free, serve, waiting
 from dva_sim.core.dispatch.situation import Advice, Assignment, Floats, Policy, Situation
+from dva_sim.kernel import options
+from dva_sim.protocol.messages import EVENT_KINDS
 
-_KINDS: Final = ("fire", "gas_leak", "flood")
 _REMEMBERED: Final = 1000  # events
 
 
@@ -34,8 +34,8 @@ class HazardTeam(Policy):
     def __init__(
         self, dangerous: Iterable[str] = ("fire", "gas_leak"), extra_s: float = 60.0
     ) -> None:
-        self.dangerous = options.some_of("dangerous", dangerous, _KINDS)
-        self.extra_s = options.at_least("extra_s", extra_s, 0)
+        self.dangerous = options.some_of("dangerous", dangerous, EVENT_KINDS)
+        self.extra_s = options.number("extra_s", extra_s, least=0)
         self._by_robot: dict[int, bool] = {}  # event: whether a robot looks at it
 
     def advise(self, situation: Situation, rng: np.random.Generator) -> Sequence[Advice]:

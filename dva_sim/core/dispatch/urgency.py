@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from dva_sim.core.dispatch import options
 from dva_sim.core.dispatch.greedy import Free, serve, waiting
 from dva_sim.core.dispatch.situation import Advice, Assignment, Floats, Policy, Situation
+from dva_sim.kernel import options
 
 _ROUNDING = 1e-9  # severities that differ by the margin as people write it, 0.3 - 0.1 and 0.2
 
@@ -26,7 +26,7 @@ class PriorityEta(Policy):
     """
 
     def __init__(self, ageing_per_s: float = 0.002) -> None:
-        self.ageing_per_s = options.at_least("ageing_per_s", ageing_per_s, 0)
+        self.ageing_per_s = options.number("ageing_per_s", ageing_per_s, least=0)
 
     def advise(self, situation: Situation, rng: np.random.Generator) -> Sequence[Advice]:
         """See `Policy`."""
@@ -56,9 +56,9 @@ class Preemptive(Policy):
     def __init__(
         self, margin: float = 0.3, gain_s: float = 30.0, ageing_per_s: float = 0.002
     ) -> None:
-        self.margin = options.above("margin", margin, 0)
-        self.gain_s = options.at_least("gain_s", gain_s, 0)
-        self.ageing_per_s = options.at_least("ageing_per_s", ageing_per_s, 0)
+        self.margin = options.number("margin", margin, above=0)
+        self.gain_s = options.number("gain_s", gain_s, least=0)
+        self.ageing_per_s = options.number("ageing_per_s", ageing_per_s, least=0)
 
     def advise(self, situation: Situation, rng: np.random.Generator) -> Sequence[Advice]:
         """See `Policy`."""

@@ -12,30 +12,18 @@ from textwrap import wrap
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.experiments.study.labels import (
-    capital,
-    factor_name,
-    level_name,
-    listing,
-    measure_name,
-    named,
-    number,
-    percent,
-    quantity,
-    setting,
-)
 from dva_sim.experiments.study.schema import Level
 from dva_sim.kernel.units import unit_of
-
-# What is not there at a level of zero.
-_ABSENT = {
-    "link.delay_s": "delay",
-    "link.up.delay_s": "delay of commands",
-    "link.down.delay_s": "delay of frames",
-    "link.jitter_s": "jitter",
-    "link.loss": "packet loss",
-    "robot.processing_s": "processing time",
-}
+from dva_sim.kernel.wording import capital, listing, number, percent, quantity
+from dva_sim.simulation.labels import (
+    absent_at_zero,
+    factor_name,
+    level_name,
+    measure_called,
+    measure_name,
+    named,
+    setting,
+)
 
 
 def place_of(finding: Finding, stop: int) -> str:
@@ -81,8 +69,8 @@ def places(f: Finding, where: NDArray[np.intp]) -> str:
 def _spoken(f: Finding, where: Iterable[int]) -> str:
     """`without delay`, `on the poor link`, `with filter none`: where a bare level is no English."""
     levels = [f.levels[int(i)] for i in where]
-    if len(levels) == 1 and levels[0] == 0 and f.over in _ABSENT:
-        return f"without {_ABSENT[f.over]}"
+    if levels == [0] and (absent := absent_at_zero(f.over)):
+        return f"without {absent}"
     if all(isinstance(level, int | float) and not isinstance(level, bool) for level in levels):
         return ""
     names = listing([level_name(f.over, level) for level in levels])
@@ -107,7 +95,6 @@ def is_ordered(f: Finding) -> bool:
 
 Floats = NDArray[np.float64]
 
-_TAKEN = ("drive_time_s", "movement_time_s", "confirmation_mean_s", "response_mean_s")
 _LEAST = 0.01  # that is not printed as zero
 
 
@@ -361,7 +348,7 @@ def _after(where: str) -> str:
 
 
 def _what_misses_count(f: Finding) -> str:
-    if f.measure not in ("drive_time_s", "confirmation_mean_s"):
+    if measure_called(f.measure).awaits != "confirmation":
         return "Such a run counts with what was measured until it ended."
     horizon = f" ({quantity(f.horizon, 's')})" if f.horizon is not None else ""
     return f"Such a run counts with all the time it was given{horizon}."
@@ -378,7 +365,7 @@ def _comparison(f: Finding, difference: float) -> str:
     if difference == 0:
         return f"{first} equals {second}"
     size = quantity(abs(difference), f.unit)
-    if f.measure in _TAKEN:
+    if measure_called(f.measure).awaits:
         return f"{first} takes {size} {'longer' if difference > 0 else 'less'} than {second}"
     side = "above" if difference > 0 else "below"
     return f"{first} lies {size} {side} {second}"

@@ -30,8 +30,8 @@ from dva_sim.experiments.analysis.compare_rows import (
     match,
 )
 from dva_sim.experiments.analysis.fail_conditions import SIGNS, TESTS, Gate, Test, percent_of
-from dva_sim.experiments.results.data_dictionary import DESIGN
 from dva_sim.experiments.results.results import Frame, Results
+from dva_sim.experiments.study.schema import DESIGN
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import hint
 
@@ -39,7 +39,7 @@ _ROW = ("part", "cell", "person", "trial", "seed")
 
 
 @dataclass(frozen=True)
-class Group:
+class GateGroup:
     """Cells that are looked at together, never of two parts.
 
     Attributes:
@@ -66,7 +66,7 @@ class Comparison:
 
     def __init__(self, first: Results, second: Results) -> None:
         self.sides = (first, second)
-        self._luck: dict[Group, frozenset[Run]] = {}
+        self._luck: dict[GateGroup, frozenset[Run]] = {}
         self._frames: dict[tuple[int, str, str], Frame] = {}
         if not self.matched.pairs:
             raise ConfigError(
@@ -114,7 +114,7 @@ class Comparison:
             raise ConfigError(f"measure {name!r} is in several tables; name {several}")
         return where[0], column
 
-    def groups(self, by: Sequence[str] | None = ()) -> Iterator[Group]:
+    def groups(self, by: Sequence[str] | None = ()) -> Iterator[GateGroup]:
         """The cells in groups.
 
         Args:
@@ -132,9 +132,9 @@ class Comparison:
         for pair in self.matched.pairs:
             groups.setdefault(_group_of(pair, by), []).append(pair)
         for (part, levels, _), pairs in groups.items():
-            yield Group(part, levels, tuple(pairs))
+            yield GateGroup(part, levels, tuple(pairs))
 
-    def rows(self, side: int, table: str, column: str, group: Group) -> Rows:
+    def rows(self, side: int, table: str, column: str, group: GateGroup) -> Rows:
         """The values of a column in some cells of the first (0) or second (1) folder.
 
         Where both have runs with the same luck, only those are looked at. The cells bear the
@@ -143,7 +143,7 @@ class Comparison:
         rows, shared = self._rows(side, table, column, group), self._shared(group)
         return rows.of(shared) if shared else rows
 
-    def failed(self, side: int, group: Group) -> frozenset[Run]:
+    def failed(self, side: int, group: GateGroup) -> frozenset[Run]:
         """The runs of some cells that failed in the first (0) or second (1) folder."""
         number = {(p.first, p.second)[side]: p.first for p in group.pairs}
         return frozenset(
@@ -152,14 +152,14 @@ class Comparison:
             if run["part"] == group.part and run["cell"] in number
         )
 
-    def _shared(self, group: Group) -> frozenset[Run]:
+    def _shared(self, group: GateGroup) -> frozenset[Run]:
         """The runs of some cells that both folders have."""
         if group not in self._luck:
             first, second = (self._rows(side, "runs", "seed", group).runs for side in (0, 1))
             self._luck[group] = frozenset(first) & frozenset(second)
         return self._luck[group]
 
-    def _rows(self, side: int, table: str, column: str, group: Group) -> Rows:
+    def _rows(self, side: int, table: str, column: str, group: GateGroup) -> Rows:
         frame = self._frame(side, table, column)
         own = [(pair.first, pair.second)[side] for pair in group.pairs]
         number = dict(zip(own, (pair.first for pair in group.pairs), strict=True))
@@ -191,7 +191,7 @@ class Comparison:
                 found.append(difference(group.part, group.levels, *rows))
         return found
 
-    def judge(self, fail_if: str) -> list[Verdict]:
+    def judge(self, fail_if: str) -> list[GateVerdict]:
         """Look at a condition such as `p95(response_s) > 1.05x`, part by part.
 
         Raises:
@@ -265,7 +265,7 @@ def _alike(a: Any, b: Any) -> bool:
 
 
 @dataclass(frozen=True)
-class Verdict:
+class GateVerdict:
     """A gate in one group of cells.
 
     Attributes:
@@ -298,7 +298,7 @@ class Verdict:
         return bool(SIGNS[self.gate.sign](self.second, self.bound))
 
 
-def judge(gate: Gate, comparison: Comparison) -> list[Verdict]:
+def judge(gate: Gate, comparison: Comparison) -> list[GateVerdict]:
     """Look at a condition wherever both folders have cells in common.
 
     Raises:
@@ -316,8 +316,8 @@ def judge(gate: Gate, comparison: Comparison) -> list[Verdict]:
 
 
 def _verdicts(
-    gate: Gate, comparison: Comparison, table: str, column: str, groups: Iterator[Group]
-) -> Iterator[Verdict]:
+    gate: Gate, comparison: Comparison, table: str, column: str, groups: Iterator[GateGroup]
+) -> Iterator[GateVerdict]:
     for group in groups:
         crashed = [comparison.failed(n, group) for n in (0, 1)]
         if gate.statistic != "missing":
@@ -332,10 +332,12 @@ def _verdicts(
         first, second = found
         _refuse_undecided(gate, group, first, second)
         bound = gate.bound.for_(first)
-        yield Verdict(gate, group.part, group.levels, first, second, bound, (shares[0], shares[1]))
+        yield GateVerdict(
+            gate, group.part, group.levels, first, second, bound, (shares[0], shares[1])
+        )
 
 
-def _refuse_crashed(group: Group, runs: int) -> None:
+def _refuse_crashed(group: GateGroup, runs: int) -> None:
     """What would have come of runs that failed is not known."""
     if runs:
         raise ConfigError(
@@ -398,7 +400,7 @@ def _statistic(gate: Gate, rows: Rows) -> float:
     return float(ends.get(gate.statistic, values.mean()))
 
 
-def _refuse_undecided(gate: Gate, group: Group, first: float, second: float) -> None:
+def _refuse_undecided(gate: Gate, group: GateGroup, first: float, second: float) -> None:
     """A gate that cannot be decided must not pass for one that was."""
     where = f"in part {group.part}"
     needs_first = gate.bound.kind != "absolute"

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from dva_sim.experiments.analysis.paired_effects import (
     Floats,
     Setting,
+    StudyView,
     Table,
-    View,
     as_floats,
     codes_of,
 )
@@ -66,7 +66,7 @@ class Endings:
         horizon: Until when an ending counts, since the report [s].
     """
 
-    def __init__(self, view: View, events: Table, runs: Table, horizon: float) -> None:
+    def __init__(self, view: StudyView, events: Table, runs: Table, horizon: float) -> None:
         here = np.asarray(events["part"]) == view.part.name
         here &= ~np.asarray(events["is_reference"]).astype(bool)
         rows = {name: np.asarray(values)[here] for name, values in events.items()}
@@ -162,7 +162,7 @@ def _keys(table: Table) -> list[tuple[Any, ...]]:
     return list(zip(*(np.asarray(table[name]).tolist() for name in names), strict=True))
 
 
-def horizon_of(view: View, scenario: Mapping[str, Any]) -> float:
+def horizon_of(view: StudyView, scenario: Mapping[str, Any]) -> float:
     """Until when an ending counts [s]: as long as events are followed, or a run lasts."""
     if view.part.has("follow_s"):
         return float(np.nanmax(as_floats(view.part.treated["follow_s"])))

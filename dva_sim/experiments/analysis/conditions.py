@@ -8,71 +8,11 @@ from operator import itemgetter
 from typing import Any, NamedTuple
 
 from dva_sim.experiments.analysis.paired_effects import Factor
-from dva_sim.experiments.study.labels import factor_name, level_name
 from dva_sim.experiments.study.schema import POINT
+from dva_sim.simulation.labels import factor_name, level_name, stated_conditions
 from dva_sim.simulation.scenario import TRIPS_OF_A_START, time_out_s
 
 _VARIED = "varied"
-_CONDITIONS = {
-    "processing time of a command at the robot": "robot.processing_s",
-    "time-out of a request": "command.timeout_s",
-    "attempts": "command.attempts",
-    "watchdog of the robot": "robot.watchdog_s",
-    "age limit of a command": "robot.max_age_s",
-    "messaging pattern": "pattern",
-    "transport": "transport",
-    "high-water mark": "zeromq.high_water_mark",
-    "kept of what waits": "zeromq.conflate",
-    "send buffer": "zeromq.send_buffer_bytes",
-    "receive buffer": "zeromq.receive_buffer_bytes",
-    "wanted command rate": "command.rate_hz",
-    "one-way delay": "link.delay_s",
-    "jitter (half-width)": "link.jitter_s",
-    "packet loss, each way": "link.loss",
-    "link rate": "link.rate_bps",
-    "queue before the link": "link.queue_bytes",
-    "law of the delay": "link.delay_law",
-    "recorded delays": "link.delay_log",
-    "packets may overtake": "link.reorder",
-    "bursts of losses": "link.bursts",
-    "queue before the link, in packets": "link.queue_packets",
-    "outages": "link.outages",
-    "partitions": "link.partitions",
-    "recorded link, towards the robot": "link.trace_up",
-    "recorded link, from the robot": "link.trace_down",
-    "rate of the shared link": "bottleneck.rate_bps",
-    "its queue": "bottleneck.queue_bytes",
-    "its one-way delay": "bottleneck.delay_s",
-    "commands per second": "commands.rate_hz",
-    "size of a command": "commands.bytes",
-    "pictures per second": "pictures.rate_hz",
-    "size of a picture": "pictures.bytes",
-    "way that is driven": "drive.task.kind",
-    "camera rate": "camera.rate_hz",
-    "size of a frame": "camera.frame_bytes",
-    "field of view": "camera.field_of_view_deg",
-    "task": "task.kind",
-    "device": "device.kind",
-    "frames per second": "frames.rate_hz",
-    "delay of commands": "link.up.delay_s",
-    "delay of frames": "link.down.delay_s",
-    "share of the correction that the machine makes": "automation",
-    "phone": "phone.profile",
-    "filter": "phone.filter",
-    "mapping": "phone.mapping",
-    "gain of the phone": "phone.mapping_options.gain",
-    "sending": "phone.send",
-    "operator strategy": "operator.strategy",
-    "control": "control",
-    "robot": "robot.profile",
-    "robots": "robot.count",
-    "guards": "guard.count",
-    "operators": "operator.count",
-    "bystanders": "bystander.count",
-    "dispatch policy": "dispatch.policy",
-    "longest time of a run": "horizon_s",
-}
-_WAYS = {"otherwise towards the robot": "link.up", "otherwise from the robot": "link.down"}
 _NOWHERE = "–"
 _OF_WAITING = (
     *("command.timeout_s", "robot.processing_s"),
@@ -95,10 +35,9 @@ def conditions(
     varied = {factor.name for factor in factors}
     sites = [_site(s) for s in scenarios.values()]
     rows = [("site", sites)] if any(site != _NOWHERE for site in sites) else []
-    of_robots = all(get(s, "model") != "task" for s in scenarios.values())
-    stated = _CONDITIONS | (_WAYS if of_robots else {})
-    stated |= {factor_name(k): k for k in also if k not in _CONDITIONS.values()}
-    for name, key in stated.items():
+    stated = stated_conditions(dict.fromkeys(s.get("model", "full") for s in scenarios.values()))
+    stated |= {key: factor_name(key) for key in also if key not in stated}
+    for key, name in stated.items():
         values = [_stated(get(s, key)) for s in scenarios.values()]
         if key in varied:
             rows.append((name, [_VARIED] * len(values)))

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from dva_sim.agents.operator.published import ranges, supports_of
 from dva_sim.experiments.analysis.conditions import get
-from dva_sim.experiments.analysis.paired_effects import Floats, Part, nan_mean
+from dva_sim.experiments.analysis.paired_effects import Floats, RunGrid, nan_mean
 from dva_sim.experiments.study.schema import STRATEGY
 
 LOOP = "loop_delay_mean_s"
@@ -42,7 +42,7 @@ class Support:
     words: str
 
 
-def support_of_part(part: Part, scenario: Mapping[str, Any]) -> Support | None:
+def support_of_part(part: RunGrid, scenario: Mapping[str, Any]) -> Support | None:
     """What published data cover of a part; None where nobody's loop has a delay.
 
     Args:
@@ -63,13 +63,13 @@ def support_of_part(part: Part, scenario: Mapping[str, Any]) -> Support | None:
     return Support(delays, outside, "; ".join(map(_told, strategies)))
 
 
-def _strategies(part: Part, scenario: Mapping[str, Any]) -> tuple[str, ...]:
+def _strategies(part: RunGrid, scenario: Mapping[str, Any]) -> tuple[str, ...]:
     factor = next((f for f in part.factors if f.name == STRATEGY), None)
     names = factor.levels if factor else (get(scenario, STRATEGY),)
     return tuple(str(name) for name in names if name is not None)
 
 
-def _has(part: Part, strategy: str) -> Marks:
+def _has(part: RunGrid, strategy: str) -> Marks:
     """Which cells are driven by a strategy."""
     has = [setting.get(STRATEGY, strategy) == strategy for setting in part.settings()]
     return np.array(has).reshape([len(f.levels) for f in part.factors])

@@ -15,7 +15,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from dva_sim.experiments.analysis.layout import layout_of
-from dva_sim.experiments.analysis.paired_effects import Floats, Part, Setting, Table
+from dva_sim.experiments.analysis.paired_effects import Floats, RunGrid, Setting, Table
 from dva_sim.experiments.study.schema import ANSWER, POINT, Contrast, Hypothesis, Level
 from dva_sim.statistics import (
     LEVEL,
@@ -34,7 +34,7 @@ Verdict = Literal["held", "did not hold", "open", "not run"]
 _ALPHA = 1 - LEVEL
 
 
-class Pairs(NamedTuple):
+class PairedRuns(NamedTuple):
     """Both sides of a contrast, run by run `(n,)`, and whose run it was."""
 
     first: Floats
@@ -151,10 +151,10 @@ def verdict_of(tested: Tested) -> Verdict:
 
 def pairs_of(
     study: Mapping[str, Any], runs: Table, contrast: Contrast, at: Setting
-) -> Pairs | None:
+) -> PairedRuns | None:
     """Both sides of a contrast at one place; None where it was not run."""
     table, factors = layout_of(study, runs)
-    part = Part(table, contrast.part, factors)
+    part = RunGrid(table, contrast.part, factors)
     known = {f.name: f.levels for f in part.factors}
     wanted = dict(at) | {contrast.factor: contrast.contrast[0]}
     there = all(name in known and level in known[name] for name, level in wanted.items())
@@ -164,7 +164,7 @@ def pairs_of(
     grid = part.excess(contrast.measure) if in_excess else part.grid(contrast.measure)
     sides = [part.where(grid, dict(at) | {contrast.factor: level}) for level in contrast.contrast]
     person = np.broadcast_to(part.persons[:, np.newaxis], sides[0].shape)
-    return Pairs(sides[0].ravel(), sides[1].ravel(), person.ravel())
+    return PairedRuns(sides[0].ravel(), sides[1].ravel(), person.ravel())
 
 
 def contrasts_of(study: Mapping[str, Any]) -> dict[str, Contrast]:
@@ -229,7 +229,7 @@ def _tested(
     return Tested(name, claim, contrast, at, found, p=p, p_against=against)
 
 
-def _p(claim: Hypothesis, pairs: Pairs) -> float:
+def _p(claim: Hypothesis, pairs: PairedRuns) -> float:
     """Of the claim's own test."""
     if claim.direction == "same":
         return equivalence(*pairs, claim.margin).p
@@ -237,7 +237,7 @@ def _p(claim: Hypothesis, pairs: Pairs) -> float:
     return one_sided_test(*pairs, margin, claim.direction)
 
 
-def _p_against(claim: Hypothesis, pairs: Pairs) -> float:
+def _p_against(claim: Hypothesis, pairs: PairedRuns) -> float:
     """Of the opposite: on the other side of the margin, or beyond either end of it."""
     if claim.direction == "above":
         return one_sided_test(*pairs, claim.margin, "below")

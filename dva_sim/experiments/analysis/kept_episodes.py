@@ -35,7 +35,7 @@ class Tables(NamedTuple):
     names: Sequence[str]
 
 
-class Incident(NamedTuple):
+class SeenIncident(NamedTuple):
     """What happened, when [s] and where [m]."""
 
     kind: str
@@ -45,7 +45,7 @@ class Incident(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Episode:
+class KeptEpisode:
     """One run that was kept.
 
     Attributes:
@@ -64,14 +64,14 @@ class Episode:
     trial: int
     value: float
     moments: Table
-    incidents: tuple[Incident, ...]
+    incidents: tuple[SeenIncident, ...]
     kept: int
     rank: float
 
 
 def typical_and_worst(
     folder: Path, part: str, measure: str, tables: Tables
-) -> tuple[Episode, Episode] | None:
+) -> tuple[KeptEpisode, KeptEpisode] | None:
     """Of the runs kept, the one nearest to the median of all and the one with the largest value.
 
     A recording is preferred where the study kept some; else the tracks of the table are taken.
@@ -101,7 +101,7 @@ def typical_and_worst(
         who = int(runs["person"][row]), int(runs["trial"][row])
         rank = float((every < values[row]).mean())
         value = float(values[row])
-        episodes.append(Episode(where, *who, value, moments, incidents, len(rows), rank))
+        episodes.append(KeptEpisode(where, *who, value, moments, incidents, len(rows), rank))
     return episodes[0], episodes[1]
 
 
@@ -133,14 +133,14 @@ def _tracked(tracks: Table, part: str, runs: Table) -> NDArray[np.intp]:
 
 def _seen(
     files: Mapping[int, Path], tracks: Table, part: str, runs: Table, row: int
-) -> tuple[Table, tuple[Incident, ...]]:
+) -> tuple[Table, tuple[SeenIncident, ...]]:
     """Who was where and what happened, from the recording or else from the table."""
     if row in files:
         from dva_sim.recordings.reading import read_lapse
 
         lapse = read_lapse(files[row])
         places = [(i, i.hazard.position) for i in lapse.incidents]
-        found = (Incident(i.kind, float(i.start), float(x), float(y)) for i, (x, y) in places)
+        found = (SeenIncident(i.kind, float(i.start), float(x), float(y)) for i, (x, y) in places)
         return lapse.tracks, tuple(found)
     cell, person, trial = _key(runs, row)
     mine = np.asarray(tracks["part"]) == part

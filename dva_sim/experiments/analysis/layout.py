@@ -12,20 +12,19 @@ from dva_sim.experiments.analysis.answer import Finding, Missed
 from dva_sim.experiments.analysis.paired_effects import (
     Factor,
     Floats,
-    Part,
+    RunGrid,
+    StudyView,
     Table,
-    View,
     as_floats,
     person_means,
     plain_level,
     present,
 )
-from dva_sim.experiments.study.labels import brief
 from dva_sim.experiments.study.schema import POINT, TUNING, Level
 from dva_sim.kernel.units import unit_of
+from dva_sim.simulation.labels import brief, measure_called
 from dva_sim.statistics import Interval, band
 
-_NEVER_NEGATIVE = ("s", "m", "Hz", "bit/s", "N s")
 ROW = "row"  # name of the factor whose levels are the rows of a list
 _KEYS = {"part", "cell", "config", "is_reference", "person", "trial", "seed"}
 
@@ -143,7 +142,7 @@ def _distinct(levels: Sequence[Any]) -> tuple[Any, ...]:
     return tuple(level for i, level in enumerate(levels) if level not in levels[:i])
 
 
-def view_of(study: Mapping[str, Any], runs: Table) -> View | None:
+def view_of(study: Mapping[str, Any], runs: Table) -> StudyView | None:
     """The view that the declared answer asks for, or a sensible one without it.
 
     Returns None where there is no run to look at.
@@ -152,7 +151,7 @@ def view_of(study: Mapping[str, Any], runs: Table) -> View | None:
     parts = list(dict.fromkeys(str(p) for p in runs["part"]))
     name = declared.get("part") if declared.get("part") in parts else next(iter(parts), None)
     table, factors = layout_of(study, runs)
-    part = Part(table, name, factors) if name else None
+    part = RunGrid(table, name, factors) if name else None
     if part is None or not len(part):
         return None
     over = _factor(part, declared.get("over"))
@@ -162,7 +161,7 @@ def view_of(study: Mapping[str, Any], runs: Table) -> View | None:
     line = line or _other(part.factors, over)
     within = {k: v for k, v in (declared.get("within") or {}).items() if _factor(part, k)}
     measure = declared.get("measure") or _first_measure(part)
-    return View(
+    return StudyView(
         part=part,
         measure=measure,
         line=line,
@@ -175,7 +174,7 @@ def view_of(study: Mapping[str, Any], runs: Table) -> View | None:
     )
 
 
-def finding_of(view: View) -> Finding | None:
+def finding_of(view: StudyView) -> Finding | None:
     """The declared contrast, measured; None where no contrast was declared or run."""
     if view.contrast is None or view.line is None:
         return None
@@ -206,11 +205,9 @@ def finding_of(view: View) -> Finding | None:
 
 def possible_values(measure: str, scenario: Mapping[str, Any]) -> tuple[float, float]:
     """The least and the greatest value that a measure can take in a run of a scenario."""
-    if measure == "confirmed" or measure.endswith("_share"):
-        return 0.0, 1.0
-    if measure in ("drive_time_s", "confirmation_mean_s", "response_mean_s"):
-        return 0.0, float(scenario.get("horizon_s", math.inf))
-    return (0.0 if unit_of(measure) in _NEVER_NEGATIVE else -math.inf), math.inf
+    column = measure_called(measure, scenario.get("model", "full"))
+    low, high = column.bounds
+    return low, min(high, float(scenario.get("horizon_s", math.inf))) if column.awaits else high
 
 
 def interval_of(values: Floats) -> Interval | None:
@@ -227,7 +224,7 @@ def interval_of(values: Floats) -> Interval | None:
     return Interval(mean, low, high, found.n_persons)
 
 
-def _missed(view: View) -> tuple[Missed, ...]:
+def _missed(view: StudyView) -> tuple[Missed, ...]:
     """Runs without confirmation at the last stop, for every line."""
     if not view.part.has("confirmed"):
         return ()
@@ -239,12 +236,12 @@ def _missed(view: View) -> tuple[Missed, ...]:
     return tuple(found)
 
 
-def _all_confirmed(view: View) -> bool:
+def _all_confirmed(view: StudyView) -> bool:
     """Whether no run of any cell ended without a confirmation."""
     return view.part.has("confirmed") and bool((present(view.part.grid("confirmed")) == 1).all())
 
 
-def _horizon(view: View) -> float | None:
+def _horizon(view: StudyView) -> float | None:
     """What missed runs count with, if it is one and the same time."""
     if not view.part.has("confirmed") or unit_of(view.measure) != "s":
         return None
@@ -253,7 +250,7 @@ def _horizon(view: View) -> float | None:
     return float(counted[0]) if len(counted) == 1 else None
 
 
-def _factor(part: Part, name: str | None) -> Factor | None:
+def _factor(part: RunGrid, name: str | None) -> Factor | None:
     return next((f for f in part.factors if f.name == name), None)
 
 
@@ -266,11 +263,12 @@ def _other(factors: Sequence[Factor], over: Factor | None) -> Factor | None:
     return next((f for f in factors if f is not over), None)
 
 
-def _first_measure(part: Part) -> str:
+def _first_measure(part: RunGrid) -> str:
     names = [c for c in part.treated if c not in _KEYS and part.has(c)]
     factors = {f.name for f in part.factors}
     measures = [c for c in names if c not in factors]
-    return "drive_time_s" if "drive_time_s" in measures else next(iter(measures), "seed")
+    times = (name for name in measures if measure_called(name).awaits)
+    return next(times, next(iter(measures), "seed"))
 
 
 def _contrast(declared: Mapping[str, Any], line: Factor | None) -> tuple[Level, Level] | None:

@@ -39,7 +39,7 @@ class Factor:
         return all(isinstance(v, int | float) and not isinstance(v, bool) for v in self.levels)
 
 
-class Part:
+class RunGrid:
     """The runs of one part of a study, as a grid.
 
     Args:
@@ -141,7 +141,7 @@ class Part:
 
 
 @dataclass(frozen=True)
-class View:
+class StudyView:
     """How a reader looks at a part: what runs along x, what is a line, what is a panel.
 
     Attributes:
@@ -158,7 +158,7 @@ class View:
         averages_points: Whether the trials are points in ranges, over which means are taken.
     """
 
-    part: Part
+    part: RunGrid
     measure: str
     line: Factor | None
     over: Factor | None

@@ -18,11 +18,12 @@ from typing import Any, Literal
 import numpy as np
 
 from dva_sim.experiments.analysis.layout import interval_of
-from dva_sim.experiments.analysis.paired_effects import Setting, View
-from dva_sim.experiments.study.labels import level_name, measure_of, number, quantity, setting
+from dva_sim.experiments.analysis.paired_effects import Setting, StudyView
 from dva_sim.experiments.study.schema import TUNING, Level, Prediction, Range
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.units import unit_of
+from dva_sim.kernel.wording import number, quantity
+from dva_sim.simulation.labels import level_name, measure_of, setting
 from dva_sim.statistics import Interval
 
 Verdict = Literal["held", "did not hold", "open", "not judged"]
@@ -48,7 +49,7 @@ class Judged:
     verdict: Verdict
 
 
-def judge_all(study: Mapping[str, Any], view: View | None) -> list[Judged]:
+def judge_all(study: Mapping[str, Any], view: StudyView | None) -> list[Judged]:
     """Every prediction of a study, as its manifest holds it."""
     found = [Prediction.model_validate(p) for p in study.get("predictions") or ()]
     return [_judge(prediction, view) for prediction in found]
@@ -85,7 +86,7 @@ def _of_range(expected: Range, found: Interval) -> Verdict:
     return "did not hold" if apart else "open"
 
 
-def _judge(prediction: Prediction, view: View | None) -> Judged:
+def _judge(prediction: Prediction, view: StudyView | None) -> Judged:
     text = prediction.text
     if prediction.direction is None:
         return Judged(text, "", "", "not judged")
@@ -112,7 +113,9 @@ def _range_words(expected: Range | None, unit: str) -> str:
     return f", {number(expected[0])} to {quantity(expected[1], unit)}" if expected else ""
 
 
-def _asked(prediction: Prediction, view: View) -> tuple[str, tuple[Level, Level], Setting] | None:
+def _asked(
+    prediction: Prediction, view: StudyView
+) -> tuple[str, tuple[Level, Level], Setting] | None:
     """Factor, levels and place of the contrast; None where they were not run."""
     if view.line is None:
         return None
@@ -132,7 +135,7 @@ def _asked(prediction: Prediction, view: View) -> tuple[str, tuple[Level, Level]
     return (factor, contrast, where) if ran else None
 
 
-def _chose_what_was(view: View, contrast: tuple[Level, Level], where: Setting) -> bool:
+def _chose_what_was(view: StudyView, contrast: tuple[Level, Level], where: Setting) -> bool:
     """Whether tuned and untuned runs are the same in all that was measured of them."""
     columns = [view.part.grid(name) for name in view.part.treated if name not in _NAMES]
     pairs = [[view.part.where(c, where | {TUNING: level}) for level in contrast] for c in columns]
@@ -140,7 +143,7 @@ def _chose_what_was(view: View, contrast: tuple[Level, Level], where: Setting) -
 
 
 def _measured(
-    view: View, factor: str, contrast: tuple[Level, Level], where: Setting
+    view: StudyView, factor: str, contrast: tuple[Level, Level], where: Setting
 ) -> Interval | None:
     """The paired difference at one place."""
     first, second = (view.part.where(view.values, where | {factor: level}) for level in contrast)

@@ -12,18 +12,12 @@ from dva_sim.experiments.analysis.answer import Finding
 from dva_sim.experiments.analysis.conditions import get
 from dva_sim.experiments.analysis.extrapolation import support_of_part
 from dva_sim.experiments.analysis.layout import interval_of
-from dva_sim.experiments.analysis.paired_effects import Factor, Part, Table, View
-from dva_sim.experiments.study.labels import (
-    factor_name,
-    level_name,
-    listing,
-    number,
-    percent,
-    quantity,
-)
+from dva_sim.experiments.analysis.paired_effects import Factor, RunGrid, StudyView, Table
 from dva_sim.experiments.study.robustness_grid import PARAMETERS
 from dva_sim.experiments.study.schema import REPEATS, STRATEGY, Level
 from dva_sim.kernel.units import unit_of
+from dva_sim.kernel.wording import listing, number, percent, quantity
+from dva_sim.simulation.labels import factor_name, level_name
 
 
 @dataclass(frozen=True)
@@ -50,7 +44,7 @@ class Repeat:
 
 
 @dataclass(frozen=True)
-class Stop:
+class RepeatedStop:
     """All repeats at one level of the factor that the answer runs over.
 
     Attributes:
@@ -98,7 +92,7 @@ class Stop:
 
 
 @dataclass(frozen=True)
-class Robustness:
+class RepeatedAnswer:
     """The answer's contrast under every model it was repeated with.
 
     Attributes:
@@ -111,7 +105,7 @@ class Robustness:
         trials: Of each.
     """
 
-    stops: tuple[Stop, ...]
+    stops: tuple[RepeatedStop, ...]
     over: str
     measure: str
     strategies: tuple[str, ...]
@@ -128,10 +122,10 @@ class Robustness:
 def robustness_of(
     study: Mapping[str, Any],
     table: Table,
-    view: View,
+    view: StudyView,
     finding: Finding,
     scenario: Mapping[str, Any],
-) -> Robustness | None:
+) -> RepeatedAnswer | None:
     """Read the table of repeats; None where none were declared.
 
     Args:
@@ -152,10 +146,10 @@ def robustness_of(
         Factor(view.line.name, view.contrast),
         Factor(view.over.name, at),
     ]
-    part = Part(table, REPEATS, factors)
+    part = RunGrid(table, REPEATS, factors)
     read = _Reading(part, finding, scenario)
     stops = tuple(_stop(read, view, level) for level in at)
-    return Robustness(
+    return RepeatedAnswer(
         stops=stops,
         over=view.over.name,
         measure=view.measure,
@@ -169,7 +163,7 @@ def robustness_of(
 class _Reading:
     """The repeats of a study, and what is known of each besides its effect."""
 
-    def __init__(self, part: Part, finding: Finding, scenario: Mapping[str, Any]) -> None:
+    def __init__(self, part: RunGrid, finding: Finding, scenario: Mapping[str, Any]) -> None:
         self.part, self.finding = part, finding
         self._own, support = get(scenario, STRATEGY), support_of_part(part, scenario)
         self._outside = None if support is None else support.outside.astype(float)
@@ -189,7 +183,7 @@ class _Reading:
         )
 
 
-def _stop(read: _Reading, view: View, level: Level) -> Stop:
+def _stop(read: _Reading, view: StudyView, level: Level) -> RepeatedStop:
     assert view.over is not None
     finding, at = read.finding, view.stops.index(level)
     repeats = [
@@ -197,7 +191,7 @@ def _stop(read: _Reading, view: View, level: Level) -> Stop:
         for model in read.part.settings(but=(str(finding.factor), view.over.name))
         if (repeat := _repeat(read, model | {view.over.name: level})) is not None
     ]
-    return Stop(
+    return RepeatedStop(
         level=level,
         found=float(finding.mean[at]),
         low=float(finding.low[at]),
@@ -229,12 +223,12 @@ def _repeat(read: _Reading, where: dict[str, Level]) -> Repeat | None:
     )
 
 
-def sentences(robustness: Robustness) -> list[str]:
+def sentences(robustness: RepeatedAnswer) -> list[str]:
     """In how many repeats the conclusion holds, and how far effects reach."""
     return [_what_was_repeated(robustness), *(_told(robustness, s) for s in robustness.stops)]
 
 
-def _what_was_repeated(r: Robustness) -> str:
+def _what_was_repeated(r: RepeatedAnswer) -> str:
     strategies = [level_name(STRATEGY, name) for name in r.strategies]
     under = f" under each of {listing(strategies)}," if strategies else ""
     others = "one other set" if r.sets == 1 else f"{r.sets} other sets"
@@ -246,7 +240,7 @@ def _what_was_repeated(r: Robustness) -> str:
     )
 
 
-def _told(r: Robustness, stop: Stop) -> str:
+def _told(r: RepeatedAnswer, stop: RepeatedStop) -> str:
     count = len(stop.others)
     where = f"At {factor_name(r.over)} {level_name(r.over, stop.level)}"
     if not count:
@@ -261,7 +255,7 @@ def _told(r: Robustness, stop: Stop) -> str:
     return f"{told}. Effects run from {reach}.{_where_it_fails(r, stop)}{_beyond(stop)}"
 
 
-def _beyond(stop: Stop) -> str:
+def _beyond(stop: RepeatedStop) -> str:
     """How many of them are extrapolations."""
     beyond = sum(r.is_beyond for r in stop.others)
     if not beyond:
@@ -272,7 +266,7 @@ def _beyond(stop: Stop) -> str:
     )
 
 
-def _where_it_fails(r: Robustness, stop: Stop) -> str:
+def _where_it_fails(r: RepeatedAnswer, stop: RepeatedStop) -> str:
     """Under which strategies the sign is another."""
     failed = []
     for name in r.strategies:

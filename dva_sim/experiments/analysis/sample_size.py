@@ -15,18 +15,28 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dva_sim.experiments.analysis.hypothesis_tests import (
-    Pairs,
+    PairedRuns,
     claims_of,
     contrasts_of,
     pairs_of,
     places_of,
 )
 from dva_sim.experiments.analysis.layout import view_of
-from dva_sim.experiments.analysis.paired_effects import Floats, Setting, Table, View
-from dva_sim.experiments.study.labels import level_name, measure_of, quantity, setting
+from dva_sim.experiments.analysis.paired_effects import Floats, Setting, StudyView, Table
 from dva_sim.experiments.study.schema import ANSWER, Contrast, Hypothesis
 from dva_sim.kernel.units import unit_of
-from dva_sim.statistics import LEVEL, MOST_PERSONS, Band, Interval, Law, band, law_of, mean_interval
+from dva_sim.kernel.wording import quantity
+from dva_sim.simulation.labels import level_name, measure_of, setting
+from dva_sim.statistics import (
+    LEVEL,
+    MOST_PERSONS,
+    Band,
+    Interval,
+    IntervalLaw,
+    band,
+    law_of,
+    mean_interval,
+)
 
 POWERS = (0.8, 0.9)
 _ALPHA = 1 - LEVEL
@@ -44,7 +54,7 @@ class Count(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Plan:
+class SizePlan:
     """What a study would need to show one thing.
 
     Attributes:
@@ -68,7 +78,7 @@ class _Test(NamedTuple):
     name: str
     what: str
     assumed: str
-    law: Law
+    law: IntervalLaw
     distance: float  # of the true difference from the nearest bound that is tested
     other: float = math.inf  # its distance from the bound on the other side, if there is one
     least: int = 2  # persons without whom the test cannot come out
@@ -76,7 +86,7 @@ class _Test(NamedTuple):
 
 def plans(
     study: Mapping[str, Any], runs: Table, decided: Collection[str] | None = None
-) -> list[Plan]:
+) -> list[SizePlan]:
     """What each hypothesis and each other comparison would need, and the answer where it is open.
 
     Args:
@@ -110,7 +120,7 @@ def _families(
     return tests
 
 
-def _of_answer(view: View | None, in_any_case: bool) -> list[_Test]:
+def _of_answer(view: StudyView | None, in_any_case: bool) -> list[_Test]:
     """What would settle the answer's question where it is open, at the level that needs most."""
     if view is None or view.contrast is None or view.line is None:
         return []
@@ -125,14 +135,14 @@ def _of_answer(view: View | None, in_any_case: bool) -> list[_Test]:
     return max(filter(None, tests), key=lambda some: _plan(some[0]).counts[0].persons, default=[])
 
 
-def _to_settle(view: View, found: Band, differences: Floats, stop: int) -> Iterator[_Test]:
+def _to_settle(view: StudyView, found: Band, differences: Floats, stop: int) -> Iterator[_Test]:
     """An effect that seems not to matter is to be shown small, any other not to be zero."""
     mean, smallest = float(found.mean[stop]), view.smallest_effect
     reach = mean - float(found.low[stop]), float(found.high[stop]) - mean
     sides, unit = _sides_of(view, stop), unit_of(view.measure)
     each = 1 - _ALPHA / int(np.isfinite(found.critical).sum())
 
-    def law(reach: float) -> Law:
+    def law(reach: float) -> IntervalLaw:
         known = law_of(differences[:, stop], np.arange(len(differences)), reach, each)
         assert known is not None  # there is a band
         return known
@@ -207,16 +217,16 @@ def _of_comparisons(
             yield _Test(name, what, assumed, law, effect, least=least)
 
 
-def _interval(pairs: Pairs, level: float) -> Interval:
+def _interval(pairs: PairedRuns, level: float) -> Interval:
     """Of the mean difference, as a report shows it but for its level."""
     return mean_interval(pairs.first - pairs.second, pairs.person, level)
 
 
-def _law(pairs: Pairs, reach: float, level: float) -> Law | None:
+def _law(pairs: PairedRuns, reach: float, level: float) -> IntervalLaw | None:
     return law_of(pairs.first - pairs.second, pairs.person, reach, level)
 
 
-def _plan(test: _Test) -> Plan:
+def _plan(test: _Test) -> SizePlan:
     law = test.law
 
     def chance(persons: int) -> float:
@@ -225,7 +235,7 @@ def _plan(test: _Test) -> Plan:
 
     wanted = POWERS if test.distance > 0 else ()
     counts = tuple(_count(chance, share, law.persons, test.least) for share in wanted)
-    return Plan(test.name, test.what, test.assumed, law.persons, counts)
+    return SizePlan(test.name, test.what, test.assumed, law.persons, counts)
 
 
 def _count(chance: Callable[[int], float], wanted: float, known: int, least: int) -> Count:
@@ -262,7 +272,7 @@ def _sides(contrast: Contrast, at: Setting) -> str:
     return _told(contrast.factor, contrast.contrast, measure, at)
 
 
-def _sides_of(view: View, stop: int) -> str:
+def _sides_of(view: StudyView, stop: int) -> str:
     assert view.line is not None
     assert view.contrast is not None
     at = dict(view.panels[0]) | view.at_stop(stop)

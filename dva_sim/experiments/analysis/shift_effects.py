@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dva_sim.experiments.analysis.paired_effects import (
+    StudyView,
     Table,
-    View,
     codes_of,
     nan_mean,
     person_means,
 )
-from dva_sim.experiments.study.labels import setting
+from dva_sim.simulation.labels import setting
 from dva_sim.simulation.shift.bounds import Floats, share_of_the_way
 from dva_sim.simulation.shift.measures import FOLLOW_S
 from dva_sim.statistics import LEVEL, Band, band
@@ -27,7 +27,7 @@ POLICY, INTENSITY = "dispatch.policy", "intensity"
 FLOOR, BEST, CALIBRATED = "random", "oracle", "nearest_idle"
 
 
-def is_dispatch(view: View | None) -> bool:
+def is_dispatch(view: StudyView | None) -> bool:
     """Whether a study compares policies on timed shifts, one line each."""
     if view is None or view.line is None or view.line.name != POLICY:
         return False
@@ -42,7 +42,7 @@ class Shifts:
         events: Columns of the table `events`, if there is one.
     """
 
-    def __init__(self, view: View, events: Table | None = None) -> None:
+    def __init__(self, view: StudyView, events: Table | None = None) -> None:
         self.view = view
         self.policies = tuple(str(level) for level in view.lines)
         self.stops = range(len(view.stops))

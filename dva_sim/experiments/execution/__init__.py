@@ -1,1 +1,5 @@
-"""Running a study: jobs, executors, the checkpoint, and what it leaves on disk."""
+"""How a study is run: by which workers, in which rounds, and how it goes on after an interruption.
+
+It may import `study` and `results`. Begin reading at `runner.py`, then `scheduling.py` (runs handed
+out in chunks) and `checkpoint.py` (what is done so far).
+"""

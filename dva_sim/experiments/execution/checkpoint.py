@@ -1,22 +1,32 @@
-"""What a running study has done so far: one row per run, safe against being killed."""
+"""What a running study has done so far: one row per run, safe against being killed.
+
+From it a study is gone on with, and shown while it still runs.
+"""
 
 from __future__ import annotations
 
 import json
 import os
+import shutil
 import sqlite3
+import tempfile
 import time
-from collections.abc import Iterable, Iterator, Mapping
+import weakref
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
+from dva_sim.experiments.results.manifest import failures
+from dva_sim.experiments.results.results import JOURNAL, MANIFEST, TABLES, Results, digests
+from dva_sim.experiments.results.tables import write_tables
+from dva_sim.experiments.study.cell_grid import RunKey, StudyRun, runs_in
 from dva_sim.kernel.errors import ConfigError, DvaSimError
+from dva_sim.simulation.models import Tables
 
-FILE = "journal.sqlite"
-_PATIENCE_S = 600.0  # how long another runner may hold the journal, to write its tables
+_PATIENCE_S = 600.0  # how long another runner may hold the checkpoint, to write its tables
 _LOOK_S = 1.0  # Ctrl-C is not heard for as long
 
 _SCHEMA = """
@@ -33,13 +43,9 @@ SET tables = excluded.tables, cost_s = excluded.cost_s, error = excluded.error
 WHERE tables IS NULL
 """
 
-Key = tuple[str, int]
-Value = bool | int | float | str | None
-Tables = dict[str, list[dict[str, Value]]]
-
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class RunOutcome:
     """How one run ended.
 
     Attributes:
@@ -49,32 +55,32 @@ class Outcome:
         error: Why it failed; None if it did not.
     """
 
-    key: Key
+    key: RunKey
     tables: str | None
     cost_s: float = 0.0
     error: str | None = None
 
 
-class Journal:
+class Checkpoint:
     """The runs of one study, in a SQLite file in WAL mode: one row for each.
 
     A batch is kept whole or not at all. A run kept twice (by two runners) is kept once.
 
     Args:
         folder: Results folder, which must exist.
-        identity: Hash of the study; a journal belongs to one study. None: whoever's it is.
+        identity: Hash of the study; a checkpoint belongs to one study. None: whoever's it is.
         must_exist: It is to be read only, not begun.
 
     Attributes:
         identity: Hash of its study.
 
     Raises:
-        ConfigError: the journal is another study's, or not a journal.
+        ConfigError: the checkpoint is another study's, or not a checkpoint.
         DvaSimError: it cannot be written, or another program holds it.
     """
 
     def __init__(self, folder: Path, identity: str | None, must_exist: bool = False) -> None:
-        self.path = folder / FILE
+        self.path = folder / JOURNAL
         with self._told():
             self._db = self._connected(must_exist)
             try:
@@ -106,7 +112,7 @@ class Journal:
                 self._db.execute(statement)
             self._db.execute("INSERT OR IGNORE INTO study (id, identity) VALUES (1, ?)", [identity])
 
-    def __enter__(self) -> Journal:
+    def __enter__(self) -> Checkpoint:
         return self
 
     def __exit__(
@@ -117,7 +123,7 @@ class Journal:
     ) -> None:
         self._db.close()
 
-    def add(self, batch: Iterable[Outcome], wall_s: float = 0.0) -> None:
+    def add(self, batch: Iterable[RunOutcome], wall_s: float = 0.0) -> None:
         """Keep some outcomes; a success takes the place of a failure, never the reverse.
 
         Args:
@@ -125,7 +131,7 @@ class Journal:
             wall_s: Time gone by since the last batch [s].
 
         Raises:
-            DvaSimError: the disk is full, or another program holds the journal.
+            DvaSimError: the disk is full, or another program holds the checkpoint.
         """
         rows = [(*o.key, o.tables, o.cost_s, _error(o)) for o in batch]
         with self._told(), self._transaction():
@@ -137,7 +143,7 @@ class Journal:
         """Keep other runners of this study waiting for as long as the block takes.
 
         Raises:
-            DvaSimError: another program holds the journal.
+            DvaSimError: another program holds the checkpoint.
         """
         with self._told():
             self._patiently("BEGIN IMMEDIATE")
@@ -158,7 +164,7 @@ class Journal:
             raise
 
     def _patiently(self, statement: str) -> None:
-        """Wait for whoever holds the journal, in steps that let Ctrl-C through."""
+        """Wait for whoever holds the checkpoint, in steps that let Ctrl-C through."""
         end = time.monotonic() + _PATIENCE_S
         while True:
             try:
@@ -172,7 +178,7 @@ class Journal:
         """Keep what the study is, so that it can be read from here before it is complete.
 
         Raises:
-            DvaSimError: the disk is full, or another program holds the journal.
+            DvaSimError: the disk is full, or another program holds the checkpoint.
         """
         with self._told(), self._transaction():
             self._db.execute("UPDATE study SET manifest = ?", [json.dumps(manifest)])
@@ -186,26 +192,26 @@ class Journal:
             (text,) = self._db.execute("SELECT manifest FROM study").fetchone()
         return None if text is None else dict(json.loads(text))
 
-    def done(self) -> set[Key]:
+    def done(self) -> set[RunKey]:
         """Keys of the runs that need not be run again."""
         query = "SELECT config, seed FROM runs WHERE tables IS NOT NULL"
         with self._told():
             return set(self._db.execute(query))
 
-    def failures(self) -> dict[Key, str]:
+    def failures(self) -> dict[RunKey, str]:
         """Runs that failed and have not succeeded since, with the reason."""
         query = "SELECT config, seed, error FROM runs WHERE tables IS NULL"
         with self._told():
             return {(config, seed): error for config, seed, error in self._db.execute(query)}
 
-    def tables(self, key: Key) -> Tables | None:
+    def tables(self, key: RunKey) -> Tables | None:
         """The tables of a run; None if it is not done."""
         query = "SELECT tables FROM runs WHERE config = ? AND seed = ?"
         with self._told():
             row = self._db.execute(query, key).fetchone()
         return json.loads(row[0]) if row is not None and row[0] is not None else None
 
-    def costs(self) -> dict[Key, float]:
+    def costs(self) -> dict[RunKey, float]:
         """What each run that is done has cost [CPU s]."""
         query = "SELECT config, seed, cost_s FROM runs WHERE tables IS NOT NULL"
         with self._told():
@@ -231,7 +237,7 @@ class Journal:
             ) from None
 
 
-def _error(outcome: Outcome) -> str | None:
+def _error(outcome: RunOutcome) -> str | None:
     return None if outcome.tables is not None else outcome.error or "failed"
 
 
@@ -245,3 +251,68 @@ def _remedy(problem: str) -> str:
     if "I/O" in problem:
         return f"{problem}: is the disk full or gone? finished runs are kept: run the command again"
     return problem
+
+
+def load_so_far(folder: str | Path) -> Results:
+    """Open a results folder, also one whose study is still running or was interrupted.
+
+    Of an unfinished study, only persons count who have all of their runs, so that every
+    comparison is paired and no cell has other persons than its neighbour. The key `partial` of
+    the manifest then tells how much is there.
+
+    Raises:
+        ConfigError: it is no results folder, or no person has all runs yet.
+    """
+    folder = Path(folder)
+    if (folder / MANIFEST).exists() or not (folder / JOURNAL).exists():
+        return Results.load(folder)
+    with Checkpoint(folder, None, must_exist=True) as checkpoint:
+        return _so_far(folder, checkpoint)
+
+
+def _so_far(folder: Path, checkpoint: Checkpoint) -> Results:
+    manifest = checkpoint.manifest()
+    if manifest is None:
+        raise ConfigError(
+            f"{folder} holds an unfinished study of another version of dva-sim, which can only "
+            "be shown when it is complete"
+        )
+    every = runs_in(manifest)
+    done, failed = checkpoint.done(), checkpoint.failures()
+    whole = _of_whole_persons(every, done | failed.keys())
+    keys = {run.key for run in every}
+    if not any(run.key in done for run in whole):
+        raise ConfigError(
+            f"{folder}: {len(done & keys)} of {len(keys)} runs are done, and no person has all of "
+            "theirs yet; try again in a while"
+        )
+    persons = len({run.person for run in whole})
+    manifest["partial"] = {"done": len(done & keys), "of": len(keys), "persons": persons}
+    manifest["runs"] = len({run.key for run in whole})
+    manifest["failures"] = failures(whole, failed)
+    aside = _tables_aside(whole, checkpoint)
+    manifest["tables"] = digests(aside / TABLES)
+    results = Results(folder, manifest, aside)
+    weakref.finalize(results, shutil.rmtree, aside, ignore_errors=True)
+    return results
+
+
+def _of_whole_persons(runs: Sequence[StudyRun], ended: Iterable[RunKey]) -> list[StudyRun]:
+    """The runs of the persons of whom no run is left to make."""
+    there = set(ended)
+    unfinished = {run.person for run in runs if run.key not in there}
+    return [run for run in runs if run.person not in unfinished]
+
+
+def _tables_aside(runs: Sequence[StudyRun], checkpoint: Checkpoint) -> Path:
+    """Tables of some runs, in a folder of their own that does not disturb who still runs."""
+    try:
+        aside = Path(tempfile.mkdtemp(prefix="dva-sim-"))
+    except OSError as error:
+        raise DvaSimError(f"tables cannot be kept for a moment: {error.strerror}") from None
+    try:
+        write_tables(aside, runs, checkpoint.tables)
+    except BaseException:
+        shutil.rmtree(aside, ignore_errors=True)
+        raise
+    return aside

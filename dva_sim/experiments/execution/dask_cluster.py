@@ -1,4 +1,4 @@
-"""An existing dask.distributed cluster as a place for runs.
+"""An existing dask.distributed cluster as the workers of a study.
 
 The scheduler itself gives the chunks of a worker that died to the others. Workers may differ from
 this machine in nothing that a run's numbers depend on; each says so before its first run.
@@ -22,7 +22,7 @@ from functools import cache, partial
 from types import TracebackType
 from typing import Any, ParamSpec, TypeVar
 
-from dva_sim.experiments.execution.executors import PlaceLost
+from dva_sim.experiments.execution.executors import WorkersLost
 from dva_sim.experiments.results.manifest import versions
 from dva_sim.kernel.errors import ConfigError, DvaSimError
 
@@ -43,7 +43,7 @@ class OtherProgram(DvaSimError):
     """A worker has another program, or other packages, than who sent the work."""
 
 
-class Cluster:
+class DaskCluster:
     """The workers of a scheduler.
 
     Args:
@@ -76,7 +76,7 @@ class Cluster:
             self._open = self._open.pop_all()
         self._seen = time.monotonic()
 
-    def __enter__(self) -> Cluster:
+    def __enter__(self) -> DaskCluster:
         return self
 
     def __exit__(
@@ -102,7 +102,7 @@ class Cluster:
             raise
         except Exception as error:
             if isinstance(error, CancelledError) or not self._is_connected():
-                raise PlaceLost(f"the scheduler at {self.address} is gone") from None
+                raise WorkersLost(f"the scheduler at {self.address} is gone") from None
             raise DvaSimError(
                 f"the cluster at {self.address} cannot run this program: {_line(error)}; its "
                 "scheduler and workers need the same dva-sim as here"
@@ -118,16 +118,16 @@ class Cluster:
         """See whether anybody is left to work.
 
         Raises:
-            PlaceLost: nobody is, and has not been for some time.
+            WorkersLost: nobody is, and has not been for some time.
         """
         now = time.monotonic()
         workers = self._workers() if is_idle else None
         if workers or not is_idle:
             self._seen = now
         elif not self._is_connected():
-            raise PlaceLost(f"the scheduler at {self.address} is gone")
+            raise WorkersLost(f"the scheduler at {self.address} is gone")
         elif now - self._seen > _WORKERS_S:
-            raise PlaceLost(f"the scheduler at {self.address} {self._lacking(workers)}")
+            raise WorkersLost(f"the scheduler at {self.address} {self._lacking(workers)}")
 
     def _lacking(self, workers: dict[str, Any] | None) -> str:
         if workers is None:

@@ -3,23 +3,27 @@
 from __future__ import annotations
 
 import math
+import re
 import time
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
 from dva_sim.experiments.execution import executors
-from dva_sim.experiments.execution.checkpoint import FILE, Journal
-from dva_sim.experiments.execution.limit import RunTooLong, limited
-from dva_sim.experiments.execution.scheduling import Episode
+from dva_sim.experiments.execution.checkpoint import Checkpoint
+from dva_sim.experiments.execution.kept_recordings import refuse_what_cannot_be_recorded
+from dva_sim.experiments.execution.scheduling import Simulate, limited
 from dva_sim.experiments.results.manifest import manifest_of
+from dva_sim.experiments.results.results import JOURNAL
 from dva_sim.experiments.study import cell_grid
-from dva_sim.experiments.study.cell_grid import Cell, Job, Key
+from dva_sim.experiments.study.cell_grid import DesignCell, RunKey, StudyJob
 from dva_sim.experiments.study.stopping import rounds
 from dva_sim.experiments.study.study import Study
-from dva_sim.experiments.study.tuned_values import load_tuned
+from dva_sim.experiments.study.tuning import load_tuned
+from dva_sim.kernel.errors import RunTooLong
+from dva_sim.simulation.models import model_for
 
 PROBE_S = 5.0  # after so long no further run is tried,
 _FEW = 3  # unless there are fewer than that, since one may be far from the others
@@ -69,8 +73,8 @@ def dry_run(
     out: str | Path,
     *,
     jobs: int | None = None,
-    probe: Episode | None = None,
-    cells: Sequence[Cell] | None = None,
+    probe: Simulate | None = None,
+    cells: Sequence[DesignCell] | None = None,
 ) -> DryRun:
     """What `run_study` would do, without doing it.
 
@@ -87,11 +91,11 @@ def dry_run(
     """
     cells = cell_grid.cells(study) if cells is None else cells
     todo = list({job.key: job for job in cell_grid.jobs(study, cells)}.values())
-    costs: dict[Key, float] = {}
-    if (Path(out) / FILE).exists():
+    costs: dict[RunKey, float] = {}
+    if (Path(out) / JOURNAL).exists():
         identity = manifest_of(study, cells, todo)["hash"]
-        with Journal(Path(out), identity, must_exist=True) as journal:
-            costs = journal.costs()
+        with Checkpoint(Path(out), identity, must_exist=True) as checkpoint:
+            costs = checkpoint.costs()
     left = [job for job in todo if job.key not in costs]
     known = _by_config(costs)
     tried = _tried(left, probe) if probe is not None and not known else _Tried({})
@@ -111,7 +115,7 @@ def dry_run(
     )
 
 
-def _by_config(costs: Mapping[Key, float]) -> dict[str, float]:
+def _by_config(costs: Mapping[RunKey, float]) -> dict[str, float]:
     """What a run of each configuration costs on the average [s]."""
     spent: dict[str, list[float]] = defaultdict(list)
     for (config, _), cost in costs.items():
@@ -119,7 +123,7 @@ def _by_config(costs: Mapping[Key, float]) -> dict[str, float]:
     return {config: sum(values) / len(values) for config, values in spent.items()}
 
 
-def _estimate(left: Sequence[Job], known: Mapping[str, float]) -> float | None:
+def _estimate(left: Sequence[StudyJob], known: Mapping[str, float]) -> float | None:
     """What the rest costs [s]; a configuration never run is taken for an average one."""
     if not known and left:
         return None
@@ -127,7 +131,7 @@ def _estimate(left: Sequence[Job], known: Mapping[str, float]) -> float | None:
     return sum(known.get(job.config, average) for job in left)
 
 
-def _tried(left: Sequence[Job], probe: Episode) -> _Tried:
+def _tried(left: Sequence[StudyJob], probe: Simulate) -> _Tried:
     """Try one run each of some configurations, spread over the design."""
     first = list({job.config: job for job in reversed(left)}.values())
     begun, costs, failed = time.monotonic(), dict[str, float](), ""
@@ -163,3 +167,41 @@ def _remark(study: Study) -> str:
     if not cell_grid.is_tuned(study):
         return ""
     return load_tuned(study).remark(cell_grid.basis_of_tuning(study))
+
+
+def contradictions_in(cells: Sequence[DesignCell]) -> list[str]:
+    """What does not go together in some configurations, each kind told once, as a sentence.
+
+    Two are of one kind if they begin with the same words, up to the first number.
+    """
+    found: dict[str, list[str]] = defaultdict(list)
+    for cell in cells:
+        for told in model_for(cell.scenario).contradictions(cell.scenario):
+            found[re.split(r"\d", told, maxsplit=1)[0]].append(told)
+    return [
+        f"{alike[0]} (in {len(alike)} of {len(cells)} configurations)" for alike in found.values()
+    ]
+
+
+def rehearse_all(
+    study: Study, progress: Callable[[int, int], object] = lambda *_: None
+) -> list[DesignCell]:
+    """Build one run of every configuration, so that a mistake is found before the first run.
+
+    Args:
+        study: From `load_study`.
+        progress: Called with the number of configurations that were built, and of all.
+
+    Returns:
+        The configurations, of which there may be so many that making them again takes time.
+
+    Raises:
+        ConfigError: what cannot be read, placed or recorded.
+    """
+    refuse_what_cannot_be_recorded(study)
+    cells = cell_grid.cells(study)
+    every = cell_grid.to_rehearse(study, cells)
+    for done, cell in enumerate(every, 1):
+        cell_grid.rehearse(study, cell)
+        progress(done, len(every))
+    return cells

@@ -1,6 +1,6 @@
-"""Where runs are made: here, or in processes of this machine; the cluster has its own module.
+"""Who makes the runs: this process, or processes of this machine; a cluster has its own module.
 
-A place gives executors of `concurrent.futures`; nothing else is known of it by who hands out runs.
+They give executors of `concurrent.futures`; who hands out runs knows nothing else of them.
 """
 
 from __future__ import annotations
@@ -8,6 +8,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
@@ -23,12 +24,12 @@ R = TypeVar("R")
 _FAMILY = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
 
 
-class PlaceLost(RunsFailed):
+class WorkersLost(RunsFailed):
     """Nobody is left to run anything; what has been run is kept."""
 
 
-class Place(Protocol):
-    """Where runs are made."""
+class Workers(Protocol):
+    """Who makes the runs, wherever that is."""
 
     @property
     def width(self) -> int:
@@ -60,11 +61,11 @@ class Place(Protocol):
             is_idle: Whether nothing has come for some seconds.
 
         Raises:
-            PlaceLost: nobody is left.
+            WorkersLost: nobody is left.
         """
 
 
-def local(processes: int | None) -> Place:
+def local(processes: int | None) -> Workers:
     """Processes of this machine; with one, everything happens in this process.
 
     Raises:
@@ -73,7 +74,7 @@ def local(processes: int | None) -> Place:
     width = cores() if processes is None else processes
     if width < 1:
         raise ConfigError(f"number of processes should be at least 1, not {width}")
-    return Processes(width) if width > 1 else Here()
+    return LocalProcesses(width) if width > 1 else ThisProcess()
 
 
 def cores() -> int:
@@ -83,7 +84,7 @@ def cores() -> int:
     return os.cpu_count() or 1
 
 
-class Here:
+class ThisProcess:
     """This process."""
 
     width, is_here = 1, True
@@ -109,7 +110,7 @@ class _AtOnce(Executor):
         return future
 
 
-class Processes:
+class LocalProcesses:
     """Processes of this machine."""
 
     is_here = False
@@ -125,7 +126,8 @@ class Processes:
         """A pool whose processes are gone when the block ends, at once if it ends in an error."""
         context = multiprocessing.get_context(_FAMILY)
         context.set_forkserver_preload([task.__module__])
-        pool = ProcessPoolExecutor(min(width, self.width), context, initializer=_begin)
+        kind = ProcessPoolExecutor if task.__module__ == "__main__" else _WithoutScript
+        pool = kind(min(width, self.width), context, initializer=_begin)
         self._pool = pool
         try:
             yield pool
@@ -148,6 +150,26 @@ class Processes:
             with suppress(ProcessLookupError):
                 os.kill(pid, signal.SIGKILL)
         self._stopped = stopped
+
+
+class _WithoutScript(ProcessPoolExecutor):
+    """Processes that do not run the script of whoever started the study.
+
+    They would run it again to find what it defines, and none of that is needed: without
+    `if __name__ == "__main__"` in the script, they would start the same study anew.
+    """
+
+    def submit(self, fn: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> Future[R]:
+        """Start a process, if need be, while nothing tells it of the script."""
+        main = vars(sys.modules["__main__"])
+        hidden: dict[str, Any] = {
+            name: main.pop(name) for name in ("__file__", "__spec__") if name in main
+        }
+        main["__spec__"] = None  # as of a script without a name
+        try:
+            return super().submit(fn, *args, **kwargs)
+        finally:
+            main.update(hidden)
 
 
 def _is_stopped(pid: int) -> bool:

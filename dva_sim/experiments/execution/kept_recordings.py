@@ -18,21 +18,23 @@ from typing import Any
 
 from dva_sim.experiments.execution import executors, scheduling
 from dva_sim.experiments.results.results import Results
+from dva_sim.experiments.results.tables import DESIGN_COLUMNS
 from dva_sim.experiments.study import cell_grid
-from dva_sim.experiments.study.cell_grid import Job
+from dva_sim.experiments.study.cell_grid import StudyJob
 from dva_sim.experiments.study.hashing import stable_hash
+from dva_sim.experiments.study.own_measures import own_measures
 from dva_sim.experiments.study.study import Study
 from dva_sim.kernel.errors import DvaSimError
-from dva_sim.simulation.models import Tables, tables_of
+from dva_sim.simulation.full.measures import tables_of
+from dva_sim.simulation.labels import measure_called
+from dva_sim.simulation.models import Tables, model_for
 from dva_sim.simulation.scenario import Scenario
 
 FOLDER = "recordings"
 _FULL = os.strerror(errno.ENOSPC)
-MORE_IS_BETTER = frozenset({"confirmed", "evacuated_share", "commands_applied"})
-"""Measures whose smallest value is the worst; of all others the largest is."""
 
 Row = Mapping[str, Any]
-Place = tuple[str, int, int, int]  # part, cell, person, trial
+RunPosition = tuple[str, int, int, int]  # part, cell, person, trial
 
 
 def refuse_what_cannot_be_recorded(study: Study) -> None:
@@ -45,7 +47,7 @@ def refuse_what_cannot_be_recorded(study: Study) -> None:
     if study.record is None:
         return
     scenarios = [cell_grid.base_scenario(study, part) for part in study.parts]
-    if not any(isinstance(scenario, Scenario) for scenario in scenarios):
+    if not any(model_for(scenario).is_recorded for scenario in scenarios):
         models = ", ".join(sorted({scenario.model for scenario in scenarios}))
         problem = f"record: {study.record} needs runs of the full model; this study's are {models}"
         raise study.error(problem, ("record",))
@@ -86,13 +88,14 @@ def record_study(
     wanted = {name_of(job): job for job in chosen(study, rows)}
     folder = _tidied(out / FOLDER, wanted)
     rest = [job for name, job in wanted.items() if not (folder / name).exists()]
-    prints = {name_of(job): _fingerprint(job, rows[place_of(job)]) for job in rest}
+    own = {measure.about.name for measure in own_measures(study).values()}
+    prints = {name_of(job): _fingerprint(job, rows[position_of(job)], own) for job in rest}
     done, total, tell = len(wanted) - len(rest), len(wanted), progress or (lambda *_: None)
     tell(done, total)
     problems = []
     try:
-        place = executors.local(jobs)
-        with closing(scheduling.run_all(rest, Rerun(folder, prints), place, limit_s)) as batches:
+        workers = executors.local(jobs)
+        with closing(scheduling.run_all(rest, Rerun(folder, prints), workers, limit_s)) as batches:
             for outcome in (outcome for batch in batches for outcome in batch):
                 done += outcome.error is None
                 problems += [] if outcome.error is None else [outcome.error]
@@ -104,7 +107,7 @@ def record_study(
     return sorted(problems)
 
 
-def chosen(study: Study, rows: Mapping[Place, Row]) -> list[Job]:
+def chosen(study: Study, rows: Mapping[RunPosition, Row]) -> list[StudyJob]:
     """The runs to record, in the order of the design.
 
     Args:
@@ -114,30 +117,32 @@ def chosen(study: Study, rows: Mapping[Place, Row]) -> list[Job]:
     every = [
         job
         for job in cell_grid.jobs(study)
-        if place_of(job) in rows and not job.is_repeat and isinstance(job.scenario, Scenario)
+        if position_of(job) in rows and not job.is_repeat and model_for(job.scenario).is_recorded
     ]
     if study.record == "all":
         return every
-    in_cells = (list(group) for _, group in groupby(every, key=lambda job: place_of(job)[:2]))
+    in_cells = (list(group) for _, group in groupby(every, key=lambda job: position_of(job)[:2]))
     if study.record == "sample" or study.answer is None:
         return [runs[0] for runs in in_cells]
     measure = study.answer.measure
-    return [max(runs, key=lambda job: _badness(measure, rows[place_of(job)])) for runs in in_cells]
+    return [
+        max(runs, key=lambda job: _badness(measure, rows[position_of(job)])) for runs in in_cells
+    ]
 
 
-def name_of(job: Job) -> str:
+def name_of(job: StudyJob) -> str:
     """The file of a run: part, cell, person and trial."""
     cell = "reference" if job.is_reference else str(job.index)
     return f"{job.part}-{cell}-{job.person}-{job.trial}.mcap"
 
 
-def place_of(job: Job) -> Place:
+def position_of(job: StudyJob) -> RunPosition:
     """Where a run stands in its study."""
     return job.part, job.index, job.person, job.trial
 
 
-def rows_of(results: Results) -> dict[Place, Row]:
-    """The table of runs, by place."""
+def rows_of(results: Results) -> dict[RunPosition, Row]:
+    """The table of runs, by position in the design."""
     runs = results.runs
     columns = {name: runs[name].tolist() for name in runs}
     rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
@@ -149,7 +154,7 @@ def _badness(measure: str, row: Row) -> float:
     value = row.get(measure)
     if value is None or math.isnan(value):
         return math.inf
-    return -float(value) if measure in MORE_IS_BETTER else float(value)
+    return -float(value) if measure_called(measure).better == "large" else float(value)
 
 
 def _tidied(folder: Path, wanted: Iterable[str]) -> Path:
@@ -187,7 +192,7 @@ class Rerun:
     folder: Path
     prints: Mapping[str, str]
 
-    def __call__(self, job: Job) -> Tables:
+    def __call__(self, job: StudyJob) -> Tables:
         """Run it again and keep it.
 
         Raises:
@@ -205,9 +210,9 @@ class Rerun:
         return {}
 
 
-def _fingerprint(job: Job, row: Row) -> str:
-    """Of what a run came to, beside what it was to be."""
-    asked = {*scheduling.DESIGN_COLUMNS, *(factor for factor, _ in job.cell)}
+def _fingerprint(job: StudyJob, row: Row, own: Iterable[str]) -> str:
+    """Of what a run came to, beside what it was to be and what the user measured of it."""
+    asked = {*DESIGN_COLUMNS, *(factor for factor, _ in job.cell), *own}
     return _print_of({name: value for name, value in row.items() if name not in asked})
 
 
@@ -217,7 +222,7 @@ def _print_of(row: Row) -> str:
     return stable_hash({n: v if isinstance(v, str) else float(v) for n, v in there.items()})
 
 
-def _about(job: Job) -> dict[str, str]:
+def _about(job: StudyJob) -> dict[str, str]:
     """What tells the run from the others of its study."""
     return {
         "part": job.part,

@@ -8,18 +8,20 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from dva_sim.experiments.execution import executors, scheduling
-from dva_sim.experiments.execution.checkpoint import FILE, Journal
-from dva_sim.experiments.execution.executors import Place, PlaceLost
-from dva_sim.experiments.execution.scheduling import Episode
-from dva_sim.experiments.execution.tables import design_row, write_tables
+from dva_sim.experiments.execution.checkpoint import Checkpoint
+from dva_sim.experiments.execution.executors import Workers, WorkersLost
+from dva_sim.experiments.execution.scheduling import Simulate, run_job
 from dva_sim.experiments.results.manifest import failures, machine, manifest_of, write_json
-from dva_sim.experiments.results.results import MACHINE, MANIFEST, TABLES, digests
+from dva_sim.experiments.results.results import JOURNAL, MACHINE, MANIFEST, TABLES, digests
+from dva_sim.experiments.results.tables import design_row, write_tables
 from dva_sim.experiments.study import cell_grid
-from dva_sim.experiments.study.cell_grid import Cell, Job
+from dva_sim.experiments.study.cell_grid import DesignCell, StudyJob
+from dva_sim.experiments.study.own_measures import own_measures
 from dva_sim.experiments.study.stopping import is_enough, rounds
 from dva_sim.experiments.study.study import Study
 from dva_sim.kernel.errors import ConfigError, DvaSimError
@@ -33,10 +35,10 @@ def run_study(
     *,
     jobs: int | None = None,
     scheduler: str | None = None,
-    episode: Episode | None = None,
+    episode: Simulate | None = None,
     progress: Progress | None = None,
     limit_s: float = scheduling.LIMIT_S,
-    cells: Sequence[Cell] | None = None,
+    cells: Sequence[DesignCell] | None = None,
 ) -> Path:
     """Run what the results folder does not hold yet, then write its tables and manifest.
 
@@ -60,7 +62,7 @@ def run_study(
     Raises:
         ConfigError: the study is not valid, the folder holds another one, or there is no such
             cluster.
-        DvaSimError: the disk is full, another program holds the journal, or the cluster is lost.
+        DvaSimError: the disk is full, another program holds the checkpoint, or the cluster is lost.
         KeyboardInterrupt: after tidying up; its message says what has been done.
     """
     out, started, clock = Path(out), datetime.now(UTC), time.perf_counter()
@@ -68,30 +70,32 @@ def run_study(
     todo = cell_grid.jobs(study, cells)
     manifest = manifest_of(study, cells, todo)
     with ExitStack() as stack:
-        place = stack.enter_context(_place(jobs, scheduler))
-        journal = stack.enter_context(_opened(out, manifest["hash"]))
-        journal.describe(manifest)
-        session = _Session(todo, journal, place, episode or _simulation(), progress, limit_s)
+        workers = stack.enter_context(_workers(jobs, scheduler))
+        checkpoint = stack.enter_context(_opened(out, manifest["hash"]))
+        checkpoint.describe(manifest)
+        simulate = episode or _simulation(study)
+        session = _Session(todo, checkpoint, workers, simulate, progress, limit_s)
         with session.told():
             carried_out, stopped = _run_rounds(study, todo, session)
-            with journal.alone():
+            with checkpoint.alone():
                 _tidy(out)
-                write_tables(out, carried_out, journal)
+                write_tables(out, carried_out, checkpoint.tables)
                 manifest["runs"] = len({job.key for job in carried_out})
-                manifest |= {"stopped": stopped, "failures": failures(carried_out, journal)}
+                manifest["stopped"] = stopped
+                manifest["failures"] = failures(carried_out, checkpoint.failures())
                 manifest["tables"] = digests(out / TABLES)
                 write_json(out / MANIFEST, manifest)
-        facts = {"cores": executors.cores(), "jobs": place.width, "started": started.isoformat()}
+        facts = {"cores": executors.cores(), "jobs": workers.width, "started": started.isoformat()}
         facts |= {"wall_s": time.perf_counter() - clock}
-        write_json(out / MACHINE, machine(carried_out, journal) | facts)
+        write_json(out / MACHINE, machine(carried_out, checkpoint.costs()) | facts)
     return out
 
 
-def _opened(out: Path, identity: str) -> Journal:
-    """The journal of a results folder, which must be this study's or new."""
+def _opened(out: Path, identity: str) -> Checkpoint:
+    """The checkpoint of a results folder, which must be this study's or new."""
     try:
         out.mkdir(parents=True, exist_ok=True)
-        if not (out / FILE).exists() and (out / MANIFEST).exists():
+        if not (out / JOURNAL).exists() and (out / MANIFEST).exists():
             found = json.loads((out / MANIFEST).read_text(encoding="utf-8")).get("hash")
             if found != identity:
                 raise ConfigError(f"{out} holds another study ({found}); give another folder")
@@ -101,7 +105,7 @@ def _opened(out: Path, identity: str) -> Journal:
         raise DvaSimError(f"{out} cannot be written: {error.strerror}") from None
     except ValueError:
         raise ConfigError(f"{out} holds something else; give another folder") from None
-    return Journal(out, identity)
+    return Checkpoint(out, identity)
 
 
 class _Session:
@@ -109,37 +113,37 @@ class _Session:
 
     def __init__(
         self,
-        todo: Sequence[Job],
-        journal: Journal,
-        place: Place,
-        episode: Episode,
+        todo: Sequence[StudyJob],
+        checkpoint: Checkpoint,
+        workers: Workers,
+        episode: Simulate,
         progress: Progress | None,
         limit_s: float,
     ) -> None:
-        self.journal = journal
-        self._place, self._episode, self._limit_s = place, episode, limit_s
+        self.checkpoint = checkpoint
+        self._workers, self._episode, self._limit_s = workers, episode, limit_s
         self._tell = progress or (lambda *_: None)
         keys = {job.key for job in todo}
-        self._total, self._count = len(keys), len(keys & journal.done())
+        self._total, self._count = len(keys), len(keys & checkpoint.done())
         self._tell(self._count, self._total)
 
-    def left(self, batch: Sequence[Job]) -> list[Job]:
+    def left(self, batch: Sequence[StudyJob]) -> list[StudyJob]:
         """What is not done yet, each run once, person by person.
 
         So what is known on the way is known of whole persons, in all cells.
         """
-        done = self.journal.done()
+        done = self.checkpoint.done()
         rest = [job for key, job in {job.key: job for job in batch}.items() if key not in done]
         return sorted(rest, key=lambda job: (job.person, job.trial))
 
-    def run(self, rest: Sequence[Job]) -> None:
-        """Run some; what comes together is in the journal before it is counted."""
+    def run(self, rest: Sequence[StudyJob]) -> None:
+        """Run some; what comes together is in the checkpoint before it is counted."""
         clock = time.perf_counter()
-        batches = scheduling.run_all(rest, self._episode, self._place, self._limit_s)
+        batches = scheduling.run_all(rest, self._episode, self._workers, self._limit_s)
         with closing(batches):
             for batch in batches:
                 now = time.perf_counter()
-                self.journal.add(batch, now - clock)
+                self.checkpoint.add(batch, now - clock)
                 clock, self._count = now, self._count + len(batch)
                 self._tell(self._count, self._total)
 
@@ -153,8 +157,8 @@ class _Session:
         go_on = "the same command goes on from there"
         try:
             yield
-        except PlaceLost as lost:
-            raise PlaceLost(
+        except WorkersLost as lost:
+            raise WorkersLost(
                 f"{lost}; {self._count} of {self._total} runs are kept; {go_on}, also with "
                 "another --scheduler or with --jobs"
             ) from None
@@ -165,24 +169,24 @@ class _Session:
 
 
 def _run_rounds(
-    study: Study, todo: Sequence[Job], session: _Session
-) -> tuple[list[Job], dict[str, Any]]:
+    study: Study, todo: Sequence[StudyJob], session: _Session
+) -> tuple[list[StudyJob], dict[str, Any]]:
     """Round after round until the study has enough; the jobs it then has, and what ended it.
 
     Whether it is enough is judged by whole rounds alone, which are the same wherever and however
     often the study was interrupted. A round that is done counts even if the budget is spent.
     """
     batches = rounds(study, todo)
-    chosen: list[Job] = []
+    chosen: list[StudyJob] = []
     why, number = None, 0
     for number, batch in enumerate(batches, 1):
         rest = session.left(batch)
-        if rest and chosen and _is_spent(study, session.journal):
+        if rest and chosen and _is_spent(study, session.checkpoint):
             why, number = "budget", number - 1
             break
         session.run(rest)
         chosen.extend(batch)
-        if number < len(batches) and is_enough(study, _rows(todo, chosen, session.journal)):
+        if number < len(batches) and is_enough(study, _rows(todo, chosen, session.checkpoint)):
             why = "enough"
             break
     if why is not None:
@@ -190,40 +194,41 @@ def _run_rounds(
     return _in_order(todo, chosen), {"rounds": number, "of": len(batches), "why": why}
 
 
-def _is_spent(study: Study, journal: Journal) -> bool:
-    return study.budget_s is not None and journal.wall_s >= study.budget_s
+def _is_spent(study: Study, checkpoint: Checkpoint) -> bool:
+    return study.budget_s is not None and checkpoint.wall_s >= study.budget_s
 
 
-def _in_order(todo: Sequence[Job], chosen: Sequence[Job]) -> list[Job]:
+def _in_order(todo: Sequence[StudyJob], chosen: Sequence[StudyJob]) -> list[StudyJob]:
     """The chosen ones in the order of the design."""
     ids = {id(job) for job in chosen}
     return [job for job in todo if id(job) in ids]
 
 
-def _rows(todo: Sequence[Job], chosen: Sequence[Job], journal: Journal) -> list[dict[str, Any]]:
+def _rows(
+    todo: Sequence[StudyJob], chosen: Sequence[StudyJob], checkpoint: Checkpoint
+) -> list[dict[str, Any]]:
     """The table `runs` of the chosen jobs, but for repeats."""
     own = [job for job in _in_order(todo, chosen) if not job.is_repeat]
-    tables = ((job, journal.tables(job.key) or {}) for job in own)
+    tables = ((job, checkpoint.tables(job.key) or {}) for job in own)
     return [design_row(job) | row for job, found in tables for row in found.get("runs", ())]
 
 
 @contextmanager
-def _place(jobs: int | None, scheduler: str | None) -> Iterator[Place]:
+def _workers(jobs: int | None, scheduler: str | None) -> Iterator[Workers]:
     if scheduler is None:
         yield executors.local(jobs)
         return
     if jobs is not None:
         raise ConfigError("give the number of processes or a scheduler, not both")
-    from dva_sim.experiments.execution.dask_cluster import Cluster
+    from dva_sim.experiments.execution.dask_cluster import DaskCluster
 
-    with Cluster(scheduler) as cluster:
+    with DaskCluster(scheduler) as cluster:
         yield cluster
 
 
-def _simulation() -> Episode:
-    from dva_sim.experiments.execution.job import run_job
-
-    return run_job
+def _simulation(study: Study) -> Simulate:
+    own = tuple(own_measures(study))
+    return partial(run_job, measures=own) if own else run_job
 
 
 def _tidy(out: Path) -> None:

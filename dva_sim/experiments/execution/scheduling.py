@@ -1,38 +1,52 @@
-"""Runs handed out in chunks to an executor; when workers die, none is lost and none doubled."""
+"""Runs handed out in chunks to workers; when these die, no run is lost and none doubled.
+
+A run that stalls is ended after a limit of time, whatever it is doing, and counts as failed.
+"""
 
 from __future__ import annotations
 
+import ctypes
+import faulthandler
 import json
+import math
+import os
+import signal
+import threading
 import time
 from collections import deque
-from collections.abc import Callable, Generator, Iterable, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
+from contextlib import contextmanager, suppress
 from functools import partial
 from typing import Any
 
-from dva_sim.experiments.execution.checkpoint import Outcome, Tables
-from dva_sim.experiments.execution.executors import Place
-from dva_sim.experiments.execution.limit import RunTooLong, limited
-from dva_sim.experiments.study.cell_grid import Job
+from dva_sim.experiments.execution.checkpoint import RunOutcome
+from dva_sim.experiments.execution.executors import Workers
+from dva_sim.experiments.results.tables import DESIGN_COLUMNS
+from dva_sim.experiments.study.cell_grid import StudyJob
+from dva_sim.kernel.errors import RunTooLong
+from dva_sim.simulation.models import Tables, model_for
+from dva_sim.simulation.run_measures import load_measure
 
-Episode = Callable[[Job], Tables]
-Batches = Generator[list[Outcome], None, None]
+Simulate = Callable[[StudyJob], Tables]
+_Batches = Generator[list[RunOutcome], None, None]
 
-DESIGN_COLUMNS = ("part", "cell", "config", "is_reference", "person", "trial", "seed")
 LIMIT_S = 600.0
 _LOOK_S = 5.0  # how often workers are looked after while none of them answers
 _AHEAD = 2  # chunks handed out for each worker, so that none of them has to wait
 _CHUNK_S = 1.0  # CPU time that a chunk should take
 _LONGEST_CHUNK = 64
+GRACE = 1.5  # times the limit: then the whole process ends, if nothing else helps
+INSIST = 1.0  # pause before a run that took no notice is told again [s]
 _KILLED = "killed the process it ran in, again and again (out of memory, or beyond its limit?)"
 
-_Chunk = Callable[[Sequence[Job]], list[Outcome]]
-_UnderWay = dict["Future[list[Outcome]]", list[Job]]
+_Chunk = Callable[[Sequence[StudyJob]], list[RunOutcome]]
+_UnderWay = dict["Future[list[RunOutcome]]", list[StudyJob]]
 
 
 def run_all(
-    jobs: Sequence[Job], episode: Episode, place: Place, limit_s: float = LIMIT_S
-) -> Batches:
+    jobs: Sequence[StudyJob], episode: Simulate, workers: Workers, limit_s: float = LIMIT_S
+) -> _Batches:
     """Run all jobs, in no particular order, and give their outcomes in batches as they come.
 
     When a worker dies, the runs it had are tried again one by one, so that the one that kills
@@ -41,24 +55,24 @@ def run_all(
     Args:
         jobs: The runs.
         episode: Makes the tables of one run; must be importable by name unless it is run here.
-        place: Where they are run.
+        workers: Where they are run.
         limit_s: A run that takes longer by the wall clock has failed.
 
     Raises:
-        PlaceLost: nobody is left to run them.
+        WorkersLost: nobody is left to run them.
         DvaSimError: workers have another program.
     """
-    plain = partial(perform_chunk, episode=episode, limit_s=limit_s, may_exit=not place.is_here)
-    run = place.guarded(plain)
-    waiting, suspects, pace = deque(jobs), deque[Job](), _Pace()
+    plain = partial(perform_chunk, episode=episode, limit_s=limit_s, may_exit=not workers.is_here)
+    run = workers.guarded(plain)
+    waiting, suspects, pace = deque(jobs), deque[StudyJob](), _Pace()
     while waiting or suspects:
-        yield from _alone(suspects, run, episode, place)
-        yield from _together(waiting, suspects, run, episode, place, pace)
+        yield from _alone(suspects, run, episode, workers)
+        yield from _together(waiting, suspects, run, episode, workers, pace)
 
 
 def perform(
-    job: Job, episode: Episode, limit_s: float = LIMIT_S, may_exit: bool = False
-) -> Outcome:
+    job: StudyJob, episode: Simulate, limit_s: float = LIMIT_S, may_exit: bool = False
+) -> RunOutcome:
     """Run one job; whatever it raises becomes its outcome."""
     start = time.thread_time()
     try:
@@ -66,18 +80,18 @@ def perform(
             tables = json.dumps(_checked(episode(job), job), separators=(",", ":"), default=_scalar)
     except (Exception, RunTooLong) as error:
         text = " ".join(str(error).split())
-        return Outcome(job.key, None, error=f"{type(error).__name__}: {text}")
-    return Outcome(job.key, tables, time.thread_time() - start)
+        return RunOutcome(job.key, None, error=f"{type(error).__name__}: {text}")
+    return RunOutcome(job.key, tables, time.thread_time() - start)
 
 
 def perform_chunk(
-    chunk: Iterable[Job], episode: Episode, limit_s: float, may_exit: bool
-) -> list[Outcome]:
+    chunk: Iterable[StudyJob], episode: Simulate, limit_s: float, may_exit: bool
+) -> list[RunOutcome]:
     """Run some jobs, one after the other."""
     return [perform(job, episode, limit_s, may_exit) for job in chunk]
 
 
-def _checked(tables: Tables, job: Job) -> Tables:
+def _checked(tables: Tables, job: StudyJob) -> Tables:
     """The tables, if they can be kept beside the columns of the design."""
     taken = {*DESIGN_COLUMNS, *(factor for factor, _ in job.cell)}
     for name, rows in tables.items():
@@ -104,67 +118,166 @@ class _Pace:
     def __init__(self) -> None:
         self._runs, self._cost_s = 0, 0.0
 
-    def add(self, outcomes: Sequence[Outcome]) -> None:
+    def add(self, outcomes: Sequence[RunOutcome]) -> None:
         """Learn from what runs have cost."""
         self._runs += len(outcomes)
         self._cost_s += sum(outcome.cost_s for outcome in outcomes)
 
-    def chunk(self, waiting: deque[Job], place: Place) -> list[Job]:
+    def chunk(self, waiting: deque[StudyJob], workers: Workers) -> list[StudyJob]:
         """The next few jobs: fewer towards the end, so that the workers finish together."""
-        if place.is_here or not self._runs:
+        if workers.is_here or not self._runs:
             return [waiting.popleft()]
         rate = self._runs / max(self._cost_s, 1e-9)
-        most = min(rate * _CHUNK_S, _LONGEST_CHUNK, len(waiting) // (4 * place.width))
+        most = min(rate * _CHUNK_S, _LONGEST_CHUNK, len(waiting) // (4 * workers.width))
         return [waiting.popleft() for _ in range(max(1, int(most)))]
 
 
 def _together(
-    waiting: deque[Job],
-    suspects: deque[Job],
+    waiting: deque[StudyJob],
+    suspects: deque[StudyJob],
     run: _Chunk,
-    episode: Episode,
-    place: Place,
+    episode: Simulate,
+    workers: Workers,
     pace: _Pace,
-) -> Batches:
+) -> _Batches:
     """Run what waits until a worker dies; what was under way then becomes suspect."""
     if not waiting:
         return
-    with place.executor(place.width, episode) as executor:
+    with workers.executor(workers.width, episode) as executor:
         under_way: _UnderWay = {}
-        most = 1 if place.is_here else _AHEAD * place.width
+        most = 1 if workers.is_here else _AHEAD * workers.width
         while (waiting and not suspects) or under_way:
             while waiting and not suspects and len(under_way) < most:
-                chunk = pace.chunk(waiting, place)
+                chunk = pace.chunk(waiting, workers)
                 try:
                     under_way[executor.submit(run, chunk)] = chunk
-                except place.deaths:
+                except workers.deaths:
                     suspects.extend(chunk)
-            for outcomes in _answers(under_way, suspects, place):
+            for outcomes in _answers(under_way, suspects, workers):
                 pace.add(outcomes)
                 yield outcomes
 
 
-def _alone(suspects: deque[Job], run: _Chunk, episode: Episode, place: Place) -> Batches:
+def _alone(suspects: deque[StudyJob], run: _Chunk, episode: Simulate, workers: Workers) -> _Batches:
     """Run each suspect in a process of its own, so that a death tells who caused it."""
     while suspects:
-        guilty: deque[Job] = deque()
-        with place.executor(1, episode) as executor:
+        guilty: deque[StudyJob] = deque()
+        with workers.executor(1, episode) as executor:
             while suspects and not guilty:
                 job = suspects.popleft()
                 under_way = {executor.submit(run, [job]): [job]}
                 while under_way:
-                    yield from _answers(under_way, guilty, place)
+                    yield from _answers(under_way, guilty, workers)
         for job in guilty:
-            yield [Outcome(job.key, None, error=_KILLED)]
+            yield [RunOutcome(job.key, None, error=_KILLED)]
 
 
-def _answers(under_way: _UnderWay, dead: deque[Job], place: Place) -> Batches:
+def _answers(under_way: _UnderWay, dead: deque[StudyJob], workers: Workers) -> _Batches:
     """What has come, after waiting for a while at most; the runs of dead workers apart."""
     done = wait(under_way, timeout=_LOOK_S, return_when=FIRST_COMPLETED).done
-    place.look_after(is_idle=not done)
+    workers.look_after(is_idle=not done)
     for future in done:
         chunk = under_way.pop(future)
         try:
             yield future.result()
-        except place.deaths:
+        except workers.deaths:
             dead.extend(chunk)
+
+
+def run_job(job: StudyJob, measures: Sequence[str] = ()) -> Tables:
+    """Simulate a job; rows by table. Ways are kept for the first trial of the first person.
+
+    Args:
+        job: The run.
+        measures: The study's own, which every process loads for itself.
+    """
+    first = job.person == 0 and job.trial == 0
+    own = [load_measure(name) for name in measures]
+    return model_for(job.scenario).tables(job.scenario, job.seed, first, own)
+
+
+@contextmanager
+def limited(seconds: float, may_exit: bool) -> Iterator[None]:
+    """Let the block take so long at most [s], by the wall clock.
+
+    Time in which the whole process was stopped (Ctrl-Z) does not count. Python code is ended by
+    an exception, again and again until it gives in. Code that never comes back to Python cannot
+    be ended so; its process is ended if `may_exit`, which takes no part in Python at all and so
+    works in every case.
+
+    Raises:
+        RunTooLong: from inside the block.
+    """
+    is_main = threading.current_thread() is threading.main_thread()
+    with open(os.devnull, "w") as nowhere:  # noqa: PTH123
+        if may_exit:
+            faulthandler.dump_traceback_later(GRACE * seconds + INSIST, exit=True, file=nowhere)
+        try:
+            with _by_signal(seconds) if is_main else _by_thread(seconds):
+                yield
+        finally:
+            if may_exit:
+                faulthandler.cancel_dump_traceback_later()
+
+
+@contextmanager
+def _by_signal(seconds: float) -> Iterator[None]:
+    """Signals at each of several ticks, since a process that is stopped misses all but one."""
+    ticks = math.ceil(seconds)
+    left = ticks
+
+    def tick(*_: object) -> None:
+        nonlocal left
+        left -= 1
+        if left <= 0:
+            raise RunTooLong(f"took more than its {seconds:g} s")
+
+    before = signal.signal(signal.SIGALRM, tick)
+    signal.setitimer(signal.ITIMER_REAL, seconds / ticks, seconds / ticks)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+
+
+@contextmanager
+def _by_thread(seconds: float) -> Iterator[None]:
+    """Signals reach the main thread only; another thread has to be told by a third."""
+    told, over = threading.get_ident(), threading.Event()
+    lock, raised = threading.Lock(), False
+
+    def insist() -> None:
+        nonlocal raised
+        pause = seconds
+        while not over.wait(pause):
+            with lock:
+                if not over.is_set():
+                    raised = True
+                    _raise_in(told)
+            pause = INSIST
+
+    watch = threading.Thread(target=insist, daemon=True)
+    watch.start()
+    try:
+        yield
+    except RunTooLong:
+        raise RunTooLong(f"took more than its {seconds:g} s") from None
+    finally:
+        while not over.is_set():
+            with suppress(RunTooLong), lock:  # it may come as late as here
+                over.set()
+                if raised:
+                    _raise_in(told)  # in place of one that may still be under way
+                    while True:  # until it comes
+                        pass
+
+
+def _raise_in(thread: int) -> None:
+    """At the next step of Python code there.
+
+    It has to come, and is not taken back: taken back, it leaves the interpreter looking for it for
+    ever, and a profiler or debugger there never gets past its first step (CPython 3.11).
+    """
+    what = ctypes.py_object(RunTooLong)
+    ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), what)

@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dva_sim.experiments.analysis.paired_effects import Floats, View, nan_mean, person_means
+from dva_sim.experiments.analysis.paired_effects import Floats, StudyView, nan_mean, person_means
 from dva_sim.experiments.report.cell_table import CellTable
-from dva_sim.experiments.study.labels import factor_name, level_name, number, percent
 from dva_sim.experiments.study.schema import POINT
 from dva_sim.kernel.units import unit_of
+from dva_sim.kernel.wording import number, percent
+from dva_sim.simulation.labels import factor_name, level_name
 from dva_sim.statistics import Components, components
 
 if TYPE_CHECKING:
@@ -42,7 +43,7 @@ def answer_table(reading: Reading) -> CellTable | None:
     return CellTable(finding.part, heads, 1, rows)
 
 
-def _means(view: View, level: object) -> Floats:
+def _means(view: StudyView, level: object) -> Floats:
     """Over persons, at each stop."""
     curve = view.curve(view.values, view.panels[0], level)  # type: ignore[arg-type]
     return nan_mean(person_means(curve), axis=0)
@@ -120,7 +121,7 @@ def _levels(study: Mapping[str, Any], usual: Mapping[str, Any]) -> list[str]:
 _FEWEST = 2
 
 
-def spread_table(view: View) -> CellTable | None:
+def spread_table(view: StudyView) -> CellTable | None:
     """Spread between and within persons, in the panel that the answer speaks of."""
     if view.contrast is None or view.line is None or len(view.part.trials) < _FEWEST:
         return None
@@ -139,7 +140,7 @@ def spread_table(view: View) -> CellTable | None:
     return CellTable(view.part.name, heads, 2, rows)
 
 
-def _stop_name(view: View, stop: int) -> str:
+def _stop_name(view: StudyView, stop: int) -> str:
     return level_name(view.over.name, view.stops[stop]) if view.over else ""
 
 

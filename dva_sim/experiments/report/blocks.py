@@ -77,7 +77,7 @@ class Printed:
 
 
 @dataclass(frozen=True)
-class Shown:
+class FigureBlock:
     """A figure with its title and caption."""
 
     figure: Drawn
@@ -105,7 +105,7 @@ class Folded:
     blocks: tuple[Block, ...]
 
 
-Block = Heading | Words | First | Items | Printed | Shown | Verbatim | Terms | Folded
+Block = Heading | Words | First | Items | Printed | FigureBlock | Verbatim | Terms | Folded
 
 
 def texts_of(blocks: Iterable[Block]) -> list[str]:
@@ -137,8 +137,8 @@ def _reworded(block: Block, change: Callable[[str], str]) -> Block:
     if isinstance(block, Printed):
         heads, note = list(map(change, block.table.heads)), change(block.table.note)
         return replace(block, table=replace(block.table, heads=heads, note=note))
-    if isinstance(block, Shown):
-        return Shown(_captioned(block.figure, change))
+    if isinstance(block, FigureBlock):
+        return FigureBlock(_captioned(block.figure, change))
     if isinstance(block, Folded):
         return replace(block, blocks=tuple(reworded(block.blocks, change)))
     return block

@@ -9,16 +9,16 @@ from typing import Any
 import numpy as np
 
 from dva_sim.experiments.analysis.extrapolation import Support
-from dva_sim.experiments.analysis.paired_effects import Floats, Part, Setting, plain_level, present
-from dva_sim.experiments.study.labels import (
-    factor_name,
-    level_name,
-    measure_name,
-    number,
-    percent,
-    with_unit,
+from dva_sim.experiments.analysis.paired_effects import (
+    Floats,
+    RunGrid,
+    Setting,
+    plain_level,
+    present,
 )
 from dva_sim.kernel.units import unit_of
+from dva_sim.kernel.wording import number, percent
+from dva_sim.simulation.labels import factor_name, level_name, measure_name, with_unit
 from dva_sim.statistics import mean_interval
 
 
@@ -65,7 +65,7 @@ SUMMARIES: tuple[Summary, ...] = (
 
 
 def cell_table(
-    part: Part,
+    part: RunGrid,
     measure: str,
     summaries: Sequence[Summary] = SUMMARIES,
     support: Support | None = None,
@@ -130,12 +130,12 @@ _FEWEST_ROWS = 3  # with fewer, a column that does not vary says little
 _MARK = "\N{NO-BREAK SPACE}†"
 
 
-def _cells(part: Part, column: str) -> list[Floats]:
-    """The finite values of every cell, in the order of `Part.settings`."""
+def _cells(part: RunGrid, column: str) -> list[Floats]:
+    """The finite values of every cell, in the order of `RunGrid.settings`."""
     return [present(cell) for cell in _by_cell(part, part.grid(column))]
 
 
-def _by_cell(part: Part, grid: Floats) -> Floats:
+def _by_cell(part: RunGrid, grid: Floats) -> Floats:
     return grid.reshape(-1, len(part.persons), len(part.trials))
 
 
@@ -143,13 +143,13 @@ def _cell_name(setting: Setting) -> list[str]:
     return [level_name(factor, level) for factor, level in setting.items()]
 
 
-def _value(part: Part, name: str) -> _Column:
+def _value(part: RunGrid, name: str) -> _Column:
     """What a factor that is no axis of the grid is set to in each cell."""
     values = [plain_level(value) for value in part.first_of_cells(name)]
     return with_unit(name), [f"{v:.3g}" if isinstance(v, float) else str(v) for v in values]
 
 
-def _counts(part: Part) -> _Column:
+def _counts(part: RunGrid) -> _Column:
     return "runs", [str(len(values)) for values in _cells(part, "seed")]
 
 
@@ -165,7 +165,7 @@ _ENDINGS = {
 }
 
 
-def _endings(part: Part) -> Iterator[_Column]:
+def _endings(part: RunGrid) -> Iterator[_Column]:
     """The share confirmed, and how the last drives of the others ended, as far as it occurs."""
     if not part.has("confirmed"):
         return
@@ -180,7 +180,7 @@ def _endings(part: Part) -> Iterator[_Column]:
             yield head, [_text(np.mean, present(cell), percent) for cell in _by_cell(part, share)]
 
 
-def _measure(part: Part, measure: str, possible: tuple[float, float]) -> list[_Column]:
+def _measure(part: RunGrid, measure: str, possible: tuple[float, float]) -> list[_Column]:
     """Median and mean with its 95 % interval, in excess of the reference where there is one.
 
     An interval ends where no value is possible.
@@ -203,7 +203,7 @@ def _measure(part: Part, measure: str, possible: tuple[float, float]) -> list[_C
     return [(f"{name}, median{unit}", medians), (f"its mean (95 % interval){unit}", means)]
 
 
-def _others(part: Part, summaries: Sequence[Summary]) -> list[_Column]:
+def _others(part: RunGrid, summaries: Sequence[Summary]) -> list[_Column]:
     return [
         (head, [_text(summary, cell, text) for cell in _cells(part, column)])
         for column, head, summary, text in summaries

@@ -10,6 +10,8 @@ import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
+from dva_sim.network.patterns import PATTERNS, Pattern, meaning_of
+
 RING = "°"  # marks on paper what the list explains
 
 
@@ -38,22 +40,13 @@ class Term:
         return self.said or rf"\b{re.escape(self.name)}\b"
 
 
+def _called(kind: type[Pattern]) -> str:
+    """Either of a pattern's names, the longer one first."""
+    return rf"\b(?:{re.escape(kind.title)}|{re.escape(kind.label)})"
+
+
 TERMS = (
-    Term(
-        "REQ/REP",
-        "request and reply: the app sends its next command only when the last one was answered",
-        r"REQ/REP",
-    ),
-    Term(
-        "plain PUB/SUB",
-        "publish and subscribe: the app sends without waiting, and the robot applies every command",
-    ),
-    Term(
-        "latest-wins PUB/SUB",
-        "publish and subscribe, but the robot applies only the newest command that it has",
-        r"\blatest-wins(?: PUB/SUB)?",
-    ),
-    Term("pipelined requests", "requests of which several may be unanswered at a time"),
+    *(Term(kind.title, meaning_of(kind), _called(kind)) for kind in PATTERNS.values()),
     Term(
         "phone default",
         "the app as mended here: a short filter (median of five), and commands at a steady rate",

@@ -7,11 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from dva_sim.experiments.report import shift_page as dispatch_page
-from dva_sim.experiments.report import transport_page
 from dva_sim.experiments.report.summary import Reading
-from dva_sim.experiments.study.labels import capital, number
 from dva_sim.experiments.study.schema import POINT
+from dva_sim.kernel.wording import capital, number
+from dva_sim.simulation.labels import measure_called
 from dva_sim.statistics import VarianceReduction, variance_reduction
 
 _FEW = 6  # persons: with fewer nothing can be drawn anew
@@ -19,16 +18,9 @@ _FEW = 6  # persons: with fewer nothing can be drawn anew
 
 def remarks(reading: Reading) -> list[str]:
     """How large it was, how it was judged, and by which program."""
-    return [_size(reading), *_of_model(reading), *_tests(reading.study), _made_by(reading)]
-
-
-def _of_model(reading: Reading) -> list[str]:
-    """Those of a dispatch or transport study, or the usual ones."""
-    if reading.shifts is not None:
-        return dispatch_page.method(reading.shifts, reading.pair_correlation)
-    if reading.is_contest:
-        return transport_page.method(reading.pair_correlation)
-    return list(_usual(reading))
+    own = reading.page.method(reading.pair_correlation) if reading.view else None
+    said = list(_usual(reading)) if own is None else own
+    return [_size(reading), *said, *_tests(reading.study), _made_by(reading)]
 
 
 def _size(reading: Reading) -> str:
@@ -129,7 +121,8 @@ def _usual(reading: Reading) -> Iterator[str]:
             "Where there is a reference run, its value is subtracted from every run of the same "
             "person and trial."
         )
-    if "confirmed" in reading.runs and reading.view and reading.view.measure == "drive_time_s":
+    awaited = measure_called(reading.view.measure).awaits if reading.view else ""
+    if "confirmed" in reading.runs and awaited == "confirmation":
         yield "A run that was not confirmed is kept: it counts with all the time it was given."
     yield "Nobody learns: a person's last trial is like the first."
     yield _not_modelled(is_task)

@@ -16,13 +16,13 @@ from typing import TYPE_CHECKING, Any
 
 from dva_sim.experiments.report.blocks import (
     Block,
+    FigureBlock,
     First,
     Folded,
     Heading,
     Items,
     Kind,
     Printed,
-    Shown,
     Terms,
     Verbatim,
     Words,
@@ -312,7 +312,7 @@ def _set(paper: Paper, block: Block) -> None:
         _items(paper, block.items)
     elif isinstance(block, Printed):
         _table(paper, block.table, block.is_words)
-    elif isinstance(block, Shown):
+    elif isinstance(block, FigureBlock):
         _figure(paper, block.figure)
     elif isinstance(block, Terms):
         _terms(paper, block)

@@ -15,57 +15,46 @@ from typing import TYPE_CHECKING, Any
 
 from dva_sim.experiments.analysis.conditions import conditions, timeout_remark
 from dva_sim.experiments.analysis.layout import factors_of, keys_of
-from dva_sim.experiments.analysis.paired_effects import View
 from dva_sim.experiments.analysis.predictions import Judged, judge_all
 from dva_sim.experiments.analysis.robustness import sentences
-from dva_sim.experiments.analysis.tuning import tuned_table
-from dva_sim.experiments.execution.partial_results import load_so_far
-from dva_sim.experiments.report import shift_page as dispatch_page
-from dva_sim.experiments.report import transport_page as transport_figures
+from dva_sim.experiments.execution.checkpoint import load_so_far
 from dva_sim.experiments.report.answer_table import answer_table, size_of, spread_table
 from dva_sim.experiments.report.blocks import (
     Block,
+    FigureBlock,
     First,
     Folded,
     Heading,
     Items,
     Printed,
-    Shown,
     Terms,
     Verbatim,
     Words,
     texts_of,
 )
 from dva_sim.experiments.report.cell_table import CellTable
-from dva_sim.experiments.report.endings import in_a_line
-from dva_sim.experiments.report.endings import sentences as sentences_of_endings
-from dva_sim.experiments.report.endings import table as endings_table
-from dva_sim.experiments.report.figures import Drawn, draw_all
-from dva_sim.experiments.report.figures import shift as dispatch_figures
-from dva_sim.experiments.report.figures.contrast import contrast
-from dva_sim.experiments.report.figures.style import styled
+from dva_sim.experiments.report.figures.registry import draw_all
+from dva_sim.experiments.report.figures.report_figure import ReportFigure
+from dva_sim.experiments.report.figures.style import Drawn
 from dva_sim.experiments.report.glossary import Marker, terms_in
-from dva_sim.experiments.report.method import remarks
-from dva_sim.experiments.report.sample_size_text import plan_table
-from dva_sim.experiments.report.summary import Reading
-from dva_sim.experiments.report.test_tables import (
+from dva_sim.experiments.report.hypothesis_tables import (
     comparison_table,
     hypothesis_table,
     registration_table,
 )
-from dva_sim.experiments.study.labels import (
-    capital,
-    factor_name,
-    is_in_file,
-    level_name,
-    listing,
-    number,
-    setting,
-    with_unit,
-)
+from dva_sim.experiments.report.method import remarks
+from dva_sim.experiments.report.outcome_table import in_a_line
+from dva_sim.experiments.report.outcome_table import sentences as sentences_of_endings
+from dva_sim.experiments.report.outcome_table import table as endings_table
+from dva_sim.experiments.report.sample_size_table import plan_table
+from dva_sim.experiments.report.summary import Reading
+from dva_sim.experiments.report.tuning_table import tuned_table
+from dva_sim.experiments.results.manifest import status_of
 from dva_sim.experiments.study.schema import POINT
-from dva_sim.experiments.study.status import Status, status_of
-from dva_sim.kernel.errors import DvaSimError
+from dva_sim.experiments.study.study import Status
+from dva_sim.kernel.errors import ConfigError, DvaSimError
+from dva_sim.kernel.wording import capital, listing, number
+from dva_sim.simulation.labels import factor_name, is_in_file, level_name, setting, with_unit
 
 if TYPE_CHECKING:
     import jinja2
@@ -241,7 +230,7 @@ def _figures(reading: Reading, drawn: Sequence[Drawn]) -> Iterator[Block]:
     reads = dict.fromkeys(chain.from_iterable(figure.reads for figure in drawn))
     part = f"All are of part {reading.view.part.name} unless the title names another one."
     yield Words(" ".join([part, *reads]))
-    yield from map(Shown, drawn)
+    yield from map(FigureBlock, drawn)
 
 
 def _tables(reading: Reading) -> Iterator[Block]:
@@ -274,11 +263,8 @@ def _method(reading: Reading) -> Iterator[Block]:
     yield Heading("Method")
     yield Items(tuple(remarks(reading)))
     scenarios, study = reading.scenarios, reading.study
-    if reading.shifts:
-        stated = dispatch_page.conditions(scenarios, keys_of(study))
-    else:
-        stated = conditions(scenarios, keys_of(study), _changed(study))
-    if stated:
+    of_model = reading.page.conditions if reading.view else conditions
+    if stated := of_model(scenarios, keys_of(study), _changed(study)):
         rows = [[name, *values] for name, values in stated]
         settings = Printed(CellTable("", ["setting", *scenarios], 1, rows))
         remark = timeout_remark(scenarios, study)
@@ -331,7 +317,7 @@ def _treatments(study: Mapping[str, Any]) -> list[tuple[str, str]]:
 PAGE, PAPER, FIGURES = "report.html", "report.pdf", "figures"
 
 
-def write_report(folder: Path, pdf: bool = False) -> Path:
+def write_report(folder: Path, pdf: bool = False, *, figures: Sequence[ReportFigure] = ()) -> Path:
     """Make `report.html` and `figures/` from what lies in a results folder.
 
     Of a study that is not finished, the page says what is known so far.
@@ -340,14 +326,16 @@ def write_report(folder: Path, pdf: bool = False) -> Path:
         folder: Of the results.
         pdf: Make `report.pdf` too. One that is there already is made again in any case, so that
             it never says something else than the page.
+        figures: Those of users, of `load_figures`; they come last.
 
     Raises:
-        ConfigError: the folder holds no results.
+        ConfigError: the folder holds no results; or a figure of a user cannot be drawn, and the
+            report, which is there, is without it.
         DvaSimError: the disk is full or refuses to be written.
     """
     reading = Reading(load_so_far(folder))
-    drawn = _draw(reading)
-    blocks = blocks_of(reading, drawn)
+    drawn, problems = draw_all(reading, figures)
+    blocks = [*(Words(f"{capital(p)}.", "warning") for p in problems), *blocks_of(reading, drawn)]
     question = str(reading.study.get("question", "A study without a question"))
     page = folder / PAGE
     try:
@@ -363,31 +351,9 @@ def write_report(folder: Path, pdf: bool = False) -> Path:
             f"the report cannot be written in {folder}: {error.strerror}; "
             f"mend that, then 'dva-sim report {folder}' makes it"
         ) from None
+    if problems:
+        raise ConfigError(f"{'; '.join(problems)}; {page} is made without")
     return page
-
-
-def _draw(reading: Reading) -> list[Drawn]:
-    """All figures, first the one that answers."""
-    if reading.view is None:
-        return []
-    return [*_answering(reading), *_others(reading, reading.view)]
-
-
-def _answering(reading: Reading) -> list[Drawn]:
-    view, finding = reading.view, reading.told
-    if view is None or view.contrast is None or finding is None:
-        return []
-    with styled():
-        drawn = contrast(finding, view.difference(view.panels[0], *view.contrast))
-    return [drawn] if drawn is not None else []
-
-
-def _others(reading: Reading, view: View) -> list[Drawn]:
-    if reading.shifts is not None:
-        return dispatch_figures.draw_all(reading.shifts)
-    if reading.is_contest:
-        return transport_figures.draw_all(view)
-    return draw_all(reading)
 
 
 def _write_figures(folder: Path, drawn: Sequence[Drawn]) -> None:

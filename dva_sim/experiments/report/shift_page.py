@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from dva_sim.experiments.analysis.answer import Answer, Finding, answer
-from dva_sim.experiments.analysis.paired_effects import Factor, Setting
-from dva_sim.experiments.analysis.shift_effects import BEST, POLICY, Shifts, pooled
+from dva_sim.experiments.analysis.paired_effects import Factor, RunGrid, Setting, StudyView, Table
+from dva_sim.experiments.analysis.shift_effects import BEST, POLICY, Shifts, is_dispatch, pooled
 from dva_sim.experiments.report.cell_table import CellTable, Summary, cell_table
-from dva_sim.experiments.study.labels import listing, number, percent
+from dva_sim.experiments.report.model_page import ModelPage, correlated
+from dva_sim.kernel.wording import listing, number, percent
 
 SUMMARIES: tuple[Summary, ...] = (
     ("on_scene_share", "on scene by T", np.mean, percent),
@@ -50,7 +51,52 @@ PERCENTILES = (50, 90, 95)
 BOUND = "the best of fresh units that stand ready at every base and station"
 
 
-def cells(shifts: Shifts) -> CellTable:
+class ShiftPage(ModelPage):
+    """Of policies compared on shifts, one line each."""
+
+    name: ClassVar[str] = "shift"
+    cluster: ClassVar[str] = "shift"
+    summaries: ClassVar[tuple[Summary, ...]] = SUMMARIES
+    has_support: ClassVar[bool] = False
+    assumed: ClassVar[tuple[str, ...]] = ()
+    ends_by_event: ClassVar[bool] = False
+
+    def __init__(self, view: StudyView, events: Table | None = None) -> None:
+        super().__init__(view)
+        self.shifts = Shifts(view, events)
+
+    @classmethod
+    def fits(cls, view: StudyView) -> bool:
+        """Whether policies are what is compared."""
+        return is_dispatch(view)
+
+    def told(self, finding: Finding) -> Finding:
+        """Along the load of people, where that is known."""
+        return _along_loads(finding, self.shifts)
+
+    def answer(self, finding: Finding | None) -> Answer:
+        """The declared contrast first; then what it is paid with, and what was best."""
+        return _answer(finding, self.shifts)
+
+    def cells(self, part: RunGrid) -> CellTable | None:
+        """Of the part the answer speaks of: with percentiles over all its events."""
+        return _cells(self.shifts) if part.name == self.view.part.name else None
+
+    def conditions(
+        self,
+        scenarios: Mapping[str, Mapping[str, Any]],
+        factors: Sequence[Factor],
+        changed: Sequence[str],
+    ) -> list[tuple[str, list[str]]]:
+        """What was the same for all policies, part by part."""
+        return _conditions(list(scenarios.values()))
+
+    def method(self, correlation: float | None) -> list[str] | None:
+        """How shifts were simulated, followed and compared."""
+        return _method(self.shifts, correlation)
+
+
+def _cells(shifts: Shifts) -> CellTable:
     """Every cell of the part the answer speaks of, with percentiles over all its events.
 
     Percentiles are pooled: the mean of the shifts' own would leave out the shifts that do not
@@ -83,20 +129,19 @@ def _percentiles(shifts: Shifts, setting: Setting) -> list[str]:
 
 
 # --- the answer ------------------------------------------------------------------------------
-def answer_of(finding: Finding | None, shifts: Shifts) -> Answer:
-    """The declared contrast first; then what it is paid with, and what was best."""
+def _answer(finding: Finding | None, shifts: Shifts) -> Answer:
     if finding is None:
         return Answer(
             "No contrast was declared that could answer the question; figures show what was run.",
             notes=_notes(shifts),
         )
-    found = answer(along_loads(finding, shifts))
+    found = answer(_along_loads(finding, shifts))
     price = {"In return": " ".join(_price(finding, shifts))} if shifts.can_spare else {}
     notes = [*_notes(shifts), *found.notes]
     return replace(found, depends=found.depends | price, notes=notes)
 
 
-def along_loads(finding: Finding, shifts: Shifts) -> Finding:
+def _along_loads(finding: Finding, shifts: Shifts) -> Finding:
     """The same along the load of people, where that is known, instead of the rate of alarms."""
     loads = [round(load, 2) for load in shifts.loads if load is not None]
     if len(loads) == len(shifts.stops):
@@ -201,11 +246,7 @@ def _progress(shifts: Shifts) -> str:
 
 
 # --- the rest of the page ----------------------------------------------------------------------
-def conditions(
-    scenarios: Mapping[str, Mapping[str, Any]], factors: Sequence[Factor]
-) -> list[tuple[str, list[str]]]:
-    """What was the same for all policies, part by part."""
-    parts = list(scenarios.values())
+def _conditions(parts: Sequence[Mapping[str, Any]]) -> list[tuple[str, list[str]]]:
     if not parts:
         return []
     return [
@@ -261,18 +302,12 @@ _INTERVALS = (
 )
 
 
-def method(shifts: Shifts, correlation: float | None) -> list[str]:
-    """How the numbers were made, as a list of remarks."""
-    alike = ""
-    if correlation is not None:
-        alike = (
-            f" The two sides of the contrast correlate with {correlation:.2f} at the last level."
-        )
+def _method(shifts: Shifts, correlation: float | None) -> list[str]:
     follow = f"{shifts.follow:g} s"
     return [
         "Intervals are over independent shifts. A shift meets the same alarms, places, walking "
         "speeds and service times under every policy, and differences are taken within it (common "
-        f"random numbers).{alike}",
+        f"random numbers).{correlated(correlation)}",
         "Counted are all alarms, true and false, first reported between the warm-up and one "
         f"follow-up before the end; each is followed for T = {follow}. Confirmed, cleared, "
         "escalated and expired compete (Aalen-Johansen).",

@@ -17,12 +17,12 @@ from typing import Any
 import numpy as np
 
 from dva_sim import statistics
-from dva_sim.experiments.analysis.answer import Answer, Finding, answer, at, places, telling_stop
+from dva_sim.experiments.analysis.answer import Answer, Finding, at, places, telling_stop
 from dva_sim.experiments.analysis.competing_risks import Endings, horizon_of, with_endings
 from dva_sim.experiments.analysis.conditions import get
 from dva_sim.experiments.analysis.extrapolation import support_of_part
 from dva_sim.experiments.analysis.hypothesis_tests import Judgement, judged
-from dva_sim.experiments.analysis.kept_episodes import Episode, Tables, typical_and_worst
+from dva_sim.experiments.analysis.kept_episodes import KeptEpisode, Tables, typical_and_worst
 from dva_sim.experiments.analysis.layout import (
     finding_of,
     keys_of,
@@ -35,40 +35,29 @@ from dva_sim.experiments.analysis.layout import (
 )
 from dva_sim.experiments.analysis.paired_effects import (
     Floats,
-    Part,
+    RunGrid,
     Setting,
+    StudyView,
     Table,
-    View,
     as_floats,
     present,
 )
-from dva_sim.experiments.analysis.robustness import Robustness, robustness_of
-from dva_sim.experiments.analysis.sample_size import Plan, plans
-from dva_sim.experiments.analysis.shift_effects import Shifts, is_dispatch
-from dva_sim.experiments.analysis.tuning import tuning_warning
-from dva_sim.experiments.report import shift_page as dispatch_page
-from dva_sim.experiments.report import transport_page
-from dva_sim.experiments.report.cell_table import SUMMARIES, CellTable, cell_table
-from dva_sim.experiments.report.sample_size_text import few_that_weigh
+from dva_sim.experiments.analysis.robustness import RepeatedAnswer, robustness_of
+from dva_sim.experiments.analysis.sample_size import SizePlan, plans
+from dva_sim.experiments.report.cell_table import CellTable, cell_table
+from dva_sim.experiments.report.model_page import ModelPage
+from dva_sim.experiments.report.pages import page_of
+from dva_sim.experiments.report.sample_size_table import few_that_weigh
+from dva_sim.experiments.report.tuning_table import tuning_warning
+from dva_sim.experiments.results.manifest import status_of
 from dva_sim.experiments.results.results import Results
-from dva_sim.experiments.study.labels import (
-    brief,
-    capital,
-    level_name,
-    listing,
-    number,
-    percent,
-    quantity,
-    setting,
-)
 from dva_sim.experiments.study.schema import POINT, REPEATS, STRATEGY, TUNING
-from dva_sim.experiments.study.status import status_of
+from dva_sim.kernel.wording import capital, listing, number, percent, quantity
+from dva_sim.simulation.labels import brief, level_name, setting
 from dva_sim.statistics import band
 
 _WAITING = "move_and_wait_share"
 _MOST_SETTINGS = 3  # told one by one
-# What an answer about driving depends on most, if the study does not vary it.
-_FIXED = ("pattern", "phone.profile", "control", "robot.profile")
 
 
 def depends(reading: Reading) -> dict[str, str]:
@@ -89,7 +78,7 @@ def _whom(reading: Reading) -> str:
 
 
 # --- persons -------------------------------------------------------------------------------
-def _persons(reading: Reading, view: View, finding: Finding) -> str:
+def _persons(reading: Reading, view: StudyView, finding: Finding) -> str:
     """How many, how they steer, and what other models of them say."""
     if reading.cluster == "shift":
         return f"{finding.persons} simulated, independent of each other."
@@ -107,7 +96,7 @@ def _persons(reading: Reading, view: View, finding: Finding) -> str:
     return f"{who} {steer}; with another, not tried here, the difference may be smaller or larger."
 
 
-def _how(view: View, finding: Finding) -> str:
+def _how(view: StudyView, finding: Finding) -> str:
     """Of the strategy that chooses: how much of the time they moved and waited."""
     stop = telling_stop(finding)
     if stop is None or not view.part.has(_WAITING):
@@ -128,7 +117,7 @@ def _mean(values: Floats) -> float:
     return float(seen.mean()) if len(seen) else math.nan
 
 
-def _under_others(found: Robustness) -> str:
+def _under_others(found: RepeatedAnswer) -> str:
     """At the last level at which it was repeated."""
     told = [stop for stop in found.stops if stop.others]
     if not told:
@@ -144,7 +133,7 @@ def _under_others(found: Robustness) -> str:
 
 
 # --- settings ------------------------------------------------------------------------------
-def _settings(reading: Reading, view: View, finding: Finding) -> Iterator[str]:
+def _settings(reading: Reading, view: StudyView, finding: Finding) -> Iterator[str]:
     """The answer under the other settings that were run, and what was not varied at all."""
     stop = telling_stop(finding)
     if finding.within and stop is not None and (others := view.panels[1:]):
@@ -154,7 +143,7 @@ def _settings(reading: Reading, view: View, finding: Finding) -> Iterator[str]:
         yield f"Not varied: {setting(fixed)}."
 
 
-def _elsewhere(view: View, finding: Finding, others: list[Setting]) -> str:
+def _elsewhere(view: StudyView, finding: Finding, others: list[Setting]) -> str:
     """The same difference, at the place of which the answer speaks first."""
     stop = telling_stop(finding) or 0
     where = f" {there}" if (there := at(finding, [stop])) else ""
@@ -175,7 +164,7 @@ def _elsewhere(view: View, finding: Finding, others: list[Setting]) -> str:
 
 
 def _difference(
-    view: View, finding: Finding, panel: Setting, stop: int
+    view: StudyView, finding: Finding, panel: Setting, stop: int
 ) -> tuple[float, float, float]:
     """Mean and band under other settings, within what is possible."""
     found = band(view.difference(panel, finding.first, finding.second))
@@ -193,15 +182,17 @@ def _apart(panel: Setting, usual: Setting) -> str:
 
 def _fixed(reading: Reading, part: str) -> dict[str, Any]:
     """Keys that matter and were not varied, with their values."""
-    if any(s.get("model") in ("timed", "transports") for s in reading.scenarios.values()):
-        return {}
     varied = {key.name for key in keys_of(reading.study)}
-    values = {key: get(reading.scenario_of(part), key) for key in _FIXED if key not in varied}
+    values = {
+        key: get(reading.scenario_of(part), key)
+        for key in reading.page.assumed
+        if key not in varied
+    }
     return {key: value for key, value in values.items() if isinstance(value, str)}
 
 
 # --- delays --------------------------------------------------------------------------------
-def _beyond(view: View, finding: Finding) -> str:
+def _beyond(view: StudyView, finding: Finding) -> str:
     """Where nobody was ever watched who could tell whether the simulated persons are right."""
     outside = view.stops_outside(view.panels[0], view.contrast)
     if not outside or view.over is None:
@@ -247,8 +238,8 @@ class Reading:
     def _is_of_events(self) -> bool:
         """Whether the answer is about events, whoever saw to them, and not about drives."""
         measure = (self.study.get("answer") or {}).get("measure")
-        models = {s.get("model") for s in self.scenarios.values()}
-        return measure in ("confirmation_mean_s", "response_mean_s") and "timed" not in models
+        ends_by_event = page_of(self.scenarios.values()).ends_by_event
+        return measure in ("confirmation_mean_s", "response_mean_s") and ends_by_event
 
     @property
     def runs(self) -> Table:
@@ -271,7 +262,7 @@ class Reading:
         return self.scenarios.get(part, {})
 
     @cached_property
-    def view(self) -> View | None:
+    def view(self) -> StudyView | None:
         """How the study is looked at, with its extrapolations known; None without any run."""
         view = view_of(self.study, self.runs) if self.runs else None
         if view is None:
@@ -290,26 +281,20 @@ class Reading:
     @property
     def told(self) -> Finding | None:
         """The finding in the words of the report: where loads are known, along them."""
-        if self.finding is None or self.shifts is None:
-            return self.finding
-        return dispatch_page.along_loads(self.finding, self.shifts)
+        return None if self.finding is None else self.page.told(self.finding)
 
     @cached_property
-    def shifts(self) -> Shifts | None:
-        """The runs as shifts, where a study compares policies of dispatch on them."""
-        if self.view is None or not is_dispatch(self.view):
-            return None
-        return Shifts(self.view, self.table("events") or None)
+    def page(self) -> ModelPage:
+        """What the report says otherwise of the study's model; asked where there are runs."""
+        assert self.view is not None
+        page = page_of(self.scenarios.values())
+        fitting = page if page.fits(self.view) else ModelPage
+        return fitting(self.view, self.table("events") or None)
 
     @property
     def cluster(self) -> str:
         """What is drawn anew for intervals: persons, or shifts."""
-        return "person" if self.shifts is None else "shift"
-
-    @property
-    def is_contest(self) -> bool:
-        """Whether transports compete on a congested link."""
-        return transport_page.is_contest(self.view)
+        return "person" if self.view is None else self.page.cluster
 
     @cached_property
     def endings(self) -> Endings | None:
@@ -322,7 +307,7 @@ class Reading:
         return found if len(found) and np.isfinite(horizon) else None
 
     @cached_property
-    def robustness(self) -> Robustness | None:
+    def robustness(self) -> RepeatedAnswer | None:
         """The answer under other models of the persons, where it was repeated."""
         if self.view is None or self.finding is None or not self.table(REPEATS):
             return None
@@ -334,8 +319,8 @@ class Reading:
         """Continuous factors: columns that tell where in its ranges each run lies."""
         return points_of(self.study, self.runs)
 
-    @property
-    def episodes(self) -> tuple[Episode, Episode] | None:
+    @cached_property
+    def episodes(self) -> tuple[KeptEpisode, KeptEpisode] | None:
         """A typical run and the worst, of those that were kept."""
         if self.view is None:
             return None
@@ -365,15 +350,7 @@ class Reading:
         """What a reader should take home, and what it depends on."""
         if self.view is None:
             return Answer("No run was completed, so there is nothing to answer with.")
-        if self.shifts is not None:
-            found = dispatch_page.answer_of(self.finding, self.shifts)
-        elif self.finding is not None:
-            found = answer(self.finding)
-        else:
-            return Answer(
-                "The contrast that would answer the question was not declared or not run; "
-                "the figures and the table show what was."
-            )
+        found = self.page.answer(self.finding)
         weighed = [few_that_weigh(self.finding, self.view)] if self.finding is not None else []
         notes = [*found.notes, *filter(None, weighed)]
         return replace(found, depends=found.depends | depends(self), notes=notes)
@@ -389,7 +366,7 @@ class Reading:
         return judged(self.study, self.runs) if self.runs else Judgement([], [])
 
     @cached_property
-    def plans(self) -> list[Plan]:
+    def plans(self) -> list[SizePlan]:
         """What a study would need: of an exploratory one for all, else for what stayed open."""
         if not self.runs:
             return []
@@ -411,27 +388,22 @@ class Reading:
             return []
         names = dict.fromkeys(str(name) for name in self.runs["part"])
         table, factors = layout_of(self.study, self.runs, are_points_trials=False)
-        parts = [Part(table, name, factors) for name in names]
+        parts = [RunGrid(table, name, factors) for name in names]
         return [self._cells_of(part, self.view) for part in parts if len(part)]
 
-    def _cells_of(self, part: Part, view: View) -> CellTable:
-        if self.shifts is not None and part.name == view.part.name:
-            return dispatch_page.cells(self.shifts)
-        summaries = dispatch_page.SUMMARIES if self.shifts is not None else SUMMARIES
-        if self.is_contest:
-            summaries = transport_page.SUMMARIES
-        scenario = self.scenario_of(part.name)
-        return cell_table(
+    def _cells_of(self, part: RunGrid, view: StudyView) -> CellTable:
+        page, scenario = self.page, self.scenario_of(part.name)
+        return page.cells(part) or cell_table(
             part,
             view.measure,
-            summaries,
-            support=support_of_part(part, scenario) if summaries is SUMMARIES else None,
+            page.summaries,
+            support=support_of_part(part, scenario) if page.has_support else None,
             possible=possible_values(view.measure, scenario),
             is_listed=bool(self.study.get("design")),
             points=[*self.points, *self._taken_together(part)],
         )
 
-    def _taken_together(self, part: Part) -> list[str]:
+    def _taken_together(self, part: RunGrid) -> list[str]:
         """Factors of a zip that another one stands for."""
         axes = [factor.name for factor in part.factors]
         zipped = (self.study.get("design") or {}).get("zip") or ()

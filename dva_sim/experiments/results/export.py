@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
-from dva_sim.experiments.results.results import Results
+from dva_sim.experiments.results.results import Results, quoted
 from dva_sim.kernel.errors import ConfigError, DvaSimError
 from dva_sim.kernel.suggestions import either
 
@@ -94,7 +94,7 @@ def _write_csv(source: Path, path: Path) -> None:
     with duckdb.connect(config={"threads": 1}) as connection:
         rows = connection.read_parquet(str(source))
         columns = ", ".join(
-            f"nullif({_quoted(n)}, 'nan') AS {_quoted(n)}" if kind == "DOUBLE" else _quoted(n)
+            f"nullif({quoted(n)}, 'nan') AS {quoted(n)}" if kind == "DOUBLE" else quoted(n)
             for n, kind in zip(rows.columns, rows.types, strict=True)
         )
         rows.project(columns).write_csv(str(path), header=True)
@@ -122,7 +122,3 @@ def _put(path: Path, write: _Write) -> None:
         raise DvaSimError(f"{path} cannot be written: {reason}") from None
     finally:
         part.unlink(missing_ok=True)
-
-
-def _quoted(name: str) -> str:
-    return '"' + name.replace('"', '""') + '"'

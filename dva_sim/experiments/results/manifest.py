@@ -1,4 +1,7 @@
-"""What a results folder says of itself: what was asked and run, and apart, on which machine."""
+"""What a results folder says of itself: what was asked and run, and what it may be called.
+
+What differs from machine to machine is apart, in a file of its own.
+"""
 
 from __future__ import annotations
 
@@ -6,26 +9,34 @@ import json
 import os
 import platform
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from dva_sim import __version__
-from dva_sim.experiments.execution.checkpoint import Journal
-from dva_sim.experiments.execution.tables import design_row
+from dva_sim.experiments.results.tables import design_row
 from dva_sim.experiments.study import cell_grid
-from dva_sim.experiments.study.cell_grid import Cell, Job, Run
-from dva_sim.experiments.study.hashing import fingerprint, inputs, program_state, stable_hash
+from dva_sim.experiments.study.cell_grid import DesignCell, RunKey, StudyJob, StudyRun
+from dva_sim.experiments.study.hashing import (
+    fingerprint,
+    fingerprint_of_judges,
+    inputs,
+    program_state,
+    stable_hash,
+)
+from dva_sim.experiments.study.own_measures import columns_told, own_measures
 from dva_sim.experiments.study.robustness_grid import parameter_sets
-from dva_sim.experiments.study.study import Study
-from dva_sim.experiments.study.tuned_values import load_tuned
-from dva_sim.kernel.errors import DvaSimError
+from dva_sim.experiments.study.study import Status, Study
+from dva_sim.experiments.study.tuning import load_tuned
+from dva_sim.kernel.errors import DvaSimError, RunTooLong
 
 _PACKAGES = ("duckdb", "lxml", "numpy", "pymunk", "scipy", "shapely", "simpy")
 
 
-def manifest_of(study: Study, cells: Sequence[Cell], todo: Sequence[Job]) -> dict[str, Any]:
+def manifest_of(
+    study: Study, cells: Sequence[DesignCell], todo: Sequence[StudyJob]
+) -> dict[str, Any]:
     """What was asked and run: nothing in it depends on when, where or how fast.
 
     Its `hash` is the identity of the results: a folder holds one study, of one program.
@@ -41,7 +52,7 @@ def manifest_of(study: Study, cells: Sequence[Cell], todo: Sequence[Job]) -> dic
         },
         "set": list(study.settings),
         "changes": dict(study.changes),
-        "inputs": inputs(cell.scenario for cell in cells),
+        "inputs": inputs((cell.scenario for cell in cells), own_measures(study)),
         "cells": [_cell_row(cell) for cell in cells],
         "parameter_sets": parameter_sets(study),
         "tuned": load_tuned(study).model_dump(mode="json") if tuned else None,
@@ -55,6 +66,8 @@ def manifest_of(study: Study, cells: Sequence[Cell], todo: Sequence[Job]) -> dic
         },
         "versions": _simulating(),
     }
+    if columns := columns_told(study, (cell.scenario for cell in cells)):
+        content["columns"] = columns
     identity = stable_hash(content)
     content["versions"] = versions()
     return content | {"hash": identity, "usual": study.usual}
@@ -76,15 +89,18 @@ def _simulating() -> dict[str, str]:
     return {"dva-sim": __version__, "fingerprint": fingerprint()} | packages
 
 
-def failures(todo: Sequence[Run], journal: Journal) -> list[dict[str, Any]]:
-    """Failed runs in the order of the design."""
-    failed = journal.failures()
+def failures(todo: Sequence[StudyRun], failed: Mapping[RunKey, str]) -> list[dict[str, Any]]:
+    """Failed runs, with the reason, in the order of the design."""
     return [design_row(j) | {"error": failed[j.key]} for j in todo if j.key in failed]
 
 
-def machine(todo: Sequence[Run], journal: Journal) -> dict[str, Any]:
-    """What is different on every machine and at every time."""
-    costs = journal.costs()
+def machine(todo: Sequence[StudyRun], costs: Mapping[RunKey, float]) -> dict[str, Any]:
+    """What is different on every machine and at every time.
+
+    Args:
+        todo: The runs of the study.
+        costs: What each run that is done has cost [CPU s].
+    """
     spent: dict[str, list[float]] = defaultdict(list)
     for job in {job.key: job for job in todo}.values():
         if job.key in costs:
@@ -112,6 +128,65 @@ def write_json(path: Path, data: dict[str, Any]) -> None:
         raise DvaSimError(f"{path} cannot be written: {error.strerror}") from None
 
 
-def _cell_row(cell: Cell) -> dict[str, Any]:
+def _cell_row(cell: DesignCell) -> dict[str, Any]:
     levels = dict(cell.levels)
     return {"part": cell.part, "cell": cell.index, "config": cell.config, "levels": levels}
+
+
+def status_of(manifest: Mapping[str, Any]) -> Status:
+    """What the result may be called; results that do not say are judged by what was set.
+
+    A confirmation has all the runs that were registered. Runs that took too long are others on
+    another machine. Verdicts are made anew whenever they are told, by the program as it is then.
+    """
+    if "status" in manifest:
+        manifest = _marked_partial(manifest)
+        status = Status.model_validate(manifest["status"])
+        return _judged_anew(_without(manifest.get("failures", []), status))
+    changes = [_as_words(change) for change in manifest.get("set", [])]
+    if not changes:
+        return Status(kind="declared")
+    return Status(kind="exploratory", why=(f"changed on the command line: {', '.join(changes)}",))
+
+
+def _marked_partial(manifest: Mapping[str, Any]) -> Mapping[str, Any]:
+    """The manifest, whose status says so if the study is not finished."""
+    if "partial" not in manifest:
+        return manifest
+    why = ("the study is not finished", *manifest["status"]["why"])
+    found = {"kind": "exploratory", "why": why, "reproducible": False}
+    return {**manifest, "status": {**manifest["status"], **found}}
+
+
+def _judged_anew(status: Status) -> Status:
+    """The status, with a word if hypotheses are judged by another program than was registered."""
+    meant = (status.registration or {}).get("judged_with")
+    if not meant or meant == (now := fingerprint_of_judges()):
+        return status
+    remark = f"what judges its hypotheses has changed since it was registered ({meant}; now {now})"
+    return status.model_copy(update={"why": (*status.why, remark)})
+
+
+def _without(failed: Sequence[Mapping[str, Any]], status: Status) -> Status:
+    """The status of results in which some runs are missing."""
+    if not failed:
+        return status
+    confirmed = status.kind == "confirmatory"
+    slow = sum(str(row["error"]).startswith(RunTooLong.__name__) for row in failed)
+    why = []
+    if confirmed:
+        why.append(f"{len(failed)} of the registered runs failed")
+    if slow:
+        why.append(f"{slow} of the runs met their limit of time; on another machine others may")
+    return status.model_copy(
+        update={
+            "kind": "exploratory" if confirmed else status.kind,
+            "why": (*why, *status.why),
+            "reproducible": status.reproducible and not slow,
+        }
+    )
+
+
+def _as_words(change: Any) -> str:
+    """One `--set`, however the manifest keeps it."""
+    return change if isinstance(change, str) else "=".join(str(word) for word in change)

@@ -1,6 +1,7 @@
-"""A table as columns of numpy arrays, which other tools can take over.
+"""What a results folder holds: the manifest, and the tables as columns of numpy arrays.
 
-Read a results folder: the manifest, and the tables as columns of numpy arrays.
+Nothing is concluded or drawn here: `experiments.report` reads results, and `dva_sim.Results` adds
+what it finds.
 """
 
 from __future__ import annotations
@@ -14,21 +15,17 @@ from html import escape
 from importlib import import_module
 from pathlib import Path
 from textwrap import shorten
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.experiments.execution.checkpoint import FILE as JOURNAL
 from dva_sim.experiments.results.data_dictionary import Column, describe
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import hint, listed
 
 if TYPE_CHECKING:
     from duckdb import DuckDBPyRelation
-
-    from dva_sim.experiments.analysis.answer import Answer
-    from dva_sim.experiments.report.summary import Reading
 
 
 _SHOWN = 10  # rows in a notebook
@@ -129,6 +126,7 @@ def _masked(values: Array) -> Array:
 
 MANIFEST = "manifest.json"
 MACHINE = "machine.json"
+JOURNAL = "journal.sqlite"  # of a study that runs; see `execution.checkpoint`
 TABLES = "tables"
 _NOT_AS_WRITTEN = "is damaged, edited or of other results; the study's command makes it again"
 
@@ -162,9 +160,10 @@ class Results:
     folder: Path
     manifest: dict[str, Any]
     aside: Path | None = None
+    _offers: ClassVar = "failures, machine"  # what to ask it for
 
     @classmethod
-    def load(cls, folder: str | Path) -> Results:
+    def load(cls, folder: str | Path) -> Self:
         """Open a results folder.
 
         Raises:
@@ -195,18 +194,6 @@ class Results:
     def question(self) -> str:
         """What was asked."""
         return str(self.study.get("question", ""))
-
-    @cached_property
-    def reading(self) -> Reading:
-        """What the runs say, in words and tables."""
-        from dva_sim.experiments.report.summary import Reading
-
-        return Reading(self)
-
-    @property
-    def answer(self) -> Answer:
-        """The answer to the question in words, with its interval, and what must be known of it."""
-        return self.reading.answer
 
     @property
     def partial(self) -> str:
@@ -263,7 +250,8 @@ class Results:
         scenarios = self.manifest.get("scenarios", {}).values()
         models = dict.fromkeys(scenario.get("model", "full") for scenario in scenarios)
         factors = [*self.factors, *((self.study.get("design") or {}).get("ranges") or {})]
-        return describe(table, self.names(table), list(models), factors)
+        told = self.manifest.get("columns")
+        return describe(table, self.names(table), list(models), factors, told)
 
     def names(self, table: str) -> list[str]:
         """The columns of a table, without its rows being read.
@@ -290,16 +278,6 @@ class Results:
             self._seen.add(table)
         return path
 
-    def report(self) -> Path:
-        """Make `report.html` and `figures/` in the folder.
-
-        Raises:
-            DvaSimError: the disk is full or refuses to be written.
-        """
-        from dva_sim.experiments.report.report import write_report
-
-        return write_report(self.folder)
-
     def table(
         self, name: str, part: str | None = None, columns: Sequence[str] | None = None
     ) -> Frame:
@@ -316,7 +294,7 @@ class Results:
         Raises:
             ConfigError: no such table, or a damaged file.
         """
-        wanted = "*" if columns is None else ", ".join(map(_quoted, columns))
+        wanted = "*" if columns is None else ", ".join(map(quoted, columns))
         return self._read(name, wanted, "" if part is None else "WHERE part = ?", part)
 
     def _read(self, name: str, columns: str, rows: str, part: str | None = None) -> Frame:
@@ -349,21 +327,13 @@ class Results:
             (
                 f"Results in {self.folder}: {runs} runs in {cells} configurations{failed}",
                 shorten(self.question, 100, placeholder=" ..."),
-                f"answer, failures, machine, report(), tables {', '.join(self.tables) or 'none'}",
+                f"{self._offers}, tables {', '.join(self.tables) or 'none'}",
             )
         )
 
-    def _repr_html_(self) -> str:
-        """What a notebook shows: question, answer, and how many runs stand behind it."""
-        depends = (f"{about}: {words}" for about, words in self.answer.depends.items())
-        notes = "".join(f"<p>{escape(note)}</p>" for note in (*depends, *self.answer.notes))
-        failed = f", {len(self.failures)} failed" if self.failures else ""
-        runs = f"<p>{self.runs.rows} runs{failed}, in {escape(str(self.folder))}</p>"
-        lead = f"<p><b>{escape(self.answer.lead)}</b></p>"
-        return f"<h3>{escape(self.question)}</h3>{lead}{notes}{runs}"
 
-
-def _quoted(name: str) -> str:
+def quoted(name: str) -> str:
+    """The name of a column, as SQL takes it."""
     return '"' + name.replace('"', '""') + '"'
 
 

@@ -1,4 +1,7 @@
-"""From a study to its runs: the cells of its design, with luck shared between them."""
+"""Where in a study a mistake of one of its scenarios was made: by `--set`, or in a file.
+
+From a study to its runs: the cells of its design, with luck shared between them.
+"""
 
 from __future__ import annotations
 
@@ -9,9 +12,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from dva_sim.experiments.study import designs
-from dva_sim.experiments.study.error_location import blamed
+from dva_sim.experiments.study.factor_levels import levels_at_ends, levels_of_cells, path_in_design
 from dva_sim.experiments.study.hashing import stable_hash
+from dva_sim.experiments.study.own_measures import names_of_own
 from dva_sim.experiments.study.robustness_grid import (
     PARAMETERS,
     TRAITS,
@@ -21,7 +24,7 @@ from dva_sim.experiments.study.robustness_grid import (
 )
 from dva_sim.experiments.study.schema import POINT, REPEATS, TUNED, TUNING, Level
 from dva_sim.experiments.study.study import Study
-from dva_sim.experiments.study.tuned_values import Basis, load_tuned
+from dva_sim.experiments.study.tuning import TuningBasis, load_tuned
 from dva_sim.kernel.config import Document, KeyPath
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.key_changes import blame
@@ -30,13 +33,62 @@ from dva_sim.kernel.suggestions import listed, unknown
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.models import AnyScenario, model_for, model_of
 
+
+def located(study: Study, part: str, error: ConfigError, changes: Mapping[str, Any]) -> ConfigError:
+    """The mistake at what makes it; as it is if a file has been named.
+
+    Args:
+        study: Whose scenario it is.
+        part: Which one.
+        error: With the keys at fault, if changes of the scenario are.
+        changes: All changes of the scenario.
+    """
+    if error.file is not None:
+        return error
+    named = [key for key, value in changes.items() if _is_named(key, value, error.problem)]
+    keys = error.keys if len(error.keys) == 1 else (named or list(error.keys))
+    for key in keys:
+        if pair := study.setting_of(tuple(key.split("."))):
+            return ConfigError(f"--set {pair}: {error.problem.removeprefix(f'{key}: ')}")
+    for key in keys:
+        for path in _places(study, part, key, changes[key]):
+            if study.is_from_file(path):
+                return study.error(error.problem, path)
+    return in_setting(study, error) if keys else error
+
+
+def in_setting(study: Study, error: ConfigError) -> ConfigError:
+    """A mistake in what the study's file does not say: in the settings, if there are any."""
+    pairs = ", ".join(f"--set {pair}" for pair in study.settings)
+    return ConfigError(f"{pairs}: {error.problem}") if pairs else error
+
+
+def _is_named(key: str, value: Any, problem: str) -> bool:
+    return key in problem or (isinstance(value, str) and repr(value) in problem)
+
+
+def _places(study: Study, part: str, key: str, value: Any) -> Iterator[KeyPath]:
+    """Where the study might give a key of its scenarios that value."""
+    yield "factors", key
+    yield "parts", part, "reference", key
+    yield "parts", part, "changes", key
+    for factor, levels in study.treatments.items():
+        for level in levels:
+            yield "treatments", factor, level, key
+    if study.version is not None:
+        yield study.version, key
+    in_design = path_in_design(study, key, value)
+    if in_design is not None:
+        yield in_design
+
+
 REFERENCE = -1
 
-Key = tuple[str, int]
+RunKey = tuple[str, int]
 
 
 @dataclass(frozen=True, slots=True)
-class Cell:
+class DesignCell:
     """One configuration of one part.
 
     Attributes:
@@ -57,7 +109,7 @@ class Cell:
 
 
 @dataclass(frozen=True, slots=True)
-class Run:
+class StudyRun:
     """One run of a study, by its place in the design.
 
     Attributes:
@@ -89,13 +141,13 @@ class Run:
         return self.part == REPEATS
 
     @property
-    def key(self) -> Key:
+    def key(self) -> RunKey:
         """What tells this run from all others; equal keys are the same run."""
         return self.config, self.seed
 
 
 @dataclass(frozen=True, slots=True)
-class Job(Run):
+class StudyJob(StudyRun):
     """A run with all that is needed to make it.
 
     Attributes:
@@ -105,7 +157,7 @@ class Job(Run):
     scenario: AnyScenario
 
 
-def cells(study: Study) -> list[Cell]:
+def cells(study: Study) -> list[DesignCell]:
     """All configurations, by part, the reference first, then those of the design in order.
 
     The repeats of the answer come last, as if they were a part of their own.
@@ -128,16 +180,19 @@ def refuse_unknown_measures(study: Study) -> None:
         ConfigError: it is none.
     """
     for path, part, measure in _asked_measures(study):
-        known = model_of(_source(study, part)).measures()
+        source = _source(study, part)
+        own = names_of_own(study, str(source.data.get("model", "full")))
+        known = [*model_of(source).measures(), *own]
         if measure not in known:
             raise study.error(unknown("measure", measure, known), path)
 
 
-def _refuse_impossible_measures(study: Study, every: Sequence[Cell]) -> None:
+def _refuse_impossible_measures(study: Study, every: Sequence[DesignCell]) -> None:
     """What no run of a part can hold would only be missed when all of them are made."""
     for path, part, measure in _asked_measures(study):
         made = [c.scenario for c in every if c.part == part and c.index != REFERENCE]
-        possible = [model_for(scenario).measures(scenario) for scenario in made]
+        own = names_of_own(study, made[0].model) if made else []
+        possible = [[*model_for(scenario).measures(scenario), *own] for scenario in made]
         if not any(measure in names for names in possible):
             problem = f"no run of part {part!r} has a value of the measure {measure!r}"
             raise study.error(f"{problem}; it has: {listed(possible[0])}", path)
@@ -161,11 +216,11 @@ def base_scenario(study: Study, part: str) -> AnyScenario:
     return _build(study, part, source, _every_change(study, part, source, {}))
 
 
-def basis_of_tuning(study: Study) -> Basis:
+def basis_of_tuning(study: Study) -> TuningBasis:
     """The persons and phones that tuned values should rest on."""
     assert study.tuning is not None
     scenario = base_scenario(study, study.tuning.part).model_dump(mode="json")
-    return Basis.of(scenario.get("operator", {}).get("population", "operators"))
+    return TuningBasis.of(scenario.get("operator", {}).get("population", "operators"))
 
 
 def is_tuned(study: Study) -> bool:
@@ -174,7 +229,7 @@ def is_tuned(study: Study) -> bool:
     return TUNED in (*study.factors.get(TUNING, ()), *listed)
 
 
-def jobs(study: Study, grid: Sequence[Cell] | None = None) -> list[Job]:
+def jobs(study: Study, grid: Sequence[DesignCell] | None = None) -> list[StudyJob]:
     """All runs in a fixed order: part, cell, person, trial; the repeats last.
 
     Args:
@@ -190,7 +245,7 @@ def jobs(study: Study, grid: Sequence[Cell] | None = None) -> list[Job]:
     return [job for name, part_cells in parts for job in _jobs_of(study, name, part_cells)]
 
 
-def runs_in(manifest: Mapping[str, Any]) -> list[Run]:
+def runs_in(manifest: Mapping[str, Any]) -> list[StudyRun]:
     """The runs that a manifest tells of, in the order of `jobs`.
 
     Args:
@@ -198,7 +253,7 @@ def runs_in(manifest: Mapping[str, Any]) -> list[Run]:
     """
     study, rows = Study.model_validate(manifest["study"]), manifest["cells"]
     return [
-        Run(part, tuple(row["levels"].items()), row["cell"], *draw, row["config"])
+        StudyRun(part, tuple(row["levels"].items()), row["cell"], *draw, row["config"])
         for part in dict.fromkeys(row["part"] for row in rows)
         for row in rows
         if row["part"] == part
@@ -206,36 +261,36 @@ def runs_in(manifest: Mapping[str, Any]) -> list[Run]:
     ]
 
 
-def to_rehearse(study: Study, every: Iterable[Cell]) -> list[Cell]:
+def to_rehearse(study: Study, every: Iterable[DesignCell]) -> list[DesignCell]:
     """The cells in which a mistake would show: instead of points in ranges, the ranges' ends."""
     ends = _at_ends(study)
     return [*ends, *(cell for cell in every if not (ends and cell.levels))]
 
 
-def _at_ends(study: Study) -> list[Cell]:
+def _at_ends(study: Study) -> list[DesignCell]:
     """Cells at both ends of every range, whichever points are drawn; none without ranges.
 
     Raises:
         ConfigError: a range has an end that is not valid.
     """
-    rows = list(designs.settings_at_ends(study))
+    rows = list(levels_at_ends(study))
     return [cell for name in study.parts if rows for cell in _cells_at(study, name, rows)]
 
 
-def _cells_of(study: Study, name: str) -> Iterator[Cell]:
+def _cells_of(study: Study, name: str) -> Iterator[DesignCell]:
     reference = study.parts[name].reference
     if reference is not None:
         yield _cell(study, name, REFERENCE, {}, _source(study, name), reference)
-    yield from _cells_at(study, name, designs.settings(study))
+    yield from _cells_at(study, name, levels_of_cells(study))
 
 
-def _cells_at(study: Study, name: str, rows: Iterable[Mapping[str, Level]]) -> Iterator[Cell]:
+def _cells_at(study: Study, name: str, rows: Iterable[Mapping[str, Level]]) -> Iterator[DesignCell]:
     source, change = _source(study, name), _changer(study)
     for index, levels in enumerate(rows):
         yield _cell(study, name, index, levels, source, change(levels))
 
 
-def _repeats_of(study: Study) -> Iterator[Cell]:
+def _repeats_of(study: Study) -> Iterator[DesignCell]:
     """The answer's contrast under every strategy and every set of parameters."""
     factors = factors_of_repeats(study)
     if not factors or study.answer is None:
@@ -281,11 +336,11 @@ def _cell(
     levels: Mapping[str, Level],
     source: Document,
     changes: Mapping[str, Any],
-) -> Cell:
+) -> DesignCell:
     every = _every_change(study, part, source, changes)
     scenario = _build(study, part, source, every)
     config = stable_hash(scenario.model_dump(mode="json"))
-    return Cell(part, index, tuple(levels.items()), scenario, config, every)
+    return DesignCell(part, index, tuple(levels.items()), scenario, config, every)
 
 
 def _source(study: Study, part: str) -> Document:
@@ -310,12 +365,13 @@ def _every_change(
 def _build(study: Study, part: str, source: Document, changes: Mapping[str, Any]) -> AnyScenario:
     """The part's scenario; a mistake in a change is told where the study makes it."""
     try:
-        return model_of(source).build(source, changes)
+        built: AnyScenario = model_of(source).build(source, changes)
+        return built
     except ConfigError as error:
-        raise blamed(study, _source_of(study, part), error, changes) from None
+        raise located(study, _source_of(study, part), error, changes) from None
 
 
-def rehearse(study: Study, cell: Cell) -> None:
+def rehearse(study: Study, cell: DesignCell) -> None:
     """Find what cannot work in a cell before anything runs.
 
     Raises:
@@ -331,7 +387,7 @@ def rehearse(study: Study, cell: Cell) -> None:
         def make(changes: Mapping[str, Any]) -> None:
             model.rehearse(model.build(source, changes), study.seed)
 
-        raise blamed(study, part, blame(error, cell.changes, make), cell.changes) from None
+        raise located(study, part, blame(error, cell.changes, make), cell.changes) from None
 
 
 def _source_of(study: Study, part: str) -> str:
@@ -347,7 +403,7 @@ def _located(changes: dict[str, Any], folder: Path) -> dict[str, Any]:
     return {**changes, key: named["dispatch"]["policy"]} if key in changes else changes
 
 
-def _jobs_of(study: Study, name: str, part_cells: Sequence[Cell]) -> Iterator[Job]:
+def _jobs_of(study: Study, name: str, part_cells: Sequence[DesignCell]) -> Iterator[StudyJob]:
     # Persons of one cluster follow each other, so that no two clusters share an operator.
     team = max(1, *(model_for(cell.scenario).team(cell.scenario) for cell in part_cells))
     draws = _draws(study, name)
@@ -356,7 +412,7 @@ def _jobs_of(study: Study, name: str, part_cells: Sequence[Cell]) -> Iterator[Jo
         scenarios = {person: play(person * team) for person, _, _ in draws}
         for draw in draws:
             scenario = scenarios[draw[0]]
-            yield Job(name, cell.levels, cell.index, *draw, cell.config, scenario)
+            yield StudyJob(name, cell.levels, cell.index, *draw, cell.config, scenario)
 
 
 def _draws(study: Study, name: str) -> list[tuple[int, int, int]]:

@@ -1,26 +1,19 @@
 """Designs: which levels meet each other, if not every one every other.
 
-A design makes rows, each with a level for some of the factors. All other factors cross them: every
-row meets every combination of their levels. Without a design there are no rows, and the cells are
-the full grid.
-
-Points of continuous factors: Latin hypercubes, Sobol' sequences, and samples for Sobol' indices.
-
-The same seed gives the same points. Values have six significant digits, so that the last bits of
-a machine's logarithm do not make another configuration.
-
-The rows of a design in a CSV file: a header of factors, then a level in every cell.
+Levels are listed, in the study or in a CSV file, or drawn as points of continuous factors: Latin
+hypercubes, Sobol' sequences, and samples for Sobol' indices. The same seed gives the same points.
+Values have six significant digits, so that the last bits of a machine's logarithm do not make
+another configuration.
 """
 
 from __future__ import annotations
 
 import csv
-import itertools
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,19 +22,20 @@ from pydantic import (
     BeforeValidator,
     ConfigDict,
     Field,
-    field_validator,
     model_validator,
 )
-from scipy.stats import qmc
 
-from dva_sim.experiments.study.schema import POINT, Level, Levels, refuse_keys_of_the_design, says
+from dva_sim.experiments.study.schema import (
+    POINT,
+    SPARES_THE_DESIGN,
+    Level,
+    Levels,
+    refuse_keys_of_the_design,
+    says,
+)
 from dva_sim.kernel.config import MOST_VALUES, Config, Document, KeyPath, parse_scalar, read_text
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.streams import derive_seed
-
-if TYPE_CHECKING:
-    from dva_sim.experiments.study.study import Study
-
 
 Row = dict[str, Level]
 
@@ -50,7 +44,7 @@ MOST_CELLS = 10_000  # of a grid, which listed rows may leave empty in part
 MOST_RUNS = 1_000_000  # whose list takes a gigabyte, and whose runs take days of CPU time
 
 
-class Span(Config):
+class ValueRange(Config):
     """The values of a continuous factor, evenly spread on some scale.
 
     Attributes:
@@ -64,7 +58,7 @@ class Span(Config):
     scale: Literal["linear", "log", "whole"] = "linear"
 
     @model_validator(mode="after")
-    def _ascends(self) -> Span:
+    def _ascends(self) -> ValueRange:
         if self.low >= self.high:
             raise ValueError(f"range should ascend, not go from {self.low:g} to {self.high:g}")
         if self.scale == "log" and self.low <= 0:
@@ -91,7 +85,8 @@ def _power_of_two(count: int) -> int:
 Ranges = dict[
     str,
     Annotated[
-        Span, BeforeValidator(_spelled_out, json_schema_input_type=Span | tuple[float, float])
+        ValueRange,
+        BeforeValidator(_spelled_out, json_schema_input_type=ValueRange | tuple[float, float]),
     ],
 ]
 Points = Annotated[int, Field(ge=2, le=MOST_POINTS)]
@@ -100,6 +95,8 @@ Dyadic = Annotated[
     AfterValidator(_power_of_two),
     Field(json_schema_extra={"enum": [2**n for n in range(1, 17)]}),
 ]
+
+Rows = Annotated[tuple[Annotated[Row, SPARES_THE_DESIGN], ...], Field(min_length=1)]
 
 LISTED = ("zip", "rows", "csv")
 SAMPLED = ("latin_hypercube", "sobol", "saltelli")
@@ -128,25 +125,14 @@ class Design(Config):
     model_config = ConfigDict(json_schema_extra={"oneOf": _ONE_KIND})
 
     zip: Annotated[tuple[str, ...], Field(min_length=2)] | None = None
-    rows: Annotated[tuple[Row, ...], Field(min_length=1)] | None = None
+    rows: Annotated[tuple[Annotated[Row, SPARES_THE_DESIGN], ...], Field(min_length=1)] | None = (
+        None
+    )
     csv: str | None = None
     latin_hypercube: Points | None = None
     sobol: Dyadic | None = None
     saltelli: Dyadic | None = None
-    ranges: Ranges = Field(default_factory=dict)
-
-    @field_validator("rows")
-    @classmethod
-    def _change_the_scenario(cls, value: tuple[Row, ...] | None) -> tuple[Row, ...] | None:
-        for row in value or ():
-            refuse_keys_of_the_design(row)
-        return value
-
-    @field_validator("ranges")
-    @classmethod
-    def _vary_the_scenario(cls, value: Ranges) -> Ranges:
-        refuse_keys_of_the_design(value)
-        return value
+    ranges: Annotated[Ranges, SPARES_THE_DESIGN] = Field(default_factory=dict)
 
     @model_validator(mode="after")
     def _is_of_one_kind(self) -> Design:
@@ -190,119 +176,9 @@ def all_factors(
     return {**levels, **declared}
 
 
-def settings(study: Study) -> Iterator[Row]:
-    """The level of every factor in every cell, in the order of the cells: last factor fastest."""
-    return _crossed(study, rows_of(study))
-
-
-def settings_at_ends(study: Study) -> Iterator[Row]:
-    """The same with each range at each of its ends, and the others in their middle.
-
-    Which points are drawn depends on the seed; whether the ends are valid does not.
-    """
-    return _crossed(study, _ends_of(study)) if _ranges_of(study) else iter(())
-
-
-def _crossed(study: Study, rows: list[Row]) -> Iterator[Row]:
-    for parts in itertools.product(*_axes(study, rows)):
-        yield {key: level for part in parts for key, level in part.items()}
-
-
-def _axes(study: Study, rows: list[Row]) -> Iterator[list[Row]]:
-    """What is crossed: the rows where the first of their factors stands, and each other factor."""
-    in_rows = together(study)
-    for factor, levels in study.factors.items():
-        if factor not in in_rows:
-            yield [{factor: level} for level in levels]
-        elif rows:
-            yield rows
-            rows = []
-
-
-def rows_of(study: Study) -> list[Row]:
-    """The rows of the study's design; none where all factors are crossed."""
-    design = study.design
-    if design is None:
-        return []
-    if design.zip is not None:
-        columns = [study.factors[name] for name in design.zip]
-        return [dict(zip(design.zip, levels, strict=True)) for levels in zip(*columns, strict=True)]
-    if design.is_sampled:
-        rows = sample(design, study.seed)
-    else:
-        rows = study.listed_rows
-    return [{POINT: i, **row} for i, row in enumerate(rows)] if POINT in study.factors else rows
-
-
-def _ends_of(study: Study) -> list[Row]:
-
-    spans = _ranges_of(study)
-    middle: Row = {key: value_at(span, 0.5) for key, span in spans.items()}
-    return [{**middle, key: value_at(spans[key], end)} for key in spans for end in (0.0, 1.0)]
-
-
-def _ranges_of(study: Study) -> Mapping[str, Span]:
-    return study.design.ranges if study.design is not None else {}
-
-
-def size(study: Study) -> int:
-    """How many cells each part has, without making them."""
-    design, in_rows = study.design, together(study)
-    crossed = math.prod(len(levels) for f, levels in study.factors.items() if f not in in_rows)
-    if design is None:
-        return crossed
-    if design.zip is not None:
-        return crossed * len(study.factors[design.zip[0]])
-    return crossed * (design.points or len(study.listed_rows))
-
-
-def runs_of(study: Study) -> int:
-    """How many runs a study has at most, without making their list."""
-    cells = size(study)
-    trials = [part.replications or study.replications for part in study.parts.values()]
-    has_reference = [part.reference is not None for part in study.parts.values()]
-    each = sum((cells + more) * count for more, count in zip(has_reference, trials, strict=True))
-    return each * study.most_persons + _runs_of_repeats(study)
-
-
-def cells_of_repeats(study: Study) -> int:
-    """How many cells the repeats of the answer have."""
-    robustness, answer = study.robustness, study.answer
-    if robustness is None or answer is None or answer.over is None:
-        return 0
-    levels = len(robustness.at or (None,)) * len(answer.contrast)
-    return max(1, len(robustness.strategies)) * (robustness.sets + 1) * levels
-
-
-def _runs_of_repeats(study: Study) -> int:
-    if study.robustness is None:
-        return 0
-    persons = min(study.robustness.persons, study.persons)
-    return cells_of_repeats(study) * persons * study.robustness.replications
-
-
-def together(study: Study) -> set[str]:
-    """The factors whose levels stand in rows, and so do not cross each other."""
-    design = study.design
-    if design is not None and design.zip is not None:
-        return set(design.zip)
-    number = {POINT} & study.factors.keys()
-    return number | set(keys_of(design, study.listed_rows))
-
-
 def keys_of(design: Design | None, rows: Sequence[Row]) -> list[str]:
     """The factors that a design brings, beside those declared."""
     return [*(rows[0] if rows else ()), *(design.ranges if design is not None else ())]
-
-
-def place_of(study: Study, key: str, value: Any) -> KeyPath | None:
-    """Where the design gives a key that value; None if it does not."""
-    if study.design is not None and key in study.design.ranges:
-        return "design", "ranges", key
-    for index, row in enumerate(study.listed_rows):
-        if key in row and row[key] == value:
-            return "design", "rows", index, key
-    return None
 
 
 Floats = NDArray[np.float64]
@@ -327,6 +203,8 @@ def _places(design: Design, axes: int, rng: np.random.Generator) -> Floats:
         McKay, Beckman & Conover, Technometrics 21 (1979), 239-245.
         Owen, Journal of Complexity 14 (1998), 466-489.
     """
+    from scipy.stats import qmc  # late: start-up
+
     if design.latin_hypercube is not None:
         return np.asarray(qmc.LatinHypercube(axes, rng=rng).random(design.latin_hypercube))
     if design.sobol is not None:
@@ -336,6 +214,8 @@ def _places(design: Design, axes: int, rng: np.random.Generator) -> Floats:
 
 
 def _sobol(axes: int, points: int, rng: np.random.Generator) -> Floats:
+    from scipy.stats import qmc  # late: start-up
+
     return np.asarray(qmc.Sobol(axes, rng=rng).random_base2(int(math.log2(points))))
 
 
@@ -358,7 +238,7 @@ def saltelli(axes: int, base: int, rng: np.random.Generator) -> Floats:
     return blocks.reshape(-1, axes)
 
 
-def value_at(span: Span, share: float) -> float | int:
+def value_at(span: ValueRange, share: float) -> float | int:
     """What stands at a share of the way from `low` to `high`."""
     if span.scale == "whole":
         return min(int(span.high), math.floor(span.low + share * (span.high - span.low + 1)))

@@ -34,10 +34,15 @@ def digest(data: Any) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def inputs(scenarios: Iterable[Config]) -> dict[str, str]:
-    """Files that scenarios name by path (maps, traces), with the hash of their contents."""
+def inputs(scenarios: Iterable[Config], others: Iterable[str] = ()) -> dict[str, str]:
+    """Files that scenarios name by path (maps, traces), with the hash of their contents.
+
+    Args:
+        scenarios: All that are run.
+        others: What else the runs depend on, as `file.py:Class`.
+    """
     dumps = (scenario.model_dump(mode="json") for scenario in scenarios)
-    names = sorted({text for dump in dumps for text in _texts(dump) if "." in text})
+    names = sorted({*others, *(text for dump in dumps for text in _texts(dump) if "." in text)})
     short = [name for name in names if "\n" not in name and len(name) < _LONGEST_NAME]
     paths = [(name, Path(_file_of(name))) for name in short]
     return {
@@ -72,7 +77,7 @@ _CODE = (
     "kernel/clock.py",
     "kernel/recorder.py",
     "kernel/streams.py",
-    "experiments/execution/job.py",
+    "experiments/execution/scheduling.py",
 )
 # What says whether a hypothesis held: a registration fixes it, other results may be judged anew.
 _JUDGES = (

@@ -21,8 +21,7 @@ from dva_sim.experiments.study.hashing import (
     stable_hash,
 )
 from dva_sim.experiments.study.schema import POINT
-from dva_sim.experiments.study.status import Status
-from dva_sim.experiments.study.study import Study
+from dva_sim.experiments.study.study import Status, Study
 from dva_sim.kernel.config import Config, Document, load_yaml, validate
 from dva_sim.kernel.errors import ConfigError, DvaSimError
 from dva_sim.kernel.resources import REGISTRATION
@@ -32,7 +31,7 @@ _OPEN = {"question", "seed"}  # keys that a registration does not fix
 _ANY_SEED = 0  # what is fixed must not depend on the seed that follows from it
 
 
-class Registration(Config):
+class Preregistration(Config):
     """What was registered.
 
     Attributes:
@@ -68,16 +67,16 @@ class Registration(Config):
         return derive_seed("registration", self.hash)
 
 
-def load_registration(document: Document) -> Registration:
+def load_registration(document: Document) -> Preregistration:
     """The registration that a file holds.
 
     Raises:
         ConfigError: it holds none.
     """
-    return validate(Registration, document.data, document.error)
+    return validate(Preregistration, document.data, document.error)
 
 
-def registration_of(study: Study) -> Registration | None:
+def registration_of(study: Study) -> Preregistration | None:
     """The registration beside a study; None where there is none.
 
     Raises:
@@ -102,7 +101,7 @@ def register(study: Study, again: bool = False) -> str:
     found = registration_of(study)
     if found is not None and not again:
         raise ConfigError(f"{path} is there already; --again replaces it, and that will be told")
-    made = Registration(
+    made = Preregistration(
         study=study.file.stem,
         question=study.question,
         made_with=f"{__version__} {fingerprint()}",
@@ -176,7 +175,7 @@ def _liberties(study: Study) -> Iterator[str]:
         yield f"how many persons are simulated depends on the clock, {study.budget_s:g} s"
 
 
-def departures(found: Registration, study: Study) -> Iterator[str]:
+def departures(found: Preregistration, study: Study) -> Iterator[str]:
     """In what a study is not what was registered."""
     if found.hash != found.proper_hash:
         yield "the registration was edited: its hash is not that of what it fixes"
@@ -189,7 +188,7 @@ def departures(found: Registration, study: Study) -> Iterator[str]:
         yield f"other than registered: {', '.join(others)}"
 
 
-def _remarks(found: Registration, study: Study) -> Iterator[str]:
+def _remarks(found: Preregistration, study: Study) -> Iterator[str]:
     """What a reader should know, although it is no departure."""
     if found.study != study.file.stem:
         yield f"it was registered as {found.study!r}"
@@ -225,7 +224,7 @@ def _portable(data: Any, files: Mapping[str, str]) -> Any:
     return [_portable(value, files) for value in data] if isinstance(data, list) else data
 
 
-def _as_text(made: Registration) -> str:
+def _as_text(made: Preregistration) -> str:
     """YAML with a key of the plan on each line, so that a difference is seen as one."""
     data = made.model_dump(mode="json")
     plan = data.pop("plan")

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, field_validator
 
-from dva_sim.agents.operator.person import Population
-from dva_sim.experiments.study.schema import REPEATS, STRATEGY, Level, Range, Robustness
+from dva_sim.agents.person import Population
+from dva_sim.experiments.study.schema import REPEATS, STRATEGY, Level, Range, RobustnessRule
 from dva_sim.experiments.study.study import Study
 from dva_sim.kernel import resources
 from dva_sim.kernel.config import Config, load_yaml, validate
@@ -113,7 +113,7 @@ def _between(band: Range, share: float) -> float:
     return float(f"{value:.{_DIGITS}g}")
 
 
-def _bands_of(study: Study, robustness: Robustness) -> Mapping[str, Range]:
+def _bands_of(study: Study, robustness: RobustnessRule) -> Mapping[str, Range]:
     try:
         document = load_yaml(resources.find(robustness.bands, PEOPLE, base=study.folder))
     except ConfigError as error:

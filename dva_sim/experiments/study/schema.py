@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import AfterValidator, ConfigDict, Field, field_validator, model_validator
 
-from dva_sim.kernel.config import Config
+from dva_sim.kernel.config import Config, Scalar
 
 SET_BY_DESIGN = {"operator.person": "persons", "operator.population_seed": "seed"}
 
@@ -18,7 +18,8 @@ STRATEGY = "operator.strategy"
 ANSWER = "answer"  # the declared contrast, where a comparison is named
 POINT = "point"  # name of the factor that numbers the points of a design without levels
 
-Level = bool | int | float | str | None
+Keys = TypeVar("Keys", bound=Iterable[str])
+Level = Scalar
 Direction = Literal["above", "below", "same"]
 
 
@@ -68,7 +69,16 @@ def refuse_keys_of_the_design(keys: Iterable[str]) -> None:
             raise ValueError(f"{key!r} is set by the study; change {SET_BY_DESIGN[key]!r} instead")
 
 
-class Part(Config):
+def _spared(keys: Keys) -> Keys:
+    refuse_keys_of_the_design(keys)
+    return keys
+
+
+SPARES_THE_DESIGN = AfterValidator(_spared)  # no key that the study sets itself
+ScenarioChanges = Annotated[Changes, SPARES_THE_DESIGN]
+
+
+class StudyPart(Config):
     """One scenario that is run in every cell.
 
     Attributes:
@@ -79,15 +89,9 @@ class Part(Config):
     """
 
     scenario: str
-    changes: Changes = Field(default_factory=dict)
-    reference: Changes | None = None
+    changes: ScenarioChanges = Field(default_factory=dict)
+    reference: ScenarioChanges | None = None
     replications: Count | None = None
-
-    @field_validator("changes", "reference")
-    @classmethod
-    def _person_is_the_designs(cls, value: Changes | None) -> Changes | None:
-        refuse_keys_of_the_design(value or {})
-        return value
 
 
 class Contrast(Config):
@@ -158,7 +162,7 @@ class Hypothesis(Config):
         return self
 
 
-class Stop(Config):
+class StopRule(Config):
     """When enough persons were simulated: decided after whole batches of them, in seed order.
 
     The study's `persons` are the first batch. After each, every half-width of the 95 % interval
@@ -190,7 +194,7 @@ class Stop(Config):
     most_persons: Count
 
     @model_validator(mode="after")
-    def _looks_at_one_thing(self) -> Stop:
+    def _looks_at_one_thing(self) -> StopRule:
         asked = (self.measure is not None, self.part is not None)
         if asked != (self.comparison is None,) * 2:
             raise ValueError("should name a comparison, or a measure and its part")
@@ -270,7 +274,7 @@ class Tuning(Config):
         return value
 
 
-class Robustness(Config):
+class RobustnessRule(Config):
     """The answer's contrast again, under other models of the persons.
 
     Every strategy is tried with the persons' usual parameters and with each of `sets` others,
@@ -291,3 +295,15 @@ class Robustness(Config):
     at: Levels | None = None
     persons: Annotated[int, Field(ge=2)] = 6
     replications: Count = 2
+
+
+DESIGN: dict[str, str] = {
+    "part": "part of the study",
+    "cell": "position of the configuration in the design, -1 for a reference run",
+    "config": "hash of the scenario as run, but for the person",
+    "is_reference": "whether the others are measured against this run",
+    "person": "simulated person, or with the timed model independent run; the cluster",
+    "trial": "of the person; the same random numbers in every cell",
+    "seed": "of the run; the same for this person and trial in every cell",
+    "parameters": "set of the persons' parameters in a repeat, 0 for the usual ones",
+}

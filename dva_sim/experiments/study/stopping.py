@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.experiments.study.cell_grid import Job
-from dva_sim.experiments.study.designs import together
-from dva_sim.experiments.study.schema import Contrast, Level, Stop
+from dva_sim.experiments.study.cell_grid import StudyJob
+from dva_sim.experiments.study.factor_levels import factors_in_rows
+from dva_sim.experiments.study.schema import Contrast, Level, StopRule
 from dva_sim.experiments.study.study import Study
 from dva_sim.statistics import band, mean_interval
 
@@ -25,10 +25,10 @@ Floats = NDArray[np.float64]
 _Run = tuple[int, int]  # person, trial
 
 
-def rounds(study: Study, jobs: Sequence[Job]) -> list[list[Job]]:
+def rounds(study: Study, jobs: Sequence[StudyJob]) -> list[list[StudyJob]]:
     """The jobs in batches of persons; a study that nothing can stop early is one batch."""
     edges = _edges(study)
-    batches: list[list[Job]] = [[] for _ in edges]
+    batches: list[list[StudyJob]] = [[] for _ in edges]
     for job in jobs:
         batches[int(np.searchsorted(edges, job.person, side="right"))].append(job)
     return [batch for batch in batches if batch]
@@ -48,7 +48,7 @@ def is_enough(study: Study, rows: Sequence[Row]) -> bool:
     return bool(len(found)) and bool(np.all(found <= stop.half_width))
 
 
-def half_widths(study: Study, stop: Stop, rows: Sequence[Row]) -> Floats:
+def half_widths(study: Study, stop: StopRule, rows: Sequence[Row]) -> Floats:
     """Half of each 95 % interval that the rule looks at; nan where there is none yet."""
     if stop.comparison is not None:
         return _of_contrast(study, study.contrasts[stop.comparison], rows)
@@ -120,7 +120,7 @@ def _factors(study: Study) -> list[str]:
 
 def _place(study: Study, asked: Contrast) -> dict[str, Level]:
     """The panel that the contrast speaks of: the levels it is within, else the first."""
-    names = {asked.factor, asked.over, *together(study)}
+    names = {asked.factor, asked.over, *factors_in_rows(study)}
     free = {f: levels[0] for f, levels in study.factors.items() if f not in names}
     return free | dict(asked.within)
 

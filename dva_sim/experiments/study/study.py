@@ -1,45 +1,34 @@
-"""The versions of a study beside the one its file describes, and what `run` is asked for.
-
-A study: one question, the factors it varies, and the contrast that answers it.
-"""
+"""A study: one question, the factors it varies, and the contrast that answers it."""
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, PrivateAttr, field_validator
 
-from dva_sim.experiments.study import validation
-from dva_sim.experiments.study.designs import ROWS, Design, Row, all_factors, read_table
-from dva_sim.experiments.study.overrides import Changed, change
+from dva_sim.experiments.study.designs import ROWS, Design, Row
 from dva_sim.experiments.study.schema import (
     ANSWER,
     REPEATS,
+    SPARES_THE_DESIGN,
     Changes,
     Contrast,
     Count,
     Hypothesis,
     Levels,
-    Part,
     Prediction,
-    Robustness,
+    RobustnessRule,
+    ScenarioChanges,
     Seed,
-    Stop,
+    StopRule,
+    StudyPart,
     Tuning,
-    refuse_keys_of_the_design,
 )
-from dva_sim.experiments.study.status import Status
-from dva_sim.kernel import resources
-from dva_sim.kernel.config import AlsoCalled, Config, Document, KeyPath, load_yaml, validate
+from dva_sim.kernel.config import AlsoCalled, Config, Document, KeyPath
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.kernel.key_changes import blame, parse_changes, set_by
-from dva_sim.kernel.streams import derive_seed
-from dva_sim.simulation.models import SCENARIOS
-from dva_sim.simulation.scenario import load as load_scenario
 
 Version = Literal["quick", "full"]
 VERSIONS: tuple[Version, ...] = ("quick", "full")
@@ -78,6 +67,24 @@ class Variant:
 FOLDER = "experiments"
 
 
+class Status(Config):
+    """What a result may be called, and why; the manifest holds it, the report shows it.
+
+    Attributes:
+        kind: `declared`: run as its file says, nothing registered. `exploratory`: something was
+            changed, tried or left open. `confirmatory`: run as registered, on seeds that nobody
+            could know before.
+        why: Reasons and remarks, each a sentence without its full stop.
+        reproducible: Whether the same command gives the same bytes on any machine.
+        registration: What was registered, whether or not this is it; None if nothing was.
+    """
+
+    kind: Literal["declared", "exploratory", "confirmatory"] = "declared"
+    why: tuple[str, ...] = ()
+    reproducible: bool = True
+    registration: dict[str, Any] | None = Field(default=None)
+
+
 class Study(Config):
     """What is asked, and all that is run to answer it.
 
@@ -98,7 +105,9 @@ class Study(Config):
         robustness: The answer again under other models of the persons.
         stop: When enough persons were simulated.
         budget_s: Time by the clock [s] after which no further persons are begun.
+        measures: Measures of the user's own, `mine.py:Mine`: further columns of the runs.
         record: Which episodes are kept as recordings.
+        figures: Figures of one's own that its report has, such as `mine.py:Mine`.
         quick: Keys that are otherwise in the small version, which `--quick` runs.
         full: Keys that are otherwise in the larger version, which `--full` runs.
     """
@@ -108,18 +117,20 @@ class Study(Config):
     seed: Annotated[Seed, AlsoCalled("random_seed")] = 1
     persons: Annotated[Count, AlsoCalled("participants", "subjects", "n_persons")] = 24
     replications: Annotated[Count, AlsoCalled("trials", "repetitions", "repeats", "runs")] = 5
-    factors: dict[str, Levels] = Field(default_factory=dict)
+    factors: Annotated[dict[str, Levels], SPARES_THE_DESIGN] = Field(default_factory=dict)
     design: Design | None = None
-    treatments: dict[str, dict[str, Changes]] = Field(default_factory=dict)
-    parts: Annotated[dict[str, Part], Field(min_length=1)]
+    treatments: dict[str, dict[str, ScenarioChanges]] = Field(default_factory=dict)
+    parts: Annotated[dict[str, StudyPart], Field(min_length=1)]
     answer: Contrast | None = None
     comparisons: dict[str, Contrast] = Field(default_factory=dict)
     hypotheses: dict[str, Hypothesis] = Field(default_factory=dict)
     tuning: Tuning | None = None
-    robustness: Robustness | None = None
-    stop: Stop | None = None
+    robustness: RobustnessRule | None = None
+    stop: StopRule | None = None
     budget_s: Annotated[float, Field(gt=0)] | None = None
+    measures: tuple[str, ...] = ()
     record: Literal["all", "worst", "sample"] | None = None
+    figures: tuple[str, ...] = ()
     quick: Changes = Field(default_factory=dict)
     full: Changes = Field(default_factory=dict)
 
@@ -132,25 +143,9 @@ class Study(Config):
     _status: Status = PrivateAttr(default_factory=Status)
     _usual: dict[str, Any] = PrivateAttr(default_factory=dict)
 
-    @field_validator("factors")
-    @classmethod
-    def _varies_the_scenario(cls, value: dict[str, Levels]) -> dict[str, Levels]:
-        refuse_keys_of_the_design(value)
-        return value
-
-    @field_validator("treatments")
-    @classmethod
-    def _changes_the_scenario(
-        cls, value: dict[str, dict[str, Changes]]
-    ) -> dict[str, dict[str, Changes]]:
-        for levels in value.values():
-            for changes in levels.values():
-                refuse_keys_of_the_design(changes)
-        return value
-
     @field_validator("parts")
     @classmethod
-    def _leaves_room_for_repeats(cls, value: dict[str, Part]) -> dict[str, Part]:
+    def _leaves_room_for_repeats(cls, value: dict[str, StudyPart]) -> dict[str, StudyPart]:
         if REPEATS in value:
             raise ValueError(f"a part cannot be called {REPEATS!r}: the repeats are")
         return value
@@ -181,7 +176,8 @@ class Study(Config):
 
     def asked(self) -> dict[str, Any]:
         """All keys that say what is run and how it is read, as JSON would hold them."""
-        return self.model_dump(mode="json", exclude={"record", *VERSIONS})
+        unasked = () if self.measures else ("measures",)
+        return self.model_dump(mode="json", exclude={"record", "figures", *VERSIONS, *unasked})
 
     @property
     def file(self) -> Path:
@@ -252,170 +248,3 @@ class Study(Config):
         if self._table is not None and path[:2] == ("design", ROWS):
             return path[1:] in self._table.places
         return path in self._document.places
-
-
-def load_study(
-    name: str | Path,
-    settings: Iterable[str] = (),
-    *,
-    version: Version | None = None,
-    pilot: int | None = None,
-) -> Study:
-    """Read a study by name or path.
-
-    Args:
-        name: The study.
-        settings: `key=value` pairs. A key of the study (`seed=2`, `factors.pattern=[req-rep]`)
-            changes the study. Any other key is one of the scenario and holds in every part; if
-            it is a factor, its value or list of values takes the place of the factor's levels.
-        version: The small or the larger version, by the study's key `quick` or `full`.
-        pilot: Only so many persons, with random seeds that the study itself never uses.
-
-    Raises:
-        ConfigError: not found, not valid, or changes that make no sense.
-    """
-    from dva_sim.experiments.study.registration import settled  # it knows cells, which studies make
-
-    document = load_yaml(resources.find(str(name), FOLDER, is_asked=True))
-    try:
-        study, data = _in_version(document, version)
-    except ConfigError as error:
-        from dva_sim.experiments.study.documents import of_other_kind  # it knows studies, too
-
-        raise of_other_kind(document, "dva-sim run", "study") or error from None
-    usual = study.usual
-    if settings := tuple(settings):
-        study = _with_settings(data, document, settings)
-    study._version, study._usual = version, usual
-    if pilot is not None:
-        study = _piloted(study, pilot)
-    return settled(study)
-
-
-def _in_version(document: Document, version: Version | None) -> tuple[Study, Changed]:
-    """The study as its file says, or one of its versions; all of them are judged."""
-    written = Changed(document.data, {}, ())
-    study = _built(written, document)
-    study._usual = _size_of(study)
-    made = {name: _version_of(study, written, document, name) for name in study.versions}
-    if version is None:
-        return study, written
-    if version not in made:
-        raise document.error(f"has no {SIZES[version]} version: no key {version!r}")
-    return made[version]
-
-
-def _version_of(
-    study: Study, written: Changed, document: Document, version: Version
-) -> tuple[Study, Changed]:
-    """A version, and its keys; claims about what the small version leaves out are left out."""
-    try:
-        data = change(written, getattr(study, version), Study, _scenarios_of(written, document))
-        made = _built(data, document, may_lose=version == "quick")
-        if made.answer is None and study.answer is not None:
-            _built(data, document)  # which tells why it cannot be answered
-        made._usual = study.usual
-        return made, data
-    except ConfigError as error:
-        raise _told_in(study, version, error) from None
-
-
-def _size_of(study: Study) -> dict[str, Any]:
-    """What a report needs to tell one version of a study from another."""
-    factors = {name: list(levels) for name, levels in study.factors.items()}
-    size = {"persons": study.persons, "replications": study.replications, "factors": factors}
-    return {"name": study.file.stem} | size
-
-
-def _told_in(study: Study, version: Version, error: ConfigError) -> ConfigError:
-    """A mistake of a version, at the key that it names."""
-    named = [
-        key
-        for key in getattr(study, version)
-        if key.rpartition(".")[2] in error.problem
-        or any(repr(step) in error.problem for step in key.split("."))
-    ]
-    problem = f"in the {SIZES[version]} version: {error.problem}"
-    return study.error(problem, (version, *named[:1]))
-
-
-def _with_settings(data: Changed, document: Document, settings: tuple[str, ...]) -> Study:
-    """The study changed by `--set`; claims about levels that are gone are gone, too."""
-    changes, scenarios = parse_changes(settings), _scenarios_of(data, document)
-
-    def make(some: Mapping[str, Any]) -> Study:
-        return _built(change(data, some, Study, scenarios), document, may_lose=True)
-
-    try:
-        study = make(changes)
-    except ConfigError as error:
-        raise set_by(settings, blame(error, changes, make, document)) from None
-    study._settings = settings
-    return study
-
-
-def _scenarios_of(data: Changed, document: Document) -> list[type[Config]]:
-    """The kinds of scenarios that the parts have; all kinds where one cannot be read."""
-    try:
-        named = [part["scenario"] for part in data.data["parts"].values()]
-        files = [load_scenario(name, base=document.file.parent) for name in named]
-        return list({SCENARIOS[str(file.data.get("model", "full"))]: None for file in files})
-    except (ConfigError, LookupError, TypeError, AttributeError):
-        return list(SCENARIOS.values())
-
-
-def _piloted(study: Study, persons: int) -> Study:
-    """Some persons with luck of their own, so that nothing of the study itself is seen."""
-    if persons < 1:
-        raise ConfigError(f"a pilot should have at least 1 person, not {persons}")
-    seed = derive_seed(study.seed, "pilot")
-    pilot = study.model_copy(update={"persons": persons, "seed": seed, "stop": None})
-    pilot._pilot = persons
-    for problem, _ in validation.of_size(pilot):
-        raise ConfigError(f"a pilot of {persons} persons: {problem}")
-    return pilot
-
-
-def _built(data: Changed, document: Document, may_lose: bool = False) -> Study:
-    """The study, if it makes sense.
-
-    Args:
-        data: Its keys.
-        document: Its file.
-        may_lose: Whether claims about what is not there are lost, instead of being mistakes.
-    """
-    study = validate(Study, data.data, document.error)
-    study._document = dataclasses.replace(
-        document, places={p: at for p, at in document.places.items() if data.holds(p)}
-    )
-    study._changes = data.changes
-    study._table = _table_of(study)
-    _tell_first(study, validation.of_design(study))
-    factors = all_factors(study.design, study.factors, study.listed_rows)
-    study = study.model_copy(update={"factors": factors})
-    _tell_first(study, validation.of_factors(study))
-    if may_lose:
-        # A claim that is made in the same breath is a mistake and no loss.
-        _tell_first(study, (f for f in validation.of_claims(study) if not data.holds(f[1])))
-        study = validation.kept_claims(study)
-    else:
-        _tell_first(study, validation.of_claims(study))
-    _tell_first(study, validation.of_stop(study))
-    return study
-
-
-def _table_of(study: Study) -> Document | None:
-    """The rows of the file that the design names; None if it names none."""
-    if study.design is None or study.design.csv is None:
-        return None
-    try:
-        path = resources.find(study.design.csv, FOLDER, suffix=".csv", base=study.folder)
-    except ConfigError as error:
-        problem = error.problem.replace("study ", "file of rows ", 1)
-        raise study.error(problem, ("design", "csv")) from None
-    return read_table(path)
-
-
-def _tell_first(study: Study, found: Iterable[validation.Fault]) -> None:
-    for problem, path in found:
-        raise study.error(problem, path)

@@ -3,21 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING
 
-from dva_sim.experiments.results.data_dictionary import DESIGN, DICTIONARY
-from dva_sim.experiments.study.designs import (
-    MOST_CELLS,
-    MOST_POINTS,
-    MOST_RUNS,
-    keys_of,
-    place_of,
-    runs_of,
-    size,
-    together,
-)
+from dva_sim.experiments.study.designs import MOST_CELLS, MOST_POINTS, MOST_RUNS, keys_of
+from dva_sim.experiments.study.factor_levels import factors_in_rows, path_in_design, runs_of, size
 from dva_sim.experiments.study.schema import (
     ANSWER,
+    DESIGN,
     POINT,
     REPEATS,
     STRATEGY,
@@ -29,18 +20,16 @@ from dva_sim.experiments.study.schema import (
     Prediction,
     refuse_keys_of_the_design,
 )
+from dva_sim.experiments.study.study import Study
 from dva_sim.kernel.config import KeyPath
 from dva_sim.kernel.suggestions import hint
+from dva_sim.simulation.models import measured_names
 
-if TYPE_CHECKING:
-    from dva_sim.experiments.study.study import Study
-
-
-Fault = tuple[str, KeyPath]
+Problem = tuple[str, KeyPath]
 """What is wrong, and the key at which that is said."""
 
 
-def of_design(study: Study) -> Iterator[Fault]:
+def of_design(study: Study) -> Iterator[Problem]:
     """Rows that do not fit together, and factors that are there twice."""
     design = study.design
     for name in (POINT,) if POINT in study.factors else ():
@@ -59,7 +48,7 @@ def of_design(study: Study) -> Iterator[Fault]:
         yield "robustness needs all levels with each other: a study without 'design'", (REPEATS,)
 
 
-def _faults_of_zip(study: Study, names: Sequence[str]) -> Iterator[Fault]:
+def _faults_of_zip(study: Study, names: Sequence[str]) -> Iterator[Problem]:
     for index, name in enumerate(names):
         path = ("design", "zip", index)
         if name not in study.factors:
@@ -72,7 +61,7 @@ def _faults_of_zip(study: Study, names: Sequence[str]) -> Iterator[Fault]:
                 yield f"{name!r} should have {wanted} levels as {names[0]!r}, not {count}", path
 
 
-def _faults_of_rows(rows: Sequence[Mapping[str, Level]]) -> Iterator[Fault]:
+def _faults_of_rows(rows: Sequence[Mapping[str, Level]]) -> Iterator[Problem]:
     first: dict[tuple[Level, ...], int] = {}
     for index, row in enumerate(rows):
         path = ("design", "rows", index)
@@ -87,7 +76,7 @@ def _faults_of_rows(rows: Sequence[Mapping[str, Level]]) -> Iterator[Fault]:
             yield f"row {index + 1} is row {same + 1} again", path
 
 
-def of_factors(study: Study) -> Iterator[Fault]:
+def of_factors(study: Study) -> Iterator[Problem]:
     """Names of treatments that do not exist, keys that two factors set, tuning without a rule."""
     setters: dict[str, str] = {}
     listed = keys_of(study.design, study.listed_rows)
@@ -114,16 +103,15 @@ def of_factors(study: Study) -> Iterator[Fault]:
     yield from of_size(study)
 
 
-def _faults_of_name(study: Study, factor: str) -> Iterator[Fault]:
+def _faults_of_name(study: Study, factor: str) -> Iterator[Problem]:
     """A treatment is a column of every table, so no other column is called so."""
-    measured = {name for model in DICTIONARY.values() for table in model.values() for name in table}
-    if factor in DESIGN or factor in measured or factor == TUNING:
+    if factor in DESIGN or factor in measured_names() or factor == TUNING:
         what = "the design" if factor in DESIGN else "what is measured"
         what = "the tuning" if factor == TUNING else f"a column of {what}"
         yield f"a treatment cannot be called {factor!r}: {what} is", ("treatments", factor)
 
 
-def of_size(study: Study) -> Iterator[Fault]:
+def of_size(study: Study) -> Iterator[Problem]:
     """A slip in a grid, or in how many persons there are, would take years to run."""
     count, has_points = size(study), POINT in study.factors
     most = MOST_POINTS if has_points else MOST_CELLS
@@ -147,10 +135,10 @@ def _levels_of(study: Study, factor: str) -> Sequence[Level]:
 
 
 def _place(study: Study, factor: str, level: Level = None) -> KeyPath:
-    return place_of(study, factor, level) or ("factors", factor)
+    return path_in_design(study, factor, level) or ("factors", factor)
 
 
-def _faults_of_tuning(study: Study) -> Iterator[Fault]:
+def _faults_of_tuning(study: Study) -> Iterator[Problem]:
     levels, tuning = study.factors.get(TUNING, ()), study.tuning
     if TUNING in study.factors and tuning is None:
         yield "the factor 'tuning' needs a rule: the key 'tuning'", ("factors", TUNING)
@@ -172,7 +160,7 @@ def _faults_of_tuning(study: Study) -> Iterator[Fault]:
         yield from _fault_of_level(study, ("tuning", "at", name), name, (level,))
 
 
-def of_claims(study: Study) -> Iterator[Fault]:
+def of_claims(study: Study) -> Iterator[Problem]:
     """What was declared about factors and levels that the study does not have."""
     yield from of_answer(study)
     yield from of_robustness(study)
@@ -208,13 +196,13 @@ def kept_claims(study: Study) -> Study:
     return rest.model_copy(update={"hypotheses": kept})
 
 
-def of_answer(study: Study) -> Iterator[Fault]:
+def of_answer(study: Study) -> Iterator[Problem]:
     """Why the declared contrast cannot be computed."""
     if study.answer is not None:
         yield from _faults_of_contrast(study, study.answer, (ANSWER,))
 
 
-def _faults_of_contrast(study: Study, asked: Contrast, path: KeyPath) -> Iterator[Fault]:
+def _faults_of_contrast(study: Study, asked: Contrast, path: KeyPath) -> Iterator[Problem]:
     if asked.part not in study.parts:
         name, told = ".".join(map(str, (*path, "part"))), hint(asked.part, study.parts, "parts")
         yield f"{name} {asked.part!r} is not a part; {told}", (*path, "part")
@@ -232,15 +220,15 @@ def _faults_of_contrast(study: Study, asked: Contrast, path: KeyPath) -> Iterato
         yield from _fault_of_place(study, asked, path)
 
 
-def _fault_of_place(study: Study, asked: Contrast, path: KeyPath) -> Iterator[Fault]:
+def _fault_of_place(study: Study, asked: Contrast, path: KeyPath) -> Iterator[Problem]:
     """The levels of all other factors have to be given, or what is meant is open."""
-    given = {asked.factor, asked.over, *asked.within, *together(study)}
+    given = {asked.factor, asked.over, *asked.within, *factors_in_rows(study)}
     for name, levels in study.factors.items():
         if len(levels) > 1 and name not in given:
             yield f"should run over {name!r} or be within a level of it", path
 
 
-def _faults_of_hypothesis(study: Study, name: str) -> Iterator[Fault]:
+def _faults_of_hypothesis(study: Study, name: str) -> Iterator[Problem]:
     hypothesis, path = study.hypotheses[name], ("hypotheses", name)
     asked = study.contrasts.get(hypothesis.comparison)
     if asked is None:
@@ -253,7 +241,7 @@ def _faults_of_hypothesis(study: Study, name: str) -> Iterator[Fault]:
         yield f"{asked.factor!r} is what is compared", (*path, "at", asked.factor)
 
 
-def of_stop(study: Study) -> Iterator[Fault]:
+def of_stop(study: Study) -> Iterator[Problem]:
     """Why a stopping rule cannot be applied."""
     stop = study.stop
     if stop is None:
@@ -269,7 +257,7 @@ def of_stop(study: Study) -> Iterator[Fault]:
         yield problem, ("stop", "most_persons")
 
 
-def _faults_of_prediction(study: Study, prediction: Prediction, path: KeyPath) -> Iterator[Fault]:
+def _faults_of_prediction(study: Study, prediction: Prediction, path: KeyPath) -> Iterator[Problem]:
     assert study.answer is not None
     factor = prediction.factor or study.answer.factor
     contrast = prediction.contrast or ()
@@ -282,7 +270,7 @@ def _faults_of_prediction(study: Study, prediction: Prediction, path: KeyPath) -
         yield "'same' needs the answer's smallest effect", (*path, "direction")
 
 
-def of_robustness(study: Study) -> Iterator[Fault]:
+def of_robustness(study: Study) -> Iterator[Problem]:
     """Why the contrast cannot be repeated."""
     robustness = study.robustness
     if robustness is None:
@@ -301,7 +289,7 @@ def of_robustness(study: Study) -> Iterator[Fault]:
 
 def _fault_of_level(
     study: Study, path: KeyPath, factor: str, levels: Sequence[Level]
-) -> Iterator[Fault]:
+) -> Iterator[Problem]:
     if factor not in study.factors:
         yield f"{factor!r} is not a factor; {hint(factor, study.factors, 'factors')}", path
         return

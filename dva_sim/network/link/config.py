@@ -6,8 +6,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
-from dva_sim.kernel.config import AlsoCalled, Config
-from dva_sim.network.link.delays import Constant, DelayLaw
+from dva_sim.kernel.config import AlsoCalled, Config, Key
+from dva_sim.network.link.delays import ConstantDelay, DelayLaw
 from dva_sim.network.link.losses import Bursts, Outage, Partition
 from dva_sim.network.link.recorded import moments_of, read_delay_log
 
@@ -62,23 +62,43 @@ class LinkConfig(Config):
         down: What is otherwise from the robot.
     """
 
-    delay_s: Annotated[Seconds, AlsoCalled("latency", "latency_s")] = 0.0
-    jitter_s: Seconds = 0.0
-    delay_law: DelayLaw | None = None
-    delay_log: str | None = None
+    delay_s: Annotated[
+        Seconds, AlsoCalled("latency", "latency_s"), Key("one-way delay", zero="delay")
+    ] = 0.0
+    jitter_s: Annotated[Seconds, Key("jitter", stated="jitter (half-width)", zero=True)] = 0.0
+    delay_law: Annotated[DelayLaw | None, Key("law of the delay")] = None
+    delay_log: Annotated[str | None, Key("recorded delays")] = None
     delay_log_share: Share = 0.5
-    reorder: bool = False
-    loss: Annotated[Loss, AlsoCalled("packet_loss", "loss_rate", "loss_share")] = 0.0
-    bursts: Bursts | None = None
-    rate_bps: Annotated[Rate, AlsoCalled("bandwidth", "bandwidth_bps", "bitrate")] = 20e6
-    queue_bytes: Room = 150_000
-    queue_packets: Packets | None = None
-    trace_up: str | None = None
-    trace_down: str | None = None
-    outages: tuple[Outage, ...] = ()
-    partitions: tuple[Partition, ...] = ()
-    up: Way | None = None
-    down: Way | None = None
+    reorder: Annotated[bool, Key("packets may overtake")] = False
+    loss: Annotated[
+        Loss,
+        AlsoCalled("packet_loss", "loss_rate", "loss_share"),
+        Key("packet loss", stated="packet loss, each way", zero=True),
+    ] = 0.0
+    bursts: Annotated[Bursts | None, Key("bursts of losses")] = None
+    rate_bps: Annotated[
+        Rate, AlsoCalled("bandwidth", "bandwidth_bps", "bitrate"), Key("link rate")
+    ] = 20e6
+    queue_bytes: Annotated[Room, Key("queue before the link")] = 150_000
+    queue_packets: Annotated[Packets | None, Key("queue before the link, in packets")] = None
+    trace_up: Annotated[str | None, Key("recorded link, towards the robot")] = None
+    trace_down: Annotated[str | None, Key("recorded link, from the robot")] = None
+    outages: Annotated[tuple[Outage, ...], Key("outages")] = ()
+    partitions: Annotated[tuple[Partition, ...], Key("partitions")] = ()
+    up: Annotated[
+        Way | None,
+        Key(
+            "otherwise towards the robot",
+            inner={"delay_s": Key("delay of commands", zero=True)},
+        ),
+    ] = None
+    down: Annotated[
+        Way | None,
+        Key(
+            "otherwise from the robot",
+            inner={"delay_s": Key("delay of frames", zero=True)},
+        ),
+    ] = None
 
     @model_validator(mode="after")
     def _causal(self) -> LinkConfig:
@@ -105,7 +125,7 @@ class LinkConfig(Config):
     @property
     def law(self) -> DelayLaw | None:
         """The law that spreads the delay, if one does."""
-        return None if isinstance(self.delay_law, Constant) else self.delay_law
+        return None if isinstance(self.delay_law, ConstantDelay) else self.delay_law
 
     def toward(self, direction: Direction) -> LinkConfig:
         """The same link with everything as it is in one direction."""

@@ -17,7 +17,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from dva_sim.kernel.config import Config
 from dva_sim.kernel.streams import Streams
 from dva_sim.network.link.recorded import read_delays
-from dva_sim.network.link.time_noise import Luck, SlowWeather, Weather, normal_quantile
+from dva_sim.network.link.time_noise import SlowWeather, UniformNumbers, Weather, normal_quantile
 
 Quantile = Callable[[float], float]
 Seconds = Annotated[float, Field(ge=0, le=30)]
@@ -40,7 +40,7 @@ class Jitter:
         luck: Gives each packet its number.
     """
 
-    def __init__(self, width: float, luck: Luck) -> None:
+    def __init__(self, width: float, luck: UniformNumbers) -> None:
         self._width, self._luck = width, luck
 
     def deviation(self, now: float) -> float:
@@ -56,7 +56,7 @@ class ByQuantile:
         luck: Gives each packet its number.
     """
 
-    def __init__(self, quantile: Quantile, luck: Luck) -> None:
+    def __init__(self, quantile: Quantile, luck: UniformNumbers) -> None:
         self._quantile, self._luck = quantile, luck
 
     def deviation(self, now: float) -> float:
@@ -64,7 +64,7 @@ class ByQuantile:
         return self._quantile(self._luck.draw(now))
 
 
-class Constant(Config):
+class ConstantDelay(Config):
     """All packets take `delay_s`: what is meant where no law is named."""
 
     law: Literal["constant"]
@@ -109,7 +109,7 @@ class _Law(Config):
 
     def play(self, delay: float, streams: Streams, name: str) -> Wobble:
         """Deviations from `delay_s` [s], with luck of that name."""
-        luck: Luck = Weather(streams, name)
+        luck: UniformNumbers = Weather(streams, name)
         if self.correlation_s:
             luck = SlowWeather(streams, name, self.correlation_s)
         return ByQuantile(self.quantile(delay), luck)
@@ -139,7 +139,7 @@ class Normal(_Law):
         return lambda u: max(-delay, sd * normal_quantile(u))
 
 
-class Gamma(_Law):
+class GammaDelay(_Law):
     """Mean `delay_s`, never below `least_s`: skewed, the more the larger its spread."""
 
     law: Literal["gamma"]
@@ -240,7 +240,7 @@ def _constant_by_name(value: Any) -> Any:
 
 
 _Any = Annotated[
-    Constant | Normal | Gamma | ShiftedExponential | Empirical, Field(discriminator="law")
+    ConstantDelay | Normal | GammaDelay | ShiftedExponential | Empirical, Field(discriminator="law")
 ]
 _ByName = Literal["constant"]
 DelayLaw = Annotated[

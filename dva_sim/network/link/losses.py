@@ -14,7 +14,7 @@ from pydantic import Field, model_validator
 
 from dva_sim.kernel.config import Config
 from dva_sim.kernel.streams import Streams
-from dva_sim.network.link.time_noise import Luck, Spells
+from dva_sim.network.link.time_noise import Spells, UniformNumbers
 
 Seconds = Annotated[float, Field(ge=0, le=1e7)]
 PositiveSeconds = Annotated[float, Field(gt=0, le=1e7)]
@@ -114,7 +114,7 @@ class Bursts(Config):
                 f"at least {least:g}"
             )
 
-    def play(self, loss: float, streams: Streams, name: str, luck: Luck) -> Fate:
+    def play(self, loss: float, streams: Streams, name: str, luck: UniformNumbers) -> Fate:
         """What takes a share `loss` of all packets, with luck of that name.
 
         Args:
@@ -146,7 +146,7 @@ class Chance:
         luck: Gives each packet its number.
     """
 
-    def __init__(self, loss: float, luck: Luck) -> None:
+    def __init__(self, loss: float, luck: UniformNumbers) -> None:
         self._loss, self._luck = loss, luck
 
     def takes(self, now: float, left_at: float) -> bool:
@@ -163,7 +163,7 @@ class TimedBursts:
         luck: Gives each packet its number.
     """
 
-    def __init__(self, spells: Spells, loss: float, luck: Luck) -> None:
+    def __init__(self, spells: Spells, loss: float, luck: UniformNumbers) -> None:
         self._spells, self._loss, self._luck = spells, loss, luck
 
     def takes(self, now: float, left_at: float) -> bool:
@@ -183,7 +183,12 @@ class CountedBursts:
     """
 
     def __init__(
-        self, rng: np.random.Generator, share: float, length: float, loss: float, luck: Luck
+        self,
+        rng: np.random.Generator,
+        share: float,
+        length: float,
+        loss: float,
+        luck: UniformNumbers,
     ) -> None:
         self._ends, self._begins = 1.0 / length, share / (1.0 - share) / length
         self._loss, self._luck = loss, luck

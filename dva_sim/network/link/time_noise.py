@@ -23,7 +23,7 @@ _NORMAL = NormalDist()
 _EDGE = 1e-12  # quantiles of unbounded laws are asked for inside (edge, 1 - edge) only
 
 
-class Luck(Protocol):
+class UniformNumbers(Protocol):
     """A source of uniform numbers, one for each packet."""
 
     def draw(self, now: float) -> float:
@@ -46,7 +46,7 @@ class Weather:
         self._slot, self._count = -1, 0
 
     def draw(self, now: float) -> float:
-        """See `Luck`."""
+        """See `UniformNumbers`."""
         slot = int(now / SLOT_S)
         self._count = self._count + 1 if slot == self._slot else 0
         self._slot = slot
@@ -97,7 +97,7 @@ class SlowWeather:
         self._block: list[float] = []
 
     def draw(self, now: float) -> float:
-        """See `Luck`."""
+        """See `UniformNumbers`."""
         number, inside = divmod(int(now / SLOT_S), _BLOCK)
         while self._number < number:
             self._go_on()

@@ -17,7 +17,7 @@ from math import inf
 from dva_sim.network.tcp.congestion import RateReduction, Reno
 from dva_sim.network.tcp.options import TcpOptions
 from dva_sim.network.tcp.retransmission_timer import RoundTrip
-from dva_sim.network.tcp.scoreboard import Scoreboard, Sent
+from dva_sim.network.tcp.scoreboard import Scoreboard, SentSegment
 
 DUPLICATES = 3
 _MICROSECOND = 1e-6  # the clock's step
@@ -54,7 +54,7 @@ class ByTime:
         self._reordering = False
         self._steps, self._persist, self._duplicate_round = 1, 0, -1
 
-    def delivered(self, sent: Sent, now: float, echo: float) -> None:
+    def delivered(self, sent: SentSegment, now: float, echo: float) -> None:
         """Learn from a segment acknowledged at `now` [s] with a time stamp's `echo` [s]."""
         if sent.end > self._furthest:
             self._furthest = sent.end

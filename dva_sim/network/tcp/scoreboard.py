@@ -10,7 +10,7 @@ from __future__ import annotations
 from dva_sim.network.tcp.send_buffer import PACKET_COST
 
 
-class Sent:
+class SentSegment:
     """One segment under way.
 
     Attributes:
@@ -44,8 +44,8 @@ class Gain:
     __slots__ = ("ambiguous", "delivered", "released", "taken")
 
     def __init__(self) -> None:
-        self.taken: list[Sent] = []
-        self.delivered: list[Sent] = []
+        self.taken: list[SentSegment] = []
+        self.delivered: list[SentSegment] = []
         self.released = 0
         self.ambiguous = False
 
@@ -63,7 +63,7 @@ class Scoreboard:
     __slots__ = ("lost", "queue", "resent", "sacked")
 
     def __init__(self) -> None:
-        self.queue: list[Sent] = []
+        self.queue: list[SentSegment] = []
         self.sacked = self.lost = self.resent = 0
 
     @property
@@ -93,7 +93,7 @@ class Scoreboard:
             self._select(start, end, gain)
         return gain
 
-    def mark_lost(self, sent: Sent) -> None:
+    def mark_lost(self, sent: SentSegment) -> None:
         """Hold a segment, or its repetition, to be lost."""
         if not sent.lost:
             sent.lost = True
@@ -108,7 +108,7 @@ class Scoreboard:
             sent.lost = False
         self.lost = 0
 
-    def repeat(self, sent: Sent, now: float) -> None:
+    def repeat(self, sent: SentSegment, now: float) -> None:
         """A segment is sent again at `now` [s]."""
         sent.repeated, sent.sent_at = True, now
         if not sent.resent:
@@ -130,7 +130,7 @@ class Scoreboard:
             del self.queue[index + 1]
         return free
 
-    def _remove(self, sent: Sent, gain: Gain) -> None:
+    def _remove(self, sent: SentSegment, gain: Gain) -> None:
         gain.released += sent.charge
         gain.ambiguous = gain.ambiguous or sent.repeated
         if sent.sacked:
@@ -140,7 +140,7 @@ class Scoreboard:
         self.lost -= sent.lost
         self.resent -= sent.resent
 
-    def _trim(self, sent: Sent, acknowledged: int, gain: Gain) -> None:
+    def _trim(self, sent: SentSegment, acknowledged: int, gain: Gain) -> None:
         cut = acknowledged - sent.start
         sent.start = acknowledged
         sent.charge -= cut

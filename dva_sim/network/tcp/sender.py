@@ -15,7 +15,7 @@ from dva_sim.network.tcp.congestion import HyStart, make_window
 from dva_sim.network.tcp.options import TcpOptions
 from dva_sim.network.tcp.recovery import OPEN, Recovery
 from dva_sim.network.tcp.retransmission_timer import PROBE, REORDER, WINDOW, Alarm, RoundTrip
-from dva_sim.network.tcp.scoreboard import Gain, Scoreboard, Sent
+from dva_sim.network.tcp.scoreboard import Gain, Scoreboard, SentSegment
 from dva_sim.network.tcp.send_buffer import SendBuffer
 
 Emit = Callable[[int, int, float], object]
@@ -231,7 +231,7 @@ class Sender:
     def _send(self, end: int, now: float) -> None:
         start, self.next = self.next, end
         charge = self.buffer.depart(end - start)
-        self.board.queue.append(Sent(start, end, now, charge))
+        self.board.queue.append(SentSegment(start, end, now, charge))
         self._leave(start, end, now)
 
     def _repeat_lost(self, now: float) -> None:

@@ -14,11 +14,11 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from dva_sim.kernel.clock import Clock
-from dva_sim.kernel.config import Config
+from dva_sim.kernel.config import Config, Key
 from dva_sim.kernel.streams import Streams
 from dva_sim.network.link import ConstantRate, Direction, Link, LinkConfig, Serialiser
 from dva_sim.network.tcp import TcpConnection, TcpEndpoint, TcpOptions
-from dva_sim.network.transports.config import Deliver, Ends, Message
+from dva_sim.network.transports.config import Deliver, Ends, TransportMessage
 
 WAYS: tuple[Direction, Direction] = ("up", "down")
 
@@ -34,9 +34,13 @@ class BottleneckConfig(Config):
         place: Where its queue is: in the `network`, or in the end `hosts` whose own line it is.
     """
 
-    rate_bps: Annotated[float, Field(ge=1e4)] = 1e6
-    queue_bytes: Annotated[int, Field(ge=3_000)] = 25_000
-    delay_s: Annotated[float, Field(ge=0, le=10)] = 0.02
+    rate_bps: Annotated[float, Field(ge=1e4), Key("rate of the shared link")] = 1e6
+    queue_bytes: Annotated[
+        int, Field(ge=3_000), Key("queue of the shared link", stated="its queue")
+    ] = 25_000
+    delay_s: Annotated[
+        float, Field(ge=0, le=10), Key("delay of the shared link", stated="its one-way delay")
+    ] = 0.02
     loss: Annotated[float, Field(ge=0, le=0.5)] = 0.0
     place: Literal["network", "hosts"] = "network"
 
@@ -57,7 +61,7 @@ class Bottleneck:
             rate_bps=config.rate_bps,
             queue_bytes=config.queue_bytes,
         )
-        self._lines = {way: Line(config.rate_bps) for way in WAYS}
+        self._lines = {way: SharedLine(config.rate_bps) for way in WAYS}
 
     def link(self, flow: str, way: Direction, priority: bool = False) -> Link:
         """The way of a flow over the link; it counts only what is the flow's own.
@@ -73,7 +77,7 @@ class Bottleneck:
         return Link(self._link, line, self._streams, f"{flow}/{way}", way)
 
 
-class Line(Serialiser):
+class SharedLine(Serialiser):
     """A serial line that knows when the packet under way has left it.
 
     Args:
@@ -113,7 +117,7 @@ class Passing(Serialiser):
         rate_bps: Of the line [bit/s].
     """
 
-    def __init__(self, line: Line, rate_bps: float) -> None:
+    def __init__(self, line: SharedLine, rate_bps: float) -> None:
         self.rate_bps, self._line = rate_bps, line
         self._seconds_per_byte, self._free_at = 8.0 / rate_bps, 0.0
 
@@ -132,7 +136,7 @@ class Passing(Serialiser):
 ALL = 1 << 30  # more than is ever readable [B]
 
 
-class OneWay:
+class OrderedMessages:
     """Messages written to one end of a connection and read from the other, in order.
 
     What the send buffer has no room for waits in the program, without end.
@@ -156,7 +160,7 @@ class OneWay:
         self._is_open = True
         self._write()
 
-    def send(self, message: Message) -> None:
+    def send(self, message: TransportMessage) -> None:
         """Write a message, or as much as there is room for."""
         self._ends_at += message.size
         self._ends.append((self._ends_at, message.number))
@@ -185,15 +189,15 @@ class TcpTransport:
     def __init__(self, clock: Clock, ends: Ends, options: TcpOptions) -> None:
         self._connection = TcpConnection(clock, ends.up, ends.down, options, options)
         operator, robot = self._connection.opener, self._connection.peer
-        self._up = OneWay(operator, robot, ends.on_command)
-        self._down = OneWay(robot, operator, ends.on_picture)
+        self._up = OrderedMessages(operator, robot, ends.on_command)
+        self._down = OrderedMessages(robot, operator, ends.on_picture)
         self._connection.open(self._up.open, self._down.open)
 
-    def command(self, message: Message) -> None:
+    def command(self, message: TransportMessage) -> None:
         """See `Transport`."""
         self._up.send(message)
 
-    def picture(self, message: Message) -> None:
+    def picture(self, message: TransportMessage) -> None:
         """See `Transport`."""
         self._down.send(message)
 

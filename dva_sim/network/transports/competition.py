@@ -15,11 +15,16 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from dva_sim.kernel.clock import Clock
-from dva_sim.kernel.config import Config
+from dva_sim.kernel.config import Config, Key
 from dva_sim.kernel.streams import Streams
 from dva_sim.network.link import Direction, Link
 from dva_sim.network.transports.bottleneck import WAYS, Bottleneck, BottleneckConfig, Bulk
-from dva_sim.network.transports.config import Message, Transport, TransportConfig, Udp
+from dva_sim.network.transports.config import (
+    TransportConfig,
+    TransportMessage,
+    TransportSession,
+    Udp,
+)
 from dva_sim.network.transports.sessions import ends_at, open_session
 
 DRAIN_S = 5.0  # the last messages that count may still arrive; assumed
@@ -36,8 +41,8 @@ class CommandsConfig(Config):
         crucial_every: Each so many is one that must arrive, such as a stop; 0: none is.
     """
 
-    rate_hz: Rate = 20.0
-    bytes: Annotated[int, Field(ge=1, le=60_000)] = 400
+    rate_hz: Annotated[Rate, Key("commands per second")] = 20.0
+    bytes: Annotated[int, Field(ge=1, le=60_000), Key("size of a command")] = 400
     crucial_every: Annotated[int, Field(ge=0)] = 0
 
 
@@ -49,8 +54,8 @@ class PicturesConfig(Config):
         bytes: Of each, with the state that comes with it.
     """
 
-    rate_hz: Rate = 10.0
-    bytes: Annotated[int, Field(ge=1, le=1_000_000)] = 4_000
+    rate_hz: Annotated[Rate, Key("pictures per second")] = 10.0
+    bytes: Annotated[int, Field(ge=1, le=1_000_000), Key("size of a picture")] = 4_000
 
 
 class BulkConfig(Config):
@@ -74,7 +79,7 @@ class ContestConfig(Config):
         measure_s: Counted.
     """
 
-    transport: TransportConfig = Udp()
+    transport: Annotated[TransportConfig, Key("transport")] = Udp()
     commands: CommandsConfig = CommandsConfig()
     pictures: PicturesConfig = PicturesConfig()
     bottleneck: BottleneckConfig = BottleneckConfig()
@@ -187,7 +192,7 @@ def _bulk(
 def _feed(
     clock: Clock,
     config: ContestConfig,
-    session: Transport,
+    session: TransportSession,
     fates: tuple[Fates, Fates],
     streams: Streams,
 ) -> None:
@@ -198,11 +203,11 @@ def _feed(
     def command() -> None:
         crucial = every > 0 and len(commands.made) % every == every - 1
         number = commands.add(clock.now, crucial)
-        session.command(Message(number, config.commands.bytes, crucial))
+        session.command(TransportMessage(number, config.commands.bytes, crucial))
 
     def picture() -> None:
         number = pictures.add(clock.now, crucial=False)
-        session.picture(Message(number, config.pictures.bytes))
+        session.picture(TransportMessage(number, config.pictures.bytes))
 
     for action, rate in ((command, config.commands.rate_hz), (picture, config.pictures.rate_hz)):
         period = 1.0 / rate

@@ -161,7 +161,7 @@ Deliver = Callable[[int], object]
 
 
 @dataclass(frozen=True, slots=True)
-class Message:
+class TransportMessage:
     """A command or a picture.
 
     Attributes:
@@ -192,11 +192,11 @@ class Ends:
     on_picture: Deliver
 
 
-class Transport(Protocol):
+class TransportSession(Protocol):
     """A session between operator and robot."""
 
-    def command(self, message: Message) -> None:
+    def command(self, message: TransportMessage) -> None:
         """The operator has a command."""
 
-    def picture(self, message: Message) -> None:
+    def picture(self, message: TransportMessage) -> None:
         """The robot has a picture."""

@@ -21,8 +21,8 @@ from typing import NamedTuple
 
 from dva_sim.kernel.clock import Clock
 from dva_sim.network.link import Link
-from dva_sim.network.transports.config import Deliver, Message
-from dva_sim.network.transports.rate_control import Law
+from dva_sim.network.transports.config import Deliver, TransportMessage
+from dva_sim.network.transports.rate_control import RateLaw
 
 REORDERED = 3  # later ones acknowledged, until one counts as lost: RFC 5681
 FIRST_TIMEOUT, LEAST_TIMEOUT, LONGEST_TIMEOUT = 1.0, 1.0, 60.0  # [s]: RFC 6298
@@ -165,7 +165,7 @@ class Pace:
         held: Whether the gap has made something wait since the round trip began.
     """
 
-    def __init__(self, law: Law, feedback: Feedback) -> None:
+    def __init__(self, law: RateLaw, feedback: Feedback) -> None:
         self._law, self._feedback = law, feedback
         self._begun, self._unanswered, self.held = False, 0, False
         self._since, self._deaf_until = 0.0, 0.0
@@ -210,16 +210,16 @@ IP_UDP = 28  # headers: RFC 791 and 768 [B]
 SLACK = 1e-6  # the clock's grain [s]
 
 
-class Part(NamedTuple):
+class MessagePart(NamedTuple):
     """A piece of a message: which of how many, and its size [B]."""
 
-    message: Message
+    message: TransportMessage
     place: int
     pieces: int
     size: int
 
 
-def parts_of(message: Message, header: int) -> list[Part]:
+def parts_of(message: TransportMessage, header: int) -> list[MessagePart]:
     """The datagrams that a message is cut into, all full but the last.
 
     Args:
@@ -229,7 +229,7 @@ def parts_of(message: Message, header: int) -> list[Part]:
     room = PACKET - IP_UDP - header
     count = max(1, math.ceil(message.size / room))
     sizes = [room] * (count - 1) + [message.size - room * (count - 1)]
-    return [Part(message, place, count, size) for place, size in enumerate(sizes)]
+    return [MessagePart(message, place, count, size) for place, size in enumerate(sizes)]
 
 
 class Assembly:
@@ -243,7 +243,7 @@ class Assembly:
         self._deliver = deliver
         self._missing: dict[int, set[int]] = {}
 
-    def add(self, part: Part) -> None:
+    def add(self, part: MessagePart) -> None:
         """A part has arrived, perhaps once more."""
         number = part.message.number
         missing = self._missing.setdefault(number, set(range(part.pieces)))
@@ -253,7 +253,7 @@ class Assembly:
                 self._deliver(number)
 
 
-class Sender:
+class DatagramSender:
     """One direction of a session whose rate a law decides, with the receiver at its other end.
 
     Args:
@@ -274,7 +274,7 @@ class Sender:
         clock: Clock,
         link: Link,
         header: int,
-        law: Law,
+        law: RateLaw,
         deliver: Deliver,
         repeats_crucial: bool = False,
     ) -> None:
@@ -282,16 +282,16 @@ class Sender:
         self._repeats, self._assembly = repeats_crucial, Assembly(deliver)
         self._feedback, self._echoes = Feedback(), Echoes()
         self._pace = Pace(law, self._feedback)
-        self._waiting: Message | None = None
-        self._parts: deque[Part] = deque()
-        self._crucial: deque[Part] = deque()
-        self._to_repeat: dict[int, Part] = {}
+        self._waiting: TransportMessage | None = None
+        self._parts: deque[MessagePart] = deque()
+        self._crucial: deque[MessagePart] = deque()
+        self._to_repeat: dict[int, MessagePart] = {}
         self._number, self._sent_at = 0, -math.inf
         self._wake_at = self._watch_at = math.inf
         self.ride: Callable[[], Sequence[Echo]] = tuple
         self.on_arrival: Callable[[Sequence[Echo]], object] = lambda echoes: None
 
-    def offer(self, message: Message) -> None:
+    def offer(self, message: TransportMessage) -> None:
         """There is something to send; what has not begun to be sent is replaced by it."""
         if message.crucial and self._repeats:
             self._crucial += parts_of(message, self._header)
@@ -345,7 +345,7 @@ class Sender:
             self._wake_at = math.inf
             self._pump()
 
-    def _send(self, now: float, part: Part) -> int:
+    def _send(self, now: float, part: MessagePart) -> int:
         number, self._number = self._number, self._number + 1
         self._feedback.sent(now, number)
         arrival = self._link.carry(now, part.size + self._header + IP_UDP)
@@ -368,7 +368,7 @@ class Sender:
             self._pump()
         self._watch()
 
-    def _arrive(self, number: int, part: Part, riding: Sequence[Echo]) -> None:
+    def _arrive(self, number: int, part: MessagePart, riding: Sequence[Echo]) -> None:
         """At the other end."""
         self._echoes.saw(self._clock.now, number)
         self._assembly.add(part)

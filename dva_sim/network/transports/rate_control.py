@@ -16,7 +16,7 @@ import math
 from typing import Protocol
 
 
-class Law(Protocol):
+class RateLaw(Protocol):
     """How often a datagram may be sent."""
 
     @property
@@ -57,20 +57,20 @@ class Aimd:
 
     @property
     def gap(self) -> float:
-        """See `Law`."""
+        """See `RateLaw`."""
         return 1.0 / self.rate if self.rate else math.inf
 
     def begin(self, round_trip: float) -> None:
-        """See `Law`."""
+        """See `RateLaw`."""
         self.rate = 1.0 / round_trip
 
     def passed(self, round_trip: float, held: bool) -> None:
-        """See `Law`."""
+        """See `RateLaw`."""
         if held:
             self.rate += self.increase / round_trip
 
     def lost(self) -> None:
-        """See `Law`."""
+        """See `RateLaw`."""
         self.rate *= 1.0 - self.decrease
 
 
@@ -116,15 +116,15 @@ class ThreeTerms:
 
     @property
     def gap(self) -> float:
-        """See `Law`."""
+        """See `RateLaw`."""
         return 1.0 / self.rate if self.rate else math.inf
 
     def begin(self, round_trip: float) -> None:
-        """See `Law`."""
+        """See `RateLaw`."""
         self.rate = 1.0 / round_trip
 
     def passed(self, round_trip: float, held: bool) -> None:
-        """See `Law`."""
+        """See `RateLaw`."""
         if not held:
             return
         self._passed += 1
@@ -132,7 +132,7 @@ class ThreeTerms:
         self.rate += (self.linear + self.square * odd) / round_trip
 
     def lost(self) -> None:
-        """See `Law`."""
+        """See `RateLaw`."""
         self.rate *= 1.0 - self.decrease
         self._passed = 0
 
@@ -173,11 +173,11 @@ class LeastRoundTrip:
         self.gap = math.inf
 
     def begin(self, round_trip: float) -> None:
-        """See `Law`."""
+        """See `RateLaw`."""
         self.least, self.gap = round_trip, min(round_trip, self.longest)
 
     def passed(self, round_trip: float, held: bool) -> None:
-        """See `Law`."""
+        """See `RateLaw`."""
         self.least = min(self.least, round_trip)
         if round_trip - self.least > self.tolerance:
             self.lost()
@@ -185,5 +185,5 @@ class LeastRoundTrip:
             self.gap /= self.narrow
 
     def lost(self) -> None:
-        """See `Law`."""
+        """See `RateLaw`."""
         self.gap = min(self.gap * self.widen, self.longest)

@@ -12,16 +12,23 @@ from dva_sim.network.transports.config import (
     Btp,
     Ends,
     Irtp,
-    Message,
     Rtnp,
     Tcp,
-    Transport,
     TransportConfig,
+    TransportMessage,
+    TransportSession,
     Trinomial,
     Zeromq,
 )
-from dva_sim.network.transports.datagrams import IP_UDP, Assembly, Echo, Part, Sender, parts_of
-from dva_sim.network.transports.rate_control import Aimd, Law, LeastRoundTrip, ThreeTerms
+from dva_sim.network.transports.datagrams import (
+    IP_UDP,
+    Assembly,
+    DatagramSender,
+    Echo,
+    MessagePart,
+    parts_of,
+)
+from dva_sim.network.transports.rate_control import Aimd, LeastRoundTrip, RateLaw, ThreeTerms
 from dva_sim.network.zmtp import ZmtpConnection, ZmtpOptions, framed
 
 NAME = "teleoperation"
@@ -39,7 +46,7 @@ def ends_at(
     return Ends(up, down, on_command, on_picture)
 
 
-def open_session(clock: Clock, config: TransportConfig, ends: Ends) -> Transport:
+def open_session(clock: Clock, config: TransportConfig, ends: Ends) -> TransportSession:
     """A session over a transport, as configured."""
     if isinstance(config, Tcp):
         return TcpTransport(clock, ends, TcpOptions(send_buffer=config.send_buffer_bytes))
@@ -63,15 +70,17 @@ class PlainSession:
         self._clock, self._ends, self._header = clock, ends, header
         self._at_robot, self._at_operator = Assembly(ends.on_command), Assembly(ends.on_picture)
 
-    def command(self, message: Message) -> None:
-        """See `Transport`."""
+    def command(self, message: TransportMessage) -> None:
+        """See `TransportSession`."""
         self._send(message, self._ends.up, self._at_robot.add)
 
-    def picture(self, message: Message) -> None:
-        """See `Transport`."""
+    def picture(self, message: TransportMessage) -> None:
+        """See `TransportSession`."""
         self._send(message, self._ends.down, self._at_operator.add)
 
-    def _send(self, message: Message, link: Link, add: Callable[[Part], object]) -> None:
+    def _send(
+        self, message: TransportMessage, link: Link, add: Callable[[MessagePart], object]
+    ) -> None:
         for part in parts_of(message, self._header):
             arrival = link.carry(self._clock.now, part.size + self._header + IP_UDP)
             if arrival is not None:
@@ -91,7 +100,8 @@ class RateSession:
         header, repeats = config.header_bytes, isinstance(config, Irtp)
         ways = ((ends.up, ends.on_command), (ends.down, ends.on_picture))
         self._up, self._down = (
-            Sender(clock, link, header, law_of(config), told, repeats) for link, told in ways
+            DatagramSender(clock, link, header, law_of(config), told, repeats)
+            for link, told in ways
         )
         if isinstance(config, Btp):
             answer_each_other(self._up, self._down)
@@ -99,12 +109,12 @@ class RateSession:
             answer_each(clock, self._up, ends.down, header)
             answer_each(clock, self._down, ends.up, header)
 
-    def command(self, message: Message) -> None:
-        """See `Transport`."""
+    def command(self, message: TransportMessage) -> None:
+        """See `TransportSession`."""
         self._up.offer(message)
 
-    def picture(self, message: Message) -> None:
-        """See `Transport`."""
+    def picture(self, message: TransportMessage) -> None:
+        """See `TransportSession`."""
         self._down.offer(message)
 
 
@@ -131,16 +141,16 @@ class ZeromqTransport:
             connection.open(lambda: None)
         self._operator, self._robot = commands.opener, pictures.peer
 
-    def command(self, message: Message) -> None:
-        """See `Transport`."""
+    def command(self, message: TransportMessage) -> None:
+        """See `TransportSession`."""
         self._operator.send(message.number, framed(message.size))
 
-    def picture(self, message: Message) -> None:
-        """See `Transport`."""
+    def picture(self, message: TransportMessage) -> None:
+        """See `TransportSession`."""
         self._robot.send(message.number, framed(message.size))
 
 
-def law_of(config: Trinomial | Irtp | Btp) -> Law:
+def law_of(config: Trinomial | Irtp | Btp) -> RateLaw:
     """The law of rate of a transport that has one."""
     if isinstance(config, Trinomial):
         return ThreeTerms(config.linear, config.square, config.decrease)
@@ -149,7 +159,7 @@ def law_of(config: Trinomial | Irtp | Btp) -> Law:
     return LeastRoundTrip(config.tolerance_s, config.widen, config.narrow, config.longest_gap_s)
 
 
-def answer_each(clock: Clock, sender: Sender, back: Link, header: int) -> None:
+def answer_each(clock: Clock, sender: DatagramSender, back: Link, header: int) -> None:
     """Let every datagram of a sender be acknowledged by one of its own on the way back."""
 
     def answer(_: Sequence[Echo]) -> None:
@@ -160,7 +170,7 @@ def answer_each(clock: Clock, sender: Sender, back: Link, header: int) -> None:
     sender.on_arrival = answer
 
 
-def answer_each_other(one: Sender, other: Sender) -> None:
+def answer_each_other(one: DatagramSender, other: DatagramSender) -> None:
     """Let the acknowledgements of two directions ride on each other's datagrams."""
     one.ride, other.ride = other.echoes, one.echoes
     one.on_arrival, other.on_arrival = other.hear, one.hear

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from dva_sim.recordings.pictures import style
 from dva_sim.recordings.pictures.moments import BYSTANDER, FRESH, ROBOT, Moments, kind_of
-from dva_sim.worlds.hazards import GasLeak, Raster
+from dva_sim.worlds.hazards import Hazard, Raster
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -27,7 +27,7 @@ STEP = 0.5  # between the points of a trail [s]
 CONE = 2.5  # length of the view cone [m]
 
 
-class Body:
+class DrawnBody:
     """One of them with a trail; for a driven robot also what its operator sees.
 
     Args:
@@ -146,7 +146,7 @@ def _fading(age: float) -> float:
 
 
 LAYER = 2.2  # over the floors, under walls and names
-SHOWN = {"fire": ("heat", "smoke"), "gas_leak": ("gas",), "flood": ("water",)}
+STAR, MARK = 12, 8  # sizes of the mark of a source [points]
 CELL = 0.25  # of the fields [m]
 MOST_CELLS = 120_000  # of a field; on a larger site cells are larger
 SMOKE_PATH = 2.5  # smoke covers the floor as it does a thing so far away [m]
@@ -156,7 +156,7 @@ WET = 0.002  # less is not drawn [m]
 LEAST_HEAT = 1.0  # less is not drawn [kW/m2]
 
 
-class Fields:
+class DrawnFields:
     """All hazards of a run on one map.
 
     Args:
@@ -175,8 +175,7 @@ class Fields:
             "smoke": _smoke,
             "gas": lambda v: _gas(v / lower),
         }
-        whats = {what for kind in moments.kinds for what in SHOWN[kind]}
-        self._paints = {what: paint for what, paint in paints.items() if what in whats}
+        self._paints = {what: paint for what, paint in paints.items() if what in moments.shown}
         gas = tuple(level * lower for level in style.GAS_LEVELS)
         self._contours = {
             "heat": _Contours(ax, style.HEAT_LEVELS, style.FIRE),
@@ -186,7 +185,7 @@ class Fields:
             np.zeros((1, 1, 4), np.uint8), origin="lower", interpolation="bilinear",
             zorder=LAYER, animated=True,
         )  # fmt: skip
-        self._sources = [_Source(ax, kind) for kind in style.MARKS]
+        self._sources = [_Source(ax, hazard) for hazard in moments.looks.values()]
 
     def show(self, time: float) -> list[Artist]:
         """The hazards at a moment [s]."""
@@ -242,17 +241,17 @@ class _Contours:
 class _Source:
     """A mark where hazards of one kind come from."""
 
-    def __init__(self, ax: Axes, kind: str) -> None:
-        self._kind = kind
-        size = 12 if kind == "fire" else 8
+    def __init__(self, ax: Axes, hazard: Hazard) -> None:
+        self._title = hazard.title
         (self._marks,) = ax.plot(
-            [], [], ls="none", marker=style.MARKS[kind], ms=size, color=style.HAZARDS[kind],
-            mec="white", mew=0.8, zorder=6, animated=True,
+            [], [], ls="none", marker=hazard.mark, ms=STAR if hazard.mark == "*" else MARK,
+            color=hazard.colour, mec="white", mew=0.8, zorder=6, animated=True,
         )  # fmt: skip
 
     def show(self, moments: Moments, time: float) -> list[Artist]:
         """Those of a kind that go on."""
-        places = [i.hazard.position for i in moments.going_on(time) if i.kind == self._kind]
+        hazards = [incident.hazard for incident in moments.going_on(time)]
+        places = [hazard.position for hazard in hazards if hazard.title == self._title]
         if not places:
             return []
         self._marks.set_data(*zip(*places, strict=True))
@@ -261,9 +260,8 @@ class _Source:
 
 def _lower_limit(moments: Moments) -> float:
     """Lower explosive limit of what leaks; of several gases, of the one that explodes first."""
-    hazards = [incident.hazard for incident in moments.recording.incidents]
-    limits = [hazard.kind_of_gas.lower for hazard in hazards if isinstance(hazard, GasLeak)]
-    return min(limits, default=1.0)
+    limits = [incident.hazard.explodes_at() for incident in moments.recording.incidents]
+    return min(1.0, *limits)
 
 
 def _over(upper: NDArray[Any], under: NDArray[Any]) -> NDArray[Any]:

@@ -11,13 +11,13 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from dva_sim.agents.people.bystander import DOWN
-from dva_sim.experiments.study.labels import level_name
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.recorder import DriveLog, TrackPoint
 from dva_sim.kernel.suggestions import unknown
+from dva_sim.network.patterns import PATTERNS
 from dva_sim.simulation.full import Playback
-from dva_sim.simulation.full.hazards import Incident
-from dva_sim.worlds.camera import Camera, Figure, Smoke, Spot
+from dva_sim.simulation.full.hazards import RunHazard
+from dva_sim.worlds.camera import Camera, Figure, SmokeView
 from dva_sim.worlds.camera.raycast import Picture
 from dva_sim.worlds.geo import Pose
 
@@ -57,7 +57,9 @@ class Moments:
         self.recording = recording
         self.tracks = recording.recorder.tracks
         self._times = {name: [p.time for p in track] for name, track in self.tracks.items()}
-        self.kinds = {i.kind for i in recording.incidents if not i.false_alarm}
+        real = sorted((i for i in recording.incidents if not i.false_alarm), key=lambda i: i.kind)
+        self.looks = {incident.hazard.title: incident.hazard for incident in real}
+        self.shown = {what for hazard in self.looks.values() for what in hazard.shows}
         self._cameras: dict[tuple[int, int], Camera] = {}
 
     # --- who is where ------------------------------------------------------------------
@@ -94,7 +96,7 @@ class Moments:
             before.mode,
         )
 
-    def going_on(self, time: float) -> list[Incident]:
+    def going_on(self, time: float) -> list[RunHazard]:
         """What has begun, is real and not dealt with at `time` [s]."""
         contained = self.recording.contained
         return [
@@ -131,17 +133,17 @@ class Moments:
         if size not in self._cameras:
             angle = math.radians(self.recording.scenario.camera.field_of_view_deg)
             self._cameras[size] = Camera(self.recording.site, width, height, angle)
-        here, spots = self.at(robot, time), [i.spot(time) for i in self.going_on(time)]
+        here = self.at(robot, time)
         raster = self.recording.surroundings.raster
         smoke = None
-        if "fire" in self.kinds:
-            smoke = Smoke(raster("smoke", time), raster("layer", time))
+        if "smoke" in self.shown:
+            smoke = SmokeView(raster("smoke", time), raster("layer", time))
         return self._cameras[size].picture(
             Pose(here.x, here.y, here.heading),
             self._others(robot, time),
-            [Spot(*spot) for spot in spots if spot is not None],
+            [incident.hazard for incident in self.going_on(time)],
             smoke,
-            raster("water", time) if "flood" in self.kinds else None,
+            raster("water", time) if "water" in self.shown else None,
             time,
         )
 
@@ -167,7 +169,7 @@ def _shown(drive: DriveLog, time: float) -> float | None:
 SAME = 0.05  # a shorter lead is none, as times are told [s]
 
 
-class Verdict(NamedTuple):
+class RunVerdict(NamedTuple):
     """How a run ended.
 
     Attributes:
@@ -191,7 +193,7 @@ class Verdict(NamedTuple):
         return f"{self.text}, {seconds(self.ahead)} ahead" if self.ahead > SAME else self.text
 
 
-def verdicts(runs: Sequence[Playback]) -> list[Verdict]:
+def verdicts(runs: Sequence[Playback]) -> list[RunVerdict]:
     """How each run ended; of two, the one that was ahead says by how much."""
     found = [_verdict(run) for run in runs]
     if len(found) != 2 or not all(verdict.text for verdict in found):
@@ -201,7 +203,7 @@ def verdicts(runs: Sequence[Playback]) -> list[Verdict]:
     return [v._replace(ahead=lead) for v, lead in zip(found, leads, strict=True)]
 
 
-def decided_at(found: Sequence[Verdict]) -> float | None:
+def decided_at(found: Sequence[RunVerdict]) -> float | None:
     """The moment that shows what some runs differ in: when the first one had come to a good end."""
     return min((verdict.time for verdict in found if verdict.good), default=None)
 
@@ -215,7 +217,9 @@ def story(runs: Sequence[Playback]) -> list[str]:
 
 def pattern_name(run: Playback) -> str:
     """The messaging pattern of a run, as reports call it."""
-    return level_name("pattern", run.scenario.pattern)
+    pattern = run.scenario.pattern
+    shipped = PATTERNS.get(pattern)
+    return shipped.title if shipped else pattern.rpartition(":")[2]
 
 
 def seconds(time: float) -> str:
@@ -227,25 +231,25 @@ def _lead(own: float, other: float) -> float:
     return 0.0 if own == other else other - own
 
 
-def _verdict(run: Playback) -> Verdict:
+def _verdict(run: Playback) -> RunVerdict:
     """How a run ended, by itself."""
     right = [
         ending.outcome == ("refuted" if incident.false_alarm else "confirmed")
         for incident, ending in zip(run.incidents, run.endings, strict=False)
     ]
     if not right:
-        return Verdict(run.duration, "", False)
+        return RunVerdict(run.duration, "", False)
     good = all(right)
     last = max(ending.time for ending in run.endings)
     time = min(last, run.duration)
     if len(right) == 1:
-        return Verdict(time, _of_one(run, good), good)
+        return RunVerdict(time, _of_one(run, good), good)
     word = "settled" if any(i.false_alarm for i in run.incidents) else "confirmed"
     if good:
         all_of = "both" if len(right) == 2 else f"all {len(right)}"
-        return Verdict(time, f"{all_of} events {word} at {last:.1f} s", good)
+        return RunVerdict(time, f"{all_of} events {word} at {last:.1f} s", good)
     text = f"{sum(right)} of {len(right)} events {word} within {time:.0f} s"
-    return Verdict(time, text, good)
+    return RunVerdict(time, text, good)
 
 
 def _of_one(run: Playback, good: bool) -> str:

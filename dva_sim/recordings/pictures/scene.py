@@ -12,8 +12,8 @@ import numpy as np
 
 from dva_sim.kernel.recorder import Moment
 from dva_sim.recordings.pictures import style
-from dva_sim.recordings.pictures.layers import LAYER, Body, Fields
-from dva_sim.recordings.pictures.moments import BYSTANDER, GUARD, ROBOT, Moments, Verdict
+from dva_sim.recordings.pictures.layers import LAYER, DrawnBody, DrawnFields
+from dva_sim.recordings.pictures.moments import BYSTANDER, GUARD, ROBOT, Moments, RunVerdict
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -55,7 +55,7 @@ class Names:
         bodies: Whose names.
     """
 
-    def __init__(self, ax: Axes, bodies: Sequence[Body]) -> None:
+    def __init__(self, ax: Axes, bodies: Sequence[DrawnBody]) -> None:
         from matplotlib.patheffects import withStroke
 
         self._ax, self._bodies = ax, bodies
@@ -96,7 +96,7 @@ class Names:
         return Box(x - half, y - half, x + half, y + half)
 
     def _put(
-        self, body: Body, text: Any, time: float, renderer: Any, frame: Box, taken: list[Box]
+        self, body: DrawnBody, text: Any, time: float, renderer: Any, frame: Box, taken: list[Box]
     ) -> Box:
         """Write a name where it is least in the way."""
         extent = text.get_window_extent(renderer)
@@ -146,15 +146,15 @@ class Scene:
         self,
         ax: Axes,
         moments: Moments,
-        verdict: Verdict,
+        verdict: RunVerdict,
         title: str = "",
         outlook: str | None = None,
     ) -> None:
         self._ax, self._moments, self._verdict, self._outlook = ax, moments, verdict, outlook
         limits = self._draw_ground()
         names = moments.names(BYSTANDER, GUARD, ROBOT)
-        self._fields = Fields(ax, moments)
-        self._bodies = [Body(ax, moments, name) for name in names]
+        self._fields = DrawnFields(ax, moments)
+        self._bodies = [DrawnBody(ax, moments, name) for name in names]
         self._names = Names(ax, self._bodies)
         ax.set(xlim=limits[0], ylim=limits[1], aspect="equal")
         self._clock = ax.set_title("", loc="right", fontsize=style.TITLE, pad=2)
@@ -255,7 +255,7 @@ def _stands_out(artist: Artist) -> bool:
     return artist.get_zorder() > LAYER and not isinstance(artist, Axis | Spine)
 
 
-def _colour_of(verdict: Verdict) -> str:
+def _colour_of(verdict: RunVerdict) -> str:
     """Of the box in which a run's end is told."""
     if not verdict.good:
         return style.FAILED

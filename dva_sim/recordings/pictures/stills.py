@@ -7,7 +7,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.recordings.pictures.moments import Moments, Verdict, decided_at, pattern_name, verdicts
+from dva_sim.recordings.pictures.moments import (
+    Moments,
+    RunVerdict,
+    decided_at,
+    pattern_name,
+    verdicts,
+)
 from dva_sim.recordings.pictures.scene import Scene
 from dva_sim.recordings.pictures.style import Sheet, heading_of
 from dva_sim.simulation.full import Playback
@@ -91,6 +97,6 @@ def _sheet(recordings: Sequence[Playback], times: Sequence[float], columns: int)
     return sheet.figure
 
 
-def _outlook(verdict: Verdict) -> str | None:
+def _outlook(verdict: RunVerdict) -> str | None:
     """What is told of a run that goes on while another one is done."""
     return f"still under way, {verdict.text}" if verdict.text else None

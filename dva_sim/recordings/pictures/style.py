@@ -9,7 +9,6 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from dva_sim.experiments.study.labels import level_name
 from dva_sim.recordings.pictures.moments import BYSTANDER, GUARD, ROBOT, Moments, pattern_name
 from dva_sim.simulation.full import Playback
 
@@ -60,18 +59,16 @@ OUTLINES = {
 }
 LENGTHS = {ROBOT: 1.6, GUARD: 1.64, BYSTANDER: 1.64}  # of the marker box, twice the bow
 
-FIRE, GAS, WATER, SMOKE = "#d1332e", "#b59a00", "#2a7fb8", "#55585e"
-HAZARDS = {"fire": FIRE, "gas_leak": GAS, "flood": WATER}
+FIRE, GAS, WATER, SMOKE = "#d1332e", "#b59a00", "#2a7fb8", "#55585e"  # over the floor
 SMALL = (
     *ROBOT_MODES.values(),
     *ACTIVITIES.values(),
-    *HAZARDS.values(),
+    *(FIRE, GAS, WATER),
     GHOST,
     AHEAD,
     BEHIND,
     FAILED,
 )
-MARKS = {"fire": "*", "gas_leak": "D", "flood": "v"}
 GAS_LEVELS = (0.1, 0.2, 0.5, 1.0)  # of the lower explosive limit
 HEAT_LEVELS = (1.0, 2.5, 10.0)  # [kW/m2]; skin bears 2.5 for long
 
@@ -95,31 +92,32 @@ def legend(moments: Iterable[Moments]) -> list[Artist]:
         for mode in sorted(modes, key=_order):
             met.add(kind)
             handles.append(_dot(SHAPES[kind], colour_of(kind, mode), f"{kind}: {mode.lower()}"))
-    kinds = {kind for run in runs for kind in run.kinds}
-    for kind in sorted(kinds):
-        handles.append(_dot(MARKS[kind], HAZARDS[kind], kind.replace("_", " ")))
+    looks = {title: hazard for run in runs for title, hazard in run.looks.items()}
+    for title, hazard in sorted(looks.items()):
+        handles.append(_dot(hazard.mark, hazard.colour, title))
     if any(run.recording.recorder.views for run in runs):
         seen = "as the operator sees it"
         handles.append(
             Line2D([], [], ls="none", marker="o", mfc="none", mec=GHOST, ms=7, label=seen)
         )
-    handles += _fields(kinds)
+    handles += _fields({what for run in runs for what in run.shown})
     return handles
 
 
-def _fields(kinds: set[str]) -> list[Artist]:
+def _fields(shown: set[str]) -> list[Artist]:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
     handles: list[Artist] = []
-    if "fire" in kinds:
+    if "smoke" in shown:
         handles.append(Patch(fc=SMOKE, alpha=0.5, label="smoke"))
+    if "heat" in shown:
         levels = ", ".join(f"{level:g}" for level in HEAT_LEVELS)
         handles.append(Line2D([], [], color=FIRE, lw=1, label=f"heat {levels} kW/m²"))
-    if "gas_leak" in kinds:
+    if "gas" in shown:
         levels = ", ".join(f"{100 * level:.0f}" for level in GAS_LEVELS)
         handles.append(Line2D([], [], color=GAS, lw=1, label=f"gas {levels} % of LEL"))
-    if "flood" in kinds:
+    if "water" in shown:
         handles.append(Patch(fc=WATER, alpha=0.5, label="water"))
     return handles
 
@@ -224,7 +222,8 @@ def heading_of(recordings: Sequence[Playback]) -> str:
     first = recordings[0]
     what = pattern_name(first) if len(recordings) == 1 else "The same run under two patterns"
     delay = first.scenario.link.delay_s
-    return f"{what}, {level_name('link.delay_s', delay)} of delay each way" if delay else what
+    told = f"{1000 * delay:g}\N{NO-BREAK SPACE}ms" if delay < 1 else f"{delay:g}\N{NO-BREAK SPACE}s"
+    return f"{what}, {told} of delay each way" if delay else what
 
 
 def _new_figure(dpi: float) -> Figure:

@@ -9,22 +9,22 @@ from dataclasses import replace
 import numpy as np
 import shapely
 
+from dva_sim.agents.observation import Observation
 from dva_sim.agents.operator.attention import DriverSeat, OperatorSetup
-from dva_sim.agents.operator.drive import Drive
+from dva_sim.agents.operator.drive import Teleoperation
 from dva_sim.agents.operator.operator import OperatorAgent
-from dva_sim.agents.operator.person import draw_person
 from dva_sim.agents.operator.strategies import Truth, load_strategy
-from dva_sim.agents.operator.supervision import Supervise
-from dva_sim.agents.robot.camera import Observation
+from dva_sim.agents.operator.supervision import Supervision
+from dva_sim.agents.person import draw_person
 from dva_sim.agents.robot.robot import EXPECTED_READY, EXPECTED_SPEED
 from dva_sim.agents.tilt import Phone
 from dva_sim.core.dispatch import load_policy
 from dva_sim.core.dispatcher import Patrols
-from dva_sim.core.dva import Desk
+from dva_sim.core.dva import Dva
 from dva_sim.core.permissions import LOW_BITS, Access, AccessRule, Permissions
 from dva_sim.core.sessions import Sessions
-from dva_sim.core.store import Memory
-from dva_sim.core.travel_times import Floats, Ground, Start, Station
+from dva_sim.core.store import Store
+from dva_sim.core.travel_times import Floats, SiteKnowledge, Start, WaitingPlace
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.streams import Streams
 from dva_sim.protocol import messages as m
@@ -43,7 +43,7 @@ from dva_sim.worlds.layout import FOOTPRINT
 def add_dva(
     stage: Stage,
     permissions: Permissions | None = None,
-    memory: Memory | None = None,
+    memory: Store | None = None,
     keep_events: bool = True,
 ) -> DvaAgent:
     """The DVA; sessions are drawn by the run's seed where no other `permissions` are given.
@@ -61,15 +61,15 @@ def add_dva(
     permissions = permissions or Permissions(lambda: int(draw.integers(2**LOW_BITS)))
     permissions.own = DVA
     policy = load_policy(dispatch.policy, dispatch.options)
-    desk = Desk(
+    desk = Dva(
         policy,
         _Ways(stage),
         replace(dispatch.rules(), operator_span=stage.scenario.operator.span),
-        stage.streams["dva/policy"],
-        Sessions(permissions),
-        _ground(stage) if policy.relocates else Ground(),
-        _access(stage.scenario),
-        _patrols(stage),
+        rng=stage.streams["dva/policy"],
+        sessions=Sessions(permissions),
+        ground=_ground(stage) if policy.relocates else SiteKnowledge(),
+        access=_access(stage.scenario),
+        patrols=_patrols(stage),
     )
     return DvaAgent(stage.device("dva", 1), desk, memory, keep_events)
 
@@ -105,33 +105,33 @@ class _Ways:
         return self._stage.planner.distance(a, frame.to_xy(goal.latitude, goal.longitude))
 
 
-def _ground(stage: Stage) -> Ground:
+def _ground(stage: Stage) -> SiteKnowledge:
     """Guards wait at their posts; each room is a zone that counts by its floor's area."""
     frame = stage.site.frame
     stations = tuple(
-        Station(f"post {number}", m.Position(*frame.to_latlon(post.x, post.y)))
+        WaitingPlace(f"post {number}", m.Position(*frame.to_latlon(post.x, post.y)))
         for number, post in enumerate(stage.site.guard_posts, 1)
     )
     rooms = [shapely.Polygon(room.polygon) for room in stage.site.rooms]
     if not stations or not rooms:
-        return Ground()
+        return SiteKnowledge()
     starts = [Start(s.name, "guard", s.position, under_way=True) for s in stations]
     middles = [room.representative_point() for room in rooms]
     goals = [m.Position(*frame.to_latlon(middle.x, middle.y)) for middle in middles]
     area = np.array([room.area for room in rooms])
-    return Ground(None, stations, _Ways(stage)(starts, goals)[1].T, area / area.sum())
+    return SiteKnowledge(None, stations, _Ways(stage)(starts, goals)[1].T, area / area.sum())
 
 
 def _access(scenario: Scenario) -> Access:
     """Without rules in the scenario everything is allowed to who asks."""
     rules = [
         AccessRule(
-            frozenset(rule.holders),
-            frozenset(rule.robots),
-            frozenset(rule.levels),
-            None if rule.sensors is None else frozenset(rule.sensors),
-            rule.from_s,
-            math.inf if rule.until_s is None else rule.until_s,
+            holders=frozenset(rule.holders),
+            robots=frozenset(rule.robots),
+            levels=frozenset(rule.levels),
+            sensors=None if rule.sensors is None else frozenset(rule.sensors),
+            since=rule.from_s,
+            until=math.inf if rule.until_s is None else rule.until_s,
         )
         for rule in scenario.access
     ]
@@ -179,10 +179,11 @@ def add_operator(
         raise ConfigError("operator.strategy 'oracle' knows the truth: only in virtual time")
     command = scenario.command
     setup = OperatorSetup(
-        scenario.window,
-        command.rate_hz,
-        command_timeout_s(scenario),
-        command.attempts,
+        pattern=stage.pattern,
+        window=command.window,
+        rate_hz=command.rate_hz,
+        timeout=command_timeout_s(scenario),
+        attempts=command.attempts,
         truth=truth if needs_truth else None,
         guarded=scenario.control == "coordinated",
     )
@@ -195,14 +196,14 @@ def add_operator(
             stage.streams[f"{device.label}/phone"],
             Streams(config.population_seed).fresh(f"person-{config.person + number - 1}/phone"),
         ),
-        strategy,
-        stage.reach,
-        stage.planner,
-        setup,
-        stage.streams[f"{device.label}/judgement"],
-        lambda what: stage.streams.fresh(f"{device.label}/look/{what}"),
+        strategy=strategy,
+        reach=stage.reach,
+        planner=stage.planner,
+        setup=setup,
+        rng=stage.streams[f"{device.label}/judgement"],
+        looks=lambda what: stage.streams.fresh(f"{device.label}/look/{what}"),
     )
-    kind = Supervise if scenario.control == "supervisory" else Drive
+    kind = Supervision if scenario.control == "supervisory" else Teleoperation
     operator = OperatorAgent(seat, kind, config.span)
     device.register()
     return operator

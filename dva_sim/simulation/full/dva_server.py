@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections import Counter
 from functools import partial
 
-from dva_sim.agents.device import HEARTBEAT, STATUS, Device
-from dva_sim.core.dva import Desk
+from dva_sim.agents.device import HEARTBEAT, STATUS, AgentDevice
+from dva_sim.core.dva import Dva
 from dva_sim.core.events import Event, State
-from dva_sim.core.outbox import Send
 from dva_sim.core.registry import DETECTOR, GUARD, ROBOT
-from dva_sim.core.store import Memory
-from dva_sim.network.patterns import Subscription
+from dva_sim.core.sessions import Send
+from dva_sim.core.store import Store
+from dva_sim.network.messaging import Subscription
 from dva_sim.protocol import messages as m
 
 MOST_TOLD = 20_000  # events whose last word is remembered, so that none is said twice
@@ -31,7 +31,7 @@ class DvaAgent:
     """
 
     def __init__(
-        self, device: Device, desk: Desk, memory: Memory | None = None, keep_events: bool = True
+        self, device: AgentDevice, desk: Dva, memory: Store | None = None, keep_events: bool = True
     ) -> None:
         self.device, self.desk = device, desk
         self.events: dict[int, Event] = {}

@@ -5,15 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
-from dva_sim.agents.device import Device
+from dva_sim.agents.device import AgentDevice
+from dva_sim.agents.observation import Observation
 from dva_sim.agents.operator.strategies import Truth
 from dva_sim.agents.people.bystander import BystanderAgent
 from dva_sim.agents.people.guard import GuardAgent
-from dva_sim.agents.robot.camera import HazardSpot, Observation
+from dva_sim.agents.robot.camera import HazardSpot
 from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.kernel.recorder import DriveLog
 from dva_sim.protocol import messages as m
-from dva_sim.simulation.full.hazards import Hearsay, Incident, draw_incidents
+from dva_sim.simulation.full.hazards import Hearsay, RunHazard, draw_incidents
 from dva_sim.simulation.full.people import People
 from dva_sim.simulation.full.robots import Machines, Starts
 from dva_sim.simulation.full.stage import DVA, Stage
@@ -115,16 +116,16 @@ class Field:
 
     # --- what happens ------------------------------------------------------------------
 
-    def _schedule(self, number: int, incident: Incident) -> None:
+    def _schedule(self, number: int, incident: RunHazard) -> None:
         """Detectors are devices too: those that will notice something register and report."""
-        stage, kind = self.stage, incident.kind.replace("_", " ")
+        stage = self.stage
         if not incident.false_alarm:
             stage.clock.call_at(
                 incident.start,
                 stage.recorder.tell,
                 incident.start,
                 incident.room or "site",
-                f"{kind} breaks out",
+                f"{incident.hazard.title} breaks out",
             )
         if incident.detected == math.inf:
             return
@@ -137,14 +138,14 @@ class Field:
             beyond = len(self.incidents) + self._others
             self._let_report(beyond, f"caller {other} of event {number}", heard, incident)
 
-    def _let_report(self, number: int, label: str, what: Hearsay, incident: Incident) -> None:
+    def _let_report(self, number: int, label: str, what: Hearsay, incident: RunHazard) -> None:
         stage = self.stage
         device = stage.device("detector", number)
         device.label = stage.labels[device.id_tag] = label
         device.register()
         stage.clock.call_at(what.time, self._report, device, incident, what.position)
 
-    def _report(self, device: Device, incident: Incident, place: tuple[float, float]) -> None:
+    def _report(self, device: AgentDevice, incident: RunHazard, place: tuple[float, float]) -> None:
         position = m.Position(*self.stage.site.frame.to_latlon(*place))
         severity = incident.hazard.severity(self.stage.clock.now)
         body = m.EventReport(None, incident.kind, position, severity, 0.9, "detected")
@@ -159,7 +160,7 @@ class Field:
 
     # --- what agents may ask of the world ----------------------------------------------
 
-    def _going_on(self, now: float) -> list[Incident]:
+    def _going_on(self, now: float) -> list[RunHazard]:
         """What has begun, is real, and was not dealt with yet."""
         return [
             incident

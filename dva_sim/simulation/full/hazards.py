@@ -11,7 +11,7 @@ from dva_sim.agents.robot.camera import HazardSpot
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.streams import Streams
 from dva_sim.simulation.scenario import EventConfig
-from dva_sim.worlds.hazards import DETECTS, Hazard, first_detection, make_hazard
+from dva_sim.worlds.hazards import Hazard, find_hazard, first_detection, make_hazard
 from dva_sim.worlds.layout import Site
 from dva_sim.worlds.site_parts import Detector
 
@@ -32,11 +32,11 @@ class Hearsay:
 
 
 @dataclass(frozen=True)
-class Incident:
+class RunHazard:
     """A hazard of this run.
 
     Attributes:
-        kind: `fire`, `gas_leak` or `flood`.
+        kind: What it is reported as: `fire`, `gas_leak` or `flood`.
         room: Where, by name; empty outside all rooms.
         start: When it begins [s].
         detected: When a detector or a person notices it [s]; infinite if nobody does.
@@ -64,10 +64,12 @@ class Incident:
         if not self.is_there(now):
             return None
         x, y = self.hazard.position
-        return HazardSpot(self.kind, x, y, self.hazard.radius(now))
+        return HazardSpot(self.kind, x, y, self.hazard.radius(now), self.hazard.shines)
 
 
-def draw_incidents(events: tuple[EventConfig, ...], site: Site, streams: Streams) -> list[Incident]:
+def draw_incidents(
+    events: tuple[EventConfig, ...], site: Site, streams: Streams
+) -> list[RunHazard]:
     """Place the events of a scenario, each by a stream of its own.
 
     Raises:
@@ -76,7 +78,7 @@ def draw_incidents(events: tuple[EventConfig, ...], site: Site, streams: Streams
     return [_draw(event, site, streams, number) for number, event in enumerate(events, 1)]
 
 
-def _draw(event: EventConfig, site: Site, streams: Streams, number: int) -> Incident:
+def _draw(event: EventConfig, site: Site, streams: Streams, number: int) -> RunHazard:
     rng = streams[f"event-{number}"]
     start = event.at_s
     if event.latest_s is not None:
@@ -89,7 +91,9 @@ def _draw(event: EventConfig, site: Site, streams: Streams, number: int) -> Inci
         detector, detected = first_detection(hazard, site)
     luck = streams[f"event-{number}/hearsay"]
     hearsay = tuple(_hearsay(detected, (x, y), site, luck) for _ in range(event.reports - 1))
-    return Incident(event.kind, room, start, detected, detector, hazard, event.false_alarm, hearsay)
+    return RunHazard(
+        hazard.reported_as, room, start, detected, detector, hazard, event.false_alarm, hearsay
+    )
 
 
 def _hearsay(
@@ -107,7 +111,8 @@ def _hearsay(
 
 def _place(event: EventConfig, site: Site, rng: np.random.Generator) -> tuple[float, float]:
     """A free place in the event's room; without one, in some room that is watched for its kind."""
-    rooms: list[str | None] = [event.room] if event.room else _watched_rooms(event.kind, site)
+    kind = find_hazard(event.kind)
+    rooms: list[str | None] = [event.room] if event.room else _watched_rooms(kind, site)
     bases = [*site.robot_bases, *site.guard_posts]
     for _ in range(TRIES):
         x, y = site.sample_free(rng, REACHABLE, rooms[int(rng.integers(len(rooms)))])
@@ -115,10 +120,10 @@ def _place(event: EventConfig, site: Site, rng: np.random.Generator) -> tuple[fl
         if site.is_free(x, y, CLEARANCE) and (event.room is not None or gap >= FAR_ENOUGH):
             return x, y
     where = f"in room {event.room!r}" if event.room else f"{FAR_ENOUGH:g} m from all bases"
-    raise ConfigError(f"site {site.name!r} has no free place for a {event.kind} {where}")
+    raise ConfigError(f"site {site.name!r} has no free place for a {kind.title} {where}")
 
 
-def _watched_rooms(kind: str, site: Site) -> list[str | None]:
+def _watched_rooms(kind: type[Hazard], site: Site) -> list[str | None]:
     """Rooms with a detector for a kind of event; `None`, which is anywhere, if there are none."""
-    watched = {site.room_at(d.x, d.y) for d in site.detectors if d.kind in DETECTS[kind]}
+    watched = {site.room_at(d.x, d.y) for d in site.detectors if d.kind in kind.detectors}
     return [room.name for room in site.rooms if room.name in watched] or [None]

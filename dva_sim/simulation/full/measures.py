@@ -1,176 +1,185 @@
-"""Where the delay comes from, from a picture's capture to its effect, as a sum that is checked.
-
-At each moment of a drive a command is in force that rests on pictures captured some time ago.
-How long ago, averaged over the time that commands were in force, is the observation-to-effect
-delay. It is found twice. *Measured*: the time of capture travels with what is wanted through hand
-and filter into each command, so that the delay is read off. *As a sum*: each stage is taken from
-its own records, at the same moments and with the same weights, since means add up only then.
-What holds a value (a frame until the next, a command until the next) counts once, at its place.
-The motors are in both with their time constant.
-
-From a recording to rows: every measure is defined here, once.
-"""
+"""From a run of the full model to rows: what each column means, and how it is found."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dva_sim.agents.people.bystander import DOWN
 from dva_sim.core.events import Event
-from dva_sim.kernel.recorder import Applied, DriveLog
-from dva_sim.simulation.full import Recording, workload
+from dva_sim.kernel.measure import Measure, names_of, text
+from dva_sim.kernel.recorder import DriveLog
+from dva_sim.simulation.full import Recording, loop_delay, workload
+from dva_sim.simulation.full.loop_delay import NAN, Row, command_ages, delay_budget, driven
 from dva_sim.simulation.scenario import Scenario
-
-Floats = NDArray[np.float64]
-Row = dict[str, Any]
-NAN = math.nan
-QUANTILES = (5, 25, 50, 75, 95)
-
-STAGES = (
-    *("frame", "downlink", "human", "hand", "filter"),
-    *("sampling", "pattern", "uplink", "processing", "motor"),
-)
-
-_COUNT = 64
-_LEFT = np.linspace(1.0, 0.0, _COUNT + 1)
-# How long ago, in time constants, a first-order lag got what it holds: the mean of each of equal
-# shares of it, so that the mean of all is one (the integral of -log v is v - v log v).
-_REMEMBERED = -_COUNT * np.diff(_LEFT - _LEFT * np.log(np.maximum(_LEFT, 1e-300)))
-_REMEMBERED /= _REMEMBERED.mean()
-
-
-class Driven(NamedTuple):
-    """A drive as far as its commands had an effect.
-
-    Attributes:
-        log: Of the drive.
-        applied: What took effect before its end.
-        hold: How long each of them was in force, shape `(n,)` [s].
-    """
-
-    log: DriveLog
-    applied: Sequence[Applied]
-    hold: Floats
-
-
-def driven(log: DriveLog, end: float) -> Driven:
-    """The commands made in a drive that took effect until `end` [s], and for how long.
-
-    Of the drive before, some may still have been under way.
-    """
-    start = math.inf if log.started is None else log.started
-    applied = [a for a in log.applied if a.issued >= start and a.time <= end]
-    times = np.array([*(a.time for a in applied), end])
-    until = np.array([a.until for a in applied])
-    return Driven(log, applied, np.maximum(np.minimum(times[1:], until) - times[:-1], 0.0))
-
-
-def command_ages(drives: Sequence[Driven]) -> Row:
-    """Age of commands at application (made to effect), and in force (averaged over time)."""
-    ages = np.array([a.time - a.issued for drive in drives for a in drive.applied])
-    row: Row = {"command_age_mean_s": float(ages.mean()) if len(ages) else NAN}
-    for q in QUANTILES:
-        row[f"command_age_p{q:02}_s"] = float(np.percentile(ages, q)) if len(ages) else NAN
-    hold = np.concatenate([drive.hold for drive in drives])
-    return row | {"age_in_force_mean_s": _mean(ages + hold / 2, hold)}
-
-
-def delay_budget(drives: Sequence[Driven], motor: float) -> Row:
-    """The mean of each stage, their sum, and the whole as it was measured.
-
-    Nothing (nan) where no command rests on a picture: nobody tilts, or the filter is frozen.
-
-    Args:
-        drives: Those of one event.
-        motor: Time constant of the robot's motors [s].
-    """
-    parts = [_stages(drive) for drive in drives if drive.log.intents and drive.applied]
-    *stages, measured, hold = np.concatenate([np.empty((0, len(STAGES) + 1)), *parts]).T
-    motor = motor if hold.any() else NAN
-    means = [*(_mean(stage, hold) for stage in stages), motor]
-    row: Row = {f"delay_{name}_s": mean for name, mean in zip(STAGES, means, strict=True)}
-    row["frame_age_mean_s"] = row["delay_frame_s"] + row["delay_downlink_s"]
-    row["loop_delay_mean_s"] = sum(means)
-    row["loop_delay_measured_s"] = _mean(measured, hold) + motor
-    return row
-
-
-def _stages(drive: Driven) -> Floats:
-    """Of each command: its stages but the motors, the whole as measured, its weight [s].
-
-    The pictures behind a command are looked up at the moments that the hand still remembers
-    when the filter takes its value. Commands from before the first picture are left out.
-
-    Returns:
-        Shape `(n, 11)`: the stages in order, the whole, the time in force.
-    """
-    log, hold = drive.log, drive.hold
-    made = np.array([(a.issued, a.sent, a.arrived, a.time) for a in drive.applied])
-    issued, sent, arrived, time = made.T
-    sample_age, captured = np.array([(a.sample_age, a.captured) for a in drive.applied]).T
-    moments = (issued - sample_age)[:, np.newaxis] - log.hand_lag * _REMEMBERED
-    # What is wanted at a moment is followed after it.
-    number = np.searchsorted([intent.time for intent in log.intents], moments, side="left") - 1
-    taken, shown, wanted = np.moveaxis(np.array(log.intents)[number], -1, 0)
-    columns = (
-        *(s.mean(axis=1) for s in (moments - wanted, shown - taken, wanted - shown)),
-        *(np.full(len(hold), log.hand_lag), sample_age, hold / 2),
-        *(sent - issued, arrived - sent, time - arrived),
-        *(time + hold / 2 - captured, hold),
-    )
-    table = np.stack(columns, axis=1)
-    known: Floats = table[number[:, -1] >= 0]
-    return known
-
-
-def _mean(values: Floats, weights: Floats) -> float:
-    """Weighted mean; nan where nothing has a weight."""
-    total = float(weights.sum())
-    return float((values * weights).sum() / total) if total else NAN
-
 
 SETTLED = "confirmed", "contained", "refuted"  # outcomes of events that somebody has looked at
 
 _OF_DRIVES = (
-    *("confirmed", "drive_time_s", "attempts"),
-    *("path_m", "contacts", "contact_impulse_n_s", "person_contacts", "jams"),
-    *("command_age_mean_s", *(f"command_age_p{q:02}_s" for q in QUANTILES), "age_in_force_mean_s"),
-    *(f"delay_{stage}_s" for stage in STAGES),
-    *("frame_age_mean_s", "loop_delay_mean_s", "loop_delay_measured_s"),
-    *("command_rate_hz", "commands_sent", "commands_applied", "commands_stale"),
-    *("commands_superseded", "round_trip_p50_s", "round_trip_p95_s", "round_trip_max_s"),
-    *("samples_per_value", "queue_max", "timeouts", "alerts", "stop_share"),
+    Measure(
+        "confirmed", "whether the first driven event was confirmed", better="large", low=0, high=1
+    ),
+    text("outcome", "how the last drive to it ended"),
+    Measure(
+        "drive_time_s",
+        "first order to confirmation, over all attempts; else the whole horizon",
+        title="driving time to confirmation",
+        awaits="confirmation",
+    ),
+    Measure("attempts", "drives to the event"),
+    Measure("path_m", "way of the robots that were driven", title="path length"),
+    Measure(
+        "contacts",
+        "contacts of these robots with walls and others",
+        title="contacts with walls and others",
+    ),
+    Measure("contact_impulse_n_s", "impulse of all contacts", title="impulse of all contacts"),
+    Measure("person_contacts", "contacts with people", title="contacts with people"),
+    Measure("jams", "times that a robot was jammed"),
+    text("cause", "why it was not confirmed; empty if it was"),
+    *loop_delay.COLUMNS,
+    Measure(
+        "command_rate_hz",
+        "commands applied per second of driving",
+        title="applied command rate",
+        better="large",
+    ),
+    Measure("commands_sent", "commands that the phone sent"),
+    Measure("commands_applied", "commands that took effect", better="large"),
+    Measure("commands_stale", "commands that a robot refused as too old"),
+    Measure("commands_superseded", "commands that a newer one replaced before they took effect"),
+    Measure(
+        "round_trip_p50_s",
+        "median time from a command's request to its answer",
+        title="median time from request to answer",
+    ),
+    Measure(
+        "round_trip_p95_s",
+        "percentile 95 of this time",
+        title="95th percentile of the time from request to answer",
+    ),
+    Measure("round_trip_max_s", "longest such time", title="longest time from request to answer"),
+    Measure(
+        "samples_per_value",
+        "accelerometer samples in a batch of the phone's filter, mean",
+        title="accelerometer samples per value of the filter",
+    ),
+    Measure("queue_max", "most commands that waited at a robot"),
+    Measure("timeouts", "requests whose answer did not come in time"),
+    Measure("alerts", "alerts of the phone that the link may be lost"),
+    Measure(
+        "stop_share",
+        "share of the driving time without a command in force",
+        title="share of driving time in safe stop",
+    ),
 )
-_OF_PEOPLE = ("dose_heat_max", "dose_toxic_max", "incapacitated")
-_OF_BYSTANDERS = ("evacuated_share", "evacuated_s")
-_OF_OPERATORS = (
-    *("utilisation", "attending_share", "queue_mean", "turns_per_min"),
-    *("reversals_per_min", "command_changes_per_min", "steering_entropy", "waiting_share"),
-    *("move_waits", "move_and_wait_share", "path_error_rms_m", "path_error_max_m"),
-    *("missed", "false_confirmations"),
+_OF_PEOPLE = (
+    Measure("dose_heat_max", "largest fractional effective dose of heat; 1 incapacitates"),
+    Measure("dose_toxic_max", "largest fractional effective dose of toxic gas; 1 incapacitates"),
+    Measure("incapacitated", "people who could not help themselves any more"),
 )
-MEASURES = (
+_OF_BYSTANDERS = (
+    Measure("evacuated_share", "share of the bystanders who got out", better="large"),
+    Measure(
+        "evacuated_s",
+        "when the last of those who got out was out",
+        title="time until the last one is out",
+    ),
+)
+RUN_COLUMNS = (
     *_OF_DRIVES,
-    *("response_mean_s", "confirmation_mean_s", "settled_per_min"),
-    *("events", "person_exposure_s", *_OF_PEOPLE, *_OF_BYSTANDERS, *_OF_OPERATORS),
-    *("replans", "messages", "traffic_bytes", "refused"),
-    *("plugin_failures", "violations", "simulated_s"),
+    Measure(
+        "response_mean_s",
+        "first report to somebody on scene, mean; the horizon where never",
+        title="restricted mean time to response",
+        awaits="response",
+    ),
+    Measure(
+        "confirmation_mean_s",
+        "first report to confirmation of true ones, mean; the horizon if never",
+        title="restricted mean time to confirmation",
+        awaits="confirmation",
+    ),
+    Measure(
+        "settled_per_min",
+        "events confirmed, contained or refuted per minute of the run",
+        title="events settled",
+        better="large",
+    ),
+    Measure("events", "events that the DVA knew of"),
+    Measure(
+        "person_exposure_s",
+        "time of people within danger radii, summed over people",
+        title="time of people in danger",
+    ),
+    *_OF_PEOPLE,
+    *_OF_BYSTANDERS,
+    *workload.COLUMNS,
+    Measure("replans", "ways that were planned anew"),
+    Measure("messages", "messages on the network"),
+    Measure("traffic_bytes", "size of all messages on the network"),
+    Measure("refused", "requests that were refused"),
+    text("network_depth", "how closely the network was modelled: message, segment or datagram"),
+    Measure("plugin_failures", "times that a class of the user's gave no answer that is one"),
+    Measure("violations", "safety rules found broken; there should be none"),
+    Measure("simulated_s", "virtual time simulated"),
 )
-"""Numbers that a row of `run_row` may hold, and so what a study may ask for."""
+"""What a row of `run_row` may hold; what is a number, a study may ask for."""
+_STEPS = {
+    "detected": "when it was detected",
+    "assigned": "when it was assigned",
+    "departed": "when the responder set out",
+    "arrived": "when the responder was on scene",
+    "confirmed": "when it was confirmed",
+    "contained": "when it was contained",
+    "closed": "when it was closed",
+}
+EVENT_COLUMNS = (
+    Measure("event_id", "number of the event in its run, from 1"),
+    text("kind", "of the event"),
+    text("room", "where it was"),
+    Measure("is_true", "whether it is no false alarm"),
+    text("responder_kind", "who was sent last: robot, guard or none"),
+    text("responder", "its name"),
+    text("outcome", "confirmed, contained, refuted, escalated, expired, open or undetected"),
+    Measure("t_occurred_s", "when it began"),
+    *(Measure(f"t_{step}_s", meaning) for step, meaning in _STEPS.items()),
+    Measure("response_s", "detection until somebody is on scene", title="response time"),
+    Measure("confirmation_s", "detection until it is confirmed", title="confirmation time"),
+    Measure("containment_s", "detection until it is contained"),
+    Measure("closing_s", "detection until it is closed"),
+    Measure("watched_s", "detection until nobody looks any more: the end of the run"),
+    Measure("missed", "whether it was refuted although it was there"),
+    Measure("false_confirmation", "whether it was confirmed although nothing was there"),
+)
+PEOPLE_COLUMNS = (
+    text("person_name", "guard or bystander"),
+    text("kind", "guard or bystander"),
+    text("activity", "at the end of the run"),
+    Measure("exposure_s", "time within danger radii"),
+    Measure("dose_heat", "fractional effective dose of heat; 1 incapacitates"),
+    Measure("dose_toxic", "fractional effective dose of toxic gas; 1 incapacitates"),
+    Measure("t_leaves_s", "when it set out to leave"),
+    Measure("t_out_s", "when it was out"),
+)
+TRACK_COLUMNS = (
+    text("agent", "robot"),
+    Measure("t_s", "time of the run"),
+    Measure("x_m", "place, to the east", low=-math.inf),
+    Measure("y_m", "place, to the north", low=-math.inf),
+    Measure("heading_rad", "anticlockwise from east"),
+    text("mode", "of the robot"),
+)
 
 
 def measures_of(scenario: Scenario) -> tuple[str, ...]:
-    """Those of `MEASURES` that a run of a scenario may hold: without robots nobody drives one."""
+    """The measures that a run of a scenario may hold: without robots nobody drives one."""
     bystanders, guards = scenario.bystander.count, scenario.guard.count
-    there = {_OF_DRIVES: scenario.robot.count, _OF_OPERATORS: scenario.operator.count}
+    there = {_OF_DRIVES: scenario.robot.count, workload.COLUMNS: scenario.operator.count}
     there |= {_OF_PEOPLE: bystanders + guards, _OF_BYSTANDERS: bystanders}
-    gone = {name for names, count in there.items() if not count for name in names}
-    return tuple(name for name in MEASURES if name not in gone)
+    gone = {column for columns, count in there.items() if not count for column in columns}
+    return names_of(column for column in RUN_COLUMNS if column not in gone)
 
 
 def run_row(recording: Recording) -> Row:
@@ -374,7 +383,7 @@ def _event_row(recording: Recording, number: int) -> Row:
         "t_occurred_s": incident.start,
     }
     times = event.times if event else {}
-    for step in ("detected", "assigned", "departed", "arrived", "confirmed", "contained", "closed"):
+    for step in _STEPS:
         row[f"t_{step}_s"] = times.get(step, NAN)
     if event is not None:
         row["outcome"] = outcome_of(event)
@@ -415,3 +424,13 @@ def track_rows(recording: Recording) -> list[Row]:
         if agent.startswith("robot")
         for point in points
     ]
+
+
+def tables_of(recording: Recording) -> dict[str, list[Row]]:
+    """What is measured of a run of the full model, but for its tracks."""
+    return {
+        "runs": [run_row(recording)],
+        "events": event_rows(recording),
+        "people": people_rows(recording),
+        "operators": workload.operator_rows(recording),
+    }

@@ -6,10 +6,9 @@ import math
 from collections.abc import Callable
 
 from dva_sim.agents.people.bystander import BystanderAgent, draw_places
-from dva_sim.agents.people.escape import refuges_of
-from dva_sim.agents.people.evacuation import Air, clean_air
+from dva_sim.agents.people.evacuation import AirAt, clean_air, refuges_of
 from dva_sim.agents.people.guard import GuardAgent
-from dva_sim.agents.people.locomotion import RADIUS
+from dva_sim.agents.people.pedestrian_avoidance import RADIUS
 from dva_sim.agents.people.profiles import Occupant, Walker
 from dva_sim.agents.people.walking import Walking
 from dva_sim.agents.robot.camera import HazardSpot
@@ -52,7 +51,7 @@ class People:
     ) -> None:
         self._stage, self._world, self._around, self._spots = stage, world, around, spots
         self._is_there, self._contain, self._starts = is_there, contain, starts
-        self._air: Air = around.at if around.has_any else clean_air
+        self._air: AirAt = around.at if around.has_any else clean_air
         self._refuges = refuges_of(stage.site)
         self._first_places: list[Point] = []
 
@@ -72,11 +71,11 @@ class People:
             walker,
             stage.planner,
             self._legs(body, walker.speed),
-            self._is_there,
-            self._contain,
-            self._air,
-            self._refuges,
-            self._smoke,
+            is_there=self._is_there,
+            contain=self._contain,
+            air=self._air,
+            refuges=self._refuges,
+            smoke=self._smoke,
         )
         device.register(guard.start)
         return guard
@@ -97,12 +96,12 @@ class People:
             stage.clock,
             occupant,
             self._legs(body, occupant.speed),
-            stage.planner,
-            places,
-            self._refuges,
-            stage.streams[f"{name}/walks"],
-            self._air,
-            self._sees_flames,
+            planner=stage.planner,
+            places=places,
+            refuges=self._refuges,
+            luck=stage.streams[f"{name}/walks"],
+            air=self._air,
+            sees=self._sees_flames,
             leaves=lambda: self._world.remove(body),
             tell=lambda what: stage.recorder.tell(stage.clock.now, name, what, "person"),
         )
@@ -111,7 +110,9 @@ class People:
 
     def _legs(self, body: PersonBody, speed: float) -> Walking:
         stage = self._stage
-        return Walking(stage.clock, stage.planner, self._world, body, speed, stage.site.doors)
+        return Walking(
+            stage.clock, stage.planner, self._world, body, speed=speed, doors=stage.site.doors
+        )
 
     def _places(self, name: str) -> list[Point]:
         """Where a bystander works; at the first nobody stands yet."""
@@ -128,7 +129,7 @@ class People:
     def _sees_flames(self, x: float, y: float, time: float) -> bool:
         sees = self._stage.planner.line_of_sight
         return any(
-            spot.kind == "fire"
+            spot.shines
             and math.dist((x, y), (spot.x, spot.y)) < FLAMES_SEEN
             and sees((x, y), (spot.x, spot.y))
             and self._around.optical_depth((x, y), (spot.x, spot.y), time) < FLAMES_THROUGH

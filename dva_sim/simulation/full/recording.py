@@ -10,7 +10,7 @@ from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.core.events import Event, State
 from dva_sim.kernel.recorder import Recorder
 from dva_sim.network.link import Link
-from dva_sim.simulation.full.hazards import Incident
+from dva_sim.simulation.full.hazards import RunHazard
 from dva_sim.simulation.scenario import Scenario
 from dva_sim.worlds.hazards import Surroundings
 from dva_sim.worlds.layout import Site
@@ -76,7 +76,7 @@ class Playback:
     seed: int
     site: Site
     recorder: Recorder
-    incidents: list[Incident]
+    incidents: list[RunHazard]
     surroundings: Surroundings
     labels: dict[str, str]
     radii: dict[str, float]
@@ -123,7 +123,7 @@ def ending_of(event: Event | None) -> Ending:
     return Ending(event.state.value, event.times["closed"])
 
 
-def event_about(incident: Incident, events: list[Event], site: Site) -> Event | None:
+def event_about(incident: RunHazard, events: list[Event], site: Site) -> Event | None:
     """The DVA's event that an incident was reported as; two near each other are one event."""
     known: tuple[float, Event | None] = MERGED_WITHIN, None
     for event in events:

@@ -11,8 +11,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from dva_sim.agents.observation import CAMERA_SCHEME
 from dva_sim.agents.robot.battery import Battery
-from dva_sim.agents.robot.camera import CAMERA_SCHEME, HazardSpot, View
+from dva_sim.agents.robot.camera import FieldOfView, HazardSpot
 from dva_sim.agents.robot.command_queue import service_times
 from dva_sim.agents.robot.controller import Limits, RobotController
 from dva_sim.agents.robot.profile import RobotProfile
@@ -169,7 +170,13 @@ class Machines:
         power = Power(profile, config.charge, body, base, stage.clock)
         setup = self._setup(profile, body, power)
         robot = RobotAgent(
-            device, controller, self._world, body, stage.planner, setup, self._drive_of
+            device,
+            controller,
+            world=self._world,
+            body=body,
+            planner=stage.planner,
+            setup=setup,
+            drive_of=self._drive_of,
         )
         device.register(robot.start)
         stage.clock.every(HOUSEKEEPING, lambda: self._look_after(robot, power))
@@ -183,13 +190,13 @@ class Machines:
         processing = profile.processing_s if robot.processing_s is None else robot.processing_s
         configs = profile.sensors if robot.sensors is None else robot.sensors
         return RobotSetup(
-            scenario.pattern,
-            service_times(processing, stage.streams.fresh(f"{body.name}/processing")),
-            camera.rate_hz,
-            camera.frame_bytes,
-            View(angle, camera.range_m, stage.planner.line_of_sight, self._smoke),
-            self._spots,
-            make_ports(
+            pattern=stage.pattern(),
+            service=service_times(processing, stage.streams.fresh(f"{body.name}/processing")),
+            frame_rate=camera.rate_hz,
+            frame_bytes=camera.frame_bytes,
+            view=FieldOfView(angle, camera.range_m, stage.planner.line_of_sight, self._smoke),
+            hazards=self._spots,
+            sensors=make_ports(
                 configs, sources, lambda what: stage.streams.fresh(f"{body.name}/sensor/{what}")
             ),
             guarded=scenario.control == "coordinated",

@@ -11,14 +11,15 @@ from dataclasses import dataclass, field
 import numpy as np
 import shapely
 
-from dva_sim.agents.device import Device
+from dva_sim.agents.device import AgentDevice
 from dva_sim.agents.operator.strategies import Reach
 from dva_sim.core.registry import DETECTOR, GUARD, OPERATOR, ROBOT
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.recorder import Recorder
 from dva_sim.kernel.streams import Streams
-from dva_sim.network.patterns import Transport
+from dva_sim.network.messaging import Transport
+from dva_sim.network.patterns import load_pattern
 from dva_sim.protocol.exchange import NOON
 from dva_sim.simulation.scenario import Scenario, request_timeout_s, robot_profiles, site_of
 from dva_sim.worlds.geo import Pose
@@ -57,7 +58,7 @@ class Stage:
         network: What carries messages.
         recorder: Told what happens.
         address: Gives a new device its address, by kind and number.
-        time_of_day: See `Device`.
+        time_of_day: See `AgentDevice`.
 
     Raises:
         ConfigError: a map that cannot be read, or that the team does not fit on.
@@ -75,6 +76,7 @@ class Stage:
         self.streams = Streams(self.seed)
         self.site = site_of(self.scenario, self.seed)
         self.robots = robot_profiles(self.scenario)
+        self.pattern = load_pattern(self.scenario.pattern, self.scenario.pattern_options)
         # One map of ways for all: what the largest robot fits through, people and others do.
         radius = max((robot.radius_m for robot in self.robots), default=FOOTPRINT)
         self.planner = planner_of(self.site, radius)
@@ -102,21 +104,21 @@ class Stage:
         spec = self._specs[robot]
         return Reach(spec.max_speed, spec.max_turn_rate, spec.drive(spec).turning_radius)
 
-    def device(self, kind: str, number: int) -> Device:
+    def device(self, kind: str, number: int) -> AgentDevice:
         """A new device: its identity and ways to talk."""
-        return Device(
-            id_of(kind, number),
-            label_of(kind, number),
-            TYPES[kind],
-            self.address(kind, number),
-            DVA,
-            self.network,
-            self.recorder,
-            self.site.frame,
-            request_timeout_s(self.scenario),
-            self.scenario.request.attempts,
-            self.labels,
-            self.time_of_day,
+        return AgentDevice(
+            id_tag=id_of(kind, number),
+            label=label_of(kind, number),
+            device_type=TYPES[kind],
+            address=self.address(kind, number),
+            dva=DVA,
+            network=self.network,
+            recorder=self.recorder,
+            frame=self.site.frame,
+            timeout=request_timeout_s(self.scenario),
+            attempts=self.scenario.request.attempts,
+            labels=self.labels,
+            time_of_day=self.time_of_day,
         )
 
 

@@ -17,6 +17,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from dva_sim.kernel.measure import Measure, names_of, text
 from dva_sim.kernel.recorder import DriveLog, TrackPoint
 from dva_sim.simulation.full import Recording
 from dva_sim.simulation.full.stage import id_of
@@ -31,6 +32,53 @@ BAND = 0.05  # of prediction errors, see `steering_entropy` [rad/s]; assumed
 EDGES = (-5.0, -2.5, -1.0, -0.5, 0.5, 1.0, 2.5, 5.0)  # of the nine bins, in bands, as published
 TRACK_STEP = 0.5  # between the points of a track that was not filmed [s]
 LEVEL_SPEED, LEVEL_TURN = 0.025, 0.035  # half a step of the phone, two degrees a second
+
+
+# --- columns -----------------------------------------------------------------------------------
+TURNS = Measure("turns_per_min", "turning from one robot to another, per minute with work in hand")
+STEERING = (
+    Measure("reversals_per_min", "reversals of the turn rate wanted by at least 0.1 rad/s"),
+    Measure("command_changes_per_min", "commands that are clearly others than the last"),
+    Measure("steering_entropy", "how unpredictably somebody steers, 0 like clockwork to 1"),
+    Measure("waiting_share", "share of the steering time in which the robot was asked to stand"),
+    Measure("move_waits", "waits to see the result of a move"),
+    Measure("move_and_wait_share", "share of the driving time steered by moving and waiting"),
+)
+_WRONG = (
+    Measure("missed", "events refuted although they were there"),
+    Measure("false_confirmations", "events confirmed although nothing was there"),
+)
+COLUMNS = (
+    Measure("utilisation", "share of the run with an order in hand, mean over operators"),
+    Measure("attending_share", "share of the run with eyes on a picture, mean over operators"),
+    Measure(
+        "queue_mean",
+        "robots that waited for their operator, mean over time and operators",
+        title="robots that wait for their operator",
+    ),
+    TURNS,
+    *STEERING,
+    Measure("path_error_rms_m", "distance from the ways planned, root mean square"),
+    Measure("path_error_max_m", "greatest distance from the ways planned"),
+    *_WRONG,
+)
+"""Of a run."""
+OPERATOR_COLUMNS = (
+    text("operator_name", "who"),
+    Measure("orders", "orders received"),
+    Measure("utilisation", "share of the run with an order in hand"),
+    Measure("attending_share", "share of the run with eyes on a picture"),
+    Measure("robots_mean", "robots in hand, mean over time"),
+    Measure("robots_max", "most robots in hand at once"),
+    Measure("queue_mean", "robots that waited for it, mean over time"),
+    Measure("queue_max", "most robots that waited at once"),
+    Measure("turns", "times that it turned from one robot to another"),
+    TURNS,
+    *STEERING,
+    *_WRONG,
+    Measure("gave_up", "drives that it gave up"),
+    Measure("lost_links", "drives that ended by a lost link"),
+)
 
 
 # --- spans of time -----------------------------------------------------------------------------
@@ -135,9 +183,7 @@ def steering(logs: Sequence[DriveLog], end: float) -> Row:
     samples = [sampled(log, end) for log in logs]
     minutes = sum(map(len, samples)) * STEP / 60.0
     if not minutes:
-        names = ("reversals_per_min", "command_changes_per_min", "steering_entropy")
-        own = ("move_waits", "move_and_wait_share")
-        return dict.fromkeys((*names, "waiting_share", *own), math.nan)
+        return dict.fromkeys(names_of(STEERING), math.nan)
     entropies = [(len(s), steering_entropy(s[:, 1])) for s in samples]
     known = [(weight, value) for weight, value in entropies if not math.isnan(value)]
     level = sum(int(_is_level(s).sum()) for s in samples) * STEP / 60.0

@@ -12,8 +12,14 @@ from collections.abc import Iterator
 
 from dva_sim.agents.robot.command_queue import mean_of
 from dva_sim.agents.robot.controller import LEASE_S
-from dva_sim.simulation.scenario.scenario import Scenario, phone_profile, robot_profiles, site_of
-from dva_sim.worlds.hazards import DETECTS
+from dva_sim.simulation.scenario.scenario import (
+    Scenario,
+    pattern_of,
+    phone_profile,
+    robot_profiles,
+    site_of,
+)
+from dva_sim.worlds.hazards import find_hazard
 
 TRIPS_OF_A_START = 4  # round trips: three until a new connection stands, one for the request
 USUAL_S = 9.0  # time-out, where the link leaves time for an answer
@@ -99,7 +105,7 @@ def _of_link(scenario: Scenario) -> Iterator[str]:
     if not _drives(scenario):
         return
     answer, waits = command_needs_s(scenario), command_timeout_s(scenario)
-    if scenario.window is not None and waits <= answer:
+    if pattern_of(scenario).answered and waits <= answer:
         yield (
             f"command.timeout_s {waits:g} is not above {answer:g} s, which "
             f"the reply to a command takes {why}: every command counts as unanswered; give more, "
@@ -126,11 +132,12 @@ def _of_link(scenario: Scenario) -> Iterator[str]:
 def _of_computer(scenario: Scenario) -> Iterator[str]:
     """A robot that needs longer for a command than the next one takes to come."""
     takes, rate = mean_processing_s(scenario), scenario.command.rate_hz
-    if scenario.pattern == "pub-sub" and takes * rate > 1:
+    pattern = pattern_of(scenario)
+    if pattern.published and not pattern.newest_wins and takes * rate > 1:
         yield (
             f"robot.processing_s {takes:g} is longer than the time between two commands "
-            f"(command.rate_hz {rate:g}), and under pub-sub each of them is obeyed: they queue, "
-            "and a stop is obeyed ever later"
+            f"(command.rate_hz {rate:g}), and under {scenario.pattern} each of "
+            "them is obeyed: they queue, and a stop is obeyed ever later"
         )
 
 
@@ -161,11 +168,11 @@ def _of_watchdog(scenario: Scenario, live: bool) -> Iterator[str]:
             f"robot.watchdog_s {limit:g} is not above {period:g} s, the time between two commands "
             f"(command.rate_hz {scenario.command.rate_hz:g}): the robot stops after each"
         )
-    elif scenario.pattern == "req-rep" and not live and limit <= command_needs_s(scenario):
+    elif pattern_of(scenario).in_step and not live and limit <= command_needs_s(scenario):
         yield (
             f"robot.watchdog_s {limit:g} is not above {command_needs_s(scenario):g} s, the time "
-            "between two commands under req-rep, which waits for each reply: the robot stops "
-            "after each"
+            f"between two commands under {scenario.pattern}, which waits for each reply: the robot "
+            "stops after each"
         )
     if phone.send == "on_change" and limit <= phone.max_delay_s:
         yield (
@@ -218,10 +225,11 @@ def _of_detectors(scenario: Scenario) -> Iterator[str]:
     unreported = [(n, event) for n, event in enumerate(scenario.events) if not event.reported]
     there = {d.kind for d in site_of(scenario, seed=0).detectors} if unreported else set()
     for number, event in unreported:
-        if there.isdisjoint(DETECTS[event.kind]):
+        kind = find_hazard(event.kind)
+        if there.isdisjoint(kind.detectors):
             yield (
                 f"events.{number}.reported is false, and the site has no detector for a "
-                f"{event.kind.replace('_', ' ')}: the DVA will not hear of it"
+                f"{kind.title}: the DVA will not hear of it"
             )
 
 

@@ -1,7 +1,4 @@
-"""What a scenario names, and whether it is there.
-
-How a scenario is read, completed and checked.
-"""
+"""How a scenario is read, checked and completed: what it names must be there."""
 
 from __future__ import annotations
 
@@ -16,7 +13,15 @@ from dva_sim.kernel.config import Document, Fail, KeyPath, load_yaml
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import unknown
 from dva_sim.simulation.scenario.contradictions import command_timeout_s, request_timeout_s
-from dva_sim.simulation.scenario.scenario import Scenario, phone_profile, robot_profiles, site_of
+from dva_sim.simulation.scenario.parts import EventConfig
+from dva_sim.simulation.scenario.scenario import (
+    Scenario,
+    pattern_of,
+    phone_profile,
+    robot_profiles,
+    site_of,
+)
+from dva_sim.worlds.hazards import KINDS, find_hazard, make_hazard
 from dva_sim.worlds.site import load_site
 
 if TYPE_CHECKING:
@@ -25,6 +30,7 @@ if TYPE_CHECKING:
 
 _OPTION = re.compile(r"option '([^']+)'")  # as those who make things by name say it
 _IN_FILES = (
+    (None, "pattern"),
     ("dispatch", "policy"),
     ("operator", "strategy"),
     ("phone", "filter"),
@@ -34,8 +40,10 @@ _IN_FILES = (
 
 def locate_files(data: dict[str, Any], folders: Sequence[Path]) -> None:
     """Let a class in a file beside the one that names it be found from anywhere."""
-    for part, key in _IN_FILES:
-        holder = data.get(part)
+    events = data.get("events")
+    holders = [(data if part is None else data.get(part), key) for part, key in _IN_FILES]
+    holders += [(event, "kind") for event in events] if isinstance(events, list | tuple) else []
+    for holder, key in holders:
         named = holder.get(key) if isinstance(holder, dict) else None
         file, colon, wanted = named.rpartition(":") if isinstance(named, str) else ("", "", "")
         beside = [folder / file for folder in folders if colon and resources.is_file(folder / file)]
@@ -57,8 +65,21 @@ def check_names(scenario: Scenario, error: Fail) -> None:
             if not resources.is_there(name, folder) and not resources.is_file(Path(name)):
                 key, known = ".".join(str(p) for p in path), resources.available(folder)
                 raise error(unknown(key, name, sorted(known)), path)
+    with _told(error, _pattern_key):
+        pattern_of(scenario)
     check_strategy(scenario.operator.strategy, scenario.operator.options, error)
     check_policy(scenario.dispatch.policy, scenario.dispatch.options, error)
+    for number, event in enumerate(scenario.events):
+        if event.kind not in KINDS:
+            _check_hazard(event, ("events", number), error)
+
+
+def _check_hazard(event: EventConfig, path: KeyPath, error: Fail) -> None:
+    """Refuse a user's hazard that cannot be loaded, or does not know its settings."""
+    with _told(error, lambda _: (*path, "kind")):
+        find_hazard(event.kind)
+    with _told(error, lambda _: (*path, "hazard")):
+        make_hazard(event.kind, (0.0, 0.0), event.at_s, **event.hazard)
 
 
 def check_strategy(strategy: str, options: Mapping[str, Any], error: Fail) -> None:
@@ -99,6 +120,11 @@ def _told(error: Fail, place: Callable[[ConfigError], KeyPath]) -> Iterator[None
         if problem.file is not None:
             raise
         raise error(problem.problem, place(problem)) from None
+
+
+def _pattern_key(problem: ConfigError) -> KeyPath:
+    found = _OPTION.search(problem.problem)
+    return ("pattern_options", found[1]) if found else ("pattern",)
 
 
 def _place(problem: ConfigError, part: str, key: str, options: str) -> KeyPath:

@@ -1,7 +1,4 @@
-"""What a scenario consists of, part by part; units are in the keys.
-
-How the DVA decides: who goes, and who may ask for what.
-"""
+"""What a scenario consists of, part by part; units are in the keys, and `Key` says their names."""
 
 from __future__ import annotations
 
@@ -10,13 +7,13 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from dva_sim.agents.robot.command_queue import Service
+from dva_sim.agents.robot.command_queue import ServiceTime
 from dva_sim.agents.robot.sensors import SensorConfig
 from dva_sim.core.assignments import Rules
 from dva_sim.core.permissions import LEVELS
-from dva_sim.kernel.config import AlsoCalled, Config
+from dva_sim.kernel.config import AlsoCalled, Config, Key
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.worlds.hazards import make_hazard
+from dva_sim.worlds.hazards import KINDS, make_hazard
 
 Positive = Annotated[float, Field(gt=0)]
 NonNegative = Annotated[float, Field(ge=0)]
@@ -56,14 +53,25 @@ class RobotConfig(Config):
             at the site's bases.
     """
 
-    profile: str | Annotated[tuple[str, ...], Field(min_length=1)] = "servrobot"
-    count: Annotated[int, Field(ge=0, le=1000), AlsoCalled("robots", "n_robots")] = 1
-    processing_s: Service | None = None
+    profile: Annotated[str | Annotated[tuple[str, ...], Field(min_length=1)], Key("robot")] = (
+        "servrobot"
+    )
+    count: Annotated[int, Field(ge=0, le=1000), AlsoCalled("robots", "n_robots"), Key("robots")] = 1
+    processing_s: Annotated[
+        ServiceTime | None,
+        Key(
+            "processing time at the robot",
+            stated="processing time of a command at the robot",
+            zero="processing time",
+        ),
+    ] = None
     sensors: Annotated[tuple[SensorConfig, ...], Field(max_length=16)] | None = None
-    charge: Annotated[float, Field(gt=0, le=1)] = 1.0
+    charge: Annotated[
+        float, Field(gt=0, le=1), Key("charge of the robots at the beginning", stated=False)
+    ] = 1.0
     way_m: Positive | None = None
-    watchdog_s: Annotated[float, Field(gt=0, le=60)] = 3.0
-    max_age_s: Annotated[float, Field(gt=0, le=120)] = 6.0
+    watchdog_s: Annotated[float, Field(gt=0, le=60), Key("watchdog of the robot")] = 3.0
+    max_age_s: Annotated[float, Field(gt=0, le=120), Key("age limit of a command")] = 6.0
 
     @model_validator(mode="after")
     def _every_profile_has_a_robot(self) -> RobotConfig:
@@ -84,16 +92,20 @@ class GuardConfig(Config):
     """
 
     profile: str = "guard"
-    count: Annotated[int, Field(ge=0, le=200), AlsoCalled("guards", "n_guards")] = 0
-    mobilisation_s: Positive | None = None
-    way_m: Positive | None = None
+    count: Annotated[int, Field(ge=0, le=200), AlsoCalled("guards", "n_guards"), Key("guards")] = 0
+    mobilisation_s: Annotated[
+        Positive | None, Key("time until the guard sets out", stated=False)
+    ] = None
+    way_m: Annotated[Positive | None, Key("way of the guard", stated=False)] = None
 
 
 class BystanderConfig(Config):
     """People who are there for other reasons: how many, and from which profile they are drawn."""
 
     profile: str = "bystanders"
-    count: Annotated[int, Field(ge=0, le=1000), AlsoCalled("bystanders", "people")] = 0
+    count: Annotated[
+        int, Field(ge=0, le=1000), AlsoCalled("bystanders", "people"), Key("bystanders")
+    ] = 0
 
 
 class PhoneConfig(BaseModel):
@@ -105,7 +117,7 @@ class PhoneConfig(BaseModel):
 
     model_config = ConfigDict(extra="allow", frozen=True, allow_inf_nan=False)
 
-    profile: str = "default"
+    profile: Annotated[str, Key("phone")] = "default"
 
     @classmethod
     def further_keys(cls) -> type[BaseModel]:
@@ -133,10 +145,14 @@ class OperatorConfig(Config):
         population_seed: Draws the population; a study gives its own seed.
     """
 
-    strategy: str = "adaptive"
-    options: dict[str, Any] = Field(default_factory=dict)
+    strategy: Annotated[str, Key("operator strategy")] = "adaptive"
+    options: Annotated[
+        dict[str, Any], Key(inner={"quality": Key("quality of the prediction", stated=False)})
+    ] = Field(default_factory=dict)
     traits: dict[str, Positive] = Field(default_factory=dict)
-    count: Annotated[int, Field(ge=0, le=50), AlsoCalled("operators", "n_operators")] = 1
+    count: Annotated[
+        int, Field(ge=0, le=50), AlsoCalled("operators", "n_operators"), Key("operators")
+    ] = 1
     span: Annotated[int, Field(ge=1, le=20)] = 1
     population: str = "operators"
     person: Annotated[int, Field(ge=0)] = 0
@@ -153,9 +169,15 @@ class CommandConfig(Config):
         window: How many requests may be unanswered at once under `pipelined`.
     """
 
-    rate_hz: Annotated[float, Field(gt=0, le=100), AlsoCalled("rate", "command_hz")] = 10.0
-    timeout_s: Annotated[float, Field(gt=0, le=120)] | None = None
-    attempts: Annotated[int, Field(ge=1, le=10)] = 3
+    rate_hz: Annotated[
+        float, Field(gt=0, le=100), AlsoCalled("rate", "command_hz"), Key("wanted command rate")
+    ] = 10.0
+    timeout_s: Annotated[
+        Annotated[float, Field(gt=0, le=120)] | None, Key("time-out of a request")
+    ] = None
+    attempts: Annotated[
+        int, Field(ge=1, le=10), Key("attempts of a request", stated="attempts")
+    ] = 3
     window: Annotated[int, Field(ge=2, le=1000)] = 8
 
 
@@ -181,29 +203,35 @@ class CameraConfig(Config):
         encode_s: From taking a frame to publishing it; one frame at a time.
     """
 
-    rate_hz: Annotated[float, Field(gt=0, le=60), AlsoCalled("fps", "frame_rate_hz")] = 10.0
-    frame_bytes: Annotated[int, Field(ge=100, le=1_000_000)] = 12_000
+    rate_hz: Annotated[
+        float, Field(gt=0, le=60), AlsoCalled("fps", "frame_rate_hz"), Key("camera rate")
+    ] = 10.0
+    frame_bytes: Annotated[int, Field(ge=100, le=1_000_000), Key("size of a frame")] = 12_000
     encode_s: Annotated[float, Field(ge=0, le=5)] = 0.0
-    field_of_view_deg: Annotated[float, Field(gt=10, le=360), AlsoCalled("fov")] = 70.0
+    field_of_view_deg: Annotated[
+        float, Field(gt=10, le=360), AlsoCalled("fov"), Key("field of view")
+    ] = 70.0
     range_m: Positive = 6.0
 
 
 class EventConfig(Config):
-    """A fire, a gas leak or a flood.
+    """A fire, a gas leak, a flood, or a hazard of the user's own.
 
     Attributes:
+        kind: `fire`, `gas_leak`, `flood`, a class in a file as `mine.py:Mine`, or what an
+            installed package offers.
         room: Where, by name; left out, the run's seed chooses a room.
         at_s: When it starts.
         latest_s: If given, the seed draws the start between `at_s` and this.
         reported: Whether somebody reports it at once; otherwise detectors must notice it.
         false_alarm: Whether nothing is there: it is reported as it would be, and that is all.
         hazard: What else belongs to its kind, such as `{growth: fast}` of a fire or
-            `{gas: propane, rate: 0.01}` of a leak: the settings of `make_hazard`.
+            `{gas: propane, rate: 0.01}` of a leak.
         reports: How many report it; the others are people who see it a little later, and tell
             the place a little otherwise.
     """
 
-    kind: Literal["fire", "gas_leak", "flood"]
+    kind: str
     room: str | None = None
     at_s: NonNegative = 0.0
     latest_s: NonNegative | None = None
@@ -220,6 +248,8 @@ class EventConfig(Config):
 
     @model_validator(mode="after")
     def _hazard_can_be_made(self) -> EventConfig:
+        if self.kind not in KINDS:
+            return self  # files are loaded when a scenario is built from one that names them
         try:
             make_hazard(self.kind, (0.0, 0.0), self.at_s, **self.hazard)
         except ConfigError as error:
@@ -242,9 +272,11 @@ class DispatchConfig(Config):
         bid_within_s: How long an auction takes bids.
     """
 
-    policy: str = "min_eta"
+    policy: Annotated[str, Key("dispatch policy")] = "min_eta"
     options: dict[str, Any] = Field(default_factory=dict)
-    escalate_after_s: NonNegative | None = 120.0
+    escalate_after_s: Annotated[
+        NonNegative | None, Key("time until an event is escalated", stated=False)
+    ] = 120.0
     containment: bool = False
     most_waiting: Annotated[int, Field(ge=0)] | None = None
     merge_distance_m: NonNegative = 8.0
@@ -256,13 +288,13 @@ class DispatchConfig(Config):
         """As the core wants them."""
         never = math.inf
         return Rules(
-            never if self.escalate_after_s is None else self.escalate_after_s,
-            self.containment,
-            self.most_waiting,
-            self.merge_distance_m,
-            self.max_attempts,
-            self.order_limit_s,
-            self.bid_within_s,
+            escalate_after=never if self.escalate_after_s is None else self.escalate_after_s,
+            containment=self.containment,
+            most_waiting=self.most_waiting,
+            merge_distance=self.merge_distance_m,
+            max_attempts=self.max_attempts,
+            order_limit=self.order_limit_s,
+            bid_within=self.bid_within_s,
         )
 
 

@@ -1,7 +1,4 @@
-"""Everything one run needs but its seed.
-
-The site and the profiles that a scenario names.
-"""
+"""Everything one run needs but its seed, with the site and the profiles that a scenario names."""
 
 from __future__ import annotations
 
@@ -9,10 +6,10 @@ from collections.abc import Mapping
 from functools import cache
 from typing import Annotated, Any, Literal, cast
 
-from pydantic import Field, model_validator
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
-from dva_sim.agents.operator.person import Population
 from dva_sim.agents.people.profiles import BystanderProfile, GuardProfile
+from dva_sim.agents.person import Population
 from dva_sim.agents.robot.profile import RobotProfile, load_robot
 from dva_sim.agents.tilt import PhoneProfile
 from dva_sim.kernel import resources
@@ -21,6 +18,7 @@ from dva_sim.kernel.config import (
     Config,
     Document,
     Fail,
+    Key,
     KeyPath,
     M,
     load_yaml,
@@ -29,6 +27,7 @@ from dva_sim.kernel.config import (
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.connections import Depth, TransportKind, ZeromqConfig
 from dva_sim.network.link import LinkConfig
+from dva_sim.network.patterns import Pattern, load_pattern
 from dva_sim.simulation.scenario.parts import (
     AccessConfig,
     BystanderConfig,
@@ -56,6 +55,8 @@ class Scenario(Config):
         control: How operators use robots. `direct`: they close the loop over the link.
             `coordinated`: the robot also watches where it drives, and slows by itself.
             `supervisory`: they name the goal and judge the picture, the robot drives alone.
+        pattern: How commands travel: by name, or a class in a file, `mine.py:Mine`.
+        pattern_options: Of the pattern, such as `{every: 5}` of one that asks now and then.
         transport: What carries messages: ZeroMQ over TCP, or datagrams.
         network_depth: How ZeroMQ over TCP is modelled: by whole messages, exact where nothing
             is lost or piles up; by TCP segments; or as each link asks for.
@@ -68,17 +69,19 @@ class Scenario(Config):
     guard: GuardConfig = GuardConfig()
     bystander: BystanderConfig = BystanderConfig()
     operator: OperatorConfig = OperatorConfig()
-    control: Literal["direct", "coordinated", "supervisory"] = "direct"
+    control: Annotated[Literal["direct", "coordinated", "supervisory"], Key("control")] = "direct"
     pattern: Annotated[
-        Literal["req-rep", "pipelined", "pub-sub", "latest-wins"],
+        str,
         AlsoCalled("messaging", "messaging_pattern", "protocol"),
+        Key("messaging pattern"),
     ] = "latest-wins"
+    pattern_options: dict[str, Any] = Field(default_factory=dict)
     phone: PhoneConfig = PhoneConfig()
     command: CommandConfig = CommandConfig()
     request: RequestConfig = RequestConfig()
-    transport: TransportKind = "zeromq"
+    transport: Annotated[TransportKind, Key("transport")] = "zeromq"
     zeromq: ZeromqConfig = ZeromqConfig()
-    network_depth: Depth = "auto"
+    network_depth: Annotated[Depth, Key("depth of the network model", stated=False)] = "auto"
     link: LinkConfig = LinkConfig()
     camera: CameraConfig = CameraConfig()
     events: Annotated[tuple[EventConfig, ...], Field(min_length=1)] = (EventConfig(kind="fire"),)
@@ -86,13 +89,19 @@ class Scenario(Config):
     access: tuple[AccessConfig, ...] = ()
     patrols: tuple[PatrolConfig, ...] = ()
     horizon_s: Annotated[
-        float, Field(ge=0.001, le=86_400), AlsoCalled("duration_s", "time_limit_s", "length_s")
+        float,
+        Field(ge=0.001, le=86_400),
+        AlsoCalled("duration_s", "time_limit_s", "length_s"),
+        Key("longest time of a run"),
     ] = 300.0
 
-    @property
-    def window(self) -> int | None:
-        """How many commands may be unanswered at once; None if nobody answers them."""
-        return {"req-rep": 1, "pipelined": self.command.window}.get(self.pattern)
+    @model_serializer(mode="wrap")
+    def _as_before(self, usual: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Options of a pattern are written only where there are any: a hash stays what it was."""
+        written: dict[str, Any] = usual(self)
+        if not written.get("pattern_options", True):
+            del written["pattern_options"]
+        return written
 
     @model_validator(mode="after")
     def _somebody_can_act(self) -> Scenario:
@@ -101,6 +110,15 @@ class Scenario(Config):
         if not self.robot.count and not self.guard.count:
             raise ValueError("nobody can respond: robot.count and guard.count are 0")
         return self
+
+
+def pattern_of(scenario: Scenario) -> Pattern:
+    """The messaging pattern of a scenario, to be asked what it is.
+
+    Raises:
+        ConfigError: there is no such pattern, or it does not know its options.
+    """
+    return load_pattern(scenario.pattern, scenario.pattern_options)()
 
 
 def site_of(scenario: Scenario, seed: int) -> Site:

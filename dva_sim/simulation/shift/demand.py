@@ -16,8 +16,8 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.streams import Streams
 from dva_sim.protocol import messages as m
 from dva_sim.simulation.shift.distributions import ZERO, Always, Draws, shares, times
-from dva_sim.simulation.shift.scenario import Severity, Stream, TimedScenario
-from dva_sim.simulation.shift.travel import Place, Terrain
+from dva_sim.simulation.shift.scenario import EventStream, Severity, TimedScenario
+from dva_sim.simulation.shift.travel import Place, Rooms, Terrain
 from dva_sim.worlds.hazards import Hazard, make_hazard
 
 
@@ -100,7 +100,7 @@ class Incident:
 CALLERS = 32  # devices that report a stream's events in turn, where reports are taken back
 
 
-class Luck:
+class EventDraws:
     """The luck of a stream's events, by their index.
 
     Args:
@@ -110,7 +110,7 @@ class Luck:
         terrain: Where.
     """
 
-    def __init__(self, stream: Stream, name: str, streams: Streams, terrain: Terrain) -> None:
+    def __init__(self, stream: EventStream, name: str, streams: Streams, terrain: Terrain) -> None:
         def one(purpose: str) -> Draws[float]:
             return shares(streams, f"demand/{name}/{purpose}")
 
@@ -163,8 +163,6 @@ class Luck:
 
 
 def _detected_after(incident: Incident, terrain: Terrain) -> float:
-    from dva_sim.simulation.shift.travel import Rooms
-
     assert isinstance(terrain, Rooms)
     return terrain.detected_after(incident.kind, incident.place)
 
@@ -195,7 +193,7 @@ class Demand:
         self._happens, self._noticed = happens, noticed
         self._names = scenario.stream_names
         self.luck = [
-            Luck(stream, name, streams, terrain)
+            EventDraws(stream, name, streams, terrain)
             for stream, name in zip(scenario.demand, self._names, strict=True)
         ]
         self._left = scenario.max_events if scenario.max_events is not None else math.inf
@@ -207,8 +205,6 @@ class Demand:
         """Find out now what would fail later."""
         for stream in self._scenario.demand:
             if stream.notice == "detectors":
-                from dva_sim.simulation.shift.travel import Rooms
-
                 if not isinstance(self._terrain, Rooms):
                     raise ConfigError("notice 'detectors' needs a site")
                 self._terrain.check_detectors(stream.kind)
@@ -301,7 +297,7 @@ class Demand:
             self._clock.call_after(after, self._noticed, incident)
 
 
-def _rate(stream: Stream) -> float:
+def _rate(stream: EventStream) -> float:
     """Events per second, as long as nobody is late."""
     if stream.between is not None:
         return 1.0 / stream.between.mean

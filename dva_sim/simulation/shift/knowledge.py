@@ -1,8 +1,7 @@
-"""What the DVA may know of the ground: ways, lists, stations and where events are expected.
+"""Who is there at the beginning of a shift, and what the DVA may know of the ground.
 
-Operators: each drives one robot at a time.
-
-Who is there: responders hired as the scenario says, everybody known to the DVA.
+Responders are hired as the scenario says, operators drive one robot each at a time, and all are
+registered with the DVA; it knows ways, lists of preference, stations, and where to expect events.
 """
 
 from __future__ import annotations
@@ -10,31 +9,48 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from dva_sim.core.assignments import Rules
 from dva_sim.core.dispatch import Policy
-from dva_sim.core.dva import Desk
+from dva_sim.core.dva import Dva
 from dva_sim.core.permissions import Permissions
 from dva_sim.core.registry import DETECTOR, GUARD, OPERATOR, ROBOT
 from dva_sim.core.sessions import Sessions
-from dva_sim.core.travel_times import Ground, Start, Station
+from dva_sim.core.travel_times import SiteKnowledge, Start, WaitingPlace
 from dva_sim.kernel.streams import Streams
 from dva_sim.protocol import messages as m
-from dva_sim.simulation.shift.demand import CALLERS
-from dva_sim.simulation.shift.responders import DONE, Unit
+from dva_sim.simulation.shift.demand import CALLERS, Demand
+from dva_sim.simulation.shift.mailbox import Mail
+from dva_sim.simulation.shift.responders import DONE, ShiftWorld, Unit
 from dva_sim.simulation.shift.scenario import Group, Point, TimedScenario, limit_of
 from dva_sim.simulation.shift.statistics import Floats
 from dva_sim.simulation.shift.travel import Place, Terrain
 
-if TYPE_CHECKING:
-    from dva_sim.simulation.shift.simulation import Shift
+
+class Team(ShiftWorld, Protocol):
+    """What of a shift is needed to say who is there and what is known of the ground."""
+
+    scenario: TimedScenario
+    streams: Streams
+    terrain: Terrain
+    demand: Demand
+    stations: dict[str, Place]
+    units: list[Unit]
+    by_device: dict[str, Unit]
+    mail: Mail
+
+    def trip(self, unit: Unit, start: Place, goal: Place) -> float:
+        """Time to get somewhere [s]."""
+
+    def travel(self, starts: Sequence[Start], goals: Sequence[m.Position]) -> tuple[Floats, Floats]:
+        """What the DVA is told of ways."""
 
 
 def travel(
-    shift: Shift, starts: Sequence[Start], goals: Sequence[m.Position]
+    shift: Team, starts: Sequence[Start], goals: Sequence[m.Position]
 ) -> tuple[Floats, Floats]:
     """See `core.ground.Travel`: what may be expected of each responder.
 
@@ -78,18 +94,18 @@ def stations(scenario: TimedScenario, terrain: Terrain) -> dict[str, Place]:
     return {s.name: place_of(terrain, s.at) for s in scenario.dispatch.stations}
 
 
-def ground_of(shift: Shift) -> Ground:
+def ground_of(shift: Team) -> SiteKnowledge:
     """Lists and stations as the core wants them."""
     places = shift.stations
-    return Ground(
+    return SiteKnowledge(
         preference=_preference(shift) if shift.scenario.dispatch.preferences else None,
-        stations=tuple(Station(name, place.position) for name, place in places.items()),
+        stations=tuple(WaitingPlace(name, place.position) for name, place in places.items()),
         reach=_reach(shift, list(places.values())),
         demand=np.array(shift.demand.share()),
     )
 
 
-def _reach(shift: Shift, places: list[Place]) -> Floats:
+def _reach(shift: Team, places: list[Place]) -> Floats:
     """From each station to each zone for a guard on its way: the mean over the zone's places."""
     terrain = shift.terrain
     speeds = [u.group.speed_mps for u in shift.units if u.kind == "guard"]
@@ -101,7 +117,7 @@ def _reach(shift: Shift, places: list[Place]) -> Floats:
     return reach / speed
 
 
-def _preference(shift: Shift) -> Callable[[m.Position, Sequence[str]], Sequence[float]]:
+def _preference(shift: Team) -> Callable[[m.Position, Sequence[str]], Sequence[float]]:
     """Ranks on the list of an event's zone; outside all zones the order of registration."""
     devices = {unit.name: unit.device for unit in shift.units}
     everybody = {unit.device: float(unit.number) for unit in shift.units}
@@ -155,7 +171,7 @@ def id_of(kind: str, number: int) -> str:
     return f"02:00:01:{IDS[kind]:02X}:{number >> 8:02X}:{number & 0xFF:02X}"
 
 
-def hire(shift: Shift, streams: Streams, stations: dict[str, Place]) -> list[Unit]:
+def hire(shift: Team, streams: Streams, stations: dict[str, Place]) -> list[Unit]:
     """All responders, in the scenario's order."""
     of_kind: Counter[str] = Counter()
     units: list[Unit] = []
@@ -169,7 +185,7 @@ def hire(shift: Shift, streams: Streams, stations: dict[str, Place]) -> list[Uni
     return units
 
 
-def _base(shift: Shift, group: Group, name: str, number: int, stations: dict[str, Place]) -> Place:
+def _base(shift: Team, group: Group, name: str, number: int, stations: dict[str, Place]) -> Place:
     base: Any = group.base
     if base is None:
         base = shift.terrain.default_base(group.kind)
@@ -189,7 +205,7 @@ def _speed(streams: Streams, group: Group, name: str) -> float:
     return float(np.clip(speed, SLOWEST * group.speed_mps, FASTEST * group.speed_mps))
 
 
-def open_desk(shift: Shift, policy: Policy) -> Desk:
+def open_desk(shift: Team, policy: Policy) -> Dva:
     """The DVA's desk, with the scenario's rules; nobody falls silent, as nobody can be lost."""
     config = shift.scenario.dispatch
     rules = Rules(
@@ -202,13 +218,20 @@ def open_desk(shift: Shift, policy: Policy) -> Desk:
         bid_within=config.bid_within_s,
     )
     sessions = Sessions(Permissions(lambda: 0))
-    ground = ground_of(shift) if policy.relocates or config.preferences else Ground()
-    desk = Desk(policy, shift.travel, rules, shift.streams["dva/policy"], sessions, ground)
+    ground = ground_of(shift) if policy.relocates or config.preferences else SiteKnowledge()
+    desk = Dva(
+        policy,
+        shift.travel,
+        rules,
+        rng=shift.streams["dva/policy"],
+        sessions=sessions,
+        ground=ground,
+    )
     desk.registry.silent_after = math.inf
     return desk
 
 
-def register(shift: Shift) -> None:
+def register(shift: Team) -> None:
     """Everybody makes itself known; who is on duty later shows no place until then."""
     mail, scenario = shift.mail, shift.scenario
 

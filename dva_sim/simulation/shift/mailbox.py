@@ -7,8 +7,8 @@ from collections import Counter, deque
 from collections.abc import Callable
 from typing import Protocol
 
-from dva_sim.core.dva import Desk
-from dva_sim.core.outbox import Send
+from dva_sim.core.dva import Dva
+from dva_sim.core.sessions import Send
 from dva_sim.kernel.clock import Clock
 from dva_sim.protocol import messages as m
 
@@ -47,7 +47,7 @@ class Mail:
 
     def __init__(
         self,
-        desk: Desk,
+        desk: Dva,
         clock: Clock,
         changed: Callable[[object], None],
         moved: Callable[[], None],

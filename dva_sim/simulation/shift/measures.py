@@ -1,4 +1,4 @@
-"""From a timed run to rows: each measure of dispatch is defined here, once.
+"""From a timed run to rows: what each column means, and how it is found.
 
 **Cohort**: all events, true ones and false alarms, first reported between the end of the warm-up
 and one follow-up before the horizon. Each is followed for the same time T after its first report
@@ -27,17 +27,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.simulation.shift.bounds import (
-    Floats,
-    Incidence,
-    evenness,
-    first_of,
-    incidence,
-    response_bounds,
-)
+from dva_sim.kernel.measure import Measure, names_of, text
+from dva_sim.simulation.shift.bounds import Floats, evenness, response_bounds
 from dva_sim.simulation.shift.recording import TimedRecording, UnitRecord
 from dva_sim.simulation.shift.scenario import TimedScenario
 from dva_sim.simulation.shift.statistics import OUTCOMES
+from dva_sim.statistics import Incidence, first_of, incidence
 
 FOLLOW_S = 600.0
 FATES = ("confirmed", "refuted", "escalated", "expired")
@@ -45,25 +40,125 @@ PERCENTILES = (50, 90, 95)
 FEWEST_IN_ZONE = 3  # events without which a zone's mean says nothing
 SLACK = 1e-6  # [s]
 
-MEASURES = (
-    *("follow_s", "events", "true_share", "on_scene_share"),
-    *("response_mean_s", "confirmation_mean_s", *(f"response_p{q}_s" for q in PERCENTILES)),
-    *("robot_share", *(f"{fate}_share" for fate in FATES), "open_share"),
-    *("escalated_later_share", "confirmed_of_true_share", "contained_share", "containment_mean_s"),
-    *("zone_ratio", "bound_mean_s", "beats_bound_share"),
-    *("use_of_guards", "evenness_of_guards", "use_of_robots", "evenness_of_robots"),
-    *("use_of_operators", "load", "exposure_s", "exposure_look_s", "exposure_max_s_per_h"),
-    *("preempted", "relocated", "auctions", "overruled", "policy_failed", "messages"),
-    *("violations", "simulated_s"),
+_OF_CONTAINMENT = (
+    Measure("contained_share", "share of the true events contained by T", better="large"),
+    Measure(
+        "containment_mean_s",
+        "mean of min(time to containment, T) of true events",
+        title="restricted mean time to containment",
+    ),
 )
-"""Numbers that a row of `run_row` may hold, and so what a study may ask for."""
-_OF_CONTAINMENT = ("contained_share", "containment_mean_s")
+RUN_COLUMNS = (
+    Measure(
+        "follow_s", "time that every event is followed, T; shares and restricted means end there"
+    ),
+    Measure("events", "events followed"),
+    Measure("true_share", "share of the events that are no false alarms"),
+    Measure("on_scene_share", "share of the events with somebody on scene by T", better="large"),
+    Measure(
+        "response_mean_s",
+        "mean of min(time to somebody on scene, T)",
+        title="restricted mean time to response",
+        awaits="response",
+        high=FOLLOW_S,
+    ),
+    Measure(
+        "confirmation_mean_s",
+        "mean of min(time to confirmation, T) of true events",
+        title="restricted mean time to confirmation",
+        awaits="confirmation",
+        high=FOLLOW_S,
+    ),
+    *(
+        Measure(
+            f"response_p{q}_s",
+            f"percentile {q} of the time to response",
+            title="median time to response"
+            if q == 50
+            else f"{q}th percentile of the time to response",
+        )
+        for q in PERCENTILES
+    ),
+    Measure("robot_share", "share of the events with a response where it was a robot's"),
+    *(
+        Measure(
+            f"{fate}_share",
+            f"share of the events {fate} by T, before anything else",
+            better="large" if fate in ("confirmed", "refuted") else "small",
+        )
+        for fate in FATES
+    ),
+    Measure("open_share", "share of the events still open at T"),
+    Measure("escalated_later_share", "share of the events escalated after confirmation, by T"),
+    Measure("confirmed_of_true_share", "share of the true events confirmed by T", better="large"),
+    *_OF_CONTAINMENT,
+    Measure("zone_ratio", "mean response of the worst zone over that of the best"),
+    Measure("bound_mean_s", "mean of min(least response time that any policy could have, T)"),
+    Measure("beats_bound_share", "share of the events answered sooner than this bound"),
+    Measure("use_of_guards", "share of the time measured that guards had an order"),
+    Measure("evenness_of_guards", "Jain's index of the guards' work, 1 if all have the same"),
+    Measure("use_of_robots", "share of the time measured that robots had an order"),
+    Measure("evenness_of_robots", "Jain's index of the robots' work, 1 if all have the same"),
+    Measure("use_of_operators", "share of the time measured that operators had an order"),
+    Measure("load", "use of the busier of guards and operators"),
+    Measure(
+        "exposure_s",
+        "time of people within danger radii, per event",
+        title="exposure of people per event",
+    ),
+    Measure(
+        "exposure_look_s",
+        "the part of it spent on finding out, per event",
+        title="exposure of people in finding out, per event",
+    ),
+    Measure("exposure_max_s_per_h", "exposure of the person most exposed, per hour"),
+    Measure("preempted", "orders taken back for a more urgent event"),
+    Measure("relocated", "guards sent to wait elsewhere"),
+    Measure("auctions", "tasks put up for bids"),
+    Measure("overruled", "decisions of the policy that the core did not follow"),
+    Measure("policy_failed", "times that the policy gave no decision, and the default one decided"),
+    Measure("messages", "messages that the DVA took"),
+    Measure("violations", "safety rules found broken; there should be none"),
+    Measure("simulated_s", "virtual time simulated"),
+)
+"""What a row of `run_row` may hold, and so what a study may ask for."""
+EVENT_COLUMNS = (
+    Measure("event_id", "number of the event in its run, from 1"),
+    text("stream", "stream of the demand that it belongs to"),
+    text("kind", "of the event"),
+    text("zone", "where it was"),
+    Measure("is_true", "whether it is no false alarm"),
+    Measure("severity", "as reported, from 0 to 1"),
+    Measure("shared", "whether it was merged with an earlier one"),
+    text("responder", "its name"),
+    text("responder_kind", "who was sent last: robot, guard or none"),
+    Measure("attempts", "responders sent"),
+    Measure("preemptions", "times that its responder was taken away"),
+    text("outcome", "confirmed, contained, refuted, escalated, expired or open"),
+    Measure("t_detected_s", "when it was detected"),
+    Measure("response_s", "first report until somebody is on scene", title="response time"),
+    Measure("confirmation_s", "first report until it is confirmed", title="confirmation time"),
+    Measure("containment_s", "first report until it is contained"),
+    Measure("closing_s", "first report until it is closed"),
+    Measure("bound_s", "least response time that any policy could have"),
+    Measure("watched_s", "for how long it was followed"),
+)
+RESPONDER_COLUMNS = (
+    text("name", "of the responder"),
+    text("kind", "guard or robot"),
+    Measure("use", "share of the time measured with an order"),
+    Measure("exposure_s", "time within danger radii"),
+    Measure("distance_m", "way travelled"),
+    Measure("confirms", "orders to find out"),
+    Measure("contains", "orders to contain"),
+    Measure("stand_bys", "orders to wait elsewhere"),
+)
 
 
 def measures_of(scenario: TimedScenario) -> tuple[str, ...]:
-    """Those of `MEASURES` that a run of a scenario holds: nothing is contained that need not be."""
+    """The measures that a run of a scenario holds: nothing is contained that need not be."""
     gone = () if scenario.dispatch.containment else _OF_CONTAINMENT
-    return tuple(name for name in MEASURES if name not in gone)
+    return names_of(column for column in RUN_COLUMNS if column not in gone)
 
 
 Row = dict[str, Any]

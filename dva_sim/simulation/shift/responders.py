@@ -66,7 +66,7 @@ def leaving(incident: Incident, now: float, speed: float) -> float:
     return incident.danger_radius(now) / speed
 
 
-class World(Protocol):
+class ShiftWorld(Protocol):
     """What a unit may ask of the world, and tell it."""
 
     @property
@@ -185,7 +185,7 @@ class Unit:
 
     def __init__(
         self,
-        world: World,
+        world: ShiftWorld,
         number: int,
         name: str,
         device: str,

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from dva_sim.core.dispatch import Policy, load_policy
-from dva_sim.core.dispatch.oracle import Instance, Oracle, solve
+from dva_sim.core.dispatch.oracle import Instance, OraclePolicy, solve
 from dva_sim.core.dispatch.situation import Advice, Situation
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.simulation.shift.demand import Incident
@@ -27,7 +27,7 @@ class _Nobody(Policy):
         return []
 
 
-def oracle_for(scenario: TimedScenario, seed: int) -> Oracle:
+def oracle_for(scenario: TimedScenario, seed: int) -> OraclePolicy:
     """The best plan for a run, followed.
 
     Raises:
@@ -35,7 +35,7 @@ def oracle_for(scenario: TimedScenario, seed: int) -> Oracle:
     """
     shift, incidents = _foresee(scenario, seed)
     plan = solve(instance_of(shift, incidents))
-    return Oracle(plan, [unit.device for unit in shift.units])
+    return OraclePolicy(plan, [unit.device for unit in shift.units])
 
 
 def instance_of(shift: Shift, incidents: list[Incident]) -> Instance:

@@ -1,6 +1,4 @@
-"""Names in a timed scenario: each must mean something, before anything runs.
-
-What one run of the timed world consists of; units are in the keys.
+"""What one run of the timed world consists of; units are in the keys, and names are checked.
 
 Nobody drives and nothing is sent over a network: responders are travel and service times. What
 is asked, decided and answered is the DVA's own core, so that a queue known from the books is a
@@ -16,9 +14,10 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from dva_sim.kernel import key_changes
-from dva_sim.kernel.config import Config, Document, Fail, KeyPath
+from dva_sim.kernel.config import Config, Document, Fail, Key, KeyPath
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import unknown
+from dva_sim.protocol.messages import EventKind
 from dva_sim.simulation.scenario import check_policy, locate_files
 from dva_sim.simulation.shift.distributions import ZERO, Constant, Law
 
@@ -101,7 +100,6 @@ Positive = Annotated[float, Field(gt=0)]
 Limit = Annotated[float, Field(ge=0, allow_inf_nan=True)] | None
 Point = tuple[float, float]
 Box = tuple[float, float, float, float]
-Kind = Literal["fire", "gas_leak", "flood"]
 
 LOOK_S, ACT_S = Constant(mean_s=0.0), Constant(mean_s=0.0)
 MOST_UNITS = 2000
@@ -197,7 +195,7 @@ class Repeats(Config):
     after: Law = ZERO
 
 
-class Stream(Config):
+class EventStream(Config):
     """Events of one class, one after the other.
 
     Attributes:
@@ -220,7 +218,7 @@ class Stream(Config):
         until_s: No event after this; left out, the horizon.
     """
 
-    kind: Kind = "fire"
+    kind: EventKind = "fire"
     name: Name = ""
     between: Law | None = None
     sources: Sources | None = None
@@ -238,7 +236,7 @@ class Stream(Config):
     until_s: Positive | None = None
 
     @model_validator(mode="after")
-    def _one_origin(self) -> Stream:
+    def _one_origin(self) -> EventStream:
         given = [self.between, self.sources, self.batch]
         if sum(g is not None for g in given) != 1:
             raise ValueError("a stream needs one of between, sources and batch")
@@ -272,7 +270,7 @@ class TimedDispatch(Config):
         stations: Where guards may wait.
     """
 
-    policy: str = "min_eta"
+    policy: Annotated[str, Key("dispatch policy")] = "min_eta"
     options: dict[str, Any] = Field(default_factory=dict)
     escalate_after_s: Limit = None
     containment: bool = False
@@ -312,9 +310,9 @@ class TimedScenario(Config):
     travel: Literal["none", "straight", "path"] | Law | None = None
     responders: Annotated[tuple[Group, ...], Field(min_length=1)]
     operators: Operators = Operators()
-    demand: Annotated[tuple[Stream, ...], Field(min_length=1)]
+    demand: Annotated[tuple[EventStream, ...], Field(min_length=1)]
     dispatch: TimedDispatch = TimedDispatch()
-    intensity: Positive = 1.0
+    intensity: Annotated[Positive, Key("rate of alarms", stated=False)] = 1.0
     warm_up_s: NonNegative = 0.0
     horizon_s: Annotated[float, Field(gt=0, le=1e11)] = 86_400.0
     max_events: Annotated[int, Field(ge=1)] | None = None

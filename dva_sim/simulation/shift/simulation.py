@@ -29,7 +29,7 @@ from dva_sim.simulation.shift.recording import TimedRecording, UnitRecord
 from dva_sim.simulation.shift.responders import Job, Unit
 from dva_sim.simulation.shift.scenario import TimedScenario
 from dva_sim.simulation.shift.statistics import CODES, STEPS_IN_ORDER, Floats, Ledger, Level, Slices
-from dva_sim.simulation.shift.travel import Place, Terrain, terrain_of
+from dva_sim.simulation.shift.travel import Occurrence, Place, Terrain, terrain_of
 
 SLACK = 1e-3  # deadlines are looked at exactly, but for the clock's step [s]
 
@@ -410,7 +410,7 @@ class Shift:
         law = self.scenario.demand[incident.stream].act or unit.group.act
         return self._drawn("act", law, incident)
 
-    def _drawn(self, purpose: str, law: Law, incident: Incident, whose: str = "") -> float:
+    def _drawn(self, purpose: str, law: Law, incident: Occurrence, whose: str = "") -> float:
         """Draws by the event's index; two laws for one purpose share their luck."""
         key = purpose, incident.stream, whose, id(law)
         draws = self._luck.get(key)

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import TYPE_CHECKING, Literal
+from typing import Literal, Protocol
 
 import numpy as np
 
@@ -23,13 +23,17 @@ from dva_sim.protocol import messages as m
 from dva_sim.simulation.shift.distributions import Floats, Law
 from dva_sim.simulation.shift.scenario import Point, TimedScenario
 from dva_sim.worlds.geo import GeoFrame, Pose
-from dva_sim.worlds.hazards import DETECTS, first_detection, make_hazard
+from dva_sim.worlds.hazards import KINDS, first_detection, make_hazard
 from dva_sim.worlds.layout import FOOTPRINT, Site
 from dva_sim.worlds.planning import Planner
 from dva_sim.worlds.site import DEFAULT_FRAME, load_site
 
-if TYPE_CHECKING:
-    from dva_sim.simulation.shift.demand import Incident
+
+class Occurrence(Protocol):
+    """What happens somewhere, as far as ways to it are its own: the event of a stream."""
+
+    stream: int
+    index: int
 
 
 APART = 1e-10  # between events at one place, so that each position is one event's [deg]
@@ -52,7 +56,7 @@ class Place:
     ) -> None:
         self.x, self.y, self.position, self.zone = x, y, position, zone
         self.fixed = fixed
-        self.about: Incident | None = None
+        self.about: Occurrence | None = None
 
     @property
     def point(self) -> Point:
@@ -458,8 +462,9 @@ class Rooms(Terrain):
         Raises:
             ConfigError: there is no detector for it.
         """
-        if not any(d.kind in DETECTS[kind] for d in self.site.detectors):
-            raise ConfigError(f"site {self.site.name!r} has no {DETECTS[kind][0]} detectors")
+        detectors = KINDS[kind].detectors
+        if not any(d.kind in detectors for d in self.site.detectors):
+            raise ConfigError(f"site {self.site.name!r} has no {detectors[0]} detectors")
 
     def detected_after(self, kind: str, place: Place) -> float:
         """From the outbreak to the first detector, or somebody, that notices it [s]."""

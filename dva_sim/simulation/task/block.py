@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from dva_sim.agents.observation import Observation
 from dva_sim.agents.operator.delay_estimation import DelayEstimate
-from dva_sim.agents.operator.person import Person, draw_person
 from dva_sim.agents.operator.strategies import (
     Driver,
     Intent,
@@ -23,7 +23,7 @@ from dva_sim.agents.operator.strategies import (
     View,
     load_strategy,
 )
-from dva_sim.agents.robot.camera import Observation
+from dva_sim.agents.person import Person, draw_person
 from dva_sim.agents.route_following import Route
 from dva_sim.kernel.streams import Streams, derive_seed
 from dva_sim.simulation.scenario.scenario import population
@@ -36,7 +36,7 @@ from dva_sim.simulation.task.cursor import (
     TrackGoal,
     TunnelGoal,
 )
-from dva_sim.simulation.task.delays import Channel, RecordedChannel, Recording, normals
+from dva_sim.simulation.task.delays import Channel, RecordedChannel, RecordedDelays, normals
 from dva_sim.simulation.task.devices import Joystick, Pair, Unicycle
 from dva_sim.simulation.task.kinds import (
     Corner,
@@ -48,7 +48,7 @@ from dva_sim.simulation.task.kinds import (
     Tracking,
     Tunnel,
 )
-from dva_sim.simulation.task.scenario import OneWay, TaskScenario
+from dva_sim.simulation.task.scenario import OneWayDelay, TaskScenario
 from dva_sim.simulation.task.trial import Seat, Trace, Trial
 
 RUN_OUT = 5.0  # the way goes on so far beyond the finish, so that nobody stops before it [m]
@@ -126,13 +126,13 @@ class DriveTrial(Trial[Observation]):
         self.plant.heading = math.atan2(self.points[1][1], self.points[1][0])
         unit = scenario.device.model_copy(update={"gain": 1.0})
         self.device = Joystick(unit, seat.person, streams, self.STEP)
-        way = OneWay() if self.is_oracle else scenario.link.up
+        way = OneWayDelay() if self.is_oracle else scenario.link.up
         self._up: Channel[Pair] = Channel(way, 0.0, streams, "up")
         self._errors = normals(streams.fresh("judgement"))
         self._next_reading, self.path = 0.0, 0.0
         self._squares, self._crossings, self._inside = 0.0, 0, True
 
-    def replay(self, recording: Recording, begin: float) -> None:
+    def replay(self, recording: RecordedDelays, begin: float) -> None:
         """Take the link from a recording, from `begin` [s] in it on; no link reaches the oracle."""
         if not self.is_oracle:
             self._up = RecordedChannel(recording.up, begin, 0.0)
@@ -239,7 +239,7 @@ PAUSE = 1.0  # between two trials, nothing is done [s]
 FINE = 0.01  # resolution at which the delay is learnt from a cursor [s]
 
 
-def play(scenario: TaskScenario, seed: int, recording: Recording | None = None) -> list[Row]:
+def play(scenario: TaskScenario, seed: int, recording: RecordedDelays | None = None) -> list[Row]:
     """Do all trials; one row each, in order.
 
     The luck of a trial is its own: it depends on seed, person and number alone, so that two
@@ -285,7 +285,7 @@ def seat_of(scenario: TaskScenario) -> Seat:
 
 
 def _play(
-    scenario: TaskScenario, seed: int, drawn: int | None, recording: Recording | None = None
+    scenario: TaskScenario, seed: int, drawn: int | None, recording: RecordedDelays | None = None
 ) -> Iterator[tuple[Row, Trace]]:
     seat, operator = seat_of(scenario), scenario.operator
     conditions = list(scenario.task.conditions())

@@ -38,7 +38,7 @@ from dva_sim.simulation.task import measures
 from dva_sim.simulation.task.delays import Channel
 from dva_sim.simulation.task.devices import Cursor, Pair, make_device
 from dva_sim.simulation.task.kinds import Pointing, ReachTask, Tracking, Tunnel
-from dva_sim.simulation.task.scenario import OneWay, TaskScenario
+from dva_sim.simulation.task.scenario import OneWayDelay, TaskScenario
 from dva_sim.simulation.task.trial import MACHINE_GAIN, Seat, Trace, Trial
 
 MOVED = 1e-3  # a cursor that has gone so far has moved [m]; assumed
@@ -173,7 +173,7 @@ class CursorTrial(Trial[Sighting]):
         reach = Reach(min(top, self.device.top), 0.0)
         super().__init__(scenario, seat, reach, streams, reaction)
         self.goal = goal
-        way = OneWay() if self.is_oracle else scenario.link.up
+        way = OneWayDelay() if self.is_oracle else scenario.link.up
         self._up: Channel[Pair] = Channel(way, 0.0, streams, "up")
         self._motion, self._summed = Motion(), summed_over(scenario.frames.rate_hz)
         self._next_reading, self.path = 0.0, 0.0

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from dva_sim.kernel.streams import Streams
 from dva_sim.network.link import Link, make_serialiser
-from dva_sim.simulation.task.scenario import OneWay
+from dva_sim.simulation.task.scenario import OneWayDelay
 
 T = TypeVar("T")
 EARLY = 1e-9  # what is due now comes now, whatever the rounding [s]
@@ -41,7 +41,7 @@ class Channel(Generic[T]):
         name: Of this direction, for its luck.
     """
 
-    def __init__(self, way: OneWay, extra: float, streams: Streams, name: str) -> None:
+    def __init__(self, way: OneWayDelay, extra: float, streams: Streams, name: str) -> None:
         config = way.link()
         self._link = Link(config, make_serialiser(config, "up", streams, name), streams, name)
         self._is_plain = not way.jitter_s and not way.loss
@@ -87,7 +87,7 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Stream:
+class FrameStream:
     """What became of the messages of one direction.
 
     Attributes:
@@ -105,7 +105,7 @@ class Stream:
 
 
 @dataclass(frozen=True)
-class Recording:
+class RecordedDelays:
     """Both directions of a link.
 
     Attributes:
@@ -113,8 +113,8 @@ class Recording:
         down: What became of frames.
     """
 
-    up: Stream
-    down: Stream
+    up: FrameStream
+    down: FrameStream
 
     @property
     def length(self) -> float:
@@ -131,7 +131,7 @@ class RecordedChannel(Channel[T]):
         extra: On top of the delays, always [s].
     """
 
-    def __init__(self, stream: Stream, begin: float, extra: float) -> None:
+    def __init__(self, stream: FrameStream, begin: float, extra: float) -> None:
         self._stream, self._begin, self._extra = stream, begin, extra
         self._numbers, self._newest = count(), -1
         self._coming: list[tuple[float, int, T]] = []

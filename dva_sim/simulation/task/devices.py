@@ -22,10 +22,9 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 
-from dva_sim.agents.operator.person import Person
+from dva_sim.agents.person import Person
 from dva_sim.agents.tilt.accelerometer import GRAVITY, Accelerometer, load_part
-from dva_sim.agents.tilt.filters import FILTERS, load_filter
-from dva_sim.agents.tilt.guarded import GuardedFilter
+from dva_sim.agents.tilt.filters import load_guarded_filter
 from dva_sim.agents.tilt.hand import MAX_SPEED, Hand
 from dva_sim.kernel.streams import Streams
 from dva_sim.simulation.task.delays import slow_noise
@@ -37,7 +36,7 @@ HAND_SPEED = 1.0  # the fastest that a hand moves a mouse [m/s]; assumed
 CALIBRATING = 20  # samples
 
 
-class Device(ABC):
+class HandDevice(ABC):
     """What every device offers to a trial.
 
     Attributes:
@@ -71,7 +70,7 @@ class Device(ABC):
         return {}
 
 
-class Mouse(Device):
+class Mouse(HandDevice):
     """The hand's place is the cursor's."""
 
     def __init__(self, config: DeviceConfig, person: Person, streams: Streams, dt: float) -> None:
@@ -82,29 +81,29 @@ class Mouse(Device):
         self._aim = self._velocity = self._place = self._told = (0.0, 0.0)
 
     def aim(self, vx: float, vy: float) -> None:
-        """See `Device`."""
+        """See `HandDevice`."""
         self._aim = vx / self._gain, vy / self._gain
 
     def move(self, dt: float) -> None:
-        """See `Device`."""
+        """See `HandDevice`."""
         (ax, ay), (vx, vy), (x, y), keep = self._aim, self._velocity, self._place, self._keep
         self._velocity = vx, vy = ax + (vx - ax) * keep, ay + (vy - ay) * keep
         nx, ny = shaken(vx, vy, self._noise)
         self._place = x + nx * dt, y + ny * dt
 
     def reading(self) -> Pair:
-        """See `Device`."""
+        """See `HandDevice`."""
         return self._place
 
     def command(self, reading: Pair | None, dt: float) -> Pair:
-        """See `Device`."""
+        """See `HandDevice`."""
         if reading is None:
             return 0.0, 0.0
         last, self._told = self._told, reading
         return _velocity(last, reading, self._gain, dt)
 
 
-class Joystick(Device):
+class Joystick(HandDevice):
     """The deflection is the velocity; both axes spring back to the middle."""
 
     def __init__(self, config: DeviceConfig, person: Person, streams: Streams, dt: float) -> None:
@@ -115,11 +114,11 @@ class Joystick(Device):
         self._most = 0.0
 
     def aim(self, vx: float, vy: float) -> None:
-        """See `Device`."""
+        """See `HandDevice`."""
         self._aim = clamped(vx / self.top, 1.0), clamped(vy / self.top, 1.0)
 
     def move(self, dt: float) -> None:
-        """See `Device`."""
+        """See `HandDevice`."""
         (ax, ay), (x, y), keep = self._aim, self._hand, self._keep
         self._hand = x, y = ax + (x - ax) * keep, ay + (y - ay) * keep
         x, y = shaken(x, y, self._noise)
@@ -127,21 +126,21 @@ class Joystick(Device):
         self._most = max(self._most, abs(x), abs(y))
 
     def reading(self) -> Pair:
-        """See `Device`."""
+        """See `HandDevice`."""
         return self._shown
 
     def command(self, reading: Pair | None, dt: float) -> Pair:
-        """See `Device`."""
+        """See `HandDevice`."""
         if reading is not None:
             self._told = self.top * reading[0], self.top * reading[1]
         return self._told
 
     def farthest(self) -> dict[str, float]:
-        """See `Device`: the largest deflection, in shares of a full one."""
+        """See `HandDevice`: the largest deflection, in shares of a full one."""
         return {"deflection_max": self._most}
 
 
-class Tilt(Device):
+class Tilt(HandDevice):
     """A tilted device: roll is along x, pitch along y; a subclass says what a tilt means.
 
     The device is calibrated at rest before each trial, so that of the part's offset only the
@@ -154,11 +153,11 @@ class Tilt(Device):
         self._gain, self.period = config.gain, 1.0 / rate
         self._limit = math.radians(config.limit_deg)
         noise = person.motor_noise
-        self._hand = Hand(person.hand_lag, streams.fresh("hand"), noise, max_tilt=self._limit)
+        self._hand = Hand(
+            person.hand_lag, streams.fresh("hand"), motor_noise=noise, max_tilt=self._limit
+        )
         self._sensor = Accelerometer(part, streams.fresh("accelerometer"), rate_hz=rate)
-        made = load_filter(config.filter, config.filter_options)(self.period)
-        own = config.filter not in FILTERS
-        self._filter = GuardedFilter(made, self.period) if own else made
+        self._filter = load_guarded_filter(config.filter, config.filter_options)(self.period)
         rest = [self._measured(0.0, 0.0) for _ in range(CALIBRATING)]
         self._rest = sum(r for r, _ in rest) / CALIBRATING, sum(p for _, p in rest) / CALIBRATING
         self._aim = self._told = (0.0, 0.0)
@@ -168,7 +167,7 @@ class Tilt(Device):
         """The hand moves when the sensor looks; its steps are exact for any length."""
 
     def reading(self) -> Pair:
-        """See `Device`: one more sample, filtered."""
+        """See `HandDevice`: one more sample, filtered."""
         pitch, roll = self._hand.step(self._aim[1], self._aim[0], self.period)
         self._most = max(self._most, abs(pitch), abs(roll))
         x, y = self._measured(pitch, roll)
@@ -178,7 +177,7 @@ class Tilt(Device):
         return value
 
     def farthest(self) -> dict[str, float]:
-        """See `Device`: the largest tilt about either axis [rad]."""
+        """See `HandDevice`: the largest tilt about either axis [rad]."""
         return {"tilt_max_rad": self._most}
 
     def _measured(self, pitch: float, roll: float) -> Pair:
@@ -195,11 +194,11 @@ class TiltVelocity(Tilt):
         self.top = self._gain * self._limit
 
     def aim(self, vx: float, vy: float) -> None:
-        """See `Device`."""
+        """See `HandDevice`."""
         self._aim = vx / self._gain, vy / self._gain
 
     def command(self, reading: Pair | None, dt: float) -> Pair:
-        """See `Device`."""
+        """See `HandDevice`."""
         if reading is not None:
             self._told = self._gain * reading[0], self._gain * reading[1]
         return self._told
@@ -214,16 +213,16 @@ class TiltPosition(Tilt):
         self._rate = 0.0, 0.0
 
     def aim(self, vx: float, vy: float) -> None:
-        """See `Device`."""
+        """See `HandDevice`."""
         self._rate = vx / self._gain, vy / self._gain
 
     def move(self, dt: float) -> None:
-        """See `Device`."""
+        """See `HandDevice`."""
         limit, (x, y), (vx, vy) = self._limit, self._aim, self._rate
         self._aim = clamped(x + vx * dt, limit), clamped(y + vy * dt, limit)
 
     def command(self, reading: Pair | None, dt: float) -> Pair:
-        """See `Device`."""
+        """See `HandDevice`."""
         if reading is None:
             return 0.0, 0.0
         last, self._told = self._told, reading
@@ -235,7 +234,7 @@ def _velocity(last: Pair, place: Pair, gain: float, dt: float) -> Pair:
     return gain * (place[0] - last[0]) / dt, gain * (place[1] - last[1]) / dt
 
 
-KINDS: dict[str, Callable[[DeviceConfig, Person, Streams, float], Device]] = {
+KINDS: dict[str, Callable[[DeviceConfig, Person, Streams, float], HandDevice]] = {
     "mouse": Mouse,
     "tilt_position": TiltPosition,
     "tilt_velocity": TiltVelocity,
@@ -243,7 +242,7 @@ KINDS: dict[str, Callable[[DeviceConfig, Person, Streams, float], Device]] = {
 }
 
 
-def make_device(config: DeviceConfig, person: Person, streams: Streams, dt: float) -> Device:
+def make_device(config: DeviceConfig, person: Person, streams: Streams, dt: float) -> HandDevice:
     """The device of a trial, in a person's hand.
 
     Args:

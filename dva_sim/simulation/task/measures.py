@@ -1,4 +1,4 @@
-"""What the literature measures of pointing, steering and tracking; pure functions of numbers.
+"""What the literature measures of pointing, steering and tracking, and the rows that hold it.
 
 References:
     I. S. MacKenzie: Fitts' law as a research and design tool in human-computer interaction.
@@ -7,8 +7,6 @@ References:
     Human-Computer Studies 61, 2004 (throughput).
     J. Accot, S. Zhai: Beyond Fitts' law: models for trajectory-based HCI tasks. CHI 1997.
     D. T. McRuer et al.: Human pilot dynamics in compensatory systems. AFFDL-TR-65-15, 1965.
-
-From the trials of a block to the one row of its run.
 """
 
 from __future__ import annotations
@@ -16,11 +14,13 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dva_sim.kernel.measure import Measure, names_of
 from dva_sim.simulation.task.scenario import TaskScenario
 
 Floats = NDArray[np.float64]
@@ -67,7 +67,7 @@ def throughput(
     return fitts_id(amplitude, width) / float(np.mean(times))
 
 
-class Line(NamedTuple):
+class FittedLine(NamedTuple):
     """A straight line fitted by least squares, and the share of variance that it explains."""
 
     intercept: float
@@ -75,7 +75,7 @@ class Line(NamedTuple):
     r2: float
 
 
-def fit_line(x: Sequence[float] | Floats, y: Sequence[float] | Floats) -> Line:
+def fit_line(x: Sequence[float] | Floats, y: Sequence[float] | Floats) -> FittedLine:
     """The least-squares line through points.
 
     Raises:
@@ -88,7 +88,7 @@ def fit_line(x: Sequence[float] | Floats, y: Sequence[float] | Floats) -> Line:
     rest = ys - (intercept + slope * xs)
     total = float(((ys - ys.mean()) ** 2).sum())
     r2 = 1.0 - float((rest**2).sum()) / total if total else 1.0
-    return Line(float(intercept), float(slope), r2)
+    return FittedLine(float(intercept), float(slope), r2)
 
 
 class Crossover(NamedTuple):
@@ -144,34 +144,109 @@ def crossover(frequencies: Sequence[float], loop: NDArray[np.complex128]) -> Cro
 
 Row = dict[str, Any]
 
-MEANS = (
-    "movement_time_s",
-    "completed",
-    "error",
-    "overshoots",
-    "wall_crossings",
-    "stops",
-    "path_error_rms_m",
-    "tracking_error_rms_m",
-    "crossover_rad_s",
-    "phase_margin_deg",
-    "path_m",
-    "waits",
-    "wait_s",
-    "move_and_wait_share",
-    "delay_felt_s",
-)
-"""Columns of the trials whose mean is a column of the run, as far as the task has them."""
 _DRIVEN = ("tunnel", "corner", "slalom", "course")
 _AIMED = ("pointing", *_DRIVEN)
-FARTHEST = ("tilt_max_rad", "deflection_max")
-SHARES = {"completed": "completed_share", "error": "error_share"}
-MEASURES = (
-    *("trials", *(SHARES.get(name, name) for name in MEANS), *FARTHEST),
-    *("throughput_bps", "effective_throughput_bps", "id_slope_s_per_bit", "steering_slope_s"),
-    *("plugin_failures", "simulated_s"),
+DRIVEN_COLUMNS = (
+    Measure(
+        "movement_time_s",
+        "time that the task took; the horizon if it was given up",
+        awaits="completion",
+    ),
+    Measure("completed", "1 if the task was done, else 0", better="large", low=0, high=1),
+    Measure("wall_crossings", "times that the wall was crossed"),
+    Measure("path_error_rms_m", "distance from the middle of the way, root mean square"),
+    Measure("waits", "waits to see the result of a move"),
+    Measure("wait_s", "time spent in these waits"),
+    Measure(
+        "delay_felt_s",
+        "delay as the person takes it, at the end",
+        title="delay as the person takes it",
+    ),
 )
-"""Numbers that a row of `run_row` may hold, and so what a study may ask for."""
+"""What is measured of whatever is driven, here and over a congested link."""
+_AVERAGED = (
+    *DRIVEN_COLUMNS,
+    Measure("error", "1 if a selection missed or a wall was crossed, else 0", low=0, high=1),
+    Measure("overshoots", "times that the target was left again"),
+    Measure("stops", "places reached, of those to go to", better="large"),
+    Measure("tracking_error_rms_m", "distance from the moving target, root mean square"),
+    Measure("crossover_rad_s", "crossover frequency of person, device and delay", better="large"),
+    Measure("phase_margin_deg", "phase margin at the crossover", better="large"),
+    Measure("path_m", "way of the cursor or vehicle", title="path length"),
+    Measure("move_and_wait_share", "share of the time steered by moving and waiting"),
+)
+"""Columns of the trials whose mean is a column of the run, as far as the task has them."""
+_FARTHEST = (
+    Measure("tilt_max_rad", "farthest that the hand tilted the device about an axis"),
+    Measure("deflection_max", "farthest that the stick was deflected, 1 for all the way"),
+)
+_FAILURES = Measure(
+    "plugin_failures", "times that a class of the user's gave no answer that is one"
+)
+TRIAL_COLUMNS = (
+    *_AVERAGED,
+    *_FARTHEST,
+    _FAILURES,
+    Measure("number", "of the trial in its block, from 0"),
+    Measure("condition", "of the task, from 0"),
+    Measure("amplitude_m", "way to the target"),
+    Measure("width_m", "of the target, tunnel or way"),
+    Measure("length_m", "of the tunnel or way"),
+    Measure("spacing_m", "between the gates of a slalom"),
+    Measure("excursion_m", "greatest excursion of the target"),
+    Measure("bandwidth_rad_s", "highest frequency of the target"),
+    Measure("id_bits", "index of difficulty, Shannon form"),
+    Measure("steering_id", "length of the tunnel over its width"),
+    Measure(
+        "end_m",
+        "where the trial ended along the task axis, from the target's centre",
+        low=-math.inf,
+    ),
+    Measure("target_rms_m", "excursion of the target, root mean square"),
+    Measure("work_s", "work at the places reached, whoever commands it"),
+    Measure("trial_time_s", "from the beginning of the trial, also before the movement is timed"),
+)
+_SHARES = {
+    "completed": Measure(
+        "completed_share", "share of the trials done", title="share of trials done", better="large"
+    ),
+    "error": Measure(
+        "error_share", "share of the trials with an error", title="share of trials with an error"
+    ),
+}
+
+
+def _of_block(column: Measure) -> Measure:
+    """The column of the run that a column of its trials becomes."""
+    mean = replace(column, meaning=f"{column.meaning}; mean over trials")
+    return _SHARES.get(column.name, mean)
+
+
+RUN_COLUMNS = (
+    Measure("trials", "in the block"),
+    *map(_of_block, _AVERAGED),
+    *_FARTHEST,
+    Measure("throughput_bps", "nominal throughput, mean over conditions", better="large"),
+    Measure(
+        "effective_throughput_bps",
+        "throughput with effective width and amplitude, likewise",
+        title="throughput with effective width",
+        better="large",
+    ),
+    Measure(
+        "id_slope_s_per_bit",
+        "time for one more bit of the index of difficulty",
+        title="time for one more bit of the index of difficulty",
+    ),
+    Measure(
+        "steering_slope_s",
+        "time for one more width of a tunnel's length",
+        title="time for one more width of a tunnel",
+    ),
+    _FAILURES,
+    Measure("simulated_s", "virtual time simulated"),
+)
+"""What a row of `run_row` may hold, and so what a study may ask for."""
 
 _OF_KINDS = {
     "error_share": _AIMED,
@@ -192,11 +267,11 @@ _OF_DEVICES = {
 
 
 def measures_of(scenario: TaskScenario) -> tuple[str, ...]:
-    """Those of `MEASURES` that a run of a scenario holds, by its task and device."""
+    """The measures that a run of a scenario holds, by its task and device."""
     task, device = scenario.task.kind, scenario.device.kind
     return tuple(
         name
-        for name in MEASURES
+        for name in names_of(RUN_COLUMNS)
         if task in _OF_KINDS.get(name, (task,)) and device in _OF_DEVICES.get(name, (device,))
     )
 
@@ -213,11 +288,11 @@ def run_row(trials: Sequence[Mapping[str, Any]]) -> Row:
         trials: Rows of `play`.
     """
     row: Row = {"trials": len(trials)}
-    for name in MEANS:
-        if name in trials[0]:
-            row[SHARES.get(name, name)] = mean(trial[name] for trial in trials)
+    for column in _AVERAGED:
+        if column.name in trials[0]:
+            row[_of_block(column).name] = mean(trial[column.name] for trial in trials)
     row["plugin_failures"] = sum(trial["plugin_failures"] for trial in trials)
-    for name in FARTHEST:
+    for name in names_of(_FARTHEST):
         if name in trials[0]:
             row[name] = max(float(trial[name]) for trial in trials)
     done = [trial for trial in trials if trial["completed"]]

@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 from dva_sim.agents.tilt.accelerometer import load_part
 from dva_sim.agents.tilt.filters import load_filter
 from dva_sim.kernel import key_changes
-from dva_sim.kernel.config import Config, Document, Fail, KeyPath
+from dva_sim.kernel.config import Config, Document, Fail, Key, KeyPath
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.link import LinkConfig
 from dva_sim.simulation.scenario.loading import check_strategy
@@ -24,7 +24,7 @@ NonNegative = Annotated[float, Field(ge=0)]
 FASTEST_LINE = 1e12  # [bit/s]: what is sent here is a few numbers, so its length costs no time
 
 
-class OneWay(Config):
+class OneWayDelay(Config):
     """One direction of the link between the hand and what it moves.
 
     Attributes:
@@ -38,7 +38,7 @@ class OneWay(Config):
     loss: Annotated[float, Field(ge=0, le=0.9)] = 0.0
 
     @model_validator(mode="after")
-    def _causal(self) -> OneWay:
+    def _causal(self) -> OneWayDelay:
         if self.jitter_s > self.delay_s:
             raise ValueError(f"jitter_s {self.jitter_s:g} is above delay_s {self.delay_s:g}")
         return self
@@ -53,8 +53,12 @@ class OneWay(Config):
 class Ways(Config):
     """Both directions: commands go up, frames come down."""
 
-    up: OneWay = OneWay()
-    down: OneWay = OneWay()
+    up: Annotated[OneWayDelay, Key(inner={"delay_s": Key("delay of commands", zero=True)})] = (
+        OneWayDelay()
+    )
+    down: Annotated[OneWayDelay, Key(inner={"delay_s": Key("delay of frames", zero=True)})] = (
+        OneWayDelay()
+    )
 
 
 class FramesConfig(Config):
@@ -65,7 +69,7 @@ class FramesConfig(Config):
         extra_s: From taking a frame to sending it, such as encoding.
     """
 
-    rate_hz: Annotated[float, Field(gt=0, le=1000)] = 60.0
+    rate_hz: Annotated[float, Field(gt=0, le=1000), Key("frame rate")] = 60.0
     extra_s: Annotated[float, Field(ge=0, le=10)] = 0.0
 
 
@@ -87,8 +91,10 @@ class DeviceConfig(Config):
         filter_options: Of the filter.
     """
 
-    kind: Literal["mouse", "tilt_position", "tilt_velocity", "joystick"] = "mouse"
-    gain: Positive = 1.0
+    kind: Annotated[
+        Literal["mouse", "tilt_position", "tilt_velocity", "joystick"], Key("device")
+    ] = "mouse"
+    gain: Annotated[Positive, Key("gain of the device", stated=False)] = 1.0
     rate_hz: Annotated[float, Field(gt=0, le=1000)] = 125.0
     limit_deg: Annotated[float, Field(gt=0, le=80)] = 45.0
     accelerometer: str = "adxl345"
@@ -131,16 +137,18 @@ class TaskScenario(Config):
 
     model: Literal["task"]
     description: str = ""
-    task: Task
+    task: Annotated[Task, Key(inner={"kind": Key("task")})]
     operator: OperatorConfig = OperatorConfig()
     device: DeviceConfig = DeviceConfig()
     link: Ways = Ways()
     frames: FramesConfig = FramesConfig()
     plant: PlantConfig = PlantConfig()
-    automation: Annotated[float, Field(ge=0, le=1)] = 0.0
+    automation: Annotated[
+        float, Field(ge=0, le=1), Key("share of the correction that the machine makes")
+    ] = 0.0
     trials: Annotated[int, Field(ge=1, le=1000)] = 1
     practice: Annotated[int, Field(ge=0, le=100)] = 3
-    horizon_s: Annotated[float, Field(gt=0, le=7200)] = 30.0
+    horizon_s: Annotated[float, Field(gt=0, le=7200), Key("longest time of a run")] = 30.0
 
     @property
     def is_driven(self) -> bool:

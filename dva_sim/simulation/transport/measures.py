@@ -1,4 +1,4 @@
-"""What is measured of a session on a congested link; each measure is defined here, once.
+"""What is measured of a session on a congested link: what each column means, and how it is found.
 
 **Delivered** is a message all of which has arrived before the run was over, some time after the
 last message that counts.
@@ -27,23 +27,79 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dva_sim.kernel.measure import Measure, text
+from dva_sim.network.link import Direction
 from dva_sim.network.transports import Contest, ContestConfig, Fates
 from dva_sim.network.transports.bottleneck import WAYS
+from dva_sim.simulation.task.measures import DRIVEN_COLUMNS
 
 Row = dict[str, Any]
 Floats = NDArray[np.float64]
 
-MEASURES = (
-    *("commands", "delivered_share", "crucial_delivered_share", "crucial_age_p95_s"),
-    *("command_rate_hz", "command_age_mean_s", "command_age_p50_s", "command_age_p95_s"),
-    *("age_in_force_mean_s", "picture_delivered_share", "picture_rate_hz"),
-    *("picture_age_mean_s", "picture_age_p95_s", "round_trip_mean_s", "round_trip_p95_s"),
-    *(f"{name}_{way}" for way in WAYS for name in ("bulk_use", "jain", "share_of_fair")),
-    *(f"{name}_{way}_bps" for way in WAYS for name in ("session", "bulk")),
-    *("movement_time_s", "completed", "path_error_rms_m", "wall_crossings"),
-    *("waits", "wait_s", "delay_felt_s", "plugin_failures", "simulated_s"),
+_WHERE: dict[Direction, str] = {"up": "towards the robot", "down": "from the robot"}
+
+
+def _of_way(way: Direction) -> tuple[Measure, ...]:
+    where = _WHERE[way]
+    return (
+        Measure(f"bulk_use_{way}", f"share of the line that TCP flows get {where}", low=0, high=1),
+        Measure(f"jain_{way}", f"Jain's index of all rates {where}", better="large", low=0, high=1),
+        Measure(f"share_of_fair_{way}", f"session's rate over a fair one, {where}", low=0),
+        Measure(f"session_{way}_bps", f"rate of the session {where}"),
+        Measure(f"bulk_{way}_bps", f"mean rate of a TCP flow {where}"),
+    )
+
+
+RUN_COLUMNS = (
+    Measure("commands", "commands made in the time measured"),
+    Measure("delivered_share", "share of the commands that arrived whole", better="large"),
+    Measure(
+        "crucial_delivered_share",
+        "share of the crucial commands that arrived whole",
+        better="large",
+    ),
+    Measure("crucial_age_p95_s", "percentile 95 of the age of crucial commands at arrival"),
+    Measure(
+        "command_rate_hz",
+        "commands applied per second",
+        title="applied command rate",
+        better="large",
+    ),
+    Measure(
+        "command_age_mean_s",
+        "mean age of applied commands at arrival",
+        title="mean command age at application",
+    ),
+    Measure("command_age_p50_s", "median of this age", title="median command age at application"),
+    Measure("command_age_p95_s", "percentile 95 of this age"),
+    Measure(
+        "age_in_force_mean_s",
+        "age of the newest applied command, mean over time",
+        title="mean age of the command in force",
+    ),
+    Measure("picture_delivered_share", "share of the pictures that arrived whole", better="large"),
+    Measure("picture_rate_hz", "pictures shown per second", better="large"),
+    Measure("picture_age_mean_s", "mean age of pictures at arrival"),
+    Measure("picture_age_p95_s", "percentile 95 of this age"),
+    Measure(
+        "round_trip_mean_s", "command until the first picture taken after it was applied, mean"
+    ),
+    Measure(
+        "round_trip_p95_s",
+        "percentile 95 of this time",
+        title="95th percentile of the time from request to answer",
+    ),
+    *(column for way in WAYS for column in _of_way(way)),
+    *DRIVEN_COLUMNS,
+    Measure("plugin_failures", "times that a class of the user's gave no answer that is one"),
+    Measure("simulated_s", "virtual time simulated"),
 )
-"""Numbers that a row of a run holds, and so what a study may ask for."""
+"""What a row of a run holds, and so what a study may ask for."""
+FLOW_COLUMNS = (
+    text("way", "up is towards the robot"),
+    text("flow", "session, or a TCP flow beside it"),
+    Measure("rate_bps", "rate on the line, with headers and what is sent again"),
+)
 
 
 def contest_row(config: ContestConfig, contest: Contest) -> Row:

@@ -7,29 +7,47 @@ goes on from its beginning when it outlasts it.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
+from dva_sim.kernel.measure import names_of
 from dva_sim.network.transports import Contest, Fates, play
 from dva_sim.simulation import task
-from dva_sim.simulation.task.delays import Recording, Stream
+from dva_sim.simulation.task.delays import FrameStream, RecordedDelays
+from dva_sim.simulation.task.measures import DRIVEN_COLUMNS
 from dva_sim.simulation.transport.measures import Row, contest_row, flow_rows
 from dva_sim.simulation.transport.scenario import TransportScenario
 
-DRIVEN = (
-    *("movement_time_s", "completed", "path_error_rms_m", "wall_crossings"),
-    *("waits", "wait_s", "delay_felt_s", "plugin_failures"),
-)
+DRIVEN = (*names_of(DRIVEN_COLUMNS), "plugin_failures")
 """What is taken over of a drive."""
 
 
-def simulate_transports(scenario: TransportScenario, seed: int) -> dict[str, list[Row]]:
-    """Simulate; a row of the run, and one of each flow."""
+class SessionRecording(NamedTuple):
+    """What is left of a run.
+
+    Attributes:
+        scenario: As it was run.
+        contest: What became of all that was sent.
+        trial: What was measured of the drive.
+    """
+
+    scenario: TransportScenario
+    contest: Contest
+    trial: Row
+
+
+def simulate_session(scenario: TransportScenario, seed: int) -> SessionRecording:
+    """The network first, and then one drive over what it delivers."""
     contest = play(scenario, seed)
     trial = task.play(scenario.task(), seed, recording_of(scenario, contest))[-1]
-    driven: dict[str, Any] = {name: trial[name] for name in DRIVEN}
-    row = contest_row(scenario, contest) | driven
+    return SessionRecording(scenario, contest, trial)
+
+
+def tables(recording: SessionRecording) -> dict[str, list[Row]]:
+    """A row of the run, and one of each flow."""
+    scenario, contest, trial = recording
+    row = contest_row(scenario, contest) | {name: trial[name] for name in DRIVEN}
     row["simulated_s"] = contest.until + float(trial["trial_time_s"])
     return {"runs": [row], "flows": flow_rows(contest)}
 
@@ -43,15 +61,15 @@ def rehearse(scenario: TransportScenario) -> None:
     task.rehearse(scenario.task())
 
 
-def recording_of(scenario: TransportScenario, contest: Contest) -> Recording:
+def recording_of(scenario: TransportScenario, contest: Contest) -> RecordedDelays:
     """What the session did to commands and pictures while it was measured."""
-    return Recording(
+    return RecordedDelays(
         _stream(contest, contest.commands, scenario.commands.rate_hz),
         _stream(contest, contest.pictures, scenario.pictures.rate_hz),
     )
 
 
-def _stream(contest: Contest, fates: Fates, rate: float) -> Stream:
+def _stream(contest: Contest, fates: Fates, rate: float) -> FrameStream:
     made, arrived = np.array(fates.made), np.array(fates.arrived)
     counts = (made >= contest.since) & (made < contest.until)
-    return Stream(1.0 / rate, (arrived - made)[counts])
+    return FrameStream(1.0 / rate, (arrived - made)[counts])

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from dva_sim.kernel import key_changes
-from dva_sim.kernel.config import Config, Document, Fail
+from dva_sim.kernel.config import Config, Document, Fail, Key
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.transports import ContestConfig
 from dva_sim.simulation import task
@@ -28,7 +28,11 @@ class DriveConfig(Config):
         horizon_s: A drive that is not done by then is given up.
     """
 
-    task: Annotated[Corner | Slalom | Course, Field(discriminator="kind")]
+    task: Annotated[
+        Corner | Slalom | Course,
+        Field(discriminator="kind"),
+        Key(inner={"kind": Key("way that is driven")}),
+    ]
     plant: PlantConfig = PlantConfig(speed_mps=0.5)
     practice: Annotated[int, Field(ge=0, le=100)] = 1
     horizon_s: Annotated[float, Field(gt=0, le=7200)] = 600.0

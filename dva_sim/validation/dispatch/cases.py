@@ -1,6 +1,4 @@
-"""What a formula is given: its parameters, taken from the scenario that is played.
-
-Cases: worlds that theory has an exact answer for, written down in a file.
+"""Cases: worlds that theory has an exact answer for, written down in a file.
 
 A case says what is played (a timed scenario), which formula knows the answer, where the
 formula's parameters stand in the scenario, and what is compared. Other numbers, or other
@@ -136,7 +134,7 @@ def _checked(key: str, hint: Any, value: Any, said: Any) -> Any:
 
 
 def _wants_law(hint: Any) -> bool:
-    return _mentions(hint, lambda h: h in _LAWS or getattr(h, "__name__", "") == "Law")
+    return _mentions(hint, lambda h: h in _LAWS or getattr(h, "__name__", "") == "DurationLaw")
 
 
 def _law(key: str, value: Any) -> distributions.Law:

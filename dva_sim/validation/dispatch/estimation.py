@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
-Verdict = Literal["agrees", "too rough", "differs"]
+CheckVerdict = Literal["agrees", "too rough", "differs"]
 
 ERRORS = 3.0  # an estimate may be so many standard errors off
 TOLERANCE = 0.005  # or so much, as a share of the exact value
@@ -105,7 +105,7 @@ def adjusted(values: Floats, controls: Floats) -> Floats:
     return left
 
 
-def verdict(found: Estimate, exact: float, precision: float | None = PRECISION) -> Verdict:
+def verdict(found: Estimate, exact: float, precision: float | None = PRECISION) -> CheckVerdict:
     """Whether an estimate agrees with the exact value.
 
     Args:

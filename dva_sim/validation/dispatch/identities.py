@@ -1,6 +1,6 @@
-"""Static instances turned and shuffled: a policy must choose the same all the same.
+"""What must hold exactly, whatever the numbers: no chance, no tolerance but the clock's step.
 
-What must hold exactly, whatever the numbers: no chance, no tolerance but the clock's step.
+One of them turns and shuffles instances: a policy must choose the same all the same.
 """
 
 from __future__ import annotations
@@ -65,7 +65,14 @@ def _choice(
     """Who is sent where, by number of the event and name."""
     tasks = tuple(
         Task(
-            number + 1, "fire", "confirm", True, float(severity), 0.9, float(number), float(number)
+            event=number + 1,
+            kind="fire",
+            stage="confirm",
+            due=True,
+            severity=float(severity),
+            confidence=0.9,
+            detected=float(number),
+            waiting_since=float(number),
         )
         for number, severity in enumerate(severities)
     )
@@ -74,13 +81,20 @@ def _choice(
     distance = np.hypot(away[..., 0], away[..., 1])
     speed = np.where(robots[order], 0.5, 1.4)
     operators = int(robots.sum() + 1) // 2
-    situation = Situation(20.0, tasks, team, distance, distance / speed, operators=operators)
+    situation = Situation(
+        now=20.0,
+        tasks=tasks,
+        responders=team,
+        distance=distance,
+        eta=distance / speed,
+        operators=operators,
+    )
     advice = load_policy(policy).advise(situation, np.random.Generator(np.random.PCG64(1)))
     sent = (piece for piece in advice if isinstance(piece, Assignment))
     return {(tasks[piece.task].event, team[piece.responder].device) for piece in sent}
 
 
-Found = Iterator[tuple[str, float]]
+Deviations = Iterator[tuple[str, float]]
 """What was looked at, and how far it is from what it should be: always 0."""
 
 SLACK_S = 1e-3  # what the clock's whole microseconds may add up to
@@ -117,7 +131,7 @@ def check_identity(name: str, seed: int) -> list[tuple[str, float]]:
 
 
 # --- one path, known from another calculation ------------------------------------------
-def _first_come_first_served(seed: int) -> Found:
+def _first_come_first_served(seed: int) -> Deviations:
     """Waits are those of Kiefer and Wolfowitz's recursion, event by event."""
     for guards in (1, 2, 5):
         scenario = {
@@ -134,7 +148,7 @@ def _first_come_first_served(seed: int) -> Found:
         yield f"waits with {guards} guards against Kiefer and Wolfowitz [s]", _beyond(off)
 
 
-def _conservation(seed: int) -> Found:
+def _conservation(seed: int) -> Deviations:
     """Every event is closed in one way and one only, whatever happens to it."""
     scenario = copy.deepcopy(_PLACES)
     scenario["responders"][0] |= {"kind": "robot"}
@@ -151,7 +165,7 @@ def _conservation(seed: int) -> Found:
 
 
 # --- the same world, seen otherwise ----------------------------------------------------
-def _time_scaling(seed: int) -> Found:
+def _time_scaling(seed: int) -> Deviations:
     """With everything 8 times as slow every moment comes 8 times as late."""
     scenario = copy.deepcopy(_PLACES)
     scenario["dispatch"] = {"policy": "priority_eta", "options": {"ageing_per_s": 0.002}}
@@ -161,7 +175,7 @@ def _time_scaling(seed: int) -> Found:
     yield f"moments with everything {FACTOR} times as slow [s]", _beyond(off)
 
 
-def _relabelling(seed: int) -> Found:
+def _relabelling(seed: int) -> Deviations:
     """Other names, and another order of the same responders, change nothing."""
     plain = _run(_PLACES, seed)
     named = copy.deepcopy(_PLACES)
@@ -172,13 +186,13 @@ def _relabelling(seed: int) -> Found:
     yield "moments in another order of guards [s]", _beyond(_apart(plain, _run(turned, seed)))
 
 
-def _rotation(seed: int) -> Found:
+def _rotation(seed: int) -> Deviations:
     """A policy's choice does not depend on where north is, nor on who is listed first."""
     yield from changed_choices(seed)
 
 
 # --- better and worse ------------------------------------------------------------------
-def _best_of_all(seed: int) -> Found:
+def _best_of_all(seed: int) -> Deviations:
     """All events at once: the best assignment is never worse than the nearest first."""
     ways: dict[str, dict[str, Any]] = {
         "straight ways": {"area": {"width_m": 100, "height_m": 100}},
@@ -203,7 +217,7 @@ def _best_of_all(seed: int) -> Found:
         yield f"of 40 days with {name}: batch_optimal worse than nearest first", float(worse)
 
 
-def _oracle(seed: int) -> Found:
+def _oracle(seed: int) -> Deviations:
     """Nobody has a smaller sum of responses than who knows the future."""
     scenario = _PLACES | {"max_events": 6, "horizon_s": 10_000, "drain": False}
     scenario["responders"] = [g | {"after": "return"} for g in _PLACES["responders"][:2]]
@@ -221,7 +235,7 @@ def _oracle(seed: int) -> Found:
         yield f"of 20 small days: the oracle worse than {policy}", float(count)
 
 
-IDENTITIES: dict[str, Callable[[int], Found]] = {
+IDENTITIES: dict[str, Callable[[int], Deviations]] = {
     "first come, first served": _first_come_first_served,
     "conservation": _conservation,
     "time scaling": _time_scaling,

@@ -1,6 +1,6 @@
 """What a run shows, in columns: events in the order of their detection, and who was busy when.
 
-Queues computed event by event, by other means than the simulation's.
+Queues are computed here too, event by event, by other means than the simulation's.
 """
 
 from __future__ import annotations

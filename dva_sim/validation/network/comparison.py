@@ -1,7 +1,4 @@
-"""Many runs of the model, spread over processes.
-
-The whole comparison: which runs of the model it takes, and what they come to.
-"""
+"""The whole comparison: which runs of the model it takes, and what they come to."""
 
 from __future__ import annotations
 
@@ -11,26 +8,13 @@ from dataclasses import dataclass, field
 from typing import Any, cast
 
 from dva_sim.experiments.execution import executors
-from dva_sim.experiments.execution.checkpoint import Tables
 from dva_sim.experiments.execution.scheduling import run_all
-from dva_sim.experiments.study.cell_grid import Job
+from dva_sim.experiments.study.cell_grid import StudyJob
 from dva_sim.kernel.errors import RunsFailed
 from dva_sim.kernel.streams import Streams, derive_seed
 from dva_sim.network.condition import Condition
 from dva_sim.network.measures import Measures
-from dva_sim.simulation.models import AnyScenario
-from dva_sim.validation.network.judging import (
-    KINDS,
-    MIN_INSIDE,
-    Cell,
-    Group,
-    Kind,
-    Row,
-    Verdict,
-    cells_of,
-    judge,
-    share_inside,
-)
+from dva_sim.simulation.models import AnyScenario, Tables
 from dva_sim.validation.network.pooling import (
     Pooled,
     is_steady,
@@ -39,7 +23,19 @@ from dva_sim.validation.network.pooling import (
     tells,
     to_be_pooled,
 )
-from dva_sim.validation.network.predict import WITHOUT, Depth, depth_for, predict
+from dva_sim.validation.network.prediction import WITHOUT, Depth, depth_for, predict
+from dva_sim.validation.network.verdicts import (
+    KINDS,
+    MIN_INSIDE,
+    CellVerdict,
+    ComparedCell,
+    ConditionGroup,
+    ConditionKind,
+    Row,
+    cells_of,
+    judge,
+    share_inside,
+)
 
 CHUNK = 10  # runs of one job
 KEPT = (
@@ -52,7 +48,7 @@ Progress = Callable[[int], None]
 
 
 @dataclass(frozen=True)
-class Order:
+class ModelRuns:
     """Runs of one condition.
 
     Attributes:
@@ -69,8 +65,8 @@ class Order:
 
 
 def play_all(
-    orders: Sequence[Order], seed: int, workers: int, progress: Progress = lambda done: None
-) -> dict[Order, list[Row]]:
+    orders: Sequence[ModelRuns], seed: int, workers: int, progress: Progress = lambda done: None
+) -> dict[ModelRuns, list[Row]]:
     """The results of every run of some orders.
 
     Run n of a condition has the same luck at every depth and whatever is left out.
@@ -99,7 +95,7 @@ def play_all(
     return {order: _joined(order, seed, rows) for order in orders}
 
 
-def perform(job: Job) -> Tables:
+def perform(job: StudyJob) -> Tables:
     """The runs of one job."""
     row, depth, without, first, count = _asked(job)
     condition = Condition.from_row(row)
@@ -113,35 +109,35 @@ def _kept(row: Measures) -> dict[str, Any]:
     return {name: row[name] for name in KEPT}
 
 
-def _jobs(order: Order, seed: int) -> list[Job]:
+def _jobs(order: ModelRuns, seed: int) -> list[StudyJob]:
     jobs = []
     for first in range(0, order.runs, CHUNK):
         count = min(CHUNK, order.runs - first)
         asked = order.condition.to_row(), order.depth, order.without, first, count
         cell = (("order", json.dumps(asked)),)
         name, nobody = _name(order, first), cast(AnyScenario, None)
-        jobs.append(Job("network", cell, 0, 0, 0, seed, name, nobody))
+        jobs.append(StudyJob("network", cell, 0, 0, 0, seed, name, nobody))
     return jobs
 
 
-def _asked(job: Job) -> tuple[dict[str, str], Depth, tuple[str, ...], int, int]:
+def _asked(job: StudyJob) -> tuple[dict[str, str], Depth, tuple[str, ...], int, int]:
     row, depth, without, first, count = json.loads(str(dict(job.cell)["order"]))
     return row, depth, tuple(without), first, count
 
 
-def _name(order: Order, first: int) -> str:
+def _name(order: ModelRuns, first: int) -> str:
     left_out = f" without {', '.join(order.without)}" if order.without else ""
     condition = f"{order.condition.label} ({order.condition.hash})"
     return f"{condition} {order.depth}{left_out}, runs from {first}"
 
 
-def _effort(job: Job) -> float:
+def _effort(job: StudyJob) -> float:
     """Commands to be played, about."""
     row, _, _, _, count = _asked(job)
     return count * float(row["hz"]) * float(row["dur_s"])
 
 
-def _joined(order: Order, seed: int, rows: Mapping[tuple[str, int], list[Row]]) -> list[Row]:
+def _joined(order: ModelRuns, seed: int, rows: Mapping[tuple[str, int], list[Row]]) -> list[Row]:
     return [row for first in range(0, order.runs, CHUNK) for row in rows[_name(order, first), seed]]
 
 
@@ -155,13 +151,13 @@ CONTROLS: dict[str, Depth] = {
 }
 """Models that are too simple, and must be found out."""
 
-Rows = dict[Order, list[Row]]
+Rows = dict[ModelRuns, list[Row]]
 
 WANTED, WANTED_POOLED = 150, 40  # conditions that should be judged
 
 
 @dataclass(frozen=True)
-class Setting:
+class NetworkSetting:
     """How much is played.
 
     Attributes:
@@ -176,7 +172,7 @@ class Setting:
     workers: int = 1
     ablate: bool = False
 
-    def runs(self, group: Group) -> int:
+    def runs(self, group: ConditionGroup) -> int:
         """Of the model for a condition: one where nothing is left to chance."""
         condition = group.condition
         if condition.loss > 0:
@@ -190,7 +186,7 @@ class Setting:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class NetworkComparison:
     """What was found.
 
     Attributes:
@@ -204,19 +200,19 @@ class Comparison:
         ablated: The same with a mechanism left out, by its name.
     """
 
-    groups: Sequence[Group]
-    left_out: Sequence[Group]
-    verdicts: Sequence[Verdict]
+    groups: Sequence[ConditionGroup]
+    left_out: Sequence[ConditionGroup]
+    verdicts: Sequence[CellVerdict]
     pooled: Pooled
-    rarely: Sequence[Cell]
+    rarely: Sequence[ComparedCell]
     controls: dict[str, Pooled] = field(default_factory=dict)
     ablated: dict[str, Pooled] = field(default_factory=dict)
 
-    def of_kind(self, kind: Kind) -> list[Verdict]:
+    def of_kind(self, kind: ConditionKind) -> list[CellVerdict]:
         """The verdicts on conditions of a kind."""
         return [v for v in self.verdicts if v.cell.group.kind == kind]
 
-    def passes_bands(self, kind: Kind) -> bool:
+    def passes_bands(self, kind: ConditionKind) -> bool:
         """Whether enough lies inside: everything, of single runs under loss nine of ten."""
         inside, judged = share_inside(self.of_kind(kind))
         return inside >= (MIN_INSIDE if kind == "single" else 1.0) * judged
@@ -240,7 +236,7 @@ class Comparison:
         return max(0, WANTED - len(judged)), max(0, WANTED_POOLED - pooled)
 
     @property
-    def judged(self) -> list[Group]:
+    def judged(self) -> list[ConditionGroup]:
         """The conditions of which at least one measure is judged."""
         found = {v.cell.group.condition for v in self.verdicts if not v.why}
         found |= {scored.cell.group.condition for scored in self.pooled.scored}
@@ -248,8 +244,10 @@ class Comparison:
 
 
 def compare(
-    groups: Sequence[Group], setting: Setting, progress: Progress = lambda done: None
-) -> Comparison:
+    groups: Sequence[ConditionGroup],
+    setting: NetworkSetting,
+    progress: Progress = lambda done: None,
+) -> NetworkComparison:
     """Play every condition that may be judged, and judge it.
 
     Raises:
@@ -267,7 +265,7 @@ def compare(
         name: pool_variant(pooled, _cells(pooled_of(played), variant, rows))
         for name, variant in orders.items()
     }
-    return Comparison(
+    return NetworkComparison(
         groups=played,
         left_out=[group for group in groups if group.left_out],
         verdicts=[judge(c) for c in cells if c.group.kind != "pooled" or is_steady(c)],
@@ -278,29 +276,31 @@ def compare(
     )
 
 
-def orders_of(groups: Sequence[Group], setting: Setting) -> dict[str, list[Order]]:
+def orders_of(
+    groups: Sequence[ConditionGroup], setting: NetworkSetting
+) -> dict[str, list[ModelRuns]]:
     """What to play: the model as it is, what is too simple, and with mechanisms left out."""
     pooled, runs = pooled_of(groups), setting.control_runs
-    orders = {MODEL: [Order(g.condition, setting.runs(g)) for g in groups]}
+    orders = {MODEL: [ModelRuns(g.condition, setting.runs(g)) for g in groups]}
     for name, depth in CONTROLS.items() if pooled else ():
-        orders[name] = [Order(g.condition, runs, depth) for g in pooled]
+        orders[name] = [ModelRuns(g.condition, runs, depth) for g in pooled]
     for name in WITHOUT if pooled and setting.ablate else ():
-        orders[name] = [Order(g.condition, runs, without=(name,)) for g in pooled]
+        orders[name] = [ModelRuns(g.condition, runs, without=(name,)) for g in pooled]
     return orders
 
 
-def pooled_of(groups: Sequence[Group]) -> list[Group]:
+def pooled_of(groups: Sequence[ConditionGroup]) -> list[ConditionGroup]:
     """The conditions that are pooled."""
     return [group for group in groups if group.kind == "pooled"]
 
 
-def runs_in(groups: Sequence[Group], setting: Setting) -> int:
+def runs_in(groups: Sequence[ConditionGroup], setting: NetworkSetting) -> int:
     """How many runs a comparison takes."""
     played = [group for group in groups if not group.left_out]
     return sum(order.runs for own in orders_of(played, setting).values() for order in own)
 
 
-def depths_of(comparison: Comparison) -> dict[str, int]:
+def depths_of(comparison: NetworkComparison) -> dict[str, int]:
     """How many conditions were played how deep."""
     found: dict[str, int] = {}
     for group in comparison.groups:
@@ -309,7 +309,9 @@ def depths_of(comparison: Comparison) -> dict[str, int]:
     return found
 
 
-def _cells(groups: Sequence[Group], orders: Sequence[Order], rows: Rows) -> list[Cell]:
+def _cells(
+    groups: Sequence[ConditionGroup], orders: Sequence[ModelRuns], rows: Rows
+) -> list[ComparedCell]:
     return [
         c for group, own in zip(groups, orders, strict=True) for c in cells_of(group, rows[own])
     ]

@@ -9,18 +9,18 @@ import numpy as np
 
 from dva_sim.experiments.report.figures.palette import FAINT, INK, SOFT
 from dva_sim.experiments.report.figures.style import Drawn, finish, panels, styled
-from dva_sim.validation.network.comparison import Comparison
-from dva_sim.validation.network.judging import (
+from dva_sim.validation.network.comparison import NetworkComparison
+from dva_sim.validation.network.pooling import standard_error
+from dva_sim.validation.network.verdicts import (
     BOUNDED_SHARE,
     BY_NAME,
     KINDS,
     SHARES,
     TIME_MS,
-    Cell,
+    ComparedCell,
+    ConditionKind,
     Floats,
-    Kind,
 )
-from dva_sim.validation.network.pooling import standard_error
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -35,7 +35,7 @@ _PAIRS = (
     ("stale_p50", "stale_p95", "age while in force [ms]"),
     ("rtt_p50", "rtt_p95", "round trip [ms]"),
 )
-_ROWS: dict[Kind, str] = {
+_ROWS: dict[ConditionKind, str] = {
     "lossless": "without loss",
     "overload": "overload",
     "single": "single, under loss",
@@ -46,7 +46,7 @@ _FARTHEST_Z = 6.5  # what is farther off stands at the edge
 _FARTHEST = 1.6  # the same of predicted over measured
 
 
-def draw_all(comparison: Comparison) -> list[Drawn]:
+def draw_all(comparison: NetworkComparison) -> list[Drawn]:
     """Every figure there is something to draw for."""
     with styled():
         drawn = [_scatter(comparison), _ratios(comparison)]
@@ -57,7 +57,7 @@ def draw_all(comparison: Comparison) -> list[Drawn]:
     return drawn
 
 
-def _scatter(comparison: Comparison) -> Drawn:
+def _scatter(comparison: NetworkComparison) -> Drawn:
     """Predicted against measured, a row for each kind of condition."""
     figure, axes = panels(len(KINDS), len(_PAIRS), 2.5)
     for panel in _panels(comparison, axes):
@@ -80,7 +80,7 @@ def _scatter(comparison: Comparison) -> Drawn:
     return finish(figure, "scatter", "Predicted against measured", text)
 
 
-def _ratios(comparison: Comparison) -> Drawn:
+def _ratios(comparison: NetworkComparison) -> Drawn:
     """The same as predicted over measured: what is off can be seen."""
     figure, axes = panels(len(KINDS), len(_PAIRS), 1.9)
     for panel in _panels(comparison, axes):
@@ -107,12 +107,12 @@ class _Panel:
     """One kind of condition and one pair of measures; each mark with its shape and colour."""
 
     axes: Axes
-    kind: Kind
+    kind: ConditionKind
     is_time: bool
-    marks: list[tuple[Cell, str, str]]
+    marks: list[tuple[ComparedCell, str, str]]
 
 
-def _panels(comparison: Comparison, axes: list[list[Axes]]) -> list[_Panel]:
+def _panels(comparison: NetworkComparison, axes: list[list[Axes]]) -> list[_Panel]:
     outside = {id(v.cell) for v in comparison.verdicts if v.word == "outside"}
     outside |= {id(scored.cell) for scored in comparison.pooled.significant}
     shown = {id(v.cell) for v in comparison.verdicts if v.word == "shown only"}
@@ -151,7 +151,7 @@ def _label(figure: Figure, axes: list[list[Axes]], text: str) -> None:
     figure.legend(*corner.get_legend_handles_labels(), loc="outside upper left", ncols=4)
 
 
-def _bar(kind: Kind, cell: Cell) -> tuple[float, float]:
+def _bar(kind: ConditionKind, cell: ComparedCell) -> tuple[float, float]:
     """Where the model expects what was measured."""
     least = 0.02 * cell.model  # a logarithmic axis has no zero
     if kind == "single":
@@ -163,7 +163,7 @@ def _bar(kind: Kind, cell: Cell) -> tuple[float, float]:
     return cell.model, cell.model
 
 
-def _diagonal(axes: Axes, kind: Kind, is_time: bool) -> None:
+def _diagonal(axes: Axes, kind: ConditionKind, is_time: bool) -> None:
     """Where both agree, and the band around it."""
     axes.set_xscale("log")
     axes.set_yscale("log")
@@ -182,7 +182,7 @@ def _diagonal(axes: Axes, kind: Kind, is_time: bool) -> None:
         _log_ticks(axis, high / low)
 
 
-def _level(axes: Axes, kind: Kind, is_time: bool) -> None:
+def _level(axes: Axes, kind: ConditionKind, is_time: bool) -> None:
     """The same for predicted over measured."""
     from matplotlib.ticker import FixedLocator, NullLocator
 
@@ -215,7 +215,7 @@ def _log_ticks(axis: Axis, reach: float) -> None:
     axis.set_minor_locator(NullLocator())
 
 
-def _scores(comparison: Comparison) -> Drawn:
+def _scores(comparison: NetworkComparison) -> Drawn:
     """How z is distributed, and of each measure."""
     pooled = comparison.pooled
     figure, [[left, right]] = panels(1, 2, 3.2, width_ratios=(1, 1.3))
@@ -263,7 +263,7 @@ def _spread(count: int) -> Floats:
     return np.asarray(0.28 * (np.arange(count) * 0.618034 % 1.0 * 2 - 1))
 
 
-def _variants(comparison: Comparison) -> Drawn:
+def _variants(comparison: NetworkComparison) -> Drawn:
     """Root mean square of z with something left out."""
     found = {"nothing left out": comparison.pooled, **comparison.controls}
     found |= {f"without {name}": pooled for name, pooled in comparison.ablated.items()}

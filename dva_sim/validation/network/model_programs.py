@@ -28,7 +28,7 @@ class Socket(Protocol):
         """Close it without lingering and open another one."""
 
 
-class Program:
+class ModelProgram:
     """What both programs have in common.
 
     Args:
@@ -68,7 +68,7 @@ class Program:
             self._clock.call_at(due, action)
 
 
-class OnGrid(Program):
+class OnGrid(ModelProgram):
     """Publishes, or asks without waiting: command k is sent at start + k / hz."""
 
     def _next(self) -> None:
@@ -78,7 +78,7 @@ class OnGrid(Program):
         self._schedule(log.start + len(log.issued) * self._period, self._next)
 
 
-class Asking(Program):
+class Asking(ModelProgram):
     """Requests: the next command goes at the later of the reply and the last issue + 1 / hz.
 
     After a time-out the same command goes over a new socket; after the last attempt it is
@@ -104,7 +104,7 @@ class Asking(Program):
             self._clock.call_at(deadline, self._expire, number, attempt)
 
     def replied(self, number: int) -> None:
-        """See `Program`; a socket that was closed delivers nothing."""
+        """See `ModelProgram`; a socket that was closed delivers nothing."""
         super().replied(number)
         self._waiting = None, 0
         self._go_on()
@@ -136,7 +136,7 @@ NEVER_EARLY_S = 1e-6
 next arrival would fall on the same moment."""
 
 
-class Command(NamedTuple):
+class ModelCommand(NamedTuple):
     """A command on its way.
 
     Attributes:
@@ -160,14 +160,14 @@ class Robot:
     def __init__(self, clock: Clock, condition: Condition, log: RunLog) -> None:
         self._clock, self._condition, self._log = clock, condition, log
         self._service_s = condition.proc_ms / 1000.0 + NEVER_EARLY_S
-        self._order: deque[ReceivePipe[Command]] = deque()
+        self._order: deque[ReceivePipe[ModelCommand]] = deque()
         self._busy = False
 
-    def accept(self) -> ReceivePipe[Command]:
+    def accept(self) -> ReceivePipe[ModelCommand]:
         """The pipe of a new connection."""
         return ReceivePipe(self._condition.hwm, self._condition.conflate in ("rob", "both"))
 
-    def receive(self, pipe: ReceivePipe[Command], command: Command) -> None:
+    def receive(self, pipe: ReceivePipe[ModelCommand], command: ModelCommand) -> None:
         """A command has arrived.
 
         The program wakes up when all that came in one piece is there: ZeroMQ's thread decodes
@@ -189,7 +189,7 @@ class Robot:
                 return
         self._busy = False
 
-    def _done(self, command: Command) -> None:
+    def _done(self, command: ModelCommand) -> None:
         self._log.applied.append((command.number, self._clock.now))
         if command.answer is not None:
             command.answer(command.number)

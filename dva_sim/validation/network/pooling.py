@@ -20,7 +20,12 @@ from numpy.typing import NDArray
 
 from dva_sim.network.condition import Condition
 from dva_sim.statistics import holm
-from dva_sim.validation.network.judging import MEASURES, Cell, Measure, reason_against
+from dva_sim.validation.network.verdicts import (
+    MEASURES,
+    ComparedCell,
+    ComparedMeasure,
+    reason_against,
+)
 
 Floats = NDArray[np.float64]
 
@@ -44,7 +49,7 @@ class Scored:
         p: Two-sided, by the normal law.
     """
 
-    cell: Cell
+    cell: ComparedCell
     z: float
     error: float
     p: float
@@ -69,10 +74,10 @@ class Pooled:
     rms: float
     expected: tuple[float, float]
     false_alarms: float
-    biases: dict[Measure, float]
+    biases: dict[ComparedMeasure, float]
 
     @property
-    def biased(self) -> list[Measure]:
+    def biased(self) -> list[ComparedMeasure]:
         """The measures whose median bias is too large."""
         return [m for m, bias in self.biases.items() if not abs(bias) < bias_limit(m)]
 
@@ -87,13 +92,13 @@ class Pooled:
         return not self.significant and self.spread_is_right and not self.biased
 
 
-def bias_limit(measure: Measure) -> float:
+def bias_limit(measure: ComparedMeasure) -> float:
     """How large a median bias may be."""
     tail_of_age = measure.is_tail and measure.name.startswith(("age", "stale"))
     return MAX_TAIL_BIAS if tail_of_age else MAX_BIAS
 
 
-def pool_variant(own: Pooled, variants: Sequence[Cell]) -> Pooled:
+def pool_variant(own: Pooled, variants: Sequence[ComparedCell]) -> Pooled:
     """A variant of the model by the measures, and in the standard errors, of the model itself.
 
     So it cannot gain or lose by how much its own runs differ.
@@ -112,12 +117,12 @@ def pool_variant(own: Pooled, variants: Sequence[Cell]) -> Pooled:
     return _judged(scored, own.expected, own.false_alarms)
 
 
-def to_be_pooled(cells: Sequence[Cell]) -> list[Cell]:
+def to_be_pooled(cells: Sequence[ComparedCell]) -> list[ComparedCell]:
     """The cells that may be judged, say something, and differ from run to run."""
     return [c for c in cells if not reason_against(c) and tells(c) and not is_steady(c)]
 
 
-def pool(judged: Sequence[Cell], rng: np.random.Generator) -> Pooled:
+def pool(judged: Sequence[ComparedCell], rng: np.random.Generator) -> Pooled:
     """Judge cells of pooled conditions together.
 
     Args:
@@ -146,7 +151,7 @@ def _judged(scored: Sequence[Scored], expected: tuple[float, float], false_alarm
     )
 
 
-def tells(cell: Cell) -> bool:
+def tells(cell: ComparedCell) -> bool:
     """Whether a mean over runs says anything: defined nearly always, and not of rare events."""
     runs = len(cell.group.runs)
     if not len(cell.measured) or len(cell.predicted) < 2:
@@ -156,36 +161,36 @@ def tells(cell: Cell) -> bool:
     return len(cell.measured) >= MIN_SHARE * runs
 
 
-def is_steady(cell: Cell) -> bool:
+def is_steady(cell: ComparedCell) -> bool:
     """Whether runs differ less than the model can tell."""
     return tells(cell) and chance(cell) < resolution(cell)
 
 
-def score(cell: Cell) -> Scored:
+def score(cell: ComparedCell) -> Scored:
     """z of one cell."""
     error = standard_error(cell)
     z = (cell.model - cell.real) / error
     return Scored(cell, z, error, float(two_sided(np.array([z]))[0]))
 
 
-def standard_error(cell: Cell) -> float:
+def standard_error(cell: ComparedCell) -> float:
     """Of the difference of the means: chance on both sides, and what cannot be told apart."""
     return float(np.hypot(chance(cell), resolution(cell)))
 
 
-def chance(cell: Cell) -> float:
+def chance(cell: ComparedCell) -> float:
     """Standard error of the difference of the means, by how much the model's runs differ."""
     spread = float(cell.predicted.std(ddof=1))
     return float(spread * np.sqrt(1 / len(cell.measured) + 1 / len(cell.predicted)))
 
 
-def resolution(cell: Cell) -> float:
+def resolution(cell: ComparedCell) -> float:
     """What half a millisecond more for each command would change."""
     measure, condition = cell.measure, cell.group.condition
     if measure.is_time:
         return 1000.0 * EXACT_S
     if measure.name == "applied_hz":
-        per_command = cell.real**2 * EXACT_S if condition.pattern == "req" else 0.0
+        per_command = cell.real**2 * EXACT_S if condition.pattern == "req-rep" else 0.0
         return float(max(per_command, 1.0 / condition.dur_s / len(cell.group.runs)))
     if measure.name == "queue":
         return float(max(EXACT_S * condition.hz, 1e-6))
@@ -194,7 +199,7 @@ def resolution(cell: Cell) -> float:
     return 1.0 / len(cell.group.runs)
 
 
-def null_scores(cells: Sequence[Cell], rng: np.random.Generator) -> Floats:
+def null_scores(cells: Sequence[ComparedCell], rng: np.random.Generator) -> Floats:
     """z if runs of the model take the sockets' place, shape `(DRAWS, cells)`.
 
     A condition's measures are taken from the same runs, so that they go together as they do;

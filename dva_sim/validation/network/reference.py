@@ -1,8 +1,7 @@
-"""What was measured on real sockets: the reference that is shipped, and what is made here.
+"""Measurements on real sockets: the document that names them, the tables, and the design of ours.
 
-The document of the comparison: where measurements come from, and what is measured here.
-
-Our own conditions are a design: in each block every link meets every pair of programs.
+The reference is shipped; our own conditions are a design, in each block of which every link
+meets every pair of programs.
 """
 
 from __future__ import annotations
@@ -49,7 +48,7 @@ class SourceConfig(Config):
 
 
 @dataclass(frozen=True)
-class Run:
+class SocketRun:
     """One run on real sockets.
 
     Attributes:
@@ -71,7 +70,7 @@ class Run:
     values: Mapping[str, float]
 
 
-def load_runs(sources: Mapping[str, SourceConfig]) -> list[Run]:
+def load_runs(sources: Mapping[str, SourceConfig]) -> list[SocketRun]:
     """Every run of some tables, in their order.
 
     Raises:
@@ -80,7 +79,7 @@ def load_runs(sources: Mapping[str, SourceConfig]) -> list[Run]:
     return [run for name, source in sources.items() for run in read_runs(name, source)]
 
 
-def read_runs(name: str, source: SourceConfig) -> list[Run]:
+def read_runs(name: str, source: SourceConfig) -> list[SocketRun]:
     """The runs of one table.
 
     Raises:
@@ -98,7 +97,7 @@ def read_runs(name: str, source: SourceConfig) -> list[Run]:
     return [_run(name, source, row, str(path), line) for line, row in enumerate(rows, start=2)]
 
 
-def _run(name: str, source: SourceConfig, row: dict[str, str], path: str, line: int) -> Run:
+def _run(name: str, source: SourceConfig, row: dict[str, str], path: str, line: int) -> SocketRun:
     try:
         condition = Condition.from_row(row)
         values = {column: _number(row[column]) for column in NUMBERS}
@@ -107,7 +106,7 @@ def _run(name: str, source: SourceConfig, row: dict[str, str], path: str, line: 
     except (ConfigError, ValueError, KeyError) as error:
         raise ConfigError(str(error), path, line, 1) from None
     own = source.independent is None or row["group"] in source.independent
-    return Run(condition, name, row["group"], seed, own, realtime, values)
+    return SocketRun(condition, name, row["group"], seed, own, realtime, values)
 
 
 def _number(text: str) -> float:
@@ -116,7 +115,7 @@ def _number(text: str) -> float:
 
 SHIPPED = "network"
 
-Settings = dict[str, float | int | str | bool]
+ConditionSettings = dict[str, float | int | str | bool]
 
 
 class BlockConfig(Config):
@@ -132,9 +131,9 @@ class BlockConfig(Config):
 
     group: str
     seeds: Annotated[int, Field(ge=1, le=100)] = 1
-    settings: Settings = Field(default_factory=dict)
-    links: dict[str, Settings]
-    programs: dict[str, Settings]
+    settings: ConditionSettings = Field(default_factory=dict)
+    links: dict[str, ConditionSettings]
+    programs: dict[str, ConditionSettings]
 
 
 class OwnConfig(Config):

@@ -1,31 +1,33 @@
-"""The comparison in rows: one for each condition to be read, one for each measure to be kept.
+"""What a comparison with real sockets found, in words: its criteria, its conditions, its rows.
 
-What the comparison leaves behind: its rows, its words and its page.
+Without loss a prediction lies in its band, and a single run under loss in the model's interval;
+pooled runs are scored together, and models that are too simple have to be found out.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from pathlib import Path
+from functools import partial
 from typing import Any
 
 from dva_sim.network.condition import Condition
-from dva_sim.validation.frame import Row, render, write_all
-from dva_sim.validation.network.comparison import Comparison
+from dva_sim.validation.frame import ResultSheet, Row, ValidationResult
+from dva_sim.validation.frame import short_number as number
+from dva_sim.validation.network.comparison import NetworkComparison
 from dva_sim.validation.network.figures import draw_all
-from dva_sim.validation.network.judging import (
+from dva_sim.validation.network.pooling import Pooled, Scored, bias_limit
+from dva_sim.validation.network.prediction import depth_for
+from dva_sim.validation.network.verdicts import (
     BY_NAME,
     KINDS,
     MIN_INSIDE,
-    Cell,
-    Group,
-    Kind,
-    Verdict,
+    CellVerdict,
+    ComparedCell,
+    ConditionGroup,
+    ConditionKind,
     share_inside,
 )
-from dva_sim.validation.network.pooling import Pooled, Scored, bias_limit
-from dva_sim.validation.network.predict import depth_for
 
 HEADS = (
     *("condition", "runs", "depth", "period [ms]", "age [ms]", "in force [ms]"),
@@ -35,7 +37,7 @@ _COLUMNS = (("age_p50", "age_p95"), ("stale_p50", "stale_p95"), ("rtt_p50", "rtt
 _ALONE = ("delivered", "queue", "timeouts", "alerts")
 
 
-def table(comparison: Comparison, kind: Kind) -> list[list[str]]:
+def table(comparison: NetworkComparison, kind: ConditionKind) -> list[list[str]]:
     """A row for each condition of a kind: measured, an arrow, predicted; and a verdict."""
     cells = _by_condition(comparison)
     misses = _misses(comparison)
@@ -46,7 +48,9 @@ def table(comparison: Comparison, kind: Kind) -> list[list[str]]:
     ]
 
 
-def _line(group: Group, cells: Mapping[str, Cell], misses: Sequence[str]) -> list[str]:
+def _line(
+    group: ConditionGroup, cells: Mapping[str, ComparedCell], misses: Sequence[str]
+) -> list[str]:
     period = cells.get("applied_hz")
     shown = [_both(period, lambda rate: 1000 / rate if rate else math.inf)]
     for pair in _COLUMNS:
@@ -57,26 +61,26 @@ def _line(group: Group, cells: Mapping[str, Cell], misses: Sequence[str]) -> lis
     return [group.condition.label, str(len(group.runs)), depth, *shown, verdict]
 
 
-def _both(cell: Cell | None, change: Any = lambda value: value) -> str:
+def _both(cell: ComparedCell | None, change: Any = lambda value: value) -> str:
     """`105 → 106`, measured and predicted; nothing where neither is defined."""
     if cell is None:
         return ""
     return f"{number(change(cell.real))} → {number(change(cell.model))}"
 
 
-def _by_condition(comparison: Comparison) -> dict[Condition, dict[str, Cell]]:
-    found: dict[Condition, dict[str, Cell]] = {}
+def _by_condition(comparison: NetworkComparison) -> dict[Condition, dict[str, ComparedCell]]:
+    found: dict[Condition, dict[str, ComparedCell]] = {}
     for cell in _all_cells(comparison):
         found.setdefault(cell.group.condition, {})[cell.measure.name] = cell
     return found
 
 
-def _all_cells(comparison: Comparison) -> list[Cell]:
+def _all_cells(comparison: NetworkComparison) -> list[ComparedCell]:
     pooled = [scored.cell for scored in comparison.pooled.scored]
     return [*(v.cell for v in comparison.verdicts), *pooled, *comparison.rarely]
 
 
-def _misses(comparison: Comparison) -> dict[Condition, list[str]]:
+def _misses(comparison: NetworkComparison) -> dict[Condition, list[str]]:
     """The measures of each condition that lie outside, or are significantly off."""
     found: dict[Condition, list[str]] = {}
     for cell in _outside(comparison):
@@ -84,21 +88,12 @@ def _misses(comparison: Comparison) -> dict[Condition, list[str]]:
     return found
 
 
-def _outside(comparison: Comparison) -> list[Cell]:
+def _outside(comparison: NetworkComparison) -> list[ComparedCell]:
     outside = [v.cell for v in comparison.verdicts if v.word == "outside"]
     return outside + [scored.cell for scored in comparison.pooled.significant]
 
 
-def number(value: float) -> str:
-    """Four digits that count, without an exponent."""
-    if math.isnan(value):
-        return "–"
-    if math.isinf(value):
-        return "∞"
-    return f"{value:.0f}" if abs(value) >= 1000 else f"{value:.4g}"
-
-
-def rows_of(comparison: Comparison) -> list[Row]:
+def rows_of(comparison: NetworkComparison) -> list[Row]:
     """A row for each measure of each condition."""
     rows = [_row(v.cell) | _judged(v) for v in comparison.verdicts]
     significant = {id(scored) for scored in comparison.pooled.significant}
@@ -106,7 +101,7 @@ def rows_of(comparison: Comparison) -> list[Row]:
     return rows + [_row(cell) | _untold() for cell in comparison.rarely]
 
 
-def _row(cell: Cell) -> Row:
+def _row(cell: ComparedCell) -> Row:
     group = cell.group
     row: Row = {"condition": group.condition.label, "cond_id": group.condition.hash}
     row |= {"kind": group.kind, "groups": " ".join(sorted({run.group for run in group.runs}))}
@@ -117,7 +112,7 @@ def _row(cell: Cell) -> Row:
     return row | {"measured": _known(cell.real), "predicted": _known(cell.model)}
 
 
-def _judged(verdict: Verdict) -> Row:
+def _judged(verdict: CellVerdict) -> Row:
     low, high = _known(verdict.low), _known(verdict.high)
     row: Row = {"low": low, "high": high, "z": None, "p": None}
     return row | {"verdict": verdict.word, "why": verdict.why}
@@ -137,7 +132,7 @@ def _known(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def variant_rows(comparison: Comparison) -> list[Row]:
+def variant_rows(comparison: NetworkComparison) -> list[Row]:
     """Root mean square of z of each variant, over all measures and for each."""
     found = {"nothing": comparison.pooled, **comparison.controls, **comparison.ablated}
     return [
@@ -158,13 +153,14 @@ NAME = "network"
 FEW_SINGLES = 20
 SUMMARY_HEADS = ("what", "found", "asked for", "verdict")
 ABLATION_HEADS = ("left out, or instead", "RMS z", "expected", "significant")
-TITLES: dict[Kind, str] = {
+WORST_HEADS = ("condition", "measured", "predicted", "z", "measure")
+TITLES: dict[ConditionKind, str] = {
     "lossless": "Without loss, load below 0.95",
     "overload": "Overload without loss",
     "single": "Single runs under loss",
     "pooled": "Pooled runs under loss, at least six seeds each",
 }
-TOLD: dict[Kind, str] = {
+TOLD: dict[ConditionKind, str] = {
     "lossless": "without loss, within the bands",
     "overload": "overload, within the bands",
     "single": "single runs under loss, within the model's 95 % intervals",
@@ -172,38 +168,55 @@ TOLD: dict[Kind, str] = {
 }
 
 
-def write(folder: Path, comparison: Comparison, conditions: Mapping[str, str]) -> Path:
-    """Write everything; the page's path.
+READING = (
+    "Measured → predicted; of times the median | the 95th percentile. The period is that of "
+    "commands applied at the robot; the queue is the mean number of commands under way (Little's "
+    "law). A name says pattern and rate, d delay [ms], j jitter [% of the delay], l loss [%], r "
+    "rate [kbit/s, 0 without limit], p service time [ms], T time-out [ms]."
+)
+WORST = 12  # of the largest z that are named
+
+
+def evidence(comparison: NetworkComparison, conditions: Mapping[str, str]) -> ValidationResult:
+    """What all conditions come to.
 
     Args:
-        folder: Made if it is not there.
         comparison: What was found.
-        conditions: What the page says of how.
-
-    Raises:
-        DvaSimError: the folder cannot be written.
+        conditions: How it was found, by name.
     """
-    drawn = draw_all(comparison)
-    page = render(
-        "validation-network.html.j2",
-        drawn,
-        headline=headline(comparison),
-        notes=notes(comparison),
-        fails=not comparison.passes,
-        conditions=conditions,
-        summary=summary(comparison),
-        ablation=ablation(comparison),
-        heads=HEADS,
-        groups=[(TITLES[kind], table(comparison, kind)) for kind in KINDS],
-        left_out=left_out(comparison),
-    )
+    criteria = _sheet("Criteria", SUMMARY_HEADS, summary(comparison))
+    without = _sheet("What is left out", ABLATION_HEADS, ablation(comparison))
+    by_kind = {kind: table(comparison, kind) for kind in KINDS}
+    tables = [
+        _sheet(f"{TITLES[kind]} (measured → predicted)", HEADS, rows, "" if number else READING)
+        for number, (kind, rows) in enumerate((k, rows) for k, rows in by_kind.items() if rows)
+    ]
+    unjudged = _sheet("Not judged", ("why", "conditions"), left_out(comparison))
+    largest = _sheet("Largest deviations of pooled conditions", WORST_HEADS, worst(comparison))
     kept = {NAME: rows_of(comparison)}
     if comparison.controls or comparison.ablated:
         kept["variants"] = variant_rows(comparison)
-    return write_all(folder, kept, drawn, page)
+    return ValidationResult(
+        name=NAME,
+        headline=headline(comparison),
+        passes=comparison.passes,
+        notes=notes(comparison),
+        conditions=conditions,
+        sheets=[sheet for sheet in (criteria, without, *tables, unjudged, largest) if sheet.rows],
+        told=[sheet for sheet in (*tables, unjudged, largest, criteria, without) if sheet.rows],
+        draw=partial(draw_all, comparison),
+        tables=kept,
+    )
 
 
-def headline(comparison: Comparison) -> str:
+def _sheet(
+    title: str, heads: tuple[str, ...], rows: Sequence[Sequence[str]], text: str = ""
+) -> ResultSheet:
+    left = frozenset({0, len(heads) - 1})
+    return ResultSheet(title, heads, rows, words=left, text=text, wraps=len(heads) == 2)
+
+
+def headline(comparison: NetworkComparison) -> str:
     """What it comes to, in two sentences."""
     judged = comparison.judged
     counts = ", ".join(
@@ -216,7 +229,7 @@ def headline(comparison: Comparison) -> str:
     return f"{len(judged)} conditions are judged ({counts}). The model {verdict}."
 
 
-def notes(comparison: Comparison) -> list[str]:
+def notes(comparison: NetworkComparison) -> list[str]:
     """What is missing, and what was found out."""
     found = []
     every, pooled = comparison.missing
@@ -245,7 +258,7 @@ def notes(comparison: Comparison) -> list[str]:
     return found
 
 
-def summary(comparison: Comparison) -> list[tuple[str, str, str, str]]:
+def summary(comparison: NetworkComparison) -> list[tuple[str, str, str, str]]:
     """Each criterion: what, found, asked for, verdict."""
     rows = []
     for kind in KINDS:
@@ -289,7 +302,7 @@ def _pooled_rows(pooled: Pooled) -> list[tuple[str, str, str, str]]:
     return rows
 
 
-def ablation(comparison: Comparison) -> list[tuple[str, str, str, str]]:
+def ablation(comparison: NetworkComparison) -> list[tuple[str, str, str, str]]:
     """Root mean square of z with something left out, the worst first."""
     own = comparison.pooled
     found = {"nothing": own, **comparison.controls, **comparison.ablated}
@@ -307,7 +320,7 @@ def ablation(comparison: Comparison) -> list[tuple[str, str, str, str]]:
     ]
 
 
-def left_out(comparison: Comparison) -> list[tuple[str, str]]:
+def left_out(comparison: NetworkComparison) -> list[tuple[str, str]]:
     """Why conditions were not judged, and how many."""
     reasons: dict[str, list[str]] = {}
     for group in comparison.left_out:
@@ -323,11 +336,16 @@ def _passes(passes: bool) -> str:
     return "passes" if passes else "fails"
 
 
-def worst(comparison: Comparison, count: int) -> list[str]:
-    """The largest z, in words."""
-    ordered = sorted(comparison.pooled.scored, key=lambda s: -abs(s.z))[:count]
+def worst(comparison: NetworkComparison) -> list[list[str]]:
+    """The largest z, the largest first."""
+    ordered = sorted(comparison.pooled.scored, key=lambda s: -abs(s.z))[:WORST]
     return [
-        f"{s.cell.group.condition.label} {s.cell.measure.name}: measured "
-        f"{number(s.cell.real)}, predicted {number(s.cell.model)}, z {s.z:.1f}"
-        for s in ordered
+        [
+            scored.cell.group.condition.label,
+            number(scored.cell.real),
+            number(scored.cell.model),
+            f"{scored.z:.1f}",
+            scored.cell.measure.name,
+        ]
+        for scored in ordered
     ]

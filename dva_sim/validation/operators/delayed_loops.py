@@ -19,13 +19,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from dva_sim.agents.operator.person import Person, Population, median_person
-from dva_sim.agents.operator.strategies.base import PointView, Reach, Strategy, View
+from dva_sim.agents.observation import Observation
+from dva_sim.agents.operator.strategies.base import PointView, Strategy
 from dva_sim.agents.operator.strategies.cursor import Sighting
 from dva_sim.agents.operator.strategies.predictor import Predictor
-from dva_sim.agents.operator.strategies.pursuit import NEAREST_LOOK, Pursuit
-from dva_sim.agents.robot.camera import Observation
-from dva_sim.agents.route_following import Route
+from dva_sim.agents.operator.strategies.pursuit import Pursuit
+from dva_sim.agents.person import Person, Population, median_person
+from dva_sim.agents.route_following import NEAREST_LOOK, Reach, Route, View
 from dva_sim.agents.tilt.filters import BATCH, Filter, load_filter
 from dva_sim.kernel.streams import Streams
 

@@ -17,8 +17,8 @@ from dva_sim.kernel.streams import Streams
 from dva_sim.simulation.shift import scenario as timed
 from dva_sim.simulation.shift import simulate_timed
 from dva_sim.validation.operators import delayed_loops
-from dva_sim.worlds.hazards import GROWTH_S, Fire
-from dva_sim.worlds.hazards.detectors import CoAlarm
+from dva_sim.worlds.hazards import GROWTH_S, Fire, make_hazard
+from dva_sim.worlds.hazards.alarms import CoAlarm
 from dva_sim.worlds.hazards.fire import FULL_GROWTH_KW
 from dva_sim.worlds.hazards.gas_dispersion import sigma_y
 
@@ -37,7 +37,9 @@ def fires() -> Values:
     times = np.arange(0.0, 700.0, 0.05)
     found = {}
     for growth in GROWTH_S:
-        heat = np.array([Fire((0.0, 0.0), 0.0, growth).heat_release(float(t)) for t in times])
+        fire = make_hazard("fire", (0.0, 0.0), 0.0, growth=growth)
+        assert isinstance(fire, Fire)
+        heat = np.array([fire.heat_release(float(t)) for t in times])
         found[growth] = float(times[np.argmax(heat >= FULL_GROWTH_KW * (1.0 - 1e-9))])
     return found
 

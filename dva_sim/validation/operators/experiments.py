@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from dva_sim.simulation.task.measures import fit_line
-from dva_sim.validation.operators.judging import Cells, Floats, Trials, Values, mean, person_means
+from dva_sim.validation.operators.verdicts import Cells, Floats, Trials, Values, mean, person_means
 
 FOLDER = "experiments/scenarios/tasks"
 

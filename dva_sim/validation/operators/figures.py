@@ -1,10 +1,6 @@
-"""Figures of what is exact: delayed loops, and the dissertation's median.
+"""Figures of a validation: what is simulated beside what was published, with its bands.
 
-Strokes that the figures of experiments share: means with intervals, bands, rings, lines.
-
-Figures of the experiments: simulated persons beside published ones.
-
-Figures of a validation: what is simulated beside what was published, with its bands.
+First what is exact (delayed loops, the dissertation's median), then the experiments, then all.
 """
 
 from __future__ import annotations
@@ -15,14 +11,21 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dva_sim.agents.operator.published import Kind, Line
+from dva_sim.agents.operator.published import LineKind, TargetLine
 from dva_sim.experiments.report.figures.palette import FAINT, INK, SOFT
 from dva_sim.experiments.report.figures.style import Drawn, finish, panels, styled
 from dva_sim.simulation.task.measures import fit_line
 from dva_sim.validation.operators import delayed_loops
 from dva_sim.validation.operators import experiments as of
 from dva_sim.validation.operators.exact import SMITH
-from dva_sim.validation.operators.judging import Cells, Floats, Trials, Verdict, mean, person_means
+from dva_sim.validation.operators.verdicts import (
+    Cells,
+    Floats,
+    LineVerdict,
+    Trials,
+    mean,
+    person_means,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -169,7 +172,7 @@ def curve(
     axes.plot([], [], "o-", color=colour, ms=5, label=label)
 
 
-def straight(axes: Axes, x: Floats, y: Floats, verdict: Verdict) -> None:
+def straight(axes: Axes, x: Floats, y: Floats, verdict: LineVerdict) -> None:
     """Points and the line through them, with how straight they are."""
     line = fit_line(x, y)
     ends = np.array([0.0, x.max()])
@@ -182,19 +185,19 @@ def straight(axes: Axes, x: Floats, y: Floats, verdict: Verdict) -> None:
     axes.set_ylim(bottom=0)
 
 
-def bar(axes: Axes, x: float, line: Line, width: float) -> None:
+def bar(axes: Axes, x: float, line: TargetLine, width: float) -> None:
     """A band as a grey bar."""
     low, high = line.low or 0.0, line.high or 0.0
     axes.bar([x], [high - low], width, bottom=low, color=FAINT, alpha=0.8, lw=0, zorder=0)
 
 
-def ring(axes: Axes, x: float, line: Line) -> None:
+def ring(axes: Axes, x: float, line: TargetLine) -> None:
     """The published number, if there is one."""
     if line.target is not None:
         axes.plot([x], [line.target], "o", mfc="none", mec=ORANGE, ms=9, mew=1.5)
 
 
-def value(axes: Axes, x: float, verdict: Verdict) -> None:
+def value(axes: Axes, x: float, verdict: LineVerdict) -> None:
     """A simulated value with its interval, and in words."""
     found = verdict.found
     axes.plot([x, x], [found.low, found.high], color=BLUE, lw=1.4)
@@ -212,10 +215,10 @@ def value(axes: Axes, x: float, verdict: Verdict) -> None:
 
 _SHADES = ("#56B4E9", "#0072B2", "#009E73", "#D55E00")  # from little to much
 
-ByLine = Mapping[str, Verdict]
+ByLine = Mapping[str, LineVerdict]
 
 
-def draw_people(verdicts: Sequence[Verdict], played: Mapping[str, Cells]) -> list[Drawn]:
+def draw_people(verdicts: Sequence[LineVerdict], played: Mapping[str, Cells]) -> list[Drawn]:
     """One figure for each experiment."""
     lines = {v.line.id: v for v in verdicts}
     return [
@@ -370,7 +373,7 @@ def _waiting(lines: ByLine, cells: Cells) -> Drawn:
     return finish(figure, "waiting", "Moving and waiting", text)
 
 
-def _excavator(axes: Axes, verdict: Verdict) -> None:
+def _excavator(axes: Axes, verdict: LineVerdict) -> None:
     """What the delay adds to its time."""
     bar(axes, 0, verdict.line, 0.5)
     ring(axes, 0, verdict.line)
@@ -433,7 +436,7 @@ def _tracking(lines: ByLine, cells: Cells) -> Drawn:
 
 
 _COLOURS = {"passes": "#0072B2", "misses": "#D55E00", "shown only": SOFT}
-_PEOPLE: tuple[Kind, ...] = ("held-out", "fitted", "remembered")
+_PEOPLE: tuple[LineKind, ...] = ("held-out", "fitted", "remembered")
 _TITLES = {
     "held-out": "Held out: counted",
     "fitted": "Fitted to: shown only",
@@ -443,13 +446,13 @@ _ROW = 0.27  # [in]
 _LIMIT = 1.6  # half widths of the band shown; what is further off stands at the edge
 
 
-def draw_all(verdicts: Sequence[Verdict], played: Mapping[str, Cells]) -> list[Drawn]:
+def draw_all(verdicts: Sequence[LineVerdict], played: Mapping[str, Cells]) -> list[Drawn]:
     """Every figure."""
     with styled():
         return [_overview(verdicts), *draw_people(verdicts, played), *draw_exact()]
 
 
-def _overview(verdicts: Sequence[Verdict]) -> Drawn:
+def _overview(verdicts: Sequence[LineVerdict]) -> Drawn:
     """All that was measured on persons, each line by its own band."""
     shown = [v for kind in _PEOPLE for v in verdicts if v.line.kind == kind]
     figure, [[axes]] = panels(1, 1, 0.9 + _ROW * (len(shown) + 2 * len(_PEOPLE)))
@@ -484,7 +487,7 @@ def _overview(verdicts: Sequence[Verdict]) -> Drawn:
     return finish(figure, "overview", "Simulated persons in the bands of published ones", text)
 
 
-def _mark(axes: Axes, row: float, verdict: Verdict) -> None:
+def _mark(axes: Axes, row: float, verdict: LineVerdict) -> None:
     low, high = verdict.line.low, verdict.line.high
     if low is None or high is None:
         return

@@ -1,28 +1,36 @@
-"""What a validation of operators leaves behind: its rows, its words and its page."""
+"""What a validation of operators found, in words: its lines, and what it leaves.
+
+A line passes if the simulated value lies in the published band; the split says which shares of
+the exact and of the held-out lines must.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
+from functools import partial
 from typing import Any
 
-from dva_sim.agents.operator.published import Kind, Line
-from dva_sim.validation.frame import Row, render, write_all
+from dva_sim.agents.operator.published import LineKind, TargetLine
+from dva_sim.validation.frame import ResultSheet, Row, ValidationResult, short_number
 from dva_sim.validation.operators.experiments import TRIED
 from dva_sim.validation.operators.figures import draw_all
-from dva_sim.validation.operators.judging import Cells, Found, Outcome, Verdict, mean
+from dva_sim.validation.operators.verdicts import Cells, Found, LineVerdict, Tally, mean
 
 NAME = "operators"
-HEADS = ("line", "what", "published", "simulated", "verdict")
+HEADS = ("line", "what", "published (band)", "simulated (95 % interval)", "verdict")
 OTHER = "standards"  # the exact lines that have nothing to do with operators and phones
-GROUPS: tuple[tuple[str, Kind, bool], ...] = (
+GROUPS: tuple[tuple[str, LineKind, bool], ...] = (
     ("Operators and phones: theory, the dissertation's app (exact)", "exact", False),
     ("Operators: published experiments that nothing was fitted to (held out)", "held-out", False),
     ("Operators: beside these, shown, never counted", "beside", False),
     ("Operators: fitted to, shown, never counted", "fitted", False),
     ("Operators: from memory, shown, never counted", "remembered", False),
     ("Fires, alarms and people on foot: standards and textbooks (exact)", "exact", True),
+)
+STEERING = (
+    "In which share of the time the persons of each experiment moved and waited for what they had "
+    "done; the rest of it they steered in a closed loop."
 )
 STEERED = "move_and_wait_share"
 BY = {
@@ -35,42 +43,50 @@ BY = {
 """What the names of the cells of an experiment mean, where they do not say it."""
 
 
-def write(
-    folder: Path,
-    verdicts: Sequence[Verdict],
-    outcome: Outcome,
+def evidence(
+    verdicts: Sequence[LineVerdict],
+    outcome: Tally,
     played: Mapping[str, Cells],
     conditions: Mapping[str, str],
-) -> Path:
-    """Write everything; the page's path.
+) -> ValidationResult:
+    """What all lines come to.
 
     Args:
-        folder: Made if it is not there.
         verdicts: Line by line.
         outcome: What they come to.
-        played: The trials of each experiment, for the figures.
-        conditions: What the page says of how.
-
-    Raises:
-        DvaSimError: the folder cannot be written.
+        played: The trials of each experiment.
+        conditions: How they were played, by name.
     """
-    drawn = draw_all(verdicts, played)
-    page = render(
-        "validation-operators.html.j2",
-        drawn,
+    groups = list(grouped(verdicts))
+    return ValidationResult(
+        name=NAME,
         headline=headline(outcome),
+        passes=outcome.passes,
         notes=notes(verdicts),
-        fails=not outcome.passes,
         conditions=conditions,
-        groups=[(title, _blocks(own)) for title, own in grouped(verdicts)],
-        steered=steered(played),
+        sheets=[*(_sheet(title, _with_sources(own)) for title, own in groups), _steered(played)],
+        told=[*(_sheet(title, list(map(words, own))) for title, own in groups), _steered(played)],
+        draw=partial(draw_all, verdicts, played),
+        tables={NAME: [_row(v) for v in verdicts], "steered": _shares(played)},
         rule=(100 * outcome.rule.exact, 100 * outcome.rule.held_out),
     )
-    tables = {NAME: [_row(v) for v in verdicts], "steered": _shares(played)}
-    return write_all(folder, tables, drawn, page)
 
 
-def grouped(verdicts: Sequence[Verdict]) -> Iterator[tuple[str, list[Verdict]]]:
+def _sheet(title: str, rows: Sequence[Sequence[str]]) -> ResultSheet:
+    left = frozenset({0, 1, 4})
+    return ResultSheet(
+        title, HEADS, rows, words=left, wraps=True, widths=(17, None, None, None, 19)
+    )
+
+
+def _steered(played: Mapping[str, Cells]) -> ResultSheet:
+    heads = "experiment", "moved and waited, by condition"
+    return ResultSheet(
+        "How they steered", heads, steered(played), frozenset({0, 1}), STEERING, wraps=True
+    )
+
+
+def grouped(verdicts: Sequence[LineVerdict]) -> Iterator[tuple[str, list[LineVerdict]]]:
     """The verdicts under their headings."""
     for title, kind, other in GROUPS:
         own = [v for v in verdicts if v.line.kind == kind]
@@ -92,7 +108,7 @@ def steered(played: Mapping[str, Cells]) -> list[tuple[str, str]]:
     return found
 
 
-def headline(outcome: Outcome) -> str:
+def headline(outcome: Tally) -> str:
     """What it comes to, in three sentences."""
     (exact, exact_of), (held, held_of) = outcome.exact, outcome.held_out
     whole, whole_of = outcome.publications
@@ -105,7 +121,7 @@ def headline(outcome: Outcome) -> str:
     return f"{found} Asked for are {asked}: {'passed' if outcome.passes else 'failed'}."
 
 
-def notes(verdicts: Sequence[Verdict]) -> list[str]:
+def notes(verdicts: Sequence[LineVerdict]) -> list[str]:
     """Every miss by name, and what is shown but not counted."""
     missed = [v for v in verdicts if v.word == "misses"]
     found = [
@@ -123,7 +139,7 @@ def notes(verdicts: Sequence[Verdict]) -> list[str]:
     return found
 
 
-def words(verdict: Verdict) -> list[str]:
+def words(verdict: LineVerdict) -> list[str]:
     """A verdict in words: line, what, published, simulated, verdict."""
     line = verdict.line
     said: str = verdict.word
@@ -132,53 +148,48 @@ def words(verdict: Verdict) -> list[str]:
     return [line.id, line.what, published(line), simulated(verdict), said]
 
 
-def published(line: Line) -> str:
+def published(line: TargetLine) -> str:
     """The target and its band, such as `0.39 (0.19 to 0.59)`."""
     unit = f" {line.unit}" if line.unit else ""
     if not line.has_band:
-        return f"{number(line.target)}{unit}"
+        return f"{short_number(line.target)}{unit}"
     if line.low is None:
-        band = f"at most {number(line.high)}"
+        band = f"at most {short_number(line.high)}"
     elif line.high is None:
-        band = f"at least {number(line.low)}"
+        band = f"at least {short_number(line.low)}"
     elif line.low == line.high:
-        band = number(line.low)
+        band = short_number(line.low)
     else:
-        band = f"{number(line.low)} to {number(line.high)}"
+        band = f"{short_number(line.low)} to {short_number(line.high)}"
     for side, limit in (("above", line.above), ("below", line.below)):
-        band += f", surely {side} {number(limit)}" if limit is not None else ""
-    return f"{band}{unit}" if line.target is None else f"{number(line.target)} ({band}){unit}"
+        band += f", surely {side} {short_number(limit)}" if limit is not None else ""
+    return f"{band}{unit}" if line.target is None else f"{short_number(line.target)} ({band}){unit}"
 
 
-def simulated(verdict: Verdict) -> str:
+def simulated(verdict: LineVerdict) -> str:
     """The value, with its interval where something is left to chance."""
     found, unit = verdict.found, f" {verdict.line.unit}" if verdict.line.unit else ""
     if math.isnan(found.value):
         return "nothing"
     if math.isinf(found.value):
         return "never"
-    value = number(found.value)
+    value = short_number(found.value)
     if found.persons:
-        value += f" ({number(found.low)} to {number(found.high)})"
+        value += f" ({short_number(found.low)} to {short_number(found.high)})"
     edge = (
         ", at the edge of what was tried" if found.value in TRIED.get(verdict.line.id, ()) else ""
     )
     return value + unit + edge
 
 
-def number(value: float | None) -> str:
-    """Four digits that count, without an exponent."""
-    return "" if value is None else f"{value:.4g}"
-
-
-def _blocks(verdicts: Sequence[Verdict]) -> list[tuple[str, str, list[list[str]]]]:
-    """Of each check: what it measured, its source, and its lines in words."""
-    blocks: dict[str, tuple[str, str, list[list[str]]]] = {}
+def _with_sources(verdicts: Sequence[LineVerdict]) -> list[Sequence[str]]:
+    """Of each check what it measured and its source, and below that its lines in words."""
+    rows: dict[str, list[Sequence[str]]] = {}
     for verdict in verdicts:
         line = verdict.line
-        source = f"{line.source} [{line.tag}]"
-        blocks.setdefault(line.check, (line.metric, source, []))[2].append(words(verdict))
-    return list(blocks.values())
+        head = line.metric, f"{line.source} [{line.tag}]"
+        rows.setdefault(line.check, [head]).append(words(verdict))
+    return [row for own in rows.values() for row in own]
 
 
 def _shares(played: Mapping[str, Cells]) -> list[Row]:
@@ -189,7 +200,7 @@ def _shares(played: Mapping[str, Cells]) -> list[Row]:
     ]
 
 
-def _row(verdict: Verdict) -> Row:
+def _row(verdict: LineVerdict) -> Row:
     line, found = verdict.line, verdict.found
     row: dict[str, Any] = {"line": line.id, "metric": line.metric, "what": line.what}
     row |= {"source": line.source, "publication": line.publication, "tag": line.tag}

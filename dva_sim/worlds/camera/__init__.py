@@ -1,7 +1,10 @@
-"""The picture a robot's camera takes: a quick 2.5-D ray-cast with walls, doors, people, hazards."""
+"""The picture a robot's camera takes: a quick 2.5-D ray-cast with walls, doors, people, hazards.
+
+It may import sites and hazards. Begin with `raycast.py`.
+"""
 
 from dva_sim.worlds.camera.raycast import Camera, encode
-from dva_sim.worlds.camera.sprites import Figure, Spot
-from dva_sim.worlds.camera.visibility import Smoke
+from dva_sim.worlds.camera.sprites import Figure
+from dva_sim.worlds.camera.visibility import SmokeView
 
-__all__ = ["Camera", "Figure", "Smoke", "Spot", "encode"]
+__all__ = ["Camera", "Figure", "SmokeView", "encode"]

@@ -10,19 +10,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.worlds.camera.sprites import Figure, Spot, Sprite, sprite_of
-from dva_sim.worlds.camera.surfaces import Floats, Hits, Rooms, Surfaces
+from dva_sim.worlds.camera.sprites import Figure, Sprite, sprite_of
+from dva_sim.worlds.camera.surfaces import Floats, Hits, RoomGrid, Surfaces
 from dva_sim.worlds.camera.textures import HORIZON, OPEN_AIR, TEXELS, Floors, Uprights
 from dva_sim.worlds.camera.visibility import (
     Rays,
-    Smoke,
+    SmokeView,
     add_firelight,
     add_smoke,
     add_water,
     look_up,
 )
 from dva_sim.worlds.geo import Pose
-from dva_sim.worlds.hazards import Raster
+from dva_sim.worlds.hazards import Hazard, Raster
 from dva_sim.worlds.layout import Site
 
 Picture = NDArray[np.uint8]
@@ -61,7 +61,7 @@ class Camera:
         self.width, self.height, self.eye_height = width, height, eye_height
         self.focal_length = width / 2 / math.tan(field_of_view / 2)  # [pixels]
         self._ceiling = site.ceiling
-        self._surfaces, self._rooms = Surfaces(site), Rooms(site)
+        self._surfaces, self._rooms = Surfaces(site), RoomGrid(site)
         self._uprights = Uprights(site, self._surfaces, self._rooms)
         column = np.arange(width, dtype=np.float32) + 0.5 - width / 2
         self._slopes: Floats = (column / self.focal_length).astype(np.float32)
@@ -76,8 +76,8 @@ class Camera:
         self,
         pose: Pose,
         figures: Sequence[Figure] = (),
-        spots: Sequence[Spot] = (),
-        smoke: Smoke | None = None,
+        hazards: Sequence[Hazard] = (),
+        smoke: SmokeView | None = None,
         water: Raster | None = None,
         time: float = 0.0,
     ) -> Picture:
@@ -86,7 +86,7 @@ class Camera:
         Args:
             pose: Of the lens [m, rad].
             figures: Robots and people around; not the one that carries the camera.
-            spots: Fires and leaks.
+            hazards: What goes on.
             smoke: Where it is, if there is any.
             water: Its depth on the floor [m], if there is any.
             time: Lets flames flicker and water ripple [s].
@@ -100,12 +100,12 @@ class Camera:
         self._draw_walls(walls, pose, colours, depth, light)
         self._draw_others(before, pose, colours, depth, light)
         scene, rays = _develop(colours, light), self._rays(pose)
-        for spot in spots:
-            if spot.kind == "fire":
-                self._light_up(scene, depth, rays, spot)
+        for hazard in hazards:
+            if firelight := hazard.light(time):
+                self._light_up(scene, depth, rays, hazard.position, firelight)
         if water is not None:
             self._flood(scene, depth, rays, water, walls.depth, time)
-        self._add_things(scene, depth, pose, (*spots, *figures), time)
+        self._add_things(scene, depth, pose, (*hazards, *figures), time)
         if smoke is not None:
             heights = self.eye_height, self._ceiling
             add_smoke(scene, depth, rays, self._fall, smoke, heights)
@@ -178,21 +178,23 @@ class Camera:
 
     # --- what moves, burns and floods --------------------------------------------------
 
-    def _light_up(self, scene: Floats, depth: Floats, rays: Rays, fire: Spot) -> None:
+    def _light_up(
+        self, scene: Floats, depth: Floats, rays: Rays, fire: tuple[float, float], light: float
+    ) -> None:
         """Firelight in the room of the fire."""
         x, y = depth[::2] * rays.x, depth[::2] * rays.y
-        x += np.float32(rays.origin[0] - fire.x)
-        y += np.float32(rays.origin[1] - fire.y)
+        x += np.float32(rays.origin[0] - fire[0])
+        y += np.float32(rays.origin[1] - fire[1])
         gap2 = x * x
         gap2 += y * y
         if float(gap2.min()) > LIGHT_REACH**2:
             return
         # A wall belongs to the room on this side of it.
-        x += np.float32(fire.x) - np.float32(0.1) * rays.x
-        y += np.float32(fire.y) - np.float32(0.1) * rays.y
-        place = np.array([[fire.x], [fire.y]], dtype=np.float32)
+        x += np.float32(fire[0]) - np.float32(0.1) * rays.x
+        y += np.float32(fire[1]) - np.float32(0.1) * rays.y
+        place = np.array([[fire[0]], [fire[1]]], dtype=np.float32)
         lit = self._rooms.at(x, y) == self._rooms.at(*place)
-        add_firelight(scene, gap2, lit, min(1.0, 0.35 + fire.radius))
+        add_firelight(scene, gap2, lit, light)
 
     def _flood(
         self, scene: Floats, depth: Floats, rays: Rays, water: Raster, far: Floats, time: float
@@ -213,18 +215,21 @@ class Camera:
         scene: Floats,
         depth: Floats,
         pose: Pose,
-        things: Sequence[Figure | Spot],
+        things: Sequence[Figure | Hazard],
         time: float,
     ) -> None:
         """Everything that stands about, the farthest first."""
         cos, sin = math.cos(pose.heading), math.sin(pose.heading)
-        ahead = [(t.x - pose.x) * cos + (t.y - pose.y) * sin for t in things]
+        gaps = [(x - pose.x, y - pose.y) for x, y in map(_place_of, things)]
+        ahead = [dx * cos + dy * sin for dx, dy in gaps]
         for number in sorted(range(len(things)), key=lambda n: -ahead[n]):
             if not CLOSEST < ahead[number] < HORIZON:
                 continue
-            thing = things[number]
-            dx, dy = thing.x - pose.x, thing.y - pose.y
-            sprite = sprite_of(thing, math.atan2(dy, dx), self._ceiling, time)
+            thing, (dx, dy) = things[number], gaps[number]
+            if isinstance(thing, Figure):
+                sprite: Sprite | None = sprite_of(thing, math.atan2(dy, dx))
+            else:
+                sprite = thing.sprite(time, self._ceiling)
             if sprite is not None:
                 self._add_sprite(scene, depth, sprite, ahead[number], dx * sin - dy * cos)
 
@@ -263,6 +268,10 @@ def encode(picture: Picture, quality: int = QUALITY) -> bytes:
     stream = BytesIO()
     Image.fromarray(picture).save(stream, "JPEG", quality=quality)
     return stream.getvalue()
+
+
+def _place_of(thing: Figure | Hazard) -> tuple[float, float]:
+    return (thing.x, thing.y) if isinstance(thing, Figure) else thing.position
 
 
 def _develop(colours: Any, light: Floats) -> Floats:

@@ -1,6 +1,6 @@
-"""Upright pictures of people, robots, flames and gas bottles, drawn once per process.
+"""Upright pictures of what stands before a camera: people, robots, flames, gas bottles.
 
-What stands about before a camera: people, robots, fires, leaking bottles.
+Each is drawn once per process. Which picture a hazard has, its own class says.
 """
 
 from __future__ import annotations
@@ -12,8 +12,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
-
-from dva_sim.worlds.hazards.fire import HEAT_PER_AREA
 
 SCALE = 120  # pixels per metre of a finished sprite
 FINER = 4  # so many times larger is it drawn, for smooth edges
@@ -31,7 +29,6 @@ HAIRS = ((62, 44, 32), (30, 26, 26), (150, 110, 60), (120, 118, 116))
 NAVY, VEST = (36, 48, 82), (236, 206, 40)
 SHELL, TRIM, DARK = (228, 232, 236), (38, 110, 190), (44, 48, 56)
 FLAME_FRAMES = 6
-FLAME_RATE = 8.0  # of the flickering [1/s]
 VIEWS = ("front", "left", "back", "right")
 
 
@@ -283,47 +280,17 @@ class Figure(NamedTuple):
     lying: bool = False
 
 
-class Spot(NamedTuple):
-    """Where something burns, leaks or floods: kind, place and radius [m]."""
-
-    kind: str
-    x: float
-    y: float
-    radius: float
-
-
-def sprite_of(thing: Figure | Spot, bearing: float, ceiling: float, time: float) -> Sprite | None:
-    """How something looks from where the lens is; a flood has nothing that stands.
+def sprite_of(figure: Figure, bearing: float) -> Sprite:
+    """How somebody looks from where the lens is.
 
     Args:
-        thing: What.
-        bearing: Of the line from the lens to it [rad].
-        ceiling: Flames end there [m].
-        time: Lets flames flicker [s].
+        figure: Who.
+        bearing: Of the line from the lens there [rad].
     """
-    if isinstance(thing, Spot):
-        if thing.kind == "gas_leak":
-            return bottle()
-        return _fire(thing, ceiling, time) if thing.kind == "fire" else None
-    view = view_of(thing.heading, bearing)
-    if thing.kind == "robot":
+    view = view_of(figure.heading, bearing)
+    if figure.kind == "robot":
         return robot(view)
-    guard = thing.kind == "guard"
-    if thing.lying:
-        return lying(thing.number, guard)
-    return person(view, thing.number, guard)
-
-
-def _fire(fire: Spot, ceiling: float, time: float) -> Sprite:
-    """Flames as wide as what burns, as high as its heat makes them.
-
-    References:
-        G. Heskestad, Fire Safety Journal 5 (1983) 103-108: L = 0.235 Q^(2/5) - 1.02 D, with
-        the heat release Q [kW] and the diameter D [m].
-    """
-    heat = HEAT_PER_AREA * math.pi * fire.radius**2
-    tall = 0.235 * heat**0.4 - 2.04 * fire.radius
-    # Tongues leap higher than the mean; the smallest fire can still be seen.
-    size = max(0.45, 2.2 * fire.radius), min(ceiling, max(0.45, 1.25 * tall))
-    frame = int(time * FLAME_RATE + 3 * fire.x) % FLAME_FRAMES
-    return flames(frame)._replace(size=size)
+    guard = figure.kind == "guard"
+    if figure.lying:
+        return lying(figure.number, guard)
+    return person(view, figure.number, guard)

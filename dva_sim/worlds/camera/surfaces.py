@@ -244,7 +244,7 @@ def pack(colours: Any) -> Colours:
     return np.asarray(rgb[..., 0] | rgb[..., 1] << 8 | rgb[..., 2] << 16, dtype=np.uint32)
 
 
-class Rooms:
+class RoomGrid:
     """The rooms of a site on a grid, numbered from 1; 0 is outside all.
 
     Args:

@@ -21,7 +21,7 @@ from dva_sim.worlds.camera.surfaces import (
     Floats,
     Hits,
     Ints,
-    Rooms,
+    RoomGrid,
     Surfaces,
     doorways,
     pack,
@@ -64,7 +64,7 @@ class Floors:
         depth: How far ahead each row meets floor or ceiling `(h, 1)` [m].
     """
 
-    def __init__(self, site: Site, rooms: Rooms, fall: Floats, eye_height: float) -> None:
+    def __init__(self, site: Site, rooms: RoomGrid, fall: Floats, eye_height: float) -> None:
         self._rooms = rooms
         floor = self._floor(site)
         parts = [floor, _coarser(floor, 4), _coarser(floor, 16), self._lamps(site)]
@@ -211,7 +211,7 @@ class Uprights:
         colours: Of all painted columns, each `TEXELS` from the floor up, in one row.
     """
 
-    def __init__(self, site: Site, surfaces: Surfaces, rooms: Rooms) -> None:
+    def __init__(self, site: Site, surfaces: Surfaces, rooms: RoomGrid) -> None:
         self._surfaces, self._rooms, self._ceiling = surfaces, rooms, site.ceiling
         self.colours: Colours = self._columns(site)
 

@@ -51,7 +51,7 @@ def look_up(x: Floats, y: Floats, *rasters: Raster) -> list[Floats]:
     return [np.pad(r.values.astype(np.float32), 1).take(index) for r in rasters]
 
 
-class Smoke(NamedTuple):
+class SmokeView(NamedTuple):
     """Smoke on a site, both on the same grid; in a building it hangs under the ceilings.
 
     Attributes:
@@ -64,7 +64,7 @@ class Smoke(NamedTuple):
 
 
 def add_smoke(
-    scene: Floats, depth: Floats, rays: Rays, fall: Floats, smoke: Smoke, heights: Any
+    scene: Floats, depth: Floats, rays: Rays, fall: Floats, smoke: SmokeView, heights: Any
 ) -> None:
     """Let smoke hide what is behind it: exp(-K d) of its contrast is left after d metres in it.
 

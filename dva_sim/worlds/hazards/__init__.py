@@ -1,32 +1,45 @@
-"""Hazards as fields: fire and smoke, leaking gas, rising water; detectors and doses."""
+"""Hazards as fields: fire and smoke, leaking gas, rising water; detectors and doses.
+
+A kind of hazard is one class, shipped or in a file of the user; nothing outside its module asks
+of which kind one is. It may import sites, maps and messages' words, no agents. Begin with
+`hazard.py`, what all of them are, and `flood.py`, the simplest of them.
+"""
 
 from __future__ import annotations
 
-from dva_sim.worlds.hazards.detectors import DETECTS, detection_time, first_detection
+from dva_sim.worlds.hazards.building import Building, SitePoints, building_of
+from dva_sim.worlds.hazards.conditions import CLEAR, QUANTITIES, Conditions
+from dva_sim.worlds.hazards.detectors import detection_time, first_detection
 from dva_sim.worlds.hazards.dose import Dose, pace_in_smoke, pace_in_water, visibility
-from dva_sim.worlds.hazards.field import CLEAR, Conditions, Hazard
 from dva_sim.worlds.hazards.fire import GROWTH_S, Fire
 from dva_sim.worlds.hazards.flood import Flood
 from dva_sim.worlds.hazards.gas_leak import GASES, GasLeak
-from dva_sim.worlds.hazards.registry import KINDS, make_hazard
+from dva_sim.worlds.hazards.hazard import Hazard, HazardField
+from dva_sim.worlds.hazards.registry import KINDS, find_hazard, known_hazards, make_hazard
 from dva_sim.worlds.hazards.surroundings import Raster, Surroundings
 
 __all__ = [
     "CLEAR",
-    "DETECTS",
     "GASES",
     "GROWTH_S",
     "KINDS",
+    "QUANTITIES",
+    "Building",
     "Conditions",
     "Dose",
     "Fire",
     "Flood",
     "GasLeak",
     "Hazard",
+    "HazardField",
     "Raster",
+    "SitePoints",
     "Surroundings",
+    "building_of",
     "detection_time",
+    "find_hazard",
     "first_detection",
+    "known_hazards",
     "make_hazard",
     "pace_in_smoke",
     "pace_in_water",

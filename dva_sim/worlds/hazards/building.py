@@ -76,6 +76,34 @@ class Building:
         return origin.x, origin.y, per_metre * cos, per_metre * sin
 
 
+class SitePoints:
+    """Points of a picture, and what lies there.
+
+    Args:
+        building: Where.
+        points: Shape `(..., 2)` [m].
+
+    Attributes:
+        spaces: Index of the space around each point, or `NOWHERE`.
+    """
+
+    def __init__(self, building: Building, points: Floats) -> None:
+        self.points = points
+        origin, resolution = building.grid.origin, building.grid.resolution
+        cos, sin = math.cos(origin.heading), math.sin(origin.heading)
+        dx, dy = points[..., 0] - origin.x, points[..., 1] - origin.y
+        columns = np.floor((cos * dx + sin * dy) / resolution).astype(np.int64)
+        rows = np.floor((cos * dy - sin * dx) / resolution).astype(np.int64)
+        height, width = building.labels.shape
+        self._inside = (rows >= 0) & (rows < height) & (columns >= 0) & (columns < width)
+        self._cells = rows * self._inside, columns * self._inside
+        self.spaces = self.of(building.labels)
+
+    def of(self, cells: NDArray[np.integer]) -> Integers:
+        """What the cells of the building's grid say at each point; -1 beyond them."""
+        return np.where(self._inside, cells[self._cells], -1).astype(np.int64)
+
+
 class _ByGrid:
     """Sites of one bare map differ in their bases only: they share what is worked out."""
 

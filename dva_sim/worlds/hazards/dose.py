@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from dva_sim.worlds.hazards.field import Conditions
+from dva_sim.worlds.hazards.conditions import Conditions
 from dva_sim.worlds.hazards.fire import TENABLE_HEAT
 
 MINUTE = 60.0

@@ -1,26 +1,63 @@
-"""Fires: how much heat they release, how much of it radiates, what smoke they make."""
+"""Fires: the heat they release, what radiates of it, the smoke they make, and who notices it.
+
+References:
+    R. L. Alpert, Fire Technology 8 (1972) 181: ceiling jets.
+    G. Heskestad and R. G. Bill, Fire Safety Journal 14 (1988) 113: heat detectors, RTI.
+"""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
-from dva_sim.worlds.hazards.field import Point
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from dva_sim.worlds.hazards.alarms import (
+    HEAT_ALARM,
+    LATEST,
+    SMOKE_ALARM,
+    SMOKE_LAYER,
+    CoAlarm,
+    DetectorAlarm,
+)
+from dva_sim.worlds.hazards.building import NOWHERE, Building, Floats, SitePoints, building_of
+from dva_sim.worlds.hazards.conditions import AMBIENT, BREATHING_HEIGHT, CLEAR, Conditions
+from dva_sim.worlds.hazards.course import FieldCourse, March
+from dva_sim.worlds.hazards.hazard import Hazard, HazardField, Point
+from dva_sim.worlds.hazards.smoke import (
+    CO_RATIO,
+    DENSITY,
+    HEAT,
+    HEAT_CAPACITY,
+    HEAT_OF_COMBUSTION,
+    KELVIN,
+    MASS,
+    RADIATIVE_FRACTION,
+    SOOT,
+    SOOT_EXTINCTION,
+    SOOT_YIELD,
+    SmokeLayers,
+)
+from dva_sim.worlds.layout import Site
+from dva_sim.worlds.line_of_sight import Sight
+
+if TYPE_CHECKING:
+    from dva_sim.worlds.camera.sprites import Sprite
 
 FULL_GROWTH_KW = 1055.0  # heat release that defines the growth classes [kW]
 GROWTH_S = {"slow": 600.0, "medium": 300.0, "fast": 150.0, "ultrafast": 75.0}
 HEAT_PER_AREA = 500.0  # heat release of burning floor [kW/m^2]; assumed, offices: 150 to 650
 FIRE_LOAD = 420e3  # fuel of an office, the mean [kJ/m^2]
 DECAY_FROM = 0.7  # share of the fuel burnt when the fire begins to die down
+MOST_PEAK_KW = 100e3  # assumed; beyond any building, and beyond what the field is made for
 PEAK_KW = 5000.0  # what the air through one door can burn, 1500 A sqrt(H) for 1.1 m x 2.1 m [kW]
 
-RADIATIVE_FRACTION = 0.3  # of a fire's heat release; assumed, 0.3 to 0.4 is usual
 TENABLE_HEAT = 2.5  # radiant heat that skin bears for long [kW/m^2]
 LEAST_DANGER = 2.0  # from flames, however small [m]; assumed
-
-HEAT_OF_COMBUSTION = 20e3  # of wood and plastics mixed [kJ/kg]; assumed
-SOOT_YIELD = 0.05  # [kg/kg]; assumed: wood 0.015, polyurethane foam 0.13 to 0.23
-CO_YIELD = 0.02  # [kg/kg]; assumed: wood 0.004, polyurethane foam 0.01 to 0.04
+FLAME_RATE = 8.0  # of the flickering before a camera [1/s]
 
 
 def largest_peak(growth: str) -> float:
@@ -31,13 +68,10 @@ def largest_peak(growth: str) -> float:
     return FULL_GROWTH_KW * (3.0 * FIRE_LOAD / HEAT_PER_AREA / GROWTH_S[growth]) ** 2
 
 
-@dataclass(frozen=True)
-class Fire:
+class Fire(Hazard):
     """A fire that grows with the square of time, burns steadily, and dies down for want of fuel.
 
     Attributes:
-        position: [m]
-        start: [s]
         growth: `slow`, `medium`, `fast` or `ultrafast`.
         peak: The most heat it releases [kW].
 
@@ -48,13 +82,27 @@ class Fire:
         C. Hopkin, M. Spearpoint and D. Hopkin, Fire Technology 55 (2019) 1599: 150 to
         650 kW/m^2 in offices.
         K. Kawagoe, Fire behaviour in rooms, BRI report 27, Tokyo 1958: air through an opening.
-        A. Tewarson, in: SFPE Handbook of Fire Protection Engineering: yields of soot and CO.
     """
 
-    position: Point
-    start: float
-    growth: str = "medium"
-    peak: float = PEAK_KW
+    reported_as = "fire"
+    title = "fire"
+    detectors = ("smoke", "heat", "co")
+    shows = ("smoke", "heat")
+    colour = "#d1332e"
+    mark = "*"
+    shines = True
+    contained_by = "extinguisher"
+
+    growth: Literal["slow", "medium", "fast", "ultrafast"] = "medium"
+    peak: Annotated[float, Field(gt=0, le=MOST_PEAK_KW)] = PEAK_KW
+
+    @model_validator(mode="after")
+    def _has_the_fuel(self) -> Fire:
+        most = largest_peak(self.growth)
+        if self.peak > most:
+            problem = f"peak {self.peak:g} kW of a {self.growth} fire is too large"
+            raise ValueError(f"{problem}: its fuel lasts to {most:.0f}")
+        return self
 
     def heat_release(self, time: float) -> float:
         """Heat release at `time` [s], in [kW]."""
@@ -99,3 +147,307 @@ class Fire:
     def severity(self, time: float) -> float:
         """See `Hazard`: heat release, of the 1055 kW that define the growth classes."""
         return min(1.0, self.heat_release(time) / FULL_GROWTH_KW)
+
+    def field(self, site: Site) -> FireField:
+        """See `Hazard`."""
+        return FireField(self, site)
+
+    def sprite(self, time: float, ceiling: float) -> Sprite | None:
+        """See `Hazard`: flames as wide as what burns, as high as its heat makes them.
+
+        References:
+            G. Heskestad, Fire Safety Journal 5 (1983) 103-108: L = 0.235 Q^(2/5) - 1.02 D, with
+            the heat release Q [kW] and the diameter D [m].
+        """
+        from dva_sim.worlds.camera.sprites import FLAME_FRAMES, flames  # late: start-up
+
+        radius = self.radius(time)
+        tall = 0.235 * self.heat_release(time) ** 0.4 - 2.04 * radius
+        # Tongues leap higher than the mean; the smallest fire can still be seen.
+        size = max(0.45, 2.2 * radius), min(ceiling, max(0.45, 1.25 * tall))
+        frame = int(time * FLAME_RATE + 3 * self.position[0]) % FLAME_FRAMES
+        return flames(frame)._replace(size=size)
+
+    def light(self, time: float) -> float:
+        """See `Hazard`."""
+        return min(1.0, 0.35 + self.radius(time))
+
+
+# --- ceiling jets ----------------------------------------------------------------------
+ENTRY_LENGTH = 1.8  # smoke enters a detector after the jet has gone so far [m]; assumed
+RTI = 50.0  # its response time index [(m s)^0.5]; assumed: a quick one
+NO_JET = (0.0, math.inf)  # in another room there is only the layer
+
+
+def jet_warmth(heat: Floats, distance: float, ceiling: float) -> Floats:
+    """Excess temperature of a fire's ceiling jet [K].
+
+    Args:
+        heat: Heat release [kW].
+        distance: Of the detector from the fire's axis [m].
+        ceiling: Height [m].
+    """
+    if distance <= 0.18 * ceiling:
+        return np.asarray(16.9 * heat ** (2 / 3) / ceiling ** (5 / 3))
+    return np.asarray(5.38 * (heat / distance) ** (2 / 3) / ceiling)
+
+
+def jet_speed(heat: Floats, distance: float, ceiling: float) -> Floats:
+    """Speed of the same jet [m/s]."""
+    if distance <= 0.15 * ceiling:
+        return np.asarray(0.96 * np.cbrt(heat / ceiling))
+    return np.asarray(0.195 * np.cbrt(heat) * ceiling**0.5 / distance ** (5 / 6))
+
+
+def jet_lag(heat: Floats, distance: float, ceiling: float) -> Floats:
+    """How long the jet needs to the detector [s]: up the plume, then outwards at its speed."""
+    near = 0.15 * ceiling
+    up = ceiling / jet_speed(heat, 0.0, ceiling)
+    if distance <= near:
+        return np.asarray(up + distance / jet_speed(heat, 0.0, ceiling))
+    outwards = 6.0 / 11.0 * (distance ** (11 / 6) - near ** (11 / 6))
+    per_length = 1.0 / (0.195 * np.cbrt(heat) * ceiling**0.5)
+    return np.asarray(up + near / jet_speed(heat, 0.0, ceiling) + outwards * per_length)
+
+
+def jet_smoke(warmth: Floats) -> Floats:
+    """Extinction in a ceiling jet [1/m]: soot is thinned on its way just as heat is."""
+    soot_per_heat = SOOT_YIELD / HEAT_OF_COMBUSTION / (1.0 - RADIATIVE_FRACTION)  # [kg/kJ]
+    return np.asarray(SOOT_EXTINCTION * soot_per_heat * DENSITY * HEAT_CAPACITY * warmth)
+
+
+@lru_cache(maxsize=16)
+def _burning(fire: Fire) -> tuple[Floats, Floats]:
+    """Ages [s] and the heat released then [kW]."""
+    ages = np.arange(1.0, LATEST)
+    return ages, np.array([max(1e-6, fire.heat_release(fire.start + age)) for age in ages.tolist()])
+
+
+def smoke_in_jet(fire: Fire, distance: float, ceiling: float) -> tuple[float, float]:
+    """Age of a fire when its ceiling jet reaches a smoke detector in its room [s].
+
+    Returns:
+        The age when any smoke is in it, and the one when the jet by itself sets it off.
+    """
+    ages, heat = _burning(fire)
+    enough = jet_smoke(jet_warmth(heat, distance, ceiling)) >= SMOKE_ALARM
+    entry = ENTRY_LENGTH / jet_speed(heat, distance, ceiling)
+    sounds = ages + jet_lag(heat, distance, ceiling) + entry
+    return float(sounds.min()), float(sounds[enough].min(initial=math.inf))
+
+
+def heat_in_jet(fire: Fire, distance: float, ceiling: float) -> float:
+    """Age of a fire when its ceiling jet sets off a heat detector in its room [s]."""
+    ages, heat = _burning(fire)
+    warmth = jet_warmth(heat, distance, ceiling)
+    share = -np.expm1(-np.sqrt(jet_speed(heat, distance, ceiling)) / RTI)  # of a second's gap
+    link = 0.0
+    for age, air, taken in zip(ages.tolist(), warmth.tolist(), share.tolist(), strict=True):
+        link += taken * (air - link)
+        if link >= HEAT_ALARM - AMBIENT:
+            return float(age)
+    return math.inf
+
+
+@lru_cache(maxsize=4096)
+def _jet(kind: str, growth: str, peak: float, gap: float, ceiling: float) -> tuple[float, float]:
+    fire = _fire_of(growth, peak)
+    reached, sounds = smoke_in_jet(fire, gap, ceiling)
+    if kind == "heat":
+        sounds = heat_in_jet(fire, gap, ceiling)
+    return reached, math.inf if kind == "co" else sounds
+
+
+# --- on a site -------------------------------------------------------------------------
+BLUR = 0.3  # the lower face of a smoke layer is so thick [m]; assumed
+RADIATION = 5.67e-11  # Stefan and Boltzmann's constant [kW/m^2/K^4]
+SMOKE_PACES = ((math.inf, 1.0),)  # in longer steps layers would swing
+
+
+class Layer(NamedTuple):
+    """Smoke under a ceiling: lower face and thickness [m], [deg C], [1/m], [ppm]."""
+
+    bottom: float
+    depth: float
+    temperature: float
+    extinction: float
+    co: float
+
+
+@lru_cache(maxsize=32)
+def _smoke(building: Building, growth: str, peak: float, room: int) -> tuple[SmokeLayers, March]:
+    smoke = SmokeLayers(building.spaces, _fire_of(growth, peak).heat_release, room)
+    return smoke, March(smoke.empty(), smoke.step, SMOKE_PACES)
+
+
+def _fire_of(growth: str, peak: float) -> Fire:
+    """Of all fires that go the same way one, by its age."""
+    return Fire.model_construct(position=(0.0, 0.0), start=0.0, growth=growth, peak=peak)
+
+
+class FireField(HazardField):
+    """Radiant heat of a fire, and its smoke.
+
+    Args:
+        fire: What burns.
+        site: Where; its walls hide the flames.
+    """
+
+    def __init__(self, fire: Fire, site: Site) -> None:
+        super().__init__(fire, site)
+        self._building, self._sight, self._fire = building_of(site), Sight(site.walls), fire
+        self._room = self._building.space_at(*fire.position)
+        self._course: FieldCourse | None = None
+        self._seen: tuple[SitePoints, NDArray[np.bool_]] | None = None
+        self._known: tuple[Floats, Floats, bool] = np.empty(0), np.empty(0), False
+
+    def at(self, x: float, y: float, time: float) -> Conditions:
+        """See `HazardField`."""
+        if time < self._fire.start:
+            return CLEAR
+        heat = 0.0
+        if time < self.until and self._sight.between((x, y), self._fire.position):
+            heat = self._fire.heat_flux(time, (x, y))
+        space = self._building.space_at(x, y)
+        layer = self.layer(space, time) if space >= 0 else None
+        if layer is None:
+            return Conditions(AMBIENT, heat)
+        heat += _glow(layer.temperature, layer.extinction * layer.depth)
+        share = _within(layer.bottom)
+        return Conditions(
+            AMBIENT + share * (layer.temperature - AMBIENT),
+            heat,
+            share * layer.extinction,
+            share * layer.co,
+        )
+
+    def layer(self, space: int, time: float) -> Layer | None:
+        """The smoke in a space; None if there is none."""
+        if self._room == NOWHERE or time <= self._fire.start:
+            return None
+        before, after, weight = self._states(time)
+        mass, heat, soot, co = (before[space] + weight * (after[space] - before[space])).tolist()
+        if mass <= 1e-6:
+            return None
+        spaces = self._building.spaces
+        volume = (mass + heat / (HEAT_CAPACITY * KELVIN)) / DENSITY
+        ceiling = float(spaces.ceiling[space])
+        depth = min(ceiling, volume / float(spaces.area[space]))
+        warmer = heat / (HEAT_CAPACITY * mass)
+        return Layer(
+            ceiling - depth,
+            depth,
+            AMBIENT + warmer,
+            SOOT_EXTINCTION * soot / volume,
+            CO_RATIO * co / mass,
+        )
+
+    def extinctions(self, time: float, where: str = "breathing") -> Floats:
+        """Extinction in each space [1/m], and 0 last, for -1: nowhere.
+
+        Args:
+            time: [s]
+            where: At `breathing` height, the `mean` from floor to ceiling, or in the `layer`.
+        """
+        if self._room == NOWHERE or time <= self._fire.start:
+            return np.zeros(self._building.spaces.count + 1)
+        before, after, weight = self._states(time)
+        state = (before + weight * (after - before))[:-1]
+        volume, share = self._filled(state)
+        value = SOOT_EXTINCTION * state[:, SOOT] / volume
+        if where == "breathing":
+            bottom = self._building.spaces.ceiling * (1.0 - share)
+            share = np.clip((BREATHING_HEIGHT - bottom) / BLUR + 0.5, 0.0, 1.0)
+        elif where == "layer":
+            share = np.ones_like(share)
+        return np.append(value * share, 0.0)
+
+    def _filled(self, state: Floats) -> tuple[Floats, Floats]:
+        """Of each space: volume of its smoke [m^3], and the share of the space that it fills."""
+        spaces = self._building.spaces
+        volume = (state[:, MASS] + state[:, HEAT] / (HEAT_CAPACITY * KELVIN)) / DENSITY
+        volume = np.maximum(volume, 1e-9)
+        return volume, np.minimum(1.0, volume / (spaces.area * spaces.ceiling))
+
+    def is_hazy(self, time: float) -> bool:
+        """See `HazardField`: whether there is smoke at breathing height anywhere.
+
+        Volumes change on straight lines from one state of the field to the next, so that it is
+        enough to look at both, once.
+        """
+        if self._room == NOWHERE or time <= self._fire.start:
+            return False
+        before, after, _ = self._states(time)
+        if before is not self._known[0] or after is not self._known[1]:
+            ceiling = self._building.spaces.ceiling
+            bottoms = [ceiling * (1.0 - self._filled(s[:-1])[1]) for s in (before, after)]
+            hazy = not np.min(bottoms) > BREATHING_HEIGHT + BLUR / 2 + 1e-6
+            self._known = before, after, hazy
+        return self._known[2]
+
+    def haze(self, places: SitePoints, time: float) -> Floats:
+        """See `HazardField`."""
+        return np.asarray(self.extinctions(time)[places.spaces])
+
+    def alarm(self, detector: str, x: float, y: float) -> DetectorAlarm:
+        """See `HazardField`: under a ceiling, where the jet arrives and smoke gathers."""
+        space, carbon_monoxide = self._building.space_at(x, y), CoAlarm()
+
+        def sounds(age: float, dt: float) -> bool:
+            layer = self.layer(space, age) if space >= 0 else None
+            if layer is None or layer.depth < SMOKE_LAYER:
+                return False
+            if detector == "smoke":
+                return layer.extinction >= SMOKE_ALARM
+            if detector == "heat":
+                return layer.temperature >= HEAT_ALARM
+            return carbon_monoxide.add(layer.co, dt)
+
+        return DetectorAlarm(sounds, *self._jet_at(detector, x, y))
+
+    def _jet_at(self, detector: str, x: float, y: float) -> tuple[float, float]:
+        """Ages at which the ceiling jet reaches a detector, and sets it off [s]."""
+        fire, site = self._fire, self.site
+        room = site.compartment_at(*fire.position)
+        if room is None or site.compartment_at(x, y) != room:
+            return NO_JET
+        gap = round(math.dist(fire.position, (x, y)), 2)
+        return _jet(detector, fire.growth, fire.peak, gap, site.compartments[room].ceiling)
+
+    def picture(self, what: str, places: SitePoints, time: float) -> Floats | None:
+        """See `HazardField`."""
+        if what in ("smoke", "layer"):
+            where = "mean" if what == "smoke" else "layer"
+            return np.asarray(self.extinctions(time, where)[places.spaces])
+        if what != "heat":
+            return None
+        if not self._fire.start <= time < self.until:
+            return np.zeros(places.spaces.shape)
+        if self._seen is None or self._seen[0] is not places:
+            seen = self._sight.from_point(self._fire.position, places.points)
+            self._seen = places, seen
+        x, y = self._fire.position
+        squared = (places.points[..., 0] - x) ** 2 + (places.points[..., 1] - y) ** 2
+        nearest = max(0.1, self._fire.radius(time)) ** 2
+        strength = self._fire.heat_flux(time, (x + 100.0, y)) * 1e4
+        return np.asarray(strength / np.maximum(squared, nearest) * self._seen[1])
+
+    def _states(self, time: float) -> tuple[Floats, Floats, float]:
+        if self._course is None:
+            smoke, march = _smoke(self._building, self._fire.growth, self._fire.peak, self._room)
+            self._course = FieldCourse(march, smoke.step_without_fire, SMOKE_PACES)
+        start = self._fire.start
+        return self._course.around(time - start, max(0.0, self.until - start))
+
+
+def _within(bottom: float) -> float:
+    """How far breathing height lies within a layer whose lower face is there [m], 0 to 1."""
+    return min(1.0, max(0.0, (BREATHING_HEIGHT - bottom) / BLUR + 0.5))
+
+
+def _glow(temperature: float, optical_depth: float) -> float:
+    """Radiant heat of hot smoke on somebody below or in it [kW/m^2]."""
+    if temperature < AMBIENT + 1.0:
+        return 0.0
+    kelvin = temperature + KELVIN - AMBIENT
+    return RADIATION * (kelvin**4 - KELVIN**4) * -math.expm1(-optical_depth)

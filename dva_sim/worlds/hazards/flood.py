@@ -1,6 +1,4 @@
-"""Floods: how much water comes, and how deep it would stand in a room.
-
-Water in the rooms of a building: they fill, and doors let it through like weirs.
+"""Floods: how much water comes, and how it fills rooms; doors let it through like weirs.
 
 Each space has one level. What flows through a door follows a broad-crested weir, held back by
 the water on the other side (Villemonte); outdoors it is gone. No water is lost on the way.
@@ -10,31 +8,31 @@ Left out: waves, slopes, drains, water under shut doors.
 References:
     V. T. Chow, Open-Channel Hydraulics, New York 1959: broad-crested weirs.
     J. R. Villemonte, Engineering News-Record 139 (1947) 866: submerged weirs.
-
-What a flood does to a site: water on its floors.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import lru_cache
+from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
+from pydantic import Field
 
-from dva_sim.worlds.hazards.building import NOWHERE, Building, Spaces
-from dva_sim.worlds.hazards.field import (
-    CLEAR,
-    LARGEST,
-    PACES,
-    Conditions,
-    Course,
-    March,
-    Places,
-    Point,
+from dva_sim.worlds.hazards.building import (
+    NOWHERE,
+    Building,
+    Floats,
+    SitePoints,
+    Spaces,
+    building_of,
 )
+from dva_sim.worlds.hazards.conditions import CLEAR, Conditions
+from dva_sim.worlds.hazards.course import PACES, FieldCourse, March
+from dva_sim.worlds.hazards.hazard import LARGEST, Hazard, HazardField
+from dva_sim.worlds.layout import Site
 
+MOST_INFLOW = 10.0  # assumed; beyond any building [m^3/s]
 INFLOW = 2e-3  # a burst pipe [m^3/s]; assumed
 FILM = 5e-3  # depth of water that spreads on a level floor [m]; about twice the capillary length
 BASIN = 50.0  # floor of a usual room [m^2]; assumed
@@ -45,19 +43,21 @@ LEAST_DANGER = 1.0  # from the source: it is slippery, and sockets are near [m];
 FULL_VOLUME = 1.0  # counts as severity 1 [m^3]; assumed
 
 
-@dataclass(frozen=True)
-class Flood:
+class Flood(Hazard):
     """Water that comes at a steady rate until it is stopped.
 
     Attributes:
-        position: [m]
-        start: [s]
         inflow: [m^3/s]
     """
 
-    position: Point
-    start: float
-    inflow: float = INFLOW
+    reported_as = "flood"
+    title = "flood"
+    detectors = ("water",)
+    shows = ("water",)
+    colour = "#2a7fb8"
+    mark = "v"
+
+    inflow: Annotated[float, Field(gt=0, le=MOST_INFLOW)] = INFLOW
 
     def volume(self, time: float) -> float:
         """Water that has come until `time` [s], in [m^3]."""
@@ -85,8 +85,10 @@ class Flood:
         """See `Hazard`: the water that has come."""
         return min(1.0, self.volume(time) / FULL_VOLUME)
 
+    def field(self, site: Site) -> FloodField:
+        """See `Hazard`."""
+        return FloodField(self, site)
 
-Floats = NDArray[np.float64]
 
 EASY = 0.25  # share of the way to the same level that one step may cover
 
@@ -154,19 +156,19 @@ def _water(building: Building, inflow: float, room: int) -> tuple[Filling, March
     return filling, March(filling.dry(), filling.step)
 
 
-class FloodField:
+class FloodField(HazardField):
     """Water on the floors: one level in each space; where it comes, first a spreading film.
 
     Args:
-        building: Where.
         flood: What flows.
+        site: Where.
     """
 
-    def __init__(self, building: Building, flood: Flood) -> None:
-        self.until = math.inf
-        self._building, self._flood = building, flood
-        self._room = building.space_at(*flood.position)
-        self._course: Course | None = None
+    def __init__(self, flood: Flood, site: Site) -> None:
+        super().__init__(flood, site)
+        self._building, self._flood = building_of(site), flood
+        self._room = self._building.space_at(*flood.position)
+        self._course: FieldCourse | None = None
 
     def at(self, x: float, y: float, time: float) -> Conditions:
         """See `HazardField`."""
@@ -181,7 +183,7 @@ class FloodField:
             level = FILM if wet else 0.0
         return Conditions(water=level)
 
-    def picture(self, what: str, places: Places, time: float) -> Floats | None:
+    def picture(self, what: str, places: SitePoints, time: float) -> Floats | None:
         """See `HazardField`."""
         if what != "water":
             return None
@@ -203,5 +205,5 @@ class FloodField:
         flood = self._flood
         if self._course is None:
             filling, march = _water(self._building, flood.inflow, self._room)
-            self._course = Course(march, filling.step_without_inflow, PACES)
+            self._course = FieldCourse(march, filling.step_without_inflow, PACES)
         return self._course.around(time - flood.start, max(0.0, self.until - flood.start))

@@ -41,12 +41,12 @@ from numpy.typing import NDArray
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.worlds.hazards.building import NOWHERE, Building
-from dva_sim.worlds.hazards.gas_leak import MIXED_HEIGHT
 from dva_sim.worlds.maps import FREE, OccupancyGrid
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
+MIXED_HEIGHT = 3.0  # the jet of a leak mixes the air up to the ceiling [m]; assumed
 CELL = 0.5  # side of a coarse cell [m]
 MOST_CELLS = 40_000  # larger houses have larger cells
 

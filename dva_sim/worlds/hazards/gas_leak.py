@@ -1,21 +1,30 @@
-"""Gas leaks: which gas, how much, and how far it is dangerous in the open."""
+"""Gas leaks: which gas, how much, how far it is dangerous, and where it is on a site."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from functools import lru_cache
-from typing import NamedTuple
+from collections.abc import Callable
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
-from dva_sim.worlds.hazards.field import LARGEST, Point
+from dva_sim.worlds.hazards.alarms import CoAlarm, DetectorAlarm
+from dva_sim.worlds.hazards.building import NOWHERE, Floats, SitePoints, building_of
+from dva_sim.worlds.hazards.conditions import BREATHING_HEIGHT, Conditions
+from dva_sim.worlds.hazards.course import FieldCourse, March
+from dva_sim.worlds.hazards.gas_dispersion import MIXED_HEIGHT, Air, Draught, air_in, mesh_in, plume
+from dva_sim.worlds.hazards.hazard import LARGEST, Hazard, HazardField
+from dva_sim.worlds.layout import Site
+
+if TYPE_CHECKING:
+    from dva_sim.worlds.camera.sprites import Sprite
 
 HOUR = 3600.0
 EDDY_DIFFUSIVITY = 0.05  # of air that ventilation stirs [m^2/s]; assumed
 AIR_CHANGES = 2.0  # of fresh air per hour; assumed
-MIXED_HEIGHT = 3.0  # the jet of a leak mixes the air up to the ceiling [m]; assumed
 LEAST_DANGER = 1.0  # from where it leaks [m]; assumed
 FULL_CLOUD = 50.0  # a small room's air at the danger level counts as severity 1 [m^3]; assumed
 
@@ -51,13 +60,17 @@ GASES = {
 }
 
 
-@dataclass(frozen=True)
-class GasLeak:
+# The most is assumed: beyond any building, and beyond what the field is made for.
+_Flow = Annotated[float, Field(ge=0, le=10)]  # [m^3/s]
+_Draught = Annotated[float, Field(ge=0, le=100)]  # [m^3/s]
+_Wind = Annotated[float, Field(gt=0, le=50)]  # [m/s]
+_Positive = Annotated[float, Field(gt=0)]
+
+
+class GasLeak(Hazard):
     """A leak that goes on at a steady rate until it is stopped.
 
     Attributes:
-        position: [m]
-        start: [s]
         gas: One of `GASES`.
         rate: Gas set free [m^3/s]; 0 stands for a serious leak of that gas.
         diffusivity: Of the stirred air [m^2/s].
@@ -74,20 +87,25 @@ class GasLeak:
         rooms, more with more fresh air.
     """
 
-    position: Point
-    start: float
-    gas: str = "methane"
-    rate: float = 0.0
-    diffusivity: float = EDDY_DIFFUSIVITY
-    air_changes: float = AIR_CHANGES
-    draught: float = 0.0
+    reported_as = "gas_leak"
+    title = "gas leak"
+    detectors = ("gas",)
+    shows = ("gas",)
+    colour = "#b59a00"
+    mark = "D"
+
+    gas: Literal["methane", "propane", "carbon_monoxide"] = "methane"
+    rate: _Flow = 0.0
+    diffusivity: _Positive = EDDY_DIFFUSIVITY
+    air_changes: _Positive = AIR_CHANGES
+    draught: _Draught = 0.0
     supply_x: float = 0.0
     supply_y: float = 0.0
     exhaust_x: float = 0.0
     exhaust_y: float = 0.0
-    wind: float = 2.0
+    wind: _Wind = 2.0
     wind_heading: float = 0.0
-    stability: str = "D"
+    stability: Literal["A", "B", "C", "D", "E", "F"] = "D"
 
     @property
     def kind_of_gas(self) -> Gas:
@@ -124,11 +142,27 @@ class GasLeak:
         cloud = self.release * max(0.0, time - self.start) / self.kind_of_gas.danger
         return min(1.0, cloud / FULL_CLOUD)
 
+    def field(self, site: Site) -> LeakField:
+        """See `Hazard`."""
+        return LeakField(self, site)
+
+    def noticed_by(self) -> tuple[str, ...]:
+        """See `Hazard`: carbon monoxide has detectors of its own."""
+        return ("co",) if self.gas == "carbon_monoxide" else self.detectors
+
+    def explodes_at(self) -> float:
+        """See `Hazard`."""
+        return self.kind_of_gas.lower
+
+    def sprite(self, time: float, ceiling: float) -> Sprite | None:
+        """See `Hazard`: a bottle."""
+        from dva_sim.worlds.camera.sprites import bottle  # late: start-up
+
+        return bottle()
+
 
 @lru_cache(maxsize=64)
-def _reach(
-    release: float, level: float, diffusivity: float, loss: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _reach(release: float, level: float, diffusivity: float, loss: float) -> tuple[Floats, Floats]:
     """How far from a steady source the gas exceeds a level: ages [s] and radii [m].
 
     A line source from floor to ceiling in the open, diffusing and thinned by fresh air: the
@@ -145,3 +179,131 @@ def _reach(
     share = release / (4.0 * math.pi * diffusivity * MIXED_HEIGHT) * total
     reached = (share >= level).sum(axis=0)  # it falls with the distance
     return np.r_[0.0, ages[1:]], np.r_[0.0, np.r_[0.0, radii][reached]]
+
+
+LARGE_MESH = 20_000  # nodes, of 5000 m^2 of floor
+GAS_PACES = ((120.0, 2.0), (600.0, 10.0), (math.inf, 30.0))
+
+
+@lru_cache(maxsize=16)
+def _gas(air: Air, node: int, rate: float) -> March:
+    return March(air.still(), lambda state, _, dt: air.step(state, node, rate, dt), GAS_PACES)
+
+
+class LeakField(HazardField):
+    """Gas from a leak: on the mesh indoors, a plume outdoors.
+
+    Args:
+        leak: What leaks.
+        site: Where.
+    """
+
+    def __init__(self, leak: GasLeak, site: Site) -> None:
+        super().__init__(leak, site)
+        self._building, self._leak = building_of(site), leak
+        self._indoors = self._building.space_at(*leak.position) != NOWHERE
+        self._course: FieldCourse | None = None
+        self._nodes: tuple[SitePoints, NDArray[np.int64]] | None = None
+
+    def at(self, x: float, y: float, time: float) -> Conditions:
+        """See `HazardField`; carbon monoxide kills long before it could explode."""
+        share = self.share(x, y, time)
+        if self._leak.gas == "carbon_monoxide":
+            return Conditions(co=1e6 * share)
+        return Conditions(gas=share, explosive=share / self._leak.kind_of_gas.lower)
+
+    def share(self, x: float, y: float, time: float) -> float:
+        """Share of the gas in the air, 0 to 1."""
+        if time <= self._leak.start:
+            return 0.0
+        if not self._indoors:
+            return self._outdoors(x, y, time)
+        node = mesh_in(self._building).node_at(x, y)
+        if node < 0:
+            return 0.0
+        before, after, weight = self._states(time)
+        return min(1.0, float(before[node]) * (1.0 - weight) + float(after[node]) * weight)
+
+    def seen_from(self, x: float, y: float) -> Callable[[float], float]:
+        """The share of gas at a place [m] by the age of a leak that goes on [s].
+
+        In still air as much gas comes from one place to another as would come back from there:
+        one solution, with the source at this place, serves leaks wherever they are. In a large
+        house that would be slow, for every detector, and the leak's own serves them all.
+        """
+        if not self._indoors or self._leak.draught > 0.0:
+            return lambda age: self.share(x, y, self._leak.start + age)
+        mesh, leak = mesh_in(self._building), self._leak
+        here, there = mesh.nearest(x, y), mesh.nearest(*leak.position)
+        source, seen, rate = here, there, 1.0
+        if len(mesh.area) > LARGE_MESH:
+            source, seen, rate = there, here, leak.release
+        march = _gas(self._air, source, rate)
+
+        def share(age: float) -> float:
+            before, after, weight = march.around(age)
+            gas = float(before[seen] + weight * (after[seen] - before[seen]))
+            return leak.release / rate * gas
+
+        return share
+
+    def alarm(self, detector: str, x: float, y: float) -> DetectorAlarm:
+        """See `HazardField`: of the leak as it is seen from there."""
+        share, carbon_monoxide = self.seen_from(x, y), CoAlarm()
+        if detector == "co":
+            return DetectorAlarm(lambda age, dt: carbon_monoxide.add(1e6 * share(age), dt))
+        alarm = self._leak.kind_of_gas.alarm
+        return DetectorAlarm(lambda age, dt: share(age) >= alarm)
+
+    def _outdoors(self, x: float, y: float, time: float) -> float:
+        """In the plume: what is there was set free when the wind set out from the leak."""
+        leak = self._leak
+        if self._indoors or self._building.space_at(x, y) != NOWHERE:
+            return 0.0
+        dx, dy = x - leak.position[0], y - leak.position[1]
+        cos, sin = math.cos(leak.wind_heading), math.sin(leak.wind_heading)
+        downwind, across = dx * cos + dy * sin, dy * cos - dx * sin
+        if not leak.start <= time - downwind / leak.wind < self.until:
+            return 0.0
+        height = BREATHING_HEIGHT
+        return plume(leak.release, leak.wind, leak.stability, downwind, across, height)
+
+    @cached_property
+    def _air(self) -> Air:
+        """The air that it leaks into."""
+        leak, mesh = self._leak, mesh_in(self._building)
+        draught = None
+        if leak.draught > 0.0:
+            supply = mesh.nearest(leak.supply_x, leak.supply_y)
+            exhaust = mesh.nearest(leak.exhaust_x, leak.exhaust_y)
+            draught = Draught(supply, exhaust, leak.draught)
+        return air_in(self._building, leak.diffusivity, leak.air_changes / HOUR, draught)
+
+    def picture(self, what: str, places: SitePoints, time: float) -> Floats | None:
+        """See `HazardField`."""
+        if what != "gas":
+            return None
+        if time <= self._leak.start:
+            return np.zeros(places.spaces.shape)
+        if not self._indoors:
+            return self._plume_picture(places, time)
+        before, after, weight = self._states(time)
+        share = before + weight * (after - before)
+        share[-1] = 0.0  # what was carried out is nowhere
+        if self._nodes is None or self._nodes[0] is not places:
+            self._nodes = places, places.of(mesh_in(self._building).nodes)
+        return np.minimum(1.0, share[self._nodes[1]])
+
+    def _plume_picture(self, places: SitePoints, time: float) -> Floats:
+        shares = [self._outdoors(x, y, time) for x, y in places.points.reshape(-1, 2).tolist()]
+        return np.array(shares).reshape(places.spaces.shape)
+
+    def _states(self, time: float) -> tuple[Floats, Floats, float]:
+        leak = self._leak
+        if self._course is None:
+            node = mesh_in(self._building).nearest(*leak.position)
+            air, march = self._air, _gas(self._air, node, leak.release)
+            self._course = FieldCourse(
+                march, lambda state, _, dt: air.step(state, node, 0.0, dt), GAS_PACES
+            )
+        return self._course.around(time - leak.start, max(0.0, self.until - leak.start))

@@ -8,8 +8,9 @@ from pathlib import Path
 import pytest
 from closed_loops import CURSOR, ROBOT, drive, person, way
 
+from dva_sim.agents.observation import Observation
 from dva_sim.agents.operator.strategies import (
-    Guarded,
+    GuardedStrategy,
     Oracle,
     PointView,
     Predictor,
@@ -20,7 +21,6 @@ from dva_sim.agents.operator.strategies import (
     known_strategies,
     load_strategy,
 )
-from dva_sim.agents.robot.camera import Observation
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full import measures, simulate
@@ -48,9 +48,17 @@ def test_all_ways_of_steering_have_names() -> None:
         ("clever", {}, "operator 'clever' is unknown; known: adaptive, move_and_wait, oracle, "),
         ("pursuit", {"gain": 2}, "operator 'pursuit' has no option 'gain'; it has none"),
         ("predictor", {"gain": 2}, "has no option 'gain'; known: inner, quality"),
-        ("predictor", {"quality": 1.5}, "option 'quality' is 1.5; should be from 0 to 1"),
-        ("predictor", {"quality": math.nan}, "option 'quality' is nan; should be from 0 to 1"),
-        ("predictor", {"quality": "nan"}, "option 'quality' is 'nan'; should be from 0 to 1"),
+        ("predictor", {"quality": 1.5}, "option 'quality' is 1.5; should be a number from 0 to 1"),
+        (
+            "predictor",
+            {"quality": math.nan},
+            "option 'quality' is nan; should be a number from 0 to 1",
+        ),
+        (
+            "predictor",
+            {"quality": "nan"},
+            "option 'quality' is 'nan'; should be a number from 0 to 1",
+        ),
         ("predictor", {"inner": "oracle"}, "option 'inner' is 'oracle', which sees nothing"),
         ("adaptive", {"closed": "oracle"}, "option 'closed' is 'oracle', which sees nothing"),
         ("adaptive", {"closed": 5}, "option 'closed' is 5; should be the name of an operator"),
@@ -124,11 +132,36 @@ def test_the_strategy_of_a_user_steers(tmp_path: Path) -> None:
         "        return Intent(self.person.caution, ahead.bearing)\n",
     )
     mine = load_strategy(name)(person(), ROBOT)
-    assert isinstance(mine, Guarded)
+    assert isinstance(mine, GuardedStrategy)
     track = drive(mine, way((0, 0), (5, 0), (5, 5)), 0.2, 60.0)
     assert math.dist((track[-1].x, track[-1].y), (5.0, 5.0)) < 0.5
-    predicted = Predictor(person(), ROBOT, inner=name)
+    predicted = Predictor(person(), ROBOT, inner=load_strategy(name)(person(), ROBOT))
     assert drive(predicted, way((0, 0), (5, 0)), 2.0, 30.0)[-1].x == pytest.approx(4.7, abs=0.1)
+
+
+USING = """
+    uses = "helper"
+
+    def __init__(self, person, reach, helper=None):
+        super().__init__(person, reach)
+        self.helper = helper
+
+    def drive(self, route, view, stop_before):
+        speed, turn_rate = self.helper.drive(route, view, stop_before)
+        return Intent(0.5 * speed, turn_rate)
+"""
+
+
+def test_a_strategy_of_a_user_may_use_another_one_that_a_configuration_names(
+    tmp_path: Path,
+) -> None:
+    name = written(tmp_path, USING)
+    mine = load_strategy(name, {"helper": "pursuit"})(person(), ROBOT)
+    plain = drive(Pursuit(person(), ROBOT), way((0, 0), (5, 0)), 0.0, 0.1)
+    half = drive(mine, way((0, 0), (5, 0)), 0.0, 0.1)
+    assert half[0].wanted.speed == pytest.approx(0.5 * plain[0].wanted.speed)
+    with pytest.raises(ConfigError, match="option 'helper' is 'oracle', which sees nothing"):
+        load_strategy(name, {"helper": "oracle"})(person(), ROBOT)
 
 
 @pytest.mark.parametrize(

@@ -220,9 +220,9 @@ def test_who_is_never_shown_a_move_tries_again_at_last() -> None:
 @pytest.mark.parametrize("inner", ["pursuit", "two_point"])
 @pytest.mark.parametrize("delay", [0.5, 2.0])
 def test_a_perfect_prediction_steers_as_without_delay(inner: str, delay: float) -> None:
-    plain = {"pursuit": Pursuit, "two_point": TwoPoint}[inner](person(), ROBOT)
-    without = drive(plain, way(*CORNER), 0.0, 40.0)
-    predicted = drive(Predictor(person(), ROBOT, inner), way(*CORNER), delay, 40.0)
+    kind = {"pursuit": Pursuit, "two_point": TwoPoint}[inner]
+    without = drive(kind(person(), ROBOT), way(*CORNER), 0.0, 40.0)
+    predicted = drive(Predictor(person(), ROBOT, kind(person(), ROBOT)), way(*CORNER), delay, 40.0)
     for ideal, at in zip(without, predicted, strict=True):
         assert at.wanted == pytest.approx(ideal.wanted, abs=1e-6)
 

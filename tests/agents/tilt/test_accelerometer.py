@@ -21,7 +21,7 @@ def sensor(
     seed: int = 1, rate_hz: float | None = None, jitter: float = 0.0, **part: Any
 ) -> Accelerometer:
     made = AccelerometerPart(**{"noise_mg": 0.0, **part})
-    return Accelerometer(made, np.random.default_rng(seed), None, rate_hz, jitter)
+    return Accelerometer(made, np.random.default_rng(seed), None, rate_hz=rate_hz, jitter=jitter)
 
 
 def samples(of: Accelerometer, count: int) -> np.ndarray:
@@ -87,7 +87,9 @@ def test_the_size_of_a_block_of_luck_changes_no_number() -> None:
     part = AccelerometerPart(noise_mg=3.0, drift_mg_per_sqrt_min=1.0, offset_mg_per_k=0.5)
     rows = []
     for block in (1, 7, 256):
-        one = Accelerometer(part, np.random.default_rng(5), None, 34.0, 0.1, block)
+        one = Accelerometer(
+            part, np.random.default_rng(5), None, rate_hz=34.0, jitter=0.1, block=block
+        )
         rows.append([(*one.sample(0.1, 0.2), one.interval()) for _ in range(600)])
     assert rows[0] == rows[1] == rows[2]
 

@@ -11,11 +11,11 @@ import pytest
 from dva_sim.agents.tilt.filters import (
     BatchMedian,
     Filter,
+    GuardedFilter,
     MovingMedian,
     known_filters,
     load_filter,
 )
-from dva_sim.agents.tilt.guarded import GuardedFilter
 from dva_sim.kernel.errors import ConfigError
 
 PERIOD = 1 / 34
@@ -152,12 +152,13 @@ def test_every_filter_answers_before_any_sample_has_come() -> None:
         (
             "median",
             {"window": 0},
-            "filter 'median': option 'window' is 0; should be a whole number, 1 to 1000",
+            "filter 'median': option 'window' is 0; should be a whole number from 1 to 1000",
         ),
         (
             "one_pole",
             {"time_constant_s": 0},
-            "filter 'one_pole': option 'time_constant_s' is 0; should be above 0, at most 60",
+            "filter 'one_pole': option 'time_constant_s' is 0; should be a number above 0, "
+            "at most 60",
         ),
         ("none", {"window": 3}, "filter 'none' has no option 'window'; it has none"),
     ],

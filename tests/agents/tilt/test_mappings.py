@@ -110,12 +110,21 @@ def test_a_new_drive_forgets_what_was_integrated() -> None:
             {"leak_s": 1},
             "mapping 'absolute' has no option 'leak_s'; known: gain, speed_gain, dead_zone",
         ),
-        ("leaky", {"leak_s": 0}, "mapping 'leaky': option 'leak_s' is 0; should be above 0"),
-        ("absolute", {"gain": -1}, "mapping 'absolute': option 'gain' is -1; should be above 0"),
+        (
+            "leaky",
+            {"leak_s": 0},
+            "mapping 'leaky': option 'leak_s' is 0; should be a number above 0",
+        ),
+        (
+            "absolute",
+            {"gain": -1},
+            "mapping 'absolute': option 'gain' is -1; should be a number above 0",
+        ),
         (
             "absolute",
             {"dead_zone": 1},
-            "mapping 'absolute': option 'dead_zone' is 1; should be at least 0, below 1",
+            "mapping 'absolute': option 'dead_zone' is 1; should be a number of at least 0, "
+            "below 1",
         ),
     ],
 )

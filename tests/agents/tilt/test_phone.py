@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from dva_sim.agents.person import Person, Population, median_person
 from dva_sim.agents.tilt import Phone, PhoneProfile, TiltCommand
 from dva_sim.kernel.config import validate
 from dva_sim.kernel.errors import ConfigError
@@ -23,21 +24,18 @@ QUIET: dict[str, Any] = {
 }
 
 
-@dataclass
-class Holder:
-    hand_lag: float = 0.0
-    perceptual_delay: float = 0.2
-    motor_noise: float = 0.0
-    margin: float = 0.5
+def holder(hand_lag: float = 0.0, motor_noise: float = 0.0) -> Person:
+    person = median_person(Population())
+    return replace(person, hand_lag=hand_lag, perceptual_delay=0.2, motor_noise=motor_noise)
 
 
 def phone(hand_lag: float = 0.0, **settings: Any) -> Phone:
-    return Phone(PhoneProfile(**{**QUIET, **settings}), Holder(hand_lag), np.random.default_rng(1))
+    return Phone(PhoneProfile(**{**QUIET, **settings}), holder(hand_lag), np.random.default_rng(1))
 
 
 def noisy(seed: int = 1, own: int = 7, **settings: Any) -> Phone:
     rng, mine = np.random.default_rng(seed), np.random.default_rng(own)
-    app = Phone(PhoneProfile(**settings), Holder(0.15, 0.2, 0.05), rng, mine)
+    app = Phone(PhoneProfile(**settings), holder(0.15, 0.05), rng, mine)
     app.pick_up(0.0)
     return app
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from searching import search
 from small_situations import INF, look, pairs, situation
 
-from dva_sim.core.dispatch import Instance, MinEta, Oracle, Policy, solve
+from dva_sim.core.dispatch import Instance, MinEta, OraclePolicy, Policy, solve
 from dva_sim.kernel.errors import ConfigError
 
 
@@ -103,12 +103,12 @@ def test_followed_event_by_event_the_plan_costs_what_it_says_and_no_more_than_ot
     arrival = np.round(rng.uniform(10, 120, (6, 2)))
     given_ = Instance(np.sort(np.round(rng.uniform(0, 300, 6))), arrival, 2 * arrival + 30)
     plan = solve(given_)
-    assert play(Oracle(plan, ("a", "b")), given_) == pytest.approx(plan.total)
+    assert play(OraclePolicy(plan, ("a", "b")), given_) == pytest.approx(plan.total)
     assert plan.total <= play(MinEta(), given_) + 1e-9
 
 
 def test_a_unit_waits_for_what_its_plan_serves_first():
-    policy = Oracle(solve(HOLD), ("guard-0",))
+    policy = OraclePolicy(solve(HOLD), ("guard-0",))
     assert pairs(policy, situation("g", [[100]], [look(1)], now=0.0)) == []
     assert pairs(policy, situation("g", [[100], [5]], [look(1), look(2)], now=1.0)) == [(1, 0)]
     assert pairs(policy, situation("g", [[100]], [look(1)], now=11.0)) == [(0, 0)]
@@ -116,9 +116,9 @@ def test_a_unit_waits_for_what_its_plan_serves_first():
 
 def test_it_cannot_be_made_without_foresight():
     with pytest.raises(ConfigError, match="knowledge of the future"):
-        Oracle()
+        OraclePolicy()
     with pytest.raises(ConfigError, match="the plan is for 1 units; given 2"):
-        Oracle(solve(HOLD), ("a", "b"))
+        OraclePolicy(solve(HOLD), ("a", "b"))
 
 
 @pytest.mark.parametrize("spread", [0, 50, 1000])

@@ -2,7 +2,7 @@ import pytest
 import synthetic_study
 
 from dva_sim.experiments.analysis.hypothesis_tests import judged
-from dva_sim.experiments.report.test_tables import comparison_table, hypothesis_table
+from dva_sim.experiments.report.hypothesis_tables import comparison_table, hypothesis_table
 
 PLAIN = {"part": "drive", "measure": "drive_time_s", "factor": "pattern"}
 COST = PLAIN | {"contrast": ["req-rep", "latest-wins"], "over": "link.delay_s"}

@@ -5,8 +5,8 @@ import pytest
 
 from dva_sim.experiments.analysis.paired_effects import (
     Factor,
-    Part,
-    View,
+    RunGrid,
+    StudyView,
     as_floats,
     codes_of,
     person_means,
@@ -37,11 +37,11 @@ def rows(persons=3, trials=2):
 
 
 def view(part, contrast=("req-rep", "latest-wins")):
-    return View(part, "drive_time_s", PATTERN, DELAY, contrast, {})
+    return StudyView(part, "drive_time_s", PATTERN, DELAY, contrast, {})
 
 
 def test_excess_is_taken_from_the_reference_of_the_same_person_and_trial():
-    part = Part(table(rows()), "drive", [PATTERN, DELAY])
+    part = RunGrid(table(rows()), "drive", [PATTERN, DELAY])
     excess = part.excess("drive_time_s")
     assert excess.shape == (2, 2, 3, 2)
     np.testing.assert_allclose(part.where(excess, {"pattern": "latest-wins"})[0], 1.0)
@@ -51,7 +51,7 @@ def test_excess_is_taken_from_the_reference_of_the_same_person_and_trial():
 def test_differences_are_paired_whatever_the_order_of_the_rows():
     shuffled = rows()
     np.random.default_rng(3).shuffle(shuffled)
-    part = Part(table(shuffled), "drive", [PATTERN, DELAY])
+    part = RunGrid(table(shuffled), "drive", [PATTERN, DELAY])
     difference = view(part).difference({}, "req-rep", "latest-wins")
     np.testing.assert_allclose(difference, np.full((3, 2), 4.0))
 
@@ -62,7 +62,7 @@ def test_a_missing_run_takes_its_pair_with_it_and_no_other():
         for r in rows()
         if not (r["person"] == 0 and r["pattern"] == "req-rep" and r["link.delay_s"] == 0.5)
     ]
-    difference = view(Part(table(there), "drive", [PATTERN, DELAY])).difference(
+    difference = view(RunGrid(table(there), "drive", [PATTERN, DELAY])).difference(
         {}, "req-rep", "latest-wins"
     )
     assert np.isnan(difference[0, 1])
@@ -71,14 +71,14 @@ def test_a_missing_run_takes_its_pair_with_it_and_no_other():
 
 def test_a_study_without_a_reference_is_judged_by_the_measure_itself():
     there = [r for r in rows() if not r["is_reference"]]
-    part = Part(table(there), "drive", [PATTERN, DELAY])
+    part = RunGrid(table(there), "drive", [PATTERN, DELAY])
     assert not part.has_reference("drive_time_s")
     assert view(part).values[1, 0, 2, 0] == pytest.approx(13.0)
 
 
 def test_factors_that_are_not_lines_or_along_x_become_panels_the_answers_first():
-    part = Part(table(rows()), "drive", [PATTERN, DELAY])
-    seen = View(part, "drive_time_s", None, DELAY, None, {"pattern": "latest-wins"})
+    part = RunGrid(table(rows()), "drive", [PATTERN, DELAY])
+    seen = StudyView(part, "drive_time_s", None, DELAY, None, {"pattern": "latest-wins"})
     assert seen.panels == [{"pattern": "latest-wins"}, {"pattern": "req-rep"}]
 
 

@@ -1,5 +1,6 @@
 import csv
 import io
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -7,9 +8,9 @@ import synthetic_study
 
 from dva_sim.experiments.analysis.competing_risks import NOTHING, Endings, horizon_of, with_endings
 from dva_sim.experiments.analysis.layout import finding_of
-from dva_sim.experiments.analysis.paired_effects import Factor, Part, View
-from dva_sim.experiments.report.endings import in_a_line, sentences, table
-from dva_sim.experiments.report.figures.outcomes import endings_in_time
+from dva_sim.experiments.analysis.paired_effects import Factor, RunGrid, StudyView
+from dva_sim.experiments.report.figures.outcomes import EndingsInTime
+from dva_sim.experiments.report.outcome_table import in_a_line, sentences, table
 
 LEVELS = ("short", "long")
 HORIZON_S = 100.0
@@ -42,8 +43,8 @@ def endings(events, how="lost link", factors=()):
         for row in events
     ]
     table_of_runs = synthetic_study.columns(runs)
-    part = Part(table_of_runs, "drive", [Factor("command.timeout_s", LEVELS), *factors])
-    view = View(part, "drive_time_s", part.factors[0], None, LEVELS, {})
+    part = RunGrid(table_of_runs, "drive", [Factor("command.timeout_s", LEVELS), *factors])
+    view = StudyView(part, "drive_time_s", part.factors[0], None, LEVELS, {})
     return Endings(view, synthetic_study.columns(events), table_of_runs, HORIZON_S), view
 
 
@@ -150,9 +151,13 @@ def test_events_count_until_they_are_no_longer_followed_or_the_run_is_over():
     assert horizon_of(view, {"horizon_s": 7200.0}) == 600.0
 
 
+def figure_of(found, view):
+    return EndingsInTime().draw(view, SimpleNamespace(endings=found))
+
+
 def test_the_figure_ends_at_the_shares_of_the_table():
     found, view = three_of_four_lost()
-    drawn = endings_in_time(found, view)
+    drawn = figure_of(found, view)
     assert drawn is not None
     rows = list(csv.DictReader(io.StringIO(drawn.csv.decode())))
     last = {row["command.timeout_s"]: row for row in rows if float(row["t_s"]) == HORIZON_S}
@@ -164,13 +169,13 @@ def test_the_figure_ends_at_the_shares_of_the_table():
 
 def test_where_nothing_ever_came_of_an_event_the_figure_says_so():
     found, view = endings([event(person, line) for line in LEVELS for person in range(2)])
-    rows = list(csv.DictReader(io.StringIO(endings_in_time(found, view).csv.decode())))
+    rows = list(csv.DictReader(io.StringIO(figure_of(found, view).csv.decode())))
     assert {float(row["nothing"]) for row in rows} == {1.0}
 
 
 def test_where_all_were_confirmed_there_is_no_figure():
     found, view = endings([confirmed(p, line) for p in range(3) for line in LEVELS])
-    assert endings_in_time(found, view) is None
+    assert figure_of(found, view) is None
 
 
 def test_a_run_without_a_drive_is_confirmed_if_its_events_were():
@@ -198,6 +203,6 @@ def test_where_all_went_right_in_the_answers_panel_the_table_shows_the_others():
     far = [escalated(p, line) | {"guard.way_m": 60, "cell": 2} for p in range(3) for line in LEVELS]
     found, view = endings([*rows, *far], factors=[Factor("guard.way_m", (5, 60))])
     made = table(found, view, "person")
-    assert made.heads[:2] == ["way of the guard", "command timeout"]
+    assert made.heads[:2] == ["way of the guard", "time-out of a request"]
     assert [row[1:3] for row in made.rows] == [["short", "3"], ["long", "3"]]
     assert made.rows[0][0] == "60\N{NO-BREAK SPACE}m"

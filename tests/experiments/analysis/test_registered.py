@@ -1,7 +1,7 @@
 import pytest
 import synthetic_study
 
-from dva_sim.experiments.report.test_tables import registration_table
+from dva_sim.experiments.report.hypothesis_tables import registration_table
 from dva_sim.experiments.study.hashing import fingerprint_of_judges
 
 PATTERNS = ["req-rep", "latest-wins"]

@@ -1,9 +1,11 @@
+from types import SimpleNamespace
+
 import pytest
 import synthetic_study
 
 from dva_sim.experiments.analysis.layout import finding_of, view_of
 from dva_sim.experiments.analysis.robustness import robustness_of, sentences
-from dva_sim.experiments.report.figures.contrast import repeats
+from dva_sim.experiments.report.figures.contrast import RepeatsFigure
 from dva_sim.experiments.report.figures.style import styled
 
 EFFECTS = {
@@ -61,6 +63,10 @@ def test_the_studys_own_model_is_no_evidence_for_itself():
         assert [r.strategy for r in stop.repeats if r.is_own] == [own] * (own != "two_point")
 
 
+def drawn(view, found):
+    return RepeatsFigure().draw(view, SimpleNamespace(robustness=found))
+
+
 def test_repeats_at_delays_at_which_nobody_was_watched_are_told_and_drawn_hollow():
     rows = [
         row | {"loop_delay_mean_s": 1.4, "delay_human_s": 0.2}
@@ -74,8 +80,8 @@ def test_repeats_at_delays_at_which_nobody_was_watched_are_told_and_drawn_hollow
     told = sentences(found)[-1].replace("\N{NO-BREAK SPACE}", " ")
     assert "1 of 3 (33 %) are extrapolated: no published experiment covers that delay" in told
     with styled():
-        assert "Hollow: extrapolated" in repeats(view, found).caption
-        assert "Hollow" not in repeats(*read(EFFECTS)).caption
+        assert "Hollow: extrapolated" in drawn(view, found).caption
+        assert "Hollow" not in drawn(*read(EFFECTS)).caption
 
 
 def test_the_sentences_give_shares_and_reach():
@@ -93,7 +99,7 @@ def test_the_sentences_give_shares_and_reach():
 def test_the_figure_shows_the_repeats_and_is_the_same_when_drawn_again():
     view, found = read(EFFECTS)
     with styled():
-        first, again = repeats(view, found), repeats(view, found)
+        first, again = drawn(view, found), drawn(view, found)
     assert first.svg == again.svg
     assert first.png[:4] == b"\x89PNG"
 

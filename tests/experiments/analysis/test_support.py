@@ -3,7 +3,7 @@ import pytest
 
 from dva_sim.agents.operator.published import ranges
 from dva_sim.experiments.analysis.extrapolation import support_of_part
-from dva_sim.experiments.analysis.paired_effects import Factor, Part, View
+from dva_sim.experiments.analysis.paired_effects import Factor, RunGrid, StudyView
 from dva_sim.experiments.report.cell_table import cell_table
 
 DELAY = Factor("link.delay_s", (0.0, 0.5, 5.0))
@@ -27,7 +27,7 @@ def part_of(*, extra=(), human=0.3):
         "loop_delay_mean_s": 2 * delays + 0.1 + human,
         "delay_human_s": np.full(count, human),
     }
-    return Part(table | dict(extra), "drive", [DELAY, STRATEGY])
+    return RunGrid(table | dict(extra), "drive", [DELAY, STRATEGY])
 
 
 def test_the_loop_without_the_person_decides_not_the_link():
@@ -54,7 +54,7 @@ def test_between_two_ranges_nobody_was_watched():
 
 def test_a_strategy_that_no_data_speak_of_is_an_extrapolation_everywhere():
     part = part_of()
-    one = Part(part.treated, "drive", [DELAY])
+    one = RunGrid(part.treated, "drive", [DELAY])
     found = support_of_part(one, {"operator": {"strategy": "mine.py:Mine"}})
     assert found.outside.all()
     assert found.words == "mine.py:Mine: no published data"
@@ -81,5 +81,5 @@ def test_the_table_marks_the_cells_and_explains_the_mark():
 def test_figures_hatch_the_stops_of_each_panel(panel, stops):
     part = part_of()
     outside = support_of_part(part, {}).outside
-    view = View(part, "drive_time_s", None, DELAY, None, {}, outside=outside)
+    view = StudyView(part, "drive_time_s", None, DELAY, None, {}, outside=outside)
     assert view.stops_outside({"operator.strategy": panel}) == stops

@@ -1,6 +1,6 @@
 import synthetic_study
 
-from dva_sim.experiments.analysis.paired_effects import Factor, Part, View
+from dva_sim.experiments.analysis.paired_effects import Factor, RunGrid, StudyView
 from dva_sim.experiments.report.answer_table import spread_table
 
 
@@ -9,9 +9,9 @@ def test_the_table_holds_both_sides_and_the_effect_at_every_stop():
     names = (("pattern", synthetic_study.PATTERNS), ("link.delay_s", synthetic_study.DELAYS))
     pattern, delay = (Factor(name, tuple(levels)) for name, levels in names)
     profile = Factor("profile", ("default", "dissertation"))
-    part = Part(runs, "drive", [pattern, delay, profile])
+    part = RunGrid(runs, "drive", [pattern, delay, profile])
     contrast = ("req-rep", "latest-wins")
-    view = View(part, "drive_time_s", pattern, delay, contrast, {"profile": "default"})
+    view = StudyView(part, "drive_time_s", pattern, delay, contrast, {"profile": "default"})
     table = spread_table(view)
     assert len(table.rows) == 3 * 6
     assert [row[:2] for row in table.rows[-3:]] == [

@@ -13,12 +13,11 @@ import patience
 import pytest
 import small_study as kit
 
-from dva_sim.experiments.execution import limit, scheduling
-from dva_sim.experiments.execution.checkpoint import FILE
+from dva_sim.experiments.execution import scheduling
 from dva_sim.experiments.execution.dry_run import dry_run
 from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.report.report import write_report
-from dva_sim.experiments.results.results import Results
+from dva_sim.experiments.results.results import JOURNAL, Results
 from dva_sim.kernel.errors import ConfigError, DvaSimError
 
 TESTS = Path(kit.__file__).parent
@@ -61,9 +60,9 @@ def test_a_table_of_other_results_is_no_evidence_for_these(tmp_path: Path, out: 
 
 
 def test_a_damaged_journal_is_told_with_what_to_do(tmp_path: Path, out: Path) -> None:
-    content = bytearray((out / FILE).read_bytes())
+    content = bytearray((out / JOURNAL).read_bytes())
     content[100:3000] = b"\xff" * 2900
-    (out / FILE).write_bytes(content)
+    (out / JOURNAL).write_bytes(content)
     with pytest.raises(ConfigError, match=r"or damaged .*; move it away to begin anew"):
         run_study(kit.study_in(tmp_path), out, jobs=1, episode=kit.cheap)
 
@@ -125,7 +124,7 @@ def test_a_folder_that_cannot_be_written_is_told(tmp_path: Path, out: Path) -> N
     )
     new, old, done = ran.stdout.splitlines()
     assert new == f"{tmp_path / 'new'} cannot be written: Read-only file system"
-    assert old.startswith(f"{out / FILE}: cannot be written")
+    assert old.startswith(f"{out / JOURNAL}: cannot be written")
     assert old.endswith("is the folder read-only?")
     assert int(done) == kit.RUNS
 
@@ -148,7 +147,7 @@ def test_a_worker_that_was_stopped_is_ended_and_its_runs_are_made_by_another(
 
 
 def ticks(count: int, limit_s: float) -> None:
-    with limit.limited(limit_s, may_exit=False):
+    with scheduling.limited(limit_s, may_exit=False):
         for _ in range(count):
             signal.raise_signal(signal.SIGALRM)
 
@@ -156,7 +155,7 @@ def ticks(count: int, limit_s: float) -> None:
 def test_time_in_which_a_process_was_stopped_does_not_count_as_its_runs() -> None:
     """A process that was stopped for an hour finds one signal waiting, not 3600."""
     ticks(1, limit_s=3600.0)
-    with pytest.raises(limit.RunTooLong, match="more than its 60 s"):
+    with pytest.raises(scheduling.RunTooLong, match="more than its 60 s"):
         ticks(60, limit_s=60.0)
 
 

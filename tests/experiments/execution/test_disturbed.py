@@ -27,6 +27,7 @@ def told(*words: str | Path) -> dict[str, Any]:
     return json.loads(ran.stdout)
 
 
+@pytest.mark.invariant("S9")
 @pytest.mark.soak
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
 def test_a_hundred_kills_at_any_moment_lose_and_double_nothing(tmp_path: Path) -> None:

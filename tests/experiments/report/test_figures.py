@@ -1,4 +1,5 @@
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -6,16 +7,16 @@ import synthetic_study
 from matplotlib.figure import Figure
 
 from dva_sim.experiments.analysis.answer import Finding
-from dva_sim.experiments.analysis.paired_effects import Factor, Part, View
+from dva_sim.experiments.analysis.paired_effects import Factor, RunGrid, StudyView
 from dva_sim.experiments.analysis.predictions import Cadence
-from dva_sim.experiments.report.figures.budget import delay_budget
-from dva_sim.experiments.report.figures.contrast import contrast
-from dva_sim.experiments.report.figures.effect import _band, command_rate, differences
-from dva_sim.experiments.report.figures.factorial import effects, heat_map
-from dva_sim.experiments.report.figures.outcomes import Events, fates, outcomes, responses
+from dva_sim.experiments.report.figures.budget import DelayBudget
+from dva_sim.experiments.report.figures.contrast import AnswerFigure
+from dva_sim.experiments.report.figures.effect import CommandRate, Differences, _band
+from dva_sim.experiments.report.figures.factorial import FactorialEffects, HeatMap
+from dva_sim.experiments.report.figures.outcomes import Events, StoryOutcomes, StoryTimes, fates
 from dva_sim.experiments.report.figures.palette import ONE, apart, columns_of
 from dva_sim.experiments.report.figures.scatter import trend
-from dva_sim.experiments.report.figures.site_map import Ways
+from dva_sim.experiments.report.figures.site_map import DrivenWays
 from dva_sim.experiments.report.figures.style import (
     fit_to,
     is_to_scale,
@@ -26,19 +27,20 @@ from dva_sim.experiments.report.figures.style import (
     place_of,
     styled,
 )
-from dva_sim.experiments.report.figures.tradeoff import tradeoff
+from dva_sim.experiments.report.figures.tradeoff import TradeOff
 from dva_sim.statistics import band
 
 DELAY = Factor("link.delay_s", (0.0, 0.05, 0.1, 0.25, 0.5, 1.0))
 PATTERN = Factor("pattern", ("req-rep", "pub-sub", "latest-wins"))
 PROFILE = Factor("profile", ("default", "dissertation"))
+NOTHING_ELSE = SimpleNamespace(scenario_of=lambda part: {"command": "unknown"})
 
 
 @pytest.fixture(scope="module")
 def view():
     runs = synthetic_study.columns(synthetic_study.drive_rows(2, 1))
-    part = Part(runs, "drive", [PATTERN, DELAY, PROFILE])
-    return View(part, "drive_time_s", PATTERN, DELAY, None, {"profile": "default"})
+    part = RunGrid(runs, "drive", [PATTERN, DELAY, PROFILE])
+    return StudyView(part, "drive_time_s", PATTERN, DELAY, None, {"profile": "default"})
 
 
 def test_lock_step_falls_behind_where_round_trip_and_processing_fill_the_period():
@@ -62,11 +64,11 @@ def test_a_boundary_outside_the_levels_has_no_place(delay):
 def test_a_panel_where_no_run_went_on_takes_nothing_from_the_others(view):
     runs = {**view.part.treated, "is_reference": np.zeros(len(view.part.treated["part"]), bool)}
     rate = np.where(runs["profile"] == "default", 8.0, np.nan)
-    part = Part(runs | {"command_rate_hz": rate}, "drive", view.part.factors)
-    both = View(part, "drive_time_s", PATTERN, DELAY, None, {})
+    part = RunGrid(runs | {"command_rate_hz": rate}, "drive", view.part.factors)
+    both = StudyView(part, "drive_time_s", PATTERN, DELAY, None, {})
     assert [panel["profile"] for panel in both.shown] == ["default", "dissertation"]
     with styled():
-        assert command_rate(both, lambda panel: None) is not None
+        assert CommandRate().draw(both, NOTHING_ELSE) is not None
 
 
 def test_names_of_lines_that_end_together_are_moved_apart_within_the_axes():
@@ -97,7 +99,7 @@ def test_shares_of_outcomes_add_up_to_one(view):
 
 def test_a_way_is_found_by_its_pattern_delay_and_profile(view):
     rows = synthetic_study.track_rows()
-    ways = Ways(synthetic_study.columns(rows), view)
+    ways = DrivenWays(synthetic_study.columns(rows), view)
     (way,) = ways.under("pub-sub", 0.25)
     wanted = [
         (r["x_m"], r["y_m"])
@@ -133,8 +135,8 @@ def test_a_logarithmic_axis_has_plain_numbers_at_round_places_only(ends, numbers
 
 def test_four_settings_stand_two_by_two_with_the_answers_levels_first():
     runs = synthetic_study.columns(synthetic_study.drive_rows(2, 1))
-    part = Part(runs, "drive", [PATTERN, Factor("link.delay_s", (0.0, 0.25)), PROFILE])
-    view = View(part, "drive_time_s", PATTERN, None, None, {"link.delay_s": 0.25})
+    part = RunGrid(runs, "drive", [PATTERN, Factor("link.delay_s", (0.0, 0.25)), PROFILE])
+    view = StudyView(part, "drive_time_s", PATTERN, None, None, {"link.delay_s": 0.25})
     assert [panel_name(panel).replace("\N{NO-BREAK SPACE}", " ") for panel in view.shown] == [
         "250 ms, default",
         "250 ms, dissertation",
@@ -170,8 +172,9 @@ def test_nobody_who_never_came_has_a_panel_and_one_fate_needs_no_picture(view):
     rows["outcome"] = np.full(len(rows["part"]), "confirmed")
     events = Events(rows, "story", view)
     assert list(events.kinds_of_times()) == ["Robot arrives", "Robot confirms"]
-    assert outcomes(view, events) is None
-    drawn = responses(view, events)
+    reading = SimpleNamespace(table={"events": rows}.get)
+    assert StoryOutcomes().draw(view, reading) is None
+    drawn = StoryTimes().draw(view, reading)
     assert f"all {len(events):,} were confirmed by a robot" in drawn.caption
 
 
@@ -179,9 +182,11 @@ def test_bars_of_a_lower_panel_are_not_cut_by_the_first(view):
     columns = ("delay_uplink_s", "delay_downlink_s")
     runs = {**view.part.treated, "is_reference": np.zeros(len(view.part.treated["part"]), bool)}
     longer = np.where(runs["profile"] == "dissertation", 3.0, 1.0)
-    part = Part(runs | {name: runs[name] * longer for name in columns}, "drive", view.part.factors)
+    part = RunGrid(
+        runs | {name: runs[name] * longer for name in columns}, "drive", view.part.factors
+    )
     with styled():
-        drawn = delay_budget(replace(view, part=part))
+        drawn = DelayBudget().draw(replace(view, part=part), NOTHING_ELSE)
     longest = max(ax.get_xlim()[1] for ax in drawn.figure.axes)
     rows = [row.split(",") for row in drawn.csv.decode().splitlines()]
     stages = [i for i, name in enumerate(rows[0]) if name.startswith("delay_")]
@@ -204,13 +209,15 @@ def two_factor_view(effect):
         for r in ratio.levels
         for w in mobilisation.levels
     ]
-    part = Part(synthetic_study.columns(rows), "d", [team, ratio, mobilisation])
-    return View(part, "response_s", team, ratio, ("robot", "guard"), {})
+    part = RunGrid(synthetic_study.columns(rows), "d", [team, ratio, mobilisation])
+    return StudyView(part, "response_s", team, ratio, ("robot", "guard"), {})
 
 
 def test_the_heat_map_draws_the_line_where_the_effect_turns_round():
     with styled():
-        drawn = heat_map(two_factor_view(lambda ratio, wait: 10 * np.log2(ratio) - 0.5 * wait))
+        drawn = HeatMap().draw(
+            two_factor_view(lambda ratio, wait: 10 * np.log2(ratio) - 0.5 * wait), NOTHING_ELSE
+        )
     assert "Thick line: where the mean difference is zero" in drawn.caption
     rows = drawn.csv.decode().splitlines()
     assert rows[0] == "wait_s,ratio,mean_s,band_low_s,band_high_s"
@@ -219,17 +226,19 @@ def test_the_heat_map_draws_the_line_where_the_effect_turns_round():
 
 def test_a_heat_map_without_a_change_of_sign_has_no_line():
     with styled():
-        drawn = heat_map(two_factor_view(lambda ratio, wait: 30.0 + wait))
+        drawn = HeatMap().draw(two_factor_view(lambda ratio, wait: 30.0 + wait), NOTHING_ELSE)
     assert "zero nowhere" in drawn.caption
 
 
 def test_a_second_factor_of_two_levels_needs_no_heat_map(view):
-    assert heat_map(view) is None
+    assert HeatMap().draw(view, NOTHING_ELSE) is None
 
 
 def test_main_effects_and_interactions_are_those_put_in():
     with styled():
-        drawn = effects(two_factor_view(lambda ratio, wait: 2.0 * ratio + 0.1 * wait))
+        drawn = FactorialEffects().draw(
+            two_factor_view(lambda ratio, wait: 2.0 * ratio + 0.1 * wait), NOTHING_ELSE
+        )
     rows = [row.split(",") for row in drawn.csv.decode().splitlines()[1:]]
     found = {(name, to): float(mean) for name, _, to, mean, *_ in rows}
     assert found["team", "robot"] == pytest.approx(2.0 * 1.875 + 0.1 * 20, abs=0.3)
@@ -239,11 +248,11 @@ def test_main_effects_and_interactions_are_those_put_in():
 
 def test_the_tradeoff_needs_an_exposure_that_varies():
     view = two_factor_view(lambda ratio, wait: 5.0)
-    assert tradeoff(view) is None
+    assert TradeOff().draw(view, NOTHING_ELSE) is None
     exposed = np.where(view.part.treated["team"] == "guard", 40.0, 2.0)
-    part = Part(view.part.treated | {"person_exposure_s": exposed}, "d", view.part.factors)
+    part = RunGrid(view.part.treated | {"person_exposure_s": exposed}, "d", view.part.factors)
     with styled():
-        drawn = tradeoff(replace(view, part=part))
+        drawn = TradeOff().draw(replace(view, part=part), NOTHING_ELSE)
     assert drawn.title == "The trade-off: response time against time of people in danger"
 
 
@@ -253,15 +262,15 @@ def of_links(view, count):
     runs = {**view.part.treated, "is_reference": np.zeros(len(view.part.treated["part"]), bool)}
     link = np.array([names[DELAY.levels.index(d)] for d in runs["link.delay_s"].tolist()])
     factors = [PATTERN, Factor("link", names), PROFILE]
-    part = Part(runs | {"link": link}, "drive", factors)
+    part = RunGrid(runs | {"link": link}, "drive", factors)
     contrast = ("req-rep", "latest-wins")
-    return View(part, "drive_time_s", PATTERN, factors[1], contrast, {"profile": "default"})
+    return StudyView(part, "drive_time_s", PATTERN, factors[1], contrast, {"profile": "default"})
 
 
 def test_lines_lead_from_number_to_number_and_never_from_word_to_word(view):
     def joined(view):
         with styled():
-            figure = differences(view, lambda panel: None).figure
+            figure = Differences().draw(view, NOTHING_ELSE).figure
         return [line for line in figure.axes[0].lines if len(line.get_xdata()) == 6 and solid(line)]
 
     def solid(line):
@@ -287,16 +296,16 @@ def test_who_does_not_drive_has_no_delay_budget(view):
     runs = {**view.part.treated, "is_reference": np.zeros(len(view.part.treated["part"]), bool)}
     guards = runs["pattern"] == "pub-sub"
     stages = {k: np.where(guards, np.nan, v) for k, v in runs.items() if k.startswith("delay_")}
-    part = Part(runs | stages, "drive", view.part.factors)
+    part = RunGrid(runs | stages, "drive", view.part.factors)
     with styled():
-        figure = delay_budget(replace(view, part=part)).figure
+        figure = DelayBudget().draw(replace(view, part=part), NOTHING_ELSE).figure
     titles = [ax.get_title("left").rpartition(", ")[2] for ax in figure.axes]
     assert titles == ["REQ/REP", "latest-wins"] * 2
 
 
 def test_names_of_six_links_stand_clear_of_each_other_beside_the_delay_budget(view):
     with styled():
-        figure = delay_budget(of_links(view, 6)).figure
+        figure = DelayBudget().draw(of_links(view, 6), NOTHING_ELSE).figure
     axes = [ax for ax in figure.axes if ax.get_visible()]
     names = list(axes[0].get_yticklabels())
     assert [text.get_text() for text in names][::5] == ["ideal", "cellular-at-the-edge"]
@@ -355,7 +364,7 @@ def answered(over="link.delay_s", levels=(0.0, 0.5, 1.0), means=(0.0, 5.0, 9.0),
 
 def drawn_answer(found):
     with styled():
-        return contrast(found, np.tile(found.mean, (found.persons, 1)))
+        return AnswerFigure().contrast(found, np.tile(found.mean, (found.persons, 1)))
 
 
 def test_the_figure_that_answers_shows_the_band_and_fills_what_differs_from_zero():

@@ -4,7 +4,7 @@ import numpy as np
 import synthetic_study
 
 from dva_sim.experiments.analysis.layout import finding_of, layout_of, points_of, view_of
-from dva_sim.experiments.analysis.paired_effects import Part
+from dva_sim.experiments.analysis.paired_effects import RunGrid
 from dva_sim.experiments.report.cell_table import cell_table
 
 ANSWER = {
@@ -44,7 +44,7 @@ def test_factors_taken_together_are_one_and_the_table_shows_them_all():
     }
     table, factors = layout_of(study, runs)
     assert [f.name for f in factors] == ["pattern", "link.jitter_s"]
-    found = cell_table(Part(table, "drive", factors), "drive_time_s", points=["link.delay_s"])
+    found = cell_table(RunGrid(table, "drive", factors), "drive_time_s", points=["link.delay_s"])
     assert len(found.rows) == 6
     assert found.rows[2][:3] == ["REQ/REP", "50\N{NO-BREAK SPACE}ms", "0.3"]
 
@@ -108,5 +108,5 @@ def test_a_reference_run_is_that_of_every_point():
     both = {key: np.concatenate([runs[key], aside[key]]) for key in runs}
     study = {"factors": {"point": [0, 1, 2], "pattern": ["pub-sub"]}}
     table, factors = layout_of(study, both)
-    excess = Part(table, "drive", factors).excess("drive_time_s")
+    excess = RunGrid(table, "drive", factors).excess("drive_time_s")
     np.testing.assert_array_equal(excess, np.zeros((1, 3, 6)))

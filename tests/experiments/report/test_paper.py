@@ -4,12 +4,12 @@ import pytest
 from matplotlib.figure import Figure
 
 from dva_sim.experiments.report.blocks import (
+    FigureBlock,
     First,
     Folded,
     Heading,
     Items,
     Printed,
-    Shown,
     Terms,
     Verbatim,
     Words,
@@ -40,7 +40,7 @@ def blocks():
         Words("Declared", "label"),
         First("It costs 4.5 s.", drawn(), (("Persons", "24 simulated."),)),
         Heading("Figures"),
-        Shown(drawn()),
+        FigureBlock(drawn()),
         Items(("one", "two")),
         Printed(CellTable("drive", ["cell", "mean"], 1, rows, note="All of them.")),
         Folded("Manifest", (Verbatim('{\n  "seed": 1\n}'),)),

@@ -14,8 +14,9 @@ from patience import PATIENCE_S
 from small_study import SHIFT
 
 import dva_sim
+from dva_sim.kernel.measure import names_of
 from dva_sim.simulation.shift import build, measures, simulate_timed
-from dva_sim.simulation.transport.measures import MEASURES
+from dva_sim.simulation.transport.measures import RUN_COLUMNS
 
 pytestmark = pytest.mark.soak
 
@@ -102,7 +103,7 @@ def contest(folder):
     rows = [
         {"part": "drive", "cell": 0, "transport": transport, "crowd": crowd, "person": person}
         | {"is_reference": False, "trial": 0, "seed": person}
-        | dict.fromkeys(MEASURES, 1.0)
+        | dict.fromkeys(names_of(RUN_COLUMNS), 1.0)
         | {"movement_time_s": 80.0 + 40 * (transport == "tcp") + person}
         for transport, crowd, person in places
     ]

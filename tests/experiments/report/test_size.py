@@ -5,12 +5,14 @@ from __future__ import annotations
 import pytest
 from small_study import REPEATED, STUDY, study_in, write_study
 
-from dva_sim.cli import study_output
-from dva_sim.experiments.analysis.tuning import tuning_study
+from dva_sim.cli import study_runs
+from dva_sim.experiments.execution import dry_run
 from dva_sim.experiments.execution.dry_run import DryRun
+from dva_sim.experiments.execution.run_request import RunRequest
 from dva_sim.experiments.study import cell_grid
-from dva_sim.experiments.study.designs import runs_of
-from dva_sim.experiments.study.study import load_study
+from dva_sim.experiments.study.factor_levels import runs_of
+from dva_sim.experiments.study.study_file import load_study
+from dva_sim.experiments.study.tuning import tuning_study
 from dva_sim.kernel.errors import ConfigError
 
 
@@ -46,11 +48,11 @@ def test_the_number_of_runs_is_known_without_their_list(tmp_path, text):
 
 def test_what_takes_a_while_is_told(tmp_path, monkeypatch, capsys):
     plan = DryRun(42, 0, 9, 1, 2, None, 0, "")
-    monkeypatch.setattr(study_output, "dry_run", lambda *_, **__: plan)
-    monkeypatch.setattr(study_output, "_MANY", 1)
-    monkeypatch.setattr(study_output, "_MANY_RUNS", 1)
+    monkeypatch.setattr(dry_run, "dry_run", lambda *_, **__: plan)
+    monkeypatch.setattr(study_runs, "_MANY", 1)
+    monkeypatch.setattr(study_runs, "_MANY_RUNS", 1)
     path = str(write_study(tmp_path))
-    study_output.plan(path, [], tmp_path / "out", study_output.Workers(), study_output.Variant())
+    study_runs.plan(RunRequest(path, tmp_path / "out"))
     lines = capsys.readouterr().out.splitlines()
     assert lines[1] == "Checking every configuration before the first run ..."
     assert lines[-4].startswith("9/9 configurations")

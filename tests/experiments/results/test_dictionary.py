@@ -3,12 +3,13 @@
 import pytest
 from small_study import study_in
 
-from dva_sim.experiments.execution.tables import design_row
-from dva_sim.experiments.results.data_dictionary import DESIGN, DICTIONARY, describe
+from dva_sim.experiments.results.data_dictionary import describe
+from dva_sim.experiments.results.tables import design_row
 from dva_sim.experiments.study import cell_grid
+from dva_sim.experiments.study.schema import DESIGN
 from dva_sim.kernel.units import UNITS, ending_of, unit_of
 from dva_sim.simulation import scenario as scenarios
-from dva_sim.simulation.models import MODELS, model_of
+from dva_sim.simulation.models import MODELS, measured_names, model_of
 
 SHORT = {
     "full": [("evacuation", {"horizon_s": 20, "bystander.count": 1})],
@@ -39,20 +40,17 @@ def columns_of(model):
 @pytest.mark.parametrize("model", MODELS)
 def test_every_column_that_a_run_fills_is_in_the_dictionary(model):
     filled = columns_of(model)
-    assert set(filled) == set(DICTIONARY[model])
+    assert set(filled) == set(MODELS[model].columns)
     for table, columns in filled.items():
-        assert columns - set(DICTIONARY[model][table]) == set()
+        told = describe(table, sorted(columns), [model], [])
+        assert [column.name for column in told if not column.meaning] == []
 
 
 @pytest.mark.parametrize("model", MODELS)
-def test_every_measure_that_a_study_may_ask_for_is_in_the_dictionary(model):
-    assert set(MODELS[model].measures()) - set(DICTIONARY[model]["runs"]) == set()
-
-
-@pytest.mark.parametrize("model", MODELS)
-def test_the_dictionary_of_runs_holds_nothing_that_is_not_there(model):
-    words = {"outcome", "cause", "network_depth"}  # of runs, but no numbers to ask for
-    assert set(DICTIONARY[model]["runs"]) - set(MODELS[model].measures()) <= words
+def test_no_table_has_two_columns_of_one_name(model):
+    for columns in MODELS[model].columns.values():
+        names = [column.name for column in columns]
+        assert sorted(set(names)) == sorted(names)
 
 
 def test_the_columns_of_the_design_are_explained(tmp_path):
@@ -62,9 +60,7 @@ def test_the_columns_of_the_design_are_explained(tmp_path):
 
 
 def test_no_column_shares_its_name_with_the_design():
-    for tables in DICTIONARY.values():
-        for columns in tables.values():
-            assert not set(columns) & set(DESIGN)
+    assert not measured_names() & set(DESIGN)
 
 
 @pytest.mark.parametrize(

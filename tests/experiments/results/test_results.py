@@ -8,6 +8,7 @@ import pytest
 import synthetic_study as synthetic
 from small_study import cheap, study_in
 
+import dva_sim
 from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.results.results import Frame, Results
 from dva_sim.kernel.errors import ConfigError
@@ -79,7 +80,7 @@ def test_a_notebook_shows_a_table_with_what_is_missing_left_empty():
 def test_a_notebook_shows_the_answer_of_a_study(tmp_path):
     rows = {"runs": synthetic.drive_rows(persons=6, trials=2)}
     folder = synthetic.write(tmp_path / "out", rows, synthetic.manifest(6, 2))
-    results = Results.load(folder)
+    results = dva_sim.load(folder)
     html = results._repr_html_()
     assert "REQ/REP or PUB/SUB for driving a robot by tilt, as delay grows?" in html
     assert results.answer.lead.startswith("With profile default, REQ/REP takes")

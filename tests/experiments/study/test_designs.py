@@ -9,9 +9,10 @@ from small_study import STUDY, cheap, study_in, write_study
 
 from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.results.results import Results
-from dva_sim.experiments.study import cell_grid, designs
+from dva_sim.experiments.study import cell_grid
 from dva_sim.experiments.study.designs import saltelli
-from dva_sim.experiments.study.study import load_study
+from dva_sim.experiments.study.factor_levels import size
+from dva_sim.experiments.study.study_file import load_study
 from dva_sim.kernel.errors import ConfigError
 
 PLAIN = STUDY.split("answer:")[0]
@@ -325,7 +326,7 @@ def test_an_end_of_a_range_that_no_point_meets_must_be_valid_too(tmp_path):
 )
 def test_how_many_cells_there_will_be_is_known_before_they_are_made(tmp_path, asked, cells):
     study = study_in(tmp_path, text=PLAIN + asked.replace("{}", "", 1))
-    assert designs.size(study) == len(levels(study)) == cells
+    assert size(study) == len(levels(study)) == cells
 
 
 def test_a_grid_of_ten_thousand_cells_is_taken_and_a_larger_one_is_refused(tmp_path):
@@ -333,7 +334,7 @@ def test_a_grid_of_ten_thousand_cells_is_taken_and_a_larger_one_is_refused(tmp_p
     grid = PLAIN.replace(DELAYS, f"  link.loss: {losses}\n  link.delay_s: {{delays}}\n")
     delays = [i / 1000 for i in range(51)]
     taken = study_in(tmp_path, text=grid.replace("{delays}", str(delays[:50])))
-    assert designs.size(taken) == 10_000
+    assert size(taken) == 10_000
     told = "study.yaml:5:1: a part would have 10,200 cells, more than 10,000; have fewer levels"
     assert complaint(tmp_path, grid.replace("{delays}", str(delays))).startswith(told)
 

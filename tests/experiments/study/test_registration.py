@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 from small_study import REPEATED, STUDY, study_in, write_study
 
+from dva_sim.experiments.results.manifest import status_of
 from dva_sim.experiments.study import cell_grid, registration
 from dva_sim.experiments.study.registration import load_registration, plan_of, register
-from dva_sim.experiments.study.status import status_of
-from dva_sim.experiments.study.study import load_study
+from dva_sim.experiments.study.study_file import load_study
 from dva_sim.kernel.config import load_yaml
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.testing.files import check_file
@@ -212,7 +212,9 @@ def test_other_code_that_judges_is_told_whenever_verdicts_are(tmp_path, monkeypa
     study = load_study(registered(tmp_path))
     manifest = {"status": study.status.model_dump(mode="json")}
     assert status_of(manifest).why == ()
-    monkeypatch.setattr("dva_sim.experiments.study.status.fingerprint_of_judges", lambda: "another")
+    monkeypatch.setattr(
+        "dva_sim.experiments.results.manifest.fingerprint_of_judges", lambda: "another"
+    )
     told = status_of(manifest)
     assert told.kind == "confirmatory"
     (remark,) = told.why

@@ -11,13 +11,13 @@ import small_study as kit
 
 from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.results.results import Results
-from dva_sim.experiments.study.cell_grid import Job
+from dva_sim.experiments.study.cell_grid import StudyJob
 
 STOP = "stop: {part: drive, measure: drive_time_s, half_width: 0.1, batch_persons: 2, "
 TEXT = kit.STUDY + STOP + "most_persons: 40}\n"
 
 
-def steady(job: Job) -> kit.Tables:
+def steady(job: StudyJob) -> kit.Tables:
     """Anything up to a second longer than the reference run, whoever drives."""
     return {"runs": [{"drive_time_s": 0.0 if job.is_reference else (job.seed % 1000) / 1000}]}
 

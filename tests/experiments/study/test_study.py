@@ -4,7 +4,7 @@ import pytest
 from small_study import STUDY, study_in, write_study
 
 from dva_sim.experiments.study import cell_grid
-from dva_sim.experiments.study.study import load_study
+from dva_sim.experiments.study.study_file import load_study
 from dva_sim.kernel.errors import ConfigError
 
 
@@ -187,7 +187,11 @@ def test_a_treatment_is_a_level_that_changes_several_keys(tmp_path):
         ("[none, both]", "[none, all]", "study:6:3: 'all' is not a treatment; named: none, both"),
         ("pattern: latest", "link.delay_s: 1, pattern: latest", "'link.delay_s' is set by two"),
         ("pattern: latest", "operator.person: 1, pattern: latest", "is set by the study"),
-        ("pattern: latest-wins", "pattern: latest-winz", "study:24:12: pattern: "),
+        (
+            "pattern: latest-wins",
+            "pattern: latest-winz",
+            "study:24:12: pattern 'latest-winz' is unknown",
+        ),
     ],
 )
 def test_a_treatment_that_makes_no_sense_is_refused(tmp_path, old, new, told):

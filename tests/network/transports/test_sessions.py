@@ -9,7 +9,7 @@ import pytest
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.streams import Streams
 from dva_sim.network.transports.bottleneck import Bottleneck, BottleneckConfig
-from dva_sim.network.transports.config import Btp, Irtp, Message, Rtnp, Trinomial, Udp
+from dva_sim.network.transports.config import Btp, Irtp, Rtnp, TransportMessage, Trinomial, Udp
 from dva_sim.network.transports.sessions import ends_at, open_session
 
 TRINOMIAL = Trinomial(kind="trinomial", header_bytes=12, linear=0.2, square=0.0, decrease=0.125)
@@ -36,7 +36,7 @@ class Bench:
         return lambda number: where.append((number, self.clock.now))
 
     def send(self, at: float, number: int, size: int = 400, crucial: bool = False) -> None:
-        self.clock.call_at(at, self.session.command, Message(number, size, crucial))
+        self.clock.call_at(at, self.session.command, TransportMessage(number, size, crucial))
 
 
 def test_udp_sends_a_command_of_400_bytes_with_28_of_headers():
@@ -50,7 +50,7 @@ def test_udp_sends_a_command_of_400_bytes_with_28_of_headers():
 
 def test_a_picture_of_4000_bytes_comes_in_three_datagrams_and_counts_when_the_last_is_there():
     bench = Bench(Udp())
-    bench.clock.call_at(1.0, bench.session.picture, Message(0, 4000))
+    bench.clock.call_at(1.0, bench.session.picture, TransportMessage(0, 4000))
     bench.clock.run(3.0)
     assert bench.ends.down.offered == 3
     assert bench.pictures == [(0, pytest.approx(1.0 + (4000 + 3 * 28) * 8e-6 + 0.05))]
@@ -58,7 +58,7 @@ def test_a_picture_of_4000_bytes_comes_in_three_datagrams_and_counts_when_the_la
 
 def test_a_picture_that_lacks_a_datagram_is_none():
     bench = Bench(Udp(), queue_bytes=3000)  # room for two of the three
-    bench.clock.call_at(1.0, bench.session.picture, Message(0, 4000))
+    bench.clock.call_at(1.0, bench.session.picture, TransportMessage(0, 4000))
     bench.clock.run(3.0)
     assert bench.ends.down.dropped == 1
     assert bench.pictures == []
@@ -89,7 +89,7 @@ def test_acknowledgements_of_btp_ride_on_pictures():
     bench = Bench(BTP)
     for number in range(20):
         bench.send(0.5 * number, number)
-        bench.clock.call_at(0.5 * number, bench.session.picture, Message(number, 400))
+        bench.clock.call_at(0.5 * number, bench.session.picture, TransportMessage(number, 400))
     bench.clock.run(12.0)
     assert [number for number, _ in bench.commands] == list(range(20))
     assert bench.ends.down.bytes == 20 * (400 + 28 + 12)

@@ -13,7 +13,7 @@ from dva_sim.agents.tilt.phone import Trail
 from dva_sim.kernel.recorder import Applied, DriveLog, Followed, Shown
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full import Recording, measures, simulate
-from dva_sim.simulation.full.measures import STAGES, Driven, command_ages, delay_budget, driven
+from dva_sim.simulation.full.loop_delay import STAGES, Driven, command_ages, delay_budget, driven
 
 MOTOR = 0.15
 RESOLUTION = 0.01  # of what is recorded: a tenth of the time from one frame to the next [s]

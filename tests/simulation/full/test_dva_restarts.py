@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from dva_sim.core.events import Event, State
-from dva_sim.core.store import Memory
+from dva_sim.core.store import Store
 from dva_sim.simulation.full.control_room import add_dva
 from dva_sim.simulation.full.dva_server import DvaAgent
 from dva_sim.simulation.full.run import Run
@@ -40,7 +40,7 @@ class Killed:
         clock.run(HORIZON)
 
     def _start(self) -> DvaAgent:
-        dva = add_dva(self.run.stage, memory=Memory(self.file))
+        dva = add_dva(self.run.stage, memory=Store(self.file))
         dva.start()
         return dva
 
@@ -71,6 +71,7 @@ def test_every_event_is_dealt_with_once_whenever_the_dva_is_killed(
     assert list(broken_event_rules(killed.dva.desk.book, DEADLINE, HORIZON)) == []
 
 
+@pytest.mark.invariant("S8")
 def test_a_dva_that_is_killed_again_and_again_loses_nothing(tmp_path: Path) -> None:
     killed = Killed(tmp_path, [12.0, 25.0, 41.0, 66.0, 93.0, 128.0], away=3.0)
     assert [e.kind for e in killed.events] == ["fire", "gas_leak", "flood"]

@@ -10,7 +10,7 @@ import pytest
 from dva_sim.agents.device import HEARTBEAT, STATUS
 from dva_sim.agents.robot.controller import Mode
 from dva_sim.agents.robot.robot import FRAME
-from dva_sim.network.patterns import Request
+from dva_sim.network.messaging import Request
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode, encode
 from dva_sim.simulation import scenario as scenarios

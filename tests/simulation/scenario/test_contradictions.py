@@ -5,15 +5,15 @@ import io
 import pytest
 from rich.console import Console
 
-from dva_sim.cli import episode_output
-from dva_sim.cli import live_output as live
-from dva_sim.cli.check_output import check
-from dva_sim.experiments.execution.job import contradictions_in
+from dva_sim.cli import episodes
+from dva_sim.cli import live_screen as live
+from dva_sim.cli.checks import check
+from dva_sim.experiments.execution.dry_run import contradictions_in
+from dva_sim.experiments.report.episode import EpisodeRequest
 from dva_sim.experiments.study import cell_grid
-from dva_sim.experiments.study.study import load_study
+from dva_sim.experiments.study.study_file import load_study
 from dva_sim.kernel.resources import available
-from dva_sim.live.options import Options
-from dva_sim.recordings.pictures import Wanted
+from dva_sim.live.options import LiveOptions
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full import simulate
 from dva_sim.simulation.scenario import Scenario, contradictions
@@ -138,7 +138,7 @@ def test_a_study_tells_each_kind_once_with_the_number_of_configurations() -> Non
 def test_an_episode_begins_with_the_warning() -> None:
     out = Console(file=io.StringIO(), width=200)
     pairs = ["link.delay_s=1.2", "request.timeout_s=9", "horizon_s=20"]
-    episode_output.episode("drive-to-event", 1, pairs, None, Wanted(), None, out)
+    episodes.episode(EpisodeRequest("drive-to-event", 1, pairs), out)
     first = out.file.getvalue().splitlines()[0]
     assert first.startswith("warning: request.timeout_s 9 is below 9.65 s")
 
@@ -154,5 +154,5 @@ def test_check_tells_it_of_a_file_that_is_valid(tmp_path, capsys) -> None:
 
 def test_a_live_run_says_it_before_anything_starts() -> None:
     out = Console(file=io.StringIO(), width=200)
-    live.warn(out, Options("drive-to-event", ("link.delay_s=0.5",)))
+    live.warn(out, LiveOptions("drive-to-event", ("link.delay_s=0.5",)))
     assert out.file.getvalue().startswith("warning: link.delay_s: a live run has the real link")

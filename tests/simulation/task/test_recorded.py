@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dva_sim.simulation.task import build, play
-from dva_sim.simulation.task.delays import RecordedChannel, Recording, Stream
+from dva_sim.simulation.task.delays import FrameStream, RecordedChannel, RecordedDelays
 
 STRAIGHT = {
     "model": "task",
@@ -21,13 +21,13 @@ STRAIGHT = {
 }
 
 
-def stream(period: float, *delays: float) -> Stream:
-    return Stream(period, np.array(delays))
+def stream(period: float, *delays: float) -> FrameStream:
+    return FrameStream(period, np.array(delays))
 
 
-def steady(delay: float) -> Recording:
+def steady(delay: float) -> RecordedDelays:
     """Always the same delay, both ways [s]."""
-    return Recording(stream(0.05, *[delay] * 40), stream(0.1, *[delay] * 20))
+    return RecordedDelays(stream(0.05, *[delay] * 40), stream(0.1, *[delay] * 20))
 
 
 def test_a_message_has_the_delay_of_the_recorded_one_made_when_it_is_or_just_before():
@@ -65,7 +65,7 @@ def test_a_drive_over_a_steady_recording_is_the_drive_over_that_delay(delay):
 
 
 def test_a_recording_in_which_nothing_arrives_leads_nowhere():
-    nothing = Recording(stream(0.05, math.inf), stream(0.1, math.inf))
+    nothing = RecordedDelays(stream(0.05, math.inf), stream(0.1, math.inf))
     assert play(build(STRAIGHT), 3, nothing)[0]["completed"] == 0.0
 
 

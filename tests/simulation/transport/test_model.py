@@ -8,13 +8,14 @@ import math
 import pytest
 from rich.console import Console
 
-from dva_sim.cli.shift_output import tell_session
-from dva_sim.experiments.study.study import load_study
+from dva_sim.cli.stories import tell
+from dva_sim.experiments.report.episode import Played
+from dva_sim.experiments.study.study_file import load_study
 from dva_sim.kernel import resources
 from dva_sim.kernel.config import Document, load_yaml
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.simulation.models import model_of
-from dva_sim.simulation.transport import build, simulate_transports
+from dva_sim.simulation.transport import build, simulate_session, tables
 
 SHORT = {
     "warm_up_s": 5,
@@ -32,6 +33,10 @@ BTP = {
 }
 
 
+def played(scenario, seed):
+    return tables(simulate_session(scenario, seed))
+
+
 def shipped() -> Document:
     return load_yaml(resources.find("congested-link", "experiments/scenarios"))
 
@@ -46,15 +51,15 @@ def test_a_run_has_every_measure_that_a_study_may_ask_for():
 def test_the_same_seed_and_person_give_the_same_run_and_others_do_not():
     scenario = build(shipped(), SHORT)
     other = model_of(shipped()).played_by(scenario, 5)
-    assert simulate_transports(scenario, 3) == simulate_transports(scenario, 3)
-    assert simulate_transports(other, 3)["flows"] == simulate_transports(scenario, 3)["flows"]
-    assert simulate_transports(other, 3)["runs"] != simulate_transports(scenario, 3)["runs"]
+    assert played(scenario, 3) == played(scenario, 3)
+    assert played(other, 3)["flows"] == played(scenario, 3)["flows"]
+    assert played(other, 3)["runs"] != played(scenario, 3)["runs"]
 
 
 def test_who_sees_a_picture_per_second_drives_slower():
     fresh = build(shipped(), SHORT | {"bulk.up": 0, "bulk.down": 0})
     rare = build(shipped(), SHORT | {"bottleneck.rate_bps": 4e4, "transport": {"kind": "tcp"}})
-    times = [simulate_transports(s, 3)["runs"][0]["movement_time_s"] for s in (fresh, rare)]
+    times = [played(s, 3)["runs"][0]["movement_time_s"] for s in (fresh, rare)]
     assert times[1] > 1.5 * times[0]
 
 
@@ -82,7 +87,9 @@ def test_no_option_of_a_law_that_could_not_be_read_has_a_default():
 
 def test_the_command_line_tells_flows_ages_and_the_drive():
     text = io.StringIO()
-    tell_session(build(shipped(), SHORT), 3, Console(file=text, width=100))
+    scenario = build(shipped(), SHORT)
+    run = Played(scenario, 3, simulate_session(scenario, 3), 0.1)
+    tell(run, Console(file=text, width=100))
     for word in ("bulk 1", "delivered", "round trip", "drive: done in"):
         assert word in text.getvalue()
 

@@ -10,7 +10,8 @@ import synthetic_study
 from page_words import words
 
 from dva_sim.experiments.report.report import write_report
-from dva_sim.simulation.transport.measures import MEASURES
+from dva_sim.kernel.measure import names_of
+from dva_sim.simulation.transport.measures import RUN_COLUMNS
 
 TRANSPORTS, CROWDS, PERSONS = ["udp", "tcp"], ["0", "8"], 6
 STUDY = {
@@ -34,7 +35,9 @@ STUDY = {
 def row(cell: int, transport: str, crowd: str, person: int) -> dict[str, object]:
     """One run: TCP takes 40 s longer beside eight flows."""
     slow = 40.0 * (transport == "tcp" and crowd == "8")
-    values = dict.fromkeys(MEASURES, 1.0) | {"movement_time_s": 80.0 + slow + person % 3}
+    values = dict.fromkeys(names_of(RUN_COLUMNS), 1.0) | {
+        "movement_time_s": 80.0 + slow + person % 3
+    }
     if crowd == "0":
         values |= dict.fromkeys(("share_of_fair_down", "bulk_use_down", "jain_down"), float("nan"))
     design = {"part": "drive", "cell": cell, "config": f"c{cell}", "transport": transport}

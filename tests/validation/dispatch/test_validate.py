@@ -4,11 +4,11 @@ import csv
 
 import pytest
 
-from dva_sim.cli.validate import validate
-from dva_sim.validation.dispatch import play
+from dva_sim.cli.validation import validate
+from dva_sim.validation.dispatch import checks
 from dva_sim.validation.dispatch.cases import load_cases
+from dva_sim.validation.dispatch.checks import check_cases
 from dva_sim.validation.dispatch.identities import IDENTITIES, check_identity
-from dva_sim.validation.dispatch.play import check_cases
 
 FILE = """
 cases:
@@ -43,23 +43,23 @@ def a_file(tmp_path, measures="[wait_s, utilisation]", source="''"):
 
 @pytest.fixture
 def only_one_identity(monkeypatch):
-    monkeypatch.setattr(play, "IDENTITIES", {"rotation": IDENTITIES["rotation"]})
+    monkeypatch.setattr(checks, "IDENTITIES", {"rotation": IDENTITIES["rotation"]})
 
 
 def test_a_right_core_passes_and_says_what_is_too_rough(tmp_path, capsys, only_one_identity):
-    assert validate("dispatch", None, a_file(tmp_path), quick=True, jobs=1, seed=1) == 0
+    assert validate("dispatch", case_file=a_file(tmp_path), quick=True, jobs=1, seed=1) == 0
     told = capsys.readouterr().out
     assert "agree with the exact values" in told
     assert "as is to be expected of a quick run" in told
 
 
 def test_a_full_run_that_is_too_rough_fails(tmp_path, only_one_identity):
-    assert validate("dispatch", None, a_file(tmp_path), quick=False, jobs=1, seed=1) == 4
+    assert validate("dispatch", case_file=a_file(tmp_path), quick=False, jobs=1, seed=1) == 4
 
 
 def test_a_wrong_answer_fails(tmp_path, capsys, only_one_identity):
     path = a_file(tmp_path, measures="{utilisation: 0.6}", source="wrong on purpose")
-    assert validate("dispatch", None, path, quick=True, jobs=1, seed=1) == 4
+    assert validate("dispatch", case_file=path, quick=True, jobs=1, seed=1) == 4
     assert "1 of" in capsys.readouterr().out
 
 
@@ -67,7 +67,7 @@ def test_a_wrong_answer_fails(tmp_path, capsys, only_one_identity):
 def test_what_is_written_is_the_same_bytes_each_time(tmp_path, only_one_identity):
     path = a_file(tmp_path)
     for name in ("one", "two"):
-        validate("dispatch", tmp_path / name, path, quick=True, jobs=1, seed=3)
+        validate("dispatch", tmp_path / name, case_file=path, quick=True, jobs=1, seed=3)
     files = sorted(p.relative_to(tmp_path / "one") for p in (tmp_path / "one").rglob("*.*"))
     assert {f.name for f in files} >= {"dispatch.csv", "dispatch.parquet", "index.html"}
     assert {f.stem for f in files if f.suffix == ".svg"} == {"deviations", "relative", "waits"}

@@ -13,8 +13,8 @@ from dva_sim.validation.network.emulator.campaign import (
     job_of,
     measure_all,
 )
-from dva_sim.validation.network.emulator.cell import Job, Outcome
-from dva_sim.validation.network.emulator.running import EmulatorError
+from dva_sim.validation.network.emulator.cell import EmulatedJob, EmulatedOutcome
+from dva_sim.validation.network.emulator.process import EmulatorError
 
 SLOW, FAST = Condition("pub", 10), Condition("pub", 50)
 Play = Callable[[Condition, int], None]
@@ -34,8 +34,8 @@ def pretend(monkeypatch: pytest.MonkeyPatch, play: Play) -> list[tuple[str, int]
         calls.append((condition.label, seed))
         return dict.fromkeys(COLUMNS, "1") | condition.to_row()
 
-    def run_job(job: Job) -> Outcome:
-        return Outcome(way="root")
+    def run_job(job: EmulatedJob) -> EmulatedOutcome:
+        return EmulatedOutcome(way="root")
 
     monkeypatch.setattr(campaign, "measure", measure)
     monkeypatch.setattr(campaign, "run_job", run_job)

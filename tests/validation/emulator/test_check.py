@@ -1,25 +1,26 @@
 import numpy as np
 import pytest
 
-from dva_sim.cli import emulated_link
+from dva_sim.cli.checks import check
 from dva_sim.kernel.streams import Streams
-from dva_sim.validation.network.emulator.running import EmulatorError
+from dva_sim.validation.network.emulator import process, self_check
+from dva_sim.validation.network.emulator.process import EmulatorError
 from dva_sim.validation.network.emulator.self_check import (
     PROBES,
     Crossing,
-    Finding,
+    LinkFinding,
     find_bursts,
     find_delay,
     find_jitter,
     find_loss,
     find_rate,
 )
-from dva_sim.validation.network.emulator.wire import Wire, WireConfig
+from dva_sim.validation.network.emulator.wire import EmulatedWire, WireConfig
 
 
 def crossing(config: WireConfig, count: int, interval_s: float, size: int = 100) -> Crossing:
     """Datagrams over a wire without devices: never late."""
-    wire = Wire(config, Streams(3), "ab")
+    wire = EmulatedWire(config, Streams(3), "ab")
     sent = interval_s * np.arange(count)
     out = [(wire.offer(float(at), size), number) for number, at in enumerate(sent)]
     arrived = sorted((at, number) for at, number in out if at is not None)
@@ -71,7 +72,7 @@ def test_jitter_that_keeps_the_order_is_not_taken_for_free_jitter() -> None:
 
 
 def test_a_finding_says_what_was_wanted_and_whether_it_passed() -> None:
-    line = str(Finding("rate", "kbit/s", 1000.0, 975.0, 20.0))
+    line = str(LinkFinding("rate", "kbit/s", 1000.0, 975.0, 20.0))
     words = " ".join(line.split())
     assert words == "rate 975.000 wanted 1000.000 within 20.000 kbit/s MISSED"
 
@@ -79,17 +80,17 @@ def test_a_finding_says_what_was_wanted_and_whether_it_passed() -> None:
 def test_a_missed_finding_is_the_exit_code(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(emulated_link, "why_no_packets", lambda: "")
+    monkeypatch.setattr(process, "why_no_packets", lambda: "")
     for found, code in ((50.5, 0), (52.0, 1)):
-        findings = [Finding("delay, median", "ms", 50.0, found, 1.0)]
-        monkeypatch.setattr(emulated_link, "check_link", lambda findings=findings: findings)
-        assert emulated_link.check() == code
+        findings = [LinkFinding("delay, median", "ms", 50.0, found, 1.0)]
+        monkeypatch.setattr(self_check, "check_link", lambda findings=findings: findings)
+        assert check(["link"]) == code
     assert "a quiet machine helps" in capsys.readouterr().out
 
 
 def test_where_there_is_no_link_the_check_says_why_and_offers_the_relay(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(emulated_link, "why_no_packets", lambda: "the emulated link needs Linux")
+    monkeypatch.setattr(process, "why_no_packets", lambda: "the emulated link needs Linux")
     with pytest.raises(EmulatorError, match="needs Linux; a relay of TCP over the loopback can"):
-        emulated_link.check()
+        check(["link"])

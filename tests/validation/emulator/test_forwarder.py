@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import pytest
 
 from dva_sim.kernel.streams import Streams
-from dva_sim.validation.network.emulator.wire import Forwarder, Wire, WireConfig, tell
+from dva_sim.validation.network.emulator.wire import EmulatedWire, Forwarder, WireConfig, tell
 
 PACKET = b"\x45" + b"." * 39
 FOREVER = 1e9
@@ -17,7 +17,7 @@ class Pretended:
     def __init__(self, **config: object) -> None:
         self.a, a = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self.b, b = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        wires = [Wire(WireConfig(**config), Streams(1), way) for way in ("ab", "ba")]  # type: ignore[arg-type]
+        wires = [EmulatedWire(WireConfig(**config), Streams(1), way) for way in ("ab", "ba")]  # type: ignore[arg-type]
         self.called, self._call = os.pipe()
         os.write(self._call, b"!")
         for end in (a, b, self.a, self.b):
@@ -95,7 +95,10 @@ def test_forwarding_ends_at_its_deadline(between: Pretended) -> None:
 
 
 def test_lateness_is_told_in_milliseconds() -> None:
-    wires = (Wire(WireConfig(), Streams(1), "ab"), Wire(WireConfig(), Streams(1), "ba"))
+    wires = (
+        EmulatedWire(WireConfig(), Streams(1), "ab"),
+        EmulatedWire(WireConfig(), Streams(1), "ba"),
+    )
     told = tell(wires, [0.001 * step for step in range(101)])
     assert told["emu_late_p50_ms"] == pytest.approx(50)
     assert told["emu_late_p99_ms"] == pytest.approx(99)

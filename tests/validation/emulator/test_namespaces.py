@@ -16,8 +16,8 @@ from patience import becomes
 
 from dva_sim.network.condition import Condition
 from dva_sim.validation.network.emulator.campaign import COLUMNS, job_of, measure
-from dva_sim.validation.network.emulator.cell import Job, Outcome
-from dva_sim.validation.network.emulator.running import (
+from dva_sim.validation.network.emulator.cell import EmulatedJob, EmulatedOutcome
+from dva_sim.validation.network.emulator.process import (
     EmulatorError,
     run_job,
     start_job,
@@ -160,13 +160,13 @@ def test_a_killed_robot_ends_the_run_and_is_named(run: Run) -> None:
     os.kill(robot, signal.SIGKILL)
     assert all_end(handles)
     run.out.seek(0)
-    assert Outcome.from_json(run.out.read().decode()).problem.startswith("the robot")
+    assert EmulatedOutcome.from_json(run.out.read().decode()).problem.startswith("the robot")
 
 
 def test_a_run_that_takes_too_long_is_ended() -> None:
     need_link()
     job = job_of(LONG, 1)
-    short = Job("commands", bound_s=0.1, arguments=job.arguments, room=job.room)
+    short = EmulatedJob("commands", bound_s=0.1, arguments=job.arguments, room=job.room)
     with pytest.raises(EmulatorError, match=r"did not come to an end within 0\.1 s"):
         run_job(short)
 
@@ -174,7 +174,7 @@ def test_a_run_that_takes_too_long_is_ended() -> None:
 def test_a_congestion_control_that_the_kernel_does_not_have_is_told_in_one_line() -> None:
     need_link()
     with pytest.raises(EmulatorError, match="congestion control 'none-such' is refused") as told:
-        run_job(Job("nothing", congestion="none-such"))
+        run_job(EmulatedJob("nothing", congestion="none-such"))
     assert "\n" not in str(told.value)
 
 
@@ -186,10 +186,10 @@ def test_where_packets_can_be_emulated_nothing_is_missing() -> None:
 def test_where_devices_are_forbidden_one_line_says_what_is_needed(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def refuse(job: Job) -> None:
+    def refuse(job: EmulatedJob) -> None:
         raise EmulatorError("a user namespace is refused: Operation not permitted")
 
-    monkeypatch.setattr("dva_sim.validation.network.emulator.running.run_job", refuse)
+    monkeypatch.setattr("dva_sim.validation.network.emulator.process.run_job", refuse)
     told = why_no_packets()
     assert told.startswith("the emulated link needs Linux, /dev/net/tun open for reading")
     assert told.endswith("here a user namespace is refused: Operation not permitted")

@@ -3,15 +3,15 @@ import sys
 import patience
 import pytest
 
-from dva_sim.validation.network.emulator.notes import Kind, Notes
+from dva_sim.validation.network.emulator.programs import NoteKind, Notes
 
 A_PROCESS_NOTES_AND_ENDS = """
 import os
-from dva_sim.validation.network.emulator.notes import Kind, Notes
+from dva_sim.validation.network.emulator.programs import NoteKind, Notes
 notes = Notes(10)
 if os.fork() == 0:
-    notes.add(Kind.ISSUED, 0, 1.5)
-    notes.add(Kind.APPLIED, 3, 2.25)
+    notes.add(NoteKind.ISSUED, 0, 1.5)
+    notes.add(NoteKind.APPLIED, 3, 2.25)
     os._exit(0)
 os.wait()
 print(notes.read())
@@ -27,7 +27,7 @@ def test_notes_of_a_process_are_read_after_it_ended() -> None:
 
 def test_there_is_no_note_without_room() -> None:
     notes = Notes(1)
-    notes.add(Kind.ALERT, 1, 1.0)
+    notes.add(NoteKind.ALERT, 1, 1.0)
     with pytest.raises(MemoryError, match="no room for more than 1 notes"):
-        notes.add(Kind.ALERT, 2, 2.0)
-    assert notes.read() == [(Kind.ALERT, 1, 1.0)]
+        notes.add(NoteKind.ALERT, 2, 2.0)
+    assert notes.read() == [(NoteKind.ALERT, 1, 1.0)]

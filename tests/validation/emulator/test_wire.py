@@ -5,16 +5,16 @@ import pytest
 
 from dva_sim.kernel.streams import Streams
 from dva_sim.network.condition import Condition
-from dva_sim.validation.network.emulator.wire import Wire, WireConfig
+from dva_sim.validation.network.emulator.wire import EmulatedWire, WireConfig
 
 MANY = 20_000
 
 
-def wire(seed: int = 1, **config: object) -> Wire:
-    return Wire(WireConfig(**config), Streams(seed), "ab")  # type: ignore[arg-type]
+def wire(seed: int = 1, **config: object) -> EmulatedWire:
+    return EmulatedWire(WireConfig(**config), Streams(seed), "ab")  # type: ignore[arg-type]
 
 
-def releases(of: Wire, times: list[float], size: int = 1000) -> list[float | None]:
+def releases(of: EmulatedWire, times: list[float], size: int = 1000) -> list[float | None]:
     return [of.offer(now, size) for now in times]
 
 

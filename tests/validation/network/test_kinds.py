@@ -1,18 +1,18 @@
 """How a condition is judged follows from what was set, never from what was found."""
 
 from dva_sim.network.condition import Condition
-from dva_sim.validation.network.judging import (
+from dva_sim.validation.network.reference import SocketRun
+from dva_sim.validation.network.verdicts import (
     grouped,
     is_bounded,
     load,
     may_livelock,
     why_not_judged,
 )
-from dva_sim.validation.network.reference import Run
 
 
 def run(condition, seed=1, group="S", independent=True):
-    return Run(condition, "reference", group, seed, independent, True, {})
+    return SocketRun(condition, "reference", group, seed, independent, True, {})
 
 
 def asks(**changes):

@@ -6,8 +6,7 @@ from importlib import resources as packages
 import pytest
 
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.validation.network.judging import grouped
-from dva_sim.validation.network.measuring import shortened
+from dva_sim.validation.network.measurement import shortened
 from dva_sim.validation.network.reference import (
     NUMBERS,
     BlockConfig,
@@ -17,6 +16,7 @@ from dva_sim.validation.network.reference import (
     load_runs,
     read_runs,
 )
+from dva_sim.validation.network.verdicts import grouped
 
 
 def test_the_design_has_what_the_reference_lacks():
@@ -45,8 +45,12 @@ def test_every_link_meets_every_pair_of_programs():
         programs={"p": {"pattern": "pub", "hz": 10}, "d": {"pattern": "dealer", "hz": 20}},
     )
     found = [(c.pattern, c.delay_ms, c.dur_s) for c in conditions_of(block)]
-    assert found == [("pub", 10, 9), ("dealer", 10, 9), ("pub", 200, 9), ("dealer", 200, 9)]
-    assert [(c.pattern, c.delay_ms) for c in shortened(block)] == [("pub", 10), ("dealer", 200)]
+    both = ("pub-sub", "pipelined")
+    assert found == [(pattern, delay, 9) for delay in (10, 200) for pattern in both]
+    assert [(c.pattern, c.delay_ms) for c in shortened(block)] == [
+        ("pub-sub", 10),
+        ("pipelined", 200),
+    ]
 
 
 def test_a_setting_that_no_condition_has_is_refused():

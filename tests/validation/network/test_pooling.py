@@ -5,9 +5,9 @@ import pytest
 
 from dva_sim.network.condition import Condition
 from dva_sim.validation.network import pooling
-from dva_sim.validation.network.judging import BY_NAME, Cell, Group
 from dva_sim.validation.network.pooling import is_steady, pool, score, tells, to_be_pooled
-from dva_sim.validation.network.reference import Run
+from dva_sim.validation.network.reference import SocketRun
+from dva_sim.validation.network.verdicts import BY_NAME, ComparedCell, ConditionGroup
 
 RNG = np.random.default_rng
 
@@ -15,9 +15,9 @@ RNG = np.random.default_rng
 def cell(measured, predicted, name="age_p50", delay_ms=50.0):
     condition = Condition("pub", 10, loss=0.05, delay_ms=delay_ms)
     values = {"emu_late_p99_ms": 0.2}
-    runs = [Run(condition, "own", "lossy", seed, True, True, values) for seed in range(6)]
-    group = Group(condition, "pooled", tuple(runs))
-    return Cell(group, BY_NAME[name], np.asarray(measured), np.asarray(predicted))
+    runs = [SocketRun(condition, "own", "lossy", seed, True, True, values) for seed in range(6)]
+    group = ConditionGroup(condition, "pooled", tuple(runs))
+    return ComparedCell(group, BY_NAME[name], np.asarray(measured), np.asarray(predicted))
 
 
 def cells(factor, seed):

@@ -4,20 +4,19 @@ import csv
 
 import pytest
 
-from dva_sim.cli import validate as commands
-from dva_sim.cli import validate_network
+from dva_sim.cli import validation
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.validation.network import comparison, result_page
-from dva_sim.validation.network.comparison import Setting, compare
-from dva_sim.validation.network.judging import grouped
+from dva_sim.validation.network.comparison import NetworkSetting, compare
 from dva_sim.validation.network.reference import load_plan, load_runs
+from dva_sim.validation.network.verdicts import grouped
 
 LABELS = (
     *("req10_d100_j0_l0_r0_p5_T2500", "pub50_d0_j0_l0_r64_p5", "pub10_d50_j0_l5_r0_p5"),
     *("req10_d50_j0_l5_r0_p5_T2500", "req10_d100_j20_l5_r0_p5_T2500"),
     "pub50_d100_j0_l0_r0_p100",
 )
-QUICK = Setting(seed=1, quick=True)
+QUICK = NetworkSetting(seed=1, quick=True)
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -76,7 +75,7 @@ def test_a_row_of_the_table_shows_measured_and_predicted(compared):
 def test_the_command_writes_the_same_bytes_again(runs, tmp_path, capsys):
     few = [run for run in runs if "l5" not in run.condition.label]
     for name in ("a", "b"):
-        assert validate_network.judge_runs(few, {}, tmp_path / name, QUICK) == 0
+        assert validation.judge_runs(few, {}, tmp_path / name, QUICK) == 0
     assert "conditions are judged" in capsys.readouterr().out
     first, second = tmp_path / "a", tmp_path / "b"
     files = [path.relative_to(first) for path in first.rglob("*") if path.is_file()]
@@ -90,22 +89,22 @@ def test_the_command_writes_the_same_bytes_again(runs, tmp_path, capsys):
 def test_the_number_of_processes_changes_nothing(runs):
     one = [run for run in runs if run.condition.label == "req10_d50_j0_l5_r0_p5_T2500"]
     alone, together = (
-        compare(grouped(one), Setting(quick=True, workers=workers)) for workers in (1, 2)
+        compare(grouped(one), NetworkSetting(quick=True, workers=workers)) for workers in (1, 2)
     )
     assert [s.z for s in alone.pooled.scored] == [s.z for s in together.pooled.scored]
 
 
 def test_a_mechanism_that_is_left_out_has_its_line(runs):
     one = [run for run in runs if run.condition.label == "pub10_d50_j0_l5_r0_p5"]
-    found = compare(grouped(one), Setting(quick=True, ablate=True))
+    found = compare(grouped(one), NetworkSetting(quick=True, ablate=True))
     names = [name for name, *_ in result_page.ablation(found)]
     assert {"nothing", "datagrams", "tail-loss probe", "RACK"} <= set(names)
 
 
 def test_options_of_others_are_refused():
     with pytest.raises(ConfigError, match="--strategy is for `validate operators`"):
-        commands.validate("network", None, strategy="adaptive")
+        validation.validate("network", strategy="adaptive")
     with pytest.raises(ConfigError, match="--ablate, --live and --measure are for"):
-        commands.validate("dispatch", None, sockets=commands.Sockets(ablate=True))
+        validation.validate("dispatch", ablate=True)
     with pytest.raises(ConfigError, match="should be dispatch, operators or network"):
-        commands.validate("sockets", None)
+        validation.validate("sockets")

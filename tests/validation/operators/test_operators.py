@@ -5,19 +5,23 @@ import csv
 import pytest
 
 from dva_sim.agents.operator.published import lines_of, load_split, load_targets
-from dva_sim.cli import validate_operators
-from dva_sim.cli.validate import validate
+from dva_sim.cli.validation import validate
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.validation.operators import experiment_runs
+from dva_sim.validation.operators.experiment_runs import (
+    OperatorsSetting,
+    measured,
+    play_experiments,
+)
 from dva_sim.validation.operators.experiments import EXPERIMENTS
-from dva_sim.validation.operators.judging import judge, outcome_of
-from dva_sim.validation.operators.play import Setting, measured, play_experiments
+from dva_sim.validation.operators.verdicts import judge, outcome_of
 
 LINES = lines_of(load_targets(), load_split())
 
 
 def played(strategy, *names, persons=3):
     chosen = [e for e in EXPERIMENTS if e.name in names]
-    setting = Setting(strategy, persons=persons, quick=True)
+    setting = OperatorsSetting(strategy, persons=persons, quick=True)
     found = measured(chosen, play_experiments(chosen, setting), seed=1)
     return {v.line.id: v for v in judge(LINES, found)}, found
 
@@ -45,14 +49,16 @@ def test_the_same_seed_gives_the_same_numbers_and_another_one_other_persons():
     one, again = (played("adaptive", "latency", persons=2)[1] for _ in range(2))
     assert one == again
     chosen = [e for e in EXPERIMENTS if e.name == "latency"]
-    other = play_experiments(chosen, Setting("adaptive", seed=2, persons=2, quick=True))
+    other = play_experiments(chosen, OperatorsSetting("adaptive", seed=2, persons=2, quick=True))
     assert chosen[0].measure(other["latency"])["S12/more"] != one["S12/more"].value
 
 
 def test_the_number_of_processes_changes_nothing():
     chosen = [e for e in EXPERIMENTS if e.name == "latency"]
     alone, together = (
-        play_experiments(chosen, Setting("adaptive", persons=2, quick=True, workers=workers))
+        play_experiments(
+            chosen, OperatorsSetting("adaptive", persons=2, quick=True, workers=workers)
+        )
         for workers in (1, 2)
     )
     for cell, trials in alone["latency"].items():
@@ -60,9 +66,7 @@ def test_the_number_of_processes_changes_nothing():
 
 
 def test_an_unknown_strategy_is_refused_before_anything_is_played(monkeypatch):
-    monkeypatch.setattr(
-        validate_operators, "play_exact", lambda *given: pytest.fail("it was played")
-    )
+    monkeypatch.setattr(experiment_runs, "play_exact", lambda *given: pytest.fail("it was played"))
     with pytest.raises(ConfigError, match="'telepathy'"):
         validate("operators", None, quick=True, jobs=1, strategy="telepathy")
 
@@ -71,7 +75,7 @@ def test_an_unknown_strategy_is_refused_before_anything_is_played(monkeypatch):
     ("what", "options", "words"),
     [
         ("robots", {}, "should be dispatch, operators or network"),
-        ("operators", {"cases": "mine.yaml"}, "--cases is for `validate dispatch`"),
+        ("operators", {"case_file": "mine.yaml"}, "--cases is for `validate dispatch`"),
         ("dispatch", {"strategy": "pursuit"}, "--strategy is for `validate operators`"),
     ],
 )
@@ -82,7 +86,7 @@ def test_what_does_not_belong_together_is_refused(what, options, words):
 
 @pytest.mark.soak
 def test_what_is_written_is_the_same_bytes_each_time(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(validate_operators, "QUICK_PERSONS", 3)
+    monkeypatch.setattr(experiment_runs, "QUICK_PERSONS", 3)
     for name in ("one", "two"):
         assert validate("operators", tmp_path / name, quick=True, jobs=2, strategy="oracle") == 4
     assert "negative" not in capsys.readouterr().err

@@ -9,7 +9,7 @@ import pytest
 from dva_sim.agents.operator.published import lines_of, load_split, load_targets
 from dva_sim.validation.operators import experiments as of
 from dva_sim.validation.operators import result_page
-from dva_sim.validation.operators.judging import (
+from dva_sim.validation.operators.verdicts import (
     Found,
     Trials,
     certain,

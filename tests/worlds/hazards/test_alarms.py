@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from dva_sim.worlds.hazards import Fire, detection_time, first_detection, make_hazard
-from dva_sim.worlds.hazards.detectors import (
-    CoAlarm,
+from dva_sim.worlds.hazards.alarms import CoAlarm
+from dva_sim.worlds.hazards.fire import (
     heat_in_jet,
     jet_lag,
     jet_smoke,
@@ -102,7 +102,7 @@ def test_a_farther_detector_sounds_later_and_a_heat_detector_later_still() -> No
 
 def test_a_heat_detector_lags_behind_the_air_by_its_response_time() -> None:
     """A slow fire is a steady jet to it: it sounds when the air is little above 58 degrees."""
-    slow, quick = Fire((0, 0), 0.0, "slow"), Fire((0, 0), 0.0, "ultrafast")
+    slow, quick = (Fire((0, 0), 0.0, growth=growth) for growth in ("slow", "ultrafast"))
     over = []
     for fire in (slow, quick):
         heat = np.array([fire.heat_release(heat_in_jet(fire, 2.0, 3.0))])

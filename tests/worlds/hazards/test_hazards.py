@@ -34,16 +34,16 @@ def test_severity_lies_between_0_and_1(kind: str) -> None:
 
 def test_what_is_not_known_is_said_in_one_line() -> None:
     for kind, settings, message in (
-        ("quake", {}, "hazard 'quake' is unknown; known: fire, gas_leak, flood"),
-        ("fire", {"rate": 1.0}, "a fire has no setting 'rate'; it has: growth, peak"),
-        ("fire", {"growth": "quick"}, "known: slow, medium, fast, ultrafast"),
-        ("gas_leak", {"gas": "helium"}, "known: methane, propane, carbon_monoxide"),
-        ("flood", {"inflow": -1.0}, "inflow of a flood is a positive number, not -1.0"),
-        ("flood", {"inflow": 10.1}, "inflow of a flood is at most 10, not 10.1"),
-        ("fire", {"peak": 100_001.0}, "peak of a fire is at most 100000, not 100001"),
-        ("fire", {"peak": math.inf}, "peak of a fire is a positive number, not inf"),
-        ("gas_leak", {"rate": 1e9}, r"rate of a gas_leak is at most 10, not 1e\+09"),
-        ("gas_leak", {"wind": 51.0}, "wind of a gas_leak is at most 50, not 51"),
+        ("quake", {}, "hazard 'quake' is unknown; known: fire, flood, gas_leak; or a file"),
+        ("fire", {"rate": 1.0}, "hazard 'fire' has no option 'rate'; known: growth, peak"),
+        ("fire", {"growth": "quick"}, "growth: should be slow, medium, fast or ultrafast"),
+        ("gas_leak", {"gas": "helium"}, "gas: should be methane, propane or carbon_monoxide"),
+        ("flood", {"inflow": -1.0}, "hazard 'flood': inflow: should be above 0, not -1.0"),
+        ("flood", {"inflow": 10.1}, "inflow: should be at most 10, not 10.1"),
+        ("fire", {"peak": 100_001.0}, "peak: should be at most 100000, not 100001"),
+        ("fire", {"peak": math.inf}, "peak: should be a finite number, not inf"),
+        ("gas_leak", {"rate": 1e9}, "rate: should be at most 10, not 1000000000"),
+        ("gas_leak", {"wind": 51.0}, "wind: should be at most 50, not 51"),
     ):
         with pytest.raises(ConfigError, match=message):
             make_hazard(kind, (0.0, 0.0), 0.0, **settings)
@@ -54,7 +54,7 @@ def test_what_is_not_known_is_said_in_one_line() -> None:
 
 @pytest.mark.parametrize(("growth", "seconds"), GROWTH_S.items())
 def test_a_fire_releases_1055_kilowatts_when_its_class_says(growth: str, seconds: float) -> None:
-    fire = Fire((0, 0), 10.0, growth)
+    fire = Fire((0, 0), 10.0, growth=growth)
     assert fire.heat_release(10.0 + seconds) == pytest.approx(1055)
     assert fire.heat_release(10.0 + seconds / 2) == pytest.approx(1055 / 4)
 
@@ -63,7 +63,7 @@ def test_a_fire_releases_1055_kilowatts_when_its_class_says(growth: str, seconds
 def test_a_fire_burns_all_its_fuel_and_no_more(growth: str) -> None:
     """5 MW burn on 10 m2 of floor, each with 420 MJ of fuel."""
     times = np.arange(0.0, 4000.0)
-    heat = [Fire((0, 0), 0.0, growth).heat_release(t) for t in times]
+    heat = [Fire((0, 0), 0.0, growth=growth).heat_release(t) for t in times]
     assert max(heat) == 5000.0
     assert heat[-1] == 0.0
     assert np.trapezoid(heat, times) == pytest.approx(10 * 420e3, rel=1e-3)

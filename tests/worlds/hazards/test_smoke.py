@@ -8,18 +8,20 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from dva_sim.worlds.hazards import fire_field as model
+from dva_sim.worlds.hazards import smoke as model
 from dva_sim.worlds.hazards.building import Spaces
-from dva_sim.worlds.hazards.field import March
-from dva_sim.worlds.hazards.fire import CO_YIELD, SOOT_YIELD, Fire
-from dva_sim.worlds.hazards.fire_field import CO, KELVIN, SOOT, Smoke, plume, volumes
-
-
-class Steady(Fire):
-    """A fire that releases as much heat as its peak says, at once and for ever."""
-
-    def heat_release(self, time: float) -> float:
-        return self.peak
+from dva_sim.worlds.hazards.course import March
+from dva_sim.worlds.hazards.fire import Fire
+from dva_sim.worlds.hazards.smoke import (
+    CO,
+    CO_YIELD,
+    KELVIN,
+    SOOT,
+    SOOT_YIELD,
+    SmokeLayers,
+    plume,
+    volumes,
+)
 
 
 def rooms(areas: list[float], ceiling: float, doors: list[tuple[int, int, float]]) -> Spaces:
@@ -35,8 +37,8 @@ def rooms(areas: list[float], ceiling: float, doors: list[tuple[int, int, float]
     )
 
 
-def filling(spaces: Spaces, heat: float, step: float = 1.0) -> tuple[Smoke, March]:
-    smoke = Smoke(spaces, Steady((0.0, 0.0), 0.0, peak=heat), 0)
+def filling(spaces: Spaces, heat: float, step: float = 1.0) -> tuple[SmokeLayers, March]:
+    smoke = SmokeLayers(spaces, lambda age: heat, 0)
     return smoke, March(smoke.empty(), smoke.step, ((math.inf, step),))
 
 
@@ -93,7 +95,8 @@ def test_the_measured_filling_times_of_nfpa_92_are_near() -> None:
 def test_a_door_of_a_burning_room_lets_out_half_a_kilogram_for_each_a_root_h() -> None:
     """Kawagoe: 0.5 A sqrt(H) kg/s flow through the only opening of a room full of flames;
     1.2 m x 2.1 m are 1.83 kg/s."""
-    smoke = Smoke(rooms([20.0], 2.4, [(0, 1, 1.2)]), Fire((0.0, 0.0), 0.0), 0)
+    fire = Fire((0.0, 0.0), 0.0)
+    smoke = SmokeLayers(rooms([20.0], 2.4, [(0, 1, 1.2)]), fire.heat_release, 0)
     out, height = smoke._doorways(
         np.array([0]), np.array([[0.0], [1e3]]), np.array([[1200.0], [KELVIN]])
     )

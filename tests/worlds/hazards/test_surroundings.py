@@ -7,10 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from dva_sim.worlds.hazards import CLEAR, Hazard, Surroundings, gas_leak_field, make_hazard
+from dva_sim.worlds.hazards import CLEAR, Hazard, Surroundings, gas_leak, make_hazard
 from dva_sim.worlds.hazards.building import building_of
-from dva_sim.worlds.hazards.gas_leak import GasLeak
-from dva_sim.worlds.hazards.gas_leak_field import LeakField
+from dva_sim.worlds.hazards.gas_leak import GasLeak, LeakField
 from dva_sim.worlds.layout import Site
 from dva_sim.worlds.site import load_site
 
@@ -182,9 +181,9 @@ def test_a_large_house_gives_a_detector_the_same_gas_from_the_leak_as_to_the_lea
     """Solved from the detector's side in small houses, from the leak's in large ones."""
     leak = make_hazard("gas_leak", LAB, 0.0)
     assert isinstance(leak, GasLeak)
-    field = LeakField(building_of(site), leak)
+    field = LeakField(leak, site)
     small = field.seen_from(*CORRIDOR)
-    monkeypatch.setattr(gas_leak_field, "LARGE_MESH", 0)
+    monkeypatch.setattr(gas_leak, "LARGE_MESH", 0)
     large = field.seen_from(*CORRIDOR)
     for age in (60.0, 300.0, 1500.0):
         assert large(age) == pytest.approx(small(age), rel=1e-9)

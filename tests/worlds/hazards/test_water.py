@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dva_sim.worlds.hazards.building import Spaces
-from dva_sim.worlds.hazards.field import March
+from dva_sim.worlds.hazards.course import March
 from dva_sim.worlds.hazards.flood import Filling, over_weir
 
 

@@ -1,16 +1,12 @@
-"""How operators steer: from what they see, or (the reference) from what is."""
+"""How operators steer: from what they see, or (the reference) from what is.
+
+A strategy stands on what persons, routes and observations are, and knows no robot. Begin with
+`base.Strategy`, then `pursuit`; `loading` finds one by its name.
+"""
 
 from dva_sim.agents.operator.strategies.adaptive import Adaptive
-from dva_sim.agents.operator.strategies.base import (
-    Guarded,
-    Intent,
-    PathView,
-    PointView,
-    Reach,
-    Strategy,
-    View,
-)
-from dva_sim.agents.operator.strategies.cursor import SHORTEST, Sighting, Velocity, gain_at
+from dva_sim.agents.operator.strategies.base import GuardedStrategy, PathView, PointView, Strategy
+from dva_sim.agents.operator.strategies.cursor import Sighting, Velocity
 from dva_sim.agents.operator.strategies.loading import (
     Driver,
     known_strategies,
@@ -19,22 +15,25 @@ from dva_sim.agents.operator.strategies.loading import (
 )
 from dva_sim.agents.operator.strategies.move_and_wait import MoveAndWait
 from dva_sim.agents.operator.strategies.predictor import Oracle, Predictor, Truth
-from dva_sim.agents.operator.strategies.pursuit import Pursuit
-from dva_sim.agents.operator.strategies.two_point import TwoPoint
+from dva_sim.agents.operator.strategies.pursuit import Pursuit, TwoPoint
+from dva_sim.agents.person import Person
+from dva_sim.agents.route_following import SHORTEST, Intent, Reach, Route, View, gain_at
 
 __all__ = [
     "SHORTEST",
     "Adaptive",
     "Driver",
-    "Guarded",
+    "GuardedStrategy",
     "Intent",
     "MoveAndWait",
     "Oracle",
     "PathView",
+    "Person",
     "PointView",
     "Predictor",
     "Pursuit",
     "Reach",
+    "Route",
     "Sighting",
     "Strategy",
     "Truth",

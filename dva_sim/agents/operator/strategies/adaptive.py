@@ -10,19 +10,20 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from dva_sim.agents.operator.person import Person
-from dva_sim.agents.operator.strategies.base import (
-    Intent,
-    PathView,
-    PointView,
-    Reach,
-    Strategy,
-    View,
-)
-from dva_sim.agents.operator.strategies.cursor import SHORTEST, Velocity, fastest, gain_at
+from dva_sim.agents.operator.strategies.base import PathView, PointView, Strategy
+from dva_sim.agents.operator.strategies.cursor import Velocity, fastest
 from dva_sim.agents.operator.strategies.move_and_wait import SHORT, MoveAndWait
-from dva_sim.agents.operator.strategies.pursuit import FARTHEST_LOOK
-from dva_sim.agents.route_following import Route
+from dva_sim.agents.operator.strategies.pursuit import Pursuit
+from dva_sim.agents.person import Person
+from dva_sim.agents.route_following import (
+    FARTHEST_LOOK,
+    SHORTEST,
+    Intent,
+    Reach,
+    Route,
+    View,
+    gain_at,
+)
 
 BETTER = 0.8  # one changes to what takes less than this share of the time; assumed
 GAP = 1.0  # a longer time between two frames is not counted as driving [s]
@@ -39,21 +40,18 @@ class Adaptive(Strategy):
     Args:
         person: Who steers.
         reach: Limits of what is steered.
-        closed: Strategy of the closed loop.
+        closed: Strategy of the closed loop; left out: `Pursuit`.
 
     Attributes:
         using: What is used now: `closed` or `move_and_wait`.
         switches: How often that has changed.
-
-    Raises:
-        ConfigError: the strategy of the closed loop is none.
     """
 
-    def __init__(self, person: Person, reach: Reach, closed: str = "pursuit") -> None:
-        from dva_sim.agents.operator.strategies.loading import load_inner
+    uses = "closed"
 
+    def __init__(self, person: Person, reach: Reach, closed: Strategy | None = None) -> None:
         super().__init__(person, reach)
-        self._closed = load_inner("closed", closed, person, reach)
+        self._closed = closed or Pursuit(person, reach)
         self._moves = MoveAndWait(person, reach)
         self.using = "closed"
         self.switches = 0

@@ -2,43 +2,19 @@
 
 A strategy is how a kind of person turns what it sees into what it wants. It sees frames that are
 late by perception and judged with an error, and what the person takes the delay to be; there is no
-way from any of these to the true state.
-
-A strategy of a user, kept within what can be done whatever it answers.
+way from any of these to the true state. A strategy of a user is kept within what can be done,
+whatever it answers (`GuardedStrategy`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
-from dva_sim.agents.operator.person import Person
 from dva_sim.agents.operator.strategies.cursor import Sighting, Velocity, slowed, through, towards
-from dva_sim.agents.robot.camera import Observation
-from dva_sim.agents.route_following import Route
+from dva_sim.agents.person import Person
+from dva_sim.agents.route_following import Intent, Reach, Route, View
 from dva_sim.kernel.plugins import FAILURES, Guard, said
-
-
-class View(NamedTuple):
-    """What a person knows of the robot that it drives.
-
-    Attributes:
-        now: The person's own clock [s].
-        seen: The newest frame perceived, as the person judges it.
-        delay: What the person takes the whole delay to be, from an intent to its effect seen [s].
-    """
-
-    now: float
-    seen: Observation
-    delay: float
-
-
-class Intent(NamedTuple):
-    """What an operator wants the robot to do now: speed [m/s], turn rate [rad/s]."""
-
-    speed: float
-    turn_rate: float
 
 
 class PointView(NamedTuple):
@@ -62,25 +38,6 @@ class PathView(NamedTuple):
     path: Route
 
 
-@dataclass(frozen=True)
-class Reach:
-    """What the robot, or the cursor, can do.
-
-    Attributes:
-        speed: At most [m/s].
-        turn_rate: At most, either way [rad/s].
-        radius: Of its sharpest curve [m]; 0: it turns on the spot.
-    """
-
-    speed: float
-    turn_rate: float
-    radius: float = 0.0
-
-    def turn(self, turn_rate: float) -> Intent:
-        """Turn at a rate [rad/s], as nearly on the spot as the robot can."""
-        return Intent(min(abs(turn_rate) * self.radius, self.speed), turn_rate)
-
-
 class Strategy:
     """How a kind of operator steers; derive from this to make another kind.
 
@@ -92,10 +49,12 @@ class Strategy:
         reach: Limits of what is steered.
 
     Attributes:
+        uses: Its argument that is another strategy, if it has one: a configuration names it there.
         failures: How often it gave no answer that is one; only strategies of users do that.
         first_failure: What was wrong with it first, in a line.
     """
 
+    uses: ClassVar[str] = ""
     failures = 0
     first_failure = ""
 
@@ -136,7 +95,7 @@ class Strategy:
         return self.person.pace * self.reach.speed
 
 
-class Guarded(Guard, Strategy):
+class GuardedStrategy(Guard, Strategy):
     """A strategy of a user: what raises or answers no two finite numbers is counted, and stands.
 
     Attributes:

@@ -13,13 +13,12 @@ import math
 from itertools import pairwise
 from typing import NamedTuple
 
-from dva_sim.agents.operator.person import Person
-from dva_sim.agents.route_following import Route
+from dva_sim.agents.person import Person
+from dva_sim.agents.route_following import SHORTEST, Route, gain_at
 
 Velocity = tuple[float, float]
 
 BEND_PIECES = 8  # in which a path is looked at for bends
-SHORTEST = 1e-3  # a delay, or a share of noise, below this counts as this
 
 
 class Sighting(NamedTuple):
@@ -48,19 +47,6 @@ class Sighting(NamedTuple):
     target_vx: float
     target_vy: float
     tolerance: float
-
-
-def gain_at(limit: float, margin: float, delay: float) -> float:
-    """The gain at which a person closes a loop [1/s]: gain x delay stays within its margin.
-
-    A loop of gain K on an integrator, with delay tau, is stable below K tau = pi/2.
-
-    Args:
-        limit: The person's own [1/s], however short the delay.
-        margin: The person's own.
-        delay: [s]
-    """
-    return min(limit, margin / max(delay, SHORTEST))
 
 
 def towards(seen: Sighting, delay: float, person: Person, most: float) -> Velocity:

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
-from dva_sim.agents.operator.person import Person, Population, median_person
 from dva_sim.agents.operator.strategies.adaptive import Adaptive
-from dva_sim.agents.operator.strategies.base import Guarded, Reach, Strategy
+from dva_sim.agents.operator.strategies.base import GuardedStrategy, Strategy
 from dva_sim.agents.operator.strategies.move_and_wait import MoveAndWait
 from dva_sim.agents.operator.strategies.predictor import Oracle, Predictor
-from dva_sim.agents.operator.strategies.pursuit import Pursuit
-from dva_sim.agents.operator.strategies.two_point import TwoPoint
+from dva_sim.agents.operator.strategies.pursuit import Pursuit, TwoPoint
+from dva_sim.agents.person import Person, Population, median_person
+from dva_sim.agents.route_following import Reach
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.kernel.plugins import Plugins
+from dva_sim.kernel.plugins import Plugins, word_of
 
 Driver = Strategy | Oracle
 
@@ -26,6 +27,14 @@ STRATEGIES: Final[dict[str, Callable[..., Driver]]] = {
     "pursuit": Pursuit,
     "two_point": TwoPoint,
 }
+
+
+def _guarded(made: Driver) -> Driver:
+    """One of a user's, kept within the limits; its class may make something else of itself."""
+    if not isinstance(made, Strategy):
+        raise ConfigError(f"makes no operator, but {type(made).__name__}")
+    return GuardedStrategy(made)
+
 
 PLUGINS: Final = Plugins[Driver](
     "operator",
@@ -39,17 +48,17 @@ PLUGINS: Final = Plugins[Driver](
 )
 
 
-def known_strategies() -> list[str]:
-    """Names that a configuration can use: shipped and installed ones; files come on top."""
-    return PLUGINS.known()
+known_strategies = PLUGINS.known
 
 
 def load_strategy(
-    name: str, options: Mapping[str, Any] | None = None, base: Path | None = None
+    name: str | Callable[..., Driver],
+    options: Mapping[str, Any] | None = None,
+    base: Path | None = None,
 ) -> Callable[[Person, Reach], Driver]:
     """What makes the strategy that `name` means, for a person and what it steers.
 
-    Those of users are kept within the limits, whatever they answer (`Guarded`).
+    Those of users are kept within the limits, whatever they answer (`GuardedStrategy`).
 
     Args:
         name: A shipped one such as `pursuit`, a class in a file such as `mine.py:Mine`, or the
@@ -62,20 +71,22 @@ def load_strategy(
         ConfigError: there is none of that name, its file or package cannot be loaded, or it is
             not a strategy; a bad option is told when it is made.
     """
-    factory, given = PLUGINS.find(name, base), dict(options or {})
+    factory, given, word = PLUGINS.find(name, base), dict(options or {}), word_of(name)
 
     def make(person: Person, reach: Reach) -> Driver:
-        made = PLUGINS.make(name, factory, given, person, reach)
-        if name in STRATEGIES:
-            return made
-        if not isinstance(made, Strategy):  # its class may make something else of itself
-            raise ConfigError(f"operator {name!r} makes no operator, but {type(made).__name__}")
-        return Guarded(made)
+        used: dict[str, Any] = {}
+        option = getattr(factory, "uses", "")
+        if option in given:
+            load = partial(_load_used, option, given[option], person, reach)
+            used[option] = PLUGINS.ask(word, load)
+        made = PLUGINS.make(word, factory, given | used, person, reach)
+        is_shipped = factory in STRATEGIES.values()
+        return made if is_shipped else PLUGINS.ask(word, partial(_guarded, made))
 
     return make
 
 
-def load_inner(option: str, name: object, person: Person, reach: Reach) -> Strategy:
+def _load_used(option: str, name: object, person: Person, reach: Reach) -> Strategy:
     """The strategy that another one is told to use, by an option of that name.
 
     Raises:

@@ -1,14 +1,10 @@
-"""One open-loop move after the other, each followed by a wait until its result is seen.
+"""Move and wait: one open-loop move after the other, each followed by a wait until it is seen.
+
+A move goes as far as the person trusts it; then it stops and sees what came of it.
 
 References:
     W. R. Ferrell: Remote manipulation with transmission delay. IEEE Trans. Human Factors in
     Electronics HFE-6 (1965): who cannot wait for the picture moves, waits, and moves again.
-
-Move and wait: as far as one trusts an open-loop move, then stop and see what came of it.
-
-References:
-    W. R. Ferrell: Remote manipulation with transmission delay. IEEE Trans. Human Factors in
-    Electronics HFE-6 (1965).
 """
 
 from __future__ import annotations
@@ -16,19 +12,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from dva_sim.agents.operator.person import Person
-from dva_sim.agents.operator.strategies.base import (
-    Intent,
-    PathView,
-    PointView,
-    Reach,
-    Strategy,
-    View,
-)
-from dva_sim.agents.operator.strategies.cursor import SHORTEST, Velocity
-from dva_sim.agents.operator.strategies.pursuit import IN_CURVES
-from dva_sim.agents.robot.camera import Observation
-from dva_sim.agents.route_following import Ahead, Route
+from dva_sim.agents.observation import Observation
+from dva_sim.agents.operator.strategies.base import PathView, PointView, Strategy
+from dva_sim.agents.operator.strategies.cursor import Velocity
+from dva_sim.agents.person import Person
+from dva_sim.agents.route_following import IN_CURVES, SHORTEST, Ahead, Intent, Reach, Route, View
 
 SETTLED_FOR = 0.3  # the picture must stand still for so long [s]; assumed
 STILL = 0.2  # slower than this share of the move, what is seen stands; assumed
@@ -36,7 +24,7 @@ SHORT = 0.5  # no part of a move is shorter: it is made slower instead [s]; assu
 PATIENCE = 3.0  # no motion seen after so many times the usual wait: one moves again; assumed
 
 Pair = tuple[float, float]
-Part = tuple[float, float, float]  # how long [s], and two wanted values
+MovePart = tuple[float, float, float]  # how long [s], and two wanted values
 
 
 class Moves:
@@ -52,7 +40,7 @@ class Moves:
     def __init__(self, reaction: float) -> None:
         self._reaction = reaction
         self.waits = 0
-        self._parts: list[Part] = []  # the first number is when it ends
+        self._parts: list[MovePart] = []  # the first number is when it ends
         self._peak = 0.0
         self._ended: float | None = None  # since when one waits
         self._was_seen = True
@@ -72,7 +60,7 @@ class Moves:
         self.waits += 1
         self._parts, self._peak, self._ended, self._was_seen = [], peak, now, True
 
-    def begin(self, now: float, parts: Sequence[Part], peak: float) -> Pair:
+    def begin(self, now: float, parts: Sequence[MovePart], peak: float) -> Pair:
         """Begin a move, and say what is wanted first.
 
         Args:
@@ -221,7 +209,9 @@ class MoveAndWait(Strategy):
 
     # --- moves -------------------------------------------------------------------------
 
-    def _way(self, route: Route, seen: Observation, left: float, stop_before: float) -> list[Part]:
+    def _way(
+        self, route: Route, seen: Observation, left: float, stop_before: float
+    ) -> list[MovePart]:
         """The next move of a robot, with so much way left [m]; none where it has come to stay."""
         here, turns, go = (seen.x, seen.y), self.reach.radius == 0.0, left - stop_before
         most = max(min(self.trusted, go), LEAST)
@@ -234,13 +224,13 @@ class MoveAndWait(Strategy):
             return [self._turn(ahead.bearing), (lasts, ahead.distance / lasts, 0.0)]
         return [self._curve(ahead)]
 
-    def _turn(self, angle: float) -> Part:
+    def _turn(self, angle: float) -> MovePart:
         """On the spot by an angle [rad]."""
         most = IN_CURVES * self.reach.turn_rate
         lasts = max(abs(angle) / most, SHORT)
         return (lasts, *self.reach.turn(angle / lasts))
 
-    def _curve(self, ahead: Ahead) -> Part:
+    def _curve(self, ahead: Ahead) -> MovePart:
         """On an arc to a place ahead, no sharper than the robot can."""
         curvature = 2.0 * math.sin(ahead.bearing) / max(ahead.distance, LEAST)
         if self.reach.radius > 0.0:

@@ -1,11 +1,11 @@
 """Steering by a prediction: what was asked for but not yet seen is added to what is seen.
 
+The oracle steers so from the true state, by a perfect prediction: a reference, not a person.
+
 References:
     O. J. M. Smith: A controller to overcome dead time. ISA Journal 6 (1959).
     T. B. Sheridan: Space teleoperation through time delay: review and prognosis. IEEE Trans.
     Robotics and Automation 9 (1993): predictor displays.
-
-The reference: steering on the true state, by a perfect prediction. Not a person.
 """
 
 from __future__ import annotations
@@ -16,20 +16,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Generic, TypeVar, final
 
+from dva_sim.agents.observation import Observation
 from dva_sim.agents.operator.delay_estimation import LONGEST
-from dva_sim.agents.operator.person import Person
-from dva_sim.agents.operator.strategies.base import (
-    Intent,
-    PathView,
-    PointView,
-    Reach,
-    Strategy,
-    View,
-)
+from dva_sim.agents.operator.strategies.base import PathView, PointView, Strategy
 from dva_sim.agents.operator.strategies.cursor import Sighting, Velocity
-from dva_sim.agents.robot.camera import Observation
-from dva_sim.agents.route_following import Route
-from dva_sim.kernel.errors import ConfigError
+from dva_sim.agents.operator.strategies.pursuit import Pursuit
+from dva_sim.agents.person import Person
+from dva_sim.agents.route_following import Intent, Reach, Route, View
+from dva_sim.kernel import options
 
 
 class Predictor(Strategy):
@@ -42,22 +36,21 @@ class Predictor(Strategy):
     Args:
         person: Who steers.
         reach: Limits of what is steered.
-        inner: Strategy that steers by the predicted picture.
+        inner: Strategy that steers by the predicted picture; left out: `Pursuit`.
         quality: From 0, no prediction, to 1, a perfect model of one's own commands.
 
     Raises:
-        ConfigError: the inner strategy is none, or the quality is none.
+        ConfigError: the quality is none.
     """
 
-    def __init__(
-        self, person: Person, reach: Reach, inner: str = "pursuit", quality: float = 1.0
-    ) -> None:
-        from dva_sim.agents.operator.strategies.loading import load_inner
+    uses = "inner"
 
+    def __init__(
+        self, person: Person, reach: Reach, inner: Strategy | None = None, quality: float = 1.0
+    ) -> None:
         super().__init__(person, reach)
-        if not isinstance(quality, int | float) or not 0.0 <= quality <= 1.0:
-            raise ConfigError(f"option 'quality' is {quality!r}; should be from 0 to 1")
-        self._inner, self._quality = load_inner("inner", inner, person, reach), quality
+        self._inner = inner or Pursuit(person, reach)
+        self._quality = options.number("quality", quality, least=0, most=1)
         self._asked: deque[tuple[float, float, float]] = deque()
 
     def drive(self, route: Route, view: View, stop_before: float) -> Intent:
@@ -164,7 +157,7 @@ class Oracle:
     DELAY = 0.1  # its own period [s]
 
     def __init__(self, person: Person, reach: Reach) -> None:
-        self._inner = Predictor(person, reach, "pursuit")
+        self._inner = Predictor(person, reach)
 
     def __init_subclass__(cls) -> None:
         raise TypeError(f"{cls.__name__} cannot derive from Oracle, which alone is told the truth")

@@ -1,70 +1,93 @@
-"""Pure pursuit: aims at a point ahead on the route, the farther the longer the delay.
+"""Steering by points ahead on the route: by one, or by a near and a far one.
+
+The published law of two points gives increments of a car's steering: k_f d(theta_f) +
+k_n d(theta_n) + k_I min(theta_n, theta_max) dt, of the visual directions theta of a far and a near
+point. A robot is steered by its turn rate, which takes the place of the steering angle, and it is
+slower by far. What is kept are proportions, nothing is fitted:
+
+- of the three gains, 16 : 4 : 3/s; their size follows from the person's own crossover gain, under
+  delay within its margin, which k_f + k_n becomes;
+- of the near to the far point, 0.37 s to 0.93 s ahead; the far point is the look-ahead that the
+  person takes under delay, and times scale with it.
 
 References:
-    R. C. Coulter: Implementation of the pure pursuit path tracking algorithm. CMU-RI-TR-92-01,
-    1992. T. B. Sheridan: Telerobotics, Automation, and Human Supervisory Control. MIT Press, 1992
-    (driving under delay).
+    D. D. Salvucci, R. Gray: A two-point visual control model of steering. Perception 33 (2004).
+    D. D. Salvucci: Modeling driver behavior in a cognitive architecture. Human Factors 48 (2006):
+    gains 16, 4, 3 and the bound of 0.07, as in the driver model published with it.
+    M. Land, J. Horwood: Which parts of the road guide steering? Nature 377 (1995): the two points.
+    P. Gawthrop et al.: Intermittent control: a computational theory of human control. Biological
+    Cybernetics 104 (2011).
 """
 
 from __future__ import annotations
 
 import math
 
-from dva_sim.agents.operator.person import Person
-from dva_sim.agents.operator.strategies.base import Intent, Reach, Strategy, View
-from dva_sim.agents.operator.strategies.cursor import SHORTEST, gain_at
-from dva_sim.agents.route_following import Ahead, Route
+from dva_sim.agents.operator.strategies.base import Strategy
+from dva_sim.agents.person import Person
+from dva_sim.agents.route_following import (
+    Ahead,
+    Intent,
+    PurePursuit,
+    Reach,
+    Route,
+    View,
+    gain_at,
+    wrap,
+)
 
-NEAREST_LOOK, FARTHEST_LOOK = 0.8, 1.8  # look-ahead inside a building [m]
-TURN_FROM, TURN_UNTIL = 0.9, 0.25  # bearing at which one stops to turn, and drives on [rad]
-IN_CURVES = 0.8  # share of the highest turn rate that one plans a curve with
+FAR, NEAR, INTEGRAL = 16.0, 4.0, 3.0  # gains as published, the last one in 1/s
+NEAR_TIME, FAR_TIME = 0.37, 0.93  # to the points, on the road [s]
+LARGEST = 0.07  # direction of the near point that the integral counts at most [rad]
+CYCLE = 0.2  # between two corrections; assumed, about the refractory time of such control [s]
 
 
-class Pursuit(Strategy):
-    """Aims at a point ahead on the route, the farther the longer the delay.
+class Pursuit(PurePursuit, Strategy):
+    """Aims at a point ahead on the route, as `PurePursuit` has it."""
 
-    The look-ahead is at least the way covered during the delay over the person's caution (0.3):
-    on a straight route the pursuit is stable up to 0.52. Where a building allows no such
-    look-ahead, the person slows down instead. Where the route bends sharply it stops to turn.
+
+class TwoPoint(Pursuit):
+    """Corrects the turn rate by how the directions of two points change.
+
+    Speed, stopping and turning on the spot are those of `Pursuit`, and so is pointing.
     """
 
     def __init__(self, person: Person, reach: Reach) -> None:
         super().__init__(person, reach)
-        self._turning = False
+        self._begin()
 
     def drive(self, route: Route, view: View, stop_before: float) -> Intent:
         """See `Strategy`."""
-        person, reach, seen = self.person, self.reach, view.seen
-        delay = max(view.delay, SHORTEST)
-        wanted = person.pace * reach.speed
-        look = min(max(wanted * delay / person.caution, NEAREST_LOOK), FARTHEST_LOOK)
-        ahead = route.ahead(seen.x, seen.y, seen.heading, look)
-        limit = TURN_UNTIL if self._turning else TURN_FROM
-        self._turning = abs(ahead.bearing) > limit
-        is_there = ahead.remaining < stop_before
-        if is_there and reach.radius > 0.0:
-            return Intent(0.0, 0.0)  # a car cannot turn towards what it has come to see
-        if self._turning or is_there:
-            gain = gain_at(person.crossover, person.margin, delay)
-            return reach.turn(self._clamp(gain * ahead.bearing))
-        speed = min(wanted, person.caution * look / delay, ahead.remaining / (2.0 * delay + 1.0))
-        return self._along(route, view, ahead, look, speed)
+        intent = super().drive(route, view, stop_before)
+        if self._turning:
+            self._begin()
+        return intent
+
+    def _begin(self) -> None:
+        """As if one had driven straight along a straight road so far."""
+        self._near = self._far = self._steering = self._turn_rate = 0.0
+        self._corrected = -math.inf
 
     def _along(self, route: Route, view: View, ahead: Ahead, look: float, speed: float) -> Intent:
-        """Towards the point ahead on an arc, slower where that would be too sharp.
+        speed = super()._along(route, view, ahead, look, speed).speed
+        passed = view.now - self._corrected
+        if passed >= CYCLE - 1e-6:
+            self._corrected = view.now
+            self._correct(route, view, ahead, look, speed, min(passed, 2.0 * CYCLE))
+        return Intent(speed, self._clamp(self._turn_rate))
 
-        Args:
-            route: The way to go.
-            view: What is seen, and when.
-            ahead: The point ahead.
-            look: How far ahead on the route it lies [m].
-            speed: As fast as one may [m/s].
-        """
-        curvature = 2.0 * math.sin(ahead.bearing) / max(ahead.distance, 0.2)
-        most = IN_CURVES * self.reach.turn_rate
-        if abs(curvature) * speed > most:
-            speed = most / abs(curvature)
-        return Intent(speed, self._clamp(curvature * speed))
-
-    def _clamp(self, turn_rate: float) -> float:
-        return min(max(turn_rate, -self.reach.turn_rate), self.reach.turn_rate)
+    def _correct(
+        self, route: Route, view: View, ahead: Ahead, look: float, speed: float, passed: float
+    ) -> None:
+        """One correction, `passed` [s] after the last one."""
+        seen, person = view.seen, self.person
+        x, y = route.point_at(route.length - ahead.remaining + look * NEAR_TIME / FAR_TIME)
+        near = wrap(math.atan2(y - seen.y, x - seen.x) - seen.heading)
+        counted = min(max(near, -LARGEST), LARGEST)
+        slower = FAR_TIME * speed / look  # than on the road
+        change = FAR * (ahead.bearing - self._far) + NEAR * (near - self._near)
+        change += INTEGRAL * slower * counted * passed
+        self._steering += change / (FAR + NEAR)
+        # The gain is applied to the sum: it changes while the delay is being learnt.
+        self._turn_rate = gain_at(person.crossover, person.margin, view.delay) * self._steering
+        self._near, self._far = near, ahead.bearing

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dva_sim.experiments.analysis.paired_effects import Factor, Floats, Setting, View, nan_mean
+from dva_sim.experiments.analysis.paired_effects import Factor, Floats, Setting, StudyView, nan_mean
 from dva_sim.experiments.report.figures.palette import (
     INK,
     PAPER,
@@ -21,22 +21,25 @@ from dva_sim.experiments.report.figures.palette import (
     key,
     key_height,
 )
+from dva_sim.experiments.report.figures.report_figure import ReportFigure
 from dva_sim.experiments.report.figures.style import (
     Drawn,
     Numbers,
-    finish,
     level_axis,
     panels,
     tick_names,
     wrapped,
 )
-from dva_sim.experiments.study.labels import brief, capital
 from dva_sim.experiments.study.schema import Level
+from dva_sim.kernel.wording import capital
+from dva_sim.simulation.labels import brief
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from dva_sim.experiments.report.summary import Reading
 
 
 _HALF = 0.36  # of a bar's width, in stops
@@ -61,7 +64,7 @@ class Stacks:
         axes: One for each setting shown and line, in that order.
     """
 
-    def __init__(self, view: View, label: str, parts: Mapping[str, Artist]) -> None:
+    def __init__(self, view: StudyView, label: str, parts: Mapping[str, Artist]) -> None:
         count, lines = len(view.lines), len(view.stops)
         columns = min(_ABREAST, count)
         deep = -(-count // columns)
@@ -159,30 +162,38 @@ _NAMES = {
 _MEASURED = "loop_delay_measured_s"
 
 
-def delay_budget(view: View) -> Drawn | None:
+class DelayBudget(ReportFigure):
     """The delay from a picture to its effect, as the sum it is and as it was measured."""
-    stages = [column for column in _NAMES if view.part.has(column)]
-    if not stages:
-        return None
-    view = _driven(view, stages[0])
-    stacks, numbers = Stacks(view, "Delay [s]", _parts(stages)), Numbers()
-    for ax, panel, level in stacks.panels():
-        means = {stage: _means(view, stage, panel, level) for stage in stages}
-        measured = _means(view, _MEASURED, panel, level)
-        stack(ax, means, STAGES)
-        _mark(ax, measured)
-        told = view.along_x() | means | {_MEASURED: measured}
-        numbers.add(view.setting(panel, level), told)
-    stacks.close()
-    caption = (
-        "From what the camera saw to the effect of the command it led to, stage by stage; means "
-        "over the time that commands were in force. Hatched stages: a value waits to be replaced "
-        "by the next. Diamond: the same delay measured as a whole."
-    )
-    return finish(stacks.figure, "delay_budget", "Where the delay comes from", caption, numbers)
+
+    name = "delay_budget"
+    title = "Where the delay comes from"
+    pages = ("driving",)
+    has_panels = True
+
+    def draw(self, view: StudyView, reading: Reading) -> Drawn | None:
+        """Draw it."""
+        stages = [column for column in _NAMES if view.part.has(column)]
+        if not stages:
+            return None
+        view = _driven(view, stages[0])
+        stacks, numbers = Stacks(view, "Delay [s]", _parts(stages)), Numbers()
+        for ax, panel, level in stacks.panels():
+            means = {stage: _means(view, stage, panel, level) for stage in stages}
+            measured = _means(view, _MEASURED, panel, level)
+            stack(ax, means, STAGES)
+            _mark(ax, measured)
+            told = view.along_x() | means | {_MEASURED: measured}
+            numbers.add(view.setting(panel, level), told)
+        stacks.close()
+        caption = (
+            "From what the camera saw to the effect of the command it led to, stage by stage; "
+            "means over the time that commands were in force. Hatched stages: a value waits to be "
+            "replaced by the next. Diamond: the same delay measured as a whole."
+        )
+        return self.finish(stacks.figure, caption, numbers)
 
 
-def _driven(view: View, stage: str) -> View:
+def _driven(view: StudyView, stage: str) -> StudyView:
     """Without the lines under which nobody drove, such as guards without robots."""
     if view.line is None:
         return view
@@ -191,7 +202,7 @@ def _driven(view: View, stage: str) -> View:
     return replace(view, line=Factor(name, tuple(there)))
 
 
-def _means(view: View, column: str, panel: Setting, level: Level) -> Floats:
+def _means(view: StudyView, column: str, panel: Setting, level: Level) -> Floats:
     """Over all runs of each stop."""
     values = view.curve(view.part.grid(column), panel, level)
     return nan_mean(values.reshape(len(values), -1), axis=1)

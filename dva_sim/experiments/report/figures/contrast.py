@@ -11,28 +11,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dva_sim.experiments.analysis.answer import Finding, condition
-from dva_sim.experiments.analysis.paired_effects import Factor, Floats, View, present
-from dva_sim.experiments.analysis.robustness import Repeat, Robustness, Stop
+from dva_sim.experiments.analysis.paired_effects import Factor, Floats, StudyView, present
+from dva_sim.experiments.analysis.robustness import Repeat, RepeatedAnswer, RepeatedStop
 from dva_sim.experiments.report.figures.palette import FAINT, INK, ONE, PAPER, SOFT, colours
+from dva_sim.experiments.report.figures.report_figure import ReportFigure
 from dva_sim.experiments.report.figures.style import (
     Drawn,
     Numbers,
     axis_label,
-    finish,
     fit_to,
     panels,
     stops_axis,
     with_unit,
     wrapped,
 )
-from dva_sim.experiments.study.labels import capital, factor_name, level_name, measure_name, number
 from dva_sim.experiments.study.schema import STRATEGY
+from dva_sim.kernel.wording import capital, number
+from dva_sim.simulation.labels import factor_name, level_name, measure_name
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from dva_sim.experiments.report.summary import Reading
 
-NAME = "answer"
+
 _SIZE = (5.8, 3.5)  # [in]: small, so that its text stays legible beside words and on a phone
 _FONT = 10.5
 _MOST_LABELS = 8
@@ -40,43 +42,54 @@ _ROOM = 0.05  # of the width, for the figures beside the outer marks
 _LEAST_SHARE = 0.02  # of the height, below which what is too small to matter is not drawn
 
 
-def contrast(finding: Finding, differences: Floats) -> Drawn | None:
-    """The difference that answers the question; None where no interval can be given.
+class AnswerFigure(ReportFigure):
+    """The difference that answers the question."""
 
-    Args:
-        finding: The answer.
-        differences: First minus second as person means `(persons, stops)`.
-    """
-    if not np.isfinite(finding.low).any():
-        return None
-    from matplotlib import rc_context
+    name = "answer"
+    title = "The declared contrast"
 
-    with rc_context({"font.size": _FONT}):
-        return _drawn(finding, differences)
+    def draw(self, view: StudyView, reading: Reading) -> Drawn | None:
+        """Draw it."""
+        if view.contrast is None or reading.told is None:
+            return None
+        return self.contrast(reading.told, view.difference(view.panels[0], *view.contrast))
 
+    def contrast(self, finding: Finding, differences: Floats) -> Drawn | None:
+        """The difference alone; None where no interval can be given.
 
-def _drawn(finding: Finding, differences: Floats) -> Drawn:
-    from matplotlib.figure import Figure
+        Args:
+            finding: The answer.
+            differences: First minus second as person means `(persons, stops)`.
+        """
+        if not np.isfinite(finding.low).any():
+            return None
+        from matplotlib import rc_context
 
-    figure = Figure(figsize=_SIZE, dpi=150, layout="constrained")
-    ax = figure.add_subplot()
-    over = Factor(finding.over, finding.levels) if finding.over else None
-    _marks(ax, finding, over)
-    stops_axis(ax, over)
-    left, right = ax.get_xlim()
-    room = _ROOM * (right - left)
-    ax.set_xlim(left - room, right + room)
-    cut = fit_to(ax, present(np.append(differences, 0.0)))
-    grey = _too_small(ax, finding)
-    _values(ax, finding)
-    first, second = _names(finding)
-    unit = f" [{finding.unit}]" if finding.unit else ""
-    ax.set_ylabel(wrapped(f"{capital(first)} minus {second}{unit}", 34))
-    caption = _caption(finding, grey)
-    title = f"{capital(first)} minus {second}: {measure_name(finding.measure)}"
-    within = condition(finding, inside=True).removesuffix(", ")
-    title = f"{title}, {within}" if within else title
-    return finish(figure, NAME, title, caption, _table(finding), (cut,))
+        with rc_context({"font.size": _FONT}):
+            return self._drawn(finding, differences)
+
+    def _drawn(self, finding: Finding, differences: Floats) -> Drawn:
+        from matplotlib.figure import Figure
+
+        figure = Figure(figsize=_SIZE, dpi=150, layout="constrained")
+        ax = figure.add_subplot()
+        over = Factor(finding.over, finding.levels) if finding.over else None
+        _marks(ax, finding, over)
+        stops_axis(ax, over)
+        left, right = ax.get_xlim()
+        room = _ROOM * (right - left)
+        ax.set_xlim(left - room, right + room)
+        cut = fit_to(ax, present(np.append(differences, 0.0)))
+        grey = _too_small(ax, finding)
+        _values(ax, finding)
+        first, second = _names(finding)
+        unit = f" [{finding.unit}]" if finding.unit else ""
+        ax.set_ylabel(wrapped(f"{capital(first)} minus {second}{unit}", 34))
+        title = f"{capital(first)} minus {second}: {measure_name(finding.measure)}"
+        within = condition(finding, inside=True).removesuffix(", ")
+        title = f"{title}, {within}" if within else title
+        caption, numbers = _caption(finding, grey), _table(finding)
+        return self.finish(figure, caption, numbers, title=title, reads=(cut,))
 
 
 def _names(f: Finding) -> tuple[str, str]:
@@ -155,34 +168,46 @@ _ROW = 0.14  # height of a repeat [in]
 _GAP = 1.5  # rows between two strategies
 
 
-def repeats(view: View, robustness: Robustness) -> Drawn | None:
+class RepeatsFigure(ReportFigure):
     """Effect and interval of every repeat, by strategy, sorted; the study's own as a band."""
-    stops = [stop for stop in robustness.stops if stop.repeats]
-    if not stops or view.contrast is None or view.line is None:
-        return None
-    rows = max(len(stop.repeats) for stop in stops) + _GAP * (len(robustness.strategies) + 1)
-    figure, (axes,) = panels(1, len(stops), max(2.4, _ROW * rows + 0.9), sharey=True)
-    first, second = (level_name(view.line.name, level) for level in view.contrast)
-    for ax, stop in zip(axes, stops, strict=True):
-        _own(ax, stop)
-        _groups(ax, stop, robustness.strategies)
-        ax.set_title(f"{factor_name(robustness.over)} {level_name(robustness.over, stop.level)}")
-        ax.set_xlabel(axis_label(view.measure, f"{first} minus {second}"))
-        ax.grid(axis="x")
-        ax.grid(axis="y", visible=False)
-    caption = (
-        "Each row: the difference under one model of the persons, with its own 95 % interval. "
-        "Diamonds have the usual parameters, dots another set. Line and blue band: the study's "
-        "own result; black: its own model again, which does not count. Grey: declared too small "
-        "to matter. Repeats have fewer persons, so their intervals are wider."
-    )
-    if any(repeat.is_beyond for stop in stops for repeat in stop.repeats):
-        caption += " Hollow: extrapolated."
-    title = f"The contrast in {measure_name(view.measure)} under other models of the persons"
-    return finish(figure, "robustness", title, caption, _numbers(view, robustness))
+
+    name = "robustness"
+    title = "The contrast under other models of the persons"
+    pages = ("driving",)
+
+    def draw(self, view: StudyView, reading: Reading) -> Drawn | None:
+        """Draw it."""
+        robustness = reading.robustness
+        if robustness is None:
+            return None
+        stops = [stop for stop in robustness.stops if stop.repeats]
+        if not stops or view.contrast is None or view.line is None:
+            return None
+        rows = max(len(stop.repeats) for stop in stops) + _GAP * (len(robustness.strategies) + 1)
+        figure, (axes,) = panels(1, len(stops), max(2.4, _ROW * rows + 0.9), sharey=True)
+        first, second = (level_name(view.line.name, level) for level in view.contrast)
+        for ax, stop in zip(axes, stops, strict=True):
+            _own(ax, stop)
+            _groups(ax, stop, robustness.strategies)
+            ax.set_title(
+                f"{factor_name(robustness.over)} {level_name(robustness.over, stop.level)}"
+            )
+            ax.set_xlabel(axis_label(view.measure, f"{first} minus {second}"))
+            ax.grid(axis="x")
+            ax.grid(axis="y", visible=False)
+        caption = (
+            "Each row: the difference under one model of the persons, with its own 95 % interval. "
+            "Diamonds have the usual parameters, dots another set. Line and blue band: the study's "
+            "own result; black: its own model again, which does not count. Grey: declared too "
+            "small to matter. Repeats have fewer persons, so their intervals are wider."
+        )
+        if any(repeat.is_beyond for stop in stops for repeat in stop.repeats):
+            caption += " Hollow: extrapolated."
+        title = f"The contrast in {measure_name(view.measure)} under other models of the persons"
+        return self.finish(figure, caption, _numbers(view, robustness), title=title)
 
 
-def _numbers(view: View, robustness: Robustness) -> Numbers:
+def _numbers(view: StudyView, robustness: RepeatedAnswer) -> Numbers:
     """Every repeat, as drawn."""
     numbers = Numbers()
     for stop in robustness.stops:
@@ -195,7 +220,7 @@ def _numbers(view: View, robustness: Robustness) -> Numbers:
     return numbers
 
 
-def _own(ax: Axes, stop: Stop) -> None:
+def _own(ax: Axes, stop: RepeatedStop) -> None:
     if stop.smallest is not None:
         ax.axvspan(-stop.smallest, stop.smallest, color=FAINT, alpha=0.5, lw=0, zorder=0)
     ax.axvspan(stop.low, stop.high, color=ONE.colour, alpha=0.15, lw=0, zorder=0)
@@ -203,7 +228,7 @@ def _own(ax: Axes, stop: Stop) -> None:
     ax.axvline(0, color=INK, lw=0.8, zorder=1)
 
 
-def _groups(ax: Axes, stop: Stop, strategies: tuple[str, ...]) -> None:
+def _groups(ax: Axes, stop: RepeatedStop, strategies: tuple[str, ...]) -> None:
     """A block of rows for each strategy, named at its middle."""
     names = strategies or ("",)
     paint = colours(Factor(STRATEGY, names))

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.experiments.analysis.paired_effects import Floats, View, present
+from dva_sim.experiments.analysis.paired_effects import Floats, StudyView, present
 from dva_sim.experiments.report.figures.palette import INK, PAPER, SOFT, Look, legend, looks
+from dva_sim.experiments.report.figures.report_figure import ReportFigure
 from dva_sim.experiments.report.figures.style import (
     Drawn,
     Numbers,
     axis_label,
     dodge,
-    finish,
     hatch_stops,
     hatch_words,
     log_axis,
@@ -23,50 +23,63 @@ from dva_sim.experiments.report.figures.style import (
     stops_axis,
     wrapped,
 )
-from dva_sim.experiments.study.labels import capital, measure_name
+from dva_sim.kernel.wording import capital
+from dva_sim.simulation.labels import measure_name
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+    from dva_sim.experiments.report.summary import Reading
 
 
 _CROWD = 60  # runs of a cell from which on dots must be small
 _GOLDEN = 0.6180339887498949
 
 
-def distributions(view: View) -> Drawn:
+class Distributions(ReportFigure):
     """Every run as a dot, with median and middle half."""
-    shown = view.shown
-    figure, axes = panels(len(shown), 1, 2.7 if len(shown) < 3 else 2.2, sharex=True, sharey=True)
-    look = looks(view.line)
-    raw, confirmed, numbers = view.part.grid(view.measure), _confirmed(view), Numbers()
-    for (ax,), panel in zip(axes, shown, strict=True):
-        for level, offset in dodge(view.lines):
-            values = view.curve(raw, panel, level).reshape(len(view.stops), -1)
-            ok = view.curve(confirmed, panel, level).reshape(values.shape) != 0
-            width = min(0.3, 0.62 / len(view.lines))
-            _dots(ax, offset, width, values, ok, look[level])
-            _boxes(ax, offset, width, values)
-            for stop, told in enumerate(values):
-                where = view.setting(panel, level) | view.at_stop(stop)
-                numbers.add(where, _columns(view, told, ok[stop]))
-        _reference_line(ax, view)
-        panel_title(ax, panel)
-        stops_axis(ax, view.over)
-        hatch_stops(ax, view.stops_outside(panel))
-        if ax is not axes[-1][0]:
-            ax.set_xlabel("")
-        ax.set_ylabel(axis_label(view.measure, wrapped(measure_name(view.measure), 24)))
-    _spread(axes[0][0], present(raw))
-    legend(figure, view.line)
-    caption = (
-        "Each mark is one run; bar, the median; box, the middle half. Columns stand in the order "
-        f"of the key.{_hollow_words(confirmed)}"
-    )
-    title = f"{capital(measure_name(view.measure))} of all {len(view.part):,} runs"
-    return finish(figure, "distributions", title, caption, numbers, (hatch_words(view),))
+
+    name = "distributions"
+    title = "Every run"
+    pages = ("driving",)
+    has_panels = True
+
+    def draw(self, view: StudyView, reading: Reading) -> Drawn | None:
+        """Draw it."""
+        shown = view.shown
+        figure, axes = panels(
+            len(shown), 1, 2.7 if len(shown) < 3 else 2.2, sharex=True, sharey=True
+        )
+        look = looks(view.line)
+        raw, confirmed, numbers = view.part.grid(view.measure), _confirmed(view), Numbers()
+        for (ax,), panel in zip(axes, shown, strict=True):
+            for level, offset in dodge(view.lines):
+                values = view.curve(raw, panel, level).reshape(len(view.stops), -1)
+                ok = view.curve(confirmed, panel, level).reshape(values.shape) != 0
+                width = min(0.3, 0.62 / len(view.lines))
+                _dots(ax, offset, width, values, ok, look[level])
+                _boxes(ax, offset, width, values)
+                for stop, told in enumerate(values):
+                    where = view.setting(panel, level) | view.at_stop(stop)
+                    numbers.add(where, _columns(view, told, ok[stop]))
+            _reference_line(ax, view)
+            panel_title(ax, panel)
+            stops_axis(ax, view.over)
+            hatch_stops(ax, view.stops_outside(panel))
+            if ax is not axes[-1][0]:
+                ax.set_xlabel("")
+            ax.set_ylabel(axis_label(view.measure, wrapped(measure_name(view.measure), 24)))
+        _spread(axes[0][0], present(raw))
+        legend(figure, view.line)
+        caption = (
+            "Each mark is one run; bar, the median; box, the middle half. Columns stand in the "
+            f"order of the key.{_hollow_words(confirmed)}"
+        )
+        title = f"{capital(measure_name(view.measure))} of all {len(view.part):,} runs"
+        return self.finish(figure, caption, numbers, title=title, reads=(hatch_words(view),))
 
 
-def _columns(view: View, values: Floats, ok: NDArray[np.bool_]) -> dict[str, Any]:
+def _columns(view: StudyView, values: Floats, ok: NDArray[np.bool_]) -> dict[str, Any]:
     """The runs of a cell that gave a value, with who drove and whether it was confirmed."""
     persons, trials = view.part.persons, view.part.trials
     there = np.isfinite(values)
@@ -124,7 +137,7 @@ def _spread(ax: Axes, values: Floats) -> None:
         log_axis(ax)
 
 
-def _reference_line(ax: Axes, view: View) -> None:
+def _reference_line(ax: Axes, view: StudyView) -> None:
     reference = present(view.part.reference(view.measure))
     if not len(reference):
         return
@@ -142,7 +155,7 @@ def _reference_line(ax: Axes, view: View) -> None:
     )
 
 
-def _confirmed(view: View) -> Floats:
+def _confirmed(view: StudyView) -> Floats:
     """Whether each run ended in a confirmation; a study that does not say so has no misses."""
     if view.part.has("confirmed"):
         return view.part.grid("confirmed")

@@ -6,8 +6,9 @@ What becomes of the commands: how old they are, and how many arrive.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,12 +16,12 @@ from dva_sim.experiments.analysis.paired_effects import (
     Factor,
     Floats,
     Setting,
-    View,
+    StudyView,
     nan_mean,
     person_means,
     present,
 )
-from dva_sim.experiments.analysis.predictions import Cadence
+from dva_sim.experiments.analysis.predictions import Cadence, cadence
 from dva_sim.experiments.report.figures.palette import (
     FAINT,
     INK,
@@ -32,12 +33,12 @@ from dva_sim.experiments.report.figures.palette import (
     looks,
     name_lines,
 )
+from dva_sim.experiments.report.figures.report_figure import ReportFigure
 from dva_sim.experiments.report.figures.style import (
     Drawn,
     Numbers,
     axis_label,
     dodge,
-    finish,
     fit_to,
     has_lines,
     hatch_stops,
@@ -49,13 +50,16 @@ from dva_sim.experiments.report.figures.style import (
     with_unit,
     wrapped,
 )
-from dva_sim.experiments.study.labels import capital, factor_name, level_name, measure_name
 from dva_sim.experiments.study.schema import Level
+from dva_sim.kernel.wording import capital
+from dva_sim.simulation.labels import factor_name, level_name, measure_name
 from dva_sim.statistics import Band, band
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from dva_sim.experiments.report.summary import Reading
 
 
 _WIDER = 1.2  # of a logarithmic axis, lest marks lie on its edges
@@ -63,54 +67,89 @@ _STEP = 0.12  # between the bars of two lines, in stops
 CadenceOf = Callable[[Setting], Cadence | None]
 
 
-def differences(view: View, cadence_of: CadenceOf) -> Drawn | None:
+def cadences(view: StudyView, scenario: Mapping[str, Any]) -> CadenceOf:
+    """The cadence of each panel, where lock-step and delay are among the factors."""
+
+    @cache
+    def lookup(panel: tuple[tuple[str, Level], ...]) -> Cadence | None:
+        return cadence(scenario, dict(panel))
+
+    def cadence_of(panel: Setting) -> Cadence | None:
+        along_delay = view.over is not None and view.over.name == "link.delay_s"
+        return lookup(tuple(panel.items())) if along_delay and "req-rep" in view.lines else None
+
+    return cadence_of
+
+
+class Differences(ReportFigure):
     """Each level minus the baseline, paired, with the band that covers all stops at once."""
-    if view.contrast is None or view.line is None:
-        return None
-    baseline = view.contrast[1]
-    others = tuple(level for level in view.lines if level != baseline)
 
-    def curve(panel: Setting, level: Level) -> Floats:
-        return view.difference(panel, level, baseline)
+    name = "differences"
+    title = "Difference of each level against another"
+    pages = ("driving", "transport")
+    has_panels = True
 
-    name = level_name(view.line.name, baseline)
-    label = axis_label(view.measure, f"Difference against\n{name}")
-    limit = view.widest
-    figure, axes, ends, cut, numbers = _curves(
-        view, others, curve, label, (-limit, limit), home=0.0
-    )
-    for ax, panel in zip(axes, view.shown, strict=True):
-        ax.axhline(0, color=INK, lw=0.8, zorder=1)
-        mark_boundary(ax, view.over, cadence_of(panel), text=True)
-    zoomed = _zoom_on_small(axes, view.smallest_effect)
-    _name(view, others, figure, axes, ends)
-    title = f"Difference against {name} in {_what(view)}"
-    boundary = _boundary_words(view, cadence_of)
-    caption = f"Above zero, {name} has the lower value.{zoomed}{boundary}"
-    reads = (_intervals_words(view), hatch_words(view), cut)
-    return finish(figure, "differences", title, caption, numbers, reads)
+    def draw(self, view: StudyView, reading: Reading) -> Drawn | None:
+        """Draw it."""
+        cadence_of = cadences(view, reading.scenario_of(view.part.name))
+        if view.contrast is None or view.line is None:
+            return None
+        baseline = view.contrast[1]
+        others = tuple(level for level in view.lines if level != baseline)
+
+        def curve(panel: Setting, level: Level) -> Floats:
+            return view.difference(panel, level, baseline)
+
+        name = level_name(view.line.name, baseline)
+        label = axis_label(view.measure, f"Difference against\n{name}")
+        limit = view.widest
+        figure, axes, ends, cut, numbers = _curves(
+            view, others, curve, label, (-limit, limit), home=0.0
+        )
+        for ax, panel in zip(axes, view.shown, strict=True):
+            ax.axhline(0, color=INK, lw=0.8, zorder=1)
+            mark_boundary(ax, view.over, cadence_of(panel), text=True)
+        zoomed = _zoom_on_small(axes, view.smallest_effect)
+        _name(view, others, figure, axes, ends)
+        title = f"Difference against {name} in {_what(view)}"
+        boundary = _boundary_words(view, cadence_of)
+        caption = f"Above zero, {name} has the lower value.{zoomed}{boundary}"
+        reads = (_intervals_words(view), hatch_words(view), cut)
+        return self.finish(figure, caption, numbers, title=title, reads=reads)
 
 
-def measure_levels(view: View) -> Drawn:
+class Levels(ReportFigure):
     """The measure itself along x, a line for each level."""
-    grid = view.values
 
-    def curve(panel: Setting, level: Level) -> Floats:
-        return person_means(view.curve(grid, panel, level))
+    name = "levels"
+    title = "The measure under each level"
+    pages = ("driving",)
+    has_panels = True
 
-    what = capital(_what(view))
-    label = axis_label(view.measure, wrapped(what))
-    limits = (-view.widest, view.widest) if _in_excess(view) else view.possible
-    figure, axes, ends, cut, numbers = _curves(view, view.lines, curve, label, limits)
-    _name(view, view.lines, figure, axes, ends)
-    excess = "Zero is the reference run. " if _in_excess(view) else ""
-    caption = (
-        f"Mean over persons. {excess}Two intervals may overlap although the difference, which is "
-        "taken within persons, is clear."
-    )
-    reads = (_intervals_words(view), hatch_words(view), cut)
-    title = f"{what} under each {factor_name(view.line.name)}" if view.line else what
-    return finish(figure, "levels", title, caption, numbers, reads)
+    def applies(self, view: StudyView, reading: Reading) -> bool:
+        """Also, something must vary."""
+        return super().applies(view, reading) and bool(view.line or view.over)
+
+    def draw(self, view: StudyView, reading: Reading) -> Drawn | None:
+        """Draw it."""
+        grid = view.values
+
+        def curve(panel: Setting, level: Level) -> Floats:
+            return person_means(view.curve(grid, panel, level))
+
+        what = capital(_what(view))
+        label = axis_label(view.measure, wrapped(what))
+        limits = (-view.widest, view.widest) if _in_excess(view) else view.possible
+        figure, axes, ends, cut, numbers = _curves(view, view.lines, curve, label, limits)
+        _name(view, view.lines, figure, axes, ends)
+        excess = "Zero is the reference run. " if _in_excess(view) else ""
+        caption = (
+            f"Mean over persons. {excess}Two intervals may overlap although the difference, which "
+            "is taken within persons, is clear."
+        )
+        reads = (_intervals_words(view), hatch_words(view), cut)
+        title = f"{what} under each {factor_name(view.line.name)}" if view.line else what
+        return self.finish(figure, caption, numbers, title=title, reads=reads)
 
 
 def mark_boundary(ax: Axes, over: Factor | None, cadence: Cadence | None, text: bool) -> None:
@@ -135,7 +174,7 @@ def mark_boundary(ax: Axes, over: Factor | None, cadence: Cadence | None, text: 
 
 
 def _curves(
-    view: View,
+    view: StudyView,
     lines: tuple[Level, ...],
     curve: Callable[[Setting, Level], Floats],
     ylabel: str,
@@ -207,14 +246,14 @@ def _zoom_on_small(axes: list[Axes], smallest: float | None) -> str:
     return f"{words} Axis: linear near zero, logarithmic beyond."
 
 
-def _side_by_side(view: View, lines: tuple[Level, ...]) -> list[tuple[Level, float]]:
+def _side_by_side(view: StudyView, lines: tuple[Level, ...]) -> list[tuple[Level, float]]:
     """Each level's place beside its stop; close together where a line goes on to the next."""
     if not has_lines(view):
         return dodge(lines)
     return [(level, _STEP * (i - (len(lines) - 1) / 2)) for i, level in enumerate(lines)]
 
 
-def _intervals_words(view: View) -> str:
+def _intervals_words(view: StudyView) -> str:
     if has_lines(view):
         return "Shaded: the 95 % band of a line. Bars: the 95 % interval of each level alone."
     return (
@@ -223,7 +262,7 @@ def _intervals_words(view: View) -> str:
 
 
 def _name(
-    view: View, lines: tuple[Level, ...], figure: Figure, axes: list[Axes], ends: list[Ends]
+    view: StudyView, lines: tuple[Level, ...], figure: Figure, axes: list[Axes], ends: list[Ends]
 ) -> None:
     """Lines are named at their ends, marks in a key."""
     if has_lines(view):
@@ -255,15 +294,15 @@ def _band(ax: Axes, bands: Band, look: Look, shift: float, limits: tuple[float, 
     return float(seen[-1]) if len(seen) else float("nan")
 
 
-def _in_excess(view: View) -> bool:
+def _in_excess(view: StudyView) -> bool:
     return view.part.has_reference(view.measure)
 
 
-def _what(view: View) -> str:
+def _what(view: StudyView) -> str:
     return f"{'excess ' if _in_excess(view) else ''}{measure_name(view.measure)}"
 
 
-def _boundary_words(view: View, cadence_of: CadenceOf) -> str:
+def _boundary_words(view: StudyView, cadence_of: CadenceOf) -> str:
     """Explain the dashed line, if any panel has one."""
     cadences = [cadence_of(panel) for panel in view.shown]
     over = view.over
@@ -279,65 +318,81 @@ _ROOM = 1.08  # above the highest mark
 _QUANTILES = ("p05", "p25", "p50", "p75", "p95")
 
 
-def command_age(view: View) -> Drawn | None:
+class CommandAge(ReportFigure):
     """How old a command is when it takes effect, as quantile ranges."""
-    columns = [f"command_age_{q}_s" for q in _QUANTILES]
-    if not all(view.part.has(column) for column in columns):
-        return None
-    figure, axes = panel_grid(view, 3.0)
-    look = looks(view.line)
-    grids, numbers = [view.part.grid(column) for column in columns], Numbers()
-    for ax, panel in zip(axes, view.shown, strict=True):
-        for level, offset in dodge(view.lines):
-            ages = [_cell_means(view.curve(grid, panel, level)) for grid in grids]
-            _ranges(ax, [stop + offset for stop in range(len(view.stops))], ages, look[level])
-            told = dict(zip(columns, ages, strict=True))
-            numbers.add(view.setting(panel, level), view.along_x() | told)
-    log_axis(axes[0])
-    label_panels(axes, view, axis_label("age_s", wrapped("Command age at application", 22)))
-    legend(figure, view.line)
-    caption = (
-        "From the making of a command to its effect at the motors: mark, the median; thick, the "
-        "middle half; thin, 5 to 95 % (averages over runs). The axis is logarithmic."
-    )
-    return finish(figure, "command_age", "Age of commands when they take effect", caption, numbers)
 
+    name = "command_age"
+    title = "Age of commands when they take effect"
+    pages = ("driving",)
+    has_panels = True
 
-def command_rate(view: View, cadence_of: CadenceOf) -> Drawn | None:
-    """Commands applied per second, beside what arithmetic allows request/reply."""
-    if not view.part.has("command_rate_hz"):
-        return None
-    figure, axes = panel_grid(view, 3.0)
-    look, every, numbers = looks(view.line), [], Numbers()
-    grid = view.part.grid("command_rate_hz")
-    for ax, panel in zip(axes, view.shown, strict=True):
-        ends: Ends = {}
-        for i, (level, place) in enumerate(dodge(view.lines)):
-            means = _cell_means(view.curve(grid, panel, level))
-            if has_lines(view):  # larger marks below, where lines lie on each other
-                _line(ax, means, look[level], 4 + 2.5 * (len(view.lines) - 1 - i))
-            else:
-                x = np.arange(len(means)) + place
-                ax.plot(x, means, look[level].mark, ms=5, color=look[level].colour)
-            ends[level] = float(means[-1])
-            told = view.along_x() | {"command_rate_hz": means}
-            numbers.add(view.setting(panel, level), told)
-        _closed_form(ax, view, cadence_of(panel))
-        every.append(ends)
-    tops = [ax.dataLim.y1 for ax in axes if np.isfinite(ax.dataLim.y1)]  # a panel may be empty
-    axes[0].set_ylim(0, _ROOM * max(tops, default=1.0))
-    label_panels(axes, view, axis_label("command_rate_hz"))
-    if has_lines(view):
-        name_lines(axes, every, view.line)
-    else:
+    def draw(self, view: StudyView, reading: Reading) -> Drawn | None:
+        """Draw it."""
+        columns = [f"command_age_{q}_s" for q in _QUANTILES]
+        if not all(view.part.has(column) for column in columns):
+            return None
+        figure, axes = panel_grid(view, 3.0)
+        look = looks(view.line)
+        grids, numbers = [view.part.grid(column) for column in columns], Numbers()
+        for ax, panel in zip(axes, view.shown, strict=True):
+            for level, offset in dodge(view.lines):
+                ages = [_cell_means(view.curve(grid, panel, level)) for grid in grids]
+                _ranges(ax, [stop + offset for stop in range(len(view.stops))], ages, look[level])
+                told = dict(zip(columns, ages, strict=True))
+                numbers.add(view.setting(panel, level), view.along_x() | told)
+        log_axis(axes[0])
+        label_panels(axes, view, axis_label("age_s", wrapped("Command age at application", 22)))
         legend(figure, view.line)
-    caption = "Mean over runs, without commands that came too old or were overtaken."
-    if any(cadence_of(panel) for panel in view.shown):
-        caption += (
-            " Dashed: what REQ/REP allows by arithmetic, min(1/T, 1/(2 d + P)), with wanted period "
-            "T, one-way delay d and processing time P."
+        caption = (
+            "From the making of a command to its effect at the motors: mark, the median; thick, "
+            "the middle half; thin, 5 to 95 % (averages over runs). The axis is logarithmic."
         )
-    return finish(figure, "command_rate", "Commands applied per second", caption, numbers)
+        return self.finish(figure, caption, numbers)
+
+
+class CommandRate(ReportFigure):
+    """Commands applied per second, beside what arithmetic allows request/reply."""
+
+    name = "command_rate"
+    title = "Commands applied per second"
+    pages = ("driving",)
+    columns = ("command_rate_hz",)
+    has_panels = True
+
+    def draw(self, view: StudyView, reading: Reading) -> Drawn | None:
+        """Draw it."""
+        cadence_of = cadences(view, reading.scenario_of(view.part.name))
+        figure, axes = panel_grid(view, 3.0)
+        look, every, numbers = looks(view.line), [], Numbers()
+        grid = view.part.grid("command_rate_hz")
+        for ax, panel in zip(axes, view.shown, strict=True):
+            ends: Ends = {}
+            for i, (level, place) in enumerate(dodge(view.lines)):
+                means = _cell_means(view.curve(grid, panel, level))
+                if has_lines(view):  # larger marks below, where lines lie on each other
+                    _line(ax, means, look[level], 4 + 2.5 * (len(view.lines) - 1 - i))
+                else:
+                    x = np.arange(len(means)) + place
+                    ax.plot(x, means, look[level].mark, ms=5, color=look[level].colour)
+                ends[level] = float(means[-1])
+                told = view.along_x() | {"command_rate_hz": means}
+                numbers.add(view.setting(panel, level), told)
+            _closed_form(ax, view, cadence_of(panel))
+            every.append(ends)
+        tops = [ax.dataLim.y1 for ax in axes if np.isfinite(ax.dataLim.y1)]  # a panel may be empty
+        axes[0].set_ylim(0, _ROOM * max(tops, default=1.0))
+        label_panels(axes, view, axis_label("command_rate_hz"))
+        if has_lines(view):
+            name_lines(axes, every, view.line)
+        else:
+            legend(figure, view.line)
+        caption = "Mean over runs, without commands that came too old or were overtaken."
+        if any(cadence_of(panel) for panel in view.shown):
+            caption += (
+                " Dashed: what REQ/REP allows by arithmetic, min(1/T, 1/(2 d + P)), with wanted "
+                "period T, one-way delay d and processing time P."
+            )
+        return self.finish(figure, caption, numbers)
 
 
 def _cell_means(values: Floats) -> Floats:
@@ -357,7 +412,7 @@ def _ranges(ax: Axes, x: Sequence[float], ages: list[Floats], look: Look) -> Non
     ax.plot(x, middle, look.mark, color=look.colour, ms=4.5)
 
 
-def _closed_form(ax: Axes, view: View, cadence: Cadence | None) -> None:
+def _closed_form(ax: Axes, view: StudyView, cadence: Cadence | None) -> None:
     if cadence is None or view.over is None or not view.over.is_numeric:
         return
     delays = np.array([float(v) for v in view.over.levels if isinstance(v, int | float)])

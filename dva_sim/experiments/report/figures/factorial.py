@@ -11,26 +11,35 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dva_sim.experiments.analysis.paired_effects import MOST_PANELS, Factor, Floats, Setting, View
+from dva_sim.experiments.analysis.paired_effects import (
+    MOST_PANELS,
+    Factor,
+    Floats,
+    Setting,
+    StudyView,
+)
 from dva_sim.experiments.report.figures.palette import DIVERGING, INK, PAPER, SOFT
+from dva_sim.experiments.report.figures.report_figure import ReportFigure
 from dva_sim.experiments.report.figures.style import (
     Drawn,
     Numbers,
     axis_label,
-    finish,
     level_axis,
     panel_title,
     panels,
     stops_axis,
     with_unit,
 )
-from dva_sim.experiments.study.labels import capital, factor_name, level_name, measure_name, number
 from dva_sim.experiments.study.schema import Level
+from dva_sim.kernel.wording import capital, number
+from dva_sim.simulation.labels import factor_name, level_name, measure_name
 from dva_sim.statistics import Effect, band, factorial_effects
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.collections import QuadMesh
+
+    from dva_sim.experiments.report.summary import Reading
 
 
 _MOST = 30  # effects that one figure has room for
@@ -38,27 +47,38 @@ _ROW = 0.21  # height of each [in]
 _ARROW = "→"
 
 
-def effects(view: View) -> Drawn | None:
+class FactorialEffects(ReportFigure):
     """Main effects and two-way interactions of a full factorial, with simultaneous intervals."""
-    factors = [f for f in view.part.factors if len(f.levels) > 1]
-    if len(factors) < 2 or not view.part.ran.all():
-        return None
-    found = _effects(view, factors)
-    if not any(np.isfinite(e.interval.low) for e in found):
-        return None
-    shown = _worth_showing(found)
-    figure, ((ax,),) = panels(1, 1, 1.0 + _ROW * (len(shown) + 1))
-    rows = _rows(ax, shown)
-    ax.axvline(0, color=INK, lw=0.8, zorder=1)
-    ax.grid(axis="x")
-    ax.grid(axis="y", visible=False)
-    ax.set_ylim(rows + 0.2, -0.8)
-    ax.set_xlabel(axis_label(view.measure, f"Change of the {measure_name(view.measure)}"))
-    title = f"Main effects and two-way interactions on the {measure_name(view.measure)}"
-    return finish(figure, "factorial_effects", title, _caption(found, shown), _numbers(view, found))
+
+    name = "factorial_effects"
+    title = "Main effects and two-way interactions"
+    pages = ("driving",)
+
+    def applies(self, view: StudyView, reading: Reading) -> bool:
+        """Also, every level must have met every other."""
+        return super().applies(view, reading) and not reading.study.get("design")
+
+    def draw(self, view: StudyView, reading: Reading) -> Drawn | None:
+        """Draw it."""
+        factors = [f for f in view.part.factors if len(f.levels) > 1]
+        if len(factors) < 2 or not view.part.ran.all():
+            return None
+        found = _effects(view, factors)
+        if not any(np.isfinite(e.interval.low) for e in found):
+            return None
+        shown = _worth_showing(found)
+        figure, ((ax,),) = panels(1, 1, 1.0 + _ROW * (len(shown) + 1))
+        rows = _rows(ax, shown)
+        ax.axvline(0, color=INK, lw=0.8, zorder=1)
+        ax.grid(axis="x")
+        ax.grid(axis="y", visible=False)
+        ax.set_ylim(rows + 0.2, -0.8)
+        ax.set_xlabel(axis_label(view.measure, f"Change of the {measure_name(view.measure)}"))
+        title = f"Main effects and two-way interactions on the {measure_name(view.measure)}"
+        return self.finish(figure, _caption(found, shown), _numbers(view, found), title=title)
 
 
-def _effects(view: View, factors: Sequence[Factor]) -> tuple[Effect, ...]:
+def _effects(view: StudyView, factors: Sequence[Factor]) -> tuple[Effect, ...]:
     """Each factor beside its first level, the compared one beside what it is compared with."""
     values, levels = view.values, {}
     for axis, factor in enumerate(view.part.factors):
@@ -72,7 +92,7 @@ def _effects(view: View, factors: Sequence[Factor]) -> tuple[Effect, ...]:
     return factorial_effects(levels, values.ravel(), person)
 
 
-def _baseline_first(view: View, factor: Factor) -> list[Level]:
+def _baseline_first(view: StudyView, factor: Factor) -> list[Level]:
     if view.line is not factor or view.contrast is None:
         return list(factor.levels)
     baseline = view.contrast[1]
@@ -139,7 +159,7 @@ def _caption(found: Sequence[Effect], shown: Sequence[Effect]) -> str:
     )
 
 
-def _numbers(view: View, found: Sequence[Effect]) -> Numbers:
+def _numbers(view: StudyView, found: Sequence[Effect]) -> Numbers:
     numbers = Numbers()
     for effect in found:
         interval = effect.interval
@@ -161,7 +181,7 @@ _ABOVE, _BELOW = "▲", "▼"
 
 
 @dataclass(frozen=True)
-class Field:
+class EffectField:
     """An effect at every pair of levels `(levels of the second, levels along x)`.
 
     Attributes:
@@ -179,32 +199,41 @@ class Field:
     high: Floats
 
 
-def heat_map(view: View) -> Drawn | None:
+class HeatMap(ReportFigure):
     """The declared contrast over two factors; None where there is no second one worth it."""
-    fields = _fields(view)
-    if not fields or view.over is None or view.line is None or view.contrast is None:
-        return None
-    second = fields[0].second
-    figure, grid = panels(len(fields), 1, max(2.4, 1.0 + 0.38 * len(second.levels)), sharex=True)
-    axes = [ax for (ax,) in grid]
-    first, other = (level_name(view.line.name, level) for level in view.contrast)
-    reach = max(float(np.nanmax(abs(field.mean))) for field in fields) or 1.0
-    has_zero = False
-    for ax, field in zip(axes, fields, strict=True):
-        image = _colours(ax, field.mean, reach)
-        has_zero |= _contours(ax, field)
-        _write(ax, field, image, reach)
-        level_axis(ax, second)
-        stops_axis(ax, view.over)
-        panel_title(ax, field.panel)
-        ax.grid(False)
-    for ax in axes[:-1]:
-        ax.set_xlabel("")
-    bar = figure.colorbar(image, ax=axes, pad=0.02)
-    bar.set_label(axis_label(view.measure, f"{first}\nminus {other}"))
-    title = f"{capital(first)} minus {other} in {measure_name(view.measure)}, over two factors"
-    numbers = _heat_numbers(view, fields)
-    return finish(figure, "heat_map", title, _heat_caption(first, other, has_zero), numbers)
+
+    name = "heat_map"
+    title = "The contrast over two factors"
+    pages = ("driving",)
+
+    def draw(self, view: StudyView, reading: Reading) -> Drawn | None:
+        """Draw it."""
+        fields = _fields(view)
+        if not fields or view.over is None or view.line is None or view.contrast is None:
+            return None
+        second = fields[0].second
+        figure, grid = panels(
+            len(fields), 1, max(2.4, 1.0 + 0.38 * len(second.levels)), sharex=True
+        )
+        axes = [ax for (ax,) in grid]
+        first, other = (level_name(view.line.name, level) for level in view.contrast)
+        reach = max(float(np.nanmax(abs(field.mean))) for field in fields) or 1.0
+        has_zero = False
+        for ax, field in zip(axes, fields, strict=True):
+            image = _colours(ax, field.mean, reach)
+            has_zero |= _contours(ax, field)
+            _write(ax, field, image, reach)
+            level_axis(ax, second)
+            stops_axis(ax, view.over)
+            panel_title(ax, field.panel)
+            ax.grid(False)
+        for ax in axes[:-1]:
+            ax.set_xlabel("")
+        bar = figure.colorbar(image, ax=axes, pad=0.02)
+        bar.set_label(axis_label(view.measure, f"{first}\nminus {other}"))
+        title = f"{capital(first)} minus {other} in {measure_name(view.measure)}, over two factors"
+        numbers = _heat_numbers(view, fields)
+        return self.finish(figure, _heat_caption(first, other, has_zero), numbers, title=title)
 
 
 def _heat_caption(first: str, second: str, has_zero: bool) -> str:
@@ -221,7 +250,7 @@ def _heat_caption(first: str, second: str, has_zero: bool) -> str:
     )
 
 
-def _fields(view: View) -> list[Field]:
+def _fields(view: StudyView) -> list[EffectField]:
     """One for each setting of the factors that are not shown, as many as there is room for."""
     second = _second(view)
     if second is None or view.contrast is None:
@@ -232,15 +261,17 @@ def _fields(view: View) -> list[Field]:
     return [field for field in fields if np.isfinite(field.mean).any()]
 
 
-def _field(view: View, second: Factor, contrast: tuple[Level, Level], panel: Setting) -> Field:
+def _field(
+    view: StudyView, second: Factor, contrast: tuple[Level, Level], panel: Setting
+) -> EffectField:
     columns = [view.difference(panel | {second.name: x}, *contrast) for x in second.levels]
     values = np.stack(columns, axis=1)  # (persons, levels of the second, stops)
     found, shape = band(values.reshape(len(values), -1)), values.shape[1:]
     mean, low, high = (x.reshape(shape) for x in (found.mean, found.low, found.high))
-    return Field(second, panel, mean, low, high)
+    return EffectField(second, panel, mean, low, high)
 
 
-def _second(view: View) -> Factor | None:
+def _second(view: StudyView) -> Factor | None:
     """The other factor with most levels; of equal ones a quantity first."""
     if view.line is None or view.over is None or len(view.over.levels) < 2:
         return None
@@ -262,7 +293,7 @@ def _colours(ax: Axes, mean: Floats, reach: float) -> QuadMesh:
     )
 
 
-def _write(ax: Axes, field: Field, image: QuadMesh, reach: float) -> None:
+def _write(ax: Axes, field: EffectField, image: QuadMesh, reach: float) -> None:
     """Numbers and marks: no colour is needed to read them, nor is it in a print."""
     for (y, x), mean in np.ndenumerate(field.mean):
         if not np.isfinite(mean):
@@ -288,7 +319,7 @@ def _mark(low: float, high: float) -> str:
     return _ABOVE if low > 0 else _BELOW if high < 0 else ""
 
 
-def _contours(ax: Axes, field: Field) -> bool:
+def _contours(ax: Axes, field: EffectField) -> bool:
     """The line of no effect with those of the band's edges; whether there is one."""
     has_zero = False
     for values, style, width in (
@@ -306,7 +337,7 @@ def _contours(ax: Axes, field: Field) -> bool:
     return has_zero
 
 
-def _heat_numbers(view: View, fields: Sequence[Field]) -> Numbers:
+def _heat_numbers(view: StudyView, fields: Sequence[EffectField]) -> Numbers:
     numbers = Numbers()
     for field in fields:
         edges = {"mean": field.mean, "band_low": field.low, "band_high": field.high}

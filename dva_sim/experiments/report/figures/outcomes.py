@@ -16,71 +16,87 @@ from dva_sim.experiments.analysis.competing_risks import NOTHING, Endings
 from dva_sim.experiments.analysis.paired_effects import (
     Floats,
     Setting,
+    StudyView,
     Table,
-    View,
     as_floats,
     codes_of,
 )
 from dva_sim.experiments.report.figures.budget import Stacks, stack
 from dva_sim.experiments.report.figures.palette import FATES, PAPER, Look, box, key, legend, looks
+from dva_sim.experiments.report.figures.report_figure import ReportFigure
 from dva_sim.experiments.report.figures.style import (
     Drawn,
     Numbers,
     dodge,
-    finish,
     outer_labels,
     panels,
     stops_axis,
     wrapped,
 )
-from dva_sim.experiments.study.labels import brief, capital, level_name
 from dva_sim.experiments.study.schema import Level
-from dva_sim.simulation.shift.bounds import CUT, incidence
+from dva_sim.kernel.wording import capital
+from dva_sim.simulation.labels import brief, level_name
+from dva_sim.statistics import CUT, incidence
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+    from dva_sim.experiments.report.summary import Reading
 
 
 _MOST_STOPS, _MOST_LINES, _POINTS = 4, 3, 241
 _TITLE = 70  # characters that the width holds
 
 
-def endings_in_time(endings: Endings, view: View) -> Drawn | None:
+class EndingsInTime(ReportFigure):
     """Cumulative incidence of each way, stacked; None where all went right."""
-    lines = _lines(endings, view)
-    stops = [stop for stop in view.stops if not _all_right(endings, lines, [stop])][-_MOST_STOPS:]
-    if not stops:
-        return None
-    figure, axes = panels(len(lines), len(stops), 1.9, sharex=True, sharey=True)
-    times, numbers = np.linspace(0.0, endings.horizon, _POINTS), Numbers()
-    for row, line in zip(axes, lines, strict=True):
-        for ax, stop in zip(row, stops, strict=True):
-            mask = endings.under(line, stop)
-            if mask.any():
-                shares = _shares(endings, mask, times)
-                _stack(ax, shares, times)
-                where = view.setting(view.panels[0], line) | _stop(view, stop)
-                numbers.add(where, {"t_s": times} | shares)
-            ax.grid(False)
-        name = level_name(view.line.name, line) if view.line else ""
-        row[0].set_ylabel(f"{wrapped(name, 24)}\nshare of events".strip())
-    axes[0][0].set(xlim=(0, endings.horizon), ylim=(0, 1))
-    axes[0][0].yaxis.set_major_formatter(lambda y, _: f"{100 * y:.0f} %")
-    for ax, stop in zip(axes[0], stops, strict=True):
-        ax.set_title(wrapped(capital(brief(_stop(view, stop))), _TITLE // len(stops)))
-    for ax in axes[-1]:
-        ax.set_xlabel("Since the report [s]")
-    key(figure, [box(FATES[way]) for way in endings.ways], [_named(w) for w in endings.ways])
-    place = f" with {brief(view.panels[0])}" if view.panels[0] else ""
-    caption = (
-        f"Share of the events of part {view.part.name}{place} that had ended in each way by each "
-        "moment (cumulative incidence, Aalen-Johansen), where not all were confirmed. The shares "
-        "at the right edge stand in the table, with intervals."
-    )
-    return finish(figure, "endings", "How it ended, and when", caption, numbers)
+
+    name = "endings"
+    title = "How it ended, and when"
+    pages = ("driving",)
+    tables = ("runs", "events")
+
+    def draw(self, view: StudyView, reading: Reading) -> Drawn | None:
+        """Draw it."""
+        endings = reading.endings
+        if endings is None:
+            return None
+        lines = _lines(endings, view)
+        stops = [stop for stop in view.stops if not _all_right(endings, lines, [stop])][
+            -_MOST_STOPS:
+        ]
+        if not stops:
+            return None
+        figure, axes = panels(len(lines), len(stops), 1.9, sharex=True, sharey=True)
+        times, numbers = np.linspace(0.0, endings.horizon, _POINTS), Numbers()
+        for row, line in zip(axes, lines, strict=True):
+            for ax, stop in zip(row, stops, strict=True):
+                mask = endings.under(line, stop)
+                if mask.any():
+                    shares = _shares(endings, mask, times)
+                    _stack(ax, shares, times)
+                    where = view.setting(view.panels[0], line) | _stop(view, stop)
+                    numbers.add(where, {"t_s": times} | shares)
+                ax.grid(False)
+            name = level_name(view.line.name, line) if view.line else ""
+            row[0].set_ylabel(f"{wrapped(name, 24)}\nshare of events".strip())
+        axes[0][0].set(xlim=(0, endings.horizon), ylim=(0, 1))
+        axes[0][0].yaxis.set_major_formatter(lambda y, _: f"{100 * y:.0f} %")
+        for ax, stop in zip(axes[0], stops, strict=True):
+            ax.set_title(wrapped(capital(brief(_stop(view, stop))), _TITLE // len(stops)))
+        for ax in axes[-1]:
+            ax.set_xlabel("Since the report [s]")
+        key(figure, [box(FATES[way]) for way in endings.ways], [_named(w) for w in endings.ways])
+        place = f" with {brief(view.panels[0])}" if view.panels[0] else ""
+        caption = (
+            f"Share of the events of part {view.part.name}{place} that had ended in each way by "
+            "each moment (cumulative incidence, Aalen-Johansen), where not all were confirmed. The "
+            "shares at the right edge stand in the table, with intervals."
+        )
+        return self.finish(figure, caption, numbers)
 
 
-def _lines(endings: Endings, view: View) -> tuple[Level, ...]:
+def _lines(endings: Endings, view: StudyView) -> tuple[Level, ...]:
     """The two that are compared, and others of which not all went right."""
     others = [line for line in view.lines if not _all_right(endings, [line], view.stops)]
     return tuple(dict.fromkeys([*(view.contrast or ()), *others]))[:_MOST_LINES]
@@ -91,7 +107,7 @@ def _all_right(endings: Endings, lines: Sequence[Level], stops: Sequence[Level])
     return all(bool(endings.is_right[endings.under(*place)].all()) for place in places)
 
 
-def _stop(view: View, stop: Level) -> Setting:
+def _stop(view: StudyView, stop: Level) -> Setting:
     return {view.over.name: stop} if view.over else {}
 
 
@@ -147,7 +163,7 @@ class Events:
         view: Names the factors and their levels.
     """
 
-    def __init__(self, table: Table, part: str, view: View) -> None:
+    def __init__(self, table: Table, part: str, view: StudyView) -> None:
         rows = {key: np.asarray(values) for key, values in table.items()}
         self.part = part
         here = (rows["part"] == part) & ~rows["is_reference"].astype(bool)
@@ -202,60 +218,94 @@ class Events:
         return str(found[0]) if len(found) == 1 else None
 
 
-def story_part(table: Table, view: View) -> str | None:
+def story_part(table: Table, view: StudyView) -> str | None:
     """The part that tells a story: the one with events that the answer is not about."""
     parts = sorted({str(p) for p in table["part"]})
     others = [part for part in parts if part != view.part.name]
     return next(iter(others or parts), None)
 
 
-def responses(view: View, events: Events) -> Drawn | None:
+def _events(view: StudyView, reading: Reading) -> Events | None:
+    """Those of the story; None where there are none."""
+    table = reading.table("events")
+    part = story_part(table, view)
+    events = Events(table, part, view) if part is not None else None
+    return events if events else None
+
+
+class StoryTimes(ReportFigure):
     """Times of the events that were reached, guards and robots apart; of those who came."""
-    shown, met, numbers = view.shown, events.kinds_of_times(), Numbers()
-    if not met:
-        return None
-    figure, axes = panels(len(shown), len(met), 2.4, sharex=True, sharey=True)
-    look = looks(view.line)
-    for row, panel in zip(axes, shown, strict=True):
-        for ax, (title, (kind, column)) in zip(row, met.items(), strict=True):
-            for level, offset in dodge(view.lines):
-                masks = [events.by(kind) & events.under(panel, level, v) for v in view.stops]
-                times = [events.times(column, mask) for mask in masks]
-                _quartiles(ax, offset, times, look[level])
-                where = view.setting(panel, level) | {"responder_kind": kind, "time": column}
-                numbers.add(where, view.along_x() | _quantiles(times))
-            stops_axis(ax, view.over)
-            ax.set_title(title if row is axes[0] else "")
-    axes[0][0].set_ylim(bottom=0)
-    outer_labels(axes, shown, "Since detection [s]")
-    legend(figure, view.line)
-    caption = (
-        "Mark, the median; bar, the middle half, of the events that were reached or "
-        f"confirmed{_what_else_came(events)}."
-    )
-    title = f"Part {events.part}: response, by who responded"
-    return finish(figure, "story_times", title, caption, numbers)
+
+    name = "story_times"
+    title = "Response, by who responded"
+    pages = ("driving",)
+    tables = ("runs", "events")
+    has_panels = True
+
+    def draw(self, view: StudyView, reading: Reading) -> Drawn | None:
+        """Draw it."""
+        events = _events(view, reading)
+        if events is None:
+            return None
+        shown, met, numbers = view.shown, events.kinds_of_times(), Numbers()
+        if not met:
+            return None
+        figure, axes = panels(len(shown), len(met), 2.4, sharex=True, sharey=True)
+        look = looks(view.line)
+        for row, panel in zip(axes, shown, strict=True):
+            for ax, (title, (kind, column)) in zip(row, met.items(), strict=True):
+                for level, offset in dodge(view.lines):
+                    masks = [events.by(kind) & events.under(panel, level, v) for v in view.stops]
+                    times = [events.times(column, mask) for mask in masks]
+                    _quartiles(ax, offset, times, look[level])
+                    where = view.setting(panel, level) | {"responder_kind": kind, "time": column}
+                    numbers.add(where, view.along_x() | _quantiles(times))
+                stops_axis(ax, view.over)
+                ax.set_title(title if row is axes[0] else "")
+        axes[0][0].set_ylim(bottom=0)
+        outer_labels(axes, shown, "Since detection [s]")
+        legend(figure, view.line)
+        caption = (
+            "Mark, the median; bar, the middle half, of the events that were reached or "
+            f"confirmed{_what_else_came(events)}."
+        )
+        title = f"Part {events.part}: response, by who responded"
+        return self.finish(figure, caption, numbers, title=title)
 
 
-def outcomes(view: View, events: Events) -> Drawn | None:
+class StoryOutcomes(ReportFigure):
     """What became of every event, as shares that add up to one; None if all met one fate."""
-    if events.one_fate() is not None:
-        return None
-    met = events.shares(np.ones(len(events), dtype=bool))
-    parts = {_NAMES.get(fate, fate): box(FATES[fate]) for fate in _FATES if met[fate]}
-    stacks, numbers = Stacks(view, "Share of events", parts), Numbers()
-    for ax, panel, level in stacks.panels():
-        shares = [events.shares(events.under(panel, level, v)) for v in view.stops]
-        told = {fate: np.array([share[fate] for share in shares]) for fate in _FATES}
-        stack(ax, told, FATES)
-        numbers.add(view.setting(panel, level), view.along_x() | told)
-    stacks.close()
-    stacks.axes[0].set_xlim(0, 1)
-    stacks.axes[0].set_xticks([0, 0.5, 1])
-    stacks.axes[0].xaxis.set_major_formatter(lambda share, _: f"{100 * share:.0f} %")
-    caption = f"All {len(events):,} events of part {events.part}: each has one of these outcomes."
-    title = f"Part {events.part}: what became of the events"
-    return finish(stacks.figure, "story_outcomes", title, caption, numbers)
+
+    name = "story_outcomes"
+    title = "What became of the events"
+    pages = ("driving",)
+    tables = ("runs", "events")
+    has_panels = True
+
+    def draw(self, view: StudyView, reading: Reading) -> Drawn | None:
+        """Draw it."""
+        events = _events(view, reading)
+        if events is None:
+            return None
+        if events.one_fate() is not None:
+            return None
+        met = events.shares(np.ones(len(events), dtype=bool))
+        parts = {_NAMES.get(fate, fate): box(FATES[fate]) for fate in _FATES if met[fate]}
+        stacks, numbers = Stacks(view, "Share of events", parts), Numbers()
+        for ax, panel, level in stacks.panels():
+            shares = [events.shares(events.under(panel, level, v)) for v in view.stops]
+            told = {fate: np.array([share[fate] for share in shares]) for fate in _FATES}
+            stack(ax, told, FATES)
+            numbers.add(view.setting(panel, level), view.along_x() | told)
+        stacks.close()
+        stacks.axes[0].set_xlim(0, 1)
+        stacks.axes[0].set_xticks([0, 0.5, 1])
+        stacks.axes[0].xaxis.set_major_formatter(lambda share, _: f"{100 * share:.0f} %")
+        caption = (
+            f"All {len(events):,} events of part {events.part}: each has one of these outcomes."
+        )
+        title = f"Part {events.part}: what became of the events"
+        return self.finish(stacks.figure, caption, numbers, title=title)
 
 
 def _what_else_came(events: Events) -> str:

@@ -18,8 +18,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from dva_sim.experiments.analysis.paired_effects import Factor
-from dva_sim.experiments.study.labels import level_name
 from dva_sim.experiments.study.schema import Level
+from dva_sim.network.patterns import PATTERNS
+from dva_sim.simulation.labels import level_name
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -57,12 +58,16 @@ LOOKS = (
 )
 ONE = _BLUE  # where there is nothing to be told apart
 
+_NAMED = {
+    "vermilion": _VERMILION,
+    "purple": _PURPLE,
+    "blue": _BLUE,
+    "green": _GREEN,
+}  # as patterns say
+
 # Levels that look the same in every figure of every study.
 _OWN: Mapping[str, Look] = {
-    "req-rep": _VERMILION,
-    "pipelined": _PURPLE,
-    "pub-sub": _BLUE,
-    "latest-wins": _GREEN,
+    **{name: _NAMED[kind.colour] for name, kind in PATTERNS.items()},
     "robot": _BLUE,
     "guard": _VERMILION,
     "bystander": _GREEN,
@@ -134,6 +139,13 @@ def colours(factor: Factor | None) -> dict[Level, str]:
 def marks(factor: Factor | None) -> dict[Level, str]:
     """A mark for each level, as lasting as its colour."""
     return {level: look.mark for level, look in looks(factor).items()}
+
+
+def is_of_palette(colour: str) -> bool:
+    """Whether a colour, as `#rrggbb`, is one of those that a figure may use."""
+    own = [INK, SOFT, FAINT, WARNING, HAZARD, "#ffffff", *(look.colour for look in LOOKS)]
+    fills = [fill.colour for kind in (FATES, STAGES) for fill in kind.values()]
+    return colour.lower() in {known.lower() for known in (*own, *fills)}
 
 
 def look_of(name: str) -> Look:

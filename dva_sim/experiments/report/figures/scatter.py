@@ -3,27 +3,33 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from dva_sim.experiments.analysis.layout import layout_of
-from dva_sim.experiments.analysis.paired_effects import Floats, Part, Setting, View, nan_mean
+from dva_sim.experiments.analysis.paired_effects import (
+    Floats,
+    RunGrid,
+    Setting,
+    StudyView,
+    nan_mean,
+)
 from dva_sim.experiments.report.figures.palette import INK, ONE, PAPER, SOFT, Look, legend, looks
+from dva_sim.experiments.report.figures.report_figure import ReportFigure
 from dva_sim.experiments.report.figures.style import (
     Drawn,
     Numbers,
     axis_label,
-    finish,
     log_axis,
     panels,
     with_unit,
     wrapped,
 )
-from dva_sim.experiments.study.labels import capital, factor_name, level_name, measure_name, setting
-from dva_sim.experiments.study.labels import with_unit as head_of
 from dva_sim.experiments.study.schema import POINT, Level
+from dva_sim.kernel.wording import capital
+from dva_sim.simulation.labels import factor_name, level_name, measure_name, setting
+from dva_sim.simulation.labels import with_unit as head_of
 from dva_sim.statistics import SobolIndex, sobol_indices
 
 if TYPE_CHECKING:
@@ -51,31 +57,40 @@ class Cloud(NamedTuple):
     level: Level
 
 
-def scatters(reading: Reading) -> list[Drawn]:
-    """For designs of points in ranges; nothing for all others."""
-    view, names = reading.view, reading.points
-    if view is None or not names:
-        return []
+class Points(NamedTuple):
+    """What every point of the ranges gave.
+
+    Attributes:
+        clouds: Each line, or the contrast of two of them if one was declared.
+        names: Continuous factors.
+        where: Their values `(factors, points)`.
+        panel: Levels of all other factors.
+    """
+
+    clouds: list[Cloud]
+    names: list[str]
+    where: Floats
+    panel: Setting
+
+
+def points_of(view: StudyView, reading: Reading) -> Points:
+    """The runs of a design of points in ranges."""
+    names = reading.points
     table, factors = layout_of(reading.study, reading.runs, are_points_trials=False)
-    part = Part(table, view.part.name, factors)
+    part = RunGrid(table, view.part.name, factors)
     panel = view.panels[0] | ({view.over.name: view.stops[-1]} if view.over else {})
     where = nan_mean(np.stack([_per_point(part, name, {}) for name in names]), axis=-1)
-    clouds = list(_clouds(view, part, panel))
-    ranges = (reading.study.get("design") or {}).get("ranges") or {}
-    drawn = [_against_each(view, clouds, names, where, panel, ranges)]
-    if (reading.study.get("design") or {}).get("saltelli"):
-        drawn.append(_indices(view, clouds, names, where, panel))
-    return drawn
+    return Points(list(_clouds(view, part, panel)), names, where, panel)
 
 
-def _per_point(part: Part, column: str, setting_: Setting) -> Floats:
+def _per_point(part: RunGrid, column: str, setting_: Setting) -> Floats:
     """A column `(points, ...)`, the other factors at some levels, everything else flat."""
     axis = [f.name for f in part.factors if f.name not in setting_].index(POINT)
     grid = np.moveaxis(part.where(part.grid(column), setting_), axis, 0)
     return grid.reshape(len(grid), -1)
 
 
-def _clouds(view: View, part: Part, panel: Setting) -> list[Cloud]:
+def _clouds(view: StudyView, part: RunGrid, panel: Setting) -> list[Cloud]:
     """Each line, or the contrast of two of them if one was declared."""
     in_excess = part.has_reference(view.measure)
     grid = part.excess(view.measure) if in_excess else part.grid(view.measure)
@@ -92,41 +107,47 @@ def _clouds(view: View, part: Part, panel: Setting) -> list[Cloud]:
     return [Cloud(name, at(level), level) for name, level in zip(names, view.lines, strict=True)]
 
 
-def _against_each(
-    view: View,
-    clouds: list[Cloud],
-    names: list[str],
-    where: Floats,
-    panel: Setting,
-    ranges: Mapping[str, Any],
-) -> Drawn:
+class Scatter(ReportFigure):
     """A panel for each factor: a dot for each point, the mean over all its runs."""
-    columns = min(_ABREAST, len(names))
-    rows = -(-len(names) // columns)
-    figure, grid = panels(rows, columns, 2.7, sharey=True)
-    axes = [ax for row in grid for ax in row]
-    numbers = Numbers()
-    means = [nan_mean(c.values.reshape(len(c.values), -1), axis=1) for c in clouds]
-    for ax, name, x in zip(axes, names, where, strict=False):
+
+    name = "scatter"
+    title = "The outcome against each continuous factor"
+    pages = ("driving",)
+
+    def applies(self, view: StudyView, reading: Reading) -> bool:
+        """Only for designs of points in ranges."""
+        return super().applies(view, reading) and bool(reading.points)
+
+    def draw(self, view: StudyView, reading: Reading) -> Drawn | None:
+        """Draw it."""
+        clouds, names, where, panel = points_of(view, reading)
+        ranges = (reading.study.get("design") or {}).get("ranges") or {}
+        columns = min(_ABREAST, len(names))
+        rows = -(-len(names) // columns)
+        figure, grid = panels(rows, columns, 2.7, sharey=True)
+        axes = [ax for row in grid for ax in row]
+        means = [nan_mean(c.values.reshape(len(c.values), -1), axis=1) for c in clouds]
+        for ax, name, x in zip(axes, names, where, strict=False):
+            for cloud, y in zip(clouds, means, strict=True):
+                _dots(ax, x, y, _look(view, cloud))
+            ax.set_xlabel(wrapped(capital(head_of(name)), 30))
+            if (ranges.get(name) or {}).get("scale") == "log":
+                log_axis(ax, "x")
+            if len(clouds) == 1 and clouds[0].level is None and view.contrast is not None:
+                ax.axhline(0, color=INK, lw=0.8, zorder=1)
+        for ax in axes[len(names) :]:
+            ax.set_visible(False)
+        label = clouds[0].name if view.contrast is not None else measure_name(view.measure)
+        for row in grid:
+            row[0].set_ylabel(axis_label(view.measure, wrapped(label, 26)))
+        if view.contrast is None:
+            legend(figure, view.line)
+        numbers = Numbers()
         for cloud, y in zip(clouds, means, strict=True):
-            _dots(ax, x, y, _look(view, cloud))
-        ax.set_xlabel(wrapped(capital(head_of(name)), 30))
-        if (ranges.get(name) or {}).get("scale") == "log":
-            log_axis(ax, "x")
-        if len(clouds) == 1 and clouds[0].level is None and view.contrast is not None:
-            ax.axhline(0, color=INK, lw=0.8, zorder=1)
-    for ax in axes[len(names) :]:
-        ax.set_visible(False)
-    label = clouds[0].name if view.contrast is not None else measure_name(view.measure)
-    for row in grid:
-        row[0].set_ylabel(axis_label(view.measure, wrapped(label, 26)))
-    if view.contrast is None:
-        legend(figure, view.line)
-    for cloud, y in zip(clouds, means, strict=True):
-        told = dict(zip(names, where, strict=True)) | {with_unit("mean", view.measure): y}
-        numbers.add(panel | {"of": cloud.name}, {POINT: range(len(y))} | told)
-    title = f"{capital(_what(view, clouds))} against each factor{_place(panel)}"
-    return finish(figure, "scatter", title, _SCATTER, numbers)
+            told = dict(zip(names, where, strict=True)) | {with_unit("mean", view.measure): y}
+            numbers.add(panel | {"of": cloud.name}, {POINT: range(len(y))} | told)
+        title = f"{capital(_what(view, clouds))} against each factor{_place(panel)}"
+        return self.finish(figure, _SCATTER, numbers, title=title)
 
 
 _SCATTER = (
@@ -138,7 +159,7 @@ _SCATTER = (
 )
 
 
-def _what(view: View, clouds: list[Cloud]) -> str:
+def _what(view: StudyView, clouds: list[Cloud]) -> str:
     if view.contrast is None:
         return measure_name(view.measure)
     return f"{clouds[0].name} in {measure_name(view.measure)}"
@@ -148,7 +169,7 @@ def _place(panel: Setting) -> str:
     return f" ({setting(panel)})" if panel else ""
 
 
-def _look(view: View, cloud: Cloud) -> Look:
+def _look(view: StudyView, cloud: Cloud) -> Look:
     return ONE if cloud.level is None else looks(view.line)[cloud.level]
 
 
@@ -185,33 +206,46 @@ def trend(x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 # --- Sobol's indices -------------------------------------------------------------------------
-def _indices(
-    view: View, clouds: list[Cloud], names: list[str], where: Floats, panel: Setting
-) -> Drawn:
+class Sobol(ReportFigure):
     """A panel for each cloud: how much of the variance over the ranges is each factor's."""
-    figure, (axes,) = panels(1, len(clouds), 1.2 + 0.42 * len(names), sharey=True, sharex=True)
-    numbers = Numbers()
-    for ax, cloud in zip(axes, clouds, strict=True):
-        found = _sobol(cloud, names, where, view.part)
-        for row, index in enumerate(found):
-            _bar(ax, row - 0.14, index, "first")
-            _bar(ax, row + 0.14, index, "total")
-            told = {
-                f"{kind}_{edge}": getattr(getattr(index, kind), edge)
-                for kind in ("first", "total")
-                for edge in ("mean", "low", "high")
-            }
-            numbers.row(panel | {"of": cloud.name, "factor": index.factor}, **told)
-        ax.axvline(0, color=INK, lw=0.8)
-        ax.set_title(cloud.name)
-        ax.set_xlabel("Share of the variance")
-        ax.grid(axis="x")
-        ax.grid(axis="y", visible=False)
-    axes[0].set_yticks(range(len(names)), [capital(factor_name(name)) for name in names])
-    axes[0].set_ylim(len(names) - 0.5, -0.5)
-    what = _what(view, clouds)
-    title = f"Which factors the {what} varies with: Sobol' indices{_place(panel)}"
-    return finish(figure, "sobol", title, _SOBOL, numbers)
+
+    name = "sobol"
+    title = "Which factors the outcome varies with: Sobol' indices"
+    pages = ("driving",)
+
+    def applies(self, view: StudyView, reading: Reading) -> bool:
+        """Only for Saltelli's sample."""
+        is_sample = bool((reading.study.get("design") or {}).get("saltelli"))
+        return super().applies(view, reading) and is_sample and bool(reading.points)
+
+    def draw(self, view: StudyView, reading: Reading) -> Drawn | None:
+        """Draw it."""
+        clouds, names, where, panel = points_of(view, reading)
+        height = 1.2 + 0.42 * len(names)
+        figure, (axes,) = panels(1, len(clouds), height, sharey=True, sharex=True)
+        numbers = Numbers()
+        for ax, cloud in zip(axes, clouds, strict=True):
+            found = _sobol(cloud, names, where)
+            for row, index in enumerate(found):
+                _bar(ax, row - 0.14, index, "first")
+                _bar(ax, row + 0.14, index, "total")
+                told = {
+                    f"{kind}_{edge}": getattr(getattr(index, kind), edge)
+                    for kind in ("first", "total")
+                    for edge in ("mean", "low", "high")
+                }
+                numbers.row(panel | {"of": cloud.name, "factor": index.factor}, **told)
+            ax.axvline(0, color=INK, lw=0.8)
+            ax.set_title(cloud.name)
+            ax.set_xlabel("Share of the variance")
+            ax.grid(axis="x")
+            ax.grid(axis="y", visible=False)
+        axes[0].set_yticks(range(len(names)), [capital(factor_name(name)) for name in names])
+        axes[0].set_ylim(len(names) - 0.5, -0.5)
+        title = (
+            f"Which factors the {_what(view, clouds)} varies with: Sobol' indices{_place(panel)}"
+        )
+        return self.finish(figure, _SOBOL, numbers, title=title)
 
 
 _SOBOL = (
@@ -222,7 +256,7 @@ _SOBOL = (
 )
 
 
-def _sobol(cloud: Cloud, names: list[str], where: Floats, part: Part) -> tuple[SobolIndex, ...]:
+def _sobol(cloud: Cloud, names: list[str], where: Floats) -> tuple[SobolIndex, ...]:
     """From every run, flat."""
     shape = cloud.values.shape
     levels = {

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dva_sim.experiments.analysis.paired_effects import Factor
+from dva_sim.experiments.analysis.paired_effects import Factor, StudyView
 from dva_sim.experiments.analysis.shift_effects import BEST, FLOOR, Shifts, pooled
 from dva_sim.experiments.report.figures.palette import (
     FAINT,
@@ -19,21 +20,18 @@ from dva_sim.experiments.report.figures.palette import (
     key,
     looks,
 )
-from dva_sim.experiments.report.figures.style import (
-    Drawn,
-    Numbers,
-    finish,
-    panels,
-    styled,
-    with_unit,
-)
-from dva_sim.experiments.study.labels import capital
+from dva_sim.experiments.report.figures.report_figure import ReportFigure
+from dva_sim.experiments.report.figures.style import Drawn, Numbers, panels, with_unit
+from dva_sim.experiments.report.shift_page import ShiftPage
 from dva_sim.experiments.study.schema import Level
+from dva_sim.kernel.wording import capital
 from dva_sim.simulation.shift import measures
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from dva_sim.experiments.report.summary import Reading
 
 
 _FATES = ("confirmed", "refuted", "open", "expired", "escalated")  # as they are stacked
@@ -41,12 +39,19 @@ _NAMES = {"refuted": "cleared as a false alarm", "open": "still open"}
 _QUANTILES = (0.5, 0.9, 0.95)
 
 
-def draw_all(shifts: Shifts) -> list[Drawn]:
-    """Every figure that the tables have the columns for, in the order of the report."""
-    with styled():
-        drawn = [trade(shifts), stages(shifts), fates_in_time(shifts), way(shifts)]
-        drawn += [percentiles(shifts), burden(shifts)]
-    return [figure for figure in drawn if figure is not None]
+class ShiftFigure(ReportFigure):
+    """Of policies compared on shifts."""
+
+    pages = ("shift",)
+
+    def draw(self, view: StudyView, reading: Reading) -> Drawn | None:
+        """Draw it, from the shifts."""
+        page = reading.page
+        return self.drawn(page.shifts) if isinstance(page, ShiftPage) else None
+
+    @abstractmethod
+    def drawn(self, shifts: Shifts) -> Drawn | None:
+        """The figure; None where there is nothing to be seen."""
 
 
 def _looks(shifts: Shifts) -> dict[Level, Look]:
@@ -55,37 +60,50 @@ def _looks(shifts: Shifts) -> dict[Level, Look]:
 
 
 # --- the trade -----------------------------------------------------------------------------
-def trade(shifts: Shifts) -> Drawn | None:
+class Trade(ShiftFigure):
     """Response against exposure, a mark for each policy, a panel for each load."""
-    if not shifts.can_spare:
-        return None
-    label = "Exposure of people in finding out what it is [s per event]"
-    figure = _scatter(shifts, "exposure_look_s", label)
+
+    name = "trade"
     title = "The trade: how soon somebody is there, against how long people stand in danger"
-    caption = (
-        "Down and to the left is better; the line joins the policies that no other beats on both. "
-        f"Response is the mean of min(time, {shifts.follow:g} s) over all events. Exposure is "
-        "guards' time within the danger radius on the way to look, looking and leaving; containing "
-        f"comes on top and costs about {_act(shifts):.0f} s per event whoever was sent. "
-        f"{_bars_words(shifts)}"
-    )
-    return finish(figure, "trade", title, caption, _scatter_numbers(shifts, "exposure_look_s"))
+
+    def drawn(self, shifts: Shifts) -> Drawn | None:
+        """Draw it."""
+        if not shifts.can_spare:
+            return None
+        label = "Exposure of people in finding out what it is [s per event]"
+        figure = _scatter(shifts, "exposure_look_s", label)
+        title = "The trade: how soon somebody is there, against how long people stand in danger"
+        caption = (
+            "Down and to the left is better; the line joins the policies that no other beats on "
+            f"both. Response is the mean of min(time, {shifts.follow:g} s) over all events. "
+            "Exposure is guards' time within the danger radius on the way to look, looking and "
+            f"leaving; containing comes on top and costs about {_act(shifts):.0f} s per event "
+            f"whoever was sent. {_bars_words(shifts)}"
+        )
+        return self.finish(
+            figure, caption, _scatter_numbers(shifts, "exposure_look_s"), title=title
+        )
 
 
-def stages(shifts: Shifts) -> Drawn | None:
+class Stages(ShiftFigure):
     """Response against containment: who looks first contains later."""
-    if not shifts.view.part.has("containment_mean_s"):
-        return None
-    figure = _scatter(shifts, "containment_mean_s", "Restricted mean time to containment [s]")
+
+    name = "stages"
     title = "Looking first or containing first: response against containment"
-    caption = (
-        "Down and to the left is better; the line joins the policies that no other beats on both. "
-        f"Both are means of min(time, {shifts.follow:g} s) from the report: of all events until "
-        "somebody is on scene, and of the true ones until a person has dealt with them. The same "
-        f"guards do both. {_bars_words(shifts)}"
-    )
-    numbers = _scatter_numbers(shifts, "containment_mean_s")
-    return finish(figure, "stages", title, caption, numbers)
+    columns = ("containment_mean_s",)
+
+    def drawn(self, shifts: Shifts) -> Drawn | None:
+        """Draw it."""
+        figure = _scatter(shifts, "containment_mean_s", "Restricted mean time to containment [s]")
+        title = "Looking first or containing first: response against containment"
+        caption = (
+            "Down and to the left is better; the line joins the policies that no other beats on "
+            f"both. Both are means of min(time, {shifts.follow:g} s) from the report: of all "
+            "events until somebody is on scene, and of the true ones until a person has dealt with "
+            f"them. The same guards do both. {_bars_words(shifts)}"
+        )
+        numbers = _scatter_numbers(shifts, "containment_mean_s")
+        return self.finish(figure, caption, numbers, title=title)
 
 
 def _scatter(shifts: Shifts, column: str, label: str) -> Figure:
@@ -164,35 +182,43 @@ def _frontier(ax: Axes, x: Any, y: Any) -> None:
 
 
 # --- what becomes of them --------------------------------------------------------------------
-def fates_in_time(shifts: Shifts) -> Drawn | None:
+class FatesOfEvents(ShiftFigure):
     """Cumulative incidence by cause, stacked, for some policies at every load."""
-    if not shifts.events:
-        return None
-    chosen = chosen_policies(shifts)
-    figure, axes = panels(len(shifts.stops), len(chosen), 2.0, sharex=True, sharey=True)
-    times, numbers = np.linspace(0.0, shifts.follow, 301), Numbers()
-    for stop, row in enumerate(axes):
-        for policy, ax in zip(chosen, row, strict=True):
-            events = dict(shifts.events_of(policy, stop))
-            if len(events["event_id"]):
-                shares = _shares(measures.fates(events), times)
-                _stack(ax, shares, times)
-                where = {"at": shifts.titles[stop], "dispatch.policy": policy}
-                numbers.add(where, {"t_s": times} | shares)
-            ax.set_xlim(0, shifts.follow)
-            ax.set_ylim(0, 1)
-            ax.grid(False)
-            if stop == 0:
-                ax.set_title(policy)
-        row[0].set_ylabel(f"{capital(shifts.titles[stop])}\nshare of events")
-    for ax in axes[-1]:
-        ax.set_xlabel("Time since the report [s]")
-    key(figure, [box(FATES[fate]) for fate in _FATES], [_NAMES.get(f, f) for f in _FATES])
-    caption = (
-        "Cumulative incidence of each outcome (Aalen-Johansen), stacked: at every moment the "
-        f"shares add up to one. All events, true and false, each followed for {shifts.follow:g} s."
-    )
-    return finish(figure, "fates", "What becomes of events, and when", caption, numbers)
+
+    name = "fates"
+    title = "What becomes of events, and when"
+    tables = ("runs", "events")
+
+    def drawn(self, shifts: Shifts) -> Drawn | None:
+        """Draw it."""
+        if not shifts.events:
+            return None
+        chosen = chosen_policies(shifts)
+        figure, axes = panels(len(shifts.stops), len(chosen), 2.0, sharex=True, sharey=True)
+        times, numbers = np.linspace(0.0, shifts.follow, 301), Numbers()
+        for stop, row in enumerate(axes):
+            for policy, ax in zip(chosen, row, strict=True):
+                events = dict(shifts.events_of(policy, stop))
+                if len(events["event_id"]):
+                    shares = _shares(measures.fates(events), times)
+                    _stack(ax, shares, times)
+                    where = {"at": shifts.titles[stop], "dispatch.policy": policy}
+                    numbers.add(where, {"t_s": times} | shares)
+                ax.set_xlim(0, shifts.follow)
+                ax.set_ylim(0, 1)
+                ax.grid(False)
+                if stop == 0:
+                    ax.set_title(policy)
+            row[0].set_ylabel(f"{capital(shifts.titles[stop])}\nshare of events")
+        for ax in axes[-1]:
+            ax.set_xlabel("Time since the report [s]")
+        key(figure, [box(FATES[fate]) for fate in _FATES], [_NAMES.get(f, f) for f in _FATES])
+        caption = (
+            "Cumulative incidence of each outcome (Aalen-Johansen), stacked: at every moment the "
+            "shares add up to one. All events, true and false, each followed for "
+            f"{shifts.follow:g} s."
+        )
+        return self.finish(figure, caption, numbers)
 
 
 def chosen_policies(shifts: Shifts) -> list[str]:
@@ -219,33 +245,37 @@ def _stack(ax: Axes, shares: dict[str, Any], times: Any) -> None:
 
 
 # --- one line per policy ---------------------------------------------------------------------
-def way(shifts: Shifts) -> Drawn | None:
+class WayToBest(ShiftFigure):
     """How far of the way from the floor to the best possible each policy gets."""
-    if shifts.target is None or not shifts.travellers:
-        return None
-    names, numbers, look = shifts.travellers, Numbers(), _looks(shifts)
-    figure, (axes,) = panels(1, len(shifts.stops), _height(len(names)), sharey=True)
-    for stop, ax in enumerate(axes):
-        found = shifts.progress(stop)
-        told: dict[str, Any] = {
-            "share": found.mean,
-            "share_low": found.low,
-            "share_high": found.high,
-        }
-        numbers.add({"at": shifts.titles[stop]}, told | {"dispatch.policy": names})
-        for row, policy in enumerate(names):
-            colour, mark = look[policy]
-            ax.hlines(row, 100 * found.low[row], 100 * found.high[row], color=colour, lw=1.6)
-            ax.plot(100 * found.mean[row], row, marker=mark, color=colour, ms=7)
-        ax.axvline(100, color=INK, lw=0.8)
-        ax.axvline(0, color=SOFT, lw=0.8, ls=":")
-        _policy_axis(ax, names, capital(shifts.titles[stop]))
-    target = "the oracle" if shifts.target == BEST else "a fresh unit at every base"
-    axes[len(axes) // 2].set_xlabel(f"Share of the way from {FLOOR} to {target} [%]")
-    title = (
-        f"How much of what can be gained in response each policy gains: 0 is {FLOOR}, 100 {target}"
-    )
-    return finish(figure, "way", title, _way_words(shifts), numbers)
+
+    name = "way"
+    title = "How much of what can be gained in response each policy gains"
+
+    def drawn(self, shifts: Shifts) -> Drawn | None:
+        """Draw it."""
+        if shifts.target is None or not shifts.travellers:
+            return None
+        names, numbers, look = shifts.travellers, Numbers(), _looks(shifts)
+        figure, (axes,) = panels(1, len(shifts.stops), _height(len(names)), sharey=True)
+        for stop, ax in enumerate(axes):
+            found = shifts.progress(stop)
+            told: dict[str, Any] = {
+                "share": found.mean,
+                "share_low": found.low,
+                "share_high": found.high,
+            }
+            numbers.add({"at": shifts.titles[stop]}, told | {"dispatch.policy": names})
+            for row, policy in enumerate(names):
+                colour, mark = look[policy]
+                ax.hlines(row, 100 * found.low[row], 100 * found.high[row], color=colour, lw=1.6)
+                ax.plot(100 * found.mean[row], row, marker=mark, color=colour, ms=7)
+            ax.axvline(100, color=INK, lw=0.8)
+            ax.axvline(0, color=SOFT, lw=0.8, ls=":")
+            _policy_axis(ax, names, capital(shifts.titles[stop]))
+        target = "the oracle" if shifts.target == BEST else "a fresh unit at every base"
+        axes[len(axes) // 2].set_xlabel(f"Share of the way from {FLOOR} to {target} [%]")
+        title = f"{self.title}: 0 is {FLOOR}, 100 {target}"
+        return self.finish(figure, _way_words(shifts), numbers, title=title)
 
 
 def _way_words(shifts: Shifts) -> str:
@@ -269,89 +299,104 @@ def _way_words(shifts: Shifts) -> str:
     )
 
 
-def percentiles(shifts: Shifts) -> Drawn | None:
+class Percentiles(ShiftFigure):
     """Half, nine tenths and 95 % of all events had somebody on scene by ..."""
-    if not shifts.events:
-        return None
-    names, numbers, look = shifts.policies, Numbers(), _looks(shifts)
-    figure, (axes,) = panels(1, len(shifts.stops), _height(len(names)), sharey=True)
-    missing = False
-    for stop, ax in enumerate(axes):
-        for row, policy in enumerate(names):
-            colour = look[policy].colour
-            value, low, high = pooled(shifts.events_of(policy, stop), _QUANTILES, shifts.follow)
-            where = {"at": shifts.titles[stop], "dispatch.policy": policy}
-            told: dict[str, Any] = {
-                "response_s": value,
-                "response_low_s": low,
-                "response_high_s": high,
-            }
-            numbers.add(where, told | {"quantile": _QUANTILES})
-            inside = [np.minimum(x, shifts.follow) for x in (value, low, high)]
-            ax.hlines([row] * 3, inside[1], inside[2], color=colour, lw=5, alpha=0.3)
-            ax.plot(inside[0], [row] * 3, color=colour, lw=0.8)
-            for x, reached, fill in zip(
-                inside[0], np.isfinite(value), (True, False, False), strict=True
-            ):
-                mark = "o" if reached else ">"
-                ax.plot(x, row, mark, ms=6, mfc=colour if fill else PAPER, mec=colour)
-            missing |= not np.isfinite(high).all()
-        _policy_axis(ax, names, capital(shifts.titles[stop]))
-        ax.set_xlim(0, None)
-    axes[len(axes) // 2].set_xlabel(
-        "Time to response by 50 % (filled), 90 % and 95 % of all events [s]"
-    )
-    never = (
-        f" An arrow, or a bar up to {shifts.follow:g} s: perhaps not reached." if missing else ""
-    )
-    caption = (
-        "Over all events of the cohort, those that nobody ever reached counting as infinitely "
-        f"late.{never} Broad bars: 95 % interval of each percentile alone, shifts drawn anew. "
-        "The axes differ from panel to panel."
-    )
-    return finish(figure, "percentiles", "Percentiles of the time to response", caption, numbers)
+
+    name = "percentiles"
+    title = "Percentiles of the time to response"
+    tables = ("runs", "events")
+
+    def drawn(self, shifts: Shifts) -> Drawn | None:
+        """Draw it."""
+        if not shifts.events:
+            return None
+        names, numbers, look = shifts.policies, Numbers(), _looks(shifts)
+        figure, (axes,) = panels(1, len(shifts.stops), _height(len(names)), sharey=True)
+        missing = False
+        for stop, ax in enumerate(axes):
+            for row, policy in enumerate(names):
+                colour = look[policy].colour
+                value, low, high = pooled(shifts.events_of(policy, stop), _QUANTILES, shifts.follow)
+                where = {"at": shifts.titles[stop], "dispatch.policy": policy}
+                told: dict[str, Any] = {
+                    "response_s": value,
+                    "response_low_s": low,
+                    "response_high_s": high,
+                }
+                numbers.add(where, told | {"quantile": _QUANTILES})
+                inside = [np.minimum(x, shifts.follow) for x in (value, low, high)]
+                ax.hlines([row] * 3, inside[1], inside[2], color=colour, lw=5, alpha=0.3)
+                ax.plot(inside[0], [row] * 3, color=colour, lw=0.8)
+                for x, reached, fill in zip(
+                    inside[0], np.isfinite(value), (True, False, False), strict=True
+                ):
+                    mark = "o" if reached else ">"
+                    ax.plot(x, row, mark, ms=6, mfc=colour if fill else PAPER, mec=colour)
+                missing |= not np.isfinite(high).all()
+            _policy_axis(ax, names, capital(shifts.titles[stop]))
+            ax.set_xlim(0, None)
+        axes[len(axes) // 2].set_xlabel(
+            "Time to response by 50 % (filled), 90 % and 95 % of all events [s]"
+        )
+        never = (
+            f" An arrow, or a bar up to {shifts.follow:g} s: perhaps not reached."
+            if missing
+            else ""
+        )
+        caption = (
+            "Over all events of the cohort, those that nobody ever reached counting as infinitely "
+            f"late.{never} Broad bars: 95 % interval of each percentile alone, shifts drawn anew. "
+            "The axes differ from panel to panel."
+        )
+        return self.finish(figure, caption, numbers)
 
 
-def burden(shifts: Shifts) -> Drawn | None:
+class Burden(ShiftFigure):
     """Who works how much, and how evenly work and service are spread."""
-    columns = {
-        "use_of_guards": "Use of guards",
-        "use_of_operators": "Use of operators",
-        "evenness_of_guards": "Evenness among guards",
-        "zone_ratio": "Worst zone's response\nover the best one's",
-    }
-    there = {c: text for c, text in columns.items() if shifts.view.part.has(c)}
-    names, numbers, look = shifts.policies, Numbers(), _looks(shifts)
-    figure, (axes,) = panels(1, len(there), _height(len(names)), sharey=True)
-    for stop, title in enumerate(shifts.titles):
-        told: dict[str, Any] = {column: shifts.means(column)[:, stop] for column in there}
-        numbers.add({"at": title}, told | {"dispatch.policy": names})
-    shades = np.linspace(0.35, 1.0, len(shifts.stops))
-    for ax, (column, text) in zip(axes, there.items(), strict=True):
-        means = shifts.means(column)
-        for row, policy in enumerate(names):
-            for stop in shifts.stops:
-                ax.plot(
-                    means[row, stop],
-                    row,
-                    "o",
-                    ms=4 + 2 * stop,
-                    color=look[policy].colour,
-                    alpha=float(shades[stop]),
-                    mec=PAPER,
-                )
-        _policy_axis(ax, names, text)
-        if column.startswith("use"):
-            ax.set_xlim(0, 1.02)
+
+    name = "burden"
     title = "How busy people are, and how evenly work and service are spread"
-    caption = (
-        f"Small to large: {', '.join(shifts.titles)}. Means over shifts. Use: share of the "
-        "measured time with an order. Evenness: Jain's index of the guards' busy time, 1 if all "
-        "work the same. On the right, the restricted mean response in the worst zone over that in "
-        f"the best, of zones with at least {measures.FEWEST_IN_ZONE} events in the shift: chance "
-        "alone lifts it above 1, under every policy."
-    )
-    return finish(figure, "burden", title, caption, numbers)
+
+    def drawn(self, shifts: Shifts) -> Drawn | None:
+        """Draw it."""
+        columns = {
+            "use_of_guards": "Use of guards",
+            "use_of_operators": "Use of operators",
+            "evenness_of_guards": "Evenness among guards",
+            "zone_ratio": "Worst zone's response\nover the best one's",
+        }
+        there = {c: text for c, text in columns.items() if shifts.view.part.has(c)}
+        names, numbers, look = shifts.policies, Numbers(), _looks(shifts)
+        figure, (axes,) = panels(1, len(there), _height(len(names)), sharey=True)
+        for stop, title in enumerate(shifts.titles):
+            told: dict[str, Any] = {column: shifts.means(column)[:, stop] for column in there}
+            numbers.add({"at": title}, told | {"dispatch.policy": names})
+        shades = np.linspace(0.35, 1.0, len(shifts.stops))
+        for ax, (column, text) in zip(axes, there.items(), strict=True):
+            means = shifts.means(column)
+            for row, policy in enumerate(names):
+                for stop in shifts.stops:
+                    ax.plot(
+                        means[row, stop],
+                        row,
+                        "o",
+                        ms=4 + 2 * stop,
+                        color=look[policy].colour,
+                        alpha=float(shades[stop]),
+                        mec=PAPER,
+                    )
+            _policy_axis(ax, names, text)
+            if column.startswith("use"):
+                ax.set_xlim(0, 1.02)
+        title = "How busy people are, and how evenly work and service are spread"
+        caption = (
+            f"Small to large: {', '.join(shifts.titles)}. Means over shifts. Use: share of the "
+            "measured time with an order. Evenness: Jain's index of the guards' busy time, 1 if "
+            "all work the same. On the right, the restricted mean response in the worst zone over "
+            f"that in the best, of zones with at least {measures.FEWEST_IN_ZONE} events in the "
+            "shift: chance alone lifts it above 1, under every policy."
+        )
+        return self.finish(figure, caption, numbers, title=title)
 
 
 def _height(rows: int) -> float:

@@ -7,13 +7,19 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.experiments.analysis.kept_episodes import Episode, agents_of, instants, way_of
-from dva_sim.experiments.analysis.paired_effects import Floats, Table, View, as_floats, codes_of
+from dva_sim.experiments.analysis.kept_episodes import KeptEpisode, agents_of, instants, way_of
+from dva_sim.experiments.analysis.paired_effects import (
+    Floats,
+    StudyView,
+    Table,
+    as_floats,
+    codes_of,
+)
 from dva_sim.experiments.report.figures.palette import (
     HAZARD,
     INK,
@@ -24,25 +30,19 @@ from dva_sim.experiments.report.figures.palette import (
     key,
     look_of,
 )
-from dva_sim.experiments.report.figures.style import WIDTH, Drawn, Numbers, finish, panels, wrapped
-from dva_sim.experiments.study.labels import (
-    capital,
-    factor_name,
-    level_name,
-    measure_name,
-    number,
-    percent,
-    quantity,
-    setting,
-)
+from dva_sim.experiments.report.figures.report_figure import ReportFigure
+from dva_sim.experiments.report.figures.style import ASIDE, WIDTH, Drawn, Numbers, panels, wrapped
 from dva_sim.experiments.study.schema import POINT, Level
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.kernel.units import unit_of
+from dva_sim.kernel.wording import capital, number, percent, quantity
+from dva_sim.simulation.labels import factor_name, level_name, measure_name, setting
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from dva_sim.experiments.report.summary import Reading
     from dva_sim.worlds.layout import Site
 
 
@@ -52,53 +52,62 @@ _MARGIN = 2.5  # [m] around everything driven
 _BAR = 5.0  # [m]
 
 
-def trajectories(view: View, tracks: Table, scenario: Mapping[str, Any]) -> Drawn | None:
+class Trajectories(ReportFigure):
     """One person, one trial: the ways taken under each line, at the first and the last stop."""
-    ways = Ways(tracks, view)
-    if not ways:
-        return None
-    stops = list(dict.fromkeys((view.stops[0], view.stops[-1])))
-    site, aside = site_of(scenario), ways.reference()
-    low, high = frame_of(ways.all_points)
-    size, count = high - low, len(view.lines)
-    abreast = min(count, _MOST if size[1] > size[0] else _ABREAST)
-    deep = -(-count // abreast)
-    height = row_height(size, columns=abreast)
-    figure, axes = panels(deep * len(stops), abreast, height, sharex=True, sharey=True)
-    paint, numbers = colours(view.line), Numbers()
-    for index, stop in enumerate(stops):
-        block = [ax for row in axes[index * deep : (index + 1) * deep] for ax in row]
-        for ax, level in zip(block, view.lines, strict=False):
-            draw_ground(ax, site)
-            for way in aside:
-                ax.plot(*way.T, color=SOFT, lw=1.3, ls=(0, (3, 2)), zorder=8)
-            for way in ways.under(level, stop):
-                _way(ax, way, paint[level])
-                where = view.setting(view.panels[0], level) | _at(view, stop)
-                numbers.add(where, {"x_m": way[:, 0], "y_m": way[:, 1]})
-            ax.set_title(wrapped(_heading(view, level, stop), _TITLE // abreast), fontsize=8.5)
-            ax.label_outer()
-        for ax in block[count:]:
-            ax.set_visible(False)
-    axes[0][0].set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-    scale_bar(axes[-1][0], low)
-    caption = (
-        f"The same person and trial{'; dashed, the reference run' if aside else ''}. Ring: where "
-        "a way begins; dot: where it ends."
-        f"{'' if site else ' The files of the site were not found, so it is left out.'}"
-    )
-    within = f" ({setting(view.panels[0])})" if view.panels[0] else ""
-    return finish(figure, "trajectories", f"Ways taken{within}", caption, numbers)
+
+    name = "trajectories"
+    title = "Ways taken"
+    pages = ("driving",)
+    tables = ("runs", "tracks")
+
+    def draw(self, view: StudyView, reading: Reading) -> Drawn | None:
+        """Draw it."""
+        tracks, scenario = reading.table("tracks"), reading.scenario_of(view.part.name)
+        ways = DrivenWays(tracks, view)
+        if not ways:
+            return None
+        stops = list(dict.fromkeys((view.stops[0], view.stops[-1])))
+        site, aside = site_of(scenario), ways.reference()
+        low, high = frame_of(ways.all_points)
+        size, count = high - low, len(view.lines)
+        abreast = min(count, _MOST if size[1] > size[0] else _ABREAST)
+        deep = -(-count // abreast)
+        height = row_height(size, columns=abreast)
+        figure, axes = panels(deep * len(stops), abreast, height, sharex=True, sharey=True)
+        paint, numbers = colours(view.line), Numbers()
+        for index, stop in enumerate(stops):
+            block = [ax for row in axes[index * deep : (index + 1) * deep] for ax in row]
+            for ax, level in zip(block, view.lines, strict=False):
+                draw_ground(ax, site)
+                for way in aside:
+                    ax.plot(*way.T, color=SOFT, lw=1.3, ls=(0, (3, 2)), zorder=8)
+                for way in ways.under(level, stop):
+                    _way(ax, way, paint[level])
+                    where = view.setting(view.panels[0], level) | _at(view, stop)
+                    numbers.add(where, {"x_m": way[:, 0], "y_m": way[:, 1]})
+                ax.set_title(wrapped(_heading(view, level, stop), _TITLE // abreast), fontsize=8.5)
+                ax.label_outer()
+            for ax in block[count:]:
+                ax.set_visible(False)
+        axes[0][0].set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+        scale_bar(axes[-1][0], low)
+        caption = (
+            f"The same person and trial{'; dashed, the reference run' if aside else ''}. Ring: "
+            "where a way begins; dot: where it "
+            f"ends.{'' if site else ' The files of the site were not found, so it is left out.'}"
+        )
+        within = f" ({setting(view.panels[0])})" if view.panels[0] else ""
+        return self.finish(figure, caption, numbers, title=f"Ways taken{within}")
 
 
-def _at(view: View, stop: Level) -> dict[str, Level]:
+def _at(view: StudyView, stop: Level) -> dict[str, Level]:
     return {view.over.name: stop} if view.over else {}
 
 
-class Ways:
+class DrivenWays:
     """Tracks of one person and trial, picked by what they were driven under."""
 
-    def __init__(self, tracks: Table, view: View) -> None:
+    def __init__(self, tracks: Table, view: StudyView) -> None:
         self._view = view
         rows = {key: np.asarray(values) for key, values in tracks.items()}
         here = (rows["part"] == view.part.name) & np.isfinite(rows["x_m"].astype(float))
@@ -174,6 +183,8 @@ def draw_ground(ax: Axes, site: Site | None) -> None:
     from dva_sim.worlds.view import draw_site
 
     draw_site(ax, site, labels=False, scale=False)
+    for artist in (*ax.lines, *ax.patches, *ax.collections):
+        artist.set_label(ASIDE)
 
 
 def _way(ax: Axes, way: Floats, colour: str) -> None:
@@ -195,13 +206,13 @@ def row_height(size: Floats, columns: int) -> float:
 def scale_bar(ax: Axes, corner: Floats) -> None:
     """Five metres, in the lower left corner."""
     x, y = corner + 0.8
-    ax.plot([x, x + _BAR], [y, y], color=INK, lw=2, solid_capstyle="butt", zorder=11)
+    ax.plot([x, x + _BAR], [y, y], color=INK, lw=2, solid_capstyle="butt", zorder=11, label=ASIDE)
     ax.annotate(
         f"{_BAR:g} m", (x, y), xytext=(0, 3), textcoords="offset points", fontsize=7.5, zorder=11
     )
 
 
-def _heading(view: View, line: Level, stop: Level) -> str:
+def _heading(view: StudyView, line: Level, stop: Level) -> str:
     words = [level_name(view.line.name, line, short=True)] if view.line else []
     if view.over:
         words.append(f"{factor_name(view.over.name)} {level_name(view.over.name, stop)}")
@@ -215,54 +226,87 @@ _NOSE = 0.05  # length of the line that shows where an agent heads, as a share o
 _NUMBERED = 9  # of a kind: more have no room for their numbers
 
 
-def time_lapse(
-    view: View, episode: Episode, scenario: Mapping[str, Any], which: str
-) -> Drawn | None:
-    """Where everybody was at some moments, with the way so far.
+class _TimeLapse(ReportFigure):
+    """Where everybody was at some moments of one run, with the way so far.
 
-    Args:
-        view: Names the measure.
-        episode: The run.
-        scenario: Of its part, for the site.
-        which: `typical` or `worst`.
+    Attributes:
+        which: Of the runs that were kept.
     """
-    names = agents_of(episode.moments)
-    ways = {name: way_of(episode.moments, name) for name in names}
-    moved = {name: way for name, way in ways.items() if len(way[0])}
-    if not moved:
-        return None
-    site = site_of(scenario)
-    points = np.vstack([places[:, :2] for _, places in moved.values()])
-    low, high = frame_of(np.vstack([points, *((i.x, i.y) for i in episode.incidents)]))
-    size = high - low
-    abreast = _MOMENTS if size[1] > _TALL * size[0] else _STRIPS_ABREAST
-    height = row_height(size, columns=abreast)
-    figure, rows = panels(_MOMENTS // abreast, abreast, height, sharex=True, sharey=True)
-    nose, numbers = _NOSE * float(size[0]), Numbers()
-    times, numbered = instants(episode.moments, _MOMENTS), _numbered(list(moved))
-    for ax, time in zip((ax for row in rows for ax in row), times, strict=True):
-        draw_ground(ax, site)
+
+    pages = ("driving",)
+    which: ClassVar[Literal["typical", "worst"]]
+
+    def draw(self, view: StudyView, reading: Reading) -> Drawn | None:
+        """Draw it."""
+        if reading.episodes is None:
+            return None
+        typical, worst = reading.episodes
+        episode = typical if self.which == "typical" else worst
+        return self.drawn(view, episode, reading.scenario_of(view.part.name))
+
+    def drawn(
+        self, view: StudyView, episode: KeptEpisode, scenario: Mapping[str, Any]
+    ) -> Drawn | None:
+        """The figure of a run; None where nobody moved in it.
+
+        Args:
+            view: Names the measure.
+            episode: The run.
+            scenario: Of its part, for the site.
+        """
+        names = agents_of(episode.moments)
+        ways = {name: way_of(episode.moments, name) for name in names}
+        moved = {name: way for name, way in ways.items() if len(way[0])}
+        if not moved:
+            return None
+        site = site_of(scenario)
+        points = np.vstack([places[:, :2] for _, places in moved.values()])
+        low, high = frame_of(np.vstack([points, *((i.x, i.y) for i in episode.incidents)]))
+        size = high - low
+        abreast = _MOMENTS if size[1] > _TALL * size[0] else _STRIPS_ABREAST
+        height = row_height(size, columns=abreast)
+        figure, rows = panels(_MOMENTS // abreast, abreast, height, sharex=True, sharey=True)
+        nose, numbers = _NOSE * float(size[0]), Numbers()
+        times, numbered = instants(episode.moments, _MOMENTS), _numbered(list(moved))
+        for ax, time in zip((ax for row in rows for ax in row), times, strict=True):
+            draw_ground(ax, site)
+            for name, (when, places) in moved.items():
+                _agent(ax, places[when <= time], look_of(kind_of(name)), nose)
+                if name in numbered and (when <= time).any():
+                    _number(ax, name, places[when <= time][-1])
+            for incident in (i for i in episode.incidents if i.start <= time):
+                ax.plot(incident.x, incident.y, "X", ms=7, color=HAZARD, mec=PAPER, zorder=8)
+            ax.set_title(f"{number(time)} s")
+            ax.label_outer()
         for name, (when, places) in moved.items():
-            _agent(ax, places[when <= time], look_of(kind_of(name)), nose)
-            if name in numbered and (when <= time).any():
-                _number(ax, name, places[when <= time][-1])
-        for incident in (i for i in episode.incidents if i.start <= time):
-            ax.plot(incident.x, incident.y, "X", ms=7, color=HAZARD, mec=PAPER, zorder=8)
-        ax.set_title(f"{number(time)} s")
-        ax.label_outer()
-    for name, (when, places) in moved.items():
-        x, y, heading = places.T
-        told = {"t_s": when, "x_m": x, "y_m": y, "heading_rad": heading}
-        numbers.add({"agent": name}, told)
-    rows[0][0].set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-    scale_bar(rows[-1][0], low)
-    _key(figure, list(moved), len(episode.incidents) > 0)
-    title = f"{capital(which)} run: {_what(view, episode)}"
-    name, caption = f"time_lapse_{which}", _caption(view, episode, which)
-    return finish(figure, name, title, caption, numbers, (_READS,))
+            x, y, heading = places.T
+            told = {"t_s": when, "x_m": x, "y_m": y, "heading_rad": heading}
+            numbers.add({"agent": name}, told)
+        rows[0][0].set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+        scale_bar(rows[-1][0], low)
+        _key(figure, list(moved), len(episode.incidents) > 0)
+        title = f"{capital(self.which)} run: {_what(view, episode)}"
+        caption = _caption(view, episode, self.which)
+        return self.finish(figure, caption, numbers, title=title, reads=(_READS,))
 
 
-def _what(view: View, episode: Episode) -> str:
+class TypicalRun(_TimeLapse):
+    """The run in the middle."""
+
+    name = "time_lapse_typical"
+    title = "A typical run"
+    which = "typical"
+
+
+class WorstRun(_TimeLapse):
+    """The run that took most."""
+
+    name = "time_lapse_worst"
+    title = "The worst run"
+    which = "worst"
+
+
+def _what(view: StudyView, episode: KeptEpisode) -> str:
     value = quantity(episode.value, unit_of(view.measure))
     where = f", {setting(episode.setting)}" if episode.setting else ""
     return f"{measure_name(view.measure)} {value}{where}"
@@ -273,7 +317,7 @@ _READS = (
 )
 
 
-def _caption(view: View, episode: Episode, which: str) -> str:
+def _caption(view: StudyView, episode: KeptEpisode, which: str) -> str:
     chosen = {
         "typical": "nearest to the median of all runs",
         "worst": "with the largest value",
@@ -331,5 +375,5 @@ def _agent(ax: Axes, so_far: Floats, look: Look, nose: float) -> None:
     ax.plot(*so_far[0, :2], "o", ms=4, mfc=PAPER, mec=look.colour, mew=1.2, zorder=10)
     if np.isfinite(heading):
         ends = [x, x + nose * np.cos(heading)], [y, y + nose * np.sin(heading)]
-        ax.plot(*ends, color=INK, lw=1.2, zorder=9)
+        ax.plot(*ends, color=INK, lw=1.2, zorder=9, label=ASIDE)
     ax.plot(x, y, look.mark, ms=7, color=look.colour, mec=INK, mew=0.6, zorder=10)

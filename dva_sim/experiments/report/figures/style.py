@@ -15,11 +15,12 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from dva_sim.experiments.analysis.paired_effects import Factor, Floats, Setting, View
+from dva_sim.experiments.analysis.paired_effects import Factor, Floats, Setting, StudyView
 from dva_sim.experiments.report.figures.palette import FAINT, INK, SOFT
-from dva_sim.experiments.study.labels import brief, capital, factor_name, level_name, measure_name
 from dva_sim.experiments.study.schema import Level
 from dva_sim.kernel.units import ending_of, unit_of
+from dva_sim.kernel.wording import capital
+from dva_sim.simulation.labels import brief, factor_name, level_name, measure_name
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -81,6 +82,8 @@ _DECADES = 5e3  # of the ends of a logarithmic axis, from which on 2 and 5 have 
 _LEAST_TICK = 8  # characters of a tick's name in a line
 _ROOM = 0.15  # share of what persons span that is left free beyond them, where bands are cut
 _ROW_LABEL = 28  # characters that the height of a row holds
+ASIDE = "_aside"  # label of what is drawn but is no result: the site, a scale, a heading
+LEAST_WORDS = 6.0  # [pt] in this width
 WIDTH = 8.4  # [in]; on screen and on paper it is stretched or shrunk to the column
 
 _STYLE: dict[str, Any] = {
@@ -283,14 +286,14 @@ def hatch_stops(axes: Axes, stops: Sequence[int]) -> None:
         )
 
 
-def hatch_words(view: View) -> str:
+def hatch_words(view: StudyView) -> str:
     """What the hatching means, if a panel has any."""
     if not any(view.stops_outside(panel) for panel in view.shown):
         return ""
     return "Hatched: at least one line is extrapolated there (marked † in the tables)."
 
 
-def panel_grid(view: View, height: float) -> tuple[Figure, list[Axes]]:
+def panel_grid(view: StudyView, height: float) -> tuple[Figure, list[Axes]]:
     """Axes for each setting shown, up to three abreast, four as two by two; `height` each [in]."""
     count = len(view.shown)
     columns = 2 if count == 4 else count
@@ -300,7 +303,7 @@ def panel_grid(view: View, height: float) -> tuple[Figure, list[Axes]]:
     return figure, [ax for row in axes for ax in row]
 
 
-def label_panels(axes: Sequence[Axes], view: View, text: str) -> None:
+def label_panels(axes: Sequence[Axes], view: StudyView, text: str) -> None:
     """Titles and x for a grid of panels; what is common to them on its outer edges only."""
     columns = 2 if len(axes) == 4 else len(axes)
     for index, (ax, panel) in enumerate(zip(axes, view.shown, strict=True)):
@@ -343,7 +346,7 @@ def _make_room(axes: Axes, columns: int) -> None:
         axes.set_xticks(axes.get_xticks(), words, fontsize=7)
 
 
-def has_lines(view: View) -> bool:
+def has_lines(view: StudyView) -> bool:
     """Lines lead from number to number; between words there is nothing to lead through."""
     return view.over is not None and view.over.is_numeric and len(view.stops) > 1
 

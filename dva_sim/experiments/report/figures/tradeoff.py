@@ -6,24 +6,32 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dva_sim.experiments.analysis.paired_effects import Floats, Setting, View, person_means, present
+from dva_sim.experiments.analysis.paired_effects import (
+    Floats,
+    Setting,
+    StudyView,
+    person_means,
+    present,
+)
 from dva_sim.experiments.report.figures.palette import legend, looks
+from dva_sim.experiments.report.figures.report_figure import ReportFigure
 from dva_sim.experiments.report.figures.style import (
     Drawn,
     Numbers,
     axis_label,
-    finish,
     has_lines,
     panel_grid,
     panel_title,
     with_unit,
 )
-from dva_sim.experiments.study.labels import factor_name, level_name, measure_name
 from dva_sim.experiments.study.schema import Level
+from dva_sim.simulation.labels import factor_name, level_name, measure_name
 from dva_sim.statistics import Band, band
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+    from dva_sim.experiments.report.summary import Reading
 
 
 _BELOW = 0.3  # of that room, below: there is little that is less than none
@@ -33,43 +41,51 @@ EXPOSURES = ("exposure_look_s", "exposure_s", "person_exposure_s")
 RESPONSES = ("response_mean_s", "confirmation_mean_s", "response_s", "drive_time_s")
 
 
-def tradeoff(view: View) -> Drawn | None:
+class TradeOff(ReportFigure):
     """Response over exposure, a line for each level of the compared factor through its stops."""
-    columns = _columns(view)
-    if columns is None:
-        return None
-    figure, axes = panel_grid(view, 3.6)
-    numbers, ends = Numbers(), []
-    for ax, panel in zip(axes, view.shown, strict=True):
-        for level in view.lines:
-            bands = [_band(view, column, panel, level) for column in columns]
-            _line(ax, view, level, *bands)
-            ends.append((ax, bands[0].mean, bands[1].mean))
-            told = {
-                with_unit(f"{word}_{edge}", column): getattr(found, name)
-                for word, column, found in zip(
-                    ("exposure", "response"), columns, bands, strict=True
-                )
-                for edge, name in _EDGES.items()
-            }
-            numbers.add(view.setting(panel, level), view.along_x() | told)
-        panel_title(ax, panel, 78 // len(axes))
-        ax.grid(True, axis="both")
-        ax.margins(0.12)
-    _fit(axes[0], view, columns)
-    for ax, x, y in ends:
-        _name_stops(ax, view, x, y)
-    figure.supxlabel(axis_label(columns[0]), fontsize="medium")
-    figure.supylabel(axis_label(columns[1]), fontsize="medium")
-    legend(figure, view.line)
-    title = f"The trade-off: {measure_name(columns[1])} against {measure_name(columns[0])}"
-    return finish(figure, "tradeoff", title, _caption(view), numbers)
+
+    name = "tradeoff"
+    title = "The trade-off: response against exposure"
+    pages = ("driving",)
+    has_panels = True
+
+    def draw(self, view: StudyView, reading: Reading) -> Drawn | None:
+        """Draw it."""
+        columns = _columns(view)
+        if columns is None:
+            return None
+        figure, axes = panel_grid(view, 3.6)
+        numbers, ends = Numbers(), []
+        for ax, panel in zip(axes, view.shown, strict=True):
+            for level in view.lines:
+                bands = [_band(view, column, panel, level) for column in columns]
+                _line(ax, view, level, *bands)
+                ends.append((ax, bands[0].mean, bands[1].mean))
+                told = {
+                    with_unit(f"{word}_{edge}", column): getattr(found, name)
+                    for word, column, found in zip(
+                        ("exposure", "response"), columns, bands, strict=True
+                    )
+                    for edge, name in _EDGES.items()
+                }
+                numbers.add(view.setting(panel, level), view.along_x() | told)
+            panel_title(ax, panel, 78 // len(axes))
+            ax.grid(True, axis="both")
+            ax.margins(0.12)
+        _fit(axes[0], view, columns)
+        for ax, x, y in ends:
+            _name_stops(ax, view, x, y)
+        figure.supxlabel(axis_label(columns[0]), fontsize="medium")
+        figure.supylabel(axis_label(columns[1]), fontsize="medium")
+        legend(figure, view.line)
+        title = f"The trade-off: {measure_name(columns[1])} against {measure_name(columns[0])}"
+        return self.finish(figure, _caption(view), numbers, title=title)
 
 
 _EDGES = {"mean": "mean", "low": "pointwise_low", "high": "pointwise_high"}
 
 
-def _caption(view: View) -> str:
+def _caption(view: StudyView) -> str:
     along = ""
     if has_lines(view) and view.over is not None:
         along = f", from one {factor_name(view.over.name)} to the next"
@@ -80,24 +96,24 @@ def _caption(view: View) -> str:
     )
 
 
-def _columns(view: View) -> tuple[str, str] | None:
+def _columns(view: StudyView) -> tuple[str, str] | None:
     """The exposure that varies, and the response beside it."""
     measured = [c for c in (view.measure, *EXPOSURES) if c in EXPOSURES and _varies(view, c)]
     responses = [c for c in (view.measure, *RESPONSES) if c in RESPONSES and _varies(view, c)]
     return (measured[0], responses[0]) if measured and responses else None
 
 
-def _varies(view: View, column: str) -> bool:
+def _varies(view: StudyView, column: str) -> bool:
     values = present(view.part.grid(column)) if view.part.has(column) else np.array([])
     return len(values) > 1 and bool(np.ptp(values) > 0)
 
 
-def _band(view: View, column: str, panel: Setting, level: Level) -> Band:
+def _band(view: StudyView, column: str, panel: Setting, level: Level) -> Band:
     means: Floats = person_means(view.curve(view.part.grid(column), panel, level))
     return band(means)
 
 
-def _fit(ax: Axes, view: View, columns: tuple[str, str]) -> None:
+def _fit(ax: Axes, view: StudyView, columns: tuple[str, str]) -> None:
     """Cut the crosses of few persons far beyond what any person did, lest they flatten all."""
     for name, column in zip("xy", columns, strict=True):
         grid = view.part.grid(column)
@@ -109,7 +125,7 @@ def _fit(ax: Axes, view: View, columns: tuple[str, str]) -> None:
         ax.set(**{f"{name}lim": (low, high)})
 
 
-def _line(ax: Axes, view: View, level: Level, exposure: Band, response: Band) -> None:
+def _line(ax: Axes, view: StudyView, level: Level, exposure: Band, response: Band) -> None:
     """A mark at each stop, joined where stops are numbers."""
     paint, mark = looks(view.line)[level]
     x, y = exposure.mean, response.mean
@@ -118,7 +134,7 @@ def _line(ax: Axes, view: View, level: Level, exposure: Band, response: Band) ->
     ax.plot(x, y, "-" if has_lines(view) else "", marker=mark, color=paint, ms=5, lw=1.2)
 
 
-def _name_stops(ax: Axes, view: View, x: Floats, y: Floats) -> None:
+def _name_stops(ax: Axes, view: StudyView, x: Floats, y: Floats) -> None:
     """The ends of a line, or each word; none beside another that it would be written over."""
     if view.over is None or len(x) < 2:
         return

@@ -18,7 +18,7 @@ from dva_sim.validation.dispatch.exact.hypercube import (
     priorities,
 )
 from dva_sim.validation.dispatch.exact.queues import (
-    Law,
+    DurationLaw,
     Measures,
     erlang_a,
     erlang_b,
@@ -33,7 +33,7 @@ from dva_sim.validation.dispatch.exact.queues import (
 
 __all__ = [
     "FORMULAS",
-    "Law",
+    "DurationLaw",
     "Measures",
     "assignment",
     "cobham",

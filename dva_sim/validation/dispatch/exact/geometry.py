@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from dva_sim.validation.dispatch.exact.queues import Floats, Law, Measures, require_stable
+from dva_sim.validation.dispatch.exact.queues import DurationLaw, Floats, Measures, require_stable
 
 _NODES = 32  # of Gauss-Legendre in each direction and piece; 48 change the ninth digit
 
@@ -51,7 +51,9 @@ def square_nearest(places: int, side_m: float = 1.0) -> Measures:
     return {"distance_m": float(2 * total * side_m)}
 
 
-def sqm(arrival_rate: float, service: Law, side_m: float = 1.0, speed_mps: float = 1.0) -> Measures:
+def sqm(
+    arrival_rate: float, service: DurationLaw, side_m: float = 1.0, speed_mps: float = 1.0
+) -> Measures:
     """One responder that starts from the centre of a square and comes back after each event.
 
     M/G/1 whose service is the way there, the time on scene, and the way back. `response_s`

@@ -28,8 +28,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dva_sim.validation.dispatch.exact.queues import (
+    DurationLaw,
     Floats,
-    Law,
     Measures,
     Memoryless,
     birth_death,
@@ -210,7 +210,7 @@ def priorities(
     return _by_class(ahead, arrival_rates, loads)
 
 
-def cobham(arrival_rates: Sequence[float], services: Sequence[Law]) -> Measures:
+def cobham(arrival_rates: Sequence[float], services: Sequence[DurationLaw]) -> Measures:
     """M/G/1, each class with its own law of service.
 
     References:

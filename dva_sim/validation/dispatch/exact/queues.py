@@ -84,7 +84,7 @@ Memoryless = Annotated[float, "exponential"]
 """The mean of a time that must be exponential for the formula to hold [s]."""
 
 
-class Law(Protocol):
+class DurationLaw(Protocol):
     """What most formulas want to know of a duration."""
 
     @property
@@ -190,7 +190,7 @@ def mmck(arrival_rate: float, mean_service_s: Memoryless, servers: int, places: 
     }
 
 
-def mg1(arrival_rate: float, service: Law) -> Measures:
+def mg1(arrival_rate: float, service: DurationLaw) -> Measures:
     """M/G/1: one server, any law of service, everybody waits.
 
     References:

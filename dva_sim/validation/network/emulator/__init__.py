@@ -1,7 +1,7 @@
 """The real side: Linux TCP and pyzmq over an emulated link, each end in its own network namespace.
 
-`wire` decides when a packet arrives, `forwarder` moves real packets by it between two TUN
-devices, `nodes` and `cell` make the namespaces and end them, `programs` are the operator and the
-robot, `measure` runs a condition, `campaign` many, `check` measures the link itself. Where
-namespaces are forbidden, `proxy` relays TCP over the loopback without loss.
+`wire` decides when a packet arrives, and a `cell` moves real packets by it between two TUN
+devices; `relay` takes its place where namespaces are forbidden, without loss. It may import the
+network's condition and measures, the kernel, and no model of the network. Begin reading at
+`campaign`, which measures many conditions, or at `self_check`, which measures the link itself.
 """

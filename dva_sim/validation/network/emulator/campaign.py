@@ -32,10 +32,9 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.streams import derive_seed
 from dva_sim.network.condition import EMULATOR_RESULTS, RESULTS, Condition
 from dva_sim.network.measures import RunLog, measure_log
-from dva_sim.validation.network.emulator.cell import PACKETS, Job, Outcome
-from dva_sim.validation.network.emulator.notes import Kind, Note
-from dva_sim.validation.network.emulator.programs import HANDSHAKE_LIMIT_S
-from dva_sim.validation.network.emulator.running import EmulatorError, refuse_for_proxy, run_job
+from dva_sim.validation.network.emulator.cell import PACKETS, EmulatedJob, EmulatedOutcome
+from dva_sim.validation.network.emulator.process import EmulatorError, refuse_for_proxy, run_job
+from dva_sim.validation.network.emulator.programs import HANDSHAKE_LIMIT_S, Note, NoteKind
 from dva_sim.validation.network.emulator.wire import WireConfig
 
 Machine = dict[str, str | int | bool | None]
@@ -107,17 +106,17 @@ def measure(condition: Condition, seed: int, link: str = PACKETS) -> Row:
     refuse_for_proxy(job)
     outcome = run_job(job)
     results = measure_log(log_of(outcome), condition.warm_s, condition.dur_s) | outcome.link
-    if condition.pattern != "req":
+    if condition.pattern != "req-rep":
         results |= {"timeouts": math.nan, "alerts": math.nan}
     row = condition.to_row() | _written(results) | {"realtime": str(int(outcome.realtime))}
     return {name: row[name] for name in COLUMNS}
 
 
-def job_of(condition: Condition, seed: int, link: str = PACKETS) -> Job:
+def job_of(condition: Condition, seed: int, link: str = PACKETS) -> EmulatedJob:
     """What the process of such a run is told."""
     played_s = condition.warm_s + condition.dur_s
     patience_ms = condition.timeout_ms or math.inf
-    return Job(
+    return EmulatedJob(
         "commands",
         WireConfig.of(condition),
         derive_seed(condition.hash, seed),
@@ -129,28 +128,28 @@ def job_of(condition: Condition, seed: int, link: str = PACKETS) -> Job:
     )
 
 
-def log_of(outcome: Outcome) -> RunLog:
+def log_of(outcome: EmulatedOutcome) -> RunLog:
     """What both programs noted, as the record that results are counted from."""
-    log = RunLog(start=_time(outcome.operator, Kind.STARTED))
-    opened = _time(outcome.operator, Kind.OPENED)
-    log.connected_s = _time(outcome.operator, Kind.CONNECTED) - opened
-    log.handshake_s = _time(outcome.operator, Kind.HANDSHAKE) - opened
+    log = RunLog(start=_time(outcome.operator, NoteKind.STARTED))
+    opened = _time(outcome.operator, NoteKind.OPENED)
+    log.connected_s = _time(outcome.operator, NoteKind.CONNECTED) - opened
+    log.handshake_s = _time(outcome.operator, NoteKind.HANDSHAKE) - opened
     for kind, number, at in [*outcome.operator, *outcome.robot]:
         match kind:
-            case Kind.ISSUED:
+            case NoteKind.ISSUED:
                 log.issued.append(at)
-            case Kind.REPLIED:
+            case NoteKind.REPLIED:
                 log.replied.append((number, at))
-            case Kind.TIMEOUT:
+            case NoteKind.TIMEOUT:
                 log.timeouts.append(at)
-            case Kind.ALERT:
+            case NoteKind.ALERT:
                 log.alerts.append(at)
-            case Kind.APPLIED:
+            case NoteKind.APPLIED:
                 log.applied.append((number, at))
     return log
 
 
-def _time(notes: list[Note], kind: Kind) -> float:
+def _time(notes: list[Note], kind: NoteKind) -> float:
     """When something happened first [s]; nan if it never did."""
     return next((at for noted, _, at in notes if noted == kind), math.nan)
 
@@ -337,7 +336,7 @@ def _look_at_machine(link: str) -> dict[str, str | int | bool | None]:
     Raises:
         EmulatorError: the link cannot be set up.
     """
-    outcome = run_job(Job("nothing", link=link))
+    outcome = run_job(EmulatedJob("nothing", link=link))
     return describe_machine(link, outcome.way, outcome.realtime)
 
 

@@ -26,10 +26,11 @@ from typing import Any, Protocol
 
 from dva_sim.kernel.streams import Streams
 from dva_sim.network.condition import Condition
-from dva_sim.validation.network.emulator import linux
-from dva_sim.validation.network.emulator.linux import OPERATOR_END, ROBOT_END, End, open_tun
-from dva_sim.validation.network.emulator.notes import Note, Notes
+from dva_sim.validation.network.emulator import namespaces
+from dva_sim.validation.network.emulator.namespaces import OPERATOR_END, ROBOT_END, End, open_tun
 from dva_sim.validation.network.emulator.programs import (
+    Note,
+    Notes,
     await_nothing,
     begin_nothing,
     run_counter,
@@ -40,9 +41,9 @@ from dva_sim.validation.network.emulator.programs import (
 from dva_sim.validation.network.emulator.relay import Proxy
 from dva_sim.validation.network.emulator.wire import (
     FORWARDER_PRIORITY,
+    EmulatedWire,
     Forwarder,
     Told,
-    Wire,
     WireConfig,
 )
 
@@ -117,9 +118,9 @@ def _live(parent: int, program: Program, channel: socket.socket, notes: Notes) -
     """All that a node's process does; it never returns."""
     code = 1
     try:
-        linux.die_with_parent(parent)
+        namespaces.die_with_parent(parent)
         gc.disable()  # a pause would look like delay
-        linux.be_punctual(PROGRAM_PRIORITY)
+        namespaces.be_punctual(PROGRAM_PRIORITY)
         program(channel, notes)
         code = 0
     except BaseException:
@@ -135,7 +136,7 @@ PACKETS, PROXY = "packets", "proxy"
 
 
 @dataclass(frozen=True)
-class Job:
+class EmulatedJob:
     """What one run is told.
 
     Attributes:
@@ -166,14 +167,14 @@ class Job:
         return json.dumps(asdict(self))
 
     @classmethod
-    def from_json(cls, text: str) -> Job:
+    def from_json(cls, text: str) -> EmulatedJob:
         """The job of such a line."""
         data = json.loads(text)
         return cls(**data | {"wire": WireConfig(**data["wire"])})
 
 
 @dataclass(frozen=True)
-class Outcome:
+class EmulatedOutcome:
     """What one run came to.
 
     Attributes:
@@ -197,7 +198,7 @@ class Outcome:
         return json.dumps(asdict(self))
 
     @classmethod
-    def from_json(cls, text: str) -> Outcome:
+    def from_json(cls, text: str) -> EmulatedOutcome:
         """The outcome of a line that the process printed."""
         data = json.loads(text)
         for end in ("operator", "robot"):
@@ -205,7 +206,7 @@ class Outcome:
         return cls(**data)
 
 
-class Link(Protocol):
+class EmulatedLink(Protocol):
     """What joins both ends while they run."""
 
     def run(self, watched: list[int], deadline: float) -> int | None:
@@ -218,7 +219,7 @@ class Link(Protocol):
         """Let go of devices and sockets."""
 
 
-class Cell:
+class EmulatedCell:
     """One run, from set-up to the last kill.
 
     Args:
@@ -226,19 +227,19 @@ class Cell:
         way: How this process became one that may make namespaces.
     """
 
-    def __init__(self, job: Job, way: str) -> None:
+    def __init__(self, job: EmulatedJob, way: str) -> None:
         self._job = job
         self._way = way
         self._nodes: list[Node] = []
         streams = Streams(job.seed)
-        self._wires = (Wire(job.wire, streams, "ab"), Wire(job.wire, streams, "ba"))
+        self._wires = (EmulatedWire(job.wire, streams, "ab"), EmulatedWire(job.wire, streams, "ba"))
 
-    def play(self) -> Outcome:
+    def play(self) -> EmulatedOutcome:
         """Set up, run, and end everything; problems become part of the outcome."""
         problem, realtime = "", False
         told: Told = {}
         try:
-            realtime = linux.be_punctual(FORWARDER_PRIORITY)
+            realtime = namespaces.be_punctual(FORWARDER_PRIORITY)
             link, word = self._set_up()
             gc.disable()  # a pause would look like delay
             self._nodes[0].channel.send(word)
@@ -252,9 +253,9 @@ class Cell:
             notes = [node.notes.read() for node in self._nodes] or [[], []]
         if not problem and codes[0] != 0:
             problem = "the operator failed"
-        return Outcome(notes[0], notes[-1], told, self._way, realtime, problem)
+        return EmulatedOutcome(notes[0], notes[-1], told, self._way, realtime, problem)
 
-    def _set_up(self) -> tuple[Link, bytes]:
+    def _set_up(self) -> tuple[EmulatedLink, bytes]:
         """The link with both ends, and what the operator is told to begin."""
         operator, robot = _programs(self._job)
         if self._job.link == PROXY:
@@ -271,7 +272,7 @@ class Cell:
         self._nodes.append(start_node(name, program, self._job.room))
         return self._nodes[-1]
 
-    def _run(self, link: Link) -> str:
+    def _run(self, link: EmulatedLink) -> str:
         """Let both ends run until the operator's program is over; what went wrong, if it did."""
         operator, robot = self._nodes
         watched = [operator.ended, robot.ended, _STDIN]
@@ -287,7 +288,7 @@ def _networked(program: Program, end: End, congestion: str) -> Program:
     """The program in a network of its own, whose device goes to whoever started it."""
 
     def run(channel: socket.socket, notes: Notes) -> None:
-        linux.enter_network_namespace()
+        namespaces.enter_network_namespace()
         tun = open_tun(end, congestion)
         socket.send_fds(channel, [b"device"], [tun])
         os.close(tun)
@@ -296,7 +297,7 @@ def _networked(program: Program, end: End, congestion: str) -> Program:
     return run
 
 
-def _programs(job: Job) -> tuple[Program, Program]:
+def _programs(job: EmulatedJob) -> tuple[Program, Program]:
     """What both ends run: the operator, the robot."""
     arguments = job.arguments
     if job.program == "commands":

@@ -1,33 +1,88 @@
-"""The operator and the robot as real pyzmq programs, and what both need.
+"""The operator and the robot as real pyzmq programs, and what they note while they run.
 
 The operator connects, the robot binds. A command is 400 bytes whose first eight are its number;
-a reply is 200 with the same number.
-
-Programs that measure the link itself: numbered datagrams, noted where they leave and arrive.
+a reply is 200 with the same number. Notes go to memory shared with whoever started a program:
+noting costs about a microsecond, and the notes outlive it, which may be killed at any moment.
+Two more programs measure the link itself: they number datagrams and note when these leave and
+arrive.
 """
 
 from __future__ import annotations
 
 import math
+import mmap
 import os
 import signal
 import socket
 import struct
 import time
 from contextlib import suppress
+from enum import IntEnum
 
 import zmq
 from zmq.utils.monitor import recv_monitor_message
 
 from dva_sim.network.condition import COMMAND_BYTES, REPLY_BYTES, Condition
-from dva_sim.validation.network.emulator.notes import Kind, Notes
+
+_COUNT = struct.Struct("q")
+_NOTE = struct.Struct("iid")
+
+
+class NoteKind(IntEnum):
+    """What happened."""
+
+    OPENED = 0
+    CONNECTED = 1
+    HANDSHAKE = 2
+    STARTED = 3
+    ISSUED = 4
+    REPLIED = 5
+    TIMEOUT = 6
+    ALERT = 7
+    APPLIED = 8
+
+
+Note = tuple[int, int, float]
+"""Kind, number of the command and time [s]."""
+
+
+class Notes:
+    """Made before the program's process is, read after.
+
+    Args:
+        room: Notes that find room.
+    """
+
+    def __init__(self, room: int) -> None:
+        self._room = room
+        self._memory = mmap.mmap(-1, _COUNT.size + room * _NOTE.size)
+        self._count = 0
+
+    def add(self, kind: NoteKind, number: int, time: float) -> None:
+        """Note that something happened.
+
+        Raises:
+            MemoryError: there is no room left.
+        """
+        if self._count == self._room:
+            raise MemoryError(f"no room for more than {self._room} notes")
+        _NOTE.pack_into(self._memory, _COUNT.size + self._count * _NOTE.size, kind, number, time)
+        self._count += 1
+        _COUNT.pack_into(self._memory, 0, self._count)
+
+    def read(self) -> list[Note]:
+        """All notes so far, in their order."""
+        (count,) = _COUNT.unpack_from(self._memory, 0)
+        end = _COUNT.size + count * _NOTE.size
+        return list(_NOTE.iter_unpack(self._memory[_COUNT.size : end]))
+
 
 HANDSHAKE_LIMIT_S = 60.0
 _NUMBER = struct.Struct("q")
 _ENDS = {
-    "req": (zmq.REQ, zmq.REP),
-    "pub": (zmq.PUB, zmq.SUB),
-    "dealer": (zmq.DEALER, zmq.ROUTER),
+    "req-rep": (zmq.REQ, zmq.REP),
+    "pub-sub": (zmq.PUB, zmq.SUB),
+    "pipelined": (zmq.DEALER, zmq.ROUTER),
 }
 _now = time.monotonic
 Context = zmq.Context[zmq.Socket[bytes]]
@@ -50,8 +105,8 @@ def run_robot(condition: Condition, endpoint: str, channel: socket.socket, notes
             *sender, payload = robot.recv_multipart()
             _pause_until(_now() + 1e-3 * condition.proc_ms)
             (number,) = _NUMBER.unpack_from(payload)
-            notes.add(Kind.APPLIED, number, _now())
-            if condition.pattern != "pub":
+            notes.add(NoteKind.APPLIED, number, _now())
+            if condition.pattern != "pub-sub":
                 robot.send_multipart([*sender, _message(number, REPLY_BYTES)])
 
 
@@ -69,12 +124,13 @@ def run_operator(condition: Condition, channel: socket.socket, notes: Notes) -> 
     """
     endpoint = channel.recv(256).decode()
     with zmq.Context() as context:
-        operator = Operator(context, condition, endpoint, notes)
-        {"req": operator.ask, "pub": operator.publish, "dealer": operator.deal}[condition.pattern]()
+        operator = SocketOperator(context, condition, endpoint, notes)
+        sends = {"req-rep": operator.ask, "pub-sub": operator.publish, "pipelined": operator.deal}
+        sends[condition.pattern]()
         operator.socket.close(0)
 
 
-class Operator:
+class SocketOperator:
     """Sends commands in one of three patterns.
 
     Args:
@@ -99,14 +155,14 @@ class Operator:
         self.socket = _open(context, condition, operator=True)
         self._start = self._connect_first()
         self._end = self._start + condition.warm_s + condition.dur_s
-        notes.add(Kind.STARTED, 0, self._start)
+        notes.add(NoteKind.STARTED, 0, self._start)
 
     def ask(self) -> None:
         """REQ: a command, its reply or an alert, then the next."""
         number, due = 0, self._start
         while due < self._end:
             _pause_until(due)
-            issue = self._note(Kind.ISSUED, number)
+            issue = self._note(NoteKind.ISSUED, number)
             if not self._exchange(number):
                 return
             number += 1
@@ -116,14 +172,14 @@ class Operator:
         """PUB: commands on a fixed grid."""
         for number, due in enumerate(self._grid()):
             _pause_until(due)
-            self._note(Kind.ISSUED, number)
+            self._note(NoteKind.ISSUED, number)
             self.socket.send(_message(number, COMMAND_BYTES))
 
     def deal(self) -> None:
         """DEALER: commands on a fixed grid, replies whenever they come."""
         for number, due in enumerate(self._grid()):
             self._listen_until(due)
-            self._note(Kind.ISSUED, number)
+            self._note(NoteKind.ISSUED, number)
             with suppress(zmq.Again):  # the pipe is full: this command is skipped, as PUB would
                 self.socket.send(_message(number, COMMAND_BYTES), zmq.NOBLOCK)
 
@@ -142,11 +198,11 @@ class Operator:
                 return True
             if late >= self._end:
                 return False
-            self._note(Kind.TIMEOUT, number)
+            self._note(NoteKind.TIMEOUT, number)
             self.socket.close(0)
             self.socket = _open(self._context, self._condition, operator=True)
             self.socket.connect(self._endpoint)
-        self._note(Kind.ALERT, number)
+        self._note(NoteKind.ALERT, number)
         return True
 
     def _listen_until(self, due: float) -> None:
@@ -157,16 +213,16 @@ class Operator:
 
     def _hear(self) -> None:
         (number,) = _NUMBER.unpack_from(self.socket.recv())
-        self._note(Kind.REPLIED, number)
+        self._note(NoteKind.REPLIED, number)
 
-    def _note(self, kind: Kind, number: int) -> float:
+    def _note(self, kind: NoteKind, number: int) -> float:
         now = _now()
         self._notes.add(kind, number, now)
         return now
 
     def _connect_first(self) -> float:
         """Connect, wait if that is set; when the first command is due."""
-        opened = self._note(Kind.OPENED, 0)
+        opened = self._note(NoteKind.OPENED, 0)
         if not self._condition.wait_hs:
             self.socket.connect(self._endpoint)
             return opened
@@ -182,10 +238,10 @@ class Operator:
         while events.poll(_milliseconds(limit - _now())):
             event = recv_monitor_message(events)
             if event["event"] == zmq.EVENT_CONNECTED:
-                self._note(Kind.CONNECTED, 0)
+                self._note(NoteKind.CONNECTED, 0)
                 self._check_congestion_control(event["value"])
             else:
-                self._note(Kind.HANDSHAKE, 0)
+                self._note(NoteKind.HANDSHAKE, 0)
                 return
         raise TimeoutError(f"there was no handshake within {HANDSHAKE_LIMIT_S:g} s")
 
@@ -262,7 +318,7 @@ def run_sender(
             left = start + number * interval_s - time.monotonic()
             if left > 0:
                 time.sleep(left)
-            notes.add(Kind.ISSUED, number, time.monotonic())
+            notes.add(NoteKind.ISSUED, number, time.monotonic())
             sender.send(_NUMBER.pack(number) + payload)
         time.sleep(linger_s)
 
@@ -281,7 +337,7 @@ def run_counter(channel: socket.socket, notes: Notes, address: str) -> None:
         while True:
             payload = receiver.recv(65_536)
             now = time.monotonic()
-            notes.add(Kind.APPLIED, _NUMBER.unpack_from(payload)[0], now)
+            notes.add(NoteKind.APPLIED, _NUMBER.unpack_from(payload)[0], now)
 
 
 def begin_nothing(channel: socket.socket, notes: Notes) -> None:

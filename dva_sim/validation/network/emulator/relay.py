@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 
-from dva_sim.validation.network.emulator.wire import Told, Wire, tell
+from dva_sim.validation.network.emulator.wire import EmulatedWire, Told, tell
 
 CHUNK_BYTES = 1448
 _HEADERS_BYTES = 52
@@ -25,7 +25,7 @@ _LOOK_AGAIN_S = 0.001  # whether a full queue has room
 
 
 @dataclass(eq=False)
-class Stream:
+class RelayedStream:
     """One direction of one connection.
 
     Attributes:
@@ -39,7 +39,7 @@ class Stream:
 
     source: socket.socket
     sink: socket.socket
-    wire: Wire
+    wire: EmulatedWire
     waiting: bytearray = field(default_factory=bytearray)
     open: bool = True
     closing: bool = False
@@ -70,13 +70,13 @@ class Proxy:
         target: Of the robot, such as `tcp://127.0.0.1:4000`.
     """
 
-    def __init__(self, wires: tuple[Wire, Wire], target: str) -> None:
+    def __init__(self, wires: tuple[EmulatedWire, EmulatedWire], target: str) -> None:
         host, _, port = target.removeprefix("tcp://").rpartition(":")
         self._target = (host, int(port))
         self._wires = wires
         self._listener = socket.create_server(("127.0.0.1", 0))
-        self._streams: list[Stream] = []
-        self._due: list[tuple[float, int, Stream, bytes]] = []
+        self._streams: list[RelayedStream] = []
+        self._due: list[tuple[float, int, RelayedStream, bytes]] = []
         self._number = 0
         self._late = array("d")
 
@@ -124,9 +124,12 @@ class Proxy:
         for end in (near, far):
             end.setblocking(False)
             end.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        self._streams += [Stream(near, far, self._wires[0]), Stream(far, near, self._wires[1])]
+        self._streams += [
+            RelayedStream(near, far, self._wires[0]),
+            RelayedStream(far, near, self._wires[1]),
+        ]
 
-    def _take(self, stream: Stream) -> None:
+    def _take(self, stream: RelayedStream) -> None:
         """Read a chunk; an empty one is the end of the stream, and crosses the wire as well."""
         if not stream.has_room(time.monotonic()):
             return  # another stream of this direction has just filled the queue

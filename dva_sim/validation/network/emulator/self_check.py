@@ -13,8 +13,8 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.validation.network.emulator.cell import Job, Outcome
-from dva_sim.validation.network.emulator.running import run_job
+from dva_sim.validation.network.emulator.cell import EmulatedJob, EmulatedOutcome
+from dva_sim.validation.network.emulator.process import run_job
 from dva_sim.validation.network.emulator.wire import WireConfig
 
 Floats = NDArray[np.float64]
@@ -24,7 +24,7 @@ _SIGMAS = 3.0
 
 
 @dataclass(frozen=True)
-class Finding:
+class LinkFinding:
     """One measured property.
 
     Attributes:
@@ -68,16 +68,16 @@ class Probe:
     count: int
     interval_s: float
     size: int
-    find: Callable[[Crossing], list[Finding]]
+    find: Callable[[Crossing], list[LinkFinding]]
 
-    def job(self, rootless: bool) -> Job:
+    def job(self, rootless: bool) -> EmulatedJob:
         """What the run is told: long enough for the last one to arrive."""
         wire = self.wire
         linger_s = wire.delay_s + wire.jitter_s + 0.1
         linger_s += max(0.0, self.count * (8 * self.size / wire.rate_bps - self.interval_s))
         told = {"count": self.count, "size": self.size, "interval_s": self.interval_s}
         bound_s = self.count * self.interval_s + linger_s + 10.0
-        return Job(
+        return EmulatedJob(
             "probe", wire, bound_s=bound_s, arguments=told | {"linger_s": linger_s},
             room=self.count + 1, rootless=rootless,
         )  # fmt: skip
@@ -102,7 +102,7 @@ class Crossing:
     arrived: Floats
 
     @classmethod
-    def of(cls, probe: Probe, outcome: Outcome) -> Crossing:
+    def of(cls, probe: Probe, outcome: EmulatedOutcome) -> Crossing:
         """What both ends noted."""
         sent = np.array([at for _, _, at in outcome.operator])
         numbers = np.array([number for _, number, _ in outcome.robot], dtype=int)
@@ -120,7 +120,7 @@ class Crossing:
         return ~np.isin(np.arange(len(self.sent)), self.numbers)
 
 
-def check_link(rootless: bool = False) -> list[Finding]:
+def check_link(rootless: bool = False) -> list[LinkFinding]:
     """Measure the emulated link; some ten seconds.
 
     Args:
@@ -136,18 +136,18 @@ def check_link(rootless: bool = False) -> list[Finding]:
     return findings
 
 
-def find_delay(crossing: Crossing) -> list[Finding]:
+def find_delay(crossing: Crossing) -> list[LinkFinding]:
     """The median and the 95th percentile of a constant delay."""
     wanted = 1e3 * crossing.wire.delay_s
     p50, p95 = (1e3 * float(p) for p in np.percentile(crossing.delays, (50, 95)))
     band = 1e3 * _DELAY_BAND_S
     return [
-        Finding("delay, median", "ms", wanted, p50, band),
-        Finding("delay, 95th percentile", "ms", wanted, p95, band),
+        LinkFinding("delay, median", "ms", wanted, p50, band),
+        LinkFinding("delay, 95th percentile", "ms", wanted, p95, band),
     ]
 
 
-def find_jitter(crossing: Crossing) -> list[Finding]:
+def find_jitter(crossing: Crossing) -> list[LinkFinding]:
     """Half-width of a uniform law, and whether packets overtake as they may.
 
     From the standard deviation, which a single late packet does not move.
@@ -159,32 +159,34 @@ def find_jitter(crossing: Crossing) -> list[Finding]:
     share = 0.5 * (1 - interval / (2 * crossing.wire.jitter_s)) ** 2
     sigma = np.sqrt(share * (1 - share) / len(crossing.numbers))
     return [
-        Finding("jitter, half-width", "ms", wanted, float(found), 1e3 * _DELAY_BAND_S),
-        Finding("overtaken", "", share, overtaken, float(_SIGMAS * sigma)),
+        LinkFinding("jitter, half-width", "ms", wanted, float(found), 1e3 * _DELAY_BAND_S),
+        LinkFinding("overtaken", "", share, overtaken, float(_SIGMAS * sigma)),
     ]
 
 
-def find_loss(crossing: Crossing) -> list[Finding]:
+def find_loss(crossing: Crossing) -> list[LinkFinding]:
     """The share of independent losses."""
     share, lost = crossing.wire.loss, crossing.lost
     sigma = np.sqrt(share * (1 - share) / len(lost))
-    return [Finding("loss", "", share, float(lost.mean()), float(_SIGMAS * sigma))]
+    return [LinkFinding("loss", "", share, float(lost.mean()), float(_SIGMAS * sigma))]
 
 
-def find_bursts(crossing: Crossing) -> list[Finding]:
+def find_bursts(crossing: Crossing) -> list[LinkFinding]:
     """The mean length of runs of losses, whose law is geometric."""
     runs = [sum(1 for _ in run) for lost, run in groupby(crossing.lost) if lost]
     mean = crossing.wire.burst_pkts or 1.0
     sigma = np.sqrt(mean * (mean - 1) / len(runs))
-    return [Finding("run of losses, mean", "packets", mean, float(np.mean(runs)), _SIGMAS * sigma)]
+    return [
+        LinkFinding("run of losses, mean", "packets", mean, float(np.mean(runs)), _SIGMAS * sigma)
+    ]
 
 
-def find_rate(crossing: Crossing) -> list[Finding]:
+def find_rate(crossing: Crossing) -> list[LinkFinding]:
     """Bits that arrive per second while packets wait."""
     wanted = 1e-3 * crossing.wire.rate_bps
     bits = 8 * crossing.size * (len(crossing.arrived) - 1)
     found = 1e-3 * bits / float(crossing.arrived[-1] - crossing.arrived[0])
-    return [Finding("rate", "kbit/s", wanted, found, _RATE_BAND * wanted)]
+    return [LinkFinding("rate", "kbit/s", wanted, found, _RATE_BAND * wanted)]
 
 
 PROBES = (

@@ -10,7 +10,7 @@ import json
 import os
 import sys
 
-from dva_sim.validation.network.emulator import linux
+from dva_sim.validation.network.emulator import namespaces
 
 
 def main() -> None:
@@ -27,18 +27,22 @@ def main() -> None:
             way = _become_owner(told["rootless"])
         except OSError as error:
             problem = error.strerror or str(error)
-    linux.die_with_parent(int(sys.argv[1]))
+    namespaces.die_with_parent(int(sys.argv[1]))
 
-    from dva_sim.validation.network.emulator.cell import Cell, Job, Outcome
+    from dva_sim.validation.network.emulator.cell import EmulatedCell, EmulatedJob, EmulatedOutcome
 
-    outcome = Outcome(problem=problem) if problem else Cell(Job.from_json(line), way).play()
+    outcome = (
+        EmulatedOutcome(problem=problem)
+        if problem
+        else EmulatedCell(EmulatedJob.from_json(line), way).play()
+    )
     print(outcome.to_json(), flush=True)
 
 
 def _become_owner(rootless: bool) -> str:
     if not rootless:
-        return linux.become_owner()
-    linux.become_root_of_a_user_namespace()
+        return namespaces.become_owner()
+    namespaces.become_root_of_a_user_namespace()
     return "user namespace"
 
 

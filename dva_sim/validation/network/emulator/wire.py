@@ -84,7 +84,7 @@ class Counts:
     tail: int = 0
 
 
-class Wire:
+class EmulatedWire:
     """One direction.
 
     Args:
@@ -97,7 +97,7 @@ class Wire:
         self.config = config
         self.counts = Counts()
         self._loss = Losses(config.loss, config.burst_pkts, streams[f"emulator/{name}/loss"])
-        self._jitter = Uniform(streams[f"emulator/{name}/jitter"])
+        self._jitter = UniformDraws(streams[f"emulator/{name}/jitter"])
         self._departures: deque[float] = deque()  # of what is in the queue
         self._last_release = -math.inf
 
@@ -130,7 +130,7 @@ class Wire:
         return release
 
 
-class Uniform:
+class UniformDraws:
     """Numbers between 0 and 1, drawn in blocks."""
 
     def __init__(self, rng: Generator) -> None:
@@ -160,7 +160,7 @@ class Losses:
     _bad: bool = field(default=False, init=False)
 
     def __post_init__(self) -> None:
-        self._luck = Uniform(self.rng)
+        self._luck = UniformDraws(self.rng)
         if self.burst is not None:
             self._leave = 1 / self.burst
             self._enter = self.share * self._leave / (1 - self.share)
@@ -190,7 +190,7 @@ class Forwarder:
         wires: From the operator to the robot, and back.
     """
 
-    def __init__(self, tuns: tuple[int, int], wires: tuple[Wire, Wire]) -> None:
+    def __init__(self, tuns: tuple[int, int], wires: tuple[EmulatedWire, EmulatedWire]) -> None:
         self._ways = {tuns[0]: (wires[0], tuns[1]), tuns[1]: (wires[1], tuns[0])}
         self._wires = wires
         self._due: list[tuple[float, int, int, bytes]] = []
@@ -248,7 +248,7 @@ class Forwarder:
             self._late.append(now - release)
 
 
-def tell(wires: tuple[Wire, Wire], late: Sequence[float]) -> Told:
+def tell(wires: tuple[EmulatedWire, EmulatedWire], late: Sequence[float]) -> Told:
     """The columns of the emulator from counts and from the lateness of releases [s]."""
     told: Told = {}
     for way, wire in zip(("ab", "ba"), wires, strict=True):

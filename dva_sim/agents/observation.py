@@ -1,0 +1,115 @@
+"""What an operator is shown of the world: observations, frames, and how far one sees in smoke.
+
+A robot's camera makes them (`robot.camera`), operators see nothing else.
+
+References:
+    T. Jin: Visibility and human behavior in fire smoke. SFPE Handbook of Fire Protection
+    Engineering (what does not shine is made out through an optical depth of 3).
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import NamedTuple
+
+Point = tuple[float, float]
+
+CAMERA_SCHEME = "zmq+tcp://"  # host, port, topic: where simulated robots publish their frames
+IN_VIEW = "in view"  # so ends what a robot says while it looks at a place
+MATCH_WITHIN = 4.0  # a hazard so near the place of an event is the one reported there [m]
+KEEP_OFF = 1.2  # from here the place of an event is looked at, by whoever drives [m]
+CLEAR = 1000.0  # visibility where there is no smoke [m]
+SEEN_THROUGH = 3.0
+"""Optical depth of smoke through which what does not shine is still made out (Jin). Smoke hides no
+fire: who sees it has found one."""
+
+
+class SeenHazard(NamedTuple):
+    """A hazard in the picture.
+
+    Attributes:
+        kind: `fire`, `gas_leak` or `flood`.
+        x: Where it is, judged from the picture and the map [m].
+        y: The same to the north [m].
+        distance: From the camera [m].
+        angle: How large it looks: the angle that it fills [rad].
+        contrast: Share of its contrast that the smoke before it leaves.
+    """
+
+    kind: str
+    x: float
+    y: float
+    distance: float
+    angle: float
+    contrast: float
+
+
+class Observation(NamedTuple):
+    """One frame, as far as a person makes use of it.
+
+    Attributes:
+        tick: The robot's own clock when it was taken [ms]; it agrees with no other clock.
+        x: Where the robot is, judged from the picture and the map [m].
+        y: The same to the north [m].
+        heading: Where it points [rad].
+        speed: How fast the picture says it goes [m/s].
+        turn_rate: How fast the picture says it turns [rad/s].
+        hazards: What burns, leaks or floods in view.
+        visibility: How far the camera sees what does not shine, through the smoke before it
+            [m]; `CLEAR` where there is none.
+    """
+
+    tick: int
+    x: float
+    y: float
+    heading: float
+    speed: float
+    turn_rate: float
+    hazards: tuple[SeenHazard, ...]
+    visibility: float = CLEAR
+
+
+class CameraFrame(NamedTuple):
+    """An observation on its way; `captured` [s] is for the recorder, not for the operator.
+
+    It stands in for a picture: what a person would make of the picture is what it holds.
+    """
+
+    observation: Observation
+    captured: float
+
+    def pack(self, size: int) -> bytes:
+        """The frame as JSON, filled up with spaces to the size of a picture [B]."""
+        return json.dumps((self.observation, self.captured)).encode().ljust(size)
+
+    @classmethod
+    def unpack(cls, data: bytes) -> CameraFrame | None:
+        """The frame in `data`; None if there is none."""
+        try:
+            (*values, hazards, visibility), captured = json.loads(data)
+            tick, *pose = (float(value) for value in values)
+            x, y, heading, speed, turn_rate = pose
+            seen = tuple(_hazard(*hazard) for hazard in hazards)
+            at = Observation(int(tick), x, y, heading, speed, turn_rate, seen, float(visibility))
+            sound = 0 <= tick < 2**53 and math.isfinite(sum(pose) + at.visibility)
+            return cls(at, float(captured)) if sound else None
+        except (ValueError, TypeError, OverflowError, RecursionError):
+            return None
+
+
+def _hazard(kind: object, *numbers: float) -> SeenHazard:
+    """A hazard out of a message that may be anything.
+
+    Raises:
+        ValueError: what is no finite number.
+    """
+    values = [float(number) for number in numbers]
+    if not math.isfinite(sum(values)):
+        raise ValueError("not a number")
+    return SeenHazard(str(kind), *values)
+
+
+def no_smoke(a: Point, b: Point) -> float:
+    """The optical depth where nothing burns."""
+    return 0.0

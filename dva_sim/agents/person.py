@@ -1,0 +1,148 @@
+"""Simulated persons: who they are does not depend on what they are asked to do.
+
+References:
+    D. T. McRuer, H. R. Jex: A review of quasi-linear pilot models. IEEE Trans. Human Factors in
+    Electronics HFE-8 (1967): gain and margin of who closes a loop.
+    C. M. Harris, D. M. Wolpert: Signal-dependent noise determines motor planning. Nature 394
+    (1998): the standard deviation of what a hand does grows with what it does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from dva_sim.kernel.config import Config
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.streams import Streams
+from dva_sim.kernel.suggestions import unknown
+
+Positive = Annotated[float, Field(gt=0)]
+Spread = Annotated[float, Field(ge=0, le=1)]
+
+
+class Trait(Config):
+    """A log-normal trait: its median, and the standard deviation of its logarithm."""
+
+    median: Positive
+    spread: Spread = 0.0
+
+    def draw(self, rng: np.random.Generator) -> float:
+        """One person's value."""
+        return float(self.median * np.exp(self.spread * rng.normal()))
+
+
+class Population(Config):
+    """Where persons are drawn from.
+
+    Attributes:
+        perceptual_delay_s: From a picture on the screen to a decision.
+        hand_lag_s: Time constant of the hand.
+        crossover_rad_s: Gain of turning towards a target.
+        caution: Share of the look-ahead that the robot may cover during the whole delay.
+        pace: Share of the robot's top speed that the person cares to drive.
+        confirm_look_s: How long an event in plain view is looked at until the person is sure, on
+            average: its criterion; who is in haste takes less, and is wrong more often.
+        reading_s: From an order on the screen to acting on it.
+        position_error_m: How well the robot's place is judged from the picture.
+        heading_error_rad: The same for its heading.
+        reaction_s: From the sight of a new goal to the first movement, the perceptual delay in it.
+        margin: Gain x delay of the loops that the person closes stays below this; pi/2 is the
+            limit of stability.
+        motor_noise: Standard deviation of what the hand does, as a share of it; assumed.
+        pointing_rad_s: Gain of bringing a cursor to its target, however short the delay; assumed,
+            of the order that manual control finds for the simplest things to steer.
+        sensitivity: How well a second in plain view tells an event from none, in standard
+            deviations [1/sqrt(s)]; assumed, so that with good pictures errors are rare.
+        search_s: How long the person looks around at a place before it says that nothing is
+            there; assumed.
+        patience_s: How long it goes on without getting anywhere, or without seeing anything;
+            assumed.
+        switch_s: From turning to another robot's picture to understanding it; assumed.
+    """
+
+    description: str = ""
+    perceptual_delay_s: Trait = Trait(median=0.22, spread=0.15)
+    hand_lag_s: Trait = Trait(median=0.15, spread=0.15)
+    crossover_rad_s: Trait = Trait(median=1.5, spread=0.15)
+    caution: Trait = Trait(median=0.3, spread=0.15)
+    pace: Trait = Trait(median=0.95, spread=0.05)
+    confirm_look_s: Trait = Trait(median=1.5, spread=0.25)
+    reading_s: Trait = Trait(median=2.0, spread=0.3)
+    position_error_m: Trait = Trait(median=0.04, spread=0.3)
+    heading_error_rad: Trait = Trait(median=0.02, spread=0.3)
+    reaction_s: Trait = Trait(median=0.30, spread=0.15)
+    margin: Trait = Trait(median=0.5, spread=0.15)
+    motor_noise: Trait = Trait(median=0.05, spread=0.3)
+    pointing_rad_s: Trait = Trait(median=4.0, spread=0.15)
+    sensitivity: Trait = Trait(median=4.5, spread=0.15)
+    search_s: Trait = Trait(median=25.0, spread=0.2)
+    patience_s: Trait = Trait(median=90.0, spread=0.25)
+    switch_s: Trait = Trait(median=1.0, spread=0.3)
+
+    @property
+    def traits(self) -> dict[str, Trait]:
+        """All of them by name, in the order of the fields of `Person`."""
+        return {name: value for name, value in self if isinstance(value, Trait)}
+
+    def with_medians(self, medians: Mapping[str, float]) -> Population:
+        """The same population around other medians; the spreads between persons stay.
+
+        Args:
+            medians: By the name of the trait, such as `{"margin": 0.4}`.
+
+        Raises:
+            ConfigError: there is no such trait, or its median is not above 0.
+        """
+        traits = self.traits
+        for name, median in medians.items():
+            if name not in traits:
+                raise ConfigError(unknown("operator.traits", name, traits))
+            if not median > 0:
+                raise ConfigError(f"operator.traits {name!r} is {median!r}; should be above 0")
+        changed = {
+            name: Trait(median=median, spread=traits[name].spread)
+            for name, median in medians.items()
+        }
+        return self.model_copy(update=changed)
+
+
+@dataclass(frozen=True)
+class Person:
+    """One simulated person; fields as in `Population` and in its order, in SI units."""
+
+    perceptual_delay: float
+    hand_lag: float
+    crossover: float
+    caution: float
+    pace: float
+    confirm_look: float
+    reading: float
+    position_error: float
+    heading_error: float
+    reaction: float
+    margin: float
+    motor_noise: float
+    pointing: float
+    sensitivity: float
+    search: float
+    patience: float
+    switch: float
+
+
+def draw_person(population: Population, seed: int, index: int) -> Person:
+    """Person number `index` of the population that `seed` draws: always the same one."""
+    rng = Streams(seed).fresh(f"person-{index}")
+    drawn = {name: trait.draw(rng) for name, trait in population.traits.items()}
+    drawn["pace"] = min(1.0, drawn["pace"])
+    return Person(*drawn.values())
+
+
+def median_person(population: Population) -> Person:
+    """The person in the middle of a population: every trait at its median."""
+    still = {name: Trait(median=trait.median) for name, trait in population.traits.items()}
+    return draw_person(population.model_copy(update=still), 0, 0)

@@ -1,0 +1,191 @@
+"""`dva-sim compare`: what two results folders have otherwise, and what a gate makes of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from itertools import groupby
+from pathlib import Path
+
+from rich.console import Console
+from rich.markup import escape
+
+from dva_sim.cli.console import console
+from dva_sim.cli.results_json import compared
+from dva_sim.cli.verbosity import print_json
+from dva_sim.experiments.analysis.compare import Comparison, GateVerdict, judge
+from dva_sim.experiments.analysis.compare_rows import Difference, Levels
+from dva_sim.experiments.analysis.fail_conditions import parse
+from dva_sim.experiments.report.terminal import print_table, program
+from dva_sim.experiments.results.results import Results
+from dva_sim.kernel.errors import ExitCode
+from dva_sim.kernel.units import unit_of
+from dva_sim.kernel.wording import number
+from dva_sim.simulation.labels import brief, factor_name, level_name
+
+
+def compare(
+    first: Path,
+    second: Path,
+    *,
+    measures: Sequence[str] = (),
+    by: Sequence[str] = (),
+    fail_if: Sequence[str] = (),
+    as_json: bool = False,
+) -> ExitCode:
+    """Compare two results folders; how it ended, by whether a condition holds.
+
+    Args:
+        first: What is compared with.
+        second: What is compared.
+        measures: `NAME` or `TABLE.NAME`; none for that of the answer.
+        by: Factors for whose levels cells are taken together.
+        fail_if: Conditions that should not hold.
+        as_json: Print it as JSON.
+
+    Raises:
+        ConfigError: one is no results folder, or there is no such measure, factor or condition.
+    """
+    gates = [parse(text) for text in fail_if]
+    comparison = Comparison(Results.load(first), Results.load(second))
+    verdicts = [verdict for gate in gates for verdict in judge(gate, comparison)]
+    if as_json:
+        print_json(compared(comparison, measures, by, verdicts))
+    else:
+        tell(comparison, measures, by, console)
+        tell_verdicts(verdicts, console)
+    has_failed = any(verdict.holds for verdict in verdicts)
+    return ExitCode.GATE_FAILED if has_failed else ExitCode.OK
+
+
+_SHOWN = 12  # names in a line
+_MARK = "*"
+
+
+def tell(
+    comparison: Comparison, measures: Sequence[str], by: Sequence[str], console: Console
+) -> None:
+    """Which folders, which cells, and how each measure differs.
+
+    Args:
+        comparison: Of the two folders.
+        measures: Which; none for that of the declared answer.
+        by: Factors for whose levels cells are taken together; none for every cell.
+        console: Where to.
+
+    Raises:
+        ConfigError: no such measure or factor.
+    """
+    for name, side in zip("AB", comparison.sides, strict=True):
+        console.print(escape(f"{name}: {side.folder}: {program(side)}{_set(side)}"), soft_wrap=True)
+        if side.failures:
+            failed = f"{len(side.failures)} runs of {name} failed and take no part"
+            console.print(failed, style="yellow", soft_wrap=True)
+    for line in (*_questions(comparison), *_cells(comparison), _luck(comparison)):
+        console.print(escape(line), soft_wrap=True)
+    wanted: Sequence[str | None] = measures or [None]
+    for measure in wanted:
+        table, column = comparison.find(measure)
+        name = column if table == "runs" else f"{table}.{column}"
+        _differences(name, comparison.differences(f"{table}.{column}", by), console)
+    console.print(f"\n{escape(_changed(comparison))}", soft_wrap=True)
+
+
+def tell_verdicts(verdicts: Iterable[GateVerdict], console: Console) -> None:
+    """Say of each condition where it holds."""
+    for _, group in groupby(verdicts, key=lambda verdict: verdict.gate.text):
+        each = list(group)
+        worst = [verdict for verdict in each if verdict.holds]
+        word = "[red]failed[/red]" if worst else "passed"
+        console.print(f"{word}: {escape(each[0].gate.text)}", soft_wrap=True)
+        for verdict in worst or each:
+            console.print(f"  {escape(_verdict(verdict))}", soft_wrap=True)
+
+
+def _verdict(verdict: GateVerdict) -> str:
+    where = ", ".join(filter(None, (verdict.part, brief(dict(verdict.levels)))))
+    values = f"A {verdict.first:.5g}, B {verdict.second:.5g}, bound {verdict.bound:.5g}"
+    here, there = verdict.missing
+    if here == there:
+        return f"{where}: {values}"
+    return f"{where}: {values}; without a value: A {100 * here:.3g} %, B {100 * there:.3g} %"
+
+
+def _set(side: Results) -> str:
+    changed = ", ".join(map(str, side.manifest.get("set", ())))
+    return f", --set {changed}" if changed else ""
+
+
+def _questions(comparison: Comparison) -> list[str]:
+    """What two studies ask, if it is not the same."""
+    asked = [side.question for side in comparison.sides]
+    if asked[0] == asked[1]:
+        return []
+    return ["Two different studies:", *(f"  {n}: {q}" for n, q in zip("AB", asked, strict=True))]
+
+
+def _cells(comparison: Comparison) -> list[str]:
+    matched = comparison.matched
+    others = sum(not pair.is_same for pair in matched.pairs)
+    more = f", {others} of them with another configuration in each" if others else ""
+    lines = [f"{len(matched.pairs)} cells are in both{more}"]
+    for name, rest in (("A", matched.only_first), ("B", matched.only_second)):
+        if rest:
+            some = "; ".join(f"{part} {brief(dict(levels))}" for part, levels in rest[:_SHOWN])
+            more = f"; and {len(rest) - _SHOWN} more" if len(rest) > _SHOWN else ""
+            lines.append(f"only in {name}: {some}{more}")
+    for factor, (here, there) in matched.differing.items():
+        sides = [", ".join(level_name(factor, x) for x in side) or "-" for side in (here, there)]
+        lines.append(f"{factor_name(factor)} differs: A {sides[0]}, B {sides[1]}")
+    return lines
+
+
+def _luck(comparison: Comparison) -> str:
+    pairs, runs = comparison.paired
+    if not pairs:
+        return "No run of both has the same random seed: persons are compared with other persons"
+    share = "all" if pairs == runs else f"{pairs} of {runs}"
+    return f"Compared in pairs of the same person, trial and seed: {share} runs of A"
+
+
+def _differences(name: str, found: Sequence[Difference], console: Console) -> None:
+    unit = f" [{unit_of(name)}]" if unit_of(name) else ""
+    console.print(f"\n[bold]{escape(f'{name}{unit}')}[/bold]")
+    factors = list(dict.fromkeys(factor for row in found for factor, _ in row.levels))
+    heads = ["part", *map(factor_name, factors), "runs A", "runs B", "median A", "median B"]
+    rows = [[row.part, *_names(row.levels, factors), *_numbers(row)] for row in found]
+    print_table([*heads, "B - A, mean (95 % interval)"], rows, console, 1 + len(factors))
+    told = sum(row.is_told_from_zero for row in found)
+    if told:
+        console.print(
+            f"{_MARK} leaves out zero, each interval for itself: {told} of {len(found)}; of "
+            "those that did not change, one in 20 would by chance",
+            style="dim",
+            soft_wrap=True,
+        )
+
+
+def _names(levels: Levels, factors: Sequence[str]) -> list[str]:
+    given = dict(levels)
+    return [level_name(factor, given[factor]) if factor in given else "" for factor in factors]
+
+
+def _numbers(row: Difference) -> list[str]:
+    return [*map(str, row.runs), *map(number, row.medians), _interval(row)]
+
+
+def _interval(row: Difference) -> str:
+    if row.is_identical:
+        return "identical"
+    mark = f" {_MARK}" if row.is_told_from_zero else ""
+    of = row.interval
+    return f"{number(of.mean)} ({number(of.low)} to {number(of.high)}){mark}"
+
+
+def _changed(comparison: Comparison) -> str:
+    if not comparison.paired[0]:
+        return ""
+    changed, every = comparison.changed()
+    if not changed:
+        return f"All {every} measures are the same in every pair of runs"
+    more = f" and {len(changed) - _SHOWN} more" if len(changed) > _SHOWN else ""
+    return f"{len(changed)} of {every} measures changed: {', '.join(changed[:_SHOWN])}{more}"

@@ -1,0 +1,261 @@
+"""A live run on the terminal: the table of devices, and the story as it happens.
+
+Keys for the devices of a scenario, by the names that people use.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from rich.box import SIMPLE_HEAD
+from rich.console import Console, Group
+from rich.live import Live
+from rich.table import Table
+from rich.text import Text
+
+from dva_sim.cli.verbosity import detail, is_verbose
+from dva_sim.core.registry import DETECTOR
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.live import process
+from dva_sim.live.options import PARTS, LiveOptions
+from dva_sim.live.process import Report, run_part
+from dva_sim.live.supervisor import Summary, Supervisor
+from dva_sim.network.keys import create_keys
+from dva_sim.network.sockets import DEFAULT_PORT
+from dva_sim.simulation.full.stage import DVA, id_of, label_of
+from dva_sim.simulation.scenario import Scenario, build, contradictions, load
+
+STORY_LINES = 12
+HELD = 2.0  # lines of several parts are told in order: so long does one wait for earlier ones [s]
+DEFAULT_DVA = f"127.0.0.1:{DEFAULT_PORT}"  # of a part that is run alone and told no other
+WIDTH = 120  # where there is no terminal to ask [characters]
+COLUMNS = (
+    "heard\ns ago",
+    "heart-\nbeats/s",
+    "commands\n/s",
+    "refused\nso far",
+    "picture\ns old",
+    "round\ntrip ms",
+)
+
+
+class Board:
+    """What is known of all devices, put together from the reports of all parts."""
+
+    def __init__(self) -> None:
+        self.devices: dict[str, dict[str, Any]] = {}
+        self.events: list[dict[str, Any]] = []
+        self.story: list[list[Any]] = []
+        self.time = 0.0
+
+    def hear(self, report: Report) -> list[list[Any]]:
+        """Take a report; the new lines of the story."""
+        self.time = max(self.time, report.time)
+        for row in report.rows:
+            self.devices.setdefault(row["label"], {}).update(row)
+        if report.part == "dva":
+            self.events = report.events
+        self.story = sorted(self.story + report.story)[-1000:]
+        return sorted(report.story)
+
+    def table(self) -> Table:
+        """The devices: what they are, do, and how the link to each is."""
+        table = Table(title=f"after {self.time:.0f} s", title_justify="left", box=SIMPLE_HEAD)
+        for column in ("device", "type", "doing", "address"):
+            table.add_column(column, no_wrap=True)
+        for column in COLUMNS:
+            table.add_column(column, justify="right")
+        for label, row in sorted(self.devices.items()):
+            # As it is: a label may look like markup, and comes from whoever registers.
+            table.add_row(*(Text(cell) for cell in (label, *_cells(row))))
+        return table
+
+    def lines_of_story(self) -> Text:
+        """The last lines of the story."""
+        return Text("\n".join(story_line(line) for line in self.story[-STORY_LINES:]))
+
+    def state_of_events(self) -> str:
+        """How the events stand, in a line."""
+        told = [f"event {e['number']} ({e['kind']}) is {e['state']}" for e in self.events]
+        return "; ".join(told) or "no event was reported"
+
+
+def story_line(line: list[Any]) -> str:
+    """A line of the timeline."""
+    time, who, what, _ = line
+    return f"{time:7.1f} s  {who:<14} {what}"
+
+
+def _cells(row: dict[str, Any]) -> list[str]:
+    listened_to = row.get("type") != DETECTOR  # a detector speaks only when it has something to say
+    silent = row.get("silent") and listened_to
+    return [
+        row.get("type", ""),
+        row.get("doing", ""),
+        row.get("address", ""),
+        "silent" if silent else _number(row.get("heard_s"), ".1f"),
+        _number(row.get("beats_hz") if listened_to else None, ".1f"),
+        _number(row.get("commands_hz"), ".1f"),
+        _number(row.get("refused"), "d"),
+        _number(row.get("picture_age_s"), ".2f"),
+        _number(row.get("round_trip_s"), ".1f", 1000.0),
+    ]
+
+
+def _number(value: float | None, form: str, factor: float = 1) -> str:
+    return "" if value is None else f"{value * factor:{form}}"
+
+
+def run_all(options: LiveOptions) -> None:
+    """Run all parts, show them, and say how it ended.
+
+    Raises:
+        DvaSimError: the scenario cannot be run, or a part failed.
+    """
+    console, board = _console(), Board()
+    warn(console, options)
+    if not console.is_terminal:
+        with closing(InOrder(console, board)) as told:
+            summary = Supervisor(options, lambda _, report: told.hear(report)).run()
+        _conclude(console, board, summary)
+        return
+    with Live(console=console, refresh_per_second=4, transient=True) as screen:
+
+        def hear(_: str, report: Report) -> None:
+            board.hear(report)
+            screen.update(Group(board.table(), board.lines_of_story()))
+
+        summary = Supervisor(options, hear).run()
+    for line in board.story:
+        _print(console, story_line(line))
+    _conclude(console, board, summary)
+
+
+def warn(console: Console, options: LiveOptions) -> None:
+    """Say what does not go together, before anything starts."""
+    for told in contradictions(options.read(), live=True):
+        _print(console, f"warning: {told}")
+
+
+def _print(console: Console, line: str) -> None:
+    console.print(line, highlight=False, markup=False, soft_wrap=True)
+
+
+def _console() -> Console:
+    console = Console()
+    return console if console.is_terminal else Console(width=WIDTH)
+
+
+def run_one(part: str, options: LiveOptions, number: int) -> None:
+    """Run one part in this process and show what it knows.
+
+    Raises:
+        DvaSimError: the scenario, the keys or the ports are not as they should be.
+    """
+    console, board = _console(), Board()
+    warn(console, options)
+    if options.dva is None and (part != "dva" or not options.port):
+        options = replace(options, dva=DEFAULT_DVA)
+    options.check()
+    if part in PARTS and part != "dva":
+        _print(console, f"Looking for the DVA at {options.dva} for {process.PATIENCE:g} s ...")
+    with Live(console=console, refresh_per_second=4, transient=True) as screen:
+
+        def say(report: Report) -> None:
+            for line in board.hear(report):
+                _print(screen.console, story_line(line))
+            if console.is_terminal:
+                screen.update(board.table())
+
+        run_part(part, options, say, number)
+    console.print(board.table())
+
+
+class InOrder:
+    """Prints the story in order of time, although each part tells its own lines once a second."""
+
+    def __init__(self, console: Console, board: Board) -> None:
+        self._console, self._board = console, board
+        self._waiting: list[list[Any]] = []
+
+    def hear(self, report: Report) -> None:
+        """Take a report, and print what nothing earlier can come to any more."""
+        self._waiting = sorted(self._waiting + self._board.hear(report))
+        while self._waiting and self._waiting[0][0] <= self._board.time - HELD:
+            _print(self._console, story_line(self._waiting.pop(0)))
+
+    def close(self) -> None:
+        """Print what still waits."""
+        for line in self._waiting:
+            _print(self._console, story_line(line))
+        self._waiting = []
+
+
+def _conclude(console: Console, board: Board, summary: Summary) -> None:
+    console.print(board.table())
+    _print(console, f"The run ended ({summary.why}): {board.state_of_events()}.")
+    counters: dict[str, int] = {}
+    for part, report in summary.latest.items():
+        detail(f"  {part}: at most {1000 * report.lateness:.1f} ms late")
+        for name, count in report.counters.items():
+            if is_verbose() or "refused" in name or "not sent" in name or "form" in name:
+                counters[name] = counters.get(name, 0) + count
+    for name, count in sorted(counters.items()):
+        _print(console, f"  {name}: {count}")
+
+
+_ID = re.compile(r"[0-9A-F]{2}(:[0-9A-F]{2}){5}")
+_LABEL = re.compile(r"(robot|guard|operator|detector)-([1-9][0-9]{0,3})")
+
+
+def make_keys(folder: Path, names: Iterable[str]) -> str:
+    """Make a pair of keys for each device that has none.
+
+    Args:
+        folder: Where keys are kept.
+        names: Ids, names such as `robot-1` or `dva`, or scenarios: all devices of one.
+
+    Returns:
+        What was done, in a line for people.
+
+    Raises:
+        ConfigError: a name that stands for nothing, or a folder that cannot be written.
+    """
+    wanted = dict.fromkeys(id_tag for name in names for id_tag in _ids(name))
+    made = create_keys(folder, wanted)
+    kept = len(wanted) - len(made)
+    return f"{folder}: made {len(made)} pairs of keys" + (f", {kept} were there" if kept else "")
+
+
+def _ids(name: str) -> Iterator[str]:
+    label = _LABEL.fullmatch(name)
+    if _ID.fullmatch(name):
+        yield name
+    elif name == label_of("dva", 1):
+        yield DVA
+    elif label:
+        yield id_of(label[1], int(label[2]))
+    else:
+        try:
+            scenario = build(load(name))
+        except ConfigError as error:
+            raise ConfigError(f"{name!r} is no device (dva, robot-1) and no scenario") from error
+        yield from _team(scenario)
+
+
+def _team(scenario: Scenario) -> Iterator[str]:
+    """All devices of a scenario; each report may have a detector or a caller."""
+    counts = {
+        "robot": scenario.robot.count,
+        "guard": scenario.guard.count,
+        "operator": scenario.operator.count,
+        "detector": sum(event.reports for event in scenario.events),
+    }
+    yield DVA
+    for kind, count in counts.items():
+        yield from (id_of(kind, number) for number in range(1, count + 1))

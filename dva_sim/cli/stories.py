@@ -1,0 +1,350 @@
+"""What came of one run, told in a terminal: of each model its story, a table and a few lines."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+from rich.text import Text
+
+from dva_sim.cli.verbosity import is_verbose, lines_of, tell_measures
+from dva_sim.experiments.report.episode import Played
+from dva_sim.experiments.report.figures.trial import name_and_unit
+from dva_sim.kernel.measure import Measure
+from dva_sim.kernel.plugins import resolved
+from dva_sim.recordings.pictures.moments import story
+from dva_sim.simulation.full import Playback, Recording
+from dva_sim.simulation.full.measures import RUN_COLUMNS
+from dva_sim.simulation.models import Tables, model_for
+from dva_sim.simulation.shift import TimedRecording, TimedScenario
+from dva_sim.simulation.shift.statistics import OUTCOMES
+from dva_sim.simulation.task import TaskScenario
+from dva_sim.simulation.transport import TransportScenario
+
+Row = Mapping[str, Any]
+
+STYLES = {"safety": "bold red", "mode": "dim", "order": "cyan", "drive": "cyan", "link": "yellow"}
+DRIVES = {"lost link": "given up, the link was taken for lost", "gave up": "given up"}
+EVENTS = 30  # of a shift in its table; the lines below it count them all
+TRIALS = 20  # of a task in its table; likewise
+EVENT_HEADS = ("detected", "kind", "where", "outcome", "looked", "after", "acted")
+COLUMNS = {
+    "id_bits": "index\n[bit]",
+    "steering_id": "index",
+    "movement_time_s": "time\n[s]",
+    "error": "error",
+    "overshoots": "over-\nshoots",
+    "wall_crossings": "crossings",
+    "path_error_rms_m": "off the\nmiddle,\nrms [m]",
+    "tracking_error_rms_m": "off the\ntarget,\nrms [m]",
+    "crossover_rad_s": "crossover\n[rad/s]",
+    "phase_margin_deg": "phase\nmargin\n[deg]",
+    "waits": "waits",
+    "delay_felt_s": "delay\nfelt\n[s]",
+}
+"""Columns of the trials that are told, as far as the task has them, with their heads."""
+
+
+def tell(run: Played, console: Console) -> None:
+    """A run, as its model tells it."""
+    teller: Callable[[Played, Console], None] = resolved(model_for(run.scenario).teller)
+    teller(run, console)
+
+
+def tell_any(run: Played, console: Console) -> None:
+    """A run of whatever model: the measures of its row."""
+    console.rule(f"{Path(run.scenario.model).name}, seed {run.seed}")
+    for line in lines_of(run.tables["runs"][0], _columns(run)):
+        console.print(line, soft_wrap=True)
+    console.print(f"simulated in {run.took_s:.2f} s", soft_wrap=True)
+
+
+def _columns(run: Played) -> Sequence[Measure]:
+    return tuple(model_for(run.scenario).columns["runs"])
+
+
+# --- a full run ----------------------------------------------------------------------
+
+
+def tell_story(playback: Playback, console: Console) -> None:
+    """What happened, in order."""
+    scenario = playback.scenario
+    delay, phone = scenario.link.delay_s * 1000, scenario.phone.profile
+    console.rule(f"{scenario.pattern}, {delay:g} ms each way, phone {phone}, seed {playback.seed}")
+    table = Table(box=None, pad_edge=False)
+    for heading in ("time", "who", "what"):
+        table.add_column(heading, justify="right" if heading == "time" else "left", style="")
+    for moment in playback.recorder.timeline:
+        style = STYLES.get(moment.kind, "")
+        table.add_row(f"{moment.time:7.1f} s", moment.who, escape(moment.what), style=style)
+    console.print(table)
+
+
+def tell_side_by_side(runs: Sequence[Playback], console: Console) -> None:
+    """How runs under several patterns ended, beside each other."""
+    console.rule("side by side")
+    for line in story(runs):
+        console.print(line, soft_wrap=True)
+
+
+def tell_outcome(tables: Tables, how: str, console: Console) -> None:
+    """What came of it.
+
+    Args:
+        tables: The rows of the run, by table.
+        how: How it came about, after its length in seconds.
+        console: Where.
+    """
+    row = tables["runs"][0]
+    lines = [_event(event) for event in tables["events"]]
+    if "commands_sent" in row:
+        cause = f" ({row['cause']})" if row["cause"] not in ("", row["outcome"]) else ""
+        attempts = f"in {row['attempts']} attempt{'s' * (row['attempts'] != 1)}"
+        outcome = DRIVES.get(row["outcome"], row["outcome"])
+        lines.append(f"robots: {outcome}{cause} {attempts}, {_driven(row)}")
+    if tables["people"]:
+        lines.append(f"people: {_fared(row, tables['people'])}")
+    counts = f"{row['messages']} messages, {row['violations']} safety rules broken"
+    lines.append(f"{row['simulated_s']:.0f} s {how}, {counts}")
+    if failures := row["plugin_failures"]:
+        lines.append(
+            f"{failures} times an operator, filter, mapping or drive of yours gave no answer"
+        )
+    for line in ("", *lines):
+        console.print(line, soft_wrap=True)
+    tell_measures(row, RUN_COLUMNS)
+
+
+def tell_full(run: Played, console: Console) -> None:
+    """A run of the full model: its story, and what came of it."""
+    assert isinstance(run.kept, Recording)
+    tell_story(run.kept, console)
+    tell_outcome(run.tables, f"simulated in {run.took_s:.2f} s", console)
+
+
+def _event(row: Row) -> str:
+    known = row["response_s"] == row["response_s"]
+    response = f", on scene {row['response_s']:.1f} s after detection" if known else ""
+    by = " by" if row["outcome"] in ("confirmed", "refuted") else ", looked at by"
+    who = f"{by} {row['responder']}" if row["responder"] else ""
+    return f"{row['kind']}: {row['outcome']}{who}{response}"
+
+
+def _driven(row: Row) -> str:
+    parts = [f"{row['contacts']} contacts"]
+    if row["jams"]:
+        parts.append(f"{row['jams']} jams")
+    if row["commands_sent"]:
+        commands = f"{row['commands_applied']} of {row['commands_sent']} commands applied"
+        age = f"median age {row['command_age_p50_s']:.2f} s"
+        parts = [commands, age, f"{row['command_rate_hz']:.1f} per s", *parts]
+    return ", ".join(parts)
+
+
+def _fared(row: Row, people: list[dict[str, Any]]) -> str:
+    parts = [f"{row['person_exposure_s']:.0f} s in danger"]
+    doses = f"{row['dose_heat_max']:.2g} of heat, {row['dose_toxic_max']:.2g} of carbon monoxide"
+    parts.append(f"largest dose {doses}")
+    if row["incapacitated"]:
+        parts.append(f"{row['incapacitated']} incapacitated")
+    if "evacuated_share" in row:
+        out = [p["t_out_s"] for p in people if p["t_out_s"] == p["t_out_s"]]
+        count = sum(p["kind"] == "bystander" for p in people)
+        last = f", the last at {max(out):.0f} s" if out else ""
+        parts.insert(0, f"{len(out)} of {count} bystanders out{last}")
+    return ", ".join(parts)
+
+
+# --- a shift -------------------------------------------------------------------------
+
+
+def tell_shift(run: Played, console: Console) -> None:
+    """A shift: its first events, and what it took to deal with all."""
+    scenario, recording = run.scenario, run.kept
+    assert isinstance(scenario, TimedScenario)
+    assert isinstance(recording, TimedRecording)
+    console.rule(f"{scenario.dispatch.policy}, seed {run.seed}")
+    if recording.columns:
+        console.print(_first_events(recording))
+    for line in _shift_lines(recording):
+        console.print(line, soft_wrap=True)
+    broken = sum(recording.violations.values())
+    console.print(
+        f"{recording.ended:.0f} s simulated in {run.took_s:.2f} s, {recording.messages} messages, "
+        f"{broken} rules broken",
+        soft_wrap=True,
+    )
+    if is_verbose() and scenario.keep == "events":
+        tell_measures(run.tables["runs"][0], _columns(run))
+
+
+def _first_events(recording: TimedRecording) -> Table:
+    table = Table(box=None, pad_edge=False)
+    for heading in EVENT_HEADS:
+        right = heading in ("detected", "after")
+        table.add_column(heading, justify="right" if right else "left", no_wrap=True)
+    columns = recording.columns
+    for row in np.argsort(columns["detected"], kind="stable")[:EVENTS]:
+        response = float(columns["arrived"][row] - columns["detected"][row])
+        zone = int(columns["zone"][row])
+        table.add_row(
+            _seconds(float(columns["detected"][row])),
+            recording.streams[int(columns["stream"][row])],
+            recording.zones[zone] if zone >= 0 else "",
+            OUTCOMES[int(columns["outcome"][row])],
+            _who(recording, int(columns["responder"][row])),
+            _seconds(response),
+            _who(recording, int(columns["actor"][row])),
+        )
+    return table
+
+
+def _shift_lines(recording: TimedRecording) -> Iterator[str]:
+    total = recording.count()
+    parts = [f"{n} {name}" for name in OUTCOMES if (n := recording.count(name))]
+    yield f"{total} events measured: {', '.join(parts)}"
+    if recording.columns:
+        columns, here = recording.columns, recording.measured
+        response = (columns["arrived"] - columns["detected"])[here]
+        there = response[np.isfinite(response)]
+        if len(there):
+            median, late = np.percentile(there, [50, 90])
+            yield f"on scene after {median:.1f} s (median), {late:.1f} s (90 % of those reached)"
+    for kind in ("guard", "robot"):
+        units = [n for n, unit in enumerate(recording.units) if unit.kind == kind]
+        if units:
+            shares = ", ".join(f"{100 * recording.utilisation(n):.0f} %" for n in units)
+            yield f"{kind}s at work: {shares}"
+    if recording.exposure:
+        yield f"people in danger: {recording.exposure:.0f} s"
+    if recording.counters:
+        counted = (f"{what} {n}" for what, n in sorted(recording.counters.items()))
+        yield f"counted: {', '.join(counted)}"
+
+
+def _who(recording: TimedRecording, number: int) -> str:
+    return recording.responders[number] if number >= 0 else ""
+
+
+def _seconds(value: float) -> str:
+    return f"{value:.1f} s" if math.isfinite(value) else ""
+
+
+# --- a session on a congested link ---------------------------------------------------
+
+
+def tell_session(run: Played, console: Console) -> None:
+    """A session on a congested link: each flow, and what the drive came to."""
+    scenario, row = run.scenario, run.tables["runs"][0]
+    assert isinstance(scenario, TransportScenario)
+    console.rule(f"{scenario.transport.kind}, {scenario.operator.strategy}, seed {run.seed}")
+    console.print(_flows(run.tables["flows"]))
+    for line in _session_lines(row):
+        console.print(line, soft_wrap=True)
+    console.print(f"{row['simulated_s']:.0f} s simulated in {run.took_s:.2f} s", soft_wrap=True)
+    tell_measures(row, _columns(run))
+
+
+def _flows(flows: Sequence[Row]) -> Table:
+    table = Table(box=None, pad_edge=False)
+    for heading in ("way", "flow", "rate\n[kbit/s]"):
+        table.add_column(heading, justify="right" if "rate" in heading else "left")
+    for flow in flows:
+        table.add_row(flow["way"], flow["flow"], f"{flow['rate_bps'] / 1000.0:.0f}")
+    return table
+
+
+def _session_lines(row: Row) -> Iterator[str]:
+    yield (
+        f"commands: {100 * row['delivered_share']:.1f} % delivered, "
+        f"{row['command_rate_hz']:.1f} Hz applied, "
+        f"{_ms(row['command_age_mean_s'])} old on average, "
+        f"95 % within {_ms(row['command_age_p95_s'])}"
+    )
+    if math.isfinite(row["crucial_delivered_share"]):
+        yield (
+            f"crucial ones: {100 * row['crucial_delivered_share']:.1f} % delivered, "
+            f"95 % within {_ms(row['crucial_age_p95_s'])}"
+        )
+    yield (
+        f"pictures: {row['picture_rate_hz']:.1f} Hz shown, "
+        f"{_ms(row['picture_age_mean_s'])} old on average, "
+        f"95 % within {_ms(row['picture_age_p95_s'])}"
+    )
+    mean, late = _ms(row["round_trip_mean_s"]), _ms(row["round_trip_p95_s"])
+    yield f"round trip: {mean} on average, {late} at 95 %"
+    done = "done" if row["completed"] else "not done"
+    yield (
+        f"drive: {done} in {row['movement_time_s']:.1f} s, "
+        f"{row['path_error_rms_m']:.2f} m off the middle (rms), "
+        f"{row['wall_crossings']} crossings"
+    )
+
+
+def _ms(seconds: float) -> str:
+    return f"{1000.0 * seconds:.0f} ms" if math.isfinite(seconds) else "never"
+
+
+# --- a task --------------------------------------------------------------------------
+
+
+def tell_task(run: Played, console: Console) -> None:
+    """A block of trials: the first ones, and all in a few words."""
+    scenario, trials, row = run.scenario, run.tables["trials"], run.tables["runs"][0]
+    assert isinstance(scenario, TaskScenario)
+    console.rule(f"{scenario.task.kind}, {scenario.operator.strategy}, seed {run.seed}")
+    console.print(_first_trials(trials))
+    if len(trials) > TRIALS:
+        console.print(f"... and {len(trials) - TRIALS} more")
+    console.print(f"{_count(row['trials'])}: {', '.join(_task_lines(row))}", soft_wrap=True)
+    if row["plugin_failures"]:
+        failures = row["plugin_failures"]
+        console.print(f"{failures} times a strategy or filter of yours gave no answer")
+    console.print(f"{row['simulated_s']:.0f} s simulated in {run.took_s:.2f} s", soft_wrap=True)
+    tell_measures(row, _columns(run))
+
+
+def _count(trials: int) -> str:
+    return "1 trial" if trials == 1 else f"{trials} trials"
+
+
+def _first_trials(trials: Sequence[Row]) -> Table:
+    there = {name: head for name, head in COLUMNS.items() if name in trials[0]}
+    table = Table(box=None, pad_edge=False)
+    conditions = [_head(key) for key in list(trials[0])[2:4]]
+    for heading in ("trial", *conditions, *there.values()):
+        table.add_column(Text(heading), justify="right", no_wrap=True)
+    for trial in trials[:TRIALS]:
+        first, second = list(trial.values())[2:4]
+        values = (_number(trial[name]) for name in there)
+        table.add_row(str(trial["number"] + 1), f"{first:.4g}", f"{second:.4g}", *values)
+    return table
+
+
+def _head(key: str) -> str:
+    """A column of a condition as a head, with its unit."""
+    name, unit = name_and_unit(key)
+    return f"{name}\n[{unit}]"
+
+
+def _number(value: Any) -> str:
+    if isinstance(value, int):
+        return str(value)
+    return f"{value:.3g}" if math.isfinite(value) else "–"
+
+
+def _task_lines(row: Row) -> list[str]:
+    parts = [f"{100 * row['completed_share']:.0f} % done"]
+    if "error_share" in row:
+        parts.append(f"{100 * row['error_share']:.0f} % with an error")
+    parts.append(f"{row['movement_time_s']:.2f} s on average")
+    if math.isfinite(row.get("throughput_bps", math.nan)):
+        parts.append(f"{row['throughput_bps']:.2f} bit/s")
+    parts.append(f"{row['waits']:.1f} waits in each")
+    return parts

@@ -1,0 +1,257 @@
+"""`dva-sim run` and `tune`: say what will run, run it, show how far it is, write the report."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, Progress, TextColumn
+
+from dva_sim.cli.console import console, say, warn
+from dva_sim.cli.verbosity import WRITTEN, detail, is_verbose, tell_cells, tell_files
+from dva_sim.experiments.execution.dry_run import DryRun, dry_run
+from dva_sim.experiments.execution.run_request import RunRequest
+from dva_sim.experiments.execution.scheduling import Simulate
+from dva_sim.experiments.results.results import Results
+from dva_sim.experiments.study.cell_grid import DesignCell
+from dva_sim.experiments.study.factor_levels import cells_of_repeats, runs_of, size
+from dva_sim.experiments.study.study import Study
+from dva_sim.kernel.errors import ExitCode, error_line
+from dva_sim.testing.file_kinds import open_study
+
+_FEW = 5  # failures that are told one by one
+_MANY = 500  # configurations, which take some seconds to check
+_MANY_RUNS = 100_000  # whose list takes seconds, too
+_LINE_S = 30.0  # between two lines of progress in a file
+_MINUTE_S, _HOUR_S = 60, 3600
+
+
+def run(request: RunRequest) -> ExitCode:
+    """Run a study and show how far it is, then write its report; the exit code."""
+    from dva_sim.experiments.report.figures.registry import load_figures
+    from dva_sim.experiments.report.report import write_report
+
+    try:
+        study, cells = _loaded(request)
+        figures = load_figures(study.figures, study.folder)  # before hours of simulation
+        before, folder = _planned(request, study, cells), request.folder
+        with _shown("running", before.runs) as show:
+            request.run(study, cells, show)
+        results = Results.load(folder)
+        failures = _told_failures(results) + _recorded(request, study)
+        with console.status("Writing the report ..."):
+            report = write_report(folder, figures=figures)
+        tell_files(folder, *WRITTEN)
+        detail(f"{results.machine.get('cpu_s', 0):.1f} s of CPU time in all runs")
+    except KeyboardInterrupt as stopped:
+        return _stopped(stopped)
+    say(f"Report: {report}")
+    return ExitCode.RUNS_FAILED if failures else ExitCode.OK
+
+
+def tune(name: str, out: Path | None, jobs: int | None) -> ExitCode:
+    """Choose what a study has tuned, and write it beside the study; the exit code."""
+    from dva_sim.experiments.analysis.tuning import tune as try_all
+    from dva_sim.experiments.study.tuning import folder_of_tuning, save_tuned, tuning_study
+
+    study = open_study(name)
+    trials = tuning_study(study)
+    folder = out if out is not None else folder_of_tuning(name)
+    say(f"[bold]{escape(trials.question)}[/bold]")
+    before = dry_run(trials, folder, jobs=jobs)
+    say(_plan(before, folder))
+    try:
+        with _shown("trying", before.runs) as show:
+            tuned = try_all(study, folder, jobs=jobs, progress=show)
+    except KeyboardInterrupt as stopped:
+        return _stopped(stopped)
+    for seen in tuned.seen:
+        when = ", ".join(f"{name} {level}" for name, level in seen.when.items())
+        detail(f"  {when}, {tuned.tuning.key} {seen.value:g}: {seen.mean:.4g}")
+    for choice in tuned.chosen:
+        when = ", ".join(f"{name} {level}" for name, level in choice.when.items())
+        say(f"{when}: {tuned.tuning.key} {choice.value:g}")
+    say(f"Kept in {save_tuned(study, tuned)}")
+    return ExitCode.OK
+
+
+def plan(request: RunRequest) -> None:
+    """Say what `run` would do."""
+
+    from dva_sim.experiments.execution.scheduling import run_job
+
+    study, cells = _loaded(request)
+    say(escape(_time(_planned(request, study, cells, run_job))))
+
+
+def _loaded(request: RunRequest) -> tuple[Study, list[DesignCell]]:
+    """A study without mistakes, and its configurations."""
+    variant = request.variant
+    study = open_study(request.study, request.changes, version=variant.version, pilot=variant.pilot)
+    say(f"[bold]{escape(study.question)}[/bold]")
+    cells = _checked(study)
+    tell_cells(study, cells)
+    return study, cells
+
+
+def _checked(study: Study) -> list[DesignCell]:
+    """Find mistakes before the first run; where that takes a while, it is told."""
+    from dva_sim.experiments.execution.dry_run import contradictions_in, rehearse_all
+
+    count = size(study) * len(study.parts) + cells_of_repeats(study)
+    if count < _MANY:
+        cells = rehearse_all(study)
+    else:
+        say("Checking every configuration before the first run ...")
+        with _shown("checking", count, "configurations") as show:
+            cells = rehearse_all(study, show)
+    warn(contradictions_in(cells))
+    return cells
+
+
+def _planned(
+    request: RunRequest, study: Study, cells: Sequence[DesignCell], probe: Simulate | None = None
+) -> DryRun:
+    """Say what will run."""
+    if (most := runs_of(study)) > _MANY_RUNS:
+        say(f"Making the list of up to {most:,} runs ...")
+    found = request.plan(study, cells, probe)
+    if found.remark:
+        say(f"[yellow]{escape(found.remark)}[/yellow]")
+    say(escape(_plan(found, request.folder)))
+    return found
+
+
+def _plan(found: DryRun, folder: Path) -> str:
+    done = f", {found.done} of them done already" if found.done else ""
+    most = f"at most {found.runs}" if found.rounds > 1 else f"{found.runs}"
+    rounds = f" and up to {found.rounds} rounds" if found.rounds > 1 else ""
+    return f"{most} runs in {found.cells} configurations{rounds}{done}; into {folder}"
+
+
+def _time(found: DryRun) -> str:
+    """How long it will take, and how that is known."""
+    if found.runs == found.done:
+        return "nothing is left to run"
+    failed = f"a run that was tried failed: {found.failed}" if found.failed else ""
+    if found.estimate_s is None:
+        return f"no estimate of the time: {failed or 'no run is done yet, and none was tried'}"
+    runs = f"{_counted(found.tried, 'run')} tried now" if found.tried else "the runs done already"
+    about = "more than" if found.is_least else "about"
+    who = _counted(found.workers, "process", "processes")
+    told = f"{about} {duration(found.estimate_s)} to go with {who}, judged by {runs}"
+    told += "; the last was stopped before its end" if found.is_least else ""
+    return f"{told}; {failed}" if failed else told
+
+
+def _counted(number: int, one: str, many: str | None = None) -> str:
+    return f"{number} {one if number == 1 else many or f'{one}s'}"
+
+
+def _told_failures(results: Results) -> int:
+    failures = results.failures
+    for f in failures if is_verbose() else failures[:_FEW]:
+        where = f"{f['part']}, cell {f['cell']}, person {f['person']}, trial {f['trial']}"
+        say(f"[red]failed:[/red] {where}: {escape(str(f['error']).splitlines()[-1])}")
+    if failures:
+        failed = _counted(len(failures), "run")
+        problem = f"{failed} failed; the same command tries again"
+        print(error_line(problem), file=sys.stderr)
+    return len(failures)
+
+
+def _recorded(request: RunRequest, study: Study) -> int:
+    """Make the recordings that the study asks for; how many could not be made."""
+    if study.record is None:
+        return 0
+    if request.scheduler is not None:
+        say("Recordings are made on this machine, from the same seeds")
+    with _shown("recording", 0) as show:
+        problems = request.record(study, show)
+    for problem in problems if is_verbose() else problems[:_FEW]:
+        say(f"[red]not recorded:[/red] {escape(problem)}")
+    if problems:
+        failed = _counted(len(problems), "run")
+        print(error_line(f"{failed} could not be recorded"), file=sys.stderr)
+    return len(problems)
+
+
+def _stopped(how: KeyboardInterrupt) -> ExitCode:
+    """Say what was done, and the command that goes on."""
+    say(f"Stopped: {how}" if str(how) else "Stopped.")
+    say(f"To go on: {escape(shlex.join(['dva-sim', *sys.argv[1:]]))}")
+    return ExitCode.INTERRUPTED
+
+
+# --- progress --------------------------------------------------------------------------
+@contextmanager
+def _shown(what: str, total: int, things: str = "runs") -> Iterator[Callable[[int, int], None]]:
+    """A bar on a terminal; elsewhere a line now and then."""
+    pace = RunPace(time.monotonic, things)
+    if not console.is_terminal:
+        yield _Lines(console, pace).show
+        return
+    columns = (TextColumn(what), BarColumn(), TextColumn("{task.fields[pace]}"))
+    with Progress(*columns, console=console) as bar:
+        task = bar.add_task(what, total=total, pace="")
+
+        def show(done: int, total: int) -> None:
+            bar.update(task, completed=done, total=total, pace=pace.line(done, total))
+
+        yield show
+
+
+class _Lines:
+    """Progress in a file: the first line, the last, and one now and then."""
+
+    def __init__(self, where: Console, pace: RunPace) -> None:
+        self._where, self._pace, self._last = where, pace, -_LINE_S
+
+    def show(self, done: int, total: int) -> None:
+        line = self._pace.line(done, total)
+        if done == total or time.monotonic() - self._last >= _LINE_S:
+            self._where.print(line, soft_wrap=True)
+            self._last = time.monotonic()
+
+
+class RunPace:
+    """How fast runs are made, since the first look.
+
+    Args:
+        clock: Seconds of a clock that only goes forward.
+        things: What is counted.
+    """
+
+    def __init__(self, clock: Callable[[], float], things: str = "runs") -> None:
+        self._clock, self._things = clock, things
+        self._first: tuple[int, float] | None = None
+
+    def line(self, done: int, total: int) -> str:
+        """So many runs are done: their rate, and the time left at this rate."""
+        now = self._clock()
+        self._first = self._first or (done, now)
+        made, took = done - self._first[0], now - self._first[1]
+        if not made or not took:
+            return f"{done}/{total} {self._things}"
+        rate = made / took
+        left = "" if done == total else f", {duration((total - done) / rate)} left"
+        often = f"{rate:.1f} {self._things}/s"
+        if rate < 1:
+            often = f"{rate * _MINUTE_S:.1f} {self._things}/min"
+        return f"{done}/{total} {self._things}, {often}{left}"
+
+
+def duration(seconds: float) -> str:
+    """In the units that people would say it in."""
+    if seconds < 90:
+        return f"{seconds:.0f} s"
+    if seconds < 90 * _MINUTE_S:
+        return f"{seconds / _MINUTE_S:.0f} min"
+    hours, rest = divmod(round(seconds / _MINUTE_S), _MINUTE_S)
+    return f"{hours} h {rest} min"

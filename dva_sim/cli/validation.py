@@ -1,0 +1,301 @@
+"""`dva-sim validate`: what is played or measured, what a terminal shows of it, how it ends."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from rich import progress as bars
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from dva_sim.agents.operator.published import lines_of, load_split, load_targets
+from dva_sim.agents.operator.strategies import try_strategy
+from dva_sim.cli.console import console, say
+from dva_sim.cli.verbosity import detail
+from dva_sim.kernel.errors import ConfigError, ExitCode
+from dva_sim.kernel.suggestions import either
+from dva_sim.validation.dispatch import cases, identities
+from dva_sim.validation.dispatch import checks as dispatch
+from dva_sim.validation.dispatch import result_page as dispatch_page
+from dva_sim.validation.frame import ResultSheet, ValidationResult
+from dva_sim.validation.network import comparison, measurement, reference
+from dva_sim.validation.network import result_page as network_page
+from dva_sim.validation.network.emulator.campaign import Progress
+from dva_sim.validation.network.emulator.cell import PACKETS, PROXY
+from dva_sim.validation.network.emulator.process import why_no_packets
+from dva_sim.validation.network.verdicts import ConditionGroup, grouped
+from dva_sim.validation.operators import experiment_runs as operators
+from dva_sim.validation.operators import result_page as operators_page
+from dva_sim.validation.operators.exact import EXACT
+from dva_sim.validation.operators.experiments import EXPERIMENTS
+from dva_sim.validation.operators.verdicts import judge, outcome_of
+
+WHAT = ("dispatch", "operators", "network")
+WIDTH, WIDE = 110, 240  # of tables at least, also in a file; of those with many columns
+_MANY = 8  # columns
+_STYLES = {
+    **dict.fromkeys(("agrees", "passes", "found out"), "green"),
+    **dict.fromkeys(("differs", "misses", "fails", "fooled us"), "bold red"),
+    "too rough": "yellow",
+    "shown only": "dim",
+}
+
+
+def validate(
+    what: str,
+    out: Path | None = None,
+    *,
+    case_file: str | None = None,
+    strategy: str | None = None,
+    quick: bool = False,
+    jobs: int | None = None,
+    seed: int = 1,
+    ablate: bool = False,
+    live: bool = False,
+    measure: Path | None = None,
+) -> ExitCode:
+    """Play, print the comparison, write it if asked to; how it ended.
+
+    Args:
+        what: `dispatch`, `operators` or `network`.
+        out: Where tables, figures and the page go.
+        case_file: A file of cases, for dispatch and network.
+        strategy: How the operators drive, for operators; left out, as the split file says.
+        quick: Fewer runs.
+        jobs: Processes; left out, one per core.
+        seed: Of all luck.
+        ablate: Leave mechanisms of the network's model out one by one.
+        live: Measure sockets now, and compare with that alone.
+        measure: Measure the whole design into this table; nothing is compared.
+
+    Raises:
+        ConfigError: something else to validate, an option that belongs to another, or a
+            mistake in the files.
+        EmulatorError: nothing can be measured here.
+    """
+    _refuse_foreign(what, case_file, strategy, ablate or live or measure is not None)
+    if out is not None and out.exists() and not out.is_dir():
+        raise ConfigError(f"--out {out} is a file; give a folder")
+    workers = jobs or os.cpu_count() or 1
+    detail(f"{what}, seed {seed}, {workers} processes{', quick' if quick else ''}")
+    for key, value in (("cases", case_file), ("strategy", strategy), ("out", out)):
+        detail(f"  {key}: {'as shipped' if value is None else value}")
+    try:
+        if what == "dispatch":
+            return conclude(partial(_dispatch, case_file, quick, workers, seed), out)
+        if what == "operators":
+            return conclude(partial(_operators, strategy, quick, workers, seed), out)
+        setting = comparison.NetworkSetting(seed, quick, workers, ablate)
+        return _network(case_file, setting, measure, live, out)
+    except KeyboardInterrupt:
+        say("Stopped.")
+        return ExitCode.INTERRUPTED
+
+
+def _refuse_foreign(what: str, cases: str | None, strategy: str | None, sockets: bool) -> None:
+    """Refuse something else to validate, and options that belong to another."""
+    if what not in WHAT:
+        raise ConfigError(f"{what!r} cannot be validated; should be {either(WHAT)}")
+    if strategy is not None and what != "operators":
+        raise ConfigError(f"--strategy is for `validate operators`: {what} has none")
+    if cases is not None and what == "operators":
+        told = "`validate dispatch` and `validate network`: operators have no cases"
+        raise ConfigError(f"--cases is for {told}")
+    if sockets and what != "network":
+        raise ConfigError("--ablate, --live and --measure are for `validate network`")
+
+
+def conclude(play: Callable[[], ValidationResult], out: Path | None) -> ExitCode:
+    """Play, tell what was found, and write it if asked to; how it ended."""
+    started = time.perf_counter()
+    found = play()
+    for sheet in found.told:
+        _tell(sheet)
+    say(f"\n[bold]{escape(found.headline)}[/bold]")
+    for note in found.notes:
+        say(escape(note))
+    say(f"{time.perf_counter() - started:.0f} s")
+    if out is not None:
+        say(f"Report: {found.write(out)}")
+    return ExitCode.OK if found.passes else ExitCode.GATE_FAILED
+
+
+def _tell(sheet: ResultSheet) -> None:
+    """A title, and lines whose verdict at the end is coloured.
+
+    A narrow terminal breaks its lines: better than numbers that are cut off.
+    """
+    width = WIDE if len(sheet.heads) > _MANY else WIDTH
+    where = Console(highlight=False, width=max(console.width, width))
+    if sheet.title:
+        where.print(f"\n[bold]{escape(sheet.title)}[/bold]")
+    table = Table(box=None, pad_edge=False, expand=bool(sheet.widths))
+    for place, head in enumerate(sheet.heads):
+        width_here = sheet.widths[place] if sheet.widths else None
+        table.add_column(
+            escape(head),
+            justify="left" if place in sheet.words or sheet.wraps else "right",
+            width=width_here,
+            ratio=1 if sheet.widths and width_here is None else None,
+            no_wrap=not sheet.wraps and place < len(sheet.heads) - 1,
+        )
+    above = ""
+    for first, *others, last in sheet.lines:
+        name = "" if sheet.merged and first == above else first
+        table.add_row(escape(name), *map(escape, others), _coloured(last))
+        above = first
+    where.print(table)
+
+
+def _coloured(verdict: str) -> str:
+    styles = (style for word, style in _STYLES.items() if verdict.startswith(word))
+    style = next(styles, "")
+    return f"[{style}]{escape(verdict)}[/]" if style else escape(verdict)
+
+
+def _bar() -> bars.Progress:
+    """Says what is under way, how much of it is done, and for how long."""
+    words = bars.TextColumn("{task.description}")
+    done = bars.MofNCompleteColumn()
+    return bars.Progress(words, bars.BarColumn(), done, bars.TimeElapsedColumn(), console=console)
+
+
+# --- dispatch --------------------------------------------------------------------------
+def _dispatch(case_file: str | None, quick: bool, workers: int, seed: int) -> ValidationResult:
+    name = case_file or cases.SHIPPED
+    played = cases.load_cases(name)
+    with _bar() as bar:
+        first = len(identities.IDENTITIES)
+        task = bar.add_task("identities", total=first + dispatch.runs_of(played, quick))
+        checks = dispatch.check_identities(seed, lambda n: bar.update(task, completed=n))
+        bar.update(task, description="cases")
+        checks += dispatch.check_cases(
+            played, seed, quick, workers, lambda n: bar.update(task, completed=first + n)
+        )
+    conditions = {"cases": f"{name} ({len(played)})", "seed": str(seed), "length": _length(quick)}
+    return dispatch_page.evidence(checks, conditions, quick)
+
+
+def _length(quick: bool) -> str:
+    return "quick" if quick else "full"
+
+
+# --- operators -------------------------------------------------------------------------
+def _operators(strategy: str | None, quick: bool, workers: int, seed: int) -> ValidationResult:
+    split = load_split()
+    lines = lines_of(load_targets(), split)
+    persons = operators.QUICK_PERSONS if quick else operators.PERSONS
+    setting = operators.OperatorsSetting(strategy or split.strategy, seed, persons, quick, workers)
+    try_strategy(setting.strategy)  # whether there is one, is known before anything is played
+    with _bar() as bar:
+        exact = len(EXACT)
+        task = bar.add_task("exact", total=exact + operators.jobs_of(EXPERIMENTS, setting))
+        found = operators.play_exact(list(EXACT), setting, lambda n: bar.update(task, completed=n))
+        bar.update(task, description="persons")
+        played = operators.play_experiments(
+            EXPERIMENTS, setting, lambda n: bar.update(task, completed=exact + n)
+        )
+    found |= operators.measured(EXPERIMENTS, played, seed)
+    judged = judge(lines, found)
+    conditions = {
+        "operators": setting.strategy,
+        "persons": str(persons),
+        "seed": str(seed),
+        "length": _length(quick),
+    }
+    outcome = outcome_of(judged, split.rule)
+    return operators_page.evidence(judged, outcome, played, conditions)
+
+
+# --- the network -----------------------------------------------------------------------
+def _network(
+    case_file: str | None,
+    setting: comparison.NetworkSetting,
+    measure: Path | None,
+    live: bool,
+    out: Path | None,
+) -> ExitCode:
+    """Compare with measurements that there are, or with some made now; or only make them."""
+    plan = reference.load_plan(case_file or reference.SHIPPED)
+    if measure is not None:
+        with _bar() as bar:
+            failures = measurement.measure_design(plan.own.blocks, measure, _teller(bar))
+        _complain([*failures, f"{measure} holds what could be measured."])
+        return ExitCode.RUNS_FAILED if failures else ExitCode.OK
+    if not live:
+        made = {n: _joined(source.made_with) for n, source in plan.sources.items()}
+        return judge_runs(reference.load_runs(plan.sources), made, out, setting)
+    with TemporaryDirectory() as folder:
+        path = (out or Path(folder)) / "measured.csv"
+        runs = _measured_now(plan.own.blocks, path, setting.quick)
+        return judge_runs(runs, {"measured on": measurement.made_with(path)}, out, setting)
+
+
+def judge_runs(
+    runs: Sequence[reference.SocketRun],
+    conditions: dict[str, str],
+    out: Path | None,
+    setting: comparison.NetworkSetting,
+) -> ExitCode:
+    """Compare the model with measurements, print it, write it if asked to; how it ended."""
+    return conclude(partial(_compared, grouped(runs), conditions, setting), out)
+
+
+def _compared(
+    groups: Sequence[ConditionGroup],
+    conditions: dict[str, str],
+    setting: comparison.NetworkSetting,
+) -> ValidationResult:
+    with _bar() as bar:
+        task = bar.add_task("runs of the model", total=comparison.runs_in(groups, setting))
+        found = comparison.compare(groups, setting, lambda n: bar.update(task, completed=n))
+    depths = ", ".join(f"{depth} {count}" for depth, count in comparison.depths_of(found).items())
+    conditions = conditions | {
+        "depth of the model, conditions": depths,
+        "seed": str(setting.seed),
+        "length": _length(setting.quick),
+    }
+    return network_page.evidence(found, conditions)
+
+
+def _measured_now(
+    blocks: Sequence[reference.BlockConfig], path: Path, quick: bool
+) -> list[reference.SocketRun]:
+    """Where packets cannot be emulated, a relay of TCP over the loopback takes their place."""
+    why = why_no_packets()
+    if why:
+        relay = "A relay over the loopback takes its place"
+        _complain([why, f"{relay}; it can neither lose nor reorder packets."])
+    with _bar() as bar:
+        link = PROXY if why else PACKETS
+        runs, problems = measurement.measure_now(blocks, path, quick, link, _teller(bar))
+    _complain(problems)
+    return runs
+
+
+def _teller(bar: bars.Progress) -> measurement.Tell:
+    """Moves a bar of its own for each block."""
+    tasks: dict[str, bars.TaskID] = {}
+
+    def tell(block: str, progress: Progress) -> None:
+        if block not in tasks:
+            tasks[block] = bar.add_task(block)
+        left = f"{block}, {progress.left_s / 60:.0f} min left"
+        bar.update(tasks[block], completed=progress.done, total=progress.total, description=left)
+
+    return tell
+
+
+def _complain(lines: Sequence[str]) -> None:
+    for line in lines:
+        say(line, markup=False)
+
+
+def _joined(made_with: Mapping[str, str]) -> str:
+    return "; ".join(f"{name} {value}" for name, value in made_with.items())

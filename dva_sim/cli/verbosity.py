@@ -1,0 +1,109 @@
+"""How much a command prints: mistakes alone, as usual, or more than usual; or JSON alone."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, redirect_stdout
+from contextvars import ContextVar
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from dva_sim.experiments.study.cell_grid import DesignCell
+    from dva_sim.experiments.study.study import Study
+    from dva_sim.kernel.measure import Measure
+
+_verbose: ContextVar[bool] = ContextVar("verbose", default=False)
+
+
+@contextmanager
+def loudness(quiet: bool = False, verbose: bool = False) -> Iterator[None]:
+    """Print nothing but mistakes inside, or more than usual."""
+    token = _verbose.set(verbose and not quiet)
+    try:
+        if not quiet:
+            yield
+            return
+        with Path(os.devnull).open("w", encoding="utf-8") as nowhere, redirect_stdout(nowhere):
+            yield
+    finally:
+        _verbose.reset(token)
+
+
+def is_verbose() -> bool:
+    """Whether more than usual is wanted."""
+    return _verbose.get()
+
+
+def detail(line: str) -> None:
+    """Print a line if more than usual is wanted."""
+    if is_verbose():
+        print(line)
+
+
+def print_json(data: Any) -> None:
+    """Print as JSON; what is no number is null."""
+    print(json.dumps(_plain(data), indent=2, ensure_ascii=False, allow_nan=False))
+
+
+def _plain(value: Any) -> Any:
+    """As JSON can hold it: what is missing or infinite is null, and arrays are lists."""
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, dict):
+        return {str(key): _plain(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(inner) for inner in value]
+    if hasattr(value, "tolist"):  # of numpy
+        return _plain(value.tolist())
+    return value
+
+
+WRITTEN = ("*.html", "*.pdf", "*.json", "figures/*", "tables/*")
+"""Files of a results folder."""
+
+
+def tell_measures(row: Mapping[str, Any], columns: Iterable[Measure]) -> None:
+    """Every measure of a run, with its unit and what it means."""
+    if not is_verbose():
+        return
+    detail("")
+    for line in lines_of(row, columns):
+        detail(line)
+
+
+def lines_of(row: Mapping[str, Any], columns: Iterable[Measure]) -> Iterator[str]:
+    """Each value of a row in a line, with its unit and what it means."""
+    from dva_sim.experiments.results.results import plain  # late: start-up
+    from dva_sim.kernel.measure import Measure
+
+    width = max(map(len, row), default=0)
+    known = {column.name: column for column in columns}
+    for name, found in row.items():
+        column = known.get(name) or Measure(name, "")
+        value = f"{plain(found)} {column.unit}".strip()
+        yield f"{name:<{width}}  {value:<14}  {column.meaning}".rstrip()
+
+
+def tell_cells(study: Study, cells: Sequence[DesignCell]) -> None:
+    """The study's file, and every configuration."""
+    if not is_verbose():
+        return
+    from dva_sim.experiments.study.cell_grid import REFERENCE  # late: start-up
+    from dva_sim.simulation.labels import brief
+
+    detail(f"Study: {study.file}, seed {study.seed}")
+    for cell in cells:
+        which = "reference" if cell.index == REFERENCE else f"cell {cell.index}"
+        detail(f"  {cell.part}, {which}: {brief(dict(cell.levels)) or '-'} ({cell.config})")
+
+
+def tell_files(folder: Path, *patterns: str) -> None:
+    """Files that were written, with their size."""
+    if not is_verbose():
+        return
+    for path in sorted(path for pattern in patterns for path in folder.glob(pattern)):
+        detail(f"  {path}: {path.stat().st_size:,} bytes")

@@ -1,0 +1,186 @@
+"""One run of a scenario as somebody asks for it: changed, played, drawn and kept.
+
+Nothing is printed here; what was written is told in lines.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.key_changes import parse_changes
+from dva_sim.kernel.plugins import resolved
+from dva_sim.network.patterns import known_patterns
+from dva_sim.recordings import Opened, read_recording, write_recording
+from dva_sim.recordings.pictures import Wanted
+from dva_sim.simulation import scenario as scenarios
+from dva_sim.simulation.full import Recording, simulate
+from dva_sim.simulation.models import AnyScenario, Model, Tables, model_for, model_of
+from dva_sim.simulation.scenario import Scenario, contradictions
+
+
+@dataclass(frozen=True)
+class Played:
+    """One run.
+
+    Attributes:
+        scenario: As it was run.
+        seed: Of the run.
+        kept: What its model has left of it.
+        took_s: By the clock [s].
+    """
+
+    scenario: AnyScenario
+    seed: int
+    kept: Any
+    took_s: float
+
+    @cached_property
+    def tables(self) -> Tables:
+        """Its rows, by table.
+
+        Raises:
+            ConfigError: it is too short for what is measured.
+        """
+        return model_for(self.scenario).rows(self.kept)
+
+
+@dataclass(frozen=True)
+class EpisodeRequest:
+    """What is asked of one scenario.
+
+    Attributes:
+        scenario: By name or path.
+        seed: Of the run.
+        changes: Keys to change, as `key=value`.
+        side_by_side: Two patterns to play the same seed under, separated by a comma.
+        pictures: What to draw.
+        record: File to keep the run in, `.mcap`.
+
+    Raises:
+        ConfigError: options that do not go together, before anything is run.
+    """
+
+    scenario: str
+    seed: int = 1
+    changes: Sequence[str] = ()
+    side_by_side: str | None = None
+    pictures: Wanted = field(default_factory=Wanted)
+    record: Path | None = None
+
+    def __post_init__(self) -> None:
+        if self.record is not None:
+            _check_record(self.record, self.side_by_side)
+        if self.side_by_side is not None and self.pictures.camera is not None:
+            raise ConfigError("--camera shows one run; it does not go with --side-by-side")
+
+    def scenarios(self) -> list[AnyScenario]:
+        """What is to be played: one scenario, or two that differ by their pattern.
+
+        Raises:
+            ConfigError: it is not there or not valid, or its model has not what is asked for.
+        """
+        document, changes = scenarios.load(self.scenario), parse_changes(list(self.changes))
+        model = model_of(document)
+        built = model.build(document, changes)
+        if not isinstance(built, Scenario):
+            self._check_other(model, f"{self.scenario} is a {built.model} scenario")
+            return [built]
+        self.pictures.check(built)
+        if self.side_by_side is None:
+            return [built]
+        patterns = _two_patterns(self.side_by_side)
+        return [scenarios.build(document, changes | {"pattern": each}) for each in patterns]
+
+    def _check_other(self, model: Model[Any], it: str) -> None:
+        """What only runs of the full model have is refused of others, before anything is run."""
+        if self.record is not None:
+            raise ConfigError(f"{it}: only full ones are recorded")
+        if self.side_by_side is not None:
+            raise ConfigError(f"{it}: only full ones run twice")
+        if self.pictures.any and not model.still:
+            raise ConfigError(f"{it}: there is nothing to see")
+        if self.pictures.any and not self.pictures.is_plain_still:
+            raise ConfigError(f"{it}: only --still shows something of it")
+
+    def play(self, scenario: AnyScenario) -> Played:
+        """Run one of its scenarios."""
+        started = time.perf_counter()
+        if isinstance(scenario, Scenario):
+            kept = simulate(scenario, self.seed, self.pictures.any or self.record is not None)
+        else:
+            kept = model_for(scenario).simulate(scenario, self.seed)
+        return Played(scenario, self.seed, kept, time.perf_counter() - started)
+
+    def write(self, runs: Sequence[Played]) -> Iterator[str]:
+        """Write what is asked for, and say of each what it is and where.
+
+        Raises:
+            ConfigError: a moment after the run ended, or a file that cannot be written.
+        """
+        first, pictures = runs[0], self.pictures
+        recordings = [run.kept for run in runs if isinstance(run.kept, Recording)]
+        if self.record is not None:
+            about = {"scenario": self.scenario}
+            write_recording(recordings[0], self.record, tables=first.tables, about=about)
+            yield f"Recording: {self.record}"
+        if recordings and pictures.any:
+            yield from pictures.write(recordings)
+        elif pictures.still is not None:
+            resolved(model_for(first.scenario).still)(first.scenario, self.seed, pictures.still)
+            yield f"Still: {pictures.still}"
+
+
+def doubts(played: Sequence[AnyScenario]) -> list[str]:
+    """What in some scenarios does not go together, each in a sentence, once."""
+    full = [scenario for scenario in played if isinstance(scenario, Scenario)]
+    return list(dict.fromkeys(doubt for scenario in full for doubt in contradictions(scenario)))
+
+
+def open_recording(file: Path, pictures: Wanted) -> Opened:
+    """A recorded run that is to be drawn.
+
+    Raises:
+        ConfigError: not a recording, or what is asked for is not in it.
+    """
+    opened = read_recording(file)
+    pictures.check(opened.playback.scenario)
+    return opened
+
+
+def write_replay(opened: Opened, pictures: Wanted, ros2: Path | None) -> Iterator[str]:
+    """Draw a recorded run, and take it to ROS 2; a line for each file.
+
+    Raises:
+        ConfigError: a moment after the run ended, or what cannot be written.
+    """
+    if pictures.any:
+        yield from pictures.write([opened.playback])
+    if ros2 is not None:
+        from dva_sim.recordings.ros2 import write_bag  # late: start-up
+
+        write_bag(opened.playback, ros2)
+        yield f"ROS 2 bag: {ros2}"
+
+
+def _check_record(path: Path, side_by_side: str | None) -> None:
+    """What cannot be kept is told before anything is run."""
+    if side_by_side is not None:
+        raise ConfigError("--record keeps one run; it does not go with --side-by-side")
+    if path.suffix.lower() != ".mcap":
+        raise ConfigError(f"recording should end in .mcap, not {path.name!r}")
+    if not path.parent.is_dir():
+        raise ConfigError(f"folder {str(path.parent)!r} for the recording does not exist")
+
+
+def _two_patterns(text: str) -> list[str]:
+    patterns = [p.strip() for p in text.split(",")]
+    if len(patterns) != 2 or any(":" not in p and p not in known_patterns() for p in patterns):
+        wanted = f"two of {', '.join(known_patterns())}, as in req-rep,latest-wins"
+        raise ConfigError(f"--side-by-side {text!r} should name {wanted}")
+    return patterns

@@ -1,0 +1,143 @@
+"""The figures of a study of transports: what each brings, what it takes, and how one drives."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
+
+import numpy as np
+
+from dva_sim.experiments.analysis.paired_effects import Floats, StudyView, nan_mean, person_means
+from dva_sim.experiments.report.figures.palette import INK, Look, legend, looks
+from dva_sim.experiments.report.figures.report_figure import ReportFigure
+from dva_sim.experiments.report.figures.style import Drawn, Numbers, log_axis, panels, stops_axis
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from dva_sim.experiments.report.summary import Reading
+
+
+WIDTH = 0.6  # of the marks of a stop, side by side
+
+
+class ShownMeasure(NamedTuple):
+    """A panel: a column, its title, the factor to its unit, and whether its axis is logarithmic."""
+
+    column: str
+    title: str
+    scale: float = 1.0
+    is_log: bool = False
+
+
+BROUGHT = (
+    ShownMeasure("round_trip_mean_s", "Round trip [s]", is_log=True),
+    ShownMeasure("round_trip_p95_s", "Round trip, 95th percentile [s]", is_log=True),
+    ShownMeasure("picture_rate_hz", "Pictures shown [Hz]"),
+    ShownMeasure("picture_age_p95_s", "Age of pictures, 95th percentile [s]", is_log=True),
+    ShownMeasure("command_rate_hz", "Commands applied [Hz]"),
+    ShownMeasure("age_in_force_mean_s", "Age of the command in force [s]", is_log=True),
+)
+TAKEN = (
+    ShownMeasure("session_down_bps", "Rate of the session, pictures' way [kbit/s]", scale=1e-3),
+    ShownMeasure("share_of_fair_down", "The same in shares of an equal one"),
+    ShownMeasure("bulk_use_down", "All TCP flows, share of the line"),
+    ShownMeasure("jain_down", "Jain's index of fairness"),
+)
+FELT = (
+    ShownMeasure("movement_time_s", "Driving time [s]", is_log=True),
+    ShownMeasure("delay_felt_s", "Delay as the person takes it [s]", is_log=True),
+)
+
+_BROUGHT_CAPTION = (
+    "Mean over persons; bars, where they are longer than the mark, the middle 90 % of persons, who "
+    "meet competitors of different luck. A round trip lasts from a command until the first picture "
+    "taken after it was applied has arrived. The age in force is that of the newest command that "
+    "the robot has, over time. A drive that was not done counts with its horizon."
+)
+_TAKEN_CAPTION = (
+    "With all headers and what is sent again. A dashed line at 1 is an equal share. Jain's index "
+    "is 1 if session and TCP flows have the same rate; a session that wants less than its share "
+    "lowers it without taking anything from anybody. Bars as above."
+)
+
+
+class _Measures(ReportFigure):
+    """A panel for each of some measures that the runs have."""
+
+    pages = ("transport",)
+    shown: ClassVar[tuple[ShownMeasure, ...]]
+    caption: ClassVar[str]
+
+    def draw(self, view: StudyView, reading: Reading) -> Drawn | None:
+        """Draw it."""
+        there = [each for each in self.shown if view.part.has(each.column)]
+        if not there:
+            return None
+        rows = (len(there) + 1) // 2
+        figure, grid = panels(rows, 2, 2.3)
+        axes = [ax for row in grid for ax in row]
+        for ax, each in zip(axes, there, strict=False):
+            _panel(ax, view, each)
+        for ax in axes[len(there) :]:
+            ax.set_visible(False)
+        for ax in axes[: len(there) - 2]:
+            ax.set_xlabel("")
+        legend(figure, view.line)
+        return self.finish(figure, self.caption, _numbers(view, there))
+
+
+class Brought(_Measures):
+    """What a session gets over each transport, and how the drive over it went."""
+
+    name = "brought"
+    title = "What each transport brings, and how one drives with it"
+    shown = FELT + BROUGHT
+    caption = _BROUGHT_CAPTION
+
+
+class Taken(_Measures):
+    """What a session takes of the line, and what is left to others."""
+
+    name = "taken"
+    title = "What each transport takes, and what it leaves to TCP"
+    shown = TAKEN
+    caption = _TAKEN_CAPTION
+
+
+def _numbers(view: StudyView, shown: Sequence[ShownMeasure]) -> Numbers:
+    """Means over persons, in the units of the table of runs."""
+    numbers, panel = Numbers(), view.panels[0]
+    grids = {each.column: view.part.grid(each.column) for each in shown}
+    for level in view.lines:
+        curves = {name: view.curve(grid, panel, level) for name, grid in grids.items()}
+        means = {name: nan_mean(person_means(curve), axis=0) for name, curve in curves.items()}
+        numbers.add(view.setting(panel, level), view.along_x() | means)
+    return numbers
+
+
+def _panel(ax: Axes, view: StudyView, shown: ShownMeasure) -> None:
+    grid, count = shown.scale * view.part.grid(shown.column), len(view.lines)
+    for index, (level, look) in enumerate(looks(view.line).items()):
+        values = person_means(view.curve(grid, view.panels[0], level))
+        place = WIDTH * ((index + 0.5) / count - 0.5)
+        _marks(ax, place, values, look)
+    ax.set_title(shown.title, fontweight="normal")
+    stops_axis(ax, view.over)
+    if shown.is_log:
+        log_axis(ax)
+    else:
+        ax.set_ylim(bottom=0)
+    if shown.column.startswith(("share_of_fair", "jain")):
+        ax.axhline(1.0, color=INK, lw=0.8, ls=(0, (4, 2)), zorder=1)
+
+
+def _marks(ax: Axes, place: float, values: Floats, look: Look) -> None:
+    """Means over persons of `values` `(persons, stops)`, with the middle 90 % of them."""
+    means = nan_mean(values, axis=0)
+    stops = np.flatnonzero(np.isfinite(means))
+    if not len(stops):
+        return
+    low, high = np.nanpercentile(values[:, stops], [5, 95], axis=0)
+    ax.vlines(stops + place, low, high, color=look.colour, lw=1.2, zorder=2)
+    ax.plot(stops + place, means[stops], look.mark, color=look.colour, ms=4.5, zorder=3)

@@ -1,0 +1,88 @@
+"""What a report says otherwise of one model of a run: words, tables, and which figures it has.
+
+`ModelPage` is the usual page, of persons who drive; a model whose runs are something else has a
+page of its own, derived from it. Nothing here knows any of those.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
+
+from dva_sim.experiments.analysis.answer import Answer, Finding, answer
+from dva_sim.experiments.analysis.conditions import conditions
+from dva_sim.experiments.analysis.paired_effects import Factor, RunGrid, StudyView, Table
+from dva_sim.experiments.report.cell_table import SUMMARIES, CellTable, Summary
+
+
+class ModelPage:
+    """The usual page.
+
+    Args:
+        view: How the study is looked at.
+        events: Columns of the table `events`, if there is one.
+
+    Attributes:
+        name: Figures say by it which pages they belong to.
+        cluster: What is drawn anew for intervals: persons, or shifts.
+        summaries: What the table of every cell shows beside the measure.
+        has_support: Whether published data tell which delays are covered.
+        assumed: Keys that an answer depends on most, to be told where a study does not vary them.
+        ends_by_event: Whether a run is as its events ended, where the answer is about them.
+    """
+
+    name: ClassVar[str] = "driving"
+    cluster: ClassVar[str] = "person"
+    summaries: ClassVar[tuple[Summary, ...]] = SUMMARIES
+    has_support: ClassVar[bool] = True
+    assumed: ClassVar[tuple[str, ...]] = ("pattern", "phone.profile", "control", "robot.profile")
+    ends_by_event: ClassVar[bool] = True
+
+    def __init__(self, view: StudyView, events: Table | None = None) -> None:
+        self.view = view
+
+    @classmethod
+    def fits(cls, view: StudyView) -> bool:
+        """Whether the study is of the kind that the page is made for."""
+        return True
+
+    def told(self, finding: Finding) -> Finding:
+        """The finding in the words of this page."""
+        return finding
+
+    def answer(self, finding: Finding | None) -> Answer:
+        """What a reader should take home."""
+        if finding is None:
+            return Answer(
+                "The contrast that would answer the question was not declared or not run; "
+                "the figures and the table show what was."
+            )
+        return answer(finding)
+
+    def cells(self, part: RunGrid) -> CellTable | None:
+        """Every cell of a part, where the page has a table of its own for it."""
+        return None
+
+    def conditions(
+        self,
+        scenarios: Mapping[str, Mapping[str, Any]],
+        factors: Sequence[Factor],
+        changed: Sequence[str],
+    ) -> list[tuple[str, list[str]]]:
+        """All settings, part by part."""
+        return conditions(scenarios, factors, changed)
+
+    def method(self, correlation: float | None) -> list[str] | None:
+        """How the numbers were made, as remarks; None where the usual ones hold.
+
+        Args:
+            correlation: Of the two sides of the contrast at the last level, where it is known.
+        """
+        return None
+
+
+def correlated(correlation: float | None) -> str:
+    """How alike the two sides of a contrast are, as a remark; nothing where it is not known."""
+    if correlation is None:
+        return ""
+    return f" The two sides of the contrast correlate with {correlation:.2f} at the last level."

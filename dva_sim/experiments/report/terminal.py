@@ -1,0 +1,182 @@
+"""Results as a terminal shows them: the answer and every cell, a table, or what columns mean.
+
+Whoever has a console prints here: `dva-sim show`, and `dva_sim.show` of a program.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from dva_sim.experiments.report.sample_size_table import plan_lines
+from dva_sim.experiments.report.summary import Reading
+from dva_sim.experiments.results.manifest import status_of
+from dva_sim.experiments.results.results import Results, plain
+
+_GAP = 2  # between columns
+_ENDS = {"enough": "its interval is narrow enough", "budget": "its time is spent"}
+
+
+def show(
+    results: Results, table: str | None, columns: bool, rows: int, console: Console | None = None
+) -> None:
+    """Show what results hold: the answer, a table, or what columns mean.
+
+    Raises:
+        ConfigError: no such table.
+    """
+    console = console or Console(highlight=False)
+    if columns:
+        show_columns(results, [] if table is None else [table], console)
+    elif table is not None:
+        show_table(results, table, rows, console)
+    else:
+        show_results(results, console)
+
+
+def show_results(results: Results, console: Console) -> None:
+    """Question, status, answer, warnings, every cell, and where it comes from."""
+    reading = Reading(results)
+    console.print(f"[bold]{escape(results.question)}[/bold]", soft_wrap=True)
+    if results.partial:
+        console.print(f"[bold yellow]{escape(results.partial)}[/]", soft_wrap=True)
+    for line in _facts(reading):
+        console.print(escape(line), soft_wrap=True)
+    console.print()
+    console.print(escape(reading.answer.lead), soft_wrap=True)
+    for about, words in reading.answer.depends.items():
+        console.print(f"{about}: {escape(words)}", style="dim", soft_wrap=True)
+    for note in reading.answer.notes:
+        console.print(escape(note), style="dim", soft_wrap=True)
+    for warning in reading.warnings:
+        console.print(f"[yellow]{escape(warning)}[/yellow]", soft_wrap=True)
+    for line in plan_lines(reading.plans, reading.cluster):
+        console.print(escape(line), soft_wrap=True)
+    for cells in reading.cells:
+        console.print(f"\n{escape(cells.part)}", style="bold")
+        print_table(cells.heads, cells.rows, console, cells.labels)
+        if cells.note:
+            console.print(escape(cells.note), style="dim", soft_wrap=True)
+    console.print(f"\n{_tables(results)}", soft_wrap=True)
+
+
+def show_table(results: Results, name: str, rows: int, console: Console) -> None:
+    """The first rows of a table.
+
+    Raises:
+        ConfigError: no such table.
+    """
+    frame = results.table(name)
+    shown = [[plain(values[row]) for values in frame.values()] for row in range(frame.rows)[:rows]]
+    print_table(list(frame), shown, console, len(results.factors))
+    if frame.rows > rows:
+        console.print(f"... and {frame.rows - rows} more rows", soft_wrap=True)
+
+
+def show_columns(results: Results, tables: Sequence[str], console: Console) -> None:
+    """What the columns of some tables mean, or of all.
+
+    Raises:
+        ConfigError: no such table.
+    """
+    for index, name in enumerate(tables or results.tables):
+        gap = "\n" if index else ""
+        console.print(f"{gap}[bold]{escape(name)}[/bold]")
+        told = Table(box=None, pad_edge=False, padding=(0, _GAP, 0, 0))
+        told.add_column("column", no_wrap=True)
+        told.add_column("unit", no_wrap=True)
+        told.add_column("meaning", overflow="fold")
+        for column in results.columns(name):
+            told.add_row(escape(column.name), column.unit, escape(column.meaning))
+        console.print(told)
+
+
+def program(results: Results) -> str:
+    """Which program made the results."""
+    versions = results.manifest.get("versions", {})
+    told = f"dva-sim {versions.get('dva-sim')}"
+    if commit := versions.get("commit"):
+        told += f", commit {commit[:12]}"
+    else:
+        told += ", commit not known"
+    return told + (" with changes that are not committed" if versions.get("dirty") else "")
+
+
+def print_table(
+    heads: Sequence[str], rows: Sequence[Sequence[str]], console: Console, labels: int = 0
+) -> None:
+    """Columns side by side as far as there is room; the names of the others in a line.
+
+    Args:
+        heads: Of the columns.
+        rows: As text.
+        console: Where to; what is no terminal has room for all.
+        labels: How many leading columns name a row.
+    """
+    widths = [_width(head, [row[n] for row in rows]) for n, head in enumerate(heads)]
+    if not console.is_terminal:
+        console = Console(file=console.file, width=sum(widths), highlight=False)
+    fits = max(
+        labels, sum(sum(widths[: n + 1]) - _GAP <= console.width for n in range(len(heads))), 1
+    )
+    table = Table(box=None, pad_edge=False, padding=(0, _GAP, 0, 0))
+    for index, head in enumerate(heads[:fits]):
+        numbers = all(_is_number(row[index]) for row in rows)
+        width = widths[index] - _GAP
+        is_right = numbers and index >= labels
+        table.add_column(escape(head), justify="right" if is_right else "left", width=width)
+    for row in rows:
+        table.add_row(*(escape(value) for value in row[:fits]))
+    console.print(table)
+    if fits < len(heads):
+        console.print(escape(f"also: {', '.join(heads[fits:])}"), style="dim", soft_wrap=True)
+
+
+def _width(head: str, values: Sequence[str]) -> int:
+    return max(map(len, [*head.split(), *values]), default=0) + _GAP
+
+
+def _is_number(text: str) -> bool:
+    return not text or re.match(r"[-+\u2212\u2013]?(\d|$)", text) is not None
+
+
+def _facts(reading: Reading) -> Iterator[str]:
+    """Status, size, program and machine, each in a line."""
+    results, manifest, study = reading.results, reading.manifest, reading.study
+    yield _status(manifest)
+    cells = len(manifest.get("cells", []))
+    size = f"{results.runs.rows} runs in {cells} configurations"
+    persons = f"{reading.persons} {reading.cluster}s x {study.get('replications')} trials"
+    yield f"{size}, {len(results.failures)} failed; {persons}, seed {study.get('seed')}"
+    if (stopped := manifest.get("stopped") or {}).get("why"):
+        why = _ENDS.get(stopped["why"], stopped["why"])
+        yield f"Ended after {stopped['rounds']} of {stopped['of']} rounds: {why}"
+    yield f"{program(results)}, study {manifest.get('hash')}"
+    if machine := results.machine:
+        yield _machine(machine)
+
+
+def _status(manifest: Mapping[str, Any]) -> str:
+    status = status_of(manifest)
+    why = "; ".join(status.why)
+    return f"Status: {status.kind}{f': {why}' if why else ''}"
+
+
+def _machine(machine: Mapping[str, Any]) -> str:
+    parts = [
+        str(machine.get("started", ""))[:16].replace("T", " "),
+        str(machine.get("platform", "")),
+    ]
+    if "cpu_s" in machine:
+        parts.append(f"{machine['cpu_s']:.0f} s of CPU time")
+    return ", ".join(part for part in parts if part)
+
+
+def _tables(results: Results) -> str:
+    names = ", ".join(results.tables) or "none"
+    return f"Tables: {names} (--table NAME shows one, --columns what they mean)"

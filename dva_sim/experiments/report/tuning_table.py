@@ -1,0 +1,53 @@
+"""What a tuning saw and chose, as a report prints it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from dva_sim.experiments.report.cell_table import CellTable
+from dva_sim.experiments.study.tuning import TunedValues, TuningBasis
+from dva_sim.kernel.config import validate
+from dva_sim.kernel.wording import listing, number
+from dva_sim.simulation.labels import factor_name, level_name, measure_name, setting
+
+
+def tuned_table(manifest: Mapping[str, Any]) -> CellTable | None:
+    """All that a tuning saw, as a report prints it; None where nothing was tuned."""
+    if not manifest.get("tuned"):
+        return None
+    tuned = validate(TunedValues, manifest["tuned"])
+    rule, chosen = tuned.tuning, {(str(c.when), c.value) for c in tuned.chosen}
+    rows = [
+        [
+            *(level_name(name, level) for name, level in seen.when.items()),
+            f"{seen.value:g}",
+            f"{number(seen.mean)} ({number(seen.low)} to {number(seen.high)})",
+            "chosen" if (str(seen.when), seen.value) in chosen else "",
+        ]
+        for seen in tuned.seen
+    ]
+    heads = [*(factor_name(name) for name in rule.by), factor_name(rule.key)]
+    heads += [f"{measure_name(rule.measure)}, mean (95 % interval)", ""]
+    at = f", at {setting(rule.at)}" if rule.at else ""
+    note = (
+        f"Rule: the least mean, of equal ones the nearest to 1; {rule.persons} persons who take "
+        f"no part in the study, {rule.replications} trials of each{at}."
+    )
+    if str(manifest["versions"].get("fingerprint")) not in tuned.made_with:
+        note += " It was tuned with another version of the program than the study was run with."
+    return CellTable(rule.part, heads, len(rule.by), rows, note=note)
+
+
+def tuning_warning(manifest: Mapping[str, Any]) -> str:
+    """That values were tuned with other persons or phones than the study was run with."""
+    if not manifest.get("tuned"):
+        return ""
+    tuned = validate(TunedValues, manifest["tuned"])
+    others = listing(tuned.basis.unlike(validate(TuningBasis, manifest["basis"])))
+    if not others:
+        return ""
+    return (
+        f"The {factor_name(tuned.tuning.key)} was tuned with other {others} than the study was run "
+        f"with: 'dva-sim tune {tuned.study}' chooses anew."
+    )

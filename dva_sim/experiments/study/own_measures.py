@@ -1,0 +1,54 @@
+"""What a study measures beyond what our models do: its own measures, and models of the user's."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+from dva_sim.experiments.study.schema import DESIGN
+from dva_sim.experiments.study.study import Study
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.measure import Measure
+from dva_sim.simulation.models import MODELS, AnyScenario, measured_names, model_for
+from dva_sim.simulation.run_measures import PLUGINS, RunMeasure, load_measure, reads, refuse_twins
+
+
+def own_measures(study: Study) -> dict[str, RunMeasure]:
+    """The measures that a study brings itself, by names that hold in any process.
+
+    Raises:
+        ConfigError: one cannot be had, or has the name of another column.
+    """
+    found: dict[str, RunMeasure] = {}
+    for number, name in enumerate(study.measures):
+        try:
+            located = PLUGINS.located(name, study.folder)
+            found[located] = load_measure(located)
+            refuse_twins(found.values(), {*DESIGN, *study.factors, *measured_names()})
+        except ConfigError as error:
+            if error.file is not None:
+                raise
+            raise study.error(error.problem, ("measures", number)) from None
+    return found
+
+
+def names_of_own(study: Study, model: str) -> list[str]:
+    """Names of its own measures that can be taken of the runs of a model."""
+    every = own_measures(study).values()
+    return [measure.about.name for measure in every if reads(measure, model)]
+
+
+def columns_told(study: Study, scenarios: Iterable[AnyScenario]) -> dict[str, Any]:
+    """What a results folder keeps of columns that are none of ours, by table and name.
+
+    It is read without the files that the columns come from.
+    """
+    told: dict[str, list[Measure]] = {}
+    named = {scenario.model: scenario for scenario in scenarios if scenario.model not in MODELS}
+    for scenario in named.values():
+        for table, columns in model_for(scenario).columns.items():
+            told.setdefault(table, []).extend(columns)
+    own = [measure.about for measure in own_measures(study).values()]
+    if own:
+        told.setdefault("runs", []).extend(own)
+    return {table: {c.name: c.as_json() for c in columns} for table, columns in told.items()}

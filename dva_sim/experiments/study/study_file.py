@@ -1,0 +1,210 @@
+"""A study's file: written anew from a template, and read with what a command changes in it."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from dva_sim.experiments.study import validation
+from dva_sim.experiments.study.designs import all_factors, read_table
+from dva_sim.experiments.study.overrides import Changed, change
+from dva_sim.experiments.study.registration import settled
+from dva_sim.experiments.study.study import FOLDER, SIZES, Study, Version
+from dva_sim.kernel import resources
+from dva_sim.kernel.config import Config, Document, load_yaml, validate
+from dva_sim.kernel.errors import ConfigError, DvaSimError
+from dva_sim.kernel.key_changes import blame, parse_changes, set_by
+from dva_sim.kernel.streams import derive_seed
+from dva_sim.simulation.models import MODELS, model_of
+from dva_sim.simulation.scenario import load as load_scenario
+
+TEMPLATE = Path(__file__).parent / "templates" / "study.yaml"
+
+
+def write_study(name: str) -> Path:
+    """Write a new study.
+
+    Args:
+        name: Its name, or the path of its file.
+
+    Returns:
+        Its file.
+
+    Raises:
+        ConfigError: there is such a file already, or it has no name.
+        DvaSimError: it cannot be written.
+    """
+    plain = name.removesuffix(".yaml").removesuffix(".yml")
+    if not Path(plain).name.strip("."):
+        raise ConfigError(f"{name!r} is no name for a study; give one such as 'mine'")
+    path = Path(name if name != plain else f"{name}.yaml")
+    try:
+        with path.open("x", encoding="utf-8", newline="\n") as file:
+            file.write(TEMPLATE.read_text(encoding="utf-8"))
+    except FileExistsError:
+        raise ConfigError(f"{path} is there already; give another name") from None
+    except OSError as error:
+        raise DvaSimError(f"{path} cannot be written: {error.strerror}") from None
+    return path
+
+
+def load_study(
+    name: str | Path,
+    settings: Iterable[str] = (),
+    *,
+    version: Version | None = None,
+    pilot: int | None = None,
+) -> Study:
+    """Read a study by name or path.
+
+    Args:
+        name: The study.
+        settings: `key=value` pairs. A key of the study (`seed=2`, `factors.pattern=[req-rep]`)
+            changes the study. Any other key is one of the scenario and holds in every part; if
+            it is a factor, its value or list of values takes the place of the factor's levels.
+        version: The small or the larger version, by the study's key `quick` or `full`.
+        pilot: Only so many persons, with random seeds that the study itself never uses.
+
+    Raises:
+        ConfigError: not found, not valid, or changes that make no sense.
+    """
+    document = load_yaml(resources.find(str(name), FOLDER, is_asked=True))
+    study, data = _in_version(document, version)
+    usual = study.usual
+    if settings := tuple(settings):
+        study = _with_settings(data, document, settings)
+    study._version, study._usual = version, usual
+    if pilot is not None:
+        study = _piloted(study, pilot)
+    return settled(study)
+
+
+def _in_version(document: Document, version: Version | None) -> tuple[Study, Changed]:
+    """The study as its file says, or one of its versions; all of them are judged."""
+    written = Changed(document.data, {}, ())
+    study = _built(written, document)
+    study._usual = _size_of(study)
+    made = {name: _version_of(study, written, document, name) for name in study.versions}
+    if version is None:
+        return study, written
+    if version not in made:
+        raise document.error(f"has no {SIZES[version]} version: no key {version!r}")
+    return made[version]
+
+
+def _version_of(
+    study: Study, written: Changed, document: Document, version: Version
+) -> tuple[Study, Changed]:
+    """A version, and its keys; claims about what the small version leaves out are left out."""
+    try:
+        data = change(written, getattr(study, version), Study, _scenarios_of(written, document))
+        made = _built(data, document, may_lose=version == "quick")
+        if made.answer is None and study.answer is not None:
+            _built(data, document)  # which tells why it cannot be answered
+        made._usual = study.usual
+        return made, data
+    except ConfigError as error:
+        raise _told_in(study, version, error) from None
+
+
+def _size_of(study: Study) -> dict[str, Any]:
+    """What a report needs to tell one version of a study from another."""
+    factors = {name: list(levels) for name, levels in study.factors.items()}
+    size = {"persons": study.persons, "replications": study.replications, "factors": factors}
+    return {"name": study.file.stem} | size
+
+
+def _told_in(study: Study, version: Version, error: ConfigError) -> ConfigError:
+    """A mistake of a version, at the key that it names."""
+    named = [
+        key
+        for key in getattr(study, version)
+        if key.rpartition(".")[2] in error.problem
+        or any(repr(step) in error.problem for step in key.split("."))
+    ]
+    problem = f"in the {SIZES[version]} version: {error.problem}"
+    return study.error(problem, (version, *named[:1]))
+
+
+def _with_settings(data: Changed, document: Document, settings: tuple[str, ...]) -> Study:
+    """The study changed by `--set`; claims about levels that are gone are gone, too."""
+    changes, scenarios = parse_changes(settings), _scenarios_of(data, document)
+
+    def make(some: Mapping[str, Any]) -> Study:
+        return _built(change(data, some, Study, scenarios), document, may_lose=True)
+
+    try:
+        study = make(changes)
+    except ConfigError as error:
+        raise set_by(settings, blame(error, changes, make, document)) from None
+    study._settings = settings
+    return study
+
+
+def _scenarios_of(data: Changed, document: Document) -> list[type[Config]]:
+    """The kinds of scenarios that the parts have; all kinds where one cannot be read."""
+    try:
+        named = [part["scenario"] for part in data.data["parts"].values()]
+        files = [load_scenario(name, base=document.file.parent) for name in named]
+        return list({model_of(file).scenario: None for file in files})
+    except (ConfigError, LookupError, TypeError, AttributeError):
+        return [model.scenario for model in MODELS.values()]
+
+
+def _piloted(study: Study, persons: int) -> Study:
+    """Some persons with luck of their own, so that nothing of the study itself is seen."""
+    if persons < 1:
+        raise ConfigError(f"a pilot should have at least 1 person, not {persons}")
+    seed = derive_seed(study.seed, "pilot")
+    pilot = study.model_copy(update={"persons": persons, "seed": seed, "stop": None})
+    pilot._pilot = persons
+    for problem, _ in validation.of_size(pilot):
+        raise ConfigError(f"a pilot of {persons} persons: {problem}")
+    return pilot
+
+
+def _built(data: Changed, document: Document, may_lose: bool = False) -> Study:
+    """The study, if it makes sense.
+
+    Args:
+        data: Its keys.
+        document: Its file.
+        may_lose: Whether claims about what is not there are lost, instead of being mistakes.
+    """
+    study = validate(Study, data.data, document.error)
+    study._document = dataclasses.replace(
+        document, places={p: at for p, at in document.places.items() if data.holds(p)}
+    )
+    study._changes = data.changes
+    study._table = _table_of(study)
+    _tell_first(study, validation.of_design(study))
+    factors = all_factors(study.design, study.factors, study.listed_rows)
+    study = study.model_copy(update={"factors": factors})
+    _tell_first(study, validation.of_factors(study))
+    if may_lose:
+        # A claim that is made in the same breath is a mistake and no loss.
+        _tell_first(study, (f for f in validation.of_claims(study) if not data.holds(f[1])))
+        study = validation.kept_claims(study)
+    else:
+        _tell_first(study, validation.of_claims(study))
+    _tell_first(study, validation.of_stop(study))
+    return study
+
+
+def _table_of(study: Study) -> Document | None:
+    """The rows of the file that the design names; None if it names none."""
+    if study.design is None or study.design.csv is None:
+        return None
+    try:
+        path = resources.find(study.design.csv, FOLDER, suffix=".csv", base=study.folder)
+    except ConfigError as error:
+        problem = error.problem.replace("study ", "file of rows ", 1)
+        raise study.error(problem, ("design", "csv")) from None
+    return read_table(path)
+
+
+def _tell_first(study: Study, found: Iterable[validation.Problem]) -> None:
+    for problem, path in found:
+        raise study.error(problem, path)

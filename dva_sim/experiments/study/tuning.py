@@ -1,0 +1,226 @@
+"""The table of tuned values: kept in a file beside the study, and looked up for each cell."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from dva_sim.experiments.study import validation
+from dva_sim.experiments.study.schema import Level, Levels, Tuning
+from dva_sim.experiments.study.study import Status, Study
+from dva_sim.kernel import resources
+from dva_sim.kernel.config import Config, load_yaml, validate
+from dva_sim.kernel.errors import ConfigError
+
+FOLDER = "tuned"  # beside the study
+
+
+class ChosenValue(Config):
+    """One value, for one combination of the levels it was tuned by.
+
+    Attributes:
+        when: Those levels.
+        value: Of the key that was tuned.
+    """
+
+    when: dict[str, Level]
+    value: float
+
+
+class TriedValue(Config):
+    """One value that was tried.
+
+    Attributes:
+        when: Levels it was tried under.
+        value: Of the key that is tuned.
+        mean: Of the measure over persons.
+        low: Lower end of its 95 % interval.
+        high: Upper end.
+    """
+
+    when: dict[str, Level]
+    value: float
+    mean: float
+    low: float
+    high: float
+
+
+class TuningBasis(Config):
+    """What users edit and tuned values rest on: hashes over the values in those files.
+
+    Attributes:
+        persons: Of the population.
+        phones: Of all phones.
+    """
+
+    persons: str
+    phones: str
+
+    @classmethod
+    def of(cls, population: str) -> TuningBasis:
+        """As the files are now."""
+        phones = resources.available("agents/phones")
+        return cls(
+            persons=_hash_of([resources.find(population, "agents/people")]),
+            phones=_hash_of([phones[name] for name in sorted(phones)]),
+        )
+
+    def unlike(self, other: TuningBasis) -> list[str]:
+        """Which of them are others."""
+        return [
+            name for name in TuningBasis.model_fields if getattr(self, name) != getattr(other, name)
+        ]
+
+
+class TunedValues(Config):
+    """What a tuning chose, and all that it saw.
+
+    Attributes:
+        study: Name of the study.
+        made_with: Version of the program, and the fingerprint of what simulates.
+        basis: The persons and phones that it was made with.
+        tuning: The rule as it was then.
+        chosen: A value for each combination of levels.
+        seen: Every value tried.
+    """
+
+    study: str
+    made_with: str
+    basis: TuningBasis
+    tuning: Tuning
+    chosen: tuple[ChosenValue, ...]
+    seen: tuple[TriedValue, ...]
+
+    def remark(self, now: TuningBasis) -> str:
+        """That it was tuned with others than there are now; empty if it was not."""
+        others = " and ".join(self.basis.unlike(now))
+        return f"tuned with other {others}: run 'dva-sim tune {self.study}' again" if others else ""
+
+    def value_for(self, levels: Mapping[str, Level]) -> float:
+        """The value chosen for the cell with these levels.
+
+        Raises:
+            ConfigError: it was not tuned for them.
+        """
+        when = {name: levels[name] for name in self.tuning.by}
+        for choice in self.chosen:
+            if choice.when == when:
+                return choice.value
+        told = ", ".join(f"{name} {level}" for name, level in when.items())
+        raise ConfigError(f"nothing was tuned for {told}; {_how_to_make(self.study)}")
+
+
+def choose(means: Mapping[float, float]) -> float:
+    """The rule: the value with the least mean; of equal ones the nearest to 1, by ratio."""
+    return min(means, key=lambda value: (means[value], abs(math.log(value)), value))
+
+
+def file_of(study: Study) -> Path:
+    """Where the tuned values of a study are kept."""
+    return study.folder / FOLDER / f"{study.file.stem}.yaml"
+
+
+def folder_of_tuning(name: str) -> Path:
+    """Where the trials of a tuning go if nobody says."""
+    return Path("results") / f"{Path(name).stem}-tuning"
+
+
+def load_tuned(study: Study) -> TunedValues:
+    """The tuned values of a study.
+
+    Raises:
+        ConfigError: there are none, or they were made by another rule.
+    """
+    path = file_of(study)
+    if not path.is_file():
+        raise ConfigError(f"{path} is not there; {_how_to_make(study.file.stem)}")
+    document = load_yaml(path)
+    tuned = validate(TunedValues, document.data, document.error)
+    if tuned.tuning != study.tuning:
+        problem = "was made by another rule than the study's"
+        raise document.error(f"{problem}; {_how_to_make(study.file.stem)}", ("tuning",))
+    return tuned
+
+
+def save_tuned(study: Study, tuned: TunedValues) -> Path:
+    """Write the tuned values beside the study; the same bytes for the same values."""
+    data = tuned.model_dump(mode="json")
+    lines = [
+        f"# Written by `dva-sim tune {tuned.study}`; what it says is not to be edited.",
+        *(f"{key}: {_flow(data[key])}" for key in ("study", "made_with", "basis")),
+        "tuning:",
+        *(f"  {key}: {_flow(value)}" for key, value in data["tuning"].items()),
+    ]
+    for key in ("chosen", "seen"):
+        lines += [f"{key}:", *(f"  - {_flow(item)}" for item in data[key])]
+    path = file_of(study)
+    path.parent.mkdir(exist_ok=True)
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
+    return path
+
+
+def _hash_of(files: Iterable[Path]) -> str:
+    """64 bits over names and values; what describes a file, or comments on it, is none of them."""
+    data = [[path.name, {**load_yaml(path).data, "description": ""}] for path in files]
+    return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()[:16]
+
+
+def _flow(data: Any) -> str:
+    """JSON is YAML, too."""
+    return json.dumps(data, ensure_ascii=False)
+
+
+def _how_to_make(name: str) -> str:
+    return f"'dva-sim tune {name}' makes it"
+
+
+def tuning_study(study: Study) -> Study:
+    """The study that tries every value: its own persons and luck, the same budget for all.
+
+    Raises:
+        ConfigError: the study tunes nothing.
+    """
+    rule = rule_of(study)
+    factors: dict[str, Levels] = {name: (level,) for name, level in rule.at.items()}
+    factors |= {name: study.factors[name] for name in rule.by}
+    factors[rule.key] = rule.levels
+    part = study.parts[rule.part]
+    trials = study.model_copy(
+        update={
+            "question": f"Which {rule.key} for each {', '.join(rule.by)}?",
+            "predictions": (),
+            "seed": rule.seed,
+            "persons": rule.persons,
+            "replications": rule.replications,
+            "factors": factors,
+            "design": None,
+            "parts": {rule.part: part.model_copy(update={"reference": None, "replications": None})},
+            "answer": None,
+            "comparisons": {},
+            "hypotheses": {},
+            "tuning": None,
+            "robustness": None,
+            "stop": None,
+            "budget_s": None,
+            "record": None,
+        }
+    )
+    for problem, _ in validation.of_size(trials):
+        raise study.error(f"tuning: {problem}", ("tuning",))
+    trials._status, trials._table = Status(), None
+    return trials
+
+
+def rule_of(study: Study) -> Tuning:
+    """The rule by which a study tunes.
+
+    Raises:
+        ConfigError: it tunes nothing.
+    """
+    if study.tuning is None:
+        raise ConfigError(f"{study.file} tunes nothing: it has no key 'tuning'")
+    return study.tuning

@@ -1,0 +1,80 @@
+"""What is measured: each column of a table, said once, beside the code that computes it.
+
+Tables, their dictionary, the words of reports and what a study may ask for all follow from these
+objects. The unit is the end of the name, see `units`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from dva_sim.kernel.units import unit_of
+from dva_sim.kernel.wording import without_unit
+
+_NEVER_NEGATIVE = frozenset({"s", "m", "m/s", "Hz", "bit/s", "B", "N s"})
+
+
+@dataclass(frozen=True)
+class Measure:
+    """A column of a table of results.
+
+    Attributes:
+        name: Of the column; it ends in the unit.
+        meaning: In words, for the data dictionary.
+        title: In reports; left out, the name without its unit.
+        better: Which values are better, where one has to be chosen.
+        awaits: What a duration waits for, such as `confirmation`. A run in which that never
+            comes counts with all the time it was given.
+        low: The least value possible; left out, as the name and the unit say.
+        high: The greatest value possible; likewise.
+        is_number: Whether it can be asked for; words cannot.
+    """
+
+    name: str
+    meaning: str
+    title: str = ""
+    better: Literal["small", "large"] = "small"
+    awaits: str = ""
+    low: float | None = None
+    high: float | None = None
+    is_number: bool = True
+
+    @property
+    def unit(self) -> str:
+        """As printed; empty for what has none."""
+        return unit_of(self.name)
+
+    @property
+    def words(self) -> str:
+        """How reports call it."""
+        return self.title or without_unit(self.name)
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """The least and the greatest value that it can have."""
+        is_share = self.name.endswith("_share")
+        low = 0.0 if is_share or self.unit in _NEVER_NEGATIVE else -math.inf
+        high = 1.0 if is_share else math.inf
+        return low if self.low is None else self.low, high if self.high is None else self.high
+
+    def as_json(self) -> dict[str, Any]:
+        """What a results folder keeps of it: it is read where its class cannot be."""
+        told = {"meaning": self.meaning, "title": self.title, "better": self.better}
+        return told | ({} if self.is_number else {"is_number": False})
+
+
+Columns = Mapping[str, tuple[Measure, ...]]
+"""The columns of each table."""
+
+
+def text(name: str, meaning: str) -> Measure:
+    """A column of words, which nobody can ask for as a measure."""
+    return Measure(name, meaning, is_number=False)
+
+
+def names_of(measures: Iterable[Measure]) -> tuple[str, ...]:
+    """The names of those that are numbers."""
+    return tuple(measure.name for measure in measures if measure.is_number)

@@ -1,0 +1,60 @@
+"""Modules that files of users may import by an earlier name: told in one line where they are."""
+
+import sys
+from collections.abc import Sequence
+from importlib.abc import MetaPathFinder
+from types import ModuleType
+
+# What pages and examples have named, and whole rooms; names are relative to `dva_sim`.
+MOVED = {
+    "agents.camera": "agents.observation",
+    "agents.operator.person": "agents.person",
+    "agents.steering": "agents.route_following",
+    "changing": "kernel.key_changes",
+    "checking": "testing",
+    "clock": "kernel.clock",
+    "config": "kernel.config",
+    "core.dispatch.options": "kernel.options",
+    "emulator": "validation.network.emulator",
+    "errors": "kernel.errors",
+    "experiments.dispatch": "simulation.shift",
+    "experiments.fan_out": "experiments.analysis.fan_out",
+    "experiments.figures": "experiments.report.figures",
+    "experiments.metrics": "simulation.full.measures",
+    "experiments.pictures": "recordings.pictures",
+    "experiments.runner": "experiments.execution.runner",
+    "experiments.statistics": "statistics",
+    "experiments.transports": "simulation.transport",
+    "experiments.validation": "validation",
+    "plugins": "kernel.plugins",
+    "recorder": "kernel.recorder",
+    "recordings.lapse": "recordings.reading",
+    "resources": "kernel.resources",
+    "scenario": "simulation.scenario",
+    "simulation.run": "simulation.full",
+    "streams": "kernel.streams",
+    "tasks": "simulation.task",
+    "timed": "simulation.shift",
+    "worlds.drawing": "worlds.geojson",
+}
+
+
+class MovedFinder(MetaPathFinder):
+    """Asked last: a module that no other finder knows may have an earlier name."""
+
+    def find_spec(
+        self, name: str, path: Sequence[str] | None, target: ModuleType | None = None
+    ) -> None:
+        """Never finds anything.
+
+        Raises:
+            ModuleNotFoundError: the module has another name now, which is told.
+        """
+        package, _, rest = name.partition(".")
+        if package == "dva_sim" and rest in MOVED:
+            raise ModuleNotFoundError(f"{name} is now dva_sim.{MOVED[rest]}", name=name)
+
+
+def tell_moved_names() -> None:
+    """From now on an import of an earlier name says the new one."""
+    sys.meta_path.append(MovedFinder())

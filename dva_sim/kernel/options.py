@@ -1,0 +1,83 @@
+"""Options of plug-ins: what a configuration gives, made sure of before anything runs.
+
+Each takes the name of an option and its value, returns the value, or says what would be right.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterable
+from typing import Any
+
+from dva_sim.kernel.errors import ConfigError
+
+
+def number(
+    name: str,
+    value: Any,
+    *,
+    least: float = -math.inf,
+    above: float = -math.inf,
+    most: float = math.inf,
+    below: float = math.inf,
+) -> float:
+    """A finite number within bounds, each of which may be left out.
+
+    Raises:
+        ConfigError: it is not.
+    """
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    fits = is_number and least <= value <= most and above < value < below
+    if not (fits and math.isfinite(value)):
+        bounds = _range(least, above, most, below)
+        raise _wrong(name, value, f"a number {bounds}".rstrip())
+    return float(value)
+
+
+def whole_number(name: str, value: Any, least: int, most: int) -> int:
+    """A whole number within bounds.
+
+    Raises:
+        ConfigError: it is not.
+    """
+    if type(value) is not int or not least <= value <= most:
+        raise _wrong(name, value, f"a whole number from {least} to {most}")
+    return value
+
+
+def one_of(name: str, value: Any, known: Collection[str]) -> str:
+    """One of some words.
+
+    Raises:
+        ConfigError: it is not.
+    """
+    if not isinstance(value, str) or value not in known:
+        raise _wrong(name, value, f"one of {', '.join(sorted(known))}")
+    return value
+
+
+def some_of(name: str, value: Any, known: Collection[str]) -> frozenset[str]:
+    """Any number of some words.
+
+    Raises:
+        ConfigError: not a list, or another word.
+    """
+    wanted = f"a list of some of {', '.join(sorted(known))}"
+    if isinstance(value, str) or not isinstance(value, Iterable):
+        raise _wrong(name, value, wanted)
+    words = list(value)
+    if not all(isinstance(word, str) and word in known for word in words):
+        raise _wrong(name, words, wanted)
+    return frozenset(words)
+
+
+def _range(least: float, above: float, most: float, below: float) -> str:
+    """Bounds in words: `above 0`, `from 0 to 1`, `of at least 0, below 1`."""
+    if math.isfinite(least) and math.isfinite(most):
+        return f"from {least:g} to {most:g}"
+    words = {"of at least": least, "above": above, "at most": most, "below": below}
+    return ", ".join(f"{word} {bound:g}" for word, bound in words.items() if math.isfinite(bound))
+
+
+def _wrong(name: str, value: Any, wanted: str) -> ConfigError:
+    return ConfigError(f"option {name!r} is {value!r}; should be {wanted}")

@@ -1,0 +1,49 @@
+"""Numbers and lists in words, as reports, tables and the terminal print them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from dva_sim.kernel.units import ending_of
+
+
+def without_unit(name: str) -> str:
+    """A key without its unit and with spaces for the signs between its words."""
+    ending = ending_of(name)
+    stem = name.removesuffix(f"_{ending}") if ending else name
+    return stem.replace(".", " ").replace("_", " ")
+
+
+def number(value: float) -> str:
+    """Three figures at most, and never more decimals than the size deserves."""
+    if not math.isfinite(value):
+        return "–"
+    decimals = 0 if abs(value) >= 100 else 1 if abs(value) >= 1 else 2
+    text = f"{value:.{decimals}f}"
+    return text.replace("-", "\N{MINUS SIGN}") if float(text) else "0"
+
+
+def capital(text: str) -> str:
+    """A capital letter first, unless that is of a name such as `min_eta`; others as they are."""
+    return text if "_" in text.partition(" ")[0] else text[:1].upper() + text[1:]
+
+
+def quantity(value: float, unit: str) -> str:
+    """A number with its unit, apart by a space that does not break."""
+    return f"{number(value)}\N{NO-BREAK SPACE}{unit}" if unit else number(value)
+
+
+def percent(share: float) -> str:
+    """A share as a whole percentage; small ones keep a decimal so that they are not zero."""
+    if not math.isfinite(share):
+        return "–"
+    text = f"{100 * share:.0f}" if share == 0 or 0.01 <= share <= 0.99 else f"{100 * share:.1f}"
+    return f"{text.removesuffix('.0')}\N{NO-BREAK SPACE}%"
+
+
+def listing(words: Sequence[str], last: str = "and") -> str:
+    """`a`, `a and b`, `a, b and c`."""
+    if len(words) < 2:
+        return "".join(words)
+    return f"{', '.join(words[:-1])} {last} {words[-1]}"

@@ -1,0 +1,235 @@
+"""Asking and telling behind one promise, whatever carries the bytes.
+
+A `Transport` is a set of nodes that can ask each other (request/reply) and tell each other
+(publish/subscribe). `dva_sim.network.virtual` keeps the promise in virtual time,
+`dva_sim.network.sockets` over ZeroMQ sockets; agents know only what stands here.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Protocol
+
+from dva_sim.kernel.clock import Clock
+
+QUEUE_LIMIT = 1000  # requests waiting at one requester
+ROUND_TRIPS_KEPT = 100_000
+
+Answer = Callable[[bytes], object]
+
+
+class Request(NamedTuple):
+    """A request that has arrived.
+
+    Attributes:
+        data: Its bytes.
+        answer: Takes the bytes of the reply; once, now or later.
+        sender: Id of the device whose key opened the connection; None without keys.
+    """
+
+    data: bytes
+    answer: Answer
+    sender: str | None = None
+
+
+Service = Callable[[Request], object]
+
+
+class Subscription(Protocol):
+    """What one node wants to hear of another."""
+
+    def close(self) -> None:
+        """Leave; nothing more is delivered."""
+
+    def pause(self) -> None:
+        """Take nothing more for now: what comes waits on the way, at last at the publisher."""
+
+    def resume(self) -> None:
+        """Take what has waited, and what comes."""
+
+
+class Wire(Protocol):
+    """A connection to the service of a peer, made anew by closing it and opening another."""
+
+    def send(self, tag: int, data: bytes) -> None:
+        """Send a request as soon as the connection is open; its reply comes with the tag."""
+
+    def close(self) -> None:
+        """Forget what is under way: no reply is delivered any more."""
+
+
+OnReply = Callable[[int, bytes], object]
+
+
+class Transport(Protocol):
+    """What carries messages between nodes; a node is named by the id of its device."""
+
+    @property
+    def clock(self) -> Clock:
+        """The clock that all who use this transport share."""
+
+    def introduce(self, node: str, address: str) -> None:
+        """Say where a node is found, as in its registration."""
+
+    def serve(self, node: str, service: Service) -> None:
+        """Let `service` take the requests to `node`."""
+
+    def connect(self, node: str, peer: str, on_reply: OnReply, pipelined: bool) -> Wire:
+        """Open a connection from `node` to the service of `peer`."""
+
+    def publish(self, node: str, topic: str, payload: Any, size: int) -> None:
+        """Send a payload, which counts as `size` bytes [B], to the subscribers of a topic."""
+
+    def ready(self, node: str, topic: str, size: int) -> bool:
+        """Whether somebody wants a topic, and `size` more bytes [B] would not have to wait."""
+
+    def subscribe(
+        self, node: str, publisher: str, topic: str, handler: Callable[[Any], object]
+    ) -> Subscription:
+        """Hand what `publisher` publishes to `handler`: topics that begin with `topic`.
+
+        Topics end in `|`, so that none begins another.
+        """
+
+
+@dataclass
+class _Asked:
+    """A request that waits or is under way."""
+
+    tag: int
+    data: bytes
+    on_reply: Callable[[bytes], object]
+    on_failure: Callable[[], object]
+    attempts: int = 0
+    sent_at: float = 0.0
+
+
+class Requester:
+    """Asks one peer; each request is answered, or fails after a number of attempts.
+
+    With a window of 1 it is a REQ socket: the next request goes when the last one is
+    answered, and after a time-out the connection is closed and opened anew. A wider window
+    is a DEALER: so many requests may be under way at once, over one connection.
+    The same bytes are sent again after a time-out, so a receiver can tell a repetition.
+
+    Args:
+        transport: Carries the messages.
+        node: Who asks.
+        peer: Who answers.
+        timeout: How long to wait for a reply [s].
+        attempts: How often a request is sent before it has failed.
+        window: How many requests may be unanswered at once.
+    """
+
+    def __init__(
+        self,
+        transport: Transport,
+        node: str,
+        peer: str,
+        timeout: float,
+        attempts: int = 3,
+        window: int = 1,
+    ) -> None:
+        self._transport, self._clock = transport, transport.clock
+        self.node, self.peer = node, peer
+        self._timeout, self._attempts, self._window = timeout, attempts, window
+        self._queue: deque[_Asked] = deque()
+        self._open: dict[int, _Asked] = {}
+        self._deadlines: deque[tuple[float, int, int]] = deque()  # when [s], tag, attempt
+        self._wire: Wire | None = None
+        self._last_tag = 0
+        self.timeouts = self.failures = self.overflows = 0
+        self.round_trips: deque[float] = deque(maxlen=ROUND_TRIPS_KEPT)
+
+    @property
+    def busy(self) -> bool:
+        """Whether a further request would have to wait."""
+        return len(self._open) >= self._window
+
+    def open(self) -> None:
+        """Connect now, as a socket does, so that the first request need not wait for it."""
+        if self._wire is None:
+            self._wire = self._transport.connect(
+                self.node, self.peer, self._on_reply, pipelined=self._window > 1
+            )
+
+    def request(
+        self,
+        data: bytes,
+        on_reply: Callable[[bytes], object],
+        on_failure: Callable[[], object] = lambda: None,
+    ) -> None:
+        """Send `data` as soon as the window allows."""
+        if len(self._queue) >= QUEUE_LIMIT:
+            self.overflows += 1
+            on_failure()
+            return
+        self._last_tag += 1
+        self._queue.append(_Asked(self._last_tag, data, on_reply, on_failure))
+        self._fill()
+
+    def close(self) -> None:
+        """Forget everything, without a word to those who wait."""
+        self._queue.clear()
+        self._open.clear()
+        self._disconnect()
+
+    def _fill(self) -> None:
+        while self._queue and not self.busy:
+            asked = self._queue.popleft()
+            asked.sent_at = self._clock.now
+            self._open[asked.tag] = asked
+            self._attempt(asked)
+
+    def _attempt(self, asked: _Asked) -> None:
+        """Send a request, over a new connection if there is none."""
+        asked.attempts += 1
+        self._deadlines.append((self._clock.now + self._timeout, asked.tag, asked.attempts))
+        if len(self._deadlines) == 1:
+            self._clock.call_at(self._deadlines[0][0], self._look_at_deadlines)
+        self.open()
+        assert self._wire is not None
+        self._wire.send(asked.tag, asked.data)
+
+    def _disconnect(self) -> None:
+        if self._wire is not None:
+            self._wire.close()
+        self._wire = None
+
+    def _on_reply(self, tag: int, reply: bytes) -> None:
+        asked = self._open.pop(tag, None)
+        if asked is None:
+            return  # doubled, or to a request that was given up
+        self.round_trips.append(self._clock.now - asked.sent_at)
+        asked.on_reply(reply)
+        self._fill()
+
+    def _look_at_deadlines(self) -> None:
+        """The first deadline is reached; those of what was answered meanwhile need no event.
+
+        One event for all: a timer for each request costs more than the request.
+        """
+        _, tag, attempt = self._deadlines[0]
+        self._expire(tag, attempt)
+        self._deadlines.popleft()
+        while self._deadlines and self._deadlines[0][1] not in self._open:
+            self._deadlines.popleft()
+        if self._deadlines:
+            self._clock.call_at(self._deadlines[0][0], self._look_at_deadlines)
+
+    def _expire(self, tag: int, attempt: int) -> None:
+        asked = self._open.get(tag)
+        if asked is None or asked.attempts != attempt:
+            return
+        self.timeouts += 1
+        if self._window == 1:
+            self._disconnect()
+        if attempt < self._attempts:
+            self._attempt(asked)
+            return
+        self.failures += 1
+        del self._open[tag]
+        asked.on_failure()
+        self._fill()

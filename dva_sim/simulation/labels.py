@@ -1,0 +1,168 @@
+"""How factors, levels, measures and numbers are called when a reader sees them."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
+from typing import Any
+
+from dva_sim.kernel.config import Key, Scalar, keys_said_of
+from dva_sim.kernel.measure import Measure
+from dva_sim.kernel.units import unit_of
+from dva_sim.kernel.wording import percent, without_unit
+from dva_sim.network.patterns import PATTERNS
+from dva_sim.simulation.models import MODELS
+
+# Factors that are no keys of a scenario: of every study, or treatments of the shipped ones.
+_OF_STUDIES = {
+    "tuning": "gain",
+    "parameters": "set of parameters",
+    "crowd": "TCP flows each way",
+    "team": "responder",
+}
+_LEVELS = {
+    **{name: kind.title for name, kind in PATTERNS.items()},
+    "zeromq": "ZeroMQ over TCP",
+    "udp": "UDP",
+    "tcp": "TCP",
+    "trinomial": "trinomial-like",
+    "irtp": "IRTP-like",
+    "btp": "BTP-like",
+    "rtnp": "RTNP-like",
+    "rtnp-in-network": "RTNP-like, network",
+    "rtnp-in-hosts": "RTNP-like, hosts",
+    "direct": "direct control",
+    "coordinated": "coordinated control",
+    "supervisory": "supervisory control",
+    "pursuit": "pursuit",
+    "two_point": "two-point steering",
+    "move_and_wait": "move and wait",
+    "median20-copy": "median of 20 (copy)",
+    "median20-inplace": "median of 20 (in place)",
+    "one_pole": "one-pole filter",
+    "keep_alive": "keep-alive",
+    "on_change": "on change",
+}
+_SHORT_LEVELS = (
+    _LEVELS
+    | {name: kind.label for name, kind in PATTERNS.items()}
+    | {name: name for name in ("direct", "coordinated", "supervisory")}
+)
+
+
+@cache
+def _keys() -> dict[str, Key]:
+    """What the scenarios' fields say of themselves; a key has one name in all models."""
+    said: dict[str, Key] = {}
+    for model in reversed(MODELS.values()):
+        said |= keys_said_of(model.scenario)
+    return said
+
+
+@cache
+def _measures() -> dict[str, Measure]:
+    """Every column by name; where models have one each, that of the first that says a title."""
+    said: dict[str, Measure] = {}
+    tables = [table for model in MODELS.values() for table in model.columns.values()]
+    for column in itertools.chain(*tables):
+        if column.name not in said or (column.title and not said[column.name].title):
+            said[column.name] = column
+    return said
+
+
+def stated_conditions(models: Iterable[str]) -> dict[str, str]:
+    """Keys that a table of conditions may state, with their words there, of some models."""
+    there = (keys_said_of(MODELS[name].scenario) for name in models if name in MODELS)
+    return {path: key.condition for said in there for path, key in said.items() if key.condition}
+
+
+def measure_called(name: str, model: str = "") -> Measure:
+    """What is known of a measure, in a certain model if it has it; else the name alone."""
+    columns = MODELS[model].columns["runs"] if model in MODELS else ()
+    own = next((column for column in columns if column.name == name), None)
+    return own or _measures().get(name) or Measure(name, "")
+
+
+def factor_name(factor: str) -> str:
+    """`link.delay_s` is the one-way delay."""
+    said = _keys().get(factor)
+    return said.title if said else _OF_STUDIES.get(factor, without_unit(factor))
+
+
+def absent_at_zero(factor: str) -> str:
+    """What is not there at a level of zero: `delay` of `link.delay_s`; mostly nothing."""
+    said = _keys().get(factor)
+    return said.absent if said else ""
+
+
+def with_unit(factor: str) -> str:
+    """A factor's name with its unit in brackets, for the head of a column."""
+    unit = unit_of(factor)
+    return f"{factor_name(factor)} [{unit}]" if unit else factor_name(factor)
+
+
+def measure_name(measure: str) -> str:
+    """`drive_time_s` is the driving time to confirmation."""
+    return measure_called(measure).words
+
+
+def measure_of(measure: str, part: str) -> str:
+    """A measure in the part of the study that it was taken in."""
+    return f"{measure_name(measure)} of part {part}"
+
+
+def level_name(factor: str, level: Scalar | Mapping[str, Any], short: bool = False) -> str:
+    """One level with its unit: 0.05 of `link.delay_s` is `50 ms`; a class without its file.
+
+    What a treatment sets may be a law, or another group of keys: `law gamma, mean_s 50 ms`.
+    """
+    if isinstance(level, Mapping):
+        return ", ".join(f"{key} {level_name(key, value)}" for key, value in level.items())
+    if isinstance(level, str):
+        name = level.rpartition(":")[2] if is_in_file(level) else level
+        return (_SHORT_LEVELS if short else _LEVELS).get(name, name)
+    if level is None or isinstance(level, bool):
+        return {None: "none", True: "yes", False: "no"}[level]
+    if factor.endswith(".loss"):
+        return percent(level)
+    unit = unit_of(factor)
+    if unit == "s" and 0 < abs(level) < 1:
+        return f"{1000 * level:g}\N{NO-BREAK SPACE}ms"
+    return f"{level:g}\N{NO-BREAK SPACE}{unit}" if unit and level else f"{level:g}"
+
+
+def is_in_file(level: Scalar) -> bool:
+    """Whether a level names a class in a file, as in `mine.py:Mine`."""
+    return isinstance(level, str) and ".py:" in level
+
+
+def brief(levels: Mapping[str, Scalar]) -> str:
+    """Scalars in a row, without the names of factors that go without saying.
+
+    Words speak for themselves, as do quantities whose unit no other factor here has:
+    `250 ms, latest-wins`.
+    """
+    units = [unit_of(factor) for factor in levels]
+    return ", ".join(_brief(factor, level, units) for factor, level in levels.items())
+
+
+def _brief(factor: str, level: Scalar, units: Sequence[str]) -> str:
+    unit, name = unit_of(factor), level_name(factor, level, short=True)
+    if isinstance(level, str):
+        return name
+    is_quantity = unit and units.count(unit) == 1 and not isinstance(level, bool)
+    if not is_quantity or level is None:
+        return f"{factor_name(factor)} {name}"
+    return name if level else f"0\N{NO-BREAK SPACE}{'ms' if unit == 's' else unit}"
+
+
+def setting(levels: Mapping[str, Scalar]) -> str:
+    """Scalars of several factors in a row: `profile default, direct control, jitter 20 ms`."""
+    return ", ".join(named(factor, level) for factor, level in levels.items())
+
+
+def named(factor: str, level: Scalar) -> str:
+    """A level behind its factor's name, unless its own has that: `direct control`."""
+    name, own = factor_name(factor), level_name(factor, level)
+    return own if name in own.split() else f"{name} {own}"

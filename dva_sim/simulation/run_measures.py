@@ -1,0 +1,117 @@
+"""Measures of the user's own: a number that a class in a file, or in a package, takes of a run."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, Final
+
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.measure import Measure
+from dva_sim.kernel.plugins import FAILURES, Plugins, said, stamp_of
+
+_NAME: Final = re.compile(r"[a-z][a-z0-9_]{0,59}")
+
+
+class RunMeasure:
+    """A number taken of what is left of a run; it becomes a column of the table of runs.
+
+    Attributes:
+        about: Its name, meaning, title and bounds; the name ends in the unit.
+        models: Names of the models whose runs it can read: a `Recording` of `full`, a
+            `TimedRecording` of `timed`, the rows of the trials of `task`, a `SessionRecording`
+            of `transports`, and of a user's model whatever that simulates.
+    """
+
+    about: Measure
+    models: tuple[str, ...] = ("full",)
+
+    def of(self, recording: Any) -> float | None:
+        """The number, finite and within its bounds; None where the run has none.
+
+        The recording is left as it is: other measures read it, too.
+        """
+        raise NotImplementedError
+
+
+PLUGINS: Final = Plugins[RunMeasure](
+    kind="measure",
+    base=RunMeasure,
+    shipped={},
+    folder="experiments/measures",
+    group="dva_sim.measures",
+    key="measures",
+    needs="of(recording)",
+    public="dva_sim.simulation.run_measures.RunMeasure",
+)
+
+
+def load_measure(name: str, base: Path | None = None) -> RunMeasure:
+    """A measure by name: `mine.py:Mine`, or what an installed package calls it.
+
+    Args:
+        name: The measure.
+        base: Folder in which a file is looked for first.
+
+    Raises:
+        ConfigError: there is none, it cannot be made, or does not say what it is.
+    """
+    found = PLUGINS.located(name, base)
+    return _loaded(found, stamp_of(found))
+
+
+@lru_cache(maxsize=64)
+def _loaded(name: str, stamp: int) -> RunMeasure:
+    """One object for each state of a file; it keeps nothing from run to run."""
+    made = PLUGINS.make(name, PLUGINS.find(name), {})
+    about = getattr(made, "about", None)
+    if not isinstance(about, Measure):
+        raise ConfigError(f"measure {name!r} should say what it is: about = Measure(name, meaning)")
+    if not _NAME.fullmatch(about.name):
+        wanted = "small letters, digits and _, as in wall_time_s"
+        raise ConfigError(f"measure {name!r} is called {about.name!r}; should be {wanted}")
+    return made
+
+
+def values_of(measures: Iterable[RunMeasure], recording: Any, model: str) -> dict[str, float]:
+    """What measures say of a run of a model, nan where they say nothing.
+
+    Raises:
+        ConfigError: a measure fails, or answers what is no finite number.
+    """
+    return {m.about.name: value_of(m, recording) for m in measures if reads(m, model)}
+
+
+def value_of(measure: RunMeasure, recording: Any) -> float:
+    """What a measure says of a run; see `values_of`."""
+    name = measure.about.name
+    try:
+        answer = measure.of(recording)
+        if answer is None:
+            return math.nan
+        if math.isfinite(answer):
+            return float(answer)
+    except FAILURES as error:
+        raise ConfigError(f"measure {name!r} cannot be taken: {said(error)}") from error
+    raise ConfigError(f"measure {name!r} is {answer!r}; should be a finite number, or None")
+
+
+def reads(measure: RunMeasure, model: str) -> bool:
+    """Whether a measure can be taken of the runs of a model, which may be in a file."""
+    named = (Path(name).name for name in (model, model.rpartition(":")[2]))
+    return model in measure.models or any(name in measure.models for name in named)
+
+
+def refuse_twins(measures: Iterable[RunMeasure], taken: Iterable[str]) -> None:
+    """Two columns of one name would be one.
+
+    Raises:
+        ConfigError: a measure is called as another column is.
+    """
+    names = [measure.about.name for measure in measures]
+    for name in names:
+        if names.count(name) > 1 or name in set(taken):
+            raise ConfigError(f"a measure cannot be called {name!r}: another column is")

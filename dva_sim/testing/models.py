@@ -1,0 +1,161 @@
+"""What every model of a run promises, tried on a scenario of its own and on scenarios near it."""
+
+from __future__ import annotations
+
+import math
+import pickle
+import time
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, Final
+
+from dva_sim.kernel.config import Document
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.simulation.models import Model, Tables, model_of
+from dva_sim.testing.promises import Case, Outcome, kept, line, part_by_part
+
+SEEDS: Final = (1, 2, 3)
+SLOW: Final = 60.0  # [s] of one run; above that it earns a warning
+FACTORS: Final = (0.0, 0.5, 2.0)  # by which each number of the scenario is changed in turn
+
+
+def check_model(name: str, options: Mapping[str, Any] | None = None) -> Outcome:
+    """See that a model keeps what every model promises.
+
+    Args:
+        name: Of the model, as in a scenario.
+        options: Keys of its scenario; those that have no default must be there.
+
+    Raises:
+        BrokenPromises: it does not; a line for each promise.
+        ConfigError: there is no such model, or no such scenario of it.
+    """
+    return kept(try_model(name, options or {}))
+
+
+def try_model(name: str, keys: Mapping[str, Any], slow: float = SLOW) -> Outcome:
+    """Try a model with the scenario that some keys make of its defaults.
+
+    Args:
+        name: Of the model, as in a scenario.
+        keys: Of the scenario; those that have no default must be there.
+        slow: A run that takes longer earns a warning [s].
+
+    Raises:
+        ConfigError: there is no such model, or no such scenario of it.
+    """
+    document = Document({"model": name}, Path("scenario.yaml").absolute())
+    model = model_of(document)
+    try:
+        scenario = model.build(document, keys)
+    except ConfigError as error:
+        raise ConfigError(f"{error.problem}; --set gives keys of its scenario") from None
+    trial = _Trial(model, scenario, document, keys)
+    found: dict[str, list[str]] = {}
+    for promise, case in trial.all():
+        found.setdefault(promise, []).append(case)
+    slowest = max(trial.took, default=0.0)
+    warnings = []
+    if slowest > slow:
+        warnings.append(f"is slow: {slowest:.2g} s a run; should be {slow:g} s")
+    if not found and len(set(trial.seen)) == 1:
+        warnings.append("comes to the same with every seed")
+    broken = tuple(line(promise, cases) for promise, cases in found.items())
+    return Outcome(broken, tuple(warnings), len(trial.took), slowest)
+
+
+class _Trial:
+    """All that is tried with one model.
+
+    Attributes:
+        took: How long each run took [s].
+        seen: What runs with several seeds came to.
+    """
+
+    def __init__(
+        self, model: Model[Any], scenario: Any, document: Document, keys: Mapping[str, Any]
+    ) -> None:
+        self._model, self._scenario = model, scenario
+        self._document, self._keys = document, keys
+        self.took, self.seen = list[float](), list[str]()
+
+    def all(self) -> Iterator[Case]:
+        """Every promise that is broken, with a case."""
+        return part_by_part((self._travels, self._runs, self._columns, self._rehearses))
+
+    def _run(self, scenario: Any, seed: int) -> Tables:
+        started = time.perf_counter()
+        tables = self._model.tables(scenario, seed, with_tracks=True)
+        self.took.append(time.perf_counter() - started)
+        return tables
+
+    def _travels(self) -> Iterator[Case]:
+        """To another process, as the runner sends it."""
+        there = pickle.loads(pickle.dumps(self._scenario))
+        if there.model_dump() != self._scenario.model_dump():
+            yield "its scenario is another one in another process", repr(there)
+
+    def _runs(self) -> Iterator[Case]:
+        """The same seed comes to the same, whatever ran before."""
+        before = repr(self._scenario.model_dump())
+        first = {seed: repr(self._run(self._scenario, seed)) for seed in SEEDS}
+        self.seen.extend(first.values())
+        for seed in reversed(SEEDS):
+            if repr(self._run(self._scenario, seed)) != first[seed]:
+                yield "comes to something else with the same seed", f"seed {seed}"
+        if repr(self._scenario.model_dump()) != before:
+            yield "changes its scenario", before
+
+    def _columns(self) -> Iterator[Case]:
+        """What it says of its tables is what they hold."""
+        tables = self._run(self._scenario, SEEDS[0])
+        if len(tables.get("runs", ())) != 1:
+            yield "has not one row for a run", f"{len(tables.get('runs', ()))} in table 'runs'"
+        for table in tables.keys() - self._model.columns.keys():
+            yield "has a table that it does not declare", table
+        for table, rows in tables.items():
+            yield from self._rows(table, rows)
+        asked = set(self._model.measures(self._scenario))
+        for name in sorted(asked - set().union(*tables.get("runs", ()))):
+            yield "lacks a measure that a study may ask for", name
+
+    def _rows(self, table: str, rows: list[dict[str, Any]]) -> Iterator[Case]:
+        known = {column.name: column for column in self._model.columns.get(table, ())}
+        for number, row in enumerate(rows):
+            for name, value in row.items():
+                where = f"{name} = {value!r} in row {number + 1} of {table!r}"
+                if name not in known:
+                    yield "has a column that it does not declare", where
+                elif known[name].is_number:
+                    yield from _of_number(value, known[name].bounds, where)
+                elif not isinstance(value, str):
+                    yield "has something else than words in a column of words", where
+
+    def _rehearses(self) -> Iterator[Case]:
+        """What cannot run is refused before it runs."""
+        for key, value in self._scenario.model_dump().items():
+            if not isinstance(value, int | float) or isinstance(value, bool):
+                continue
+            for factor in FACTORS:
+                yield from self._near({key: type(value)(factor * value)})
+
+    def _near(self, change: dict[str, Any]) -> Iterator[Case]:
+        try:
+            scenario = self._model.build(self._document, {**self._keys, **change})
+            self._model.rehearse(scenario, SEEDS[0])
+        except ConfigError:
+            return
+        try:
+            self._run(scenario, SEEDS[0])
+        except Exception as error:
+            told = f"{type(error).__name__}: {error}, with {change}"
+            yield "fails in a run that its rehearsal let through", told
+
+
+def _of_number(value: Any, bounds: tuple[float, float], where: str) -> Iterator[Case]:
+    if isinstance(value, str) or not hasattr(value, "__float__"):
+        yield "has no number in a column of numbers", where
+    elif math.isinf(value):
+        yield "has an infinite number", where
+    elif value < bounds[0] or value > bounds[1]:
+        yield "leaves the bounds of a column", f"{where}; bounds {bounds[0]:g} to {bounds[1]:g}"

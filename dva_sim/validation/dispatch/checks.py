@@ -1,0 +1,255 @@
+"""Cases played through the real core and policies, spread over processes."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import cast
+
+import numpy as np
+
+from dva_sim.experiments.execution import executors
+from dva_sim.experiments.execution.checkpoint import RunOutcome
+from dva_sim.experiments.execution.scheduling import run_all
+from dva_sim.experiments.study.cell_grid import StudyJob
+from dva_sim.kernel.errors import RunsFailed
+from dva_sim.kernel.streams import derive_seed
+from dva_sim.simulation.models import Tables
+from dva_sim.simulation.scenario import Scenario
+from dva_sim.simulation.shift import simulate_timed
+from dva_sim.simulation.shift.scenario import TimedScenario
+from dva_sim.validation.dispatch.cases import Case
+from dva_sim.validation.dispatch.control_variates import controls, inputs
+from dva_sim.validation.dispatch.estimation import (
+    PRECISION,
+    CheckVerdict,
+    Estimate,
+    certain,
+    estimate,
+    verdict,
+)
+from dva_sim.validation.dispatch.identities import IDENTITIES, check_identity
+from dva_sim.validation.dispatch.measures import Batches, sums
+from dva_sim.validation.dispatch.samples import Floats, Sample, occupied, sample_of
+
+Columns = dict[str, Floats]
+LOOK_AGAIN = 4  # times as many runs, in all, for a case that seems to differ
+
+
+@dataclass(frozen=True)
+class Check:
+    """One comparison.
+
+    Attributes:
+        case: Name of the case.
+        title: What the case is.
+        measure: What was measured.
+        exact: What it should be.
+        found: What it was.
+        verdict: Whether the two agree.
+        source: Where the exact value comes from.
+        events: How many events were played for it.
+        kind: `result`; `input` for what the scenario put in; `identity` for what holds
+            without chance.
+        again: What differed at first, so that the case was played again, longer; empty if
+            nothing did.
+    """
+
+    case: str
+    title: str
+    measure: str
+    exact: float
+    found: Estimate
+    verdict: CheckVerdict
+    source: str
+    events: int
+    kind: str = "result"
+    again: str = ""
+
+    @property
+    def deviation(self) -> float:
+        """How far off, in standard errors; 0 where nothing is left to chance and all is right."""
+        off = self.found.value - self.exact
+        if self.found.error > 0:
+            return off / self.found.error
+        return 0.0 if self.verdict != "differs" else float(np.copysign(np.inf, off))
+
+
+def check_cases(
+    cases: Sequence[Case],
+    seed: int,
+    quick: bool,
+    workers: int,
+    progress: Callable[[int], None] = lambda done: None,
+) -> list[Check]:
+    """Play all cases and compare.
+
+    A case that differs by more than chance easily explains is played again, longer, and judged
+    by all its runs together: what was chance goes away, and what is wrong shows more clearly.
+
+    Args:
+        cases: What to play.
+        seed: Of all luck.
+        quick: Play as little as the cases say for that.
+        workers: Processes.
+        progress: Told how many runs are finished.
+
+    Raises:
+        RunsFailed: a run failed.
+    """
+    outcomes: dict[tuple[str, int], RunOutcome] = {}
+    everything = [job for case in cases for job in _jobs(case, seed, _runs(case, quick))]
+    _perform(everything, workers, outcomes, progress)
+    checks = []
+    for case in cases:
+        runs = _runs(case, quick)
+        found = _compare(case, _columns(_jobs(case, seed, runs), outcomes))
+        off = [c for c in found if c.verdict == "differs" and c.found.error > 0]
+        if off:
+            again = _jobs(case, seed, LOOK_AGAIN * runs)
+            _perform(again[runs:], workers, outcomes, lambda done: None)
+            why = ", ".join(f"{c.measure} {c.deviation:+.2f} SE" for c in off)
+            found = [replace(c, again=why) for c in _compare(case, _columns(again, outcomes))]
+        checks += found
+    return checks
+
+
+def _perform(
+    jobs: Sequence[StudyJob],
+    workers: int,
+    outcomes: dict[tuple[str, int], RunOutcome],
+    progress: Callable[[int], None],
+) -> None:
+    """Play some runs, and add how they ended."""
+    for batch in run_all(jobs, play, executors.local(workers)):
+        for outcome in batch:
+            if outcome.error is not None:
+                raise RunsFailed(f"a run of case {outcome.key[0]!r} failed: {outcome.error}")
+            outcomes[outcome.key] = outcome
+        progress(len(outcomes))
+
+
+def play(job: StudyJob) -> Tables:
+    """One run: tops and bottoms of each measure, and the controls, one row per batch."""
+    scenario = cast(TimedScenario, job.scenario)
+    asked = dict(job.cell)
+    sample = sample_of(simulate_timed(scenario, job.seed))
+    batches = Batches(sample, int(str(asked["batches"])))
+    columns: Columns = {"events": batches.count(np.ones(len(sample.stream), dtype=bool))}
+    columns["broken"] = np.full(len(batches.lengths), float(sample.broken))
+    columns["open"] = batches.count(sample.outcome == "open")
+    share = batches.lengths / batches.lengths.sum()
+    columns["worked"] = sum(sample.worked) * share
+    columns["had work"] = occupied(sample.busy_from, sample.busy_until, batches.edges)
+    for name, (area, by_event) in _little(sample, batches).items():
+        columns[f"area {name}"], columns[f"times {name}"] = area, by_event
+    for number, name in enumerate(json.loads(str(asked["measures"]))):
+        columns[f"top {number}"], columns[f"bottom {number}"] = sums(name, batches)
+    for name, (top, bottom) in inputs(batches, scenario).items():
+        columns[f"in {name}"], columns[f"expected {name}"] = top, bottom
+    for name, values in controls(batches, scenario).items():
+        columns[f"control {name}"] = values
+    names, rows = list(columns), np.column_stack(list(columns.values()))
+    return {"batches": [dict(zip(names, row.tolist(), strict=True)) for row in rows]}
+
+
+def check_identities(seed: int, progress: Callable[[int], None] = lambda done: None) -> list[Check]:
+    """Look at everything that must hold exactly, in any world.
+
+    Args:
+        seed: Of the luck with which it is looked at.
+        progress: Told how many are finished.
+    """
+    checks = []
+    for done, name in enumerate(IDENTITIES, start=1):
+        for what, off in check_identity(name, seed):
+            found, title = certain(off), name[0].upper() + name[1:]
+            judged = verdict(found, 0.0)
+            checks.append(Check(name, title, what, 0.0, found, judged, "", 0, "identity"))
+        progress(done)
+    return checks
+
+
+def runs_of(cases: Sequence[Case], quick: bool) -> int:
+    """How many runs it takes to check all cases."""
+    return sum(_runs(case, quick) for case in cases)
+
+
+def _runs(case: Case, quick: bool) -> int:
+    return case.quick_runs if quick else case.runs
+
+
+def _jobs(case: Case, seed: int, runs: int) -> list[StudyJob]:
+    cell = (("batches", case.batches), ("measures", json.dumps(list(case.exact))))
+    scenario = cast(Scenario, case.scenario)
+    return [
+        StudyJob(
+            part=case.name,
+            cell=cell,
+            index=0,
+            person=0,
+            trial=trial,
+            seed=derive_seed("validation", case.name, seed, trial),
+            scenario=scenario,
+            config=case.name,
+        )
+        for trial in range(runs)
+    ]
+
+
+def _little(sample: Sample, batches: Batches) -> dict[str, tuple[Floats, Floats]]:
+    """How many wait and are served: as the world sums it up, and by the times of the events.
+
+    The first follows what happens as it happens, the second is who came and went when. Their
+    ratio is 1 in every run, not only on average: Little's law, path by path.
+    """
+    sent = np.where(np.isnan(sample.assigned), sample.closed, sample.assigned)
+    acts = np.isfinite(sample.act_assigned)
+    until = np.maximum(sample.confirmed, sample.act_assigned)[acts]
+    waits = occupied(sample.detected, sent, batches.edges)
+    waits += occupied(sample.confirmed[acts], until, batches.edges)
+    stays = occupied(sample.detected, sample.closed, batches.edges)
+    share = batches.lengths / batches.lengths.sum()
+    return {
+        "waiting": (sample.waiting_area * share, waits),
+        "served": (sample.served_area * share, stays - waits),
+    }
+
+
+def _columns(jobs: Sequence[StudyJob], outcomes: dict[tuple[str, int], RunOutcome]) -> Columns:
+    """The batches of all runs of a case, run after run."""
+    rows = [row for job in jobs for row in json.loads(outcomes[job.key].tables or "")["batches"]]
+    return {name: np.array([row[name] for row in rows], dtype=float) for name in rows[0]}
+
+
+def _compare(case: Case, columns: Columns) -> list[Check]:
+    """All that a case is judged by: results, what was put in, and what must hold in any case."""
+    known = [values for name, values in columns.items() if name.startswith("control ")]
+    luck = np.column_stack(known) if known else None
+    found = [
+        ("result", measure, exact, estimate(columns[f"top {n}"], columns[f"bottom {n}"], luck))
+        for n, (measure, exact) in enumerate(case.exact.items())
+    ]
+    for name in (name.removeprefix("in ") for name in columns if name.startswith("in ")):
+        share = estimate(columns[f"in {name}"], columns[f"expected {name}"])
+        found.append(("input", f"{name}, share of the expected", 1.0, share))
+    for name in ("waiting", "served"):
+        area, times = columns[f"area {name}"].sum(), columns[f"times {name}"].sum()
+        law = "identity", f"Little's law, {name}", 1.0, certain(area / times if times else 1.0)
+        found.append(law)
+    worked, had = columns["worked"].sum(), columns["had work"].sum()
+    same = certain(worked / had if had else 1.0)
+    found.append(("identity", "work by the units over work by the events", 1.0, same))
+    lost = columns["open"].sum() + columns["broken"].max()
+    found.append(("identity", "events lost, rules broken", 0.0, certain(lost)))
+    return [_check(case, columns, *each) for each in found]
+
+
+def _check(
+    case: Case, columns: Columns, kind: str, measure: str, exact: float, found: Estimate
+) -> Check:
+    strict = kind == "result" and measure not in case.loosely
+    judged = verdict(found, exact, PRECISION if strict else None)
+    events = int(columns["events"].sum())
+    return Check(case.name, case.title, measure, exact, found, judged, case.source, events, kind)

@@ -1,0 +1,175 @@
+"""What a hazard is: a growing danger, the field that it makes on a site, and how both are shown.
+
+Derive from `Hazard` and `HazardField` to make a kind of your own; worlds/HAZARDS.md says how.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+from pydantic import ValidationError
+
+from dva_sim.kernel.config import Config, first_mistake
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.protocol.messages import EVENT_KINDS
+from dva_sim.worlds.hazards.alarms import DetectorAlarm, alarm_in
+from dva_sim.worlds.hazards.building import Floats, SitePoints
+from dva_sim.worlds.hazards.conditions import QUANTITIES, Conditions
+from dva_sim.worlds.layout import Site
+
+if TYPE_CHECKING:
+    from dva_sim.worlds.camera.sprites import Sprite
+
+Point = tuple[float, float]
+
+LARGEST = 2.5  # what can be seen of a leak or flood never grows beyond this [m]; assumed
+
+
+class Hazard(Config):
+    """A growing danger, as it would be in the open: what walls make of it, its field knows.
+
+    What a scenario may set of a kind are the fields of its class, with their units, limits and
+    defaults. The same settings are the same hazard: it draws no random numbers.
+
+    Args:
+        position: Its middle [m].
+        start: When it begins [s].
+        settings: What else belongs to its kind.
+
+    Attributes:
+        reported_as: What messages call it, and so all who know it by messages: `fire`,
+            `gas_leak` or `flood`. They deal with it as with one of those.
+        title: What people call it.
+        detectors: Kinds of detector that notice it.
+        shows: What pictures show of it over the floor, some of `QUANTITIES`.
+        colour: Of its mark, as `#rrggbb`.
+        mark: Of its source, as matplotlib names markers.
+        shines: Whether it is seen through smoke, as flames are.
+        contained_by: How a guard deals with it: `valve`, or `extinguisher`.
+
+    Raises:
+        ConfigError: an unknown setting, or a value that it cannot have.
+    """
+
+    reported_as: ClassVar[str] = ""
+    title: ClassVar[str] = ""
+    detectors: ClassVar[tuple[str, ...]] = ()
+    shows: ClassVar[tuple[str, ...]] = ()
+    colour: ClassVar[str] = "#a33ea1"
+    mark: ClassVar[str] = "X"
+    shines: ClassVar[bool] = False
+    contained_by: ClassVar[str] = "valve"
+
+    position: Point
+    start: float
+
+    def __init__(self, position: Point, start: float, **settings: Any) -> None:
+        data = {"position": position, "start": start, **settings}
+        try:
+            super().__init__(**data)
+        except ValidationError as problems:
+            mistakes = problems.errors(include_url=False)
+            problem, _ = first_mistake(type(self), data, mistakes)
+            raise ConfigError(problem) from None
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **_: Any) -> None:
+        """Refuse a class of which nobody could be told.
+
+        Raises:
+            TypeError: `reported_as` or `shows` has a word that nobody knows.
+        """
+        if cls.reported_as not in EVENT_KINDS:
+            known = ", ".join(EVENT_KINDS)
+            raise TypeError(f"reported_as of {cls.__name__} should be one of {known}")
+        if not set(cls.shows) <= set(QUANTITIES):
+            raise TypeError(f"shows of {cls.__name__} should be some of {', '.join(QUANTITIES)}")
+
+    def radius(self, time: float) -> float:
+        """Radius that can be seen at `time` [s], in [m]."""
+        raise NotImplementedError
+
+    def danger_radius(self, time: float) -> float:
+        """Radius within which people should not be at `time` [s], in [m]."""
+        raise NotImplementedError
+
+    def severity(self, time: float) -> float:
+        """0 (nothing yet) to 1 at `time` [s]."""
+        raise NotImplementedError
+
+    def field(self, site: Site) -> HazardField:
+        """What it does to a site."""
+        raise NotImplementedError
+
+    def noticed_by(self) -> tuple[str, ...]:
+        """Kinds of detector that notice it with these settings."""
+        return self.detectors
+
+    def explodes_at(self) -> float:
+        """Share of its gas in the air that can explode; infinite if it has none."""
+        return math.inf
+
+    def sprite(self, time: float, ceiling: float) -> Sprite | None:
+        """What stands there before a robot's camera at `time` [s], below a ceiling [m]."""
+        return None
+
+    def light(self, time: float) -> float:
+        """How much it lights up its room before a camera at `time` [s], 0 to 1."""
+        return 0.0
+
+
+class HazardField:
+    """What one hazard does to the air and the floor of a site; derive from this.
+
+    Only `at` has to be defined: everything else follows from it, if slowly. Nothing may depend
+    on what was asked before.
+
+    Args:
+        hazard: What happens.
+        site: Where.
+
+    Attributes:
+        until: When its source was stopped [s].
+    """
+
+    def __init__(self, hazard: Hazard, site: Site) -> None:
+        self.hazard, self.site = hazard, site
+        self.until = math.inf
+
+    def at(self, x: float, y: float, time: float) -> Conditions:
+        """What it adds to clear air at a place [m]; nothing up to its start."""
+        raise NotImplementedError
+
+    def picture(self, what: str, places: SitePoints, time: float) -> Floats | None:
+        """A raster of what it adds, such as `water`; None if it adds nothing of the kind.
+
+        Args:
+            what: One of `QUANTITIES`; or `layer`, smoke as it is where it is thickest between
+                floor and ceiling, where `smoke` is the mean of it.
+            places: For which points.
+            time: [s]
+        """
+        what = "smoke" if what == "layer" else what
+        return (
+            self._part(QUANTITIES[what].part, places, time) if what in self.hazard.shows else None
+        )
+
+    def is_hazy(self, time: float) -> bool:
+        """Whether anybody's sight is impaired at `time` [s]: quick, as cameras ask often."""
+        return "smoke" in self.hazard.shows and time > self.hazard.start
+
+    def haze(self, places: SitePoints, time: float) -> Floats:
+        """Extinction of light at places, at the height of a person's eyes [1/m]."""
+        return self._part("extinction", places, time)
+
+    def alarm(self, detector: str, x: float, y: float) -> DetectorAlarm:
+        """What a kind of detector at a place [m] makes of it, if it begins at 0 and goes on."""
+        return alarm_in(detector, lambda age: self.at(x, y, age))
+
+    def _part(self, part: str, places: SitePoints, time: float) -> Floats:
+        """One part of the conditions, point by point."""
+        points = places.points.reshape(-1, 2).tolist()
+        values = [getattr(self.at(x, y, time), part) for x, y in points]
+        return np.array(values, float).reshape(places.spaces.shape)

@@ -1,0 +1,118 @@
+"""How the phone's app sends commands."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dva_sim.agents.device import AgentDevice, command_topic
+from dva_sim.agents.operator.command_sender import CommandSender
+from dva_sim.agents.person import Population, draw_person
+from dva_sim.agents.tilt import Phone, PhoneProfile
+from dva_sim.kernel.clock import Clock
+from dva_sim.kernel.recorder import DriveLog, Recorder
+from dva_sim.kernel.streams import Streams
+from dva_sim.network.link import ConstantRate, Link, LinkConfig
+from dva_sim.network.patterns import Pattern, PubSub
+from dva_sim.network.virtual import VirtualNetwork
+from dva_sim.protocol.codec import decode
+from dva_sim.protocol.messages import SetTeleOp
+from dva_sim.worlds.geo import GeoFrame
+
+PHONE, ROBOT = "02:00:00:03:00:01", "02:00:00:01:00:01"
+
+
+def small_network() -> VirtualNetwork:
+    line = Link(LinkConfig(), ConstantRate(1e9), Streams(1), "line")
+    return VirtualNetwork(Clock(), lambda a, b: (line, line))
+
+
+def small_sender(
+    network: VirtualNetwork, pattern: Pattern, seen: list[int | None]
+) -> CommandSender:
+    device = AgentDevice(
+        id_tag=PHONE,
+        label="operator-1",
+        device_type="TeleOp",
+        address="",
+        dva="",
+        network=network,
+        recorder=Recorder(),
+        frame=GeoFrame(38.66, -9.2),
+        timeout=9.0,
+        attempts=3,
+    )
+    return CommandSender(
+        device,
+        pattern=pattern,
+        drive=DriveLog(ROBOT, PHONE, 1, ordered=0.0),
+        session=7,
+        phone=Phone(PhoneProfile(), draw_person(Population(), 1, 0), np.random.default_rng(1)),
+        rate_hz=10.0,
+        timeout=9.0,
+        attempts=3,
+        window=8,
+        seen_tick=lambda: seen[-1],
+        on_lost=lambda why: None,
+    )
+
+
+def test_no_command_leaves_the_phone_before_the_first_picture() -> None:
+    """Without a tick the robot could not bound the age of what waits for a connection."""
+    network, seen = small_network(), list[int | None]([None])
+    got: list[bytes] = []
+    network.subscribe(ROBOT, PHONE, command_topic(ROBOT), got.append)
+    network.clock.run(1.0)
+
+    sender = small_sender(network, PubSub(), seen)
+    sender.start()
+    network.clock.run(3.0)
+    assert (got, sender.drive.sent) == ([], 0)
+
+    seen.append(4321)
+    network.clock.run(4.05)
+    sender.stop()
+    network.clock.run(6.0)
+    bodies = [decode(data).body for data in got]
+    assert len(bodies) == sender.drive.sent == 11
+    assert all(isinstance(b, SetTeleOp) and b.seen_tick == 4321 for b in bodies)
+
+
+class Broken(PubSub):
+    """Fails with every second command."""
+
+    count = 0
+
+    def offer(self, command) -> None:  # type: ignore[no-untyped-def]
+        self.count += 1
+        if self.count % 2:
+            raise ValueError("odd")
+        super().offer(command)
+
+
+def test_what_a_pattern_of_a_user_gets_wrong_is_counted_and_the_others_go() -> None:
+    network = small_network()
+    sender = small_sender(network, Broken(), [1])
+    sender.start()
+    network.clock.run(0.95)
+    assert (sender.failures, sender.drive.sent) == (5, 5)
+    assert sender.first_failure == "ValueError: odd"
+
+
+def test_a_shipped_pattern_that_fails_ends_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its errors are ours: nobody should have to look for them in a counter."""
+    monkeypatch.setattr(PubSub, "offer", lambda pattern, command: 1 / 0)
+    sender = small_sender(small_network(), PubSub(), [1])
+    with pytest.raises(ZeroDivisionError):
+        sender.start()
+
+
+def test_once_a_drive_is_over_its_pattern_sends_nothing() -> None:
+    network, kept = small_network(), PubSub()
+    sender = small_sender(network, kept, [1])
+    sender.start()
+    network.clock.run(0.35)
+    sender.stop()
+    sent, last = sender.drive.sent, sender.drive.commands[-1]
+    kept.line.publish(last)  # type: ignore[arg-type]
+    assert sender.drive.sent == sent == 4

@@ -1,0 +1,430 @@
+"""What a robot obeys, and what it refuses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from dva_sim.agents.robot.controller import LEASE_S, STAND, Decision, Limits, Mode, RobotController
+from dva_sim.protocol import messages as m
+
+DVA, ROBOT, ANA, RUI = (f"02:00:00:00:00:0{i}" for i in range(1, 5))
+
+
+class Bench:
+    """A controller, and messages that arrive when they are decided on."""
+
+    def __init__(self) -> None:
+        self.robot = RobotController(ROBOT, DVA, Limits(watchdog=3.0, max_age=6.0))
+        self.number = 0
+
+    def say(
+        self,
+        source: str,
+        body: m.Body,
+        now: float = 0.0,
+        session: int = 7,
+        arrived: float | None = None,
+        number: int | None = None,
+        moving: bool = False,
+    ) -> Decision:
+        self.number += 1
+        number = self.number if number is None else number
+        message = m.Message(ROBOT, number, source, "12:00:00", session, body)
+        return self.robot.handle(message, now if arrived is None else arrived, now, moving)
+
+
+@pytest.fixture
+def bench() -> Bench:
+    return Bench()
+
+
+@pytest.fixture
+def driven(bench: Bench) -> Bench:
+    """Ana holds session 7 and has started at time 0."""
+    bench.say(DVA, m.PermissionGrant(ANA, "teleoperation", 7))
+    assert bench.say(ANA, m.StartTeleOp()).code == m.OK
+    return bench
+
+
+def test_without_permission_nothing_starts(bench: Bench) -> None:
+    assert bench.say(ANA, m.StartTeleOp()).code == m.NOT_PERMITTED
+    bench.say(DVA, m.PermissionGrant(ANA, "missions", 7))
+    assert bench.say(ANA, m.StartTeleOp()).code == m.NOT_PERMITTED
+    assert bench.robot.mode is Mode.IDLE
+
+
+def test_only_the_dva_grants(bench: Bench) -> None:
+    assert bench.say(RUI, m.PermissionGrant(RUI, "both", 9)).code == m.NOT_PERMITTED
+    assert bench.robot.grant is None
+
+
+@pytest.mark.invariant("S1")
+def test_a_command_is_in_force_until_the_watchdog_counted_from_its_arrival(driven: Bench) -> None:
+    decision = driven.say(ANA, m.SetTeleOp(0.4, 0.1), now=2.0, arrived=1.5)
+    assert decision.set_point is not None
+    assert decision.set_point.until == 4.5
+
+
+@pytest.mark.invariant("S1")
+def test_the_seen_tick_bounds_the_age_without_a_shared_clock(driven: Bench) -> None:
+    driven.robot.clock_offset = 5000.0
+    seen = driven.robot.tick(1.0)
+    decision = driven.say(ANA, m.SetTeleOp(0.4, 0.1, seen), now=6.5)
+    assert decision.set_point is not None
+    assert decision.set_point.until == pytest.approx(7.0)
+    assert driven.say(ANA, m.SetTeleOp(0.4, 0.1, seen), now=7.1).code == m.STALE
+
+
+def test_a_command_without_a_tick_is_counted(driven: Bench) -> None:
+    driven.say(ANA, m.SetTeleOp(0.4, 0.1), now=1.0)
+    assert driven.robot.without_tick == 1
+
+
+def test_a_command_that_waited_longer_than_the_watchdog_is_stale(driven: Bench) -> None:
+    assert driven.say(ANA, m.SetTeleOp(0.4, 0.1), now=5.0, arrived=1.9).code == m.STALE
+
+
+def test_an_older_command_never_follows_a_newer_one(driven: Bench) -> None:
+    assert driven.say(ANA, m.SetTeleOp(0.4, 0.0), number=50).code == m.OK
+    assert driven.say(ANA, m.SetTeleOp(0.1, 0.0), number=49).code == m.OUT_OF_ORDER
+    assert driven.say(ANA, m.SetTeleOp(0.4, 0.0), number=50).code == m.OUT_OF_ORDER
+
+
+@pytest.mark.invariant("S2")
+def test_commands_of_others_and_of_old_sessions_never_act(driven: Bench) -> None:
+    assert driven.say(RUI, m.SetTeleOp(0.4, 0.0)).code == m.WRONG_MODE
+    assert driven.say(ANA, m.SetTeleOp(0.4, 0.0), session=6).code == m.BAD_SESSION
+
+
+@pytest.mark.invariant("S2")
+def test_a_new_grant_stops_the_robot_and_fences_the_old_holder(driven: Bench) -> None:
+    assert driven.say(DVA, m.PermissionGrant(RUI, "teleoperation", 8)).set_point == STAND
+    assert driven.say(ANA, m.SetTeleOp(0.4, 0.0)).code == m.WRONG_MODE
+    assert driven.say(RUI, m.StartTeleOp(), session=8, moving=True).code == m.BUSY
+    assert driven.say(RUI, m.StartTeleOp(), session=8).code == m.OK
+
+
+def test_an_old_grant_that_comes_late_changes_nothing(driven: Bench) -> None:
+    assert driven.say(DVA, m.PermissionGrant(RUI, "both", 5)).code == m.BAD_SESSION
+    assert driven.robot.owner == ANA
+
+
+@pytest.mark.invariant("S3")
+@pytest.mark.parametrize("source", [ANA, RUI, DVA])
+def test_an_emergency_stops_whoever_sends_it_and_nothing_earlier_moves_it(
+    driven: Bench, source: str
+) -> None:
+    driven.say(ANA, m.SetTeleOp(0.5, 0.0), now=1.0)
+    stop = driven.say(source, m.Emergency(), now=2.0, session=0)
+    assert (stop.code, stop.set_point) == (m.OK, STAND)
+    assert driven.say(ANA, m.SetTeleOp(0.5, 0.0), now=2.1).code == m.WRONG_MODE
+    assert driven.say(ANA, m.StartTeleOp(), now=2.2, arrived=1.9).code == m.STALE
+    assert driven.say(ANA, m.StartTeleOp(), now=2.4, arrived=2.3).code == m.OK
+
+
+def test_stop_and_start_again_are_idempotent(driven: Bench) -> None:
+    assert driven.say(ANA, m.StartTeleOp()).text == "already started"
+    assert driven.say(ANA, m.StopTeleOp()).set_point == STAND
+    assert driven.say(ANA, m.StopTeleOp()).code == m.OK
+    assert driven.robot.mode is Mode.IDLE
+
+
+def test_teleoperation_ends_by_itself_when_the_operator_is_gone(driven: Bench) -> None:
+    driven.say(ANA, m.SetTeleOp(0.5, 0.0), now=1.0)
+    assert not driven.robot.expire(1.0 + LEASE_S)
+    assert driven.robot.expire(1.1 + LEASE_S)
+    assert driven.robot.mode is Mode.IDLE
+
+
+def test_a_mission_needs_its_own_permission_and_an_idle_robot(bench: Bench) -> None:
+    there = m.GoTo((m.Position(38.66, -9.2),))
+    bench.say(DVA, m.PermissionGrant(ANA, "teleoperation", 7))
+    assert bench.say(ANA, there).code == m.NOT_PERMITTED
+    bench.say(DVA, m.PermissionGrant(ANA, "both", 8))
+    assert bench.say(ANA, there, session=8).code == m.OK
+    assert bench.robot.mode is Mode.MISSION
+    assert bench.say(ANA, m.StartTeleOp(), session=8).code == m.BUSY
+    assert bench.say(ANA, m.CancelMission(), session=8).set_point == STAND
+    assert bench.robot.mode is Mode.IDLE
+
+
+@pytest.mark.parametrize(
+    "refused",
+    [
+        lambda b: b.say(ANA, m.SetTeleOp(0.5, 0.0), session=6),
+        lambda b: b.say(RUI, m.StartTeleOp()),
+        lambda b: b.say(RUI, m.StopTeleOp()),
+        lambda b: b.say(ANA, m.GetDeviceList()),
+    ],
+)
+def test_a_refused_message_changes_nothing(
+    driven: Bench, refused: Callable[[Bench], Decision]
+) -> None:
+    before = vars(driven.robot).copy()
+    decision = refused(driven)
+    assert decision.code != m.OK
+    assert decision.text
+    assert vars(driven.robot) == before
+
+
+def test_a_revocation_stops_the_robot_and_its_session_never_comes_back(driven: Bench) -> None:
+    over = m.PermissionRevocation(ROBOT, ANA, 7)
+    assert driven.say(ANA, over).code == m.NOT_PERMITTED
+    assert driven.robot.owner == ANA
+    assert driven.say(DVA, over).set_point == STAND
+    assert driven.robot.mode is Mode.IDLE
+    assert driven.say(ANA, m.StartTeleOp()).code == m.NOT_PERMITTED
+    assert driven.say(DVA, m.PermissionGrant(ANA, "teleoperation", 7)).code == m.BAD_SESSION
+    assert driven.say(DVA, over).code == m.OK  # once more: it is over all the same
+
+
+def test_a_revocation_of_an_older_session_changes_nothing(driven: Bench) -> None:
+    assert driven.say(DVA, m.PermissionRevocation(ROBOT, ANA, 6)).set_point is None
+    assert driven.robot.owner == ANA
+
+
+def test_a_copy_of_an_old_order_that_comes_late_does_nothing(driven: Bench) -> None:
+    """Its reply may have been forgotten by then, so the number has to tell."""
+    driven.say(ANA, m.StopTeleOp(), number=50)
+    driven.say(ANA, m.StartTeleOp(), number=60)
+    assert driven.say(ANA, m.StopTeleOp(), number=50).code == m.OUT_OF_ORDER
+    assert driven.robot.mode is Mode.TELEOPERATION
+    driven.say(ANA, m.StopTeleOp(), number=70)
+    assert driven.say(ANA, m.StartTeleOp(), number=60).code == m.OUT_OF_ORDER
+    assert driven.robot.mode is Mode.IDLE
+
+
+@pytest.fixture
+def sensing(driven: Bench) -> Bench:
+    """Ana drives and may read the heat; Rui may read the smoke and nothing else."""
+    driven.robot.sensors = (m.Sensor("heat_flux", "kW/m2"), m.Sensor("smoke", "1/m"))
+    driven.say(DVA, m.PermissionGrant(ANA, "teleoperation", 8, None, ("heat_flux",)))
+    driven.say(ANA, m.StartTeleOp(), session=8)
+    assert driven.say(DVA, m.PermissionGrant(RUI, "sensors", 9, None, ("smoke",))).code == m.OK
+    return driven
+
+
+@pytest.mark.invariant("S5")
+@pytest.mark.parametrize(
+    ("who", "session", "sensor", "code"),
+    [
+        (ANA, 8, "heat_flux", m.OK),
+        (RUI, 9, "smoke", m.OK),
+        (ANA, 8, "smoke", m.NOT_PERMITTED),
+        (RUI, 9, "heat_flux", m.NOT_PERMITTED),
+        (DVA, 9, "smoke", m.NOT_PERMITTED),
+        (ANA, 7, "heat_flux", m.BAD_SESSION),
+        (RUI, 8, "smoke", m.BAD_SESSION),
+        (ANA, 8, "radar", m.UNKNOWN_SENSOR),
+    ],
+)
+def test_each_sensor_is_permitted_by_name(
+    sensing: Bench, who: str, session: int, sensor: str, code: int
+) -> None:
+    assert sensing.say(who, m.DevSub(sensor, 2.0), session=session).code == code
+
+
+def test_who_may_read_sensors_takes_the_robot_from_nobody(sensing: Bench) -> None:
+    assert sensing.robot.owner == ANA
+    assert sensing.say(RUI, m.StartTeleOp(), session=9).code == m.NOT_PERMITTED
+    sensing.say(DVA, m.PermissionRevocation(ROBOT, RUI, 9))
+    assert sensing.say(RUI, m.DevSub("smoke", 1.0), session=9).code == m.NOT_PERMITTED
+    assert sensing.robot.owner == ANA
+
+
+def test_a_robot_tells_everybody_which_sensors_it_has(sensing: Bench) -> None:
+    told = sensing.say("02:00:00:00:00:99", m.GetSensorInfo(), session=0).content
+    assert told is not None
+    assert [sensor.name for sensor in told.sensors] == ["heat_flux", "smoke"]
+
+
+def test_a_revocation_that_overtakes_its_grant_holds(bench: Bench) -> None:
+    bench.say(DVA, m.PermissionRevocation(ROBOT, ANA, 7))
+    assert bench.say(DVA, m.PermissionGrant(ANA, "both", 7)).code == m.BAD_SESSION
+    assert bench.say(ANA, m.StartTeleOp()).code == m.NOT_PERMITTED
+
+
+def test_a_session_told_again_renews_the_address_and_stops_nothing(driven: Bench) -> None:
+    again = m.PermissionGrant(ANA, "teleoperation", 7, "192.168.1.77")
+    assert driven.say(DVA, again).code == m.OK
+    assert driven.robot.owner == ANA
+    assert driven.robot.grant == again
+
+
+def test_starting_again_makes_older_orders_and_commands_old(driven: Bench) -> None:
+    driven.say(ANA, m.StartTeleOp(), number=60)
+    assert driven.say(ANA, m.SetTeleOp(0.4, 0.0), number=59).code == m.OUT_OF_ORDER
+    assert driven.say(ANA, m.StopTeleOp(), number=58).code == m.OUT_OF_ORDER
+    assert driven.robot.mode is Mode.TELEOPERATION
+
+
+HERE = m.Position(38.66, -9.2)
+MESSAGES = {
+    "StartTeleOp": m.StartTeleOp(),
+    "SetTeleOp": m.SetTeleOp(0.3, 0.1),
+    "StopTeleOp": m.StopTeleOp(),
+    "GoTo": m.GoTo((HERE,)),
+    "Patrol": m.Patrol((HERE, HERE), 0),
+    "Inspect": m.Inspect(3, "fire", HERE),
+    "ReturnToBase": m.ReturnToBase(),
+    "CancelMission": m.CancelMission(),
+    "GetMissionStatus": m.GetMissionStatus(),
+    "GetSensorInfo": m.GetSensorInfo(),
+    "Emergency": m.Emergency(),
+}
+BEGINS = ("GoTo", "Patrol", "Inspect", "ReturnToBase")
+LETTERS = {"I": Mode.IDLE, "M": Mode.MISSION, "T": Mode.TELEOPERATION}
+CODES = {
+    "ok": m.OK,
+    "perm": m.NOT_PERMITTED,
+    "mode": m.WRONG_MODE,
+    "busy": m.BUSY,
+}
+# Each cell: the reply, and the mode afterwards. Columns: what Ana may do; with none or sensors
+# alone, Rui holds the robot with the level both and it is Rui's teleoperation or mission.
+TABLE = """
+mode message           none     sensors  teleoperation missions both
+I    StartTeleOp       perm I   perm I   ok T          perm I   ok T
+I    SetTeleOp         mode I   mode I   mode I        mode I   mode I
+I    StopTeleOp        perm I   perm I   ok I          perm I   ok I
+I    begins            perm I   perm I   perm I        ok M     ok M
+I    CancelMission     perm I   perm I   perm I        ok I     ok I
+I    GetMissionStatus  ok I     ok I     ok I          ok I     ok I
+I    GetSensorInfo     ok I     ok I     ok I          ok I     ok I
+I    Emergency         ok I     ok I     ok I          ok I     ok I
+M    StartTeleOp       perm M   perm M   -             perm M   busy M
+M    SetTeleOp         mode M   mode M   -             mode M   mode M
+M    StopTeleOp        perm M   perm M   -             perm M   ok M
+M    begins            perm M   perm M   -             busy M   busy M
+M    CancelMission     perm M   perm M   -             ok I     ok I
+M    GetMissionStatus  ok M     ok M     -             ok M     ok M
+M    GetSensorInfo     ok M     ok M     -             ok M     ok M
+M    Emergency         ok I     ok I     -             ok I     ok I
+T    StartTeleOp       perm T   perm T   ok T          -        ok T
+T    SetTeleOp         mode T   mode T   ok T          -        ok T
+T    StopTeleOp        perm T   perm T   ok I          -        ok I
+T    begins            perm T   perm T   perm T        -        busy T
+T    CancelMission     perm T   perm T   perm T        -        ok T
+T    GetMissionStatus  ok T     ok T     ok T          -        ok T
+T    GetSensorInfo     ok T     ok T     ok T          -        ok T
+T    Emergency         ok I     ok I     ok I          -        ok I
+"""
+
+
+def cells() -> list[tuple[str, str, str, str, str]]:
+    """Mode, message, level, reply, mode afterwards; states that cannot occur are left out."""
+    heading, *rows = TABLE.strip().splitlines()
+    levels = heading.split()[2:]
+    found = []
+    for row in rows:
+        mode, what, *rest = row.split()
+        for level in levels:
+            code = rest.pop(0)
+            if code == "-":
+                continue
+            after = rest.pop(0)
+            names = BEGINS if what == "begins" else (what,)
+            found += [(mode, name, level, code, after) for name in names]
+    return found
+
+
+def in_mode(mode: Mode, level: str) -> Bench:
+    """Ana has that permission, and the robot is in that mode for who holds it."""
+    bench = Bench()
+    holder, held = (RUI, "both") if level in ("none", "sensors") else (ANA, level)
+    bench.say(DVA, m.PermissionGrant(holder, held, 7))
+    if level == "sensors":
+        bench.say(DVA, m.PermissionGrant(ANA, "sensors", 7, None, ("smoke",)))
+    if mode is not Mode.IDLE:
+        begin = m.StartTeleOp() if mode is Mode.TELEOPERATION else m.GoTo((HERE,))
+        assert bench.say(holder, begin).code == m.OK
+    assert bench.robot.mode is mode
+    return bench
+
+
+@pytest.mark.invariant("S5")
+@pytest.mark.parametrize(("mode", "what", "level", "code", "after"), cells())
+def test_every_mode_answers_every_message_by_the_permission_held(
+    mode: str, what: str, level: str, code: str, after: str
+) -> None:
+    bench = in_mode(LETTERS[mode], level)
+    decision = bench.say(ANA, MESSAGES[what], now=1.0)
+    assert decision.code == CODES[code]
+    assert bench.robot.mode is LETTERS[after]
+    if LETTERS[mode] is not Mode.IDLE and after == "I":
+        assert decision.set_point == STAND  # what ends a motion says so to the motors
+    if decision.code != m.OK:
+        assert decision.set_point is None
+    assert (bench.robot.owner is None) == (after == "I")
+
+
+def test_the_table_has_every_mode_and_message() -> None:
+    assert {(mode, what) for mode, what, *_ in cells()} == {
+        (mode, what) for mode in LETTERS for what in MESSAGES
+    }
+
+
+@pytest.mark.invariant("S2")
+@pytest.mark.parametrize("name", BEGINS)
+def test_a_mission_begins_only_at_a_standstill(bench: Bench, name: str) -> None:
+    bench.say(DVA, m.PermissionGrant(ANA, "missions", 7))
+    assert bench.say(ANA, MESSAGES[name], moving=True).code == m.BUSY
+    assert bench.say(ANA, MESSAGES[name], moving=False).code == m.OK
+
+
+@pytest.mark.parametrize("name", BEGINS)
+def test_a_mission_that_was_sent_before_an_emergency_does_not_begin_after_it(
+    bench: Bench, name: str
+) -> None:
+    bench.say(DVA, m.PermissionGrant(ANA, "missions", 7))
+    bench.say(RUI, m.Emergency(), now=2.0)
+    assert bench.say(ANA, MESSAGES[name], now=2.1, arrived=1.9).code == m.STALE
+    assert bench.say(ANA, MESSAGES[name], now=2.3, arrived=2.2).code == m.OK
+
+
+def told(bench: Bench) -> tuple[str, int, str]:
+    status = bench.say(RUI, m.GetMissionStatus(), session=0).content
+    assert isinstance(status, m.MissionStatus)
+    return status.mission_state, status.waypoints_left, status.reason
+
+
+def test_how_a_mission_stands_is_told_to_everybody_who_asks(bench: Bench) -> None:
+    assert told(bench) == ("none", 0, "")
+    bench.say(DVA, m.PermissionGrant(ANA, "missions", 7))
+    bench.say(ANA, m.Patrol((HERE, HERE, HERE), 2), number=41)
+    assert told(bench) == ("under_way", 3, "")
+    assert bench.robot.mission_status.mission_id == 41
+    assert bench.robot.mission_stands("waiting", 2, "somebody is in the way")
+    assert not bench.robot.mission_stands("waiting", 2, "somebody is in the way")
+    assert told(bench) == ("waiting", 2, "somebody is in the way")
+    assert bench.robot.mission_stands("failed", 2, "no way")
+    assert told(bench) == ("failed", 2, "no way")
+    assert bench.robot.mode is Mode.IDLE
+
+
+@pytest.mark.parametrize(
+    ("source", "body", "reason"),
+    [
+        (ANA, m.CancelMission(), "cancelled"),
+        (RUI, m.Emergency(), "emergency"),
+        (DVA, m.PermissionRevocation(ROBOT, ANA, 7), "revoked"),
+        (DVA, m.PermissionGrant(RUI, "both", 8), "revoked"),
+    ],
+)
+def test_a_mission_that_somebody_ends_has_failed_and_says_why(
+    bench: Bench, source: str, body: m.Body, reason: str
+) -> None:
+    bench.say(DVA, m.PermissionGrant(ANA, "missions", 7))
+    bench.say(ANA, m.GoTo((HERE,)))
+    assert bench.say(source, body, now=1.0).set_point == STAND
+    assert told(bench) == ("failed", 1, reason)
+
+
+def test_what_a_robot_says_of_a_mission_that_is_over_is_no_news(bench: Bench) -> None:
+    bench.say(DVA, m.PermissionGrant(ANA, "missions", 7))
+    bench.say(ANA, m.GoTo((HERE,)))
+    bench.say(ANA, m.CancelMission())
+    assert not bench.robot.mission_stands("done", 0, "")
+    assert told(bench) == ("failed", 1, "cancelled")

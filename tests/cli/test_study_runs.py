@@ -1,0 +1,151 @@
+"""What is said before, during and after a run: plans, progress, and how to go on."""
+
+from __future__ import annotations
+
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import small_study as kit
+
+from dva_sim.cli import study_runs
+from dva_sim.cli.study_runs import RunPace, duration
+from dva_sim.experiments.execution.dry_run import DryRun, _spread, dry_run
+from dva_sim.experiments.execution.run_request import RunRequest
+from dva_sim.experiments.execution.runner import run_study
+
+
+@pytest.mark.parametrize(
+    ("seconds", "words"),
+    [(0.2, "0 s"), (89, "89 s"), (90, "2 min"), (3600, "60 min"), (5400, "1 h 30 min")],
+)
+def test_durations_are_said_as_people_would(seconds: float, words: str) -> None:
+    assert duration(seconds) == words
+
+
+def test_the_rate_counts_what_this_session_made_not_what_was_done_before() -> None:
+    clock = iter([100.0, 110.0, 130.0])
+    pace = RunPace(lambda: next(clock))
+    assert pace.line(600, 1000) == "600/1000 runs"
+    assert pace.line(620, 1000) == "620/1000 runs, 2.0 runs/s, 3 min left"
+    assert pace.line(1000, 1000) == "1000/1000 runs, 13.3 runs/s"
+
+
+def test_slow_runs_are_counted_by_the_minute() -> None:
+    clock = iter([0.0, 120.0])
+    pace = RunPace(lambda: next(clock))
+    pace.line(0, 10)
+    assert pace.line(3, 10) == "3/10 runs, 1.5 runs/min, 5 min left"
+
+
+def test_a_dry_run_of_a_fresh_folder_tries_some_runs_and_keeps_none(tmp_path: Path) -> None:
+    plan = dry_run(kit.study_in(tmp_path), tmp_path / "out", jobs=2, probe=kit.cheap)
+    assert (plan.runs, plan.done, plan.workers) == (kit.RUNS, 0, 2)
+    assert plan.tried == 5  # the reference and four cells; both parts share them
+    assert plan.estimate_s is not None
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_probe_ends_when_its_time_is_up_but_not_after_one_or_two(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("dva_sim.experiments.execution.dry_run.PROBE_S", 0.0)
+    plan = dry_run(kit.study_in(tmp_path), tmp_path / "out", probe=kit.cheap)
+    assert plan.tried == 3
+
+
+def test_a_run_that_does_not_end_in_time_costs_as_much_at_least(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def never(job: object) -> kit.Tables:
+        while True:
+            time.thread_time()
+
+    monkeypatch.setattr("dva_sim.experiments.execution.dry_run.MOST_S", 0.02)
+    monkeypatch.setattr("dva_sim.experiments.execution.dry_run._SHORT_S", 0.02)
+    plan = dry_run(kit.study_in(tmp_path), tmp_path / "out", jobs=1, probe=never)
+    assert (plan.tried, plan.is_least) == (1, True)
+    assert plan.estimate_s is not None
+    assert plan.estimate_s > 0
+
+
+def test_a_run_that_fails_when_tried_is_told(tmp_path: Path) -> None:
+    def falls(job: object) -> kit.Tables:
+        raise RuntimeError("fell\ndeep")
+
+    plan = dry_run(kit.study_in(tmp_path), tmp_path / "out", probe=falls)
+    assert (plan.tried, plan.estimate_s) == (0, None)
+    assert study_runs._time(plan) == (
+        "no estimate of the time: a run that was tried failed: RuntimeError: fell deep"
+    )
+
+
+@pytest.mark.parametrize(
+    ("plan", "words"),
+    [
+        (DryRun(42, 42, 9, 1, 2, 0.0, 0, ""), "nothing is left to run"),
+        (
+            DryRun(42, 0, 9, 1, 1, 300.0, 5, ""),
+            "about 5 min to go with 1 process, judged by 5 runs tried now",
+        ),
+        (
+            DryRun(42, 7, 9, 1, 2, 30.0, 0, ""),
+            "about 30 s to go with 2 processes, judged by the runs done already",
+        ),
+        (
+            DryRun(42, 0, 9, 1, 2, 7200.0, 1, "", is_least=True),
+            "more than 2 h 0 min to go with 2 processes, judged by 1 run tried now; the last "
+            "was stopped before its end",
+        ),
+        (
+            DryRun(42, 0, 9, 1, 2, 30.0, 4, "", failed="ValueError: no"),
+            "about 30 s to go with 2 processes, judged by 4 runs tried now; a run that was tried "
+            "failed: ValueError: no",
+        ),
+    ],
+)
+def test_an_estimate_says_what_it_rests_on(plan: DryRun, words: str) -> None:
+    assert study_runs._time(plan) == words
+
+
+def test_a_plan_says_that_a_study_may_stop_early() -> None:
+    plan = DryRun(42, 7, 9, 4, 2, 30.0, 0, "")
+    assert study_runs._plan(plan, Path("out")) == (
+        "at most 42 runs in 9 configurations and up to 4 rounds, 7 of them done already; into out"
+    )
+
+
+def test_a_probe_spreads_over_the_design() -> None:
+    for count in (1, 2, 3, 9, 100, 101):
+        assert sorted(_spread(count)) == list(range(count))
+    first = _spread(100)[:5]
+    assert min(abs(a - b) for a in first for b in first if a != b) >= 10
+
+
+def test_what_is_stopped_names_the_command_that_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    study = kit.write_study(tmp_path)
+    monkeypatch.setattr(sys, "argv", ["dva-sim", "run", "my study.yaml", "--set", "seed=3"])
+
+    def stop(*_: object, progress: object, **__: object) -> None:
+        raise KeyboardInterrupt("interrupted after 7 of 42 runs")
+
+    monkeypatch.setattr("dva_sim.experiments.execution.runner.run_study", stop)
+    code = study_runs.run(RunRequest(study, tmp_path / "out", jobs=1))
+    assert code == 130
+    *_, what, how = capsys.readouterr().out.splitlines()
+    assert what == "Stopped: interrupted after 7 of 42 runs"
+    assert how == "To go on: dva-sim run 'my study.yaml' --set seed=3"
+
+
+def test_ctrl_c_while_tables_are_written_says_that_all_runs_are_done(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stop(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("dva_sim.experiments.execution.runner.write_tables", stop)
+    with pytest.raises(KeyboardInterrupt, match="after 42 of 42 runs"):
+        run_study(kit.study_in(tmp_path), tmp_path / "out", jobs=1, episode=kit.cheap)

@@ -1,0 +1,372 @@
+"""What survives a DVA that was killed, and a file that is full, locked or something else."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import sqlite3
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from office import (
+    ADDRESS,
+    GUARD,
+    OPERATOR,
+    OTHER_GUARD,
+    ROBOT,
+    Office,
+)
+from walks import Walk, snapshot
+
+from dva_sim.core.assignments import Rules
+from dva_sim.core.dva import Dva
+from dva_sim.core.events import State
+from dva_sim.core.permissions import Access, AccessRule
+from dva_sim.core.sessions import Send
+from dva_sim.core.store import Store
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.protocol import messages as m
+
+RULES = Rules(containment=True, escalate_after=60.0)
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    return tmp_path / "state.sqlite"
+
+
+def keep(office: Office, memory: Store, now: float = 0.0) -> str | None:
+    return memory.keep(office.desk, office.desk.book.changes(), now)
+
+
+def next_life(office: Office, file: Path, now: float, epoch: float = 0.0) -> Dva:
+    """The office goes on with a new desk that knows what the file knows."""
+    memory = Store(file, epoch)
+    office.desk = office.new_desk()
+    memory.recall(office.desk, now)
+    memory.close()
+    return office.desk
+
+
+# --- what is remembered --------------------------------------------------------------------
+
+
+def test_an_empty_file_knows_nothing(file: Path) -> None:
+    memory = Store(file)
+    assert not memory.recall(Office().new_desk(), 0.0)
+    memory.close()
+
+
+def test_the_next_life_knows_events_devices_permissions_and_who_works_on_what(file: Path) -> None:
+    office, memory = Office(rules=RULES), Store(file)
+    office.fire(12, now=1.0)
+    office.fire(80, now=2.0, kind="flood")
+    office.say(OPERATOR, m.PermissionRequest(ROBOT, "teleoperation", ("heat_flux",)), 3.0)
+    office.progress(OPERATOR, "departed", 4.0)
+    keep(office, memory)
+    memory.close()
+    before = snapshot(office.desk)
+    assert set(before["engaged"]) == {(OPERATOR, 1), (ROBOT, 1), (GUARD, 2)}
+    assert snapshot(next_life(office, file, 5.0)) == before
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_after_any_day_the_next_life_knows_all_that_was_kept(seed: int, tmp_path: Path) -> None:
+    day = Walk(seed, tmp_path)
+    for _ in range(80):
+        day.step()
+    day._take(day._kill())
+    day.memory.close()
+
+
+def test_the_order_of_registration_lasts_when_a_device_moves(file: Path) -> None:
+    office, memory = Office(), Store(file)
+    keep(office, memory)
+    office.say(GUARD, m.Registration("guard", "Guard", "10.0.0.7"))
+    keep(office, memory)
+    memory.close()
+    ids = list(office.desk.registry.entries)
+    assert list(next_life(office, file, 0.0).registry.entries) == ids
+
+
+def test_times_of_different_lives_agree(file: Path) -> None:
+    """The first life began at 1000 s of the wall clock, the second at 1500 s."""
+    office, memory = Office(), Store(file, epoch=1000.0)
+    office.busy(GUARD, ROBOT, OPERATOR)
+    office.fire(12, now=480.0)
+    keep(office, memory)
+    memory.close()
+    next_life(office, file, 0.0, epoch=1500.0)
+    assert office.event().waiting_since == -20.0
+    office.busy(GUARD, ROBOT, OPERATOR)
+    assert office.tick(39.0) == []
+    assert office.event().state is State.PENDING
+    office.tick(40.0)
+    assert office.event().state is State.ESCALATED
+
+
+def test_devices_have_their_time_out_to_show_that_they_are_there(file: Path) -> None:
+    office, memory = Office(), Store(file)
+    office.ok(office.fire(12))
+    keep(office, memory)
+    memory.close()
+    desk = next_life(office, file, 100.0)
+    desk.tick(110.0)
+    assert office.working == {OPERATOR: 1, ROBOT: 1}
+    desk.tick(110.1)
+    assert office.working == {}
+
+
+def test_sessions_go_on_growing(file: Path) -> None:
+    office, memory = Office(), Store(file)
+    ask = m.PermissionRequest(ROBOT, "teleoperation")
+    first = office.say(OPERATOR, ask)[0].content
+    keep(office, memory)
+    assert isinstance(first, m.Permission)
+    office.say(OPERATOR, m.PermissionRevocation(ROBOT, OPERATOR, first.session))
+    keep(office, memory)
+    memory.close()
+    next_life(office, file, 1.0)
+    second = office.say(OPERATOR, ask)[0].content
+    assert isinstance(second, m.Permission)
+    assert second.session > first.session
+
+
+def test_a_permission_that_no_rule_allows_any_longer_ends_when_it_is_remembered(
+    file: Path,
+) -> None:
+    office, memory = Office(), Store(file)
+    content = office.say(OPERATOR, m.PermissionRequest(ROBOT, "teleoperation"))[0].content
+    keep(office, memory)
+    memory.close()
+    office.access = Access((AccessRule(levels=frozenset({"sensors"})),))
+    assert isinstance(content, m.Permission)
+    over = m.PermissionRevocation(ROBOT, OPERATOR, content.session)
+    assert next_life(office, file, 1.0).tick(1.0) == [Send(ROBOT, over), Send(OPERATOR, over)]
+
+
+def killed_before_the_robot_hears(file: Path) -> tuple[Office, Store, Send]:
+    """A session was ended, which was kept; what the robot said to that, nobody knows."""
+    office, memory = Office(), Store(file)
+    content = office.say(OPERATOR, m.PermissionRequest(ROBOT, "teleoperation"))[0].content
+    assert isinstance(content, m.Permission)
+    over = m.PermissionRevocation(ROBOT, OPERATOR, content.session)
+    assert office.say(OPERATOR, over)[1] == [Send(ROBOT, over)]
+    keep(office, memory)
+    return office, memory, Send(ROBOT, over)
+
+
+def test_a_robot_that_has_not_heard_of_an_end_is_told_by_the_next_life(file: Path) -> None:
+    office, memory, untold = killed_before_the_robot_hears(file)
+    memory.close()
+    assert next_life(office, file, 1.0).go_on() == [untold]
+
+
+def test_a_robot_that_did_not_answer_is_told_by_every_life_until_it_does(file: Path) -> None:
+    office, memory, untold = killed_before_the_robot_hears(file)
+    for life in range(3):
+        office.no([untold], life)
+        keep(office, memory)
+        memory.close()
+        assert next_life(office, file, life).go_on() == [untold]
+        memory = Store(file)
+        memory.recall(office.new_desk(), life)
+    office.ok([untold], 3.0)
+    keep(office, memory)
+    memory.close()
+    assert next_life(office, file, 4.0).go_on() == []
+
+
+def test_what_has_not_changed_is_not_written_again(file: Path) -> None:
+    office, memory = Office(), Store(file)
+    office.fire(12)
+    keep(office, memory)
+    written = memory._file.total_changes
+    office.say(OPERATOR, m.GetDeviceList())
+    office.beat(now=1.0)
+    keep(office, memory)
+    assert memory._file.total_changes == written
+    memory.close()
+
+
+# --- kills ---------------------------------------------------------------------------------
+
+
+def test_a_copy_of_the_file_taken_at_any_moment_knows_what_was_kept_until_then(
+    tmp_path: Path,
+) -> None:
+    """The file and its log, as a kill leaves them: nothing was closed."""
+    day = Walk(7, tmp_path)
+    for step in range(60):
+        day.step()
+        copy = tmp_path / f"copy-{step}.sqlite"
+        for end in ("", "-wal"):
+            shutil.copy(f"{day.file}{end}", f"{copy}{end}")
+        memory, desk = Store(copy, day.memory.epoch), day._desk()
+        memory.recall(desk, day.now)
+        memory.close()
+        assert snapshot(desk) == snapshot(day.desk)
+    day.memory.close()
+
+
+SAYS_WHAT_IT_KEPT = """
+import sys
+sys.path.insert(0, sys.argv[2])
+from office import Office
+from dva_sim.core.store import Memory
+office, memory = Office(), Memory(sys.argv[1])
+while True:
+    office.fire(20.0 * (office.desk.book.total + 1), source=sys.argv[3])
+    memory.keep(office.desk, office.desk.book.changes(), 0.0)
+    print(office.desk.book.total, flush=True)
+"""
+
+
+def test_a_process_that_is_killed_forgets_nothing_that_it_has_said(file: Path) -> None:
+    """Three kills, each amid the writing."""
+    for enough in (3, 17, 60):
+        command = [sys.executable, "-c", SAYS_WHAT_IT_KEPT, str(file)]
+        command += [str(Path(__file__).parents[1]), OPERATOR]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+            assert process.stdout is not None
+            said = 0
+            for line in process.stdout:
+                said = int(line)
+                if said == enough:
+                    process.send_signal(signal.SIGKILL)
+        memory, desk = Store(file), Office().new_desk()
+        memory.recall(desk, 0.0)
+        memory.close()
+        assert desk.book.total in (said, said + 1)
+        assert sum(desk.book.counts.values()) == desk.book.total
+        for path in file.parent.iterdir():
+            path.unlink()
+
+
+# --- files that do not work ----------------------------------------------------------------
+
+
+def test_a_full_disk_is_one_line_and_work_goes_on_and_is_caught_up_with(file: Path) -> None:
+    office, memory = Office(), Store(file)
+    keep(office, memory)
+    pages = memory._file.execute("PRAGMA page_count").fetchone()[0]
+    memory._file.execute(f"PRAGMA max_page_count = {pages}")
+    problems = set()
+    for number in range(40):
+        office.fire(20.0 * number)
+        problems.add(keep(office, memory))
+    assert problems - {None} == {"cannot keep its memory: database or disk is full"}
+    memory._file.execute("PRAGMA max_page_count = 100000")
+    office.register(OTHER_GUARD, "Guard", 5)
+    assert keep(office, memory) is None
+    memory.close()
+    before = snapshot(office.desk)
+    assert before["total"] == 40
+    assert snapshot(next_life(office, file, 0.0)) == before
+
+
+def test_a_file_that_another_holds_is_one_line_and_caught_up_with_later(file: Path) -> None:
+    office, memory = Office(), Store(file)
+    other = sqlite3.connect(file, isolation_level=None)
+    other.execute("BEGIN IMMEDIATE")
+    office.fire(12)
+    assert keep(office, memory) == "cannot keep its memory: database is locked"
+    other.execute("ROLLBACK")
+    other.close()
+    assert keep(office, memory) is None
+    memory.close()
+    assert next_life(office, file, 0.0).book.total == 1
+
+
+def refusal(file: Path) -> str:
+    with pytest.raises(ConfigError) as refused:
+        Store(file)
+    line = str(refused.value)
+    assert "\n" not in line
+    assert line.startswith(f"{file}: ")
+    return line.removeprefix(f"{file}: ")
+
+
+def test_a_folder_is_no_memory(tmp_path: Path) -> None:
+    assert refusal(tmp_path) == "cannot be used as the DVA's memory: unable to open database file"
+
+
+def test_a_file_in_a_folder_that_is_not_there_is_no_memory(tmp_path: Path) -> None:
+    assert "unable to open" in refusal(tmp_path / "nowhere" / "state.sqlite")
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="to root no file is read-only")
+def test_a_file_that_may_only_be_read_is_no_memory(file: Path) -> None:
+    Store(file).close()
+    file.chmod(0o444)
+    assert "readonly" in refusal(file)
+
+
+def test_a_text_is_no_memory_and_stays_as_it_is(file: Path) -> None:
+    file.write_text("dear diary, " * 100)
+    assert refusal(file) == "cannot be used as the DVA's memory: file is not a database"
+    assert file.read_text() == "dear diary, " * 100
+
+
+def test_the_database_of_something_else_is_no_memory_and_stays_as_it_is(file: Path) -> None:
+    with sqlite3.connect(file) as other:
+        other.execute("CREATE TABLE events (title TEXT)")
+    other.close()
+    before = file.read_bytes()
+    assert refusal(file) == "is not a DVA's memory of format 1"
+    assert file.read_bytes() == before
+
+
+@pytest.mark.parametrize("value", [0, 2])
+def test_a_memory_of_another_format_is_refused(file: Path, value: int) -> None:
+    memory = Store(file)
+    memory._file.execute("UPDATE about SET value = ? WHERE name = 'format'", (value,))
+    memory.close()
+    assert refusal(file) == "is not a DVA's memory of format 1"
+
+
+def test_a_file_that_another_holds_cannot_be_opened(
+    file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("dva_sim.core.store.OPEN_WITHIN", 0.01)
+    other = sqlite3.connect(file, isolation_level=None)
+    other.execute("BEGIN EXCLUSIVE")
+    assert refusal(file) == "cannot be used as the DVA's memory: database is locked"
+    other.close()
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        "UPDATE events SET data = 'not json'",
+        "UPDATE events SET data = json_remove(data, '$.times')",
+        "UPDATE events SET data = json_set(data, '$.state', 'on holiday')",
+        "UPDATE devices SET data = '[]'",
+        "UPDATE grants SET data = '{}'",
+        "DROP TABLE grants",
+    ],
+)
+def test_a_memory_whose_content_makes_no_sense_is_refused_in_one_line(
+    file: Path, damage: str
+) -> None:
+    office, memory = Office(), Store(file)
+    office.say(OPERATOR, m.PermissionRequest(ROBOT, "teleoperation"))
+    office.fire(12)
+    keep(office, memory)
+    memory._file.execute(damage)
+    with pytest.raises(ConfigError, match="cannot be used as the DVA's memory") as refused:
+        memory.recall(office.new_desk(), 0.0)
+    assert "\n" not in str(refused.value)
+    memory.close()
+
+
+def test_a_label_of_any_letters_is_kept_as_it_is(file: Path) -> None:
+    office, memory = Office(), Store(file)
+    office.say(GUARD, m.Registration("Zoë's 'guard' \U0001f525 \"1\"", "Guard", ADDRESS))
+    keep(office, memory)
+    memory.close()
+    entry = next_life(office, file, 0.0).registry.entries[GUARD]
+    assert entry.device.label == "Zoë's 'guard' \U0001f525 \"1\""

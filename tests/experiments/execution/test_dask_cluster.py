@@ -1,0 +1,258 @@
+"""Runs on a dask cluster of this machine give the same bytes, and what goes wrong is told."""
+
+from __future__ import annotations
+
+import signal
+import socket
+import sqlite3
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import patience
+import pytest
+import small_study as kit
+from dask_cluster import DaskCluster
+
+from dva_sim.experiments.execution import dask_cluster, scheduling
+from dva_sim.experiments.execution.executors import WorkersLost
+from dva_sim.experiments.execution.runner import run_study
+from dva_sim.experiments.execution.scheduling import limited
+from dva_sim.kernel.errors import ConfigError, DvaSimError, RunTooLong
+
+
+@pytest.fixture
+def dask(tmp_path: Path) -> Iterator[DaskCluster]:
+    folder = tmp_path / "cluster"
+    folder.mkdir()
+    with DaskCluster(folder) as started:
+        yield started
+
+
+@pytest.mark.system
+def test_a_worker_killed_half_way_loses_and_doubles_nothing(
+    tmp_path: Path, dask: DaskCluster, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    study = kit.study_in(tmp_path)
+    plain = kit.files(run_study(study, tmp_path / "plain", jobs=1, episode=kit.cheap))
+    for _ in range(2):
+        dask.add_worker()
+
+    def kill_one(done: int, total: int) -> None:
+        if done >= total // 2:
+            dask.workers[0].kill()
+
+    out = run_study(
+        study, tmp_path / "out", scheduler=dask.address, episode=kit.slower, progress=kill_one
+    )
+    assert dask.workers[0].wait() == -9
+    assert dask.workers[1].poll() is None
+    assert kit.files(out) == plain
+    with sqlite3.connect(out / "journal.sqlite") as journal:
+        (rows,) = journal.execute("SELECT count(*) FROM runs WHERE tables IS NOT NULL").fetchone()
+    journal.close()
+    assert rows == kit.RUNS
+
+
+@pytest.mark.system
+def test_a_scheduler_killed_half_way_ends_in_one_line_and_another_goes_on(
+    tmp_path: Path,
+    dask: DaskCluster,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    study = kit.study_in(tmp_path)
+    plain = kit.files(run_study(study, tmp_path / "plain", jobs=1, episode=kit.cheap))
+    dask.add_worker()
+    seen: list[int] = []
+
+    def kill_it(done: int, total: int) -> None:
+        seen.append(done)
+        if done >= total // 2:
+            dask.scheduler.kill()
+
+    out, address = tmp_path / "out", dask.address
+    monkeypatch.setattr(dask_cluster, "_CONNECT_S", 1.0)
+    with pytest.raises(WorkersLost) as lost:
+        run_study(study, out, scheduler=address, episode=kit.slower, progress=kill_it)
+    told = f"the scheduler at {address} is gone; {seen[-1]} of {kit.RUNS} runs are kept; "
+    told += "the same command goes on from there, also with another --scheduler or with --jobs"
+    assert str(lost.value) == told
+    assert capfd.readouterr() == ("", "")  # the library's logs are not let through
+    begun: list[int] = []
+    run_study(study, out, jobs=1, episode=kit.cheap, progress=lambda done, _: begun.append(done))
+    assert begun[0] == seen[-1] > 0
+    assert kit.files(out) == plain
+
+
+@pytest.mark.system
+def test_a_cluster_nobody_works_or_answers_in_is_told(
+    dask: DaskCluster, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with dask_cluster.DaskCluster(dask.address) as place:
+        place.look_after(is_idle=True)
+        monkeypatch.setattr(dask_cluster, "_WORKERS_S", 0.0)
+        with pytest.raises(
+            WorkersLost, match=r"has had no workers for 0 s: start some with 'dask w"
+        ):
+            place.look_after(is_idle=True)
+        monkeypatch.setattr(dask_cluster, "_CONNECT_S", 0.2)
+        dask.scheduler.send_signal(signal.SIGSTOP)
+        with pytest.raises(WorkersLost, match="has not answered for 0 s"):
+            place.look_after(is_idle=True)
+        place.look_after(is_idle=False)  # something has come meanwhile
+        dask.scheduler.send_signal(signal.SIGCONT)
+
+
+@pytest.mark.system
+def test_a_worker_with_another_profile_near_it_is_refused(
+    tmp_path: Path, dask: DaskCluster
+) -> None:
+    phones = tmp_path / "elsewhere" / "agents" / "phones"
+    phones.mkdir(parents=True)
+    (phones / "default.yaml").write_text("filter: none\n")
+    dask.add_worker(cwd=tmp_path / "elsewhere")
+    with pytest.raises(DvaSimError, match=r"worker tcp://.* has fingerprint \w+ \(here \w+\)"):
+        run_study(
+            kit.study_in(tmp_path), tmp_path / "out", scheduler=dask.address, episode=kit.cheap
+        )
+
+
+def test_programs_differ_in_what_a_run_depends_on_not_in_their_commit() -> None:
+    here = {"dva-sim": "1.0", "fingerprint": "abc", "commit": "123", "dirty": False, "numpy": "2.0"}
+    assert dask_cluster.differences(here, here | {"commit": None, "dirty": None}) == ""
+    assert dask_cluster.differences(here, here | {"numpy": "1.9"}) == "numpy 1.9 (here 2.0)"
+    older = {name: value for name, value in here.items() if name != "fingerprint"}
+    assert dask_cluster.differences(here, older) == "fingerprint None (here abc)"
+
+
+@pytest.mark.parametrize("address", ["127.0.0.1", "127.0.0.1:8786", "foo://127.0.0.1:1", "tcp://:"])
+def test_an_address_that_is_none_is_refused(tmp_path: Path, address: str) -> None:
+    with pytest.raises(ConfigError, match="should be like tcp://"):
+        run_study(kit.study_in(tmp_path), tmp_path / "out", scheduler=address)
+
+
+def test_a_scheduler_that_is_not_there_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(dask_cluster, "_CONNECT_S", 0.01)
+    with pytest.raises(ConfigError, match=r"no scheduler answers at tcp://127\.0\.0\.1:9: nothing"):
+        run_study(kit.study_in(tmp_path), tmp_path / "out", scheduler="tcp://127.0.0.1:9")
+
+
+@pytest.mark.parametrize(
+    ("says", "told"),
+    [(b"HTTP/1.0 400 Bad request\r\n\r\n", "something else"), (b"", r"nothing within 0\.2 s")],
+)
+def test_another_program_is_not_taken_for_a_scheduler(
+    says: bytes, told: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(dask_cluster, "_CONNECT_S", 30.0 if says else 0.2)
+    over = threading.Event()
+
+    def answer() -> None:
+        with server.accept()[0] as caller:
+            caller.sendall(says)
+            over.wait()
+
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
+        listener = threading.Thread(target=answer, daemon=True)
+        listener.start()
+        with pytest.raises(ConfigError, match=f"no scheduler answers at {address}: .*{told}"):
+            dask_cluster.DaskCluster(address)
+        over.set()
+        listener.join()
+
+
+def test_what_to_install_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(ConfigError, match=r"pip install 'dva-sim\[cluster\]'"):
+        run_study(kit.study_in(tmp_path), tmp_path / "out", scheduler="tcp://127.0.0.1:9")
+
+
+def test_processes_and_a_scheduler_exclude_each_other(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="not both"):
+        run_study(kit.study_in(tmp_path), tmp_path / "out", jobs=2, scheduler="tcp://127.0.0.1:9")
+
+
+def test_a_run_in_a_thread_of_a_worker_has_its_limit_too() -> None:
+    from concurrent.futures import ThreadPoolExecutor
+
+    def stalls() -> None:
+        with limited(0.05, may_exit=False):
+            while True:
+                time.monotonic()
+
+    def is_quick() -> str:
+        with limited(60.0, may_exit=False):
+            return "done"
+
+    with ThreadPoolExecutor(1) as executor:
+        assert executor.submit(is_quick).result() == "done"
+        with pytest.raises(RunTooLong, match=r"took more than its 0\.05 s"):
+            executor.submit(stalls).result()
+        assert executor.submit(is_quick).result() == "done"
+
+
+LOOKED_AT = """
+import sys, threading, time
+from dva_sim.experiments.execution.scheduling import limited
+from dva_sim.kernel.errors import RunTooLong
+
+def stalls():
+    try:
+        with limited(0.05, may_exit=False):
+            while True:
+                time.monotonic()
+    except RunTooLong:
+        pass
+
+def is_quick():
+    with limited(60.0, may_exit=False):
+        len("done")
+
+def looked_at():
+    return 1
+
+seen = []
+for run in (is_quick, stalls):
+    thread = threading.Thread(target=run)
+    thread.start()
+    thread.join()
+    sys.setprofile(lambda *what: seen.append(what[1]))
+    looked_at()
+    sys.setprofile(None)
+print(seen.count("call"))
+"""
+
+
+def test_after_a_limit_in_a_thread_a_profiler_still_gets_on() -> None:
+    """In a process of its own: it would not come back, and nothing after it either."""
+    done = patience.run([sys.executable, "-c", LOOKED_AT], capture_output=True, text=True)
+    assert done.stdout.strip() == "2", done.stderr
+
+
+def test_a_run_that_takes_the_limit_for_its_own_is_told_again(tmp_path: Path) -> None:
+    from concurrent.futures import ThreadPoolExecutor
+
+    def stubborn(job: object) -> kit.Tables:
+        for _ in range(2):
+            try:
+                while True:
+                    time.monotonic()
+            except BaseException:
+                continue
+        return {}
+
+    from dva_sim.experiments.study import cell_grid
+
+    job = cell_grid.jobs(kit.study_in(tmp_path))[0]
+    with ThreadPoolExecutor(1) as executor:
+        ended = executor.submit(scheduling.perform, job, stubborn, 0.05).result()
+    assert ended.error is None  # it has come back by itself, told twice
+    assert ended.tables == "{}"

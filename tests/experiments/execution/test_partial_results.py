@@ -1,0 +1,130 @@
+"""What `show` and `report` tell of a study that is still running, or was interrupted."""
+
+import json
+import sqlite3
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import small_study as kit
+
+from dva_sim.cli.results_json import shown
+from dva_sim.experiments.execution.checkpoint import load_so_far
+from dva_sim.experiments.execution.runner import run_study
+from dva_sim.experiments.report.report import write_report
+from dva_sim.experiments.results.manifest import status_of
+from dva_sim.experiments.results.results import Results
+from dva_sim.experiments.study.cell_grid import StudyJob
+from dva_sim.kernel.errors import ConfigError
+
+
+def measured(job: StudyJob) -> kit.Tables:
+    """A run that leaves its measures and no track."""
+    return {"runs": kit.cheap(job)["runs"]}
+
+
+@pytest.fixture
+def stopped(tmp_path: Path) -> Callable[[int], Path]:
+    """A results folder whose study was interrupted after some runs."""
+
+    def stop(after: int) -> Path:
+        def show(done: int, total: int) -> None:
+            if done >= after:
+                raise KeyboardInterrupt
+
+        with pytest.raises(KeyboardInterrupt):
+            run_study(
+                kit.study_in(tmp_path), tmp_path / "out", jobs=1, episode=measured, progress=show
+            )
+        return tmp_path / "out"
+
+    return stop
+
+
+def test_runs_are_made_person_by_person_so_that_all_cells_of_some_persons_are_known(stopped):
+    out = stopped(after=kit.RUNS - 5)
+    results = load_so_far(out)
+    assert results.manifest["partial"]["done"] == kit.RUNS - 5
+    assert results.manifest["partial"]["of"] == kit.RUNS
+    runs = results.runs
+    sizes = [np.sum((runs["part"] == "drive") & (runs["cell"] == c)) for c in set(runs["cell"])]
+    assert len(set(sizes)) == 1
+    persons = results.manifest["partial"]["persons"]
+    assert set(runs["person"]) == set(range(persons))
+    assert 0 < persons < 3
+
+
+def test_what_is_shown_so_far_are_rows_of_the_results_to_come(stopped, tmp_path):
+    out = stopped(after=kit.RUNS - 5)
+    part = load_so_far(out).runs
+    whole = Results.load(run_study(kit.study_in(tmp_path), out, jobs=1, episode=measured)).runs
+    in_part = np.isin(whole["person"], np.unique(part["person"]))
+    assert part["drive_time_s"].tolist() == whole["drive_time_s"][in_part].tolist()
+    assert part["seed"].tolist() == whole["seed"][in_part].tolist()
+    assert part["config"].tolist() == whole["config"][in_part].tolist()
+
+
+def test_the_page_of_a_study_under_way_is_marked_partial_and_the_final_one_is_not(
+    stopped, tmp_path
+):
+    out = stopped(after=kit.RUNS - 5)
+    told = f'<p class="banner" role="status">Partial: {kit.RUNS - 5} of {kit.RUNS} runs are done'
+    assert told in write_report(out).read_text(encoding="utf-8")
+    assert status_of(load_so_far(out).manifest).kind == "exploratory"
+    run_study(kit.study_in(tmp_path), out, jobs=1, episode=measured)
+    assert "Partial:" not in write_report(out).read_text(encoding="utf-8")
+
+
+def test_as_data_it_says_how_much_is_there(stopped):
+    told = shown(load_so_far(stopped(after=kit.RUNS - 5)))
+    assert told["partial"] == {"done": kit.RUNS - 5, "of": kit.RUNS, "persons": told["persons"]}
+
+
+def test_looking_changes_nothing_in_the_folder(stopped, tmp_path):
+    out = stopped(after=kit.RUNS - 5)
+    before = sorted(path.name for path in out.rglob("*"))
+    load_so_far(out)
+    assert sorted(path.name for path in out.rglob("*")) == before
+
+
+def test_before_any_person_has_all_runs_that_is_said(stopped):
+    out = stopped(after=2)
+    with pytest.raises(ConfigError, match=f"2 of {kit.RUNS} runs are done, and no person has all"):
+        load_so_far(out)
+
+
+def test_a_failed_run_counts_as_ended_and_is_listed(tmp_path):
+    def failing(job):
+        if job.person == 2 and job.trial == 0:
+            raise KeyboardInterrupt
+        if job.person == 0 and job.index == 1:
+            raise ValueError("sank")
+        return measured(job)
+
+    out = tmp_path / "out"
+    with pytest.raises(KeyboardInterrupt):
+        run_study(kit.study_in(tmp_path), out, jobs=1, episode=failing)
+    results = load_so_far(out)
+    assert {f["error"] for f in results.failures} == {"ValueError: sank"}
+    assert set(results.runs["person"]) == {0, 1}
+
+
+def test_an_unfinished_study_of_an_older_version_is_refused_in_one_line(tmp_path):
+    with sqlite3.connect(tmp_path / "journal.sqlite") as db:
+        db.execute("CREATE TABLE study (id INTEGER, identity TEXT, wall_s REAL)")
+        db.execute("INSERT INTO study VALUES (1, 'abc', 0)")
+    with pytest.raises(ConfigError, match="unfinished study of another version of dva-sim"):
+        load_so_far(tmp_path)
+
+
+def test_a_file_is_no_results_folder(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(ConfigError, match="is not a folder; give the folder"):
+        load_so_far(tmp_path / "file")
+
+
+def test_a_finished_folder_is_read_as_it_is(tmp_path):
+    out = run_study(kit.study_in(tmp_path), tmp_path / "out", jobs=1, episode=measured)
+    assert load_so_far(out).manifest == json.loads((out / "manifest.json").read_text())
+    assert not load_so_far(out).partial

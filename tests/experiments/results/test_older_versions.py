@@ -1,0 +1,94 @@
+"""Results and recordings that version 0.7.0 wrote are still read; it made `data/results-0.7.0`."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+from command_line import call
+
+import dva_sim
+
+DATA = Path(__file__).parents[2] / "data" / "results-0.7.0"
+CONFIRMED_S = {"req-rep": [39.477242, 110.563333], "latest-wins": [35.876995, 88.163333]}
+
+
+@pytest.fixture
+def older(tmp_path):
+    """A copy, since a report is written into it."""
+    return Path(shutil.copytree(DATA, tmp_path / "older"))
+
+
+@pytest.fixture
+def unfinished(older):
+    """As an interrupted study left them: the runs, and neither tables nor manifest."""
+    (older / "manifest.json").unlink()
+    shutil.rmtree(older / "tables")
+    return older
+
+
+def test_older_results_are_loaded(older):
+    results = dva_sim.load(older)
+    assert results.manifest["versions"]["dva-sim"] == "0.7.0"
+    assert results.tables == ["events", "operators", "runs", "tracks"]
+    for pattern, times in CONFIRMED_S.items():
+        rows = results.runs.where(results.runs["pattern"] == pattern)
+        assert rows["drive_time_s"] == pytest.approx(times)
+    assert "No difference" in results.answer.lead
+
+
+def test_older_results_are_shown(older):
+    done = call("show", older)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "dva-sim 0.7.0" in done.stdout
+    assert dva_sim.load(older).answer.lead.split(".")[0] in done.stdout
+
+
+def test_the_columns_of_older_results_are_explained(older):
+    done = call("show", older, "--columns")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "detection until somebody is on scene" in done.stdout
+
+
+@pytest.mark.system  # draws
+def test_older_results_are_reported(older):
+    assert call("report", older).returncode == 0
+    assert "dva-sim 0.7.0" in (older / "report.html").read_text()
+
+
+def test_older_results_are_compared_with_others(older, tmp_path):
+    copy = shutil.copytree(DATA, tmp_path / "copy")
+    done = call("compare", older, copy, "--fail-if", "mean(drive_time_s) > 1x")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert dva_sim.compare(older, copy).paired == (4, 4)
+
+
+def test_older_results_are_exported(older, tmp_path):
+    (file,) = dva_sim.export(older, tmp_path / "runs.csv")
+    assert len(file.read_text().splitlines()) == 1 + 4
+
+
+def test_an_older_unfinished_study_is_shown_as_far_as_it_is(unfinished):
+    done = call("show", unfinished)
+    assert done.returncode == 0
+    assert "Partial: 4 of 4 runs are done." in done.stdout
+
+
+@pytest.mark.parametrize("finished", [True, False])
+def test_an_older_study_is_not_gone_on_with_by_another_program(older, finished):
+    if not finished:
+        (older / "manifest.json").unlink()
+    done = call("run", older / "study.yaml", "-o", older)
+    assert done.returncode == 2
+    (line,) = done.stderr.splitlines()
+    assert "the program or its libraries were changed; give another folder with -o" in line
+
+
+def test_an_older_recording_is_played(older):
+    played = dva_sim.replay(older / "recordings" / "drive-0-0-0.mcap")
+    assert played.measures["drive_time_s"] == pytest.approx(CONFIRMED_S["req-rep"][0])
+
+
+def test_an_older_recording_is_told(older):
+    done = call("replay", older / "recordings" / "drive-0-0-0.mcap")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "simulated by dva-sim 0.7.0" in done.stdout

@@ -1,0 +1,103 @@
+"""Where a mistake is told: at the `--set` that makes it, at its key, or in its file."""
+
+from __future__ import annotations
+
+import pytest
+from small_study import STUDY, write_study
+
+from dva_sim.experiments.execution.dry_run import rehearse_all
+from dva_sim.experiments.report.episode import EpisodeRequest
+from dva_sim.experiments.study.study_file import load_study
+from dva_sim.kernel.config import load_yaml
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.key_changes import build, parse_changes, set_by
+from dva_sim.simulation.scenario import Scenario
+from dva_sim.testing.file_kinds import mistakes_of
+
+
+def played(request):
+    return [request.play(scenario) for scenario in request.scenarios()]
+
+
+def complaint_of_study(folder, *settings):
+    with pytest.raises(ConfigError) as caught:
+        rehearse_all(load_study(write_study(folder, STUDY), settings))
+    return str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("setting", "told"),
+    [
+        ("person=4", "unknown key 'person'; did you mean 'persons'?"),
+        ("robots=3", "unknown key 'robots'; did you mean 'robot.count'?"),
+        ("trials=3", "unknown key 'trials'; did you mean 'replications'?"),
+        ("seed=-1", "should be at least 0, not -1"),
+        ("persons=5%", "should be a whole number, not '5%'"),
+        ("link.delay_s=500ms", "should be a number, not '500ms'; write 0.5"),
+        ("link.delay_s=[0, fast]", "should be a number, not 'fast'"),
+        (
+            "factors.pattern=[req-rep, pubsub]",
+            "pattern 'pubsub' is unknown; did you mean 'pub-sub'?",
+        ),
+        ("robot.count=9", "site 'caparica' has 3 robot bases, the scenario needs more"),
+        ("link.jitter_s=9", "link: jitter_s 9 is above delay_s 0"),
+        ("phone.filter=medain", "filter 'medain' is unknown; did you mean 'median'?"),
+        ("answer.measure=time_s", "measure 'time_s' is unknown; known: confirmed, drive_time_s"),
+        ("answer.contrast=[req-rep, pubsub]", "'pubsub' is not a level of 'pattern'; levels: "),
+        ("parts.drive.scenario=fire-dril", "scenario 'fire-dril' not found; did you mean 'fire-d"),
+        ("events=[{kind: fire, room: Archives}]", "no room 'Archives'; did you mean 'Archive'?"),
+        ("parts=3", "should be a mapping of keys to values, not 3"),
+    ],
+)
+def test_a_mistake_in_a_setting_of_a_study_is_told_at_that_setting(tmp_path, setting, told):
+    line = complaint_of_study(tmp_path, "persons=2", setting, "replications=1")
+    assert line.startswith(f"--set {setting}: ")
+    assert told in line
+
+
+def test_of_several_mistakes_in_settings_the_first_is_told(tmp_path):
+    line = complaint_of_study(tmp_path, "persons=2", "seed=-1", "replications=none")
+    assert line == "--set seed=-1: should be at least 0, not -1"
+
+
+def test_settings_that_exclude_each_other_are_told_together(tmp_path):
+    (tmp_path / "one.yaml").write_text("horizon_s: 60\n")
+    document = load_yaml(tmp_path / "one.yaml")
+    pairs = ["robot.count=0", "horizon_s=50", "guard.count=0"]
+    with pytest.raises(ConfigError) as caught:
+        build(Scenario, document, parse_changes(pairs), lambda s, _: s, lambda *_: None)
+    # Without the first of them somebody can act; without the last nobody can either.
+    assert caught.value.keys == ("robot.count",)
+    assert str(set_by(pairs, caught.value)).startswith("--set robot.count=0: ")
+
+
+def test_a_mistake_of_the_file_itself_stays_there_whatever_is_set(tmp_path):
+    text = STUDY.replace("persons: 3", "persons: none")
+    with pytest.raises(ConfigError, match=r"study\.yaml:3:1: persons: should be a whole number"):
+        load_study(write_study(tmp_path, text), ["replications=1"])
+
+
+@pytest.mark.parametrize(
+    ("setting", "told"),
+    [
+        ("robots=2", "unknown key 'robots'; did you mean 'robot.count'?"),
+        ("robot.count=20", "site 'caparica' has 3 robot bases"),
+        ("link.delay_s=-1", "should be at least 0, not -1"),
+        ("robot.count=0", "nobody can respond: robot.count and guard.count are 0"),
+    ],
+)
+def test_a_mistake_in_a_setting_of_an_episode_is_told_at_that_setting(tmp_path, setting, told):
+    path = tmp_path / "one.yaml"
+    path.write_text("description: one robot\nhorizon_s: 60\n")
+    with pytest.raises(ConfigError) as caught, mistakes_of(str(path), ["horizon_s=5", setting], 1):
+        played(EpisodeRequest(str(path), changes=["horizon_s=5", setting]))
+    assert str(caught.value).startswith(f"--set {setting}: ")
+    assert told in str(caught.value)
+
+
+def test_what_a_scenario_cannot_place_is_told_at_its_key(tmp_path):
+    path = tmp_path / "many.yaml"
+    path.write_text("description: many\nrobot:\n  count: 20\n")
+    told = r"many\.yaml:3:3: site 'caparica' has 3 robot bases"
+    with pytest.raises(ConfigError, match=told), mistakes_of(str(path), [], 1):
+        played(EpisodeRequest(str(path)))

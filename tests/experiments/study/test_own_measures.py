@@ -1,0 +1,131 @@
+"""A study can bring its own measures and models, in files that are read by every process."""
+
+import json
+import shutil
+
+import pytest
+from small_study import STUDY, study_in
+
+from dva_sim.cli import names
+from dva_sim.experiments.execution.runner import run_study
+from dva_sim.experiments.report.report import write_report
+from dva_sim.experiments.results.results import Results
+from dva_sim.experiments.study import cell_grid
+from dva_sim.kernel import resources
+from dva_sim.kernel.errors import ConfigError
+
+MEASURE = """\
+from dva_sim.kernel.measure import Measure
+from dva_sim.simulation.run_measures import RunMeasure
+
+
+class Mine(RunMeasure):
+    about = Measure("standing_s", "time that robots stood", title="time standing")
+
+    def of(self, recording):
+        tracks = recording.recorder.tracks
+        points = [p for name in tracks if name.startswith("robot") for p in tracks[name]]
+        pairs = zip(points, points[1:])
+        return sum(b.time - a.time for a, b in pairs if (a.x, a.y) == (b.x, b.y))
+"""
+SMALL = (
+    STUDY.replace("persons: 3", "persons: 2")
+    .replace("replications: 2", "replications: 1")
+    .replace("    reference: {operator.strategy: oracle}\n", "")
+    .replace("link.delay_s: [0, 0.25]", "link.delay_s: [0]")
+    .replace("measure: drive_time_s", "measure: standing_s")
+    .replace("  over: link.delay_s\n", "")
+    .replace("  story:\n    scenario: one.yaml\n    replications: 1\n", "")
+)
+
+
+def study_with(tmp_path, measures="[mine.py:Mine]", code=MEASURE, text=SMALL):
+    (tmp_path / "mine.py").write_text(code)
+    return study_in(tmp_path, text=f"{text}measures: {measures}\n")
+
+
+def test_a_study_measures_what_a_file_beside_it_says_in_every_process(tmp_path):
+    study = study_with(tmp_path)
+    run_study(study, tmp_path / "two", jobs=2)
+    found = Results.load(tmp_path / "two")
+    assert (found.runs["standing_s"] > 0).all()
+    told = {column.name: column for column in found.columns("runs")}
+    assert (told["standing_s"].unit, told["standing_s"].meaning) == ("s", "time that robots stood")
+
+
+def test_results_are_read_without_the_file_and_say_what_it_said(tmp_path):
+    study = study_with(tmp_path)
+    run_study(study, tmp_path / "out", jobs=1)
+    manifest = json.loads((tmp_path / "out" / "manifest.json").read_text())
+    assert manifest["columns"]["runs"]["standing_s"]["title"] == "time standing"
+    assert [name for name in manifest["inputs"] if name.endswith("mine.py:Mine")]
+    (tmp_path / "mine.py").write_text("raise SystemExit('read from a results folder')\n")
+    assert "standing" in write_report(tmp_path / "out").read_text()
+
+
+def test_a_study_without_own_measures_is_the_same_study_as_ever(tmp_path):
+    assert "measures" not in study_in(tmp_path).asked()
+
+
+@pytest.mark.parametrize(
+    ("measures", "code", "said"),
+    [
+        ("[none.py:Mine]", MEASURE, "measure 'none.py:Mine': file 'none.py' not found; looked in"),
+        ("[mine.py:Yours]", MEASURE, "there is no class 'Yours' in"),
+        ("[mine.py:Mine, mine.py:Mine]", MEASURE, None),
+        ("[mine.py:Mine]", MEASURE.replace("standing_s", "path_m"), "cannot be called 'path_m'"),
+        ("[mine.py:Mine]", MEASURE.replace("standing_s", "seed"), "cannot be called 'seed'"),
+    ],
+)
+def test_a_measure_that_cannot_be_is_refused_before_any_run(tmp_path, measures, code, said):
+    study = study_with(tmp_path, measures, code)
+    if said is None:  # twice the same is once
+        assert cell_grid.cells(study)
+        return
+    with pytest.raises(ConfigError, match=said) as refused:
+        cell_grid.cells(study)
+    assert refused.value.line == study._document.places[("measures", 0)][0]
+
+
+def test_a_measure_of_another_model_is_not_there_to_be_asked_for(tmp_path):
+    code = MEASURE.replace("    about", '    models = ("timed",)\n    about')
+    with pytest.raises(ConfigError, match="measure 'standing_s' is unknown"):
+        cell_grid.cells(study_with(tmp_path, code=code))
+
+
+def test_a_run_whose_measure_fails_is_a_failure_that_is_told(tmp_path):
+    study = study_with(tmp_path, code=MEASURE.replace("return sum", "return 1 / 0 + sum"))
+    run_study(study, tmp_path / "out", jobs=1)
+    (error, *_) = [row["error"] for row in Results.load(tmp_path / "out").failures]
+    assert "measure 'standing_s' cannot be taken: ZeroDivisionError" in error
+
+
+QUEUE = """\
+question: How long do alarms wait?
+persons: 4
+replications: 1
+factors:
+  guards: [2, 3]
+parts:
+  queue: {scenario: queue.yaml}
+answer: {part: queue, measure: wait_mean_s, factor: guards, contrast: [2, 3]}
+"""
+
+
+def test_a_model_in_a_file_beside_its_scenario_is_played_in_every_process(tmp_path):
+    shipped = next(root for root in resources.roots() if (root / "experiments/models").is_dir())
+    shutil.copy(shipped / "experiments/models/alarm_queue.py", tmp_path / "queue.py")
+    (tmp_path / "queue.yaml").write_text("model: queue.py:AlarmQueue\nalarms: 200\n")
+    study = study_in(tmp_path, text=QUEUE)
+    run_study(study, tmp_path / "out", jobs=2)
+    (tmp_path / "queue.py").unlink()
+    found = Results.load(tmp_path / "out")
+    waits, guards = found.runs["wait_mean_s"], found.runs["guards"]
+    assert waits[guards == 2].mean() > waits[guards == 3].mean()
+    told = {column.name: column.meaning for column in found.columns("alarms")}
+    assert told["service_s"] == "that the guard needed"
+    assert write_report(tmp_path / "out").is_file()
+
+
+def test_what_can_be_named_holds_the_models():
+    assert {entry.name for entry in names.everything("models")["models"]} >= {"full", "timed"}

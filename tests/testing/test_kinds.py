@@ -1,0 +1,57 @@
+"""What users may bring, tried in test suites of their own: one entry for each kind."""
+
+import pytest
+
+from dva_sim import testing
+from dva_sim.agents.operator.strategies import Pursuit
+from dva_sim.agents.tilt.filters import MovingMedian
+from dva_sim.core.dispatch import MinEta
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.testing.kinds import TRIALS, plural
+
+
+class Greedy(MinEta):
+    """Sends everybody to the first task."""
+
+    def advise(self, situation, rng):
+        first = super().advise(situation, rng)
+        return [*first, *first]
+
+
+@pytest.mark.parametrize("kind", TRIALS)
+def test_every_kind_has_plugins_and_a_function_that_tries_it(kind):
+    trial = TRIALS[kind]
+    plugins = trial.load_plugins()
+    assert plugins.known() or plugins.files()
+    assert trial.known() or plugins.files()
+    assert getattr(testing, f"check_{kind}") is trial.load_check()
+    assert f"check_{kind}" in dir(testing)
+    assert "2 " in trial.ways(testing.Outcome((), (), 2, 0.001))
+
+
+def test_what_keeps_its_promises_is_tried_by_its_name_or_its_class():
+    assert testing.check_policy("min_eta").tries == 200
+    assert testing.check_policy(MinEta).tries == 200
+    assert testing.check_filter(MovingMedian, {"window": 5}).broken == ()
+    assert testing.check_operator(Pursuit).broken == ()
+
+
+def test_what_breaks_them_fails_the_test_with_a_line_for_each():
+    with pytest.raises(AssertionError, match=r"task 0 .*in situation 1") as failed:
+        testing.check_policy(Greedy)
+    assert failed.value.outcome.broken == tuple(str(failed.value).splitlines())
+
+
+def test_what_cannot_be_had_is_a_mistake_in_the_call():
+    with pytest.raises(ConfigError, match="policy 'Greedy' has no option 'speed'"):
+        testing.check_policy(Greedy, {"speed": 3})
+    with pytest.raises(ConfigError, match="filter 'mean' is unknown"):
+        testing.check_filter("mean")
+    with pytest.raises(ConfigError, match="'Pursuit' is not a policy; should be a class derived"):
+        testing.check_policy(Pursuit)
+    with pytest.raises(AttributeError, match="'check_car'"):
+        _ = testing.check_car
+
+
+def test_several_of_a_kind_are_called_as_in_english():
+    assert [plural(kind) for kind in ("policy", "robot")] == ["policies", "robots"]

@@ -1,0 +1,129 @@
+"""A measure of the user's that breaks a promise is found out, each fault by its own line."""
+
+import math
+from types import MappingProxyType
+
+import pytest
+
+from dva_sim.cli import checks
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.measure import Measure
+from dva_sim.simulation.run_measures import RunMeasure, load_measure
+from dva_sim.testing.measures import try_measure
+
+
+def measure(
+    of, *, name="trial_time_s", meaning="mean time of the trials", models=("task",), **of_it
+):
+    """A measure of short tasks, which are the quickest runs."""
+    about = Measure(name, meaning, **of_it)
+    return type("Mine", (RunMeasure,), {"about": about, "models": models, "of": of})
+
+
+def mean_time(self, trials):
+    return sum(trial["trial_time_s"] for trial in trials) / len(trials)
+
+
+def counts_calls(self, trials):
+    self.calls = getattr(self, "calls", 0) + 1
+    return float(self.calls)
+
+
+def remembers_runs(self, trials):
+    self.first = getattr(self, "first", trials[0]["trial_time_s"])
+    return self.first
+
+
+def drops_a_trial(self, trials):
+    del trials[0]
+    return 1.0
+
+
+def changes_a_trial(self, trials):
+    trials[0]["waits"] = 99
+    return 1.0
+
+
+def test_a_measure_that_keeps_its_promises_is_told_nothing():
+    outcome = try_measure(measure(mean_time))
+    assert (outcome.broken, outcome.warnings, outcome.tries) == ((), (), 6)
+
+
+def test_the_shipped_example_keeps_its_promises():
+    name = "nearest_person.py:NearestPerson"
+    assert try_measure(lambda: type(load_measure(name))(), slow=60.0).broken == ()
+    assert checks.check(["measure", name], []) == 0
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (measure(lambda *_: math.inf), "answers what is no finite number and not None: inf of"),
+        (measure(lambda *_: "much"), "answers what is no finite number and not None: 'much' of"),
+        (measure(lambda *_: [1.0]), "answers what is no finite number and not None: [1.0] of"),
+        (measure(lambda *_: -1.0), "leaves its bounds: -1 of tasks/fitts-lag, seed 1; bounds 0 "),
+        (measure(lambda *_: 3.0, high=2.0), "leaves its bounds: 3 of"),
+        (measure(drops_a_trial), "changes the recording: of tasks/fitts-lag, seed 1"),
+        (measure(changes_a_trial), "changes the recording: of tasks/fitts-lag, seed 1"),
+        (measure(counts_calls), "answers differently when it is asked again: 1.0, 2.0 of"),
+        (measure(remembers_runs), "a new copy answers differently: "),
+        (measure(lambda *_: 1 / 0), "raises: ZeroDivisionError: division by zero (test_measures"),
+        (measure(mean_time, meaning=" "), "does not say what it means: about.meaning of"),
+        (measure(mean_time, name="waits"), "is called as another measure is: waits"),
+        (measure(mean_time, low=2.0, high=1.0), "has bounds that nothing is within: 2 to 1"),
+    ],
+)
+def test_a_broken_promise_is_told_in_a_plain_line(make, said):
+    outcome = try_measure(make)
+    assert any(line.startswith(said) for line in outcome.broken), outcome.broken
+
+
+def test_a_measure_that_never_says_anything_earns_a_warning():
+    outcome = try_measure(measure(lambda *_: None))
+    assert outcome.broken == ()
+    assert outcome.warnings == ("says nothing of any run that was tried",)
+
+
+def test_a_slow_measure_earns_a_warning():
+    (warning,) = try_measure(measure(mean_time), slow=0.0).warnings
+    assert warning.startswith("is slow: ")
+
+
+def test_a_measure_of_no_model_of_ours_cannot_be_tried():
+    with pytest.raises(ConfigError, match="should read one of our models to be tried"):
+        try_measure(measure(mean_time, models=("mine.py:Mine",)))
+
+
+@pytest.mark.parametrize(
+    ("body", "said"),
+    [
+        ("def of(self, recording): return 1.0", "should say what it is: about = Measure"),
+        ("about = Measure('a b', 'x')\n    def of(self, r): return 1.0", "is called 'a b'; should"),
+        ("about = Measure('b_s', 'x')", "has no of(recording); should define it"),
+    ],
+)
+def test_a_class_that_is_no_measure_is_refused_in_one_line(tmp_path, body, said):
+    head = (
+        "from dva_sim.kernel.measure import Measure\n"
+        "from dva_sim.simulation.run_measures import RunMeasure\n"
+    )
+    (tmp_path / "mine.py").write_text(f"{head}class Mine(RunMeasure):\n    {body}\n")
+    with pytest.raises(ConfigError, match=said.replace("(", r"\(").replace(")", r"\)")):
+        load_measure("mine.py:Mine", tmp_path)
+
+
+def test_a_file_that_changed_is_read_anew(tmp_path):
+    import os
+
+    text = (
+        "from dva_sim.kernel.measure import Measure\n"
+        "from dva_sim.simulation.run_measures import RunMeasure\n"
+        "class Mine(RunMeasure):\n"
+        "    about = Measure('b_s', 'x')\n"
+        "    def of(self, recording): return NUMBER\n"
+    )
+    file = tmp_path / "mine.py"
+    for number in (1.0, 2.0):
+        file.write_text(text.replace("NUMBER", str(number)))
+        os.utime(file, (number, number))
+        assert load_measure("mine.py:Mine", tmp_path).of(MappingProxyType({})) == number
