@@ -19,7 +19,7 @@ from dva_sim.agents.operator.strategies import (
     Strategy,
     View,
 )
-from dva_sim.agents.person import Person, Population, median_person
+from dva_sim.agents.population import Person, Population, median_person
 from dva_sim.agents.route_following import Route
 
 ROBOT = Reach(speed=0.5, turn_rate=math.pi / 6)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from functools import cache
 
 from dva_sim.agents.observation import Observation
-from dva_sim.agents.robot.camera import FieldOfView, HazardSpot
+from dva_sim.agents.robot.field_of_view import FieldOfView, HazardSpot
 from dva_sim.agents.robot.manoeuvres import Sensed
 from dva_sim.agents.robot.missions import PERIOD, MissionGoal, Pilot, PilotStep
 from dva_sim.agents.robot.robot import Surrounded

@@ -12,8 +12,8 @@ from dva_sim.core.assignments import Rules
 from dva_sim.core.dispatch import MinEta, Policy
 from dva_sim.core.dva import Dva
 from dva_sim.core.events import Event, State
-from dva_sim.core.permissions import Access, Permissions
-from dva_sim.core.sessions import Send, Sessions
+from dva_sim.core.permissions import Access
+from dva_sim.core.sessions import Permissions, Send, Sessions
 from dva_sim.core.travel_times import SiteKnowledge, Start
 from dva_sim.protocol import messages as m
 

@@ -23,8 +23,8 @@ from dva_sim.core.dispatch import (
 )
 from dva_sim.core.dva import Dva
 from dva_sim.core.events import ACT_STEPS, STEPS, Event, State
-from dva_sim.core.permissions import Access, AccessRule, Permissions
-from dva_sim.core.sessions import Send, Sessions
+from dva_sim.core.permissions import Access, AccessRule
+from dva_sim.core.sessions import Permissions, Send, Sessions
 from dva_sim.core.store import Store
 from dva_sim.core.travel_times import SiteKnowledge, WaitingPlace
 from dva_sim.protocol import messages as m

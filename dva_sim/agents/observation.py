@@ -1,6 +1,6 @@
 """What an operator is shown of the world: observations, frames, and how far one sees in smoke.
 
-A robot's camera makes them (`robot.camera`), operators see nothing else.
+A robot's camera makes them (`robot.field_of_view`), operators see nothing else.
 
 References:
     T. Jin: Visibility and human behavior in fire smoke. SFPE Handbook of Fire Protection

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dva_sim.agents.observation import Observation
-from dva_sim.agents.person import Person
+from dva_sim.agents.population import Person
 
 REACH = 2.0  # on a route in a building, one looks for one's place so far ahead of the last [m]
 BENT = 1.5  # way along a route to what one moves straight; around a right angle, up to 1.41

@@ -26,8 +26,8 @@ from dva_sim.validation.dispatch import result_page as dispatch_page
 from dva_sim.validation.frame import ResultSheet, ValidationResult
 from dva_sim.validation.network import comparison, measurement, reference
 from dva_sim.validation.network import result_page as network_page
-from dva_sim.validation.network.emulator.campaign import Progress
 from dva_sim.validation.network.emulator.cell import PACKETS, PROXY
+from dva_sim.validation.network.emulator.measuring import Progress
 from dva_sim.validation.network.emulator.process import why_no_packets
 from dva_sim.validation.network.verdicts import ConditionGroup, grouped
 from dva_sim.validation.operators import experiment_runs as operators

@@ -1,10 +1,14 @@
-"""Sessions as the DVA keeps them: whom it grants what, and who has to hear that it is over."""
+"""Sessions as the DVA keeps them: who holds which robot, and who has to hear that it is over.
+
+There is one holder at a time, whose session is a fencing token (`Permissions`).
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import KW_ONLY, dataclass, field
+from typing import TypeVar
 
-from dva_sim.core.permissions import Grant, Permissions
 from dva_sim.protocol import messages as m
 
 
@@ -136,3 +140,130 @@ class Sessions:
         self.tell_robot(body)
         if holder_too and grant.holder != self.permissions.own:
             self._over.append(Send(grant.holder, body))
+
+
+K = TypeVar("K")
+
+MOST_OBSERVERS = 10_000
+LOW_BITS = 32  # of a session: nobody can guess them; the bits above only grow
+
+
+@dataclass(frozen=True, slots=True)
+class Grant:
+    """A permission that holds.
+
+    Attributes:
+        robot: Id of the robot.
+        holder: Id of the device that may act.
+        level: `teleoperation`, `missions`, `both` or `sensors`.
+        session: Fencing token: a robot obeys only the highest it was told.
+        sensors: Sensors that the holder may subscribe to.
+        address: Where the holder is found.
+    """
+
+    robot: str
+    holder: str
+    level: str
+    session: int
+    _: KW_ONLY
+    sensors: tuple[str, ...] = ()
+    address: str | None = None
+
+
+@dataclass
+class Permissions:
+    """At most one grant to drive each robot, and any number to read its sensors.
+
+    Attributes:
+        draw: Gives `LOW_BITS` random bits.
+        count: Sessions handed out so far, from any start that is higher than in an earlier
+            life of the DVA: it makes sessions grow.
+        changes: How often a grant was made, or ended.
+        own: Id of the DVA, which may hold robots itself: its grants yield to all others.
+    """
+
+    draw: Callable[[], int]
+    count: int = 1000
+    grants: dict[str, Grant] = field(default_factory=dict)
+    observers: dict[tuple[str, str], Grant] = field(default_factory=dict)
+    changes: int = 0
+    own: str = ""
+
+    def request(
+        self,
+        robot: str,
+        holder: str,
+        level: str,
+        sensors: tuple[str, ...] = (),
+        address: str | None = None,
+    ) -> tuple[Grant | None, bool]:
+        """Grant a robot that is free, or already the holder's.
+
+        Returns:
+            The grant, or None if another holds the robot; and whether the robot has to be told:
+            of what it knows already, asked for once more, it has not.
+        """
+        only_sensors = level == "sensors"
+        held = self.observers.get((robot, holder)) if only_sensors else self.grants.get(robot)
+        if held is not None and held.holder not in (holder, self.own):
+            return None, False
+        if only_sensors and held is None and len(self.observers) >= MOST_OBSERVERS:
+            return None, False
+        asked = holder, level, sensors
+        same = held is not None and (held.holder, held.level, held.sensors) == asked
+        session = held.session if held is not None and same else self._new_session(only_sensors)
+        grant = Grant(robot, holder, level, session, sensors=sensors, address=address)
+        self.changes += grant != held
+        if only_sensors:
+            self.observers[robot, holder] = grant
+        else:
+            self.grants[robot] = grant
+        return grant, grant != held
+
+    def _new_session(self, only_sensors: bool) -> int:
+        """Only the right to drive is fenced by the height of its session."""
+        self.count += not only_sensors
+        return self.count << LOW_BITS | self.draw()
+
+    def all(self) -> list[Grant]:
+        """Every grant that holds."""
+        return [*self.grants.values(), *self.observers.values()]
+
+    def restore(self, grant: Grant) -> None:
+        """A grant of an earlier life of the DVA holds on."""
+        self.changes += 1
+        if grant.level == "sensors":
+            self.observers[grant.robot, grant.holder] = grant
+        else:
+            self.grants[grant.robot] = grant
+
+    def end(self, session: int) -> None:
+        """A single grant is over, or never began."""
+        self.changes += 1
+        _drop_session(self.grants, session)
+        _drop_session(self.observers, session)
+
+    def release(self, holder: str, robot: str | None = None) -> list[Grant]:
+        """Take back the right to drive from `holder`: of one robot, or of all; what that was."""
+        return self._counted(_take(self.grants, holder, robot))
+
+    def forget(self, holder: str, robot: str | None = None) -> list[Grant]:
+        """The same for the right to read sensors."""
+        return self._counted(_take(self.observers, holder, robot))
+
+    def _counted(self, taken: list[Grant]) -> list[Grant]:
+        self.changes += len(taken)
+        return taken
+
+
+def _take(grants: dict[K, Grant], holder: str, robot: str | None) -> list[Grant]:
+    """Take the grants of a holder out of a dictionary."""
+    taken = {key: g for key, g in grants.items() if g.holder == holder and robot in (None, g.robot)}
+    for key in taken:
+        del grants[key]
+    return list(taken.values())
+
+
+def _drop_session(grants: dict[K, Grant], session: int) -> None:
+    for key in [key for key, grant in grants.items() if grant.session == session]:
+        del grants[key]

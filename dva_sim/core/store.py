@@ -19,8 +19,8 @@ from typing import Any
 
 from dva_sim.core.dva import Dva
 from dva_sim.core.events import KEPT_CLOSED, Event, State
-from dva_sim.core.permissions import Grant
 from dva_sim.core.registry import DeviceEntry
+from dva_sim.core.sessions import Grant
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.protocol.messages import Device, PermissionRevocation, Position
 

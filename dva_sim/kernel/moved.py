@@ -8,7 +8,7 @@ from types import ModuleType
 # What pages and examples have named, and whole rooms; names are relative to `dva_sim`.
 MOVED = {
     "agents.camera": "agents.observation",
-    "agents.operator.person": "agents.person",
+    "agents.operator.person": "agents.population",
     "agents.steering": "agents.route_following",
     "changing": "kernel.key_changes",
     "checking": "testing",

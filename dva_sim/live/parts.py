@@ -17,7 +17,7 @@ from dva_sim.agents.operator.scripted import ScriptedOperator, drill
 from dva_sim.agents.robot.decision_log import DecisionLog
 from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.core.events import Event
-from dva_sim.core.permissions import LOW_BITS, Permissions
+from dva_sim.core.sessions import LOW_BITS, Permissions
 from dva_sim.core.store import Store
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import either

@@ -1,21 +1,16 @@
-"""Ask what listens at an endpoint whether it wants keys, by the greeting of ZMTP 3 (RFC 37).
-
-When one end has keys and the other has none, each hangs up as soon as it sees that. The quicker
-one knows why, and the slower one may be cut off before it has read a word. This greets slowly:
-it waits until it has heard the other end before it names its own mechanism, and never hangs up
-first on a stranger. So both ends come to know.
-
-Why two ends did not come together, in words, as far as either end can know.
-
-What libzmq reports of a failed handshake says less at one end than at the other, and not the
-same each time.
-
-Sockets with keys, and a clear word at both ends when two do not come together.
+"""Sockets with keys, and a clear word at both ends when two do not come together.
 
 Without keys a socket is only watched. With keys a socket that binds is a CURVE server with its
 device's own key, and one that connects knows the key of the device it wants to reach; who asks
 at a server must have a key of the ring. Nothing here waits or has a thread: the loop that polls
 all sockets passes those that are ready to `Security.handle`.
+
+When one end has keys and the other has none, each hangs up as soon as it sees that. The quicker
+one knows why, and the slower one may be cut off before it has read a word. So an end that was
+refused asks what listens at the endpoint, by the greeting of ZMTP 3 (RFC 37), slowly: it waits
+until it has heard the other end before it names its own mechanism, and never hangs up first on a
+stranger. What libzmq reports of a failed handshake says less at one end than at the other, and not
+the same each time: it is put into words as far as either end can know.
 """
 
 from __future__ import annotations

@@ -1,95 +1,112 @@
-"""What `protocol/dva.xsd` allows, as data: the one place of every limit and every word on the wire.
+"""Bytes checked against `protocol/dva.xsd` before anything is made of them.
 
-Writer, reader and checker all derive from it what they refuse.
+libxml2 validates every message while parsing it, and what a schema cannot forbid is refused
+before: other encodings, other markup, entities, names that nobody knows.
 """
 
 from __future__ import annotations
 
+import re
 from functools import cache
-from pathlib import Path
 from typing import Final
 
 from lxml import etree
 
-from dva_sim.kernel.resources import roots
+from dva_sim.protocol import limits
+from dva_sim.protocol.errors import ProtocolError
+from dva_sim.protocol.messages import BAD_MESSAGE, Message
+from dva_sim.protocol.xml_reader import read
+from dva_sim.protocol.xml_writer import DECLARATION
 
-_XS: Final = "{http://www.w3.org/2001/XMLSchema}"
-WHOLE: Final = {"xs:unsignedInt": 2**32 - 1, "xs:unsignedLong": 2**64 - 1}
-"""Kinds of whole numbers that types start from, and the largest of each."""
+MAX_BYTES: Final = 8192
 
-# What a schema calls \P{Cc}, without what no XML can hold.
-_CHARACTER: Final = "[^\x00-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]"
+_OUR_DECLARATION = DECLARATION.encode()
+_DECLARATION = re.compile(
+    rb"""<\?xml\s+version\s*=\s*(["'])1\.0\1"""
+    rb"""(?:\s+encoding\s*=\s*(["'])utf-8\2)?"""
+    rb"""(?:\s+standalone\s*=\s*(["'])(?:yes|no)\3)?\s*\?>""",
+    re.IGNORECASE,
+)
+# Every `<` has to begin `<name>`, `</name>` or `<name/>`.
+_TAG = re.compile(rb"</?(\w++)\s*+/?>")
+_OTHER_ENTITY = re.compile(rb"&(?!(?:amp|lt|gt|quot|apos|#[0-9]++|#x[0-9A-Fa-f]++);)")
+# No string may hold a line break or tab, so between `>` and `<` one blank is as good as any.
+_BLANK_LINES = re.compile(rb"> *+[\t\r\n][ \t\r\n]*+<")
 
 
-def schema_file() -> Path:
-    """The schema that came with the program: one in the working folder must not replace it."""
-    found = (root / "protocol" / "dva.xsd" for root in roots()[1:])
-    return next(path for path in found if path.is_file())
+def read_validated(data: bytes) -> Message:
+    """The message in any form that the specification allows."""
+    _refuse_by_sight(data)
+    try:
+        # libxml2 never forgets a run of blanks that it saw between elements.
+        root = etree.fromstring(_BLANK_LINES.sub(b">\n<", data), _parser())
+    except etree.XMLSyntaxError as error:
+        raise ProtocolError(BAD_MESSAGE, _one_line(error)) from None
+    return read(root)
+
+
+def _refuse_by_sight(data: bytes) -> None:
+    """Refuse what the parser must not see: size, encodings, other markup, unknown names.
+
+    The markup matters: a DOCTYPE brings entities, `xsi:schemaLocation` makes libxml2 open files,
+    a comment inside a value hides half of it from careless readers, and a schema does not see
+    prefixes that were never declared. The names matter, also of entities, because libxml2 keeps
+    each one that it has read for as long as the thread lives: new ones would fill the memory.
+    """
+    if len(data) > MAX_BYTES:
+        raise ProtocolError(BAD_MESSAGE, f"{len(data)} bytes; a message has at most {MAX_BYTES}")
+    rest = data[_end_of_declaration(data) :]
+    if 0 in rest or not rest.lstrip().startswith(b"<"):
+        raise ProtocolError(BAD_MESSAGE, "not XML in UTF-8 without byte order mark")
+    found = _TAG.findall(rest)
+    if len(found) != rest.count(b"<"):
+        raise ProtocolError(
+            BAD_MESSAGE, "markup other than plain elements, which have no attribute or namespace"
+        )
+    if not _names().issuperset(found):
+        unknown = next(name for name in found if name not in _names())
+        raise ProtocolError(BAD_MESSAGE, f"no element is called {unknown.decode()[:64]}")
+    if _OTHER_ENTITY.search(rest):
+        raise ProtocolError(BAD_MESSAGE, "& that begins no &amp;, &lt;, &gt; or the like")
+
+
+def _end_of_declaration(data: bytes) -> int:
+    if data.startswith(_OUR_DECLARATION):
+        return len(_OUR_DECLARATION)
+    if not data.startswith(b"<?xml"):
+        return 0
+    declaration = _DECLARATION.match(data)
+    if declaration is None:
+        raise ProtocolError(
+            BAD_MESSAGE, "the XML declaration is broken, or names another encoding than UTF-8"
+        )
+    return declaration.end()
 
 
 @cache
-def tree() -> etree._ElementTree:
-    """The schema, read once."""
-    return etree.parse(schema_file())
+def _names() -> frozenset[bytes]:
+    """All names of elements in the schema."""
+    return frozenset(name.encode() for name in limits.names())
 
 
 @cache
-def facets(name: str) -> dict[str, list[str]]:
-    """All that restricts a simple type, the narrowest first, and `base`, what it starts from."""
-    found: dict[str, list[str]] = {}
-    while (restriction := _restrictions().get(name)) is not None:
-        for facet in restriction.iterchildren(f"{_XS}*"):
-            found.setdefault(etree.QName(facet).localname, []).append(str(facet.get("value")))
-        name = str(restriction.get("base"))
-        found["base"] = [name]
-    return found
+def _parser() -> etree.XMLParser:
+    """The one parser, with the schema attached; lxml locks it for each document."""
+    # An encoding given here wins over what the document says, which has been checked by sight.
+    return etree.XMLParser(
+        schema=etree.XMLSchema(file=str(limits.schema_file())),
+        encoding="UTF-8",
+        resolve_entities=False,
+        no_network=True,
+        load_dtd=False,
+        huge_tree=False,
+        remove_comments=True,
+        remove_pis=True,
+    )
 
 
-@cache
-def _restrictions() -> dict[str, etree._Element]:
-    types = tree().getroot().iterchildren(f"{_XS}simpleType")
-    return {str(t.get("name")): r for t in types if (r := t.find(f"{_XS}restriction")) is not None}
-
-
-def types_of(element: str) -> set[str | None]:
-    """The types of all elements of a name."""
-    return {e.get("type") for e in tree().iter(f"{_XS}element") if e.get("name") == element}
-
-
-def names() -> frozenset[str]:
-    """All names of elements."""
-    return frozenset(e.get("name", "") for e in tree().iter(f"{_XS}element"))
-
-
-def choices(name: str) -> list[str]:
-    """The words that a type allows."""
-    return facets(name)["enumeration"]
-
-
-def pattern(name: str) -> str:
-    """The form of a type's text as a regular expression, without its length and without groups."""
-    form = facets(name)["pattern"][0]
-    return form.replace("(", "(?:").replace(r"\P{Cc}", _CHARACTER)
-
-
-def length(name: str) -> tuple[int, int]:
-    """Of a type's text: the least and the most characters."""
-    known = facets(name)
-    return int(known.get("minLength", ["0"])[0]), int(known["maxLength"][0])
-
-
-def bounds(name: str) -> tuple[float, float]:
-    """The least and the greatest of a type's numbers; of whole numbers they are whole."""
-    known, kind = facets(name), int if facets(name)["base"][0] in WHOLE else float
-    low, high = known.get("minInclusive", ["0"])[0], known.get("maxInclusive")
-    return kind(low), kind(high[0]) if high else WHOLE[known["base"][0]]
-
-
-def most(holder: str, child: str) -> int:
-    """How often `child` may stand in an element, or in a type, called `holder`."""
-    for node in tree().iter(f"{_XS}element", f"{_XS}complexType"):
-        if node.get("name") == holder:
-            for element in node.iter(f"{_XS}element"):
-                if element is not node and element.get("name") == child:
-                    return int(element.get("maxOccurs", "1"))
-    raise KeyError(f"{holder} holds no {child}")
+def _one_line(error: etree.XMLSyntaxError) -> str:
+    """What libxml2 says, as text that fits into a reply."""
+    # lxml spells some messages as the repr of their bytes.
+    said = re.sub(r"""^line \d+: b(["'])(.*)\1$""", r"not well-formed: \2", str(error.msg))
+    return "".join(c if c.isprintable() else " " for c in said)[:200]

@@ -11,10 +11,10 @@ from collections.abc import Callable
 from functools import lru_cache
 from typing import Any, Final
 
+from dva_sim.protocol import limits
 from dva_sim.protocol import messages as m
-from dva_sim.protocol import schema
 from dva_sim.protocol.errors import ProtocolError
-from dva_sim.protocol.schema import bounds, choices, length, most
+from dva_sim.protocol.limits import bounds, choices, length, most
 
 DECLARATION: Final = '<?xml version="1.0" encoding="UTF-8" standalone="yes"?>'
 
@@ -66,18 +66,18 @@ def _text_of(name: str, kind: str, form: str) -> Callable[[str], str]:
     """Text that has a length; `form` says what characters it has."""
     least, most_ = length(kind)
     told = f"{least} to {most_} {form}" if least else f"up to {most_} {form}"
-    return _string(name, f"(?=(?s:.{{{least},{most_}}})\\Z){schema.pattern(kind)}", told)
+    return _string(name, f"(?=(?s:.{{{least},{most_}}})\\Z){limits.pattern(kind)}", told)
 
 
 def _choice(name: str, kind: str) -> Callable[[str], str]:
     return _string(name, "|".join(choices(kind)), " or ".join(choices(kind)))
 
 
-_device_id = _string("an id", schema.pattern("DeviceID"), "like 70:1A:04:F9:81:D6")
-_clock = _string("Timestamp", schema.pattern("Timestamp"), "HH:MM:SS")
+_device_id = _string("an id", limits.pattern("DeviceID"), "like 70:1A:04:F9:81:D6")
+_clock = _string("Timestamp", limits.pattern("Timestamp"), "HH:MM:SS")
 _name = _text_of("a name", "Name", "printable characters")
 _text = _text_of("Text", "Text", "printable characters")
-_address = _string("IpAddr", schema.pattern("Address"), "like 192.168.1.48 or with :port")
+_address = _string("IpAddr", limits.pattern("Address"), "like 192.168.1.48 or with :port")
 _url = _text_of("CameraUrl", "Url", "ASCII characters without spaces")
 _mode = _choice("Mode", "Mode")
 _level = _choice("Level", "Level")

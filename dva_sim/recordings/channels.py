@@ -1,10 +1,7 @@
-"""Robots and people in a recording: where they are, what they do, where they are taken to be.
+"""The channels of a recording: who is where, hazards, what a viewer draws, what is told and said.
 
-Hazards as grids over the floor: smoke, radiant heat, gas and water.
-
-What a viewer draws: walls and names of rooms, everybody's body, hazards as they grow.
-
-What is told and said in a recording: the story, the messages, commands, what screens show.
+Robots and people with where they are taken to be; smoke, radiant heat, gas and water as grids over
+the floor; walls, names of rooms and bodies for a viewer; the story, messages and commands.
 """
 
 from __future__ import annotations

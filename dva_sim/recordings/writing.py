@@ -1,6 +1,6 @@
-"""The site of a recording: put into files that go with it, and made from them again.
+"""A run as an MCAP file: the same run makes the same bytes, and a file is whole or not there.
 
-A run as an MCAP file: the same run makes the same bytes, and a file is whole or not there.
+The site goes with it as files, and is made from them again.
 """
 
 from __future__ import annotations

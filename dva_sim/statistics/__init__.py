@@ -55,6 +55,7 @@ studies, 24 persons).
 """
 
 from dva_sim.statistics.bands import Band, band
+from dva_sim.statistics.differences import Components, components, mean_interval, paired_difference
 from dva_sim.statistics.effect_sizes import (
     MOST_PERSONS,
     EffectSize,
@@ -70,8 +71,6 @@ from dva_sim.statistics.incidence import (
     first_of,
     incidence,
 )
-from dva_sim.statistics.means import Components, components, mean_interval, paired_difference
-from dva_sim.statistics.pairing import VarianceReduction, pair_correlation, variance_reduction
 from dva_sim.statistics.persons import LEVEL, Interval, bootstrap_interval, person_means
 from dva_sim.statistics.proportions import quantile_interval, share_interval
 from dva_sim.statistics.sensitivity import Effect, SobolIndex, factorial_effects, sobol_indices
@@ -82,6 +81,11 @@ from dva_sim.statistics.tests import (
     holm,
     one_sided_test,
     permutation_test,
+)
+from dva_sim.statistics.variance_reduction import (
+    VarianceReduction,
+    pair_correlation,
+    variance_reduction,
 )
 
 __all__ = [

@@ -1,4 +1,6 @@
-"""Means in units of their standard error, as they come out when persons are drawn anew.
+"""Several levels at once: means over persons with a band that holds all of them.
+
+It rests on means in units of their standard error, as they come out when persons are drawn anew.
 
 How far an interval reaches is decided on each side by itself: where a few persons are far off,
 the mean errs to one side more often and farther. Measured with 24 persons in 10,000 studies each:
@@ -25,8 +27,6 @@ by Student's in 63 to 91 %.
 References:
     Efron & Tibshirani, An Introduction to the Bootstrap (1993), section 12.5 (bootstrap-t); Hall,
     Ann. Stat. 16 (1988) 927-953 (symmetric and one-sided kinds).
-
-Several levels at once: means over persons with a band that holds all of them.
 """
 
 from __future__ import annotations

@@ -21,7 +21,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dva_sim.statistics.pairing import RESAMPLES, Pairs, studentised_intervals
 from dva_sim.statistics.persons import (
     LEVEL,
     Floats,
@@ -31,6 +30,7 @@ from dva_sim.statistics.persons import (
     students_t,
 )
 from dva_sim.statistics.proportions import share_interval
+from dva_sim.statistics.variance_reduction import RESAMPLES, Pairs, studentised_intervals
 
 
 @dataclass(frozen=True)

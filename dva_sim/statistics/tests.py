@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dva_sim.statistics.bands import chance_above
-from dva_sim.statistics.means import paired_difference
+from dva_sim.statistics.differences import paired_difference
 from dva_sim.statistics.persons import RESAMPLES, Floats, Interval, person_means
 
 ALPHA = 0.05

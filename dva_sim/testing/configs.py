@@ -12,7 +12,7 @@ from PIL import Image
 
 from dva_sim.agents.operator.published import TargetFile, load_split
 from dva_sim.agents.people.profiles import BystanderProfile, GuardProfile
-from dva_sim.agents.person import Population
+from dva_sim.agents.population import Population
 from dva_sim.agents.robot.profile import read_robot
 from dva_sim.agents.tilt import AccelerometerPart, PhoneProfile, try_phone
 from dva_sim.experiments.execution.dry_run import contradictions_in

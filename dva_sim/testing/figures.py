@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from dva_sim.experiments.analysis.paired_effects import Floats
+from dva_sim.experiments.analysis.run_grid import Floats
 from dva_sim.experiments.report.figures.palette import is_of_palette
 from dva_sim.experiments.report.figures.registry import PLUGINS
 from dva_sim.experiments.report.figures.report_figure import ReportFigure
@@ -255,6 +255,8 @@ def _points(axes: Axes) -> Iterator[tuple[str, Floats]]:
         if one.get_transform() == axes.transData and not _is_aside(one):
             yield "line", np.asarray(one.get_xydata(), dtype=float)
     for many in axes.collections:
+        if _is_aside(many):
+            continue
         if many.get_offset_transform() == axes.transData:
             yield "mark", np.ma.filled(many.get_offsets(), np.nan).reshape(-1, 2).astype(float)
         elif hasattr(many, "get_segments") and many.get_transform() == axes.transData:

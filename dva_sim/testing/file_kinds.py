@@ -13,7 +13,7 @@ from typing import Any, Final, NamedTuple
 
 from dva_sim.agents.operator.published import SplitFile, TargetFile
 from dva_sim.agents.people.profiles import BystanderProfile, GuardProfile
-from dva_sim.agents.person import Population
+from dva_sim.agents.population import Population
 from dva_sim.agents.robot.profile import RobotProfile
 from dva_sim.agents.tilt import AccelerometerPart, PhoneProfile
 from dva_sim.experiments.study.registration import Preregistration

@@ -13,7 +13,7 @@ from typing import Any, Final
 from dva_sim.kernel.config import Document, load_yaml
 from dva_sim.kernel.errors import ConfigError, DvaSimError
 from dva_sim.kernel.suggestions import hint
-from dva_sim.protocol.schema import schema_file
+from dva_sim.protocol.limits import schema_file
 from dva_sim.testing.messages import READ_BYTES, check_message
 from dva_sim.testing.promises import Problem, not_text
 
@@ -167,7 +167,7 @@ def _json_schema(kind: str) -> dict[str, Any]:
     from pydantic import TypeAdapter
 
     from dva_sim.agents.people.profiles import BystanderProfile, GuardProfile
-    from dva_sim.agents.person import Population
+    from dva_sim.agents.population import Population
     from dva_sim.agents.robot.profile import RobotProfile
     from dva_sim.agents.tilt import AccelerometerPart, PhoneProfile
     from dva_sim.experiments.study.robustness_grid import Bands

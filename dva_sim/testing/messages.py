@@ -14,9 +14,10 @@ from xml.parsers import expat
 
 from lxml import etree
 
-from dva_sim.protocol.codec import MAX_BYTES, decode
+from dva_sim.protocol.codec import decode
 from dva_sim.protocol.errors import ProtocolError
-from dva_sim.protocol.schema import WHOLE, facets, schema_file, types_of
+from dva_sim.protocol.limits import WHOLE, facets, schema_file, types_of
+from dva_sim.protocol.schema import MAX_BYTES
 from dva_sim.testing.promises import Problem, at, not_text
 
 

@@ -23,7 +23,7 @@ from dva_sim.agents.operator.strategies import (
     View,
     load_strategy,
 )
-from dva_sim.agents.person import Person, Population, draw_person, median_person
+from dva_sim.agents.population import Person, Population, draw_person, median_person
 from dva_sim.agents.route_following import Route
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.testing.promises import Case, Outcome, kept, line, part_by_part

@@ -16,7 +16,7 @@ from typing import Any, Final
 import numpy as np
 
 from dva_sim.experiments.results.results import MANIFEST, TABLES
-from dva_sim.experiments.study.schema import Level
+from dva_sim.experiments.study.parts import Level
 from dva_sim.simulation.models import MODELS
 
 Rows = list[dict[str, Any]]

@@ -23,7 +23,7 @@ from dva_sim.agents.people.evacuation import (
     refuges_of,
 )
 from dva_sim.agents.people.profiles import BystanderProfile, Occupant
-from dva_sim.agents.person import Trait
+from dva_sim.agents.population import Trait
 from dva_sim.kernel.config import load_yaml, validate
 from dva_sim.kernel.resources import find
 from dva_sim.kernel.streams import Streams

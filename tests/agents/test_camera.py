@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dva_sim.agents.observation import CLEAR, CameraFrame, Observation, SeenHazard
-from dva_sim.agents.robot.camera import FieldOfView, HazardSpot
+from dva_sim.agents.robot.field_of_view import FieldOfView, HazardSpot
 
 FIRE = SeenHazard("fire", 4.0, 5.0, 1.5, 0.6, 1.0)
 FRAME = CameraFrame(Observation(86_320, 1.0, 2.0, 0.5, 0.4, -0.1, (FIRE,), 2.5), 12.5)

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from fleet import Fleet, Robot, caparica
 
-from dva_sim.agents.robot.camera import HazardSpot
 from dva_sim.agents.robot.collision_guard import PERSONAL
+from dva_sim.agents.robot.field_of_view import HazardSpot
 from dva_sim.agents.robot.manoeuvres import INSPECT_FOR, LOOK_FROM
 from dva_sim.agents.robot.missions import GIVE_UP_AFTER, MOST_JAMS, NEAR, RESERVE, MissionGoal
 from dva_sim.agents.robot.profile import RobotProfile

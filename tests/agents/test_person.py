@@ -8,7 +8,7 @@ from dataclasses import asdict, fields
 import numpy as np
 import pytest
 
-from dva_sim.agents.person import Person, Population, Trait, draw_person, median_person
+from dva_sim.agents.population import Person, Population, Trait, draw_person, median_person
 from dva_sim.kernel.errors import ConfigError
 
 

@@ -18,7 +18,7 @@ from replayed_operator import replay, taped
 
 from dva_sim.agents.observation import Observation
 from dva_sim.agents.operator.strategies import Pursuit, Reach, View
-from dva_sim.agents.person import Population, draw_person
+from dva_sim.agents.population import Population, draw_person
 from dva_sim.agents.route_following import Route
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full import simulate

@@ -7,8 +7,7 @@ from office import DVA, GUARD, OPERATOR, ROBOT, Office, crow, east
 
 from dva_sim.core.dispatcher import REST, Patrols
 from dva_sim.core.dva import Dva
-from dva_sim.core.permissions import Permissions
-from dva_sim.core.sessions import Send, Sessions
+from dva_sim.core.sessions import Permissions, Send, Sessions
 from dva_sim.protocol import messages as m
 
 BEAT = (east(20), east(40))

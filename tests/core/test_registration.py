@@ -10,7 +10,8 @@ from office import ADDRESS, DETECTOR, DVA, GUARD, OPERATOR, ROBOT, Office
 from dva_sim.core.registry import Registry
 from dva_sim.core.sessions import Send
 from dva_sim.protocol import messages as m
-from dva_sim.protocol.codec import MAX_BYTES, encode
+from dva_sim.protocol.codec import encode
+from dva_sim.protocol.schema import MAX_BYTES
 
 STRANGER = "02:00:00:09:00:09"
 AGAIN = m.Registration("operator", "TeleOp", ADDRESS)

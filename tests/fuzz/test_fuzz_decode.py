@@ -58,7 +58,7 @@ def test_bytes_that_take_new_branches_are_kept_in_the_folder_given(tmp_path):
     ("file", "right", "wrong"),
     [
         ("codec.py", '_real("[0-9]{1,2}")', '_real("[0-9]{1,3}")'),
-        ("codec.py", 'len(found) != rest.count(b"<")', "False"),
+        ("schema.py", 'len(found) != rest.count(b"<")', "False"),
         ("xml_reader.py", "_float(speed), _float(turn_rate)", "_float(turn_rate), _float(speed)"),
     ],
     ids=["bound", "markup", "fields"],

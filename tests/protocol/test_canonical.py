@@ -12,16 +12,9 @@ from message_strategies import BODIES, ROBOT, TABLET, message, with_header
 from searching import search
 
 from dva_sim.protocol import messages as m
-from dva_sim.protocol.codec import (
-    MAX_SESSION,
-    MAX_TICK,
-    MAX_UINT32,
-    _read_validated,
-    decode,
-    encode,
-    read_canonical,
-)
+from dva_sim.protocol.codec import MAX_SESSION, MAX_TICK, MAX_UINT32, decode, encode, read_canonical
 from dva_sim.protocol.errors import ProtocolError
+from dva_sim.protocol.schema import read_validated
 
 STATUS = m.RobotStatus("Teleoperation", m.Position(38.66, -9.2), 1.57, 0.5, -0.25, 86320)
 KNOWN = [
@@ -46,7 +39,7 @@ def agrees(data):
     """Whether the quick way knows the bytes; fails where the whole way says anything else."""
     quick = read_canonical(data)
     if quick is not None:
-        validated = _read_validated(data)
+        validated = read_validated(data)
         assert repr(quick) == repr(validated), data
         tree = judged(data)
         assert tree is not None, data
@@ -139,7 +132,7 @@ def whole_way_agrees_with_the_specification(data):
     """Whether the bytes are a message; fails where parser and specification differ."""
     tree = judged(data)
     try:
-        read = _read_validated(data)
+        read = read_validated(data)
     except ProtocolError:
         assert tree is None, data
         return False

@@ -10,8 +10,9 @@ from message_strategies import BODIES, ROBOT, TABLET, message, messages
 from searching import search
 
 from dva_sim.protocol import messages as m
-from dva_sim.protocol.codec import MAX_BYTES, decode, encode, timestamp
+from dva_sim.protocol.codec import decode, encode, timestamp
 from dva_sim.protocol.errors import ProtocolError
+from dva_sim.protocol.schema import MAX_BYTES
 
 SCHEMA = etree.XMLSchema(file=str(Path(__file__).parents[2] / "protocol" / "dva.xsd"))
 
@@ -233,7 +234,7 @@ def test_every_reply_code_has_a_name_of_its_own():
 
 
 def test_a_schema_in_the_working_folder_does_not_replace_the_programs(tmp_path, monkeypatch):
-    from dva_sim.protocol.schema import schema_file
+    from dva_sim.protocol.limits import schema_file
 
     (tmp_path / "protocol").mkdir()
     (tmp_path / "protocol" / "dva.xsd").write_text("<anything/>")

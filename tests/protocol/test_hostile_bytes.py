@@ -20,8 +20,9 @@ from message_strategies import message
 from searching import search
 
 from dva_sim.protocol import messages as m
-from dva_sim.protocol.codec import MAX_BYTES, decode, encode
+from dva_sim.protocol.codec import decode, encode
 from dva_sim.protocol.errors import ProtocolError
+from dva_sim.protocol.schema import MAX_BYTES
 
 GOOD = encode(message(m.SetTeleOp(0.5, 0.56, 86320)))
 REPLY = encode(message(m.Reply(124, m.BUSY, "é & <ü>", m.SensorInfo("http://10.0.0.1/?a=b"))))

@@ -1,4 +1,4 @@
-"""Where an operator sits: who it is, what is at hand, and which screen it looks at.
+"""Which screen an operator looks at, and where it sits: who it is, and what is at hand.
 
 A person looks at one screen at a time, and takes a moment to find its way into another. A robot
 that is where it was sent waits for a judgement: who has waited longest is served first, until
@@ -23,7 +23,7 @@ from dva_sim.agents.device import AgentDevice
 from dva_sim.agents.observation import Observation
 from dva_sim.agents.operator.delay_estimation import DelayEstimate
 from dva_sim.agents.operator.strategies import Driver, Reach, Truth
-from dva_sim.agents.person import Person
+from dva_sim.agents.population import Person
 from dva_sim.agents.tilt import Phone
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.recorder import DriveLog

@@ -28,7 +28,7 @@ from dva_sim.agents.operator.strategies import (
     gain_at,
 )
 from dva_sim.agents.operator.supervision import Work
-from dva_sim.agents.person import Person
+from dva_sim.agents.population import Person
 from dva_sim.agents.route_following import Route
 from dva_sim.kernel.recorder import DriveLog
 from dva_sim.protocol import messages as m

@@ -21,7 +21,7 @@ import math
 from collections.abc import Callable, Iterator
 
 from dva_sim.agents.observation import CLEAR, MATCH_WITHIN, SEEN_THROUGH, Observation, SeenHazard
-from dva_sim.agents.person import Person
+from dva_sim.agents.population import Person
 from dva_sim.worlds.planning import Planner
 
 STILL = 1.0 / 3.0  # a picture that does not change tells something for one fixation [s]

@@ -8,7 +8,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from dva_sim.agents.person import Trait
+from dva_sim.agents.population import Trait
 from dva_sim.kernel.config import Config
 
 SLOWEST, FASTEST = 0.6, 2.2  # walking [m/s]

@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dva_sim.agents.person import Population, median_person
+from dva_sim.agents.population import Population, median_person
 from dva_sim.agents.robot.avoidance import SQUEEZE, Avoidance, Blocked, pace_among
 from dva_sim.agents.robot.collision_guard import CollisionGuard, Nearby
 from dva_sim.agents.robot.controller import Mission

@@ -10,7 +10,6 @@ from dataclasses import dataclass, field
 
 from dva_sim.agents.device import LONGEST_BID, STATUS, AgentDevice, command_topic
 from dva_sim.agents.observation import CameraFrame, Observation
-from dva_sim.agents.robot.camera import FieldOfView, HazardSpot
 from dva_sim.agents.robot.collision_guard import CollisionGuard, Nearby, who_is_near
 from dva_sim.agents.robot.command_queue import LIMIT, CommandQueue, Letter
 from dva_sim.agents.robot.controller import (
@@ -22,6 +21,7 @@ from dva_sim.agents.robot.controller import (
     TimedSetPoint,
 )
 from dva_sim.agents.robot.decision_log import LEASE_ENDS, MISSION_ENDS, DecisionLog
+from dva_sim.agents.robot.field_of_view import FieldOfView, HazardSpot
 from dva_sim.agents.robot.manoeuvres import Sensed
 from dva_sim.agents.robot.missions import PERIOD, MissionGoal, Pilot, PilotStep
 from dva_sim.agents.robot.sensors import SensorPort, SensorSubscriptions

@@ -17,7 +17,7 @@ from typing import Annotated, Any, Final, Literal, NamedTuple
 import numpy as np
 from pydantic import Field, model_validator
 
-from dva_sim.agents.person import Person
+from dva_sim.agents.population import Person
 from dva_sim.agents.tilt.accelerometer import (
     GRAVITY,
     Accelerometer,

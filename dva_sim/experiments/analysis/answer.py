@@ -12,7 +12,7 @@ from textwrap import wrap
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.experiments.study.schema import Level
+from dva_sim.experiments.study.parts import Level
 from dva_sim.kernel.units import unit_of
 from dva_sim.kernel.wording import capital, listing, number, percent, quantity
 from dva_sim.simulation.labels import (

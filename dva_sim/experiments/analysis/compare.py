@@ -31,7 +31,7 @@ from dva_sim.experiments.analysis.compare_rows import (
 )
 from dva_sim.experiments.analysis.fail_conditions import SIGNS, TESTS, Gate, Test, percent_of
 from dva_sim.experiments.results.results import Frame, Results
-from dva_sim.experiments.study.schema import DESIGN
+from dva_sim.experiments.study.parts import DESIGN
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import hint
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from dva_sim.experiments.results.results import Array, Results
 from dva_sim.experiments.study.cell_grid import REFERENCE
-from dva_sim.experiments.study.schema import REPEATS, Level
+from dva_sim.experiments.study.parts import REPEATS, Level
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.statistics import LEVEL, Interval, paired_difference, person_means
 

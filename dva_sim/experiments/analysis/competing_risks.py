@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.experiments.analysis.paired_effects import (
+from dva_sim.experiments.analysis.run_grid import (
     Floats,
     Setting,
     StudyView,
@@ -24,7 +24,7 @@ from dva_sim.experiments.analysis.paired_effects import (
     as_floats,
     codes_of,
 )
-from dva_sim.experiments.study.schema import Level
+from dva_sim.experiments.study.parts import Level
 from dva_sim.statistics import Interval, cumulative_incidence, paired_difference, share_interval
 
 CONFIRMED, CLEARED, NOTHING = "confirmed", "cleared", "nothing"

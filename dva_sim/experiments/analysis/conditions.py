@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from operator import itemgetter
 from typing import Any, NamedTuple
 
-from dva_sim.experiments.analysis.paired_effects import Factor
-from dva_sim.experiments.study.schema import POINT
+from dva_sim.experiments.analysis.run_grid import Factor
+from dva_sim.experiments.study.parts import POINT
 from dva_sim.simulation.labels import factor_name, level_name, stated_conditions
 from dva_sim.simulation.scenario import TRIPS_OF_A_START, time_out_s
 

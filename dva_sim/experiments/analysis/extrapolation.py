@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from dva_sim.agents.operator.published import ranges, supports_of
 from dva_sim.experiments.analysis.conditions import get
-from dva_sim.experiments.analysis.paired_effects import Floats, RunGrid, nan_mean
-from dva_sim.experiments.study.schema import STRATEGY
+from dva_sim.experiments.analysis.run_grid import Floats, RunGrid, nan_mean
+from dva_sim.experiments.study.parts import STRATEGY
 
 LOOP = "loop_delay_mean_s"
 PERSONAL = ("delay_human_s", "delay_hand_s")

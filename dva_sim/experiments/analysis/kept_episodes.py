@@ -10,13 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.experiments.analysis.paired_effects import (
-    Floats,
-    Setting,
-    Table,
-    as_floats,
-    plain_level,
-)
+from dva_sim.experiments.analysis.run_grid import Floats, Setting, Table, as_floats, plain_level
 
 RECORDINGS = "recordings"
 

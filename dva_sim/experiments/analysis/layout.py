@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from dva_sim.experiments.analysis.answer import Finding, Missed
-from dva_sim.experiments.analysis.paired_effects import (
+from dva_sim.experiments.analysis.run_grid import (
     Factor,
     Floats,
     RunGrid,
@@ -20,7 +20,7 @@ from dva_sim.experiments.analysis.paired_effects import (
     plain_level,
     present,
 )
-from dva_sim.experiments.study.schema import POINT, TUNING, Level
+from dva_sim.experiments.study.parts import POINT, TUNING, Level
 from dva_sim.kernel.units import unit_of
 from dva_sim.simulation.labels import brief, measure_called
 from dva_sim.statistics import Interval, band

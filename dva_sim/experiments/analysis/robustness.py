@@ -12,9 +12,9 @@ from dva_sim.experiments.analysis.answer import Finding
 from dva_sim.experiments.analysis.conditions import get
 from dva_sim.experiments.analysis.extrapolation import support_of_part
 from dva_sim.experiments.analysis.layout import interval_of
-from dva_sim.experiments.analysis.paired_effects import Factor, RunGrid, StudyView, Table
+from dva_sim.experiments.analysis.run_grid import Factor, RunGrid, StudyView, Table
+from dva_sim.experiments.study.parts import REPEATS, STRATEGY, Level
 from dva_sim.experiments.study.robustness_grid import PARAMETERS
-from dva_sim.experiments.study.schema import REPEATS, STRATEGY, Level
 from dva_sim.kernel.units import unit_of
 from dva_sim.kernel.wording import listing, number, percent, quantity
 from dva_sim.simulation.labels import factor_name, level_name

@@ -22,8 +22,8 @@ from dva_sim.experiments.analysis.hypothesis_tests import (
     places_of,
 )
 from dva_sim.experiments.analysis.layout import view_of
-from dva_sim.experiments.analysis.paired_effects import Floats, Setting, StudyView, Table
-from dva_sim.experiments.study.schema import ANSWER, Contrast, Hypothesis
+from dva_sim.experiments.analysis.run_grid import Floats, Setting, StudyView, Table
+from dva_sim.experiments.study.parts import ANSWER, Contrast, Hypothesis
 from dva_sim.kernel.units import unit_of
 from dva_sim.kernel.wording import quantity
 from dva_sim.simulation.labels import level_name, measure_of, setting

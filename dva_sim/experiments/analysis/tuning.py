@@ -6,13 +6,13 @@ import itertools
 from pathlib import Path
 
 from dva_sim import __version__
-from dva_sim.experiments.analysis.paired_effects import Factor, Floats, RunGrid
+from dva_sim.experiments.analysis.run_grid import Factor, Floats, RunGrid
 from dva_sim.experiments.execution.runner import Progress, run_study
 from dva_sim.experiments.execution.scheduling import LIMIT_S, Simulate
 from dva_sim.experiments.results.results import Results
 from dva_sim.experiments.study.cell_grid import basis_of_tuning, refuse_unknown_measures
 from dva_sim.experiments.study.hashing import fingerprint
-from dva_sim.experiments.study.schema import Level, Tuning
+from dva_sim.experiments.study.parts import Level, Tuning
 from dva_sim.experiments.study.study import Study
 from dva_sim.experiments.study.tuning import (
     ChosenValue,

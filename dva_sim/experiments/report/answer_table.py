@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dva_sim.experiments.analysis.paired_effects import Floats, StudyView, nan_mean, person_means
+from dva_sim.experiments.analysis.run_grid import Floats, StudyView, nan_mean, person_means
 from dva_sim.experiments.report.cell_table import CellTable
-from dva_sim.experiments.study.schema import POINT
+from dva_sim.experiments.study.parts import POINT
 from dva_sim.kernel.units import unit_of
 from dva_sim.kernel.wording import number, percent
 from dva_sim.simulation.labels import factor_name, level_name

@@ -17,10 +17,10 @@ from dva_sim.experiments.analysis.hypothesis_tests import (
     Verdict,
     judged,
 )
-from dva_sim.experiments.analysis.paired_effects import Setting, Table
+from dva_sim.experiments.analysis.run_grid import Setting, Table
 from dva_sim.experiments.report.cell_table import CellTable
 from dva_sim.experiments.study.hashing import fingerprint_of_judges
-from dva_sim.experiments.study.schema import POINT
+from dva_sim.experiments.study.parts import POINT
 from dva_sim.kernel.units import unit_of
 from dva_sim.kernel.wording import listing, number, quantity
 from dva_sim.simulation.labels import factor_name, level_name, measure_of, setting

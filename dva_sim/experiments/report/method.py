@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from dva_sim.experiments.report.summary import Reading
-from dva_sim.experiments.study.schema import POINT
+from dva_sim.experiments.study.parts import POINT
 from dva_sim.kernel.wording import capital, number
 from dva_sim.simulation.labels import measure_called
 from dva_sim.statistics import VarianceReduction, variance_reduction

@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 
 from dva_sim.experiments.analysis.answer import Answer, Finding, answer
 from dva_sim.experiments.analysis.conditions import conditions
-from dva_sim.experiments.analysis.paired_effects import Factor, RunGrid, StudyView, Table
+from dva_sim.experiments.analysis.run_grid import Factor, RunGrid, StudyView, Table
 from dva_sim.experiments.report.cell_table import SUMMARIES, CellTable, Summary
 
 

@@ -8,9 +8,9 @@ import numpy as np
 
 from dva_sim.experiments.analysis.answer import Finding, place_of
 from dva_sim.experiments.analysis.competing_risks import CLEARED, CONFIRMED, NOTHING, Ended, Endings
-from dva_sim.experiments.analysis.paired_effects import Setting, StudyView
+from dva_sim.experiments.analysis.run_grid import Setting, StudyView
 from dva_sim.experiments.report.cell_table import CellTable
-from dva_sim.experiments.study.schema import Level
+from dva_sim.experiments.study.parts import Level
 from dva_sim.kernel.wording import capital, listing, number, percent, quantity
 from dva_sim.simulation.labels import factor_name, level_name, setting
 from dva_sim.statistics import Interval

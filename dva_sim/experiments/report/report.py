@@ -50,7 +50,7 @@ from dva_sim.experiments.report.sample_size_table import plan_table
 from dva_sim.experiments.report.summary import Reading
 from dva_sim.experiments.report.tuning_table import tuned_table
 from dva_sim.experiments.results.manifest import status_of
-from dva_sim.experiments.study.schema import POINT
+from dva_sim.experiments.study.parts import POINT
 from dva_sim.experiments.study.study import Status
 from dva_sim.kernel.errors import ConfigError, DvaSimError
 from dva_sim.kernel.wording import capital, listing, number

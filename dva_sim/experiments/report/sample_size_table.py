@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dva_sim.experiments.analysis.answer import Finding
-from dva_sim.experiments.analysis.paired_effects import Floats, StudyView
+from dva_sim.experiments.analysis.run_grid import Floats, StudyView
 from dva_sim.experiments.analysis.sample_size import POWERS, Count, SizePlan
 from dva_sim.experiments.report.cell_table import CellTable
 from dva_sim.kernel.wording import number, quantity

@@ -33,7 +33,8 @@ from dva_sim.experiments.analysis.layout import (
     view_of,
     with_rows,
 )
-from dva_sim.experiments.analysis.paired_effects import (
+from dva_sim.experiments.analysis.robustness import RepeatedAnswer, robustness_of
+from dva_sim.experiments.analysis.run_grid import (
     Floats,
     RunGrid,
     Setting,
@@ -42,7 +43,6 @@ from dva_sim.experiments.analysis.paired_effects import (
     as_floats,
     present,
 )
-from dva_sim.experiments.analysis.robustness import RepeatedAnswer, robustness_of
 from dva_sim.experiments.analysis.sample_size import SizePlan, plans
 from dva_sim.experiments.report.cell_table import CellTable, cell_table
 from dva_sim.experiments.report.model_page import ModelPage
@@ -51,7 +51,7 @@ from dva_sim.experiments.report.sample_size_table import few_that_weigh
 from dva_sim.experiments.report.tuning_table import tuning_warning
 from dva_sim.experiments.results.manifest import status_of
 from dva_sim.experiments.results.results import Results
-from dva_sim.experiments.study.schema import POINT, REPEATS, STRATEGY, TUNING
+from dva_sim.experiments.study.parts import POINT, REPEATS, STRATEGY, TUNING
 from dva_sim.kernel.wording import capital, listing, number, percent, quantity
 from dva_sim.simulation.labels import brief, level_name, setting
 from dva_sim.statistics import band

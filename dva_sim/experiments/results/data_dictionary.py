@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from dva_sim.experiments.study.schema import DESIGN, REPEATS
+from dva_sim.experiments.study.parts import DESIGN, REPEATS
 from dva_sim.kernel.units import unit_of
 from dva_sim.simulation.models import MODELS
 

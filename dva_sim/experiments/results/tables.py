@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from dva_sim.experiments.results.results import TABLES, quoted
 from dva_sim.experiments.study.cell_grid import RunKey, StudyRun
-from dva_sim.experiments.study.schema import REPEATS
+from dva_sim.experiments.study.parts import REPEATS
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.simulation.models import Tables
 

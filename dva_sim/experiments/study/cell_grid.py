@@ -15,6 +15,7 @@ from typing import Any
 from dva_sim.experiments.study.factor_levels import levels_at_ends, levels_of_cells, path_in_design
 from dva_sim.experiments.study.hashing import stable_hash
 from dva_sim.experiments.study.own_measures import names_of_own
+from dva_sim.experiments.study.parts import POINT, REPEATS, TUNED, TUNING, Level
 from dva_sim.experiments.study.robustness_grid import (
     PARAMETERS,
     TRAITS,
@@ -22,7 +23,6 @@ from dva_sim.experiments.study.robustness_grid import (
     parameter_sets,
     settings_of_repeats,
 )
-from dva_sim.experiments.study.schema import POINT, REPEATS, TUNED, TUNING, Level
 from dva_sim.experiments.study.study import Study
 from dva_sim.experiments.study.tuning import TuningBasis, load_tuned
 from dva_sim.kernel.config import Document, KeyPath

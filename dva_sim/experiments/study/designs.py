@@ -25,7 +25,7 @@ from pydantic import (
     model_validator,
 )
 
-from dva_sim.experiments.study.schema import (
+from dva_sim.experiments.study.parts import (
     POINT,
     SPARES_THE_DESIGN,
     Level,

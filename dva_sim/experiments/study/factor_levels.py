@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from dva_sim.experiments.study.designs import Row, ValueRange, keys_of, sample, value_at
-from dva_sim.experiments.study.schema import POINT
+from dva_sim.experiments.study.parts import POINT
 from dva_sim.experiments.study.study import Study
 from dva_sim.kernel.config import KeyPath
 

@@ -82,7 +82,7 @@ _CODE = (
 # What says whether a hypothesis held: a registration fixes it, other results may be judged anew.
 _JUDGES = (
     "experiments/analysis/hypothesis_tests.py",
-    "experiments/analysis/paired_effects.py",
+    "experiments/analysis/run_grid.py",
     "experiments/analysis/layout.py",
     "statistics",
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from dva_sim.experiments.study.schema import DESIGN
+from dva_sim.experiments.study.parts import DESIGN
 from dva_sim.experiments.study.study import Study
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.measure import Measure

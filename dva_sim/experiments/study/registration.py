@@ -20,7 +20,7 @@ from dva_sim.experiments.study.hashing import (
     inputs,
     stable_hash,
 )
-from dva_sim.experiments.study.schema import POINT
+from dva_sim.experiments.study.parts import POINT
 from dva_sim.experiments.study.study import Status, Study
 from dva_sim.kernel.config import Config, Document, load_yaml, validate
 from dva_sim.kernel.errors import ConfigError, DvaSimError

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, field_validator
 
-from dva_sim.agents.person import Population
-from dva_sim.experiments.study.schema import REPEATS, STRATEGY, Level, Range, RobustnessRule
+from dva_sim.agents.population import Population
+from dva_sim.experiments.study.parts import REPEATS, STRATEGY, Level, Range, RobustnessRule
 from dva_sim.experiments.study.study import Study
 from dva_sim.kernel import resources
 from dva_sim.kernel.config import Config, load_yaml, validate

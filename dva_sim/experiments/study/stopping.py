@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from dva_sim.experiments.study.cell_grid import StudyJob
 from dva_sim.experiments.study.factor_levels import factors_in_rows
-from dva_sim.experiments.study.schema import Contrast, Level, StopRule
+from dva_sim.experiments.study.parts import Contrast, Level, StopRule
 from dva_sim.experiments.study.study import Study
 from dva_sim.statistics import band, mean_interval
 

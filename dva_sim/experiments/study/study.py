@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, PrivateAttr, field_validator
 
 from dva_sim.experiments.study.designs import ROWS, Design, Row
-from dva_sim.experiments.study.schema import (
+from dva_sim.experiments.study.parts import (
     ANSWER,
     REPEATS,
     SPARES_THE_DESIGN,

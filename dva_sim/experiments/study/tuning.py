@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from dva_sim.experiments.study import validation
-from dva_sim.experiments.study.schema import Level, Levels, Tuning
+from dva_sim.experiments.study.parts import Level, Levels, Tuning
 from dva_sim.experiments.study.study import Status, Study
 from dva_sim.kernel import resources
 from dva_sim.kernel.config import Config, load_yaml, validate

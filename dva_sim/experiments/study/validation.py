@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from dva_sim.experiments.study.designs import MOST_CELLS, MOST_POINTS, MOST_RUNS, keys_of
 from dva_sim.experiments.study.factor_levels import factors_in_rows, path_in_design, runs_of, size
-from dva_sim.experiments.study.schema import (
+from dva_sim.experiments.study.parts import (
     ANSWER,
     DESIGN,
     POINT,

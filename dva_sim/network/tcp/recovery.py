@@ -1,13 +1,11 @@
-"""Which segments are lost: by time (RACK), or by three later ones acknowledged.
+"""What an end does about losses: when it recovers, how far, and whether it was needless.
+
+Segments are taken for lost by time (RACK), or by three later ones acknowledged.
 
 References:
-    RFC 8985 (RACK), section 6; RFC 6675 (three duplicates).
-
-What an end does about losses: when it recovers, how far, and whether it was needless.
-
-References:
-    RFC 8985 (RACK and the tail-loss probe's verdict), RFC 6937 (rate reduction), RFC 5681
-    and 6298 (after a time-out), RFC 3522 (needless recoveries, told by time stamps).
+    RFC 8985 (RACK, section 6, and the tail-loss probe's verdict), RFC 6675 (three duplicates),
+    RFC 6937 (rate reduction), RFC 5681 and 6298 (after a time-out), RFC 3522 (needless recoveries,
+    told by time stamps).
 """
 
 from __future__ import annotations

@@ -1,23 +1,18 @@
-"""The round trip as the sender sees it, and the retransmission time-out that follows.
+"""The one retransmission timer of an end: what it waits for, until when, and how long.
 
-A timer that is moved far more often than it rings.
-
-Moving it later costs nothing: the event already scheduled looks, when it is due, whether
-the deadline has moved on. Only an earlier deadline needs a new event.
+The time-out follows the round trip as the sender sees it. The timer is moved far more often than
+it rings, and moving it later costs nothing: the event already scheduled looks, when it is due,
+whether the deadline has moved on. Only an earlier deadline needs a new event.
 
 Linux keeps such timers in a wheel of several rings, of which each outer one is eight times
 coarser: the longer the wait, the later it may ring, and never early. At 250 ticks a second
 a wait of 300 ms ends on a grid of 32 ms.
 
 References:
-    Corbet: Reinventing the timer wheel. LWN.net, 2015; seen in our own measurements.
-
-The one retransmission timer of an end: what it waits for, and until when.
-
-References:
     RFC 6298, section 5 (when the time-out is started and moved), RFC 8985, sections 6.2
     and 7.2 (doubts about reordering, tail-loss probe), RFC 9293, section 3.8.6.1 (probing
-    a closed window).
+    a closed window). Corbet: Reinventing the timer wheel. LWN.net, 2015; seen in our own
+    measurements.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ from dva_sim.network.patterns import PATTERNS
 from dva_sim.simulation.full import Playback
 from dva_sim.simulation.full.hazards import RunHazard
 from dva_sim.worlds.camera import Camera, Figure, SmokeView
-from dva_sim.worlds.camera.raycast import Picture
+from dva_sim.worlds.camera.picture import Picture
 from dva_sim.worlds.geo import Pose
 
 ROBOT, GUARD, BYSTANDER = "robot", "guard", "bystander"

@@ -15,14 +15,14 @@ from dva_sim.agents.operator.drive import Teleoperation
 from dva_sim.agents.operator.operator import OperatorAgent
 from dva_sim.agents.operator.strategies import Truth, load_strategy
 from dva_sim.agents.operator.supervision import Supervision
-from dva_sim.agents.person import draw_person
+from dva_sim.agents.population import draw_person
 from dva_sim.agents.robot.robot import EXPECTED_READY, EXPECTED_SPEED
 from dva_sim.agents.tilt import Phone
 from dva_sim.core.dispatch import load_policy
 from dva_sim.core.dispatcher import Patrols
 from dva_sim.core.dva import Dva
-from dva_sim.core.permissions import LOW_BITS, Access, AccessRule, Permissions
-from dva_sim.core.sessions import Sessions
+from dva_sim.core.permissions import Access, AccessRule
+from dva_sim.core.sessions import LOW_BITS, Permissions, Sessions
 from dva_sim.core.store import Store
 from dva_sim.core.travel_times import Floats, SiteKnowledge, Start, WaitingPlace
 from dva_sim.kernel.errors import ConfigError

@@ -10,7 +10,7 @@ from dva_sim.agents.observation import Observation
 from dva_sim.agents.operator.strategies import Truth
 from dva_sim.agents.people.bystander import BystanderAgent
 from dva_sim.agents.people.guard import GuardAgent
-from dva_sim.agents.robot.camera import HazardSpot
+from dva_sim.agents.robot.field_of_view import HazardSpot
 from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.kernel.recorder import DriveLog
 from dva_sim.protocol import messages as m

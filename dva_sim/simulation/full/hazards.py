@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dva_sim.agents.robot.camera import HazardSpot
+from dva_sim.agents.robot.field_of_view import HazardSpot
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.streams import Streams
 from dva_sim.simulation.scenario import EventConfig

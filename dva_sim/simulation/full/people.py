@@ -11,7 +11,7 @@ from dva_sim.agents.people.guard import GuardAgent
 from dva_sim.agents.people.pedestrian_avoidance import RADIUS
 from dva_sim.agents.people.profiles import Occupant, Walker
 from dva_sim.agents.people.walking import Walking
-from dva_sim.agents.robot.camera import HazardSpot
+from dva_sim.agents.robot.field_of_view import HazardSpot
 from dva_sim.simulation.full.robots import Starts
 from dva_sim.simulation.full.stage import Stage
 from dva_sim.simulation.scenario import bystander_profile, guard_profile

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from dva_sim.agents.observation import CAMERA_SCHEME
 from dva_sim.agents.robot.battery import Battery
-from dva_sim.agents.robot.camera import FieldOfView, HazardSpot
 from dva_sim.agents.robot.command_queue import service_times
 from dva_sim.agents.robot.controller import Limits, RobotController
+from dva_sim.agents.robot.field_of_view import FieldOfView, HazardSpot
 from dva_sim.agents.robot.profile import RobotProfile
 from dva_sim.agents.robot.robot import FRAME, RobotAgent, RobotSetup
 from dva_sim.agents.robot.sensors import make_ports, sources_of

@@ -1,6 +1,6 @@
-"""What carries the messages of a scenario, and what they ask of a robot's link.
+"""Build a run from a scenario, let its virtual time pass, and keep what happened.
 
-Build a run from a scenario, let its virtual time pass, and keep what happened.
+What carries the messages of a scenario, and what they ask of a robot's link, is decided here.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Ids on the wire and names for people.
+"""What the parts of a run share: scenario, random streams, clock, network, site, and who is who.
 
-What the parts of a run share: scenario, luck, clock, network, site, and who is who.
+Ids on the wire and names for people are made here.
 """
 
 from __future__ import annotations

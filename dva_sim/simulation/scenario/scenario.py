@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, cast
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from dva_sim.agents.people.profiles import BystanderProfile, GuardProfile
-from dva_sim.agents.person import Population
+from dva_sim.agents.population import Population
 from dva_sim.agents.robot.profile import RobotProfile, load_robot
 from dva_sim.agents.tilt import PhoneProfile
 from dva_sim.kernel import resources

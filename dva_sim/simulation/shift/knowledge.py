@@ -16,9 +16,8 @@ import numpy as np
 from dva_sim.core.assignments import Rules
 from dva_sim.core.dispatch import Policy
 from dva_sim.core.dva import Dva
-from dva_sim.core.permissions import Permissions
 from dva_sim.core.registry import DETECTOR, GUARD, OPERATOR, ROBOT
-from dva_sim.core.sessions import Sessions
+from dva_sim.core.sessions import Permissions, Sessions
 from dva_sim.core.travel_times import SiteKnowledge, Start, WaitingPlace
 from dva_sim.kernel.streams import Streams
 from dva_sim.protocol import messages as m
@@ -52,7 +51,7 @@ class Team(ShiftWorld, Protocol):
 def travel(
     shift: Team, starts: Sequence[Start], goals: Sequence[m.Position]
 ) -> tuple[Floats, Floats]:
-    """See `core.ground.Travel`: what may be expected of each responder.
+    """See `core.travel_times.Travel`: what may be expected of each responder.
 
     Where each way's time is drawn for itself it is known beforehand: choosing by it is the
     point of such a world.

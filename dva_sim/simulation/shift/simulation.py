@@ -1,9 +1,8 @@
-"""The balance of a timed run: every event of the world in exactly one state, none lost.
+"""A shift: the world of one timed run, around the DVA itself, and the balance of its events.
 
-What the world counted is held against what the DVA's book says, and the rules that hold
-whatever a policy advises against what everybody is really at.
-
-A shift: the world of one timed run, around the DVA's own desk.
+Every event of the world is in exactly one state, and none is lost: what the world counted is held
+against what the DVA's book says, and the rules that hold whatever a policy advises against what
+everybody is really at.
 """
 
 from __future__ import annotations
@@ -320,7 +319,7 @@ class Shift:
         self.demand.closed(incident, now)
 
     def travel(self, starts: Sequence[Start], goals: Sequence[m.Position]) -> tuple[Floats, Floats]:
-        """What the DVA is told of ways: see `core.ground.Travel`."""
+        """What the DVA is told of ways: see `core.travel_times.Travel`."""
         return knowledge.travel(self, starts, goals)
 
     def _tell_who_moves(self) -> None:
@@ -328,7 +327,7 @@ class Shift:
         for unit in self._moving:
             self._publish(unit, unit.here(), "walking")
 
-    # --- what units may ask, and tell: see `units.World` -----------------------------------
+    # --- what units may ask, and tell: see `responders.ShiftWorld` ---------------------------
 
     @property
     def now(self) -> float:

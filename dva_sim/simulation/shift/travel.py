@@ -1,10 +1,8 @@
-"""Places and the ways between them: nowhere in particular, or on a plane.
+"""Ways in a shift: between places without a map, on a plane, or planned on a site.
 
-A site as the timed world sees it: a few places in each room, and planned ways between them.
-
-Ways between places that stay are planned once per process. From half-way, where planning
-each time would cost more than the rest of the run, the way leads straight to what is in sight
-- the goal, a door or an opening - and on from there.
+On a site there are a few places in each room. Ways between places that stay are planned once per
+process. From half-way, where planning each time would cost more than the rest of the run, the way
+leads straight to what is in sight - the goal, a door or an opening - and on from there.
 """
 
 from __future__ import annotations

@@ -23,19 +23,11 @@ from dva_sim.agents.operator.strategies import (
     View,
     load_strategy,
 )
-from dva_sim.agents.person import Person, draw_person
+from dva_sim.agents.population import Person, draw_person
 from dva_sim.agents.route_following import Route
 from dva_sim.kernel.streams import Streams, derive_seed
 from dva_sim.simulation.scenario.scenario import population
 from dva_sim.simulation.task import measures
-from dva_sim.simulation.task.cursor import (
-    CursorTrial,
-    Goal,
-    PointGoal,
-    ReachGoal,
-    TrackGoal,
-    TunnelGoal,
-)
 from dva_sim.simulation.task.delays import Channel, RecordedChannel, RecordedDelays, normals
 from dva_sim.simulation.task.devices import Joystick, Pair, Unicycle
 from dva_sim.simulation.task.kinds import (
@@ -47,6 +39,14 @@ from dva_sim.simulation.task.kinds import (
     Task,
     Tracking,
     Tunnel,
+)
+from dva_sim.simulation.task.pointing import (
+    CursorTrial,
+    Goal,
+    PointGoal,
+    ReachGoal,
+    TrackGoal,
+    TunnelGoal,
 )
 from dva_sim.simulation.task.scenario import OneWayDelay, TaskScenario
 from dva_sim.simulation.task.trial import Seat, Trace, Trial

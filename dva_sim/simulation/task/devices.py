@@ -22,7 +22,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 
-from dva_sim.agents.person import Person
+from dva_sim.agents.population import Person
 from dva_sim.agents.tilt.accelerometer import GRAVITY, Accelerometer, load_part
 from dva_sim.agents.tilt.filters import load_guarded_filter
 from dva_sim.agents.tilt.hand import MAX_SPEED, Hand

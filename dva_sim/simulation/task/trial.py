@@ -20,7 +20,7 @@ from typing import Generic, TypeVar
 
 from dva_sim.agents.operator.delay_estimation import DelayEstimate
 from dva_sim.agents.operator.strategies import Driver, Oracle, Reach, Strategy
-from dva_sim.agents.person import Person
+from dva_sim.agents.population import Person
 from dva_sim.kernel.streams import Streams
 from dva_sim.simulation.task.delays import Channel
 from dva_sim.simulation.task.scenario import TaskScenario

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.condition import Condition
-from dva_sim.validation.network.emulator.campaign import Progress, measure_all
 from dva_sim.validation.network.emulator.cell import PACKETS
+from dva_sim.validation.network.emulator.measuring import Progress, measure_all
 from dva_sim.validation.network.reference import (
     BlockConfig,
     SocketRun,

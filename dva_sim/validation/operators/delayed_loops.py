@@ -24,7 +24,7 @@ from dva_sim.agents.operator.strategies.base import PointView, Strategy
 from dva_sim.agents.operator.strategies.cursor import Sighting
 from dva_sim.agents.operator.strategies.predictor import Predictor
 from dva_sim.agents.operator.strategies.pursuit import Pursuit
-from dva_sim.agents.person import Person, Population, median_person
+from dva_sim.agents.population import Person, Population, median_person
 from dva_sim.agents.route_following import NEAREST_LOOK, Reach, Route, View
 from dva_sim.agents.tilt.filters import BATCH, Filter, load_filter
 from dva_sim.kernel.streams import Streams

@@ -3,7 +3,7 @@
 It may import sites and hazards. Begin with `raycast.py`.
 """
 
-from dva_sim.worlds.camera.raycast import Camera, encode
+from dva_sim.worlds.camera.picture import Camera, encode
 from dva_sim.worlds.camera.sprites import Figure
 from dva_sim.worlds.camera.visibility import SmokeView
 

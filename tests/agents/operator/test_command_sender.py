@@ -7,7 +7,7 @@ import pytest
 
 from dva_sim.agents.device import AgentDevice, command_topic
 from dva_sim.agents.operator.command_sender import CommandSender
-from dva_sim.agents.person import Population, draw_person
+from dva_sim.agents.population import Population, draw_person
 from dva_sim.agents.tilt import Phone, PhoneProfile
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.recorder import DriveLog, Recorder

@@ -11,7 +11,7 @@ import pytest
 
 from dva_sim.agents.observation import CLEAR, Observation, SeenHazard
 from dva_sim.agents.operator.inspection import Looking
-from dva_sim.agents.person import Population, median_person
+from dva_sim.agents.population import Population, median_person
 from dva_sim.worlds.planning import Planner
 
 PLACE = (10.0, 5.0)

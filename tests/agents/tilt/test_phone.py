@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dva_sim.agents.person import Person, Population, median_person
+from dva_sim.agents.population import Person, Population, median_person
 from dva_sim.agents.tilt import Phone, PhoneProfile, TiltCommand
 from dva_sim.kernel.config import validate
 from dva_sim.kernel.errors import ConfigError

@@ -3,7 +3,7 @@ import itertools
 import numpy as np
 import pytest
 
-from dva_sim.experiments.analysis.paired_effects import (
+from dva_sim.experiments.analysis.run_grid import (
     Factor,
     RunGrid,
     StudyView,

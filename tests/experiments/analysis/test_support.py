@@ -3,7 +3,7 @@ import pytest
 
 from dva_sim.agents.operator.published import ranges
 from dva_sim.experiments.analysis.extrapolation import support_of_part
-from dva_sim.experiments.analysis.paired_effects import Factor, RunGrid, StudyView
+from dva_sim.experiments.analysis.run_grid import Factor, RunGrid, StudyView
 from dva_sim.experiments.report.cell_table import cell_table
 
 DELAY = Factor("link.delay_s", (0.0, 0.5, 5.0))

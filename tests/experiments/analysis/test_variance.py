@@ -1,6 +1,6 @@
 import synthetic_study
 
-from dva_sim.experiments.analysis.paired_effects import Factor, RunGrid, StudyView
+from dva_sim.experiments.analysis.run_grid import Factor, RunGrid, StudyView
 from dva_sim.experiments.report.answer_table import spread_table
 
 

@@ -11,7 +11,7 @@ from matplotlib.colors import to_rgb
 
 import dva_sim.experiments.report.figures
 from dva_sim.experiments.analysis.competing_risks import WAYS
-from dva_sim.experiments.analysis.paired_effects import Factor
+from dva_sim.experiments.analysis.run_grid import Factor
 from dva_sim.experiments.report.figures import outcomes, palette
 from dva_sim.experiments.report.figures import shift as dispatch
 from dva_sim.experiments.report.figures.palette import FATES, LOOKS, STAGES, colours, looks, marks

@@ -6,7 +6,7 @@ from small_study import study_in
 from dva_sim.experiments.results.data_dictionary import describe
 from dva_sim.experiments.results.tables import design_row
 from dva_sim.experiments.study import cell_grid
-from dva_sim.experiments.study.schema import DESIGN
+from dva_sim.experiments.study.parts import DESIGN
 from dva_sim.kernel.units import UNITS, ending_of, unit_of
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.models import MODELS, measured_names, model_of

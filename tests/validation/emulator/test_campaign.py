@@ -4,8 +4,9 @@ from pathlib import Path
 import pytest
 
 from dva_sim.network.condition import Condition
-from dva_sim.validation.network.emulator import campaign
-from dva_sim.validation.network.emulator.campaign import (
+from dva_sim.validation.network.emulator import measuring
+from dva_sim.validation.network.emulator.cell import EmulatedJob, EmulatedOutcome
+from dva_sim.validation.network.emulator.measuring import (
     COLUMNS,
     Progress,
     Row,
@@ -13,7 +14,6 @@ from dva_sim.validation.network.emulator.campaign import (
     job_of,
     measure_all,
 )
-from dva_sim.validation.network.emulator.cell import EmulatedJob, EmulatedOutcome
 from dva_sim.validation.network.emulator.process import EmulatorError
 
 SLOW, FAST = Condition("pub", 10), Condition("pub", 50)
@@ -37,8 +37,8 @@ def pretend(monkeypatch: pytest.MonkeyPatch, play: Play) -> list[tuple[str, int]
     def run_job(job: EmulatedJob) -> EmulatedOutcome:
         return EmulatedOutcome(way="root")
 
-    monkeypatch.setattr(campaign, "measure", measure)
-    monkeypatch.setattr(campaign, "run_job", run_job)
+    monkeypatch.setattr(measuring, "measure", measure)
+    monkeypatch.setattr(measuring, "run_job", run_job)
     return calls
 
 

@@ -15,8 +15,8 @@ from emulated import all_end, need_link, networks, wait_for_children
 from patience import becomes
 
 from dva_sim.network.condition import Condition
-from dva_sim.validation.network.emulator.campaign import COLUMNS, job_of, measure
 from dva_sim.validation.network.emulator.cell import EmulatedJob, EmulatedOutcome
+from dva_sim.validation.network.emulator.measuring import COLUMNS, job_of, measure
 from dva_sim.validation.network.emulator.process import (
     EmulatorError,
     run_job,
@@ -29,7 +29,7 @@ pytestmark = pytest.mark.system
 
 LONG = Condition("pub", 10, dur_s=600)
 WAITING = """
-from dva_sim.validation.network.emulator.campaign import measure
+from dva_sim.validation.network.emulator.measuring import measure
 from dva_sim.network.condition import Condition
 measure(Condition("pub", 10, dur_s=600), 1)
 """

@@ -16,7 +16,7 @@ from dva_sim.agents.operator.strategies.loading import (
 from dva_sim.agents.operator.strategies.move_and_wait import MoveAndWait
 from dva_sim.agents.operator.strategies.predictor import Oracle, Predictor, Truth
 from dva_sim.agents.operator.strategies.pursuit import Pursuit, TwoPoint
-from dva_sim.agents.person import Person
+from dva_sim.agents.population import Person
 from dva_sim.agents.route_following import SHORTEST, Intent, Reach, Route, View, gain_at
 
 __all__ = [

@@ -14,7 +14,7 @@ from dva_sim.agents.operator.strategies.base import PathView, PointView, Strateg
 from dva_sim.agents.operator.strategies.cursor import Velocity, fastest
 from dva_sim.agents.operator.strategies.move_and_wait import SHORT, MoveAndWait
 from dva_sim.agents.operator.strategies.pursuit import Pursuit
-from dva_sim.agents.person import Person
+from dva_sim.agents.population import Person
 from dva_sim.agents.route_following import (
     FARTHEST_LOOK,
     SHORTEST,

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from typing import ClassVar, NamedTuple
 
 from dva_sim.agents.operator.strategies.cursor import Sighting, Velocity, slowed, through, towards
-from dva_sim.agents.person import Person
+from dva_sim.agents.population import Person
 from dva_sim.agents.route_following import Intent, Reach, Route, View
 from dva_sim.kernel.plugins import FAILURES, Guard, said
 

@@ -13,7 +13,7 @@ import math
 from itertools import pairwise
 from typing import NamedTuple
 
-from dva_sim.agents.person import Person
+from dva_sim.agents.population import Person
 from dva_sim.agents.route_following import SHORTEST, Route, gain_at
 
 Velocity = tuple[float, float]

@@ -12,7 +12,7 @@ from dva_sim.agents.operator.strategies.base import GuardedStrategy, Strategy
 from dva_sim.agents.operator.strategies.move_and_wait import MoveAndWait
 from dva_sim.agents.operator.strategies.predictor import Oracle, Predictor
 from dva_sim.agents.operator.strategies.pursuit import Pursuit, TwoPoint
-from dva_sim.agents.person import Person, Population, median_person
+from dva_sim.agents.population import Person, Population, median_person
 from dva_sim.agents.route_following import Reach
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.plugins import Plugins, word_of

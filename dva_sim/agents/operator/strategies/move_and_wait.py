@@ -15,7 +15,7 @@ from collections.abc import Mapping, Sequence
 from dva_sim.agents.observation import Observation
 from dva_sim.agents.operator.strategies.base import PathView, PointView, Strategy
 from dva_sim.agents.operator.strategies.cursor import Velocity
-from dva_sim.agents.person import Person
+from dva_sim.agents.population import Person
 from dva_sim.agents.route_following import IN_CURVES, SHORTEST, Ahead, Intent, Reach, Route, View
 
 SETTLED_FOR = 0.3  # the picture must stand still for so long [s]; assumed

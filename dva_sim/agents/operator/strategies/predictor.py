@@ -21,7 +21,7 @@ from dva_sim.agents.operator.delay_estimation import LONGEST
 from dva_sim.agents.operator.strategies.base import PathView, PointView, Strategy
 from dva_sim.agents.operator.strategies.cursor import Sighting, Velocity
 from dva_sim.agents.operator.strategies.pursuit import Pursuit
-from dva_sim.agents.person import Person
+from dva_sim.agents.population import Person
 from dva_sim.agents.route_following import Intent, Reach, Route, View
 from dva_sim.kernel import options
 

@@ -24,7 +24,7 @@ from __future__ import annotations
 import math
 
 from dva_sim.agents.operator.strategies.base import Strategy
-from dva_sim.agents.person import Person
+from dva_sim.agents.population import Person
 from dva_sim.agents.route_following import (
     Ahead,
     Intent,

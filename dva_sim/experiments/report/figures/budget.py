@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dva_sim.experiments.analysis.paired_effects import Factor, Floats, Setting, StudyView, nan_mean
+from dva_sim.experiments.analysis.run_grid import Factor, Floats, Setting, StudyView, nan_mean
 from dva_sim.experiments.report.figures.palette import (
     INK,
     PAPER,
@@ -30,7 +30,7 @@ from dva_sim.experiments.report.figures.style import (
     tick_names,
     wrapped,
 )
-from dva_sim.experiments.study.schema import Level
+from dva_sim.experiments.study.parts import Level
 from dva_sim.kernel.wording import capital
 from dva_sim.simulation.labels import brief
 

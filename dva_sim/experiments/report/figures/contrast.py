@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dva_sim.experiments.analysis.answer import Finding, condition
-from dva_sim.experiments.analysis.paired_effects import Factor, Floats, StudyView, present
 from dva_sim.experiments.analysis.robustness import Repeat, RepeatedAnswer, RepeatedStop
+from dva_sim.experiments.analysis.run_grid import Factor, Floats, StudyView, present
 from dva_sim.experiments.report.figures.palette import FAINT, INK, ONE, PAPER, SOFT, colours
 from dva_sim.experiments.report.figures.report_figure import ReportFigure
 from dva_sim.experiments.report.figures.style import (
@@ -25,7 +25,7 @@ from dva_sim.experiments.report.figures.style import (
     with_unit,
     wrapped,
 )
-from dva_sim.experiments.study.schema import STRATEGY
+from dva_sim.experiments.study.parts import STRATEGY
 from dva_sim.kernel.wording import capital, number
 from dva_sim.simulation.labels import factor_name, level_name, measure_name
 

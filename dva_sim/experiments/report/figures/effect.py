@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dva_sim.experiments.analysis.paired_effects import (
+from dva_sim.experiments.analysis.predictions import Cadence, cadence
+from dva_sim.experiments.analysis.run_grid import (
     Factor,
     Floats,
     Setting,
@@ -21,7 +22,6 @@ from dva_sim.experiments.analysis.paired_effects import (
     person_means,
     present,
 )
-from dva_sim.experiments.analysis.predictions import Cadence, cadence
 from dva_sim.experiments.report.figures.palette import (
     FAINT,
     INK,
@@ -50,7 +50,7 @@ from dva_sim.experiments.report.figures.style import (
     with_unit,
     wrapped,
 )
-from dva_sim.experiments.study.schema import Level
+from dva_sim.experiments.study.parts import Level
 from dva_sim.kernel.wording import capital
 from dva_sim.simulation.labels import factor_name, level_name, measure_name
 from dva_sim.statistics import Band, band

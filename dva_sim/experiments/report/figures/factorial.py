@@ -11,13 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dva_sim.experiments.analysis.paired_effects import (
-    MOST_PANELS,
-    Factor,
-    Floats,
-    Setting,
-    StudyView,
-)
+from dva_sim.experiments.analysis.run_grid import MOST_PANELS, Factor, Floats, Setting, StudyView
 from dva_sim.experiments.report.figures.palette import DIVERGING, INK, PAPER, SOFT
 from dva_sim.experiments.report.figures.report_figure import ReportFigure
 from dva_sim.experiments.report.figures.style import (
@@ -30,7 +24,7 @@ from dva_sim.experiments.report.figures.style import (
     stops_axis,
     with_unit,
 )
-from dva_sim.experiments.study.schema import Level
+from dva_sim.experiments.study.parts import Level
 from dva_sim.kernel.wording import capital, number
 from dva_sim.simulation.labels import factor_name, level_name, measure_name
 from dva_sim.statistics import Effect, band, factorial_effects

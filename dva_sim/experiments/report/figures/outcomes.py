@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dva_sim.experiments.analysis.competing_risks import NOTHING, Endings
-from dva_sim.experiments.analysis.paired_effects import (
+from dva_sim.experiments.analysis.run_grid import (
     Floats,
     Setting,
     StudyView,
@@ -33,7 +33,7 @@ from dva_sim.experiments.report.figures.style import (
     stops_axis,
     wrapped,
 )
-from dva_sim.experiments.study.schema import Level
+from dva_sim.experiments.study.parts import Level
 from dva_sim.kernel.wording import capital
 from dva_sim.simulation.labels import brief, level_name
 from dva_sim.statistics import CUT, incidence

@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from dva_sim.experiments.analysis.paired_effects import Factor
-from dva_sim.experiments.study.schema import Level
+from dva_sim.experiments.analysis.run_grid import Factor
+from dva_sim.experiments.study.parts import Level
 from dva_sim.network.patterns import PATTERNS
 from dva_sim.simulation.labels import level_name
 

@@ -8,13 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from dva_sim.experiments.analysis.layout import layout_of
-from dva_sim.experiments.analysis.paired_effects import (
-    Floats,
-    RunGrid,
-    Setting,
-    StudyView,
-    nan_mean,
-)
+from dva_sim.experiments.analysis.run_grid import Floats, RunGrid, Setting, StudyView, nan_mean
 from dva_sim.experiments.report.figures.palette import INK, ONE, PAPER, SOFT, Look, legend, looks
 from dva_sim.experiments.report.figures.report_figure import ReportFigure
 from dva_sim.experiments.report.figures.style import (
@@ -26,7 +20,7 @@ from dva_sim.experiments.report.figures.style import (
     with_unit,
     wrapped,
 )
-from dva_sim.experiments.study.schema import POINT, Level
+from dva_sim.experiments.study.parts import POINT, Level
 from dva_sim.kernel.wording import capital
 from dva_sim.simulation.labels import factor_name, level_name, measure_name, setting
 from dva_sim.simulation.labels import with_unit as head_of

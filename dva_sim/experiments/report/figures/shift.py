@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dva_sim.experiments.analysis.paired_effects import Factor, StudyView
+from dva_sim.experiments.analysis.run_grid import Factor, StudyView
 from dva_sim.experiments.analysis.shift_effects import BEST, FLOOR, Shifts, pooled
 from dva_sim.experiments.report.figures.palette import (
     FAINT,
@@ -23,7 +23,7 @@ from dva_sim.experiments.report.figures.palette import (
 from dva_sim.experiments.report.figures.report_figure import ReportFigure
 from dva_sim.experiments.report.figures.style import Drawn, Numbers, panels, with_unit
 from dva_sim.experiments.report.shift_page import ShiftPage
-from dva_sim.experiments.study.schema import Level
+from dva_sim.experiments.study.parts import Level
 from dva_sim.kernel.wording import capital
 from dva_sim.simulation.shift import measures
 
@@ -138,12 +138,18 @@ def _scatter(shifts: Shifts, column: str, label: str) -> Figure:
 
 
 def _scatter_numbers(shifts: Shifts, column: str) -> Numbers:
-    """Means, and half-widths of the difference against the baseline."""
+    """Means, and ends of bars: the interval of the difference against the baseline."""
     numbers = Numbers()
     told: dict[str, Any] = {}
     for name in ("response_mean_s", column):
-        told[name] = shifts.means(name)
-        told[with_unit(f"{name.removesuffix('_s')}_half_width", name)] = _half_widths(shifts, name)
+        means, halves, stem = (
+            shifts.means(name),
+            _half_widths(shifts, name),
+            name.removesuffix("_s"),
+        )
+        told[name] = means
+        told[with_unit(f"{stem}_low", name)] = means - halves
+        told[with_unit(f"{stem}_high", name)] = means + halves
     for stop, title in enumerate(shifts.titles):
         at_stop: dict[str, Any] = {name: values[:, stop] for name, values in told.items()}
         numbers.add({"at": title}, at_stop | {"dispatch.policy": shifts.policies})
@@ -323,7 +329,8 @@ class Percentiles(ShiftFigure):
                     "response_low_s": low,
                     "response_high_s": high,
                 }
-                numbers.add(where, told | {"quantile": _QUANTILES})
+                shown = {"quantile": _QUANTILES, "drawn_until_s": [shifts.follow] * len(_QUANTILES)}
+                numbers.add(where, told | shown)
                 inside = [np.minimum(x, shifts.follow) for x in (value, low, high)]
                 ax.hlines([row] * 3, inside[1], inside[2], color=colour, lw=5, alpha=0.3)
                 ax.plot(inside[0], [row] * 3, color=colour, lw=0.8)

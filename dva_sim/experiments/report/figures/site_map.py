@@ -13,13 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dva_sim.experiments.analysis.kept_episodes import KeptEpisode, agents_of, instants, way_of
-from dva_sim.experiments.analysis.paired_effects import (
-    Floats,
-    StudyView,
-    Table,
-    as_floats,
-    codes_of,
-)
+from dva_sim.experiments.analysis.run_grid import Floats, StudyView, Table, as_floats, codes_of
 from dva_sim.experiments.report.figures.palette import (
     HAZARD,
     INK,
@@ -32,7 +26,7 @@ from dva_sim.experiments.report.figures.palette import (
 )
 from dva_sim.experiments.report.figures.report_figure import ReportFigure
 from dva_sim.experiments.report.figures.style import ASIDE, WIDTH, Drawn, Numbers, panels, wrapped
-from dva_sim.experiments.study.schema import POINT, Level
+from dva_sim.experiments.study.parts import POINT, Level
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.kernel.units import unit_of
 from dva_sim.kernel.wording import capital, number, percent, quantity

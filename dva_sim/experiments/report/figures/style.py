@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from dva_sim.experiments.analysis.paired_effects import Factor, Floats, Setting, StudyView
+from dva_sim.experiments.analysis.run_grid import Factor, Floats, Setting, StudyView
 from dva_sim.experiments.report.figures.palette import FAINT, INK, SOFT
-from dva_sim.experiments.study.schema import Level
+from dva_sim.experiments.study.parts import Level
 from dva_sim.kernel.units import ending_of, unit_of
 from dva_sim.kernel.wording import capital
 from dva_sim.simulation.labels import brief, factor_name, level_name, measure_name

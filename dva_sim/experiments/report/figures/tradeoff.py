@@ -6,13 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dva_sim.experiments.analysis.paired_effects import (
-    Floats,
-    Setting,
-    StudyView,
-    person_means,
-    present,
-)
+from dva_sim.experiments.analysis.run_grid import Floats, Setting, StudyView, person_means, present
 from dva_sim.experiments.report.figures.palette import legend, looks
 from dva_sim.experiments.report.figures.report_figure import ReportFigure
 from dva_sim.experiments.report.figures.style import (
@@ -24,7 +18,7 @@ from dva_sim.experiments.report.figures.style import (
     panel_title,
     with_unit,
 )
-from dva_sim.experiments.study.schema import Level
+from dva_sim.experiments.study.parts import Level
 from dva_sim.simulation.labels import factor_name, level_name, measure_name
 from dva_sim.statistics import Band, band
 

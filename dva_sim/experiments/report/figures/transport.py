@@ -7,10 +7,18 @@ from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
 
-from dva_sim.experiments.analysis.paired_effects import Floats, StudyView, nan_mean, person_means
+from dva_sim.experiments.analysis.run_grid import Floats, StudyView, nan_mean, person_means
 from dva_sim.experiments.report.figures.palette import INK, Look, legend, looks
 from dva_sim.experiments.report.figures.report_figure import ReportFigure
-from dva_sim.experiments.report.figures.style import Drawn, Numbers, log_axis, panels, stops_axis
+from dva_sim.experiments.report.figures.style import (
+    Drawn,
+    Numbers,
+    log_axis,
+    panels,
+    stops_axis,
+    with_unit,
+)
+from dva_sim.kernel.units import ending_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -106,13 +114,19 @@ class Taken(_Measures):
 
 
 def _numbers(view: StudyView, shown: Sequence[ShownMeasure]) -> Numbers:
-    """Means over persons, in the units of the table of runs."""
+    """Means over persons and the middle 90 % of them, in the units of the table of runs."""
     numbers, panel = Numbers(), view.panels[0]
     grids = {each.column: view.part.grid(each.column) for each in shown}
     for level in view.lines:
         curves = {name: view.curve(grid, panel, level) for name, grid in grids.items()}
-        means = {name: nan_mean(person_means(curve), axis=0) for name, curve in curves.items()}
-        numbers.add(view.setting(panel, level), view.along_x() | means)
+        told: dict[str, Floats] = {}
+        for name, curve in curves.items():
+            persons = person_means(curve)
+            stem = name.removesuffix(f"_{ending_of(name)}")
+            told[name] = nan_mean(persons, axis=0)
+            for end, values in zip(("low", "high"), _middle(persons), strict=True):
+                told[with_unit(f"{stem}_{end}", name)] = values
+        numbers.add(view.setting(panel, level), view.along_x() | told)
     return numbers
 
 
@@ -132,12 +146,20 @@ def _panel(ax: Axes, view: StudyView, shown: ShownMeasure) -> None:
         ax.axhline(1.0, color=INK, lw=0.8, ls=(0, (4, 2)), zorder=1)
 
 
+def _middle(values: Floats) -> Floats:
+    """Ends of the middle 90 % of persons at each stop: `(2, stops)`."""
+    found = np.full((2, values.shape[1]), np.nan)
+    there = np.isfinite(values).any(axis=0)
+    found[:, there] = np.nanpercentile(values[:, there], [5, 95], axis=0)
+    return found
+
+
 def _marks(ax: Axes, place: float, values: Floats, look: Look) -> None:
     """Means over persons of `values` `(persons, stops)`, with the middle 90 % of them."""
     means = nan_mean(values, axis=0)
     stops = np.flatnonzero(np.isfinite(means))
     if not len(stops):
         return
-    low, high = np.nanpercentile(values[:, stops], [5, 95], axis=0)
+    low, high = _middle(values[:, stops])
     ax.vlines(stops + place, low, high, color=look.colour, lw=1.2, zorder=2)
     ax.plot(stops + place, means[stops], look.mark, color=look.colour, ms=4.5, zorder=3)

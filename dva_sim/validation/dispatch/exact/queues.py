@@ -1,6 +1,6 @@
-"""Laplace transforms of the laws that times can follow.
+"""One waiting line, one or more servers: what queueing theory says of it, exactly.
 
-One waiting line, one or more servers: what queueing theory says of it, exactly.
+Laplace transforms of the laws that times can follow stand below.
 
 A server is a responder or an operator, a customer an event. Every formula takes rates per
 second and times in seconds, and gives its measures by name:

@@ -1,13 +1,10 @@
-"""The two ends of a link: a process each, with a network of its own where packets are emulated.
-
-A namespace here has no name: it ends with its process, and the process ends with the one that
-started it. So nothing can be left behind, whoever is killed.
-
-One run: a process that starts both ends, is the link between them, and tells what they noted.
+"""One run: a process that starts both ends, is the link between them, and tells what they noted.
 
 It happens in a fresh interpreter with one thread, told what to do by one line of JSON (see
 `start`). Its standard input stays open as long as somebody waits for the answer: when it closes,
-the run ends.
+the run ends. Each end is a process with a network of its own where packets are emulated. A
+namespace here has no name: it ends with its process, and the process ends with the one that
+started it. So nothing can be left behind, whoever is killed.
 """
 
 from __future__ import annotations
@@ -26,8 +23,8 @@ from typing import Any, Protocol
 
 from dva_sim.kernel.streams import Streams
 from dva_sim.network.condition import Condition
-from dva_sim.validation.network.emulator import namespaces
-from dva_sim.validation.network.emulator.namespaces import OPERATOR_END, ROBOT_END, End, open_tun
+from dva_sim.validation.network.emulator import linux_calls
+from dva_sim.validation.network.emulator.linux_calls import OPERATOR_END, ROBOT_END, End, open_tun
 from dva_sim.validation.network.emulator.programs import (
     Note,
     Notes,
@@ -118,9 +115,9 @@ def _live(parent: int, program: Program, channel: socket.socket, notes: Notes) -
     """All that a node's process does; it never returns."""
     code = 1
     try:
-        namespaces.die_with_parent(parent)
+        linux_calls.die_with_parent(parent)
         gc.disable()  # a pause would look like delay
-        namespaces.be_punctual(PROGRAM_PRIORITY)
+        linux_calls.be_punctual(PROGRAM_PRIORITY)
         program(channel, notes)
         code = 0
     except BaseException:
@@ -239,7 +236,7 @@ class EmulatedCell:
         problem, realtime = "", False
         told: Told = {}
         try:
-            realtime = namespaces.be_punctual(FORWARDER_PRIORITY)
+            realtime = linux_calls.be_punctual(FORWARDER_PRIORITY)
             link, word = self._set_up()
             gc.disable()  # a pause would look like delay
             self._nodes[0].channel.send(word)
@@ -288,7 +285,7 @@ def _networked(program: Program, end: End, congestion: str) -> Program:
     """The program in a network of its own, whose device goes to whoever started it."""
 
     def run(channel: socket.socket, notes: Notes) -> None:
-        namespaces.enter_network_namespace()
+        linux_calls.enter_network_namespace()
         tun = open_tun(end, congestion)
         socket.send_fds(channel, [b"device"], [tun])
         os.close(tun)

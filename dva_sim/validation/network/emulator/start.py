@@ -10,7 +10,7 @@ import json
 import os
 import sys
 
-from dva_sim.validation.network.emulator import namespaces
+from dva_sim.validation.network.emulator import linux_calls
 
 
 def main() -> None:
@@ -27,7 +27,7 @@ def main() -> None:
             way = _become_owner(told["rootless"])
         except OSError as error:
             problem = error.strerror or str(error)
-    namespaces.die_with_parent(int(sys.argv[1]))
+    linux_calls.die_with_parent(int(sys.argv[1]))
 
     from dva_sim.validation.network.emulator.cell import EmulatedCell, EmulatedJob, EmulatedOutcome
 
@@ -41,8 +41,8 @@ def main() -> None:
 
 def _become_owner(rootless: bool) -> str:
     if not rootless:
-        return namespaces.become_owner()
-    namespaces.become_root_of_a_user_namespace()
+        return linux_calls.become_owner()
+    linux_calls.become_root_of_a_user_namespace()
     return "user namespace"
 
 

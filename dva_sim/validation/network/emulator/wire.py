@@ -1,9 +1,8 @@
 """One direction of the emulated link: decides when a packet that is offered now comes out.
 
 Drop-tail queue, serialisation at the rate, loss, delay with jitter, in this order. It knows no
-device and no clock: the forwarder asks it with real packets, tests with scripted ones.
-
-Moves packets between the two TUN devices when the wires say, and notes how late it is.
+device and no clock: the forwarder asks it with real packets, and moves them between the two TUN
+devices when it says, noting how late it is; tests ask it with scripted ones.
 """
 
 from __future__ import annotations

@@ -1,10 +1,7 @@
-"""The machine that a measurement was made on: what a reader needs to judge it, and nothing else.
+"""Real TCP and ZeroMQ measured: real programs over the emulated link, many conditions, many times.
 
-A condition measured: real pyzmq programs over the emulated link, and what they came to.
-
-A table of measurements that grows by whole rows, also when its writer is killed.
-
-Many conditions measured, several times each: it can be stopped, killed and taken up again.
+A measurement can be stopped, killed and taken up again: its table grows by whole rows, also when
+its writer is killed. Beside it stands the machine it was made on, as far as a reader needs that.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.experiments.study.schema import Level
+from dva_sim.experiments.study.parts import Level
 
 Table = Mapping[str, NDArray[Any]]
 Floats = NDArray[np.float64]

@@ -1,8 +1,7 @@
-"""Statistics of persons' pairs of means, and how far they would scatter with other persons.
+"""Did pairing help: how alike two treatments' random numbers are, and what that does to variance.
 
-Everything rests on sums over persons, so that leaving one out is a subtraction.
-
-Did pairing help: how alike two treatments' luck is, and what that does to the variance.
+It rests on statistics of persons' pairs of means, and how far they would scatter with other
+persons. Everything is sums over persons, so that leaving one out is a subtraction.
 """
 
 from __future__ import annotations

@@ -1,0 +1,95 @@
+"""What `protocol/dva.xsd` allows, as data: the one place of every limit and every word on the wire.
+
+Writer, reader and checker all derive from it what they refuse.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+from typing import Final
+
+from lxml import etree
+
+from dva_sim.kernel.resources import roots
+
+_XS: Final = "{http://www.w3.org/2001/XMLSchema}"
+WHOLE: Final = {"xs:unsignedInt": 2**32 - 1, "xs:unsignedLong": 2**64 - 1}
+"""Kinds of whole numbers that types start from, and the largest of each."""
+
+# What a schema calls \P{Cc}, without what no XML can hold.
+_CHARACTER: Final = "[^\x00-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]"
+
+
+def schema_file() -> Path:
+    """The schema that came with the program: one in the working folder must not replace it."""
+    found = (root / "protocol" / "dva.xsd" for root in roots()[1:])
+    return next(path for path in found if path.is_file())
+
+
+@cache
+def tree() -> etree._ElementTree:
+    """The schema, read once."""
+    return etree.parse(schema_file())
+
+
+@cache
+def facets(name: str) -> dict[str, list[str]]:
+    """All that restricts a simple type, the narrowest first, and `base`, what it starts from."""
+    found: dict[str, list[str]] = {}
+    while (restriction := _restrictions().get(name)) is not None:
+        for facet in restriction.iterchildren(f"{_XS}*"):
+            found.setdefault(etree.QName(facet).localname, []).append(str(facet.get("value")))
+        name = str(restriction.get("base"))
+        found["base"] = [name]
+    return found
+
+
+@cache
+def _restrictions() -> dict[str, etree._Element]:
+    types = tree().getroot().iterchildren(f"{_XS}simpleType")
+    return {str(t.get("name")): r for t in types if (r := t.find(f"{_XS}restriction")) is not None}
+
+
+def types_of(element: str) -> set[str | None]:
+    """The types of all elements of a name."""
+    return {e.get("type") for e in tree().iter(f"{_XS}element") if e.get("name") == element}
+
+
+def names() -> frozenset[str]:
+    """All names of elements."""
+    return frozenset(e.get("name", "") for e in tree().iter(f"{_XS}element"))
+
+
+def choices(name: str) -> list[str]:
+    """The words that a type allows."""
+    return facets(name)["enumeration"]
+
+
+def pattern(name: str) -> str:
+    """The form of a type's text as a regular expression, without its length and without groups."""
+    form = facets(name)["pattern"][0]
+    return form.replace("(", "(?:").replace(r"\P{Cc}", _CHARACTER)
+
+
+def length(name: str) -> tuple[int, int]:
+    """Of a type's text: the least and the most characters."""
+    known = facets(name)
+    return int(known.get("minLength", ["0"])[0]), int(known["maxLength"][0])
+
+
+def bounds(name: str) -> tuple[float, float]:
+    """The least and the greatest of a type's numbers; of whole numbers they are whole."""
+    known, kind = facets(name), int if facets(name)["base"][0] in WHOLE else float
+    low, high = known.get("minInclusive", ["0"])[0], known.get("maxInclusive")
+    return kind(low), kind(high[0]) if high else WHOLE[known["base"][0]]
+
+
+def most(holder: str, child: str) -> int:
+    """How often `child` may stand in an element, or in a type, called `holder`."""
+    for node in tree().iter(f"{_XS}element", f"{_XS}complexType"):
+        if node.get("name") == holder:
+            for element in node.iter(f"{_XS}element"):
+                if element is not node and element.get("name") == child:
+                    return int(element.get("maxOccurs", "1"))
+    raise KeyError(f"{holder} holds no {child}")
