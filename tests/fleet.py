@@ -15,11 +15,10 @@ from dva_sim.agents.robot.robot import Surrounded
 from dva_sim.kernel.clock import Clock
 from dva_sim.worlds.drives import DriveSpec
 from dva_sim.worlds.geo import Pose
-from dva_sim.worlds.layout import Site
 from dva_sim.worlds.physics import PersonBody, World
 from dva_sim.worlds.planning import Planner
 from dva_sim.worlds.robot_body import RobotBody
-from dva_sim.worlds.site import load_site
+from dva_sim.worlds.site import Site, load_site
 
 Point = tuple[float, float]
 CAMERA_ANGLE, CAMERA_RANGE = math.radians(70.0), 6.0

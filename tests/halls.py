@@ -13,10 +13,10 @@ from dva_sim.agents.people.pedestrian_avoidance import RADIUS
 from dva_sim.agents.people.walking import Walking
 from dva_sim.kernel.clock import Clock
 from dva_sim.worlds.geo import GeoFrame, Pose
-from dva_sim.worlds.layout import Site
 from dva_sim.worlds.maps import rasterise
 from dva_sim.worlds.physics import World
 from dva_sim.worlds.planning import Planner
+from dva_sim.worlds.site import Site
 
 Wall = tuple[float, float, float, float]
 Point = tuple[float, float]

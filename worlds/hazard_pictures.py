@@ -11,8 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 
 from dva_sim.worlds.hazards import Surroundings, make_hazard
-from dva_sim.worlds.layout import Site
-from dva_sim.worlds.site import load_site
+from dva_sim.worlds.site import Site, load_site
 from dva_sim.worlds.view import draw_site
 
 Point = tuple[float, float]

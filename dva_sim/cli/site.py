@@ -11,7 +11,7 @@ from typer import Argument, Option
 from dva_sim.cli.options import SITES, whole
 
 if TYPE_CHECKING:
-    from dva_sim.worlds.layout import Site
+    from dva_sim.worlds.site import Site
 
 SiteName = Annotated[
     str,

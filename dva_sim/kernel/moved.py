@@ -36,6 +36,7 @@ MOVED = {
     "tasks": "simulation.task",
     "timed": "simulation.shift",
     "worlds.drawing": "worlds.geojson",
+    "worlds.layout": "worlds.site",
 }
 
 

@@ -28,8 +28,8 @@ from dva_sim.simulation.full.hazards import RunHazard
 from dva_sim.simulation.full.run import FILM_PERIOD
 from dva_sim.simulation.scenario import Scenario, site_of
 from dva_sim.worlds.hazards import KINDS
-from dva_sim.worlds.layout import Site
 from dva_sim.worlds.maps import FREE, OCCUPIED, UNKNOWN, UNKNOWN_SHADE
+from dva_sim.worlds.site import Site
 from dva_sim.worlds.site_export import write_site
 
 SHADES = {FREE: 254, OCCUPIED: 0, UNKNOWN: UNKNOWN_SHADE}

@@ -30,7 +30,7 @@ from dva_sim.testing.promises import Problem
 from dva_sim.validation.dispatch.cases import load_cases
 from dva_sim.validation.network.reference import load_plan
 from dva_sim.worlds.geo import GeoFrame
-from dva_sim.worlds.geojson import read_plan
+from dva_sim.worlds.geojson import make_plan, read_features
 from dva_sim.worlds.maps import RosMap
 from dva_sim.worlds.site import DEFAULT_FRAME, load_site, map_site
 
@@ -61,7 +61,7 @@ def check_plan(path: Path) -> list[Problem]:
     """What is wrong with a drawn plan; whether its bases are free is for its site to say."""
 
     def read() -> Iterator[ConfigError]:
-        read_plan(path, _frame_of(path))
+        make_plan(read_features(path, _frame_of(path)))
         return iter(())
 
     return _collect(path, read, lambda error: error)

@@ -22,10 +22,9 @@ from dva_sim.worlds.hazards import (
     building_of,
     detection_time,
 )
-from dva_sim.worlds.hazards.alarms import DETECTORS
+from dva_sim.worlds.hazards.detectors import DETECTORS
 from dva_sim.worlds.hazards.registry import PLUGINS
-from dva_sim.worlds.layout import Site
-from dva_sim.worlds.site import load_site
+from dva_sim.worlds.site import Site, load_site
 from dva_sim.worlds.site_parts import Detector
 
 Point = tuple[float, float]

@@ -252,8 +252,6 @@ PLUGINS: Final = Plugins(
     finish=lambda drive: GuardedDrive(drive),
 )
 
-known_drives = PLUGINS.known
-
 
 def load_drive(
     name: str | Callable[..., Drive],

@@ -31,6 +31,7 @@ from dva_sim.worlds.site_parts import (
     Detector,
     Exit,
     FixedCamera,
+    FloorPlan,
     LinkQuality,
     Lookup,
     RadioCoverage,
@@ -172,14 +173,19 @@ def read_features(path: Path, frame: GeoFrame) -> Iterator[Feature]:
     """The features of a GeoJSON file, in its order.
 
     Raises:
-        ConfigError: not GeoJSON, an unknown kind, a shape that does not suit its kind.
+        ConfigError: not GeoJSON, an unknown kind, a shape that does not suit its kind, no room.
     """
-    for index, feature in enumerate(_features(path)):
+    kinds = set()
+    for index, data in enumerate(_features(path)):
         fail = partial(_error, path, index)
         try:
-            yield _feature(feature, frame, fail)
+            feature = _feature(data, frame, fail)
         except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
             raise fail(f"is not a GeoJSON feature: {error}") from error
+        kinds.add(feature.kind)
+        yield feature
+    if "room" not in kinds:
+        raise ConfigError("the plan has no feature of kind 'room'", path)
 
 
 def _features(path: Path) -> list[Any]:
@@ -265,79 +271,48 @@ NOTHING = 2  # further out than rooms (0) and ground outdoors (1)
 GROUND = ("room", "path", "yard")  # where two overlap, the first of these counts
 
 
-@dataclass
-class FloorPlan:
-    """What a site's features come to, in metres.
+def make_plan(features: Iterable[Feature], ceiling: float = CEILING) -> tuple[FloorPlan, Any]:
+    """What is on a plan, and its floor: a shapely area without the solids.
 
-    Attributes:
-        floor: Shapely area of rooms, outdoor ground and doorways without the solids.
-        walls: Segments `(n, 4)` [m], opened at the doors.
-        doors: Segments `(n, 4)` [m].
-        door_heights: Of each door [m].
-        rooms: Rooms, then paths, then yards.
-        solids: Corners `(k, 2)` [m] of walls drawn as areas.
-        places: Poses by kind, each with what makes an error at its place in the file.
-    """
-
-    floor: Any = None
-    walls: Points = field(default_factory=lambda: np.empty((0, 4)))
-    doors: Points = field(default_factory=lambda: np.empty((0, 4)))
-    door_heights: tuple[float, ...] = ()
-    rooms: tuple[Room, ...] = ()
-    solids: tuple[Points, ...] = ()
-    exits: tuple[Exit, ...] = ()
-    zones: tuple[Zone, ...] = ()
-    wifi: tuple[RadioCoverage, ...] = ()
-    cameras: tuple[FixedCamera, ...] = ()
-    base_stations: tuple[BaseStation, ...] = ()
-    detectors: tuple[Detector, ...] = ()
-    places: dict[str, list[tuple[Pose, Fail]]] = field(default_factory=lambda: defaultdict(list))
-
-    def poses(self, kind: str) -> tuple[Pose, ...]:
-        """All poses of a kind, in the order of the file."""
-        return tuple(pose for pose, _ in self.places[kind])
-
-
-def read_plan(path: Path, frame: GeoFrame, ceiling: float = CEILING) -> FloorPlan:
-    """Read a plan; `ceiling` [m] is that of rooms that do not say.
-
-    Raises:
-        ConfigError: not GeoJSON, an unknown kind, a shape that does not suit its kind.
-    """
-    plan = make_plan(read_features(path, frame), ceiling)
-    if not plan.rooms:
-        raise ConfigError("the plan has no feature of kind 'room'", path)
-    return plan
-
-
-def make_plan(features: Iterable[Feature], ceiling: float = CEILING) -> FloorPlan:
-    """Put features together.
+    Args:
+        features: In the order of the file.
+        ceiling: Of rooms that do not say [m].
 
     Raises:
         ConfigError: a property that does not suit its kind.
     """
-    features = tuple(features)
     kinds: dict[str, list[Feature]] = defaultdict(list)
+    detectors: list[Feature] = []
     for feature in features:
         kinds[feature.kind].append(feature)
-    plan = FloorPlan(rooms=_rooms(kinds, ceiling))
-    lookup = Lookup(plan.rooms)
-    plan.exits = tuple(_exit(lookup, *numbered) for numbered in _numbered(kinds, "exit"))
-    plan.zones = tuple(Zone(n, _corners(f), f.drawn.use) for f, n in _numbered(kinds, "zone"))
-    plan.wifi = tuple(
-        RadioCoverage(n, _corners(f), f.drawn.link) for f, n in _numbered(kinds, "wifi")
+        if feature.kind.endswith("_detector"):
+            detectors.append(feature)
+    rooms = _rooms(kinds, ceiling)
+    lookup = Lookup(rooms)
+    exits = tuple(_exit(lookup, *numbered) for numbered in _numbered(kinds, "exit"))
+    walls, solids, floor = _open_walls(kinds, rooms, exits, lookup)
+    plan = FloorPlan(
+        walls=walls,
+        rooms=rooms,
+        doors=np.array([_ends(door.shape) for door in kinds["door"]]).reshape(-1, 4),
+        robot_bases=tuple(map(_pose, kinds["robot_base"])),
+        guard_posts=tuple(map(_pose, kinds["guard_post"])),
+        operator_desks=tuple(map(_pose, kinds["operator_desk"])),
+        detectors=_detectors(detectors),
+        solids=solids,
+        door_heights=tuple(door.drawn.height_m for door in kinds["door"]),
+        exits=exits,
+        zones=tuple(Zone(n, _corners(f), f.drawn.use) for f, n in _numbered(kinds, "zone")),
+        cameras=tuple(_camera(*numbered) for numbered in _numbered(kinds, "camera")),
+        base_stations=tuple(
+            BaseStation(f.shape.x, f.shape.y, f.drawn.radio, n)
+            for f, n in _numbered(kinds, "base_station")
+        ),
+        wifi=tuple(
+            RadioCoverage(n, _corners(f), f.drawn.link) for f, n in _numbered(kinds, "wifi")
+        ),
     )
-    plan.cameras = tuple(_camera(*numbered) for numbered in _numbered(kinds, "camera"))
-    plan.base_stations = tuple(
-        BaseStation(f.shape.x, f.shape.y, f.drawn.radio, n)
-        for f, n in _numbered(kinds, "base_station")
-    )
-    plan.detectors = _detectors(features)
-    for kind in ("robot_base", "guard_post", "operator_desk"):
-        for feature in kinds[kind]:
-            plan.places[kind].append((_pose(feature), feature.fail))
-    _open_walls(plan, kinds, lookup)
-    return plan
+    return plan, floor
 
 
 def _numbered(kinds: dict[str, list[Feature]], kind: str) -> list[tuple[Feature, str]]:
@@ -380,11 +355,10 @@ def _detectors(features: Iterable[Feature]) -> tuple[Detector, ...]:
     """In the order of the file, numbered by kind."""
     found: list[Detector] = []
     for feature in features:
-        if feature.kind.endswith("_detector"):
-            sensor = feature.kind.removesuffix("_detector")
-            number = 1 + sum(other.kind == sensor for other in found)
-            name = feature.drawn.name or f"{sensor}-{number}"
-            found.append(Detector(name, sensor, feature.shape.x, feature.shape.y))
+        sensor = feature.kind.removesuffix("_detector")
+        number = 1 + sum(other.kind == sensor for other in found)
+        name = feature.drawn.name or f"{sensor}-{number}"
+        found.append(Detector(name, sensor, feature.shape.x, feature.shape.y))
     return tuple(found)
 
 
@@ -415,8 +389,13 @@ def _how_far_out(rooms: Lookup[Room], x: float, y: float, heading: float) -> int
     return NOTHING
 
 
-def _open_walls(plan: FloorPlan, kinds: dict[str, list[Feature]], rooms: Lookup[Room]) -> None:
-    """Open the walls at the doors and find the floor.
+def _open_walls(
+    kinds: dict[str, list[Feature]],
+    rooms: tuple[Room, ...],
+    exits: tuple[Exit, ...],
+    lookup: Lookup[Room],
+) -> tuple[Points, tuple[Points, ...], Any]:
+    """Walls opened at the doors `(n, 4)` [m], corners of solids, and the floor.
 
     An exit opens the wall only where ground is drawn beyond it: nobody drives off the plan.
     """
@@ -425,18 +404,17 @@ def _open_walls(plan: FloorPlan, kinds: dict[str, list[Feature]], rooms: Lookup[
     walls = [feature.shape for feature in kinds["wall"]]
     solids = [wall for wall in walls if wall.geom_type == "Polygon"]
     drawn = shapely.union_all([wall for wall in walls if wall.geom_type != "Polygon"])
-    exits = [
+    doors = [feature.shape for feature in kinds["door"]] + [
         feature.shape
-        for feature, way in zip(kinds["exit"], plan.exits, strict=True)
-        if _how_far_out(rooms, way.x, way.y, way.heading) < NOTHING
+        for feature, way in zip(kinds["exit"], exits, strict=True)
+        if _how_far_out(lookup, way.x, way.y, way.heading) < NOTHING
     ]
-    doors = [feature.shape for feature in kinds["door"]] + exits
     doorways = [door.buffer(DOOR_REACH, cap_style="flat") for door in doors]
     opened = shapely.difference(drawn, shapely.union_all(doorways))
-    plan.walls = np.vstack([segments(shapely.line_merge(opened)), *map(segments, solids)])
-    plan.doors = np.array([_ends(door.shape) for door in kinds["door"]]).reshape(-1, 4)
-    plan.door_heights = tuple(door.drawn.height_m for door in kinds["door"])
-    plan.solids = tuple(shapely.get_coordinates(solid.exterior) for solid in solids)
-    ground = [shapely.Polygon(room.polygon) for room in plan.rooms]
+    ground = [shapely.Polygon(room.polygon) for room in rooms]
     sills = [door.buffer(SILL, cap_style="flat") for door in doors]
-    plan.floor = shapely.difference(shapely.union_all(ground + sills), shapely.union_all(solids))
+    return (
+        np.vstack([segments(shapely.line_merge(opened)), *map(segments, solids)]),
+        tuple(shapely.get_coordinates(solid.exterior) for solid in solids),
+        shapely.difference(shapely.union_all(ground + sills), shapely.union_all(solids)),
+    )

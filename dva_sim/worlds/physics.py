@@ -10,6 +10,7 @@ A bare hall with walls as one likes: where drives are tried and physics is teste
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from typing import Final
@@ -32,10 +33,10 @@ from dva_sim.worlds.bodies import (
     set_velocity,
 )
 from dva_sim.worlds.drives import DriveSpec
-from dva_sim.worlds.geo import GeoFrame, Pose
-from dva_sim.worlds.layout import Site
+from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.maps import FREE, rasterise
 from dva_sim.worlds.robot_body import RobotBody
+from dva_sim.worlds.site import DEFAULT_FRAME, Site
 
 RELAXATION: Final = 0.5  # of a person's velocity towards the wanted one [s]
 MOST_PUSH: Final = 3.0  # force of a person's legs by mass [m/s^2]; assumed
@@ -274,7 +275,6 @@ def _wall(space: pymunk.Space, x1: float, y1: float, x2: float, y2: float) -> py
     return wall
 
 
-CAMPUS: Final = GeoFrame(38.6612, -9.2058)  # Monte de Caparica
 Segment = tuple[float, float, float, float]
 
 
@@ -282,23 +282,13 @@ def hall(width: float, depth: float, walls: Sequence[Segment] = ()) -> Site:
     """A hall with a corner at 0, 0, and walls in it [m], thin as all walls are."""
     import shapely
 
-    border = [
-        (0, 0, width, 0),
-        (width, 0, width, depth),
-        (width, depth, 0, depth),
-        (0, depth, 0, 0),
-    ]
+    corners = [(0, 0), (width, 0), (width, depth), (0, depth), (0, 0)]
+    border = [(*a, *b) for a, b in itertools.pairwise(corners)]
     lines = np.array([*border, *walls], float)
     return Site(
         name="hall",
-        frame=CAMPUS,
+        frame=DEFAULT_FRAME,
         walls=lines,
-        rooms=(),
-        doors=np.empty((0, 4)),
-        robot_bases=(),
-        guard_posts=(),
-        operator_desks=(),
-        detectors=(),
         extent=(0.0, 0.0, width, depth),
         grid=rasterise(shapely.box(0, 0, width, depth), lines, 0.1),
     )

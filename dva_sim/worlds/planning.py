@@ -11,9 +11,9 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.worlds.layout import Site
 from dva_sim.worlds.line_of_sight import Sight
 from dva_sim.worlds.maps import OccupancyGrid
+from dva_sim.worlds.site import Site
 
 CELL = 0.2  # side of a planning cell [m]
 COMFORT = 1.0  # nearer to a wall than this, a way costs more [m]

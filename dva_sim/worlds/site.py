@@ -1,16 +1,18 @@
-"""Bare ROS maps as sites: walls from the border of the floor, bases placed by a seed.
+"""A place where robots and people work, and such places by name: drawn, generated, or a bare map.
 
-Sites by name: drawn, generated, or from a bare ROS map.
+Of a bare ROS map the walls are the border of its floor; bases are placed by a seed.
 """
 
 from __future__ import annotations
 
+import itertools
 import json
-from collections.abc import Mapping
-from dataclasses import replace
-from functools import lru_cache
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,24 +23,199 @@ from dva_sim.kernel.config import Config, Document, load_yaml, validate
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.streams import Streams
 from dva_sim.kernel.suggestions import hint
+from dva_sim.worlds.compartments import NOWHERE, FloorPartition, of_floor, of_rooms
 from dva_sim.worlds.geo import GeoFrame, Pose
-from dva_sim.worlds.geojson import FloorPlan, make_plan, read_plan
-from dva_sim.worlds.layout import FOOTPRINT, STANDING, Site
-from dva_sim.worlds.maps import OccupancyGrid, load_ros_map, outline, rasterise
+from dva_sim.worlds.geojson import Feature, make_plan, read_features
+from dva_sim.worlds.maps import FREE, OccupancyGrid, load_ros_map, outline, rasterise
 from dva_sim.worlds.office_block import OfficeBlock, office_block
-from dva_sim.worlds.site_parts import CEILING, Detector, Room
+from dva_sim.worlds.site_parts import (
+    CEILING,
+    DOOR_HEIGHT,
+    Compartment,
+    Detector,
+    FloorPlan,
+    Lookup,
+    Opening,
+    RadioCoverage,
+    Room,
+)
 
-__all__ = [
-    "DEFAULT_FRAME",
-    "FOOTPRINT",
-    "Detector",
-    "Pose",
-    "Room",
-    "Site",
-    "SiteFile",
-    "load_site",
-    "map_site",
-]
+Floats = NDArray[np.float64]
+T = TypeVar("T")
+
+FOOTPRINT = 0.30  # radius that must fit at a robot base [m]
+STANDING = 0.20  # radius that must fit where a person stands [m]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Site(FloorPlan):
+    """A place where robots and people work.
+
+    Attributes:
+        name: Name of the site or of the map.
+        frame: Where on earth its plane lies.
+        extent: xmin, ymin, xmax, ymax of everything [m].
+        grid: What is free, occupied and unknown.
+        ceiling: Of rooms that do not say [m].
+    """
+
+    name: str
+    frame: GeoFrame
+    extent: tuple[float, float, float, float]
+    grid: OccupancyGrid
+    ceiling: float = CEILING
+    _kept: dict[object, Any] = field(default_factory=dict, repr=False)
+
+    def kept(self, key: object, make: Callable[[], T]) -> T:
+        """What `make` makes: once for this site, and for copies of it on the same grid."""
+        key = self.grid, key
+        if key not in self._kept:
+            self._kept[key] = make()
+        made: T = self._kept[key]
+        return made
+
+    def room_at(self, x: float, y: float) -> str | None:
+        """Name of the room around a point [m], or None outside all rooms."""
+        room = self._rooms.at(x, y)
+        return None if room is None else room.name
+
+    def link_quality(self, x: float, y: float) -> RadioCoverage | None:
+        """The coverage drawn around a point [m], the later over the earlier; None for none."""
+        return self._wifi.at(x, y)
+
+    @cached_property
+    def _rooms(self) -> Lookup[Room]:
+        return Lookup(self.rooms)
+
+    @cached_property
+    def _wifi(self) -> Lookup[RadioCoverage]:
+        return Lookup(self.wifi[::-1])
+
+    @cached_property
+    def wall_lines(self) -> Floats:
+        """The walls `(n, 4)` [m] without the sides of solids."""
+        sides = Counter(_side(a, b) for solid in self.solids for a, b in itertools.pairwise(solid))
+        walls = [_side(wall[:2], wall[2:]) for wall in self.walls]
+        drawn = Counter(walls)
+        keep = np.array([drawn[wall] > sides[wall] for wall in walls], dtype=bool)
+        return np.asarray(self.walls[keep])
+
+    # --- bodies of air -----------------------------------------------------------------
+
+    @property
+    def compartments(self) -> tuple[Compartment, ...]:
+        """The rooms that are not outdoors; on a bare map, blocks of its floor."""
+        return self.partition.compartments
+
+    @property
+    def openings(self) -> tuple[Opening, ...]:
+        """Doors, exits and open borders between two compartments, or one and outdoors."""
+        return self.partition.openings
+
+    def compartment_at(self, x: float, y: float) -> int | None:
+        """Index of the compartment around a point [m], to within a cell; None for none."""
+        row, column = self.grid.to_cell(x, y)
+        labels = self.partition.labels
+        inside = 0 <= row < labels.shape[0] and 0 <= column < labels.shape[1]
+        label = int(labels[row, column]) if inside else NOWHERE
+        return None if label == NOWHERE else label
+
+    @cached_property
+    def partition(self) -> FloorPartition:
+        """Compartments, openings, and whose each cell of the grid is."""
+        return self.kept("partition", self._partition)
+
+    def _partition(self) -> FloorPartition:
+        if not self.rooms:
+            return of_floor(self.grid, self.grid.floor(FOOTPRINT))
+        heights = self.door_heights or (DOOR_HEIGHT,) * len(self.doors)
+        doors = zip(self.doors.tolist(), heights, strict=True)
+        ways = [
+            *((ends, height, "door") for ends, height in doors),
+            *((way.ends, DOOR_HEIGHT, "exit") for way in self.exits),
+        ]
+        return of_rooms(self.grid, self.rooms, self.walls, ways)
+
+    # --- places ------------------------------------------------------------------------
+
+    def room(self, name: str) -> Room:
+        """The room of that name.
+
+        Raises:
+            ConfigError: there is none; the message lists the rooms.
+        """
+        for room in self.rooms:
+            if room.name == name:
+                return room
+        known = [room.name for room in self.rooms]
+        told = hint(name, known, "rooms") if known else "a bare map names no rooms"
+        raise ConfigError(f"site {self.name!r} has no room {name!r}; {told}")
+
+    def is_free(self, x: float, y: float, clearance: float) -> bool:
+        """Whether a disc of radius `clearance` [m] fits at a point [m], to within a cell."""
+        return self.grid.state_at(x, y) == FREE and self.grid.clearance_at(x, y) >= clearance
+
+    def sample_free(
+        self,
+        rng: np.random.Generator,
+        clearance: float,
+        room: str | None = None,
+        near: tuple[float, float] | None = None,
+        within: float = 2.0,
+    ) -> tuple[float, float]:
+        """A random free point that a robot can reach, or somebody slimmer if so asked.
+
+        Args:
+            rng: Source of luck.
+            clearance: Radius that must fit at the point [m]; on the way there no more than a
+                robot's has to, or doors would part the site.
+            room: Only inside this room.
+            near: Only around this point [m] ...
+            within: ... nearer than this [m].
+
+        Raises:
+            ConfigError: no such room, or no free point there.
+        """
+        cells = self.kept((clearance, room), lambda: self._free_cells(clearance, room))
+        columns = self.grid.cells.shape[1]
+        if near is not None and len(cells):
+            middles = self.grid.to_xy(cells // columns + 0.5, cells % columns + 0.5)
+            cells = cells[np.hypot(*(middles - near).T) < within]
+        if not len(cells):
+            where = f"room {room!r} of site {self.name!r}" if room else f"site {self.name!r}"
+            near_text = f" within {within:g} m of {near}" if near else ""
+            raise ConfigError(f"{where} has no free place of {clearance:g} m radius{near_text}")
+        cell = int(cells[rng.integers(len(cells))])
+        jitter = rng.random(2)
+        x, y = self.grid.to_xy(cell // columns + jitter[0], cell % columns + jitter[1]).tolist()
+        return x, y
+
+    def _free_cells(self, clearance: float, room: str | None) -> NDArray[np.int64]:
+        """Flat indices of the cells that `sample_free` chooses from."""
+        reached = self.grid.reachable(min(clearance, FOOTPRINT))
+        cells = np.flatnonzero(reached & (self.grid.clearance >= clearance))
+        if room is None:
+            return cells
+        import shapely
+
+        columns = self.grid.cells.shape[1]
+        middles = self.grid.to_xy(cells // columns + 0.5, cells % columns + 0.5)
+        return cells[shapely.contains_xy(self.ground_of(self.room(room)), middles)]
+
+    def ground_of(self, room: Room) -> Any:
+        """The shapely area of a room; of ground outdoors what nothing else is drawn over."""
+        import shapely
+
+        area: Any = shapely.Polygon(room.polygon)
+        if not room.outdoor:
+            return area
+        over = self.rooms[: self.rooms.index(room)]
+        return area - shapely.union_all([shapely.Polygon(other.polygon) for other in over])
+
+
+def _side(a: Floats, b: Floats) -> frozenset[tuple[float, ...]]:
+    """A segment in either direction, to the millimetre."""
+    return frozenset(tuple(np.round(end, 3).tolist()) for end in (a, b))
 
 
 # A bare map does not say where on earth it is: the campus in Monte de Caparica.
@@ -88,11 +265,6 @@ def _bare_map(path: Path) -> Site:
         name=path.stem,
         frame=DEFAULT_FRAME,
         walls=walls,
-        rooms=(),
-        doors=np.empty((0, 4)),
-        robot_bases=(),
-        guard_posts=(),
-        operator_desks=(),
         detectors=_lattice(grid, reached),
         extent=(*map(float, xy.min(axis=0)), *map(float, xy.max(axis=0))),  # type: ignore[arg-type]
         grid=grid,
@@ -177,23 +349,36 @@ def _load_site(path: Path, options: str) -> Site:
         raise document.error(problem, ("image",))
     config = validate(SiteFile, document.data, document.error)
     frame = GeoFrame(config.origin.latitude, config.origin.longitude)
-    plan = _plan(config, document, frame, json.loads(options))
-    return _site(config, frame, plan)
+    features = _features(config, document, frame, json.loads(options))
+    plan, floor = make_plan(features, config.ceiling_m)
+    site = Site(
+        **vars(plan),
+        name=config.name,
+        frame=frame,
+        extent=floor.bounds,
+        grid=rasterise(floor, plan.walls, config.resolution_m),
+        ceiling=config.ceiling_m,
+    )
+    for feature in features:
+        radius = {"robot_base": FOOTPRINT, "guard_post": STANDING}.get(feature.kind, 0.0)
+        if radius and not site.is_free(feature.shape.x, feature.shape.y, radius):
+            told = f"{feature.kind} needs {radius:g} m of free floor around it: it is in a wall"
+            raise feature.fail(told)
+    return site
 
 
-def _plan(
+def _features(
     config: SiteFile, document: Document, frame: GeoFrame, options: Mapping[str, Any]
-) -> FloorPlan:
+) -> tuple[Feature, ...]:
     if config.generate is not None:
-        wanted = _with_options(config.name, config.generate, options)
-        return make_plan(office_block(wanted), config.ceiling_m)
+        return office_block(_with_options(config.name, config.generate, options))
     if options:
         given = ", ".join(options)
         raise ConfigError(f"site {config.name!r} is drawn and takes no options; given: {given}")
     file = document.file.parent / str(config.plan)
     if not resources.is_file(file):
         raise document.error(f"plan {config.plan!r} not found", ("plan",))
-    return read_plan(file, frame, config.ceiling_m)
+    return tuple(read_features(file, frame))
 
 
 def _with_options(name: str, block: OfficeBlock, options: Mapping[str, Any]) -> OfficeBlock:
@@ -203,32 +388,3 @@ def _with_options(name: str, block: OfficeBlock, options: Mapping[str, Any]) -> 
             raise ConfigError(f"site {name!r} has no option {key!r}; {hint(key, known)}")
     data = block.model_dump() | dict(options)
     return validate(OfficeBlock, data, lambda text, _: ConfigError(f"site {name!r}: {text}"))
-
-
-def _site(config: SiteFile, frame: GeoFrame, plan: FloorPlan) -> Site:
-    site = Site(
-        name=config.name,
-        frame=frame,
-        walls=plan.walls,
-        rooms=plan.rooms,
-        doors=plan.doors,
-        robot_bases=plan.poses("robot_base"),
-        guard_posts=plan.poses("guard_post"),
-        operator_desks=plan.poses("operator_desk"),
-        detectors=plan.detectors,
-        extent=plan.floor.bounds,
-        grid=rasterise(plan.floor, plan.walls, config.resolution_m),
-        solids=plan.solids,
-        door_heights=plan.door_heights,
-        exits=plan.exits,
-        zones=plan.zones,
-        cameras=plan.cameras,
-        base_stations=plan.base_stations,
-        wifi=plan.wifi,
-        ceiling=config.ceiling_m,
-    )
-    for kind, radius in (("robot_base", FOOTPRINT), ("guard_post", STANDING)):
-        for pose, error in plan.places[kind]:
-            if not site.is_free(pose.x, pose.y, radius):
-                raise error(f"{kind} needs {radius:g} m of free floor around it: it is in a wall")
-    return site

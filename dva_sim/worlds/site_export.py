@@ -12,7 +12,7 @@ import numpy as np
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.geojson import Feature, write_features
-from dva_sim.worlds.layout import FOOTPRINT, Site
+from dva_sim.worlds.site import FOOTPRINT, Site
 from dva_sim.worlds.site_parts import DOOR_HEIGHT, Room
 
 

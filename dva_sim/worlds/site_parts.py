@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+
+from dva_sim.worlds.geo import Pose
 
 Points = NDArray[np.float64]
 CEILING = 3.0  # of a room that does not say [m]
@@ -189,6 +191,43 @@ class BaseStation(NamedTuple):
     y: float
     radio: str
     name: str
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class FloorPlan:
+    """What is where on a site.
+
+    Attributes:
+        walls: Segments x1, y1, x2, y2, opened at the doors, shape `(n, 4)` [m].
+        rooms: Named parts of the floor and of the ground outdoors; none on a bare map.
+        doors: Openings in the walls, shape `(n, 4)` [m]; exits are not among them.
+        robot_bases: Where robots start.
+        guard_posts: Where guards wait.
+        operator_desks: Where operators sit.
+        detectors: Smoke, heat, CO, gas and water detectors.
+        solids: Corners `(k, 2)` [m] of filled obstacles such as shelves.
+        door_heights: Of each door [m]; 2.1 m where nothing is said.
+        exits: Ways to safety.
+        zones: Parts of the floor with a rule or a purpose.
+        cameras: Fixed cameras.
+        base_stations: Antennas.
+        wifi: Where the radio link has a quality of its own.
+    """
+
+    walls: Points
+    rooms: tuple[Room, ...] = ()
+    doors: Points = field(default_factory=lambda: np.empty((0, 4)))
+    robot_bases: tuple[Pose, ...] = ()
+    guard_posts: tuple[Pose, ...] = ()
+    operator_desks: tuple[Pose, ...] = ()
+    detectors: tuple[Detector, ...] = ()
+    solids: tuple[Points, ...] = ()
+    door_heights: tuple[float, ...] = ()
+    exits: tuple[Exit, ...] = ()
+    zones: tuple[Zone, ...] = ()
+    cameras: tuple[FixedCamera, ...] = ()
+    base_stations: tuple[BaseStation, ...] = ()
+    wifi: tuple[RadioCoverage, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.worlds.layout import FOOTPRINT, Site
+from dva_sim.worlds.site import FOOTPRINT, Site
 from dva_sim.worlds.site_parts import Exit, Room
 from dva_sim.worlds.view_marks import (
     CAMERA,

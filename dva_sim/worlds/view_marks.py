@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.worlds.layout import Site
+from dva_sim.worlds.site import Site
 from dva_sim.worlds.site_parts import FixedCamera
 
 if TYPE_CHECKING:

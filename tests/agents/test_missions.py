@@ -19,7 +19,7 @@ from dva_sim.agents.robot.manoeuvres import INSPECT_FOR, LOOK_FROM
 from dva_sim.agents.robot.missions import GIVE_UP_AFTER, MOST_JAMS, NEAR, RESERVE, MissionGoal
 from dva_sim.agents.robot.profile import RobotProfile
 from dva_sim.protocol import messages as m
-from dva_sim.worlds.layout import Site
+from dva_sim.worlds.site import Site
 
 WEST, EAST = (6.0, 12.0), (20.0, 12.0)
 SOUTH_OF_DOOR, NORTH_OF_DOOR = (33.15, 16.0), (33.15, 20.5)

@@ -17,10 +17,9 @@ from benchmarks.goals import goal
 
 from dva_sim.worlds.drives import DriveSpec
 from dva_sim.worlds.geo import Pose
-from dva_sim.worlds.layout import Site
 from dva_sim.worlds.lidar import Lidar
 from dva_sim.worlds.physics import World, hall
-from dva_sim.worlds.site import load_site
+from dva_sim.worlds.site import Site, load_site
 
 DT = 0.04  # of a tick, as in every run [s]
 SPEED, TURN_RATE = 0.4, 0.5  # each robot drives a circle of 0.8 m, and meets nothing

@@ -7,8 +7,7 @@ import pytest
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.resources import find
-from dva_sim.recordings.reading import read_recording
-from dva_sim.recordings.recorded_hazards import RecordedHazard
+from dva_sim.recordings.reading import RecordedHazard, read_recording
 from dva_sim.recordings.writing import write_recording
 from dva_sim.simulation.full.run import simulate
 from dva_sim.simulation.scenario import build

@@ -14,7 +14,7 @@ from dva_sim.cli import checks
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.testing.hazards import try_hazard
 from dva_sim.worlds.hazards import CLEAR, Conditions, Hazard, HazardField, make_hazard
-from dva_sim.worlds.hazards.alarms import DetectorAlarm
+from dva_sim.worlds.hazards.detectors import DetectorAlarm
 
 EXAMPLE = "steam_leak.py:SteamLeak"
 

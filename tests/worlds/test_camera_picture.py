@@ -11,9 +11,8 @@ from dva_sim.worlds.camera import Camera, Figure, SmokeView, encode
 from dva_sim.worlds.geo import GeoFrame, Pose
 from dva_sim.worlds.hazards import Fire, Raster
 from dva_sim.worlds.hazards.fire import HEAT_PER_AREA
-from dva_sim.worlds.layout import Site
 from dva_sim.worlds.maps import rasterise
-from dva_sim.worlds.site import load_site
+from dva_sim.worlds.site import Site, load_site
 from dva_sim.worlds.site_parts import Exit, Room
 
 EAST = 0.0

@@ -5,12 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dva_sim.worlds.geo import GeoFrame, Pose
-from dva_sim.worlds.layout import Site
+from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.line_of_sight import Sight
 from dva_sim.worlds.maps import UNKNOWN, OccupancyGrid, rasterise
 from dva_sim.worlds.planning import Disc, Planner
-from dva_sim.worlds.site import load_site, map_site
+from dva_sim.worlds.site import DEFAULT_FRAME, Site, load_site, map_site
 
 MAPS = Path(__file__).parents[1] / "data"
 
@@ -23,8 +22,7 @@ def make_site(walls, size=10.0):
     lines = np.array([*border, *walls], float)
     grid = rasterise(shapely.box(0, 0, size, size), lines, 0.05)
     extent = (0.0, 0.0, size, size)
-    frame, doors = GeoFrame(38.6612, -9.2058), np.empty((0, 4))
-    return Site("hall", frame, lines, (), doors, (), (), (), (), extent, grid)
+    return Site(name="hall", frame=DEFAULT_FRAME, walls=lines, extent=extent, grid=grid)
 
 
 def with_door(middle, width):

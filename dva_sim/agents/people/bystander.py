@@ -32,8 +32,8 @@ from dva_sim.agents.people.walking import Walking
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.worlds.hazards import Conditions
-from dva_sim.worlds.layout import Site
 from dva_sim.worlds.planning import Planner
+from dva_sim.worlds.site import Site
 from dva_sim.worlds.site_parts import Room
 
 WORKING, WALKING, ALARMED = "working", "walking", "alarmed"

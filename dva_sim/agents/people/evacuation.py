@@ -26,8 +26,8 @@ from dva_sim.agents.device import do_nothing
 from dva_sim.agents.people.walking import Walking
 from dva_sim.kernel.clock import Clock
 from dva_sim.worlds.hazards import CLEAR, Conditions, Dose, pace_in_smoke, pace_in_water
-from dva_sim.worlds.layout import Site
 from dva_sim.worlds.planning import Disc, Planner
+from dva_sim.worlds.site import Site
 
 UNTENABLE: Final = Conditions(
     temperature=60.0,

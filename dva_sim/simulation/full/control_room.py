@@ -37,7 +37,7 @@ from dva_sim.simulation.scenario import (
     phone_profile,
     population,
 )
-from dva_sim.worlds.layout import FOOTPRINT
+from dva_sim.worlds.site import FOOTPRINT
 
 
 def add_dva(

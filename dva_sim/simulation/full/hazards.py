@@ -12,7 +12,7 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.streams import Streams
 from dva_sim.simulation.scenario import EventConfig
 from dva_sim.worlds.hazards import Hazard, find_hazard, first_detection, make_hazard
-from dva_sim.worlds.layout import Site
+from dva_sim.worlds.site import Site
 from dva_sim.worlds.site_parts import Detector
 
 REACHABLE = 0.4  # radius that fits through the doors on the way there [m]

@@ -13,7 +13,7 @@ from dva_sim.network.link import Link
 from dva_sim.simulation.full.hazards import RunHazard
 from dva_sim.simulation.scenario import Scenario
 from dva_sim.worlds.hazards import Surroundings
-from dva_sim.worlds.layout import Site
+from dva_sim.worlds.site import Site
 
 MERGED_WITHIN = 8.5  # the DVA takes reports so near each other for one event [m]
 

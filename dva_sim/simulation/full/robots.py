@@ -26,10 +26,10 @@ from dva_sim.simulation.full.stage import DVA, Stage, place_of
 from dva_sim.worlds.bodies import GRIP
 from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.hazards import Surroundings
-from dva_sim.worlds.layout import FOOTPRINT
 from dva_sim.worlds.lidar import Lidar
 from dva_sim.worlds.physics import World
 from dva_sim.worlds.robot_body import RobotBody
+from dva_sim.worlds.site import FOOTPRINT
 
 TRIES = 200
 APART = 1.5  # between the middles of two who begin [m]

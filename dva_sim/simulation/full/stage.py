@@ -23,8 +23,8 @@ from dva_sim.network.patterns import load_pattern
 from dva_sim.protocol.exchange import NOON
 from dva_sim.simulation.scenario import Scenario, request_timeout_s, robot_profiles, site_of
 from dva_sim.worlds.geo import Pose
-from dva_sim.worlds.layout import FOOTPRINT, Site
 from dva_sim.worlds.planning import Planner
+from dva_sim.worlds.site import FOOTPRINT, Site
 
 DVA = "02:00:00:00:00:01"
 _ROOMS = {"dva": 0, "robot": 1, "guard": 2, "operator": 3, "detector": 4}

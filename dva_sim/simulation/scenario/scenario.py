@@ -43,8 +43,7 @@ from dva_sim.simulation.scenario.parts import (
     RobotConfig,
     SiteConfig,
 )
-from dva_sim.worlds.layout import Site
-from dva_sim.worlds.site import load_site, map_site
+from dva_sim.worlds.site import Site, load_site, map_site
 
 
 class Scenario(Config):

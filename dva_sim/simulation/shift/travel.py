@@ -22,9 +22,8 @@ from dva_sim.simulation.shift.distributions import Floats, Law
 from dva_sim.simulation.shift.scenario import Point, TimedScenario
 from dva_sim.worlds.geo import GeoFrame, Pose
 from dva_sim.worlds.hazards import KINDS, first_detection, make_hazard
-from dva_sim.worlds.layout import FOOTPRINT, Site
 from dva_sim.worlds.planning import Planner
-from dva_sim.worlds.site import DEFAULT_FRAME, load_site
+from dva_sim.worlds.site import DEFAULT_FRAME, FOOTPRINT, Site, load_site
 
 
 class Occurrence(Protocol):

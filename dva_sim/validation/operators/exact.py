@@ -18,7 +18,7 @@ from dva_sim.simulation.shift import scenario as timed
 from dva_sim.simulation.shift import simulate_timed
 from dva_sim.validation.operators import delayed_loops
 from dva_sim.worlds.hazards import GROWTH_S, Fire, make_hazard
-from dva_sim.worlds.hazards.alarms import CoAlarm
+from dva_sim.worlds.hazards.detectors import CoAlarm
 from dva_sim.worlds.hazards.fire import FULL_GROWTH_KW
 from dva_sim.worlds.hazards.gas_dispersion import sigma_y
 

@@ -23,7 +23,7 @@ from dva_sim.worlds.camera.visibility import (
 )
 from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.hazards import Hazard, Raster
-from dva_sim.worlds.layout import Site
+from dva_sim.worlds.site import Site
 
 Picture = NDArray[np.uint8]
 

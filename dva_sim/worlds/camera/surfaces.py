@@ -17,7 +17,7 @@ import shapely
 from numpy.typing import NDArray
 
 from dva_sim.worlds.geo import Pose
-from dva_sim.worlds.layout import Site
+from dva_sim.worlds.site import Site
 from dva_sim.worlds.site_parts import DOOR_HEIGHT
 
 Floats = NDArray[np.float32]

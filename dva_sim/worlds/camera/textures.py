@@ -27,7 +27,7 @@ from dva_sim.worlds.camera.surfaces import (
     pack,
 )
 from dva_sim.worlds.geo import Pose
-from dva_sim.worlds.layout import Site
+from dva_sim.worlds.site import Site
 from dva_sim.worlds.site_parts import DOOR_HEIGHT
 
 Bytes = NDArray[np.uint8]

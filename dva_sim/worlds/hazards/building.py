@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.worlds.layout import Site
 from dva_sim.worlds.maps import OccupancyGrid
+from dva_sim.worlds.site import Site
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -104,27 +104,12 @@ class SitePoints:
         return np.where(self._inside, cells[self._cells], -1).astype(np.int64)
 
 
-class _ByGrid:
-    """Sites of one bare map differ in their bases only: they share what is worked out."""
-
-    def __init__(self, site: Site) -> None:
-        self.site = site
-
-    def __hash__(self) -> int:
-        return hash(id(self.site.grid))
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _ByGrid) and other.site.grid is self.site.grid
-
-
 def building_of(site: Site) -> Building:
-    """The building that a site is, once per process."""
-    return _building(_ByGrid(site))
+    """The building that a site is; copies of a site share what is worked out."""
+    return site.kept("building", lambda: _building(site))
 
 
-@lru_cache(maxsize=8)
-def _building(key: _ByGrid) -> Building:
-    site = key.site
+def _building(site: Site) -> Building:
     parting = _Parting(site)
     openings = [o for o in site.openings if o.height > 0.0]
     ends = [

@@ -15,7 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from dva_sim.worlds.hazards.alarms import (
+from dva_sim.worlds.hazards.building import NOWHERE, Building, Floats, SitePoints
+from dva_sim.worlds.hazards.conditions import AMBIENT, BREATHING_HEIGHT, CLEAR, Conditions
+from dva_sim.worlds.hazards.detectors import (
     HEAT_ALARM,
     LATEST,
     SMOKE_ALARM,
@@ -23,10 +25,7 @@ from dva_sim.worlds.hazards.alarms import (
     CoAlarm,
     DetectorAlarm,
 )
-from dva_sim.worlds.hazards.building import NOWHERE, Building, Floats, SitePoints, building_of
-from dva_sim.worlds.hazards.conditions import AMBIENT, BREATHING_HEIGHT, CLEAR, Conditions
-from dva_sim.worlds.hazards.course import FieldCourse, March
-from dva_sim.worlds.hazards.hazard import Hazard, HazardField, Point
+from dva_sim.worlds.hazards.hazard import Hazard, March, Point, SolvedField, Step
 from dva_sim.worlds.hazards.smoke import (
     CO_RATIO,
     DENSITY,
@@ -41,8 +40,8 @@ from dva_sim.worlds.hazards.smoke import (
     SOOT_YIELD,
     SmokeLayers,
 )
-from dva_sim.worlds.layout import Site
 from dva_sim.worlds.line_of_sight import Sight
+from dva_sim.worlds.site import Site
 
 if TYPE_CHECKING:
     from dva_sim.worlds.camera.sprites import Sprite
@@ -275,9 +274,9 @@ class Layer(NamedTuple):
 
 
 @lru_cache(maxsize=32)
-def _smoke(building: Building, growth: str, peak: float, room: int) -> tuple[SmokeLayers, March]:
+def _smoke(building: Building, growth: str, peak: float, room: int) -> tuple[March, Step]:
     smoke = SmokeLayers(building.spaces, _fire_of(growth, peak).heat_release, room)
-    return smoke, March(smoke.empty(), smoke.step, SMOKE_PACES)
+    return March(smoke.empty(), smoke.step, SMOKE_PACES), smoke.step_without_fire
 
 
 def _fire_of(growth: str, peak: float) -> Fire:
@@ -285,7 +284,7 @@ def _fire_of(growth: str, peak: float) -> Fire:
     return Fire.model_construct(position=(0.0, 0.0), start=0.0, growth=growth, peak=peak)
 
 
-class FireField(HazardField):
+class FireField(SolvedField):
     """Radiant heat of a fire, and its smoke.
 
     Args:
@@ -295,9 +294,7 @@ class FireField(HazardField):
 
     def __init__(self, fire: Fire, site: Site) -> None:
         super().__init__(fire, site)
-        self._building, self._sight, self._fire = building_of(site), Sight(site.walls), fire
-        self._room = self._building.space_at(*fire.position)
-        self._course: FieldCourse | None = None
+        self._sight, self._fire = Sight(site.walls), fire
         self._seen: tuple[SitePoints, NDArray[np.bool_]] | None = None
         self._known: tuple[Floats, Floats, bool] = np.empty(0), np.empty(0), False
 
@@ -308,7 +305,7 @@ class FireField(HazardField):
         heat = 0.0
         if time < self.until and self._sight.between((x, y), self._fire.position):
             heat = self._fire.heat_flux(time, (x, y))
-        space = self._building.space_at(x, y)
+        space = self.building.space_at(x, y)
         layer = self.layer(space, time) if space >= 0 else None
         if layer is None:
             return Conditions(AMBIENT, heat)
@@ -323,13 +320,13 @@ class FireField(HazardField):
 
     def layer(self, space: int, time: float) -> Layer | None:
         """The smoke in a space; None if there is none."""
-        if self._room == NOWHERE or time <= self._fire.start:
+        if self.room == NOWHERE or time <= self._fire.start:
             return None
-        before, after, weight = self._states(time)
+        before, after, weight = self.states(time)
         mass, heat, soot, co = (before[space] + weight * (after[space] - before[space])).tolist()
         if mass <= 1e-6:
             return None
-        spaces = self._building.spaces
+        spaces = self.building.spaces
         volume = (mass + heat / (HEAT_CAPACITY * KELVIN)) / DENSITY
         ceiling = float(spaces.ceiling[space])
         depth = min(ceiling, volume / float(spaces.area[space]))
@@ -349,14 +346,13 @@ class FireField(HazardField):
             time: [s]
             where: At `breathing` height, the `mean` from floor to ceiling, or in the `layer`.
         """
-        if self._room == NOWHERE or time <= self._fire.start:
-            return np.zeros(self._building.spaces.count + 1)
-        before, after, weight = self._states(time)
-        state = (before + weight * (after - before))[:-1]
+        if self.room == NOWHERE or time <= self._fire.start:
+            return np.zeros(self.building.spaces.count + 1)
+        state = self.state(time)[:-1]
         volume, share = self._filled(state)
         value = SOOT_EXTINCTION * state[:, SOOT] / volume
         if where == "breathing":
-            bottom = self._building.spaces.ceiling * (1.0 - share)
+            bottom = self.building.spaces.ceiling * (1.0 - share)
             share = np.clip((BREATHING_HEIGHT - bottom) / BLUR + 0.5, 0.0, 1.0)
         elif where == "layer":
             share = np.ones_like(share)
@@ -364,7 +360,7 @@ class FireField(HazardField):
 
     def _filled(self, state: Floats) -> tuple[Floats, Floats]:
         """Of each space: volume of its smoke [m^3], and the share of the space that it fills."""
-        spaces = self._building.spaces
+        spaces = self.building.spaces
         volume = (state[:, MASS] + state[:, HEAT] / (HEAT_CAPACITY * KELVIN)) / DENSITY
         volume = np.maximum(volume, 1e-9)
         return volume, np.minimum(1.0, volume / (spaces.area * spaces.ceiling))
@@ -375,11 +371,11 @@ class FireField(HazardField):
         Volumes change on straight lines from one state of the field to the next, so that it is
         enough to look at both, once.
         """
-        if self._room == NOWHERE or time <= self._fire.start:
+        if self.room == NOWHERE or time <= self._fire.start:
             return False
-        before, after, _ = self._states(time)
+        before, after, _ = self.states(time)
         if before is not self._known[0] or after is not self._known[1]:
-            ceiling = self._building.spaces.ceiling
+            ceiling = self.building.spaces.ceiling
             bottoms = [ceiling * (1.0 - self._filled(s[:-1])[1]) for s in (before, after)]
             hazy = not np.min(bottoms) > BREATHING_HEIGHT + BLUR / 2 + 1e-6
             self._known = before, after, hazy
@@ -391,7 +387,7 @@ class FireField(HazardField):
 
     def alarm(self, detector: str, x: float, y: float) -> DetectorAlarm:
         """See `HazardField`: under a ceiling, where the jet arrives and smoke gathers."""
-        space, carbon_monoxide = self._building.space_at(x, y), CoAlarm()
+        space, carbon_monoxide = self.building.space_at(x, y), CoAlarm()
 
         def sounds(age: float, dt: float) -> bool:
             layer = self.layer(space, age) if space >= 0 else None
@@ -432,12 +428,9 @@ class FireField(HazardField):
         strength = self._fire.heat_flux(time, (x + 100.0, y)) * 1e4
         return np.asarray(strength / np.maximum(squared, nearest) * self._seen[1])
 
-    def _states(self, time: float) -> tuple[Floats, Floats, float]:
-        if self._course is None:
-            smoke, march = _smoke(self._building, self._fire.growth, self._fire.peak, self._room)
-            self._course = FieldCourse(march, smoke.step_without_fire, SMOKE_PACES)
-        start = self._fire.start
-        return self._course.around(time - start, max(0.0, self.until - start))
+    def solve(self) -> tuple[March, Step]:
+        """See `SolvedField`."""
+        return _smoke(self.building, self._fire.growth, self._fire.peak, self.room)
 
 
 def _within(bottom: float) -> float:

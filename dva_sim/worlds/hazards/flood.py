@@ -19,18 +19,10 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from dva_sim.worlds.hazards.building import (
-    NOWHERE,
-    Building,
-    Floats,
-    SitePoints,
-    Spaces,
-    building_of,
-)
+from dva_sim.worlds.hazards.building import NOWHERE, Building, Floats, SitePoints, Spaces
 from dva_sim.worlds.hazards.conditions import CLEAR, Conditions
-from dva_sim.worlds.hazards.course import PACES, FieldCourse, March
-from dva_sim.worlds.hazards.hazard import LARGEST, Hazard, HazardField
-from dva_sim.worlds.layout import Site
+from dva_sim.worlds.hazards.hazard import LARGEST, Hazard, March, SolvedField, Step
+from dva_sim.worlds.site import Site
 
 MOST_INFLOW = 10.0  # assumed; beyond any building [m^3/s]
 INFLOW = 2e-3  # a burst pipe [m^3/s]; assumed
@@ -151,12 +143,12 @@ def over_weir(above: Floats, below: Floats, width: Floats) -> Floats:
 
 
 @lru_cache(maxsize=64)
-def _water(building: Building, inflow: float, room: int) -> tuple[Filling, March]:
+def _water(building: Building, inflow: float, room: int) -> tuple[March, Step]:
     filling = Filling(building.spaces, room, inflow)
-    return filling, March(filling.dry(), filling.step)
+    return March(filling.dry(), filling.step), filling.step_without_inflow
 
 
-class FloodField(HazardField):
+class FloodField(SolvedField):
     """Water on the floors: one level in each space; where it comes, first a spreading film.
 
     Args:
@@ -166,19 +158,17 @@ class FloodField(HazardField):
 
     def __init__(self, flood: Flood, site: Site) -> None:
         super().__init__(flood, site)
-        self._building, self._flood = building_of(site), flood
-        self._room = self._building.space_at(*flood.position)
-        self._course: FieldCourse | None = None
+        self._flood = flood
 
     def at(self, x: float, y: float, time: float) -> Conditions:
         """See `HazardField`."""
-        space = self._building.space_at(x, y)
-        if space == NOWHERE or self._room == NOWHERE or time <= self._flood.start:
+        space = self.building.space_at(x, y)
+        if space == NOWHERE or self.room == NOWHERE or time <= self._flood.start:
             return CLEAR
-        before, after, weight = self._states(time)
+        before, after, weight = self.states(time)
         volume = float(before[space]) * (1.0 - weight) + float(after[space]) * weight
-        level = volume / float(self._building.spaces.area[space])
-        if space == self._room and level < FILM:
+        level = volume / float(self.building.spaces.area[space])
+        if space == self.room and level < FILM:
             wet = math.dist((x, y), self._flood.position) < math.sqrt(volume / (math.pi * FILM))
             level = FILM if wet else 0.0
         return Conditions(water=level)
@@ -187,23 +177,19 @@ class FloodField(HazardField):
         """See `HazardField`."""
         if what != "water":
             return None
-        if self._room == NOWHERE or time <= self._flood.start:
+        if self.room == NOWHERE or time <= self._flood.start:
             return np.zeros(places.spaces.shape)
-        before, after, weight = self._states(time)
-        state = before + weight * (after - before)
-        level = np.append(state[:-1] / self._building.spaces.area, 0.0)
+        state = self.state(time)
+        level = np.append(state[:-1] / self.building.spaces.area, 0.0)
         depth = level[places.spaces]
-        if level[self._room] < FILM:
-            here = places.spaces == self._room
+        if level[self.room] < FILM:
+            here = places.spaces == self.room
             x, y = self._flood.position
             away = np.hypot(places.points[..., 0] - x, places.points[..., 1] - y)
-            wet = away < math.sqrt(state[self._room] / (math.pi * FILM))
+            wet = away < math.sqrt(state[self.room] / (math.pi * FILM))
             depth = np.where(here, np.where(wet, FILM, 0.0), depth)
         return np.asarray(depth)
 
-    def _states(self, time: float) -> tuple[Floats, Floats, float]:
-        flood = self._flood
-        if self._course is None:
-            filling, march = _water(self._building, flood.inflow, self._room)
-            self._course = FieldCourse(march, filling.step_without_inflow, PACES)
-        return self._course.around(time - flood.start, max(0.0, self.until - flood.start))
+    def solve(self) -> tuple[March, Step]:
+        """See `SolvedField`."""
+        return _water(self.building, self._flood.inflow, self.room)

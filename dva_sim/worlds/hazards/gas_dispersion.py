@@ -16,7 +16,7 @@ References:
     S. V. Patankar, Numerical Heat Transfer and Fluid Flow, Hemisphere 1980: finite volumes,
     the exponential scheme.
 
-Gas outdoors: Gaussian puffs and plumes over flat ground.
+Gas outdoors: Gaussian plumes over flat ground.
 
 How wide they are follows from the distance and from how stable the air is, classes A (sunny,
 calm) to F (clear night). Fitted from 0.1 km on; nearer it is extrapolated: across by the same
@@ -331,23 +331,3 @@ def plume(rate: float, wind: float, stability: str, x: float, y: float, z: float
     across, up = sigma_y(stability, x), sigma_z(stability, x)
     shape = math.exp(-0.5 * (y / across) ** 2 - 0.5 * (z / up) ** 2)
     return min(1.0, rate / (math.pi * wind * across * up) * shape)
-
-
-def puff(amount: float, stability: str, travelled: float, x: float, y: float, z: float) -> float:
-    """Share of gas in the air around what was set free at once on the ground.
-
-    Args:
-        amount: Gas set free [m^3].
-        stability: A to F.
-        travelled: How far the wind has carried it [m].
-        x: Downwind of where it was set free [m].
-        y: Across [m].
-        z: Above the ground [m].
-    """
-    if travelled <= 0.0:
-        return 0.0
-    across, up = sigma_y(stability, travelled), sigma_z(stability, travelled)
-    along = (x - travelled) / across
-    shape = math.exp(-0.5 * (along**2 + (y / across) ** 2 + (z / up) ** 2))
-    whole = float((2.0 * math.pi) ** 1.5) * across * across * up
-    return min(1.0, 2.0 * amount / whole * shape)

@@ -11,13 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from dva_sim.worlds.hazards.alarms import CoAlarm, DetectorAlarm
-from dva_sim.worlds.hazards.building import NOWHERE, Floats, SitePoints, building_of
+from dva_sim.worlds.hazards.building import NOWHERE, Floats, SitePoints
 from dva_sim.worlds.hazards.conditions import BREATHING_HEIGHT, Conditions
-from dva_sim.worlds.hazards.course import FieldCourse, March
+from dva_sim.worlds.hazards.detectors import CoAlarm, DetectorAlarm
 from dva_sim.worlds.hazards.gas_dispersion import MIXED_HEIGHT, Air, Draught, air_in, mesh_in, plume
-from dva_sim.worlds.hazards.hazard import LARGEST, Hazard, HazardField
-from dva_sim.worlds.layout import Site
+from dva_sim.worlds.hazards.hazard import LARGEST, Hazard, March, SolvedField, Step
+from dva_sim.worlds.site import Site
 
 if TYPE_CHECKING:
     from dva_sim.worlds.camera.sprites import Sprite
@@ -190,7 +189,7 @@ def _gas(air: Air, node: int, rate: float) -> March:
     return March(air.still(), lambda state, _, dt: air.step(state, node, rate, dt), GAS_PACES)
 
 
-class LeakField(HazardField):
+class LeakField(SolvedField):
     """Gas from a leak: on the mesh indoors, a plume outdoors.
 
     Args:
@@ -200,9 +199,7 @@ class LeakField(HazardField):
 
     def __init__(self, leak: GasLeak, site: Site) -> None:
         super().__init__(leak, site)
-        self._building, self._leak = building_of(site), leak
-        self._indoors = self._building.space_at(*leak.position) != NOWHERE
-        self._course: FieldCourse | None = None
+        self._leak, self._indoors = leak, self.room != NOWHERE
         self._nodes: tuple[SitePoints, NDArray[np.int64]] | None = None
 
     def at(self, x: float, y: float, time: float) -> Conditions:
@@ -218,10 +215,10 @@ class LeakField(HazardField):
             return 0.0
         if not self._indoors:
             return self._outdoors(x, y, time)
-        node = mesh_in(self._building).node_at(x, y)
+        node = mesh_in(self.building).node_at(x, y)
         if node < 0:
             return 0.0
-        before, after, weight = self._states(time)
+        before, after, weight = self.states(time)
         return min(1.0, float(before[node]) * (1.0 - weight) + float(after[node]) * weight)
 
     def seen_from(self, x: float, y: float) -> Callable[[float], float]:
@@ -233,7 +230,7 @@ class LeakField(HazardField):
         """
         if not self._indoors or self._leak.draught > 0.0:
             return lambda age: self.share(x, y, self._leak.start + age)
-        mesh, leak = mesh_in(self._building), self._leak
+        mesh, leak = mesh_in(self.building), self._leak
         here, there = mesh.nearest(x, y), mesh.nearest(*leak.position)
         source, seen, rate = here, there, 1.0
         if len(mesh.area) > LARGE_MESH:
@@ -258,7 +255,7 @@ class LeakField(HazardField):
     def _outdoors(self, x: float, y: float, time: float) -> float:
         """In the plume: what is there was set free when the wind set out from the leak."""
         leak = self._leak
-        if self._indoors or self._building.space_at(x, y) != NOWHERE:
+        if self._indoors or self.building.space_at(x, y) != NOWHERE:
             return 0.0
         dx, dy = x - leak.position[0], y - leak.position[1]
         cos, sin = math.cos(leak.wind_heading), math.sin(leak.wind_heading)
@@ -271,13 +268,13 @@ class LeakField(HazardField):
     @cached_property
     def _air(self) -> Air:
         """The air that it leaks into."""
-        leak, mesh = self._leak, mesh_in(self._building)
+        leak, mesh = self._leak, mesh_in(self.building)
         draught = None
         if leak.draught > 0.0:
             supply = mesh.nearest(leak.supply_x, leak.supply_y)
             exhaust = mesh.nearest(leak.exhaust_x, leak.exhaust_y)
             draught = Draught(supply, exhaust, leak.draught)
-        return air_in(self._building, leak.diffusivity, leak.air_changes / HOUR, draught)
+        return air_in(self.building, leak.diffusivity, leak.air_changes / HOUR, draught)
 
     def picture(self, what: str, places: SitePoints, time: float) -> Floats | None:
         """See `HazardField`."""
@@ -287,23 +284,18 @@ class LeakField(HazardField):
             return np.zeros(places.spaces.shape)
         if not self._indoors:
             return self._plume_picture(places, time)
-        before, after, weight = self._states(time)
-        share = before + weight * (after - before)
+        share = self.state(time)
         share[-1] = 0.0  # what was carried out is nowhere
         if self._nodes is None or self._nodes[0] is not places:
-            self._nodes = places, places.of(mesh_in(self._building).nodes)
+            self._nodes = places, places.of(mesh_in(self.building).nodes)
         return np.minimum(1.0, share[self._nodes[1]])
 
     def _plume_picture(self, places: SitePoints, time: float) -> Floats:
         shares = [self._outdoors(x, y, time) for x, y in places.points.reshape(-1, 2).tolist()]
         return np.array(shares).reshape(places.spaces.shape)
 
-    def _states(self, time: float) -> tuple[Floats, Floats, float]:
-        leak = self._leak
-        if self._course is None:
-            node = mesh_in(self._building).nearest(*leak.position)
-            air, march = self._air, _gas(self._air, node, leak.release)
-            self._course = FieldCourse(
-                march, lambda state, _, dt: air.step(state, node, 0.0, dt), GAS_PACES
-            )
-        return self._course.around(time - leak.start, max(0.0, self.until - leak.start))
+    def solve(self) -> tuple[March, Step]:
+        """See `SolvedField`."""
+        air, node = self._air, mesh_in(self.building).nearest(*self._leak.position)
+        march = _gas(air, node, self._leak.release)
+        return march, lambda state, _, dt: air.step(state, node, 0.0, dt)

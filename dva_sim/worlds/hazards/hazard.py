@@ -1,11 +1,18 @@
 """What a hazard is: a growing danger, the field that it makes on a site, and how both are shown.
 
 Derive from `Hazard` and `HazardField` to make a kind of your own; worlds/HAZARDS.md says how.
+
+What robots and people do changes nothing but when a source stops. So the fields shipped are solved
+once per process for each site, kind and space that they start in, step by step and only as far as
+somebody asks; a run goes on from there on its own once its hazard is dealt with.
 """
 
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
+from collections.abc import Callable, Iterator, Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -14,15 +21,22 @@ from pydantic import ValidationError
 from dva_sim.kernel.config import Config, first_mistake
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.protocol.messages import EVENT_KINDS
-from dva_sim.worlds.hazards.alarms import DetectorAlarm, alarm_in
-from dva_sim.worlds.hazards.building import Floats, SitePoints
+from dva_sim.worlds.hazards.building import Floats, SitePoints, building_of
 from dva_sim.worlds.hazards.conditions import QUANTITIES, Conditions
-from dva_sim.worlds.layout import Site
+from dva_sim.worlds.hazards.detectors import LATEST, DetectorAlarm, alarm_in
+from dva_sim.worlds.site import Site
+from dva_sim.worlds.site_parts import Detector
 
 if TYPE_CHECKING:
     from dva_sim.worlds.camera.sprites import Sprite
 
+
 Point = tuple[float, float]
+Step = Callable[[Floats, float, float], Floats]
+Paces = Sequence[tuple[float, float]]
+
+# Until which age, in which steps [s]: what has just begun changes fast.
+PACES = ((120.0, 1.0), (600.0, 2.0), (1800.0, 5.0), (math.inf, 20.0))
 
 LARGEST = 2.5  # what can be seen of a leak or flood never grows beyond this [m]; assumed
 
@@ -173,3 +187,116 @@ class HazardField:
         points = places.points.reshape(-1, 2).tolist()
         values = [getattr(self.at(x, y, time), part) for x, y in points]
         return np.array(values, float).reshape(places.spaces.shape)
+
+
+class March:
+    """The states of a field at growing ages, and the way from one to the next.
+
+    Args:
+        state: At age 0.
+        step: From a state at an age [s] to the one `dt` [s] later; it changes nothing.
+        paces: Until which age, in which steps [s].
+    """
+
+    def __init__(self, state: Floats, step: Step, paces: Paces = PACES) -> None:
+        self._step, self.paces = step, paces
+        self.ages, self.states = [0.0], [state]
+
+    def around(self, age: float) -> tuple[Floats, Floats, float]:
+        """The states before and after an age [s], and the weight of the later one."""
+        ages = self.ages
+        while ages[-1] <= age:
+            self._advance()
+        after = max(1, bisect_right(ages, age))
+        weight = (age - ages[after - 1]) / (ages[after] - ages[after - 1])
+        return self.states[after - 1], self.states[after], max(0.0, weight)
+
+    def at(self, age: float) -> Floats:
+        """The state at an age [s], between two steps on the straight line."""
+        before, after, weight = self.around(age)
+        between: Floats = before + weight * (after - before)
+        return between
+
+    def _advance(self) -> None:
+        age = self.ages[-1]
+        dt = next(step for until, step in self.paces if age < until)
+        self.states.append(self._step(self.states[-1], age, dt))
+        self.ages.append(age + dt)
+
+
+class SolvedField(HazardField):
+    """A field that is solved step by step: shared until the source stops, then this run's own.
+
+    Attributes:
+        building: Where.
+        room: Index of the space that it starts in, or `NOWHERE`.
+    """
+
+    def __init__(self, hazard: Hazard, site: Site) -> None:
+        super().__init__(hazard, site)
+        self.building = building_of(site)
+        self.room = self.building.space_at(*hazard.position)
+        self._own: tuple[float, March] | None = None
+
+    def solve(self) -> tuple[March, Step]:
+        """The states with the source, shared from age 0 on; and the step without it."""
+        raise NotImplementedError
+
+    @cached_property
+    def _solved(self) -> tuple[March, Step]:
+        return self.solve()
+
+    def states(self, time: float) -> tuple[Floats, Floats, float]:
+        """The states before and after `time` [s], and the weight of the later one."""
+        (shared, step), start = self._solved, self.hazard.start
+        age, stopped = time - start, max(0.0, self.until - start)
+        if age <= stopped:
+            return shared.around(age)
+        if self._own is None or self._own[0] != stopped:
+            self._own = stopped, March(shared.at(stopped), step, shared.paces)
+        return self._own[1].around(age - stopped)
+
+    def state(self, time: float) -> Floats:
+        """The state at `time` [s], between two steps on the straight line."""
+        before, after, weight = self.states(time)
+        between: Floats = before + weight * (after - before)
+        return between
+
+
+def detection_time(hazard: Hazard, detector: Detector, site: Site) -> float:
+    """When a detector notices a hazard [s]; infinite if it does not within an hour."""
+    return _first(hazard, [detector] if detector.kind in hazard.noticed_by() else [], site)[1]
+
+
+def first_detection(hazard: Hazard, site: Site) -> tuple[Detector | None, float]:
+    """The detector that notices a hazard first, and when [s]; None and infinity if none does."""
+    return _first(hazard, [d for d in site.detectors if d.kind in hazard.noticed_by()], site)
+
+
+def _first(
+    hazard: Hazard, detectors: Sequence[Detector], site: Site
+) -> tuple[Detector | None, float]:
+    """All detectors are asked at growing ages until one sounds."""
+    best: tuple[Detector | None, float] = None, math.inf
+    if not detectors:
+        return best
+    field = hazard.model_copy(update={"start": 0.0}).field(site)
+    alarms = [(d, field.alarm(d.kind, d.x, d.y)) for d in detectors]
+    best = min(((d, alarm.at_latest) for d, alarm in alarms), key=lambda found: found[1])
+    for age, dt in _ages():
+        if age >= best[1]:
+            break
+        sounding = [d for d, alarm in alarms if alarm.sounds(age, dt) and age >= alarm.reached]
+        if sounding:
+            best = sounding[0], age
+            break
+    return (best[0], hazard.start + best[1]) if best[1] < math.inf else (None, math.inf)
+
+
+def _ages() -> Iterator[tuple[float, float]]:
+    """Ages at which alarms are asked, and the time since the last one [s]: 2 % apart."""
+    age = 0.0
+    while age < LATEST:
+        dt = float(max(1, round(0.02 * age)))
+        age += dt
+        yield age, dt

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from dva_sim.worlds.hazards.building import SitePoints, building_of
 from dva_sim.worlds.hazards.conditions import CLEAR, QUANTITIES, Conditions, together
 from dva_sim.worlds.hazards.hazard import Hazard, HazardField, Point
-from dva_sim.worlds.layout import Site
+from dva_sim.worlds.site import Site
 
 RAY = 0.25  # between the points of a line of sight [m]
 

@@ -128,9 +128,8 @@ def test_one_who_is_called_on_the_way_back_turns_around_at_once() -> None:
 
 
 def test_each_room_of_the_site_is_reached_by_the_planner_s_way() -> None:
-    from dva_sim.worlds.layout import FOOTPRINT
     from dva_sim.worlds.planning import Planner
-    from dva_sim.worlds.site import load_site
+    from dva_sim.worlds.site import FOOTPRINT, load_site
 
     scenario = {
         "model": "timed",

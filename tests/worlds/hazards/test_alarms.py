@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from dva_sim.worlds.hazards import Fire, detection_time, first_detection, make_hazard
-from dva_sim.worlds.hazards.alarms import CoAlarm
+from dva_sim.worlds.hazards.detectors import CoAlarm
 from dva_sim.worlds.hazards.fire import (
     heat_in_jet,
     jet_lag,

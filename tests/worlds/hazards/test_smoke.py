@@ -10,8 +10,8 @@ from scipy.integrate import solve_ivp
 
 from dva_sim.worlds.hazards import smoke as model
 from dva_sim.worlds.hazards.building import Spaces
-from dva_sim.worlds.hazards.course import March
 from dva_sim.worlds.hazards.fire import Fire
+from dva_sim.worlds.hazards.hazard import March
 from dva_sim.worlds.hazards.smoke import (
     CO,
     CO_YIELD,

@@ -10,8 +10,7 @@ import pytest
 from dva_sim.worlds.hazards import CLEAR, Hazard, Surroundings, gas_leak, make_hazard
 from dva_sim.worlds.hazards.building import building_of
 from dva_sim.worlds.hazards.gas_leak import GasLeak, LeakField
-from dva_sim.worlds.layout import Site
-from dva_sim.worlds.site import load_site
+from dva_sim.worlds.site import Site, load_site
 
 LAB = (19.0, 22.5)  # in the chemistry lab; its door opens on the north corridor
 BESIDE, CORRIDOR, OFFICE = (21.5, 22.5), (13.1, 22.0), (19.0, 15.6)

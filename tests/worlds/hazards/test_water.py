@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from dva_sim.worlds.hazards.building import Spaces
-from dva_sim.worlds.hazards.course import March
 from dva_sim.worlds.hazards.flood import Filling, over_weir
+from dva_sim.worlds.hazards.hazard import March
 
 
 def rooms(areas: list[float], doors: list[tuple[int, int, float]]) -> Spaces:

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from dva_sim.experiments.report.summary import Reading
-    from dva_sim.worlds.layout import Site
+    from dva_sim.worlds.site import Site
 
 
 _ABREAST, _MOST = 4, 7  # panels, if they are broad or high
