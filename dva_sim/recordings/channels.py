@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 from dva_sim.agents.observation import CameraFrame
 from dva_sim.kernel.recorder import Sent, TrackPoint
 from dva_sim.recordings import messages
-from dva_sim.recordings.messages import FRAME, HERE, XML, ChannelMessage
+from dva_sim.recordings.messages import FRAME, HERE, XML, ChannelMessage, stamped
 from dva_sim.simulation.full import Playback
+from dva_sim.simulation.full.hazards import RunHazard
 from dva_sim.worlds.hazards import Hazard, Raster
 
 POSE, ACTIVITY, FIX, SEEN = "pose", "activity", "fix", "seen"  # last parts of topics
@@ -61,8 +62,7 @@ def activities(playback: Playback) -> Iterator[ChannelMessage]:
     for name, track in playback.recorder.tracks.items():
         for mode, points in groupby(track, key=lambda p: p.mode):
             time = next(points).time
-            content = {"timestamp": messages.stamp(time), "activity": mode}
-            yield ChannelMessage(time, f"/{name}/{ACTIVITY}", "dva_sim.Activity", content)
+            yield stamped(time, f"/{name}/{ACTIVITY}", "dva_sim.Activity", activity=mode)
 
 
 def beliefs(playback: Playback) -> Iterator[ChannelMessage]:
@@ -79,25 +79,22 @@ def fixes(playback: Playback) -> Iterator[ChannelMessage]:
         for _, points in groupby(playback.recorder.tracks[name], key=lambda p: p.time // 1.0):
             p = next(points)
             latitude, longitude = playback.site.frame.to_latlon(p.x, p.y)
-            content = {
-                "timestamp": messages.stamp(p.time),
-                "frame_id": name,
-                "latitude": round(latitude, 9),
-                "longitude": round(longitude, 9),
-                "altitude": 0.0,
-                "position_covariance": [0.0] * 9,
-                "position_covariance_type": 0,
-            }
-            yield ChannelMessage(p.time, f"/{name}/{FIX}", "foxglove.LocationFix", content)
+            yield stamped(
+                p.time,
+                f"/{name}/{FIX}",
+                "foxglove.LocationFix",
+                frame_id=name,
+                latitude=round(latitude, 9),
+                longitude=round(longitude, 9),
+                altitude=0.0,
+                position_covariance=[0.0] * 9,
+                position_covariance_type=0,
+            )
 
 
 def _pose(name: str, what: str, p: TrackPoint) -> ChannelMessage:
-    content = {
-        "timestamp": messages.stamp(p.time),
-        "frame_id": FRAME,
-        "pose": messages.pose(p.x, p.y, p.heading),
-    }
-    return ChannelMessage(p.time, f"/{name}/{what}", "foxglove.PoseInFrame", content)
+    pose = messages.pose(p.x, p.y, p.heading)
+    return stamped(p.time, f"/{name}/{what}", "foxglove.PoseInFrame", frame_id=FRAME, pose=pose)
 
 
 def _transform(name: str, p: TrackPoint) -> dict[str, Any]:
@@ -137,18 +134,19 @@ def _grid(what: str, time: float, cell: float, raster: Raster) -> ChannelMessage
     low, left = int(rows.min()), int(columns.min())
     part = raster.values[low : rows.max() + 1, left : columns.max() + 1]
     west, _, south, _ = raster.extent
-    content = {
-        "timestamp": messages.stamp(time),
-        "frame_id": FRAME,
-        "pose": messages.pose(west + left * cell, south + low * cell),
-        "column_count": part.shape[1],
-        "cell_size": {"x": round(cell, 6), "y": round(cell, 6)},
-        "row_stride": 4 * part.shape[1],
-        "cell_stride": 4,
-        "fields": [{"name": what, "offset": 0, "type": 7}],
-        "data": base64.b64encode(_shortened(part).tobytes()).decode(),
-    }
-    return ChannelMessage(time, f"{GRIDS}{what}", "foxglove.Grid", content)
+    return stamped(
+        time,
+        f"{GRIDS}{what}",
+        "foxglove.Grid",
+        frame_id=FRAME,
+        pose=messages.pose(west + left * cell, south + low * cell),
+        column_count=part.shape[1],
+        cell_size={"x": round(cell, 6), "y": round(cell, 6)},
+        row_stride=4 * part.shape[1],
+        cell_stride=4,
+        fields=[{"name": what, "offset": 0, "type": 7}],
+        data=base64.b64encode(_shortened(part).tobytes()).decode(),
+    )
 
 
 def _shortened(values: NDArray[np.float64]) -> NDArray[np.float32]:
@@ -189,12 +187,9 @@ def ground(playback: Playback) -> Iterator[ChannelMessage]:
 
 def hazards(playback: Playback) -> Iterator[ChannelMessage]:
     """What is real, from when it begins until it is dealt with or the run ends."""
-    for number, incident in enumerate(playback.incidents):
-        if incident.false_alarm:
-            continue
-        name, until = f"hazard-{number + 1}", playback.contained.get(number, math.inf)
-        drawn = -math.inf
-        for time in _steps(incident.start, min(until, playback.duration)):
+    for number, incident, until in _real(playback):
+        name, drawn = f"hazard-{number}", -math.inf
+        for time in _steps(incident.start, until):
             radius = incident.hazard.radius(time)
             if radius - drawn >= LEAST_GROWTH:
                 drawn = radius
@@ -205,22 +200,30 @@ def hazards(playback: Playback) -> Iterator[ChannelMessage]:
 
 def states(playback: Playback) -> Iterator[ChannelMessage]:
     """The same hazards as numbers, once a second."""
-    for number, incident in enumerate(playback.incidents):
-        until = min(playback.contained.get(number, math.inf), playback.duration)
+    for number, incident, until in _real(playback):
         x, y = incident.hazard.position
-        for time in _steps(incident.start, until) if not incident.false_alarm else ():
-            content = {
-                "timestamp": messages.stamp(time),
-                "number": number + 1,
-                "kind": incident.kind,
-                "room": incident.room,
-                "x_m": round(x, messages.PLACES),
-                "y_m": round(y, messages.PLACES),
-                "radius_m": round(incident.hazard.radius(time), 3),
-                "danger_radius_m": round(incident.hazard.danger_radius(time), 3),
-                "severity": round(incident.hazard.severity(time), 4),
-            }
-            yield ChannelMessage(time, HAZARDS, "dva_sim.Hazard", content)
+        for time in _steps(incident.start, until):
+            yield stamped(
+                time,
+                HAZARDS,
+                "dva_sim.Hazard",
+                number=number,
+                kind=incident.kind,
+                room=incident.room,
+                x_m=round(x, messages.PLACES),
+                y_m=round(y, messages.PLACES),
+                radius_m=round(incident.hazard.radius(time), 3),
+                danger_radius_m=round(incident.hazard.danger_radius(time), 3),
+                severity=round(incident.hazard.severity(time), 4),
+            )
+
+
+def _real(playback: Playback) -> Iterator[tuple[int, RunHazard, float]]:
+    """What is real, with its number from 1, and until when it goes on [s]."""
+    for number, incident in enumerate(playback.incidents):
+        if not incident.false_alarm:
+            until = playback.contained.get(number, math.inf)
+            yield number + 1, incident, min(until, playback.duration)
 
 
 def _steps(start: float, end: float) -> Iterator[float]:
@@ -315,16 +318,17 @@ LEVELS = {"safety": 3, "mode": 1, "link": 1}  # of Foxglove's log; all else is f
 def told(playback: Playback) -> Iterator[ChannelMessage]:
     """The timeline."""
     for moment in playback.recorder.timeline:
-        content = {
-            "timestamp": messages.stamp(moment.time),
-            "level": LEVELS.get(moment.kind, 2),
-            "message": moment.what,
-            "name": moment.who,
-            "file": "",
-            "line": 0,
-            "kind": moment.kind,
-        }
-        yield ChannelMessage(moment.time, STORY, "foxglove.Log", content)
+        yield stamped(
+            moment.time,
+            STORY,
+            "foxglove.Log",
+            level=LEVELS.get(moment.kind, 2),
+            message=moment.what,
+            name=moment.who,
+            file="",
+            line=0,
+            kind=moment.kind,
+        )
 
 
 def said(playback: Playback) -> Iterator[ChannelMessage]:
@@ -352,63 +356,52 @@ def shown(playback: Playback) -> Iterator[ChannelMessage]:
     """The frames that come onto the operators' screens."""
     labels = playback.labels
     for number, drive in enumerate(playback.recorder.drives):
-        for frame in drive.frames:
-            content = {
-                "timestamp": messages.stamp(frame.time),
-                "drive": number,
-                "robot": labels[drive.robot],
-                "captured_s": frame.captured,
-            }
-            topic = f"/{labels[drive.operator]}/{SCREEN}"
-            yield ChannelMessage(frame.time, topic, "dva_sim.Shown", content)
+        topic, whose = f"/{labels[drive.operator]}/{SCREEN}", labels[drive.robot]
+        for at in drive.frames:
+            said = {"drive": number, "robot": whose, "captured_s": at.captured}
+            yield stamped(at.time, topic, "dva_sim.Shown", **said)
 
 
 def commanded(playback: Playback) -> Iterator[ChannelMessage]:
     """What the phones make of the tilt."""
     labels = playback.labels
     for number, drive in enumerate(playback.recorder.drives):
+        topic, whose = f"/{labels[drive.operator]}/{COMMANDS}", labels[drive.robot]
         for time, speed, turn_rate in drive.commands:
-            content = {
-                "timestamp": messages.stamp(time),
-                "drive": number,
-                "robot": labels[drive.robot],
-                "speed_m_s": round(speed, 5),
-                "turn_rate_rad_s": round(turn_rate, 5),
-            }
-            topic = f"/{labels[drive.operator]}/{COMMANDS}"
-            yield ChannelMessage(time, topic, "dva_sim.Command", content)
+            made = {"speed_m_s": round(speed, 5), "turn_rate_rad_s": round(turn_rate, 5)}
+            yield stamped(time, topic, "dva_sim.Command", drive=number, robot=whose, **made)
 
 
 def applied(playback: Playback) -> Iterator[ChannelMessage]:
     """What the robots make of the commands."""
     for drive in playback.recorder.drives:
         for a in drive.applied:
-            content = {
-                "timestamp": messages.stamp(a.time),
-                "made_s": a.issued,
-                "sent_s": a.sent,
-                "arrived_s": a.arrived,
-                "until_s": messages.finite(a.until),
-                "captured_s": messages.finite(a.captured),
-            }
-            topic = f"/{playback.labels[drive.robot]}/applied"
-            yield ChannelMessage(a.time, topic, "dva_sim.Applied", content)
+            yield stamped(
+                a.time,
+                f"/{playback.labels[drive.robot]}/applied",
+                "dva_sim.Applied",
+                made_s=a.issued,
+                sent_s=a.sent,
+                arrived_s=a.arrived,
+                until_s=messages.finite(a.until),
+                captured_s=messages.finite(a.captured),
+            )
 
 
 def _frame(sent: Sent, names: Mapping[str, str]) -> ChannelMessage:
     frame: CameraFrame = sent.payload
     seen = frame.observation
-    content: dict[str, Any] = {
-        "timestamp": messages.stamp(sent.time),
-        "to": names[sent.destination],
-        "size_bytes": sent.size,
-        "captured_s": frame.captured,
-        "x_m": round(seen.x, messages.PLACES),
-        "y_m": round(seen.y, messages.PLACES),
-        "heading_rad": round(seen.heading, messages.PLACES),
-        "visibility_m": round(seen.visibility, 2),
-        "hazards": [
-            {"kind": h.kind, "x_m": round(h.x, 2), "y_m": round(h.y, 2)} for h in seen.hazards
-        ],
-    }
-    return ChannelMessage(sent.time, f"/{names[sent.source]}/{CAMERA}", "dva_sim.Frame", content)
+    hazards = [{"kind": h.kind, "x_m": round(h.x, 2), "y_m": round(h.y, 2)} for h in seen.hazards]
+    return stamped(
+        sent.time,
+        f"/{names[sent.source]}/{CAMERA}",
+        "dva_sim.Frame",
+        to=names[sent.destination],
+        size_bytes=sent.size,
+        captured_s=frame.captured,
+        x_m=round(seen.x, messages.PLACES),
+        y_m=round(seen.y, messages.PLACES),
+        heading_rad=round(seen.heading, messages.PLACES),
+        visibility_m=round(seen.visibility, 2),
+        hazards=hazards,
+    )

@@ -1,11 +1,7 @@
-"""Hazards of a recording whose class is the user's own: shown as they were, never simulated again.
+"""An MCAP file of a run, read back: enough to tell its story and draw it, without simulating.
 
-A recording loads no code. What such a hazard looked like is in the file: its sizes once a second,
-and what lay over the floor every two seconds.
-
-An MCAP file of a run, read back: enough to tell its story and draw it, without simulating.
-
-What figures take from a recording: the site, who was where when, hazards, what was told.
+A recording loads no code. Of a hazard whose class is the user's own the file has what it looked
+like: its sizes once a second, and what lay over the floor every two seconds; it is shown as it was.
 """
 
 from __future__ import annotations
@@ -403,15 +399,7 @@ def _traffic(raw: _Raw, run: Mapping[str, Any]) -> Iterator[Sent]:
 
 def _drives(raw: _Raw, run: Mapping[str, Any]) -> list[DriveLog]:
     drives = [
-        DriveLog(
-            entry["robot"],
-            entry["operator"],
-            entry["event"],
-            entry["ordered_s"],
-            entry["started_s"],
-            entry["ended_s"],
-            entry["outcome"],
-        )
+        DriveLog(**{key.removesuffix("_s"): entry[key] for key in writing.DRIVE})
         for entry in run["drives"]
     ]
     for topic, said in raw.said.items():

@@ -90,6 +90,7 @@ FORMAT = 1  # of what is attached; a reader refuses a later one
 ABOUT, DIGEST = "dva-sim", "digest"  # name of the metadata, and of one entry of it
 RUN, SCENARIO, TABLES, SITE = "run.json", "scenario.json", "tables.json", "site/"
 DESCRIBED = ("title", "shows", "colour", "mark")  # of a hazard whose class a reader does not load
+DRIVE = ("robot", "operator", "event", "ordered_s", "started_s", "ended_s", "outcome")
 CHUNK = 256 * 1024  # what a file that was cut short loses at most, unpacked [B]
 
 Tables = Mapping[str, Any]
@@ -264,15 +265,7 @@ def facts(playback: Playback) -> dict[str, Any]:
             for ending in playback.endings
         ],
         "drives": [
-            {
-                "robot": drive.robot,
-                "operator": drive.operator,
-                "event": drive.event,
-                "ordered_s": drive.ordered,
-                "started_s": drive.started,
-                "ended_s": drive.ended,
-                "outcome": drive.outcome,
-            }
+            {key: getattr(drive, key.removesuffix("_s")) for key in DRIVE}
             for drive in playback.recorder.drives
         ],
     }

@@ -211,13 +211,19 @@ class Body:
         """Apply its own forces for one tick; False if it stands and shall stand."""
         raise NotImplementedError
 
+    def counts(self, other: Body | None) -> tuple[Contacts, ...]:
+        """Which of its contacts one with somebody, or a wall (None), is among."""
+        raise NotImplementedError
+
     def meets(self, other: Body | None, now: float) -> None:
         """It begins to touch somebody, or a wall (None)."""
-        raise NotImplementedError
+        for contacts in self.counts(other):
+            contacts.begin(now)
 
     def parts(self, other: Body | None, now: float) -> None:
         """It touches somebody, or a wall (None), no longer."""
-        raise NotImplementedError
+        for contacts in self.counts(other):
+            contacts.end(now)
 
     def feels(self, other: Body | None, impulse: float) -> None:
         """A contact with somebody, or a wall (None), has stopped or pushed it [N s]."""

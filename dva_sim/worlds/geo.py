@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 # WGS-84: semi-major axis [m] and first eccentricity squared.
@@ -19,13 +21,14 @@ class Pose(NamedTuple):
     heading: float
 
 
+@dataclass(frozen=True)
 class GeoFrame:
     """A plane that touches the earth at one point: x east, y north [m].
 
     Points are taken to lie on the ellipsoid (height 0), which makes the plane and
     geographic coordinates one-to-one near the origin.
 
-    Args:
+    Attributes:
         latitude: Of the origin [deg].
         longitude: Of the origin [deg].
 
@@ -33,27 +36,31 @@ class GeoFrame:
         EPSG Guidance Note 7-2, "Geographic/topocentric conversions".
     """
 
-    def __init__(self, latitude: float, longitude: float) -> None:
-        self.latitude = latitude
-        self.longitude = longitude
-        phi = math.radians(latitude)
-        self._lambda = math.radians(longitude)
-        self._sin, self._cos = math.sin(phi), math.cos(phi)
-        w2 = 1 - _E2 * self._sin**2
-        self._normal = _A / math.sqrt(w2)
-        meridian = self._normal * (1 - _E2) / w2
-        self._degrees_north = math.degrees(1 / meridian)
-        self._degrees_east = math.degrees(1 / (self._normal * self._cos))
+    latitude: float
+    longitude: float
+
+    @cached_property
+    def _origin(self) -> tuple[float, float, float]:
+        """Sine and cosine of its latitude, and the radius of curvature there, eastwards [m]."""
+        phi = math.radians(self.latitude)
+        return math.sin(phi), math.cos(phi), _A / math.sqrt(1 - _E2 * math.sin(phi) ** 2)
+
+    @cached_property
+    def _degrees(self) -> tuple[float, float]:
+        """Degrees of longitude and of latitude for each metre east and north."""
+        sin, cos, normal = self._origin
+        meridian = normal * (1 - _E2) / (1 - _E2 * sin**2)
+        return math.degrees(1 / (normal * cos)), math.degrees(1 / meridian)
 
     def to_xy(self, latitude: float, longitude: float) -> tuple[float, float]:
         """Plane coordinates [m] of a geographic position [deg]."""
-        phi, along = math.radians(latitude), math.radians(longitude) - self._lambda
+        sin_0, cos_0, normal_0 = self._origin
+        phi, along = math.radians(latitude), math.radians(longitude) - math.radians(self.longitude)
         sin, cos = math.sin(phi), math.cos(phi)
         normal = _A / math.sqrt(1 - _E2 * sin * sin)
         out = normal * cos * math.cos(along)
-        up = (1 - _E2) * (normal * sin - self._normal * self._sin)
-        north = self._cos * up - self._sin * (out - self._normal * self._cos)
-        return normal * cos * math.sin(along), north
+        up = (1 - _E2) * (normal * sin - normal_0 * sin_0)
+        return normal * cos * math.sin(along), cos_0 * up - sin_0 * (out - normal_0 * cos_0)
 
     def to_latlon(self, x: float, y: float) -> tuple[float, float]:
         """Latitude and longitude [deg] of a point of the plane [m].
@@ -63,21 +70,10 @@ class GeoFrame:
         latitude, longitude = self.latitude, self.longitude
         east, north = x, y
         for _ in range(4):
-            latitude += north * self._degrees_north
-            longitude += east * self._degrees_east
+            longitude += east * self._degrees[0]
+            latitude += north * self._degrees[1]
             x_now, y_now = self.to_xy(latitude, longitude)
             east, north = x - x_now, y - y_now
             if abs(east) + abs(north) < 1e-6:
                 break
         return latitude, longitude
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, GeoFrame):
-            return NotImplemented
-        return (self.latitude, self.longitude) == (other.latitude, other.longitude)
-
-    def __hash__(self) -> int:
-        return hash((self.latitude, self.longitude))
-
-    def __repr__(self) -> str:
-        return f"GeoFrame({self.latitude}, {self.longitude})"

@@ -31,24 +31,13 @@ class Lidar:
 
     Args:
         world: Where.
-        rays: Per scan.
+        rays: Per scan, evenly all around, the first one ahead.
         reach: What is farther is not seen [m].
-        field_of_view: Angle between the outermost rays, symmetric about the heading [rad]; a
-            full turn: even spacing, the first ray ahead.
     """
 
-    def __init__(
-        self,
-        world: World,
-        rays: int = 36,
-        reach: float = 8.0,
-        field_of_view: float = 2.0 * math.pi,
-    ) -> None:
-        self.rays, self.reach = rays, reach
-        whole = field_of_view >= 2.0 * math.pi
-        self._step = 2.0 * math.pi / rays if whole else field_of_view / max(rays - 1, 1)
-        self._start = 0.0 if whole or rays == 1 else -0.5 * field_of_view
-        self.angles: Floats = self._start + self._step * np.arange(rays, dtype=np.float64)
+    def __init__(self, world: World, rays: int = 36, reach: float = 8.0) -> None:
+        self.rays, self.reach, self._step = rays, reach, 2.0 * math.pi / rays
+        self.angles: Floats = self._step * np.arange(rays, dtype=np.float64)
         self._world, self._walls = world, world.site.walls
         self._near: dict[tuple[int, int], Ints] = {}
         self._asked: dict[RobotBody, float] = {}
@@ -126,7 +115,7 @@ class Lidar:
             Which angle, and which ray, one row for each that may fall into it.
         """
         turn = 2.0 * math.pi
-        low = (low - self._start) % turn
+        low = low % turn
         firsts, lasts = [], []
         for begin in (low, low - turn):  # what crosses the first ray comes in two parts
             firsts.append(np.maximum(np.ceil(begin / self._step - EDGE), 0).astype(np.int64))

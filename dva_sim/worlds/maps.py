@@ -68,9 +68,13 @@ class OccupancyGrid:
 
     def state_at(self, x: float, y: float) -> int:
         """`FREE`, `OCCUPIED` or `UNKNOWN`; outside of the grid nothing is known."""
+        return int(self.look_up(self.cells, x, y, UNKNOWN))
+
+    def look_up(self, values: NDArray[Any], x: float, y: float, outside: Any) -> Any:
+        """What an array of the grid's shape holds at a point [m]; else `outside`."""
         row, column = self.to_cell(x, y)
-        inside = 0 <= row < self.cells.shape[0] and 0 <= column < self.cells.shape[1]
-        return int(self.cells[row, column]) if inside else UNKNOWN
+        rows, columns = values.shape
+        return values[row, column] if 0 <= row < rows and 0 <= column < columns else outside
 
     @cached_property
     def clearance(self) -> NDArray[np.float64]:
@@ -88,9 +92,7 @@ class OccupancyGrid:
 
     def clearance_at(self, x: float, y: float) -> float:
         """Room around a point [m], to within a cell; 0 where it is not known free."""
-        row, column = self.to_cell(x, y)
-        inside = 0 <= row < self.cells.shape[0] and 0 <= column < self.cells.shape[1]
-        return float(self.clearance[row, column]) if inside else 0.0
+        return float(self.look_up(self.clearance, x, y, 0.0))
 
     def reachable(self, clearance: float) -> NDArray[np.bool_]:
         """The largest connected part of the cells with at least `clearance` [m] of room."""

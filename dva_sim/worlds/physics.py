@@ -1,11 +1,7 @@
-"""A person's body: legs push it towards the velocity that is wanted.
+"""Moving bodies seen from above: robots and people that push, slip and stop (pymunk, no gravity).
 
-Moving bodies seen from above: robots and people that push, slip and stop (pymunk, no gravity).
-
-What a robot's motors do is in `drives`, what its wheels hold in `robot_body`, how people walk in
-`person_body`, what counts as a contact or a jam in `contacts`.
-
-A bare hall with walls as one likes: where drives are tried and physics is tested.
+What a robot's motors do is in `drives`, what its wheels hold in `robot_body`, what counts as a
+contact or a jam in `bodies`. A bare hall with walls as one likes is where drives are tried.
 """
 
 from __future__ import annotations
@@ -28,6 +24,7 @@ from dva_sim.worlds.bodies import (
     WALL,
     AskedFor,
     Body,
+    Contacts,
     Timing,
     set_force,
     set_velocity,
@@ -38,6 +35,7 @@ from dva_sim.worlds.maps import FREE, rasterise
 from dva_sim.worlds.robot_body import RobotBody
 from dva_sim.worlds.site import DEFAULT_FRAME, Site
 
+MASS: Final = 75.0  # of an adult [kg]
 RELAXATION: Final = 0.5  # of a person's velocity towards the wanted one [s]
 MOST_PUSH: Final = 3.0  # force of a person's legs by mass [m/s^2]; assumed
 
@@ -55,14 +53,14 @@ class PersonBody(Body):
 
     kind = PERSON
 
-    def __init__(self, world: Timing, name: str, pose: Pose, radius: float, mass: float) -> None:
-        body = pymunk.Body(mass, math.inf)
+    def __init__(self, world: Timing, name: str, pose: Pose, radius: float) -> None:
+        body = pymunk.Body(MASS, math.inf)
         body.position = pose.x, pose.y
         shape = pymunk.Circle(body, radius)
         # Who brushes past a wall or somebody else is not held back.
         shape.friction, shape.elasticity, shape.collision_type = 0.0, 0.0, self.kind
         super().__init__(world, name, body, shape)
-        self.radius, self._mass, self._circle = radius, mass, shape
+        self.radius, self._circle = radius, shape
         self._asked = AskedFor((0.0, 0.0))
 
     def walk(self, vx: float, vy: float) -> None:
@@ -90,19 +88,13 @@ class PersonBody(Body):
             return bool(self._asked.coming)
         ax, ay = (wx - vx) / RELAXATION, (wy - vy) / RELAXATION
         asked = math.hypot(ax, ay)
-        share = self._mass * min(1.0, MOST_PUSH / asked) if asked > 0.0 else 0.0
+        share = MASS * min(1.0, MOST_PUSH / asked) if asked > 0.0 else 0.0
         set_force(self._raw, (ax * share, ay * share))
         return True
 
-    def meets(self, other: Body | None, now: float) -> None:
-        """It begins to touch somebody, or a wall (None)."""
-        if other is not None and other.kind == ROBOT:
-            self._touch.begin(now)
-
-    def parts(self, other: Body | None, now: float) -> None:
-        """It touches somebody, or a wall (None), no longer."""
-        if other is not None and other.kind == ROBOT:
-            self._touch.end(now)
+    def counts(self, other: Body | None) -> tuple[Contacts, ...]:
+        """Only those with robots."""
+        return (self._touch,) if other is not None and other.kind == ROBOT else ()
 
     def feels(self, other: Body | None, impulse: float) -> None:
         """A contact with somebody, or a wall (None), has stopped or pushed it [N s]."""
@@ -164,16 +156,14 @@ class World:
         self.robots.append(robot)
         return robot
 
-    def add_person(
-        self, name: str, pose: Pose, radius: float = 0.25, mass: float = 75.0
-    ) -> PersonBody:
-        """Place a person, whose size [m, kg] is that of an adult unless it is given.
+    def add_person(self, name: str, pose: Pose, radius: float = 0.25) -> PersonBody:
+        """Place a person, whose size [m] is that of an adult unless it is given.
 
         Raises:
             ConfigError: a wall, a robot or another person is in the way.
         """
         self._check_place("person", name, pose, radius)
-        person = PersonBody(self, name, pose, radius, mass)
+        person = PersonBody(self, name, pose, radius)
         self._add(person)
         self.people.append(person)
         return person

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections import OrderedDict
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Sequence
 from functools import lru_cache
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +25,6 @@ KEPT_FIELDS, KEPT_PATHS, KEPT_MAPS = 256, 2048, 4
 
 Point = tuple[float, float]
 Floats = NDArray[np.float64]
-T = TypeVar("T")
 
 
 class Disc(NamedTuple):
@@ -40,7 +38,7 @@ class Disc(NamedTuple):
 class Planner:
     """Plans ways on a site and says what can be seen.
 
-    Planners of one grid and clearance share what they have worked out: the field of a goal
+    Planners of one site and clearance share what they have worked out: the field of a goal
     is solved once per process.
 
     Args:
@@ -49,8 +47,9 @@ class Planner:
     """
 
     def __init__(self, site: Site, clearance: float) -> None:
-        self._sight = Sight(site.walls)
-        self._roadmap = _roadmap(site.grid, clearance)
+        self._roadmap = site.kept(
+            ("roadmap", clearance), lambda: Roadmap(site.grid, clearance, Sight(site.walls))
+        )
 
     def path(self, start: Point, goal: Point, avoid: Sequence[Disc] = ()) -> Floats | None:
         """A way from `start` to `goal` [m].
@@ -67,8 +66,8 @@ class Planner:
         Returns:
             Points about `STEP` apart, shape `(n, 2)`, or None if there is no way.
         """
-        roadmap = self._roadmap.around(avoid) if avoid else self._roadmap
-        way = roadmap.way(_plain(start), _plain(goal), self.line_of_sight)
+        roadmap = self._roadmap.around(tuple(avoid)) if avoid else self._roadmap
+        way = roadmap.way(_plain(start), _plain(goal))
         return None if way is None else way.copy()
 
     def room_at(self, points: Floats) -> Floats:
@@ -77,20 +76,15 @@ class Planner:
 
     def distance(self, start: Point, goal: Point) -> float:
         """Length of that way [m]; infinite if there is none."""
-        return self._roadmap.length(_plain(start), _plain(goal), self.line_of_sight)
+        return self._roadmap.length(_plain(start), _plain(goal))
 
     def line_of_sight(self, a: Point, b: Point) -> bool:
         """Whether no wall stands between two places [m]."""
-        return self._sight.between(a, b)
+        return self._roadmap.sight.between(a, b)
 
 
 def _plain(point: Point) -> Point:
     return float(point[0]), float(point[1])
-
-
-@lru_cache(maxsize=8)
-def _roadmap(grid: OccupancyGrid, clearance: float) -> Roadmap:
-    return Roadmap(grid, clearance, grid.clearance)
 
 
 class Roadmap:
@@ -101,11 +95,15 @@ class Roadmap:
     Args:
         grid: How the cells lie.
         clearance: Radius that must fit [m].
-        room: How far from what is not free each cell is, as the shape of the grid [m].
+        sight: From where it can be walked straight to a node.
+        room: How far from what is not free each cell is, if not as the grid has it [m].
     """
 
-    def __init__(self, grid: OccupancyGrid, clearance: float, room: Floats) -> None:
-        self._grid, self._clearance = grid, clearance
+    def __init__(
+        self, grid: OccupancyGrid, clearance: float, sight: Sight, room: Floats | None = None
+    ) -> None:
+        self._grid, self._clearance, self.sight = grid, clearance, sight
+        room = grid.clearance if room is None else room
         block = max(1, round(CELL / grid.resolution))
         shape = -(-np.array(grid.cells.shape) // block)
         padding = [(0, int(n * block - k)) for n, k in zip(shape, grid.cells.shape, strict=True)]
@@ -123,16 +121,14 @@ class Roadmap:
         self._corner = np.array([grid.origin.x, grid.origin.y])
         self._turn = np.array([[cos, -sin], [sin, cos]]) / grid.resolution
         self._clearances = room.ravel()
-        self._fields: OrderedDict[Hashable, tuple[Floats, NDArray[np.int32]]] = OrderedDict()
-        self._ways: OrderedDict[Hashable, Floats | None] = OrderedDict()
-        self._lengths: OrderedDict[Hashable, float] = OrderedDict()
-        self._others: OrderedDict[Hashable, Roadmap] = OrderedDict()
+        # What is asked for again is kept; ways and lengths by start and goal [m].
+        self.around = lru_cache(KEPT_MAPS)(self._around)
+        self.way = lru_cache(KEPT_PATHS)(self._way)
+        self.length = lru_cache(KEPT_PATHS)(self._length)
+        self._field_of = lru_cache(KEPT_FIELDS)(self._field)
 
-    def around(self, discs: Sequence[Disc]) -> Roadmap:
-        """The same floor with some things standing on it; the last few are kept."""
-        return _kept(self._others, tuple(discs), KEPT_MAPS, lambda: self._with(discs))
-
-    def _with(self, discs: Sequence[Disc]) -> Roadmap:
+    def _around(self, discs: tuple[Disc, ...]) -> Roadmap:
+        """The same floor with some things standing on it."""
         room = self._grid.clearance.copy()
         rows, columns = room.shape
         for x, y, radius in discs:
@@ -144,7 +140,7 @@ class Roadmap:
             gaps = np.hypot(*np.moveaxis(self._grid.to_xy(*near) - (x, y), -1, 0)) - radius
             here = room[top:bottom, left:right]
             np.minimum(here, np.maximum(gaps, 0.0), out=here)
-        return Roadmap(self._grid, self._clearance, room)
+        return Roadmap(self._grid, self._clearance, self.sight, room)
 
     def _connect(self) -> object:
         """Eight neighbours, where their free discs overlap: then nothing is between them."""
@@ -164,26 +160,16 @@ class Roadmap:
         (a, b), cost = np.concatenate(pairs, axis=1), np.concatenate(costs)
         return csr_array((cost, (a, b)), shape=(free.size, free.size))
 
-    def way(self, start: Point, goal: Point, sees: Callable[[Point, Point], bool]) -> Floats | None:
-        """The finished way between two points [m], kept for the next time."""
-        return _kept(self._ways, (start, goal), KEPT_PATHS, lambda: self._solve(start, goal, sees))
+    def _length(self, start: Point, goal: Point) -> float:
+        """Of the way [m]; infinite if there is none."""
+        way = self.way(start, goal)
+        return math.inf if way is None else float(np.hypot(*np.diff(way, axis=0).T).sum())
 
-    def length(self, start: Point, goal: Point, sees: Callable[[Point, Point], bool]) -> float:
-        """Of that way [m]; infinite if there is none."""
-
-        def measure() -> float:
-            way = self.way(start, goal, sees)
-            return math.inf if way is None else float(np.hypot(*np.diff(way, axis=0).T).sum())
-
-        return _kept(self._lengths, (start, goal), KEPT_PATHS, measure)
-
-    def _solve(
-        self, start: Point, goal: Point, sees: Callable[[Point, Point], bool]
-    ) -> Floats | None:
-        first, last = self._node_at(start, sees), self._node_at(goal, sees)
+    def _way(self, start: Point, goal: Point) -> Floats | None:
+        first, last = self._node_at(start), self._node_at(goal)
         if first is None or last is None:
             return None
-        costs, towards = _kept(self._fields, last, KEPT_FIELDS, lambda: self._field(last))
+        costs, towards = self._field_of(last)
         if math.isinf(costs[first]):
             return None
         chain = [first]
@@ -197,20 +183,17 @@ class Roadmap:
         from scipy.sparse.csgraph import dijkstra
 
         costs, towards = dijkstra(
-            self._graph,
-            directed=False,
-            indices=goal,
-            return_predecessors=True,
+            self._graph, directed=False, indices=goal, return_predecessors=True
         )
         return costs, towards
 
-    def _node_at(self, point: Point, sees: Callable[[Point, Point], bool]) -> int | None:
+    def _node_at(self, point: Point) -> int | None:
         """The nearest node in sight of a point."""
         gaps = np.hypot(*(self._spots - point).T)
         near = np.flatnonzero(gaps <= SNAP)
         for index in near[np.argsort(gaps[near], kind="stable")]:
             x, y = self._spots[index].tolist()
-            if sees(point, (x, y)):
+            if self.sight.between(point, (x, y)):
                 return int(self._nodes[index])
         return None
 
@@ -267,14 +250,3 @@ def _resample(points: Floats) -> Floats:
     along = np.r_[0.0, np.cumsum(np.hypot(*np.diff(points, axis=0).T))]
     at = np.linspace(0.0, along[-1], 2 + int(along[-1] / STEP))
     return np.stack([np.interp(at, along, points[:, 0]), np.interp(at, along, points[:, 1])], 1)
-
-
-def _kept(memory: OrderedDict[Hashable, T], key: Hashable, size: int, make: Callable[[], T]) -> T:
-    """The value kept for `key`, or a new one; the one not used for longest makes place."""
-    if key in memory:
-        memory.move_to_end(key)
-        return memory[key]
-    value = memory[key] = make()
-    if len(memory) > size:
-        memory.popitem(last=False)
-    return value

@@ -91,6 +91,7 @@ class RobotBody(Body):
 
     Attributes:
         spec: Mass, size, limits.
+        motors: What they do; how sharply they can turn, and what a user's own got wrong.
         distance: Way covered so far [m].
         work: Done by the motors against inertia and what is in the way, without braking [J].
     """
@@ -109,7 +110,7 @@ class RobotBody(Body):
         shape.friction, shape.elasticity = FRICTION, ELASTICITY
         shape.collision_type = self.kind
         super().__init__(world, name, body, shape)
-        self.spec, self.radius, self._drive = spec, spec.radius, spec.drive(spec)
+        self.spec, self.radius, self.motors = spec, spec.radius, spec.drive(spec)
         self.distance, self.work, self._grip = 0.0, 0.0, GRIP
         self._powered = True
         self._asked = AskedFor(STOP)
@@ -137,21 +138,6 @@ class RobotBody(Body):
     def jams(self) -> int:
         """How often it became stuck."""
         return self._jam.count
-
-    @property
-    def turning_radius(self) -> float:
-        """Of the sharpest curve that it can drive [m]; 0: it turns on the spot."""
-        return self._drive.turning_radius
-
-    @property
-    def drive_failures(self) -> int:
-        """How often its motors' own program gave no answer that is one; it braked instead."""
-        return self._drive.failures
-
-    @property
-    def first_failure(self) -> str:
-        """What was wrong with that program first, in a line."""
-        return self._drive.first_failure
 
     @property
     def speed(self) -> float:
@@ -203,7 +189,7 @@ class RobotBody(Body):
         else:
             speed = min(max(speed, 0.0), spec.max_speed)
             turn_rate = min(max(turn_rate, -spec.max_turn_rate), spec.max_turn_rate)
-            speed, turn_rate = self._drive.set_point(speed, turn_rate)
+            speed, turn_rate = self.motors.set_point(speed, turn_rate)
             self._asked.put(start, TickTarget(speed, turn_rate, world.tick_at(until)))
         world.wake(self)
 
@@ -241,7 +227,7 @@ class RobotBody(Body):
                 self._lock.open()
             if self._touch.touching:
                 self._jam.strain(*self.pose(), dt)
-        along, turn = self._drive.accelerations(wanted, wanted_spin, forward, spin, dt)
+        along, turn = self.motors.accelerations(wanted, wanted_spin, forward, spin, dt)
         across, most = -sideways / dt, self._grip * G
         asked = math.hypot(along, across)
         if asked > most:
@@ -265,17 +251,10 @@ class RobotBody(Body):
             self._lock.close(self._grip)
         return self._lock.closed
 
-    def meets(self, other: Body | None, now: float) -> None:
-        """It begins to touch somebody, or a wall (None)."""
-        self._touch.begin(now)
-        if other is not None and other.kind == PERSON:
-            self._people.begin(now)
-
-    def parts(self, other: Body | None, now: float) -> None:
-        """It touches somebody, or a wall (None), no longer."""
-        self._touch.end(now)
-        if other is not None and other.kind == PERSON:
-            self._people.end(now)
+    def counts(self, other: Body | None) -> tuple[Contacts, ...]:
+        """All; those with people by themselves, too."""
+        person = other is not None and other.kind == PERSON
+        return (self._touch, self._people) if person else (self._touch,)
 
     def feels(self, other: Body | None, impulse: float) -> None:
         """A contact with somebody, or a wall (None), has stopped or pushed it [N s]."""

@@ -114,10 +114,7 @@ class Site(FloorPlan):
 
     def compartment_at(self, x: float, y: float) -> int | None:
         """Index of the compartment around a point [m], to within a cell; None for none."""
-        row, column = self.grid.to_cell(x, y)
-        labels = self.partition.labels
-        inside = 0 <= row < labels.shape[0] and 0 <= column < labels.shape[1]
-        label = int(labels[row, column]) if inside else NOWHERE
+        label = int(self.grid.look_up(self.partition.labels, x, y, NOWHERE))
         return None if label == NOWHERE else label
 
     @cached_property
@@ -156,12 +153,7 @@ class Site(FloorPlan):
         return self.grid.state_at(x, y) == FREE and self.grid.clearance_at(x, y) >= clearance
 
     def sample_free(
-        self,
-        rng: np.random.Generator,
-        clearance: float,
-        room: str | None = None,
-        near: tuple[float, float] | None = None,
-        within: float = 2.0,
+        self, rng: np.random.Generator, clearance: float, room: str | None = None
     ) -> tuple[float, float]:
         """A random free point that a robot can reach, or somebody slimmer if so asked.
 
@@ -170,21 +162,15 @@ class Site(FloorPlan):
             clearance: Radius that must fit at the point [m]; on the way there no more than a
                 robot's has to, or doors would part the site.
             room: Only inside this room.
-            near: Only around this point [m] ...
-            within: ... nearer than this [m].
 
         Raises:
             ConfigError: no such room, or no free point there.
         """
         cells = self.kept((clearance, room), lambda: self._free_cells(clearance, room))
         columns = self.grid.cells.shape[1]
-        if near is not None and len(cells):
-            middles = self.grid.to_xy(cells // columns + 0.5, cells % columns + 0.5)
-            cells = cells[np.hypot(*(middles - near).T) < within]
         if not len(cells):
             where = f"room {room!r} of site {self.name!r}" if room else f"site {self.name!r}"
-            near_text = f" within {within:g} m of {near}" if near else ""
-            raise ConfigError(f"{where} has no free place of {clearance:g} m radius{near_text}")
+            raise ConfigError(f"{where} has no free place of {clearance:g} m radius")
         cell = int(cells[rng.integers(len(cells))])
         jitter = rng.random(2)
         x, y = self.grid.to_xy(cell // columns + jitter[0], cell % columns + jitter[1]).tolist()

@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import shapely
+from shapely import Point
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.worlds.geo import Pose
@@ -48,8 +50,6 @@ def write_site(site: Site, folder: Path) -> Path:
 
 def features_of(site: Site) -> Iterator[Feature]:
     """All that is drawn on a site, in metres."""
-    import shapely
-
     yield from (_ground(room, site.ceiling) for room in site.rooms)
     yield from () if site.rooms else _floor(site)
     for wall in site.wall_lines if site.rooms else ():
@@ -72,8 +72,6 @@ def features_of(site: Site) -> Iterator[Feature]:
 
 
 def _ground(room: Room, ceiling: float) -> Feature:
-    import shapely
-
     kind = "room" if not room.outdoor else "path" if room.paved else "yard"
     height = {} if room.outdoor or room.ceiling == ceiling else {"ceiling_m": room.ceiling}
     return Feature(kind, shapely.Polygon(room.polygon), {"name": room.name, **height})
@@ -81,8 +79,6 @@ def _ground(room: Room, ceiling: float) -> Feature:
 
 def _floor(site: Site) -> Iterator[Feature]:
     """The floor of a bare map as one room, with what stands in it as solids."""
-    import shapely
-
     walls = [shapely.LineString(wall.reshape(2, 2)) for wall in site.walls]
     pieces = shapely.get_parts(shapely.union_all(walls))  # cut where they cross
     faces: list[Any] = list(shapely.get_parts(shapely.polygonize(list(pieces))))
@@ -95,15 +91,8 @@ def _floor(site: Site) -> Iterator[Feature]:
 
 
 def _points(site: Site) -> Iterator[Feature]:
-    from shapely import Point
-
-    kinds = (
-        ("robot_base", site.robot_bases),
-        ("guard_post", site.guard_posts),
-        ("operator_desk", site.operator_desks),
-    )
-    for kind, poses in kinds:
-        for pose in poses:
+    for kind in ("robot_base", "guard_post", "operator_desk"):
+        for pose in getattr(site, f"{kind}s"):
             yield Feature(kind, Point(pose.x, pose.y), _heading(pose))
     for camera in site.cameras:
         properties = {

@@ -1,21 +1,29 @@
 """A site seen from above: the ground on which tracks, robots and hazards are drawn, or by itself.
 
-Names of rooms are written where they fit: smaller, in more lines, or turned; else left out. As a
-picture of its own (a poster) it has a key.
+As a picture of its own (a poster) it has a key.
 """
 
 from __future__ import annotations
 
-import itertools
 import math
 import re
 from collections import Counter
-from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any
 
 import numpy as np
+import shapely
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, PathPatch, Polygon
+from matplotlib.path import Path as Outline
+from matplotlib.transforms import Affine2D
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.worlds.site import FOOTPRINT, Site
@@ -23,194 +31,15 @@ from dva_sim.worlds.site_parts import Exit, Room
 from dva_sim.worlds.view_marks import (
     CAMERA,
     DETECTORS,
+    INK,
     STATION,
     draw_equipment,
     draw_north,
     draw_scale_bar,
     draw_views,
     mast,
-    points_per_metre,
+    write_names,
 )
-
-if TYPE_CHECKING:
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-
-INK, FAINT_INK = "#59606a", "#7c8b6d"
-SIZES = (7.5, 6.5, 5.5, 4.8, 4.2, 3.6)  # [pt]
-LINE = 1.15  # height of a line, in font sizes
-SLACK = 0.3  # of a line, as fonts are drawn in whole dots [font sizes]
-GAP = 0.2  # between a name and the walls [m]
-PLACES = 9  # tried along each side of a room
-MOST_LINES = 3
-# How much less legible a name is that is turned, covers something, is only a number.
-TURNED, COVERING, ABRIDGED = 0.8, 0.6, 0.35
-
-
-class NameLayout(NamedTuple):
-    """One way to write a name: with line breaks, of a size [pt], perhaps turned; how legible."""
-
-    text: str
-    size: float
-    turned: bool
-    worth: float
-
-
-def write_names(ax: Axes, site: Site, least: float = 0.0) -> None:
-    """Write the name of each room where it covers nothing, if it can.
-
-    Args:
-        ax: Its limits are those of the finished picture.
-        site: Gives the rooms and what stands in them.
-        least: A name that would have to be smaller is left out [pt].
-    """
-    import shapely
-
-    metre = points_per_metre(ax)
-    things = shapely.STRtree(_things(site))
-    for number, room in enumerate(site.rooms):
-        area: Any = shapely.Polygon(room.polygon)
-        if room.outdoor:  # what is drawn over it takes its name's place
-            area = area - shapely.union_all(
-                [shapely.Polygon(r.polygon) for r in site.rooms[:number]]
-            )
-        found = _best(area.buffer(-GAP, join_style="mitre"), room.name, things, metre, least)
-        if found is not None:
-            setting, x, y = found
-            _write(ax, room, setting, x, y)
-
-
-def _things(site: Site) -> list[Any]:
-    """What names should not cover."""
-    import shapely
-
-    marks = [(d.x, d.y, 0.3) for d in site.detectors]
-    marks += [(s.x, s.y, 0.5) for s in site.base_stations]
-    marks += [(c.x, c.y, 0.3) for c in site.cameras]
-    marks += [(p.x, p.y, 0.5) for p in (*site.robot_bases, *site.guard_posts)]
-    marks += [(p.x, p.y, 0.9) for p in site.operator_desks]
-    marks += [(way.x, way.y, 1.0) for way in site.exits]
-    leaves = [((a + c) / 2, (b + d) / 2, 0.9) for a, b, c, d in site.doors.tolist()]
-    discs = [shapely.Point(x, y).buffer(radius) for x, y, radius in marks + leaves]
-    return [*discs, *(shapely.Polygon(corners) for corners in site.solids)]
-
-
-def _best(
-    area: Any, name: str, things: Any, metre: float, least: float
-) -> tuple[NameLayout, float, float] | None:
-    """The most legible setting that fits, and where."""
-    import shapely
-
-    if area.is_empty:
-        return None
-    shapely.prepare(area)
-    best, found = 0.0, None
-    for setting in _settings(name):
-        if setting.worth <= best:
-            break  # they come from the most to the least legible
-        if setting.size < least:
-            continue
-        width, height = (side / metre for side in _box(setting))
-        spots = _spots(area, width, height)
-        if not len(spots):
-            continue
-        hit = things.query(_boxes(spots, width, height), predicate="intersects")[0]
-        covered = np.bincount(hit, minlength=len(spots))
-        worth = setting.worth * (COVERING if covered.min() else 1.0)
-        if worth > best:
-            best, found = worth, (setting, *spots[np.argmin(covered)].tolist())
-    return found
-
-
-@lru_cache(maxsize=4096)
-def _settings(name: str) -> tuple[NameLayout, ...]:
-    """All ways to write a name, the most legible first; at last only its number."""
-    texts = [(text, 1.0) for text in _wraps(name)]
-    number = re.search(r"\w?\d+$|\b[A-Z]$", name)
-    texts += [(number[0], ABRIDGED)] if number else []
-    ways = itertools.product(texts, SIZES, ((False, 1.0), (True, TURNED)))
-    settings = [
-        NameLayout(text, size, turned, worth * size * less)
-        for (text, worth), size, (turned, less) in ways
-    ]
-    return tuple(sorted(settings, key=lambda setting: -setting.worth))
-
-
-@lru_cache(maxsize=4096)
-def _wraps(name: str) -> tuple[str, ...]:
-    """The name in one line, and in the most even two and three lines."""
-    words = name.split()
-    texts = [name]
-    for lines in range(2, min(MOST_LINES, len(words)) + 1):
-        cuts = itertools.combinations(range(1, len(words)), lines - 1)
-        wraps = [
-            "\n".join(" ".join(words[a:b]) for a, b in itertools.pairwise((0, *cut, len(words))))
-            for cut in cuts
-        ]
-        texts.append(min(wraps, key=lambda text: max(map(len, text.split("\n")))))
-    return tuple(texts)
-
-
-def _box(setting: NameLayout) -> tuple[float, float]:
-    """Width and height of a setting [pt]."""
-    lines = setting.text.split("\n")
-    long = max(map(_width, lines)) * setting.size
-    high = LINE * len(lines) * setting.size
-    return (high, long) if setting.turned else (long, high)
-
-
-@lru_cache(maxsize=4096)
-def _width(line: str) -> float:
-    """Of a line, in font sizes."""
-    from matplotlib.font_manager import FontProperties
-    from matplotlib.textpath import text_to_path
-
-    font = FontProperties(size=10)
-    width, _, _ = text_to_path.get_text_width_height_descent(line, font, ismath=False)
-    return float(width) / 10 + SLACK
-
-
-def _boxes(middles: NDArray[np.float64], width: float, height: float) -> Any:
-    import shapely
-
-    (x, y), across, up = middles.T, width / 2, height / 2
-    return shapely.box(x - across, y - up, x + across, y + up)
-
-
-def _spots(area: Any, width: float, height: float) -> NDArray[np.float64]:
-    """Where the middle of a box may lie, those near the middle of the area first."""
-    import shapely
-
-    xmin, ymin, xmax, ymax = area.bounds
-    if width > xmax - xmin or height > ymax - ymin:
-        return np.empty((0, 2))
-    xs = np.linspace(xmin + width / 2, xmax - width / 2, PLACES)
-    ys = np.linspace(ymin + height / 2, ymax - height / 2, PLACES)
-    spots = np.stack(np.meshgrid(xs, ys), axis=-1).reshape(-1, 2)
-    spots = spots[shapely.contains(area, _boxes(spots, width, height))]
-    away = np.hypot(
-        *((spots - ((xmin + xmax) / 2, (ymin + ymax) / 2)) / (xmax - xmin, ymax - ymin)).T
-    )
-    return np.asarray(spots[np.argsort(away, kind="stable")])
-
-
-def _write(ax: Axes, room: Room, setting: NameLayout, x: float, y: float) -> None:
-    ax.text(
-        x,
-        y,
-        setting.text,
-        ha="center",
-        va="center",
-        rotation=90 if setting.turned else 0,
-        fontsize=setting.size,
-        linespacing=LINE,
-        color=FAINT_INK if room.outdoor and not room.paved else INK,
-        zorder=4,
-        clip_on=True,
-    )
-
 
 Floats = NDArray[np.float64]
 
@@ -299,8 +128,6 @@ def set_limits(ax: Axes, site: Site) -> None:
 # --- ground ----------------------------------------------------------------------------
 def _draw_rooms(ax: Axes, site: Site) -> None:
     """Yards below paths below rooms; rooms of one purpose have one colour."""
-    from matplotlib.collections import PolyCollection
-
     tints: dict[str, str] = {}
     rooms = sorted(site.rooms, key=lambda room: (not room.outdoor, room.paved))
     colours = [_floor(room, tints) for room in rooms]
@@ -322,10 +149,6 @@ def _floor(room: Room, tints: dict[str, str]) -> str:
 
 def _draw_grid(ax: Axes, site: Site) -> None:
     """The floor of a bare map, and what stands on it."""
-    from matplotlib.colors import ListedColormap
-    from matplotlib.transforms import Affine2D
-    from scipy import ndimage
-
     grid = site.grid
     floor = grid.floor(FOOTPRINT)
     shades = np.ma.masked_where(~ndimage.binary_fill_holes(floor), floor)
@@ -348,8 +171,6 @@ def _draw_grid(ax: Axes, site: Site) -> None:
 # --- walls and ways through them -------------------------------------------------------
 def _draw_walls(ax: Axes, site: Site) -> None:
     """Walls as one shape in metres, so that they keep their width when somebody zooms."""
-    import shapely
-
     width = WALL_WIDTH if site.rooms else WALL_WIDTH / 2
     lines = shapely.multilinestrings(site.wall_lines.reshape(-1, 2, 2))
     area = shapely.buffer(lines, width / 2, cap_style="square", join_style="mitre")
@@ -358,8 +179,6 @@ def _draw_walls(ax: Axes, site: Site) -> None:
 
 def _draw_doors(ax: Axes, site: Site) -> None:
     """Leaves that stand open, and the arcs they swing through."""
-    from matplotlib.collections import LineCollection
-
     leaves, arcs = [], []
     busy = Counter(name for o in site.openings for name in (o.room_a, o.room_b) if name)
     for ends in site.doors:
@@ -398,8 +217,6 @@ def _draw_exit(ax: Axes, way: Exit) -> None:
 
 # --- zones -----------------------------------------------------------------------------
 def _hatch(ax: Axes, polygon: Floats, colour: str, hatch: str | None, **style: Any) -> None:
-    from matplotlib.patches import Polygon
-
     patch = Polygon(polygon, fill=False, hatch=hatch, edgecolor=colour, **style)
     patch.set_hatch_linewidth(0.45)
     ax.add_patch(patch)
@@ -414,8 +231,6 @@ def _draw_zones(ax: Axes, site: Site) -> None:
 
 def _draw_coverage(ax: Axes, site: Site) -> None:
     """Each coverage where no later one is drawn over it."""
-    import shapely
-
     above: Any = shapely.Polygon()
     for area in reversed(site.wifi):
         polygon = shapely.Polygon(area.polygon)
@@ -427,14 +242,10 @@ def _draw_coverage(ax: Axes, site: Site) -> None:
 
 def _fill(ax: Axes, area: Any, **style: Any) -> None:
     """A shapely area, holes and all."""
-    import shapely
-    from matplotlib.patches import PathPatch
-    from matplotlib.path import Path
-
     rings = shapely.get_rings(shapely.get_parts(area))
     if len(rings):
-        paths = (Path(shapely.get_coordinates(ring), closed=True) for ring in rings)
-        ax.add_patch(PathPatch(Path.make_compound_path(*paths), **style))
+        paths = (Outline(shapely.get_coordinates(ring), closed=True) for ring in rings)
+        ax.add_patch(PathPatch(Outline.make_compound_path(*paths), **style))
 
 
 LONG_SIDE, MOST_INCHES = 8.4, 18.0  # of the picture [in]; a page shows 840 pixels of it
@@ -464,8 +275,6 @@ def write_poster(site: Site, file: Path, coverage: bool, width: int) -> None:
 
 def poster(site: Site, coverage: bool) -> Figure:
     """The picture itself."""
-    from matplotlib.figure import Figure
-
     (left, right), (low, high) = limits(site)
     across, up = right - left, high - low
     long = min(MOST_INCHES, max(LONG_SIDE, INCHES_PER_METRE * max(across, up)))
@@ -510,8 +319,6 @@ def _handles(site: Site, coverage: bool) -> list[Artist]:
 
 
 def _areas(site: Site, coverage: bool) -> list[Artist]:
-    from matplotlib.patches import Patch
-
     outdoor = {room.paved for room in site.rooms if room.outdoor}
     found: list[Artist] = [Patch(fc=PAVING, label="path")] if True in outdoor else []
     found += [Patch(fc=GRASS, label="yard")] if False in outdoor else []
@@ -527,7 +334,5 @@ def _areas(site: Site, coverage: bool) -> list[Artist]:
 
 
 def _mark(marker: Any, label: str, colour: str, **style: Any) -> Artist:
-    from matplotlib.lines import Line2D
-
     look = {"mfc": colour, "mec": colour, "mew": 0.8, "ms": 5, **style}
     return Line2D([], [], ls="none", marker=marker, label=label, **look)

@@ -1,24 +1,33 @@
-"""What stands on a site, as marks: detectors, bases, posts, desks, cameras, antennas."""
+"""What stands on a site, as marks: detectors, bases, posts, desks, cameras, antennas; and names.
+
+Names of rooms are written where they fit: smaller, in more lines, or turned; else left out.
+"""
 
 from __future__ import annotations
 
 import itertools
 import math
-from typing import TYPE_CHECKING, Any
+import re
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
+import shapely
+from matplotlib.axes import Axes
+from matplotlib.font_manager import FontProperties
+from matplotlib.patches import Circle, Polygon, Rectangle
+from matplotlib.path import Path
+from matplotlib.textpath import text_to_path
+from matplotlib.transforms import Affine2D
 from numpy.typing import NDArray
 
+from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.site import Site
-from dva_sim.worlds.site_parts import FixedCamera
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.path import Path
+from dva_sim.worlds.site_parts import BaseStation, FixedCamera, Room
 
 Floats = NDArray[np.float64]
 
-INK, DESK = "#59606a", "#c6cad0"
+INK, FAINT_INK, DESK = "#59606a", "#7c8b6d", "#c6cad0"
 DETECTORS = {
     "smoke": ("o", "#9aa1ab"),
     "heat": ("D", "#d55e00"),
@@ -61,29 +70,18 @@ def draw_equipment(ax: Axes, site: Site, small_marks: bool = True) -> None:
 def _draw_small_marks(ax: Axes, site: Site) -> None:
     _draw_detectors(ax, site)
     for post in site.guard_posts:
-        ax.plot(
-            post.x,
-            post.y,
-            marker="P",
-            ms=4.5 * scale_of(ax),
-            mfc=INK,
-            mec="white",
-            mew=0.5,
-            zorder=3.5,
-        )
+        _mark(ax, post, "P", 4.5, mfc=INK, mec="white", mew=0.5, zorder=3.5)
     for camera in site.cameras:
-        _draw_camera(ax, camera)
+        look = (3, 0, math.degrees(camera.heading) - 90)
+        _mark(ax, camera, look, 4.5, color=CAMERA, mew=0, zorder=3.6)
     for station in site.base_stations:
-        ax.plot(
-            station.x,
-            station.y,
-            marker=mast(),
-            ms=7 * scale_of(ax),
-            mfc="none",
-            mec=STATION,
-            mew=0.7,
-            zorder=3.6,
-        )
+        _mark(ax, station, mast(), 7, mfc="none", mec=STATION, mew=0.7, zorder=3.6)
+
+
+def _mark(
+    ax: Axes, at: Pose | FixedCamera | BaseStation, marker: Any, size: float, **style: Any
+) -> None:
+    ax.plot(at.x, at.y, marker=marker, ms=size * scale_of(ax), **style)
 
 
 def _draw_detectors(ax: Axes, site: Site) -> None:
@@ -96,8 +94,6 @@ def _draw_detectors(ax: Axes, site: Site) -> None:
 
 
 def _draw_bases(ax: Axes, site: Site) -> None:
-    from matplotlib.patches import Circle
-
     for base in site.robot_bases:
         ring = Circle((base.x, base.y), 0.42, fill=False, ec=INK, lw=0.9, ls=(0, (2, 1.2)))
         ax.add_patch(ring).set_zorder(3.5)
@@ -106,9 +102,6 @@ def _draw_bases(ax: Axes, site: Site) -> None:
 
 
 def _draw_desks(ax: Axes, site: Site) -> None:
-    from matplotlib.patches import Rectangle
-    from matplotlib.transforms import Affine2D
-
     for desk in site.operator_desks if site.rooms else ():
         turn = Affine2D().rotate(desk.heading).translate(desk.x, desk.y) + ax.transData
         table = Rectangle((0.25, -0.7), 0.7, 1.4, fc=DESK, ec=INK, lw=0.5, zorder=3.5)
@@ -117,16 +110,8 @@ def _draw_desks(ax: Axes, site: Site) -> None:
         ax.plot(desk.x, desk.y, "o", ms=2.6 * scale_of(ax), color=INK, zorder=3.5)
 
 
-def _draw_camera(ax: Axes, camera: FixedCamera) -> None:
-    look = (3, 0, math.degrees(camera.heading) - 90)
-    size = 4.5 * scale_of(ax)
-    ax.plot(camera.x, camera.y, marker=look, ms=size, color=CAMERA, mew=0, zorder=3.6)
-
-
 def draw_views(ax: Axes, site: Site) -> None:
     """The floor that each fixed camera sees."""
-    from matplotlib.patches import Polygon
-
     for camera in site.cameras:
         seen = Polygon(view_of(site, camera), facecolor=CAMERA, alpha=0.08, lw=0, zorder=1.8)
         ax.add_patch(seen)
@@ -149,14 +134,169 @@ def view_of(site: Site, camera: FixedCamera) -> Floats:
 
 def mast() -> Path:
     """An antenna with a wave on both sides, as a marker."""
-    from matplotlib.path import Path
-
     pole = Path([(0, -1), (0, 0.3)])
     waves = []
     for radius, start in itertools.product((0.45, 0.85), (-45, 135)):
         arc = Path.arc(start, start + 90)
         waves.append(Path(np.asarray(arc.vertices) * radius + (0.0, 0.3), arc.codes))
     return Path.make_compound_path(pole, *waves)
+
+
+# --- names of rooms ----------------------------------------------------------------------
+SIZES = (7.5, 6.5, 5.5, 4.8, 4.2, 3.6)  # [pt]
+LINE = 1.15  # height of a line, in font sizes
+SLACK = 0.3  # of a line, as fonts are drawn in whole dots [font sizes]
+GAP = 0.2  # between a name and the walls [m]
+PLACES = 9  # tried along each side of a room
+MOST_LINES = 3
+# How much less legible a name is that is turned, covers something, is only a number.
+TURNED, COVERING, ABRIDGED = 0.8, 0.6, 0.35
+
+
+class NameLayout(NamedTuple):
+    """One way to write a name: with line breaks, of a size [pt], perhaps turned; how legible."""
+
+    text: str
+    size: float
+    turned: bool
+    worth: float
+
+
+def write_names(ax: Axes, site: Site, least: float = 0.0) -> None:
+    """Write the name of each room where it covers nothing, if it can.
+
+    Args:
+        ax: Its limits are those of the finished picture.
+        site: Gives the rooms and what stands in them.
+        least: A name that would have to be smaller is left out [pt].
+    """
+    metre = points_per_metre(ax)
+    things = shapely.STRtree(_things(site))
+    for room in site.rooms:
+        area = site.ground_of(room).buffer(-GAP, join_style="mitre")
+        found = _best(area, room.name, things, metre, least)
+        if found is not None:
+            setting, x, y = found
+            _write(ax, room, setting, x, y)
+
+
+def _things(site: Site) -> list[Any]:
+    """What names should not cover."""
+    marks = [(d.x, d.y, 0.3) for d in site.detectors]
+    marks += [(s.x, s.y, 0.5) for s in site.base_stations]
+    marks += [(c.x, c.y, 0.3) for c in site.cameras]
+    marks += [(p.x, p.y, 0.5) for p in (*site.robot_bases, *site.guard_posts)]
+    marks += [(p.x, p.y, 0.9) for p in site.operator_desks]
+    marks += [(way.x, way.y, 1.0) for way in site.exits]
+    leaves = [((a + c) / 2, (b + d) / 2, 0.9) for a, b, c, d in site.doors.tolist()]
+    discs = [shapely.Point(x, y).buffer(radius) for x, y, radius in marks + leaves]
+    return [*discs, *(shapely.Polygon(corners) for corners in site.solids)]
+
+
+def _best(
+    area: Any, name: str, things: Any, metre: float, least: float
+) -> tuple[NameLayout, float, float] | None:
+    """The most legible setting that fits, and where."""
+    if area.is_empty:
+        return None
+    shapely.prepare(area)
+    best, found = 0.0, None
+    for setting in _settings(name):
+        if setting.worth <= best:
+            break  # they come from the most to the least legible
+        if setting.size < least:
+            continue
+        width, height = (side / metre for side in _box(setting))
+        spots = _spots(area, width, height)
+        if not len(spots):
+            continue
+        hit = things.query(_boxes(spots, width, height), predicate="intersects")[0]
+        covered = np.bincount(hit, minlength=len(spots))
+        worth = setting.worth * (COVERING if covered.min() else 1.0)
+        if worth > best:
+            best, found = worth, (setting, *spots[np.argmin(covered)].tolist())
+    return found
+
+
+@lru_cache(maxsize=4096)
+def _settings(name: str) -> tuple[NameLayout, ...]:
+    """All ways to write a name, the most legible first; at last only its number."""
+    texts = [(text, 1.0) for text in _wraps(name)]
+    number = re.search(r"\w?\d+$|\b[A-Z]$", name)
+    texts += [(number[0], ABRIDGED)] if number else []
+    ways = itertools.product(texts, SIZES, ((False, 1.0), (True, TURNED)))
+    settings = [
+        NameLayout(text, size, turned, worth * size * less)
+        for (text, worth), size, (turned, less) in ways
+    ]
+    return tuple(sorted(settings, key=lambda setting: -setting.worth))
+
+
+@lru_cache(maxsize=4096)
+def _wraps(name: str) -> tuple[str, ...]:
+    """The name in one line, and in the most even two and three lines."""
+    words = name.split()
+    texts = [name]
+    for lines in range(2, min(MOST_LINES, len(words)) + 1):
+        cuts = itertools.combinations(range(1, len(words)), lines - 1)
+        wraps = [
+            "\n".join(" ".join(words[a:b]) for a, b in itertools.pairwise((0, *cut, len(words))))
+            for cut in cuts
+        ]
+        texts.append(min(wraps, key=lambda text: max(map(len, text.split("\n")))))
+    return tuple(texts)
+
+
+def _box(setting: NameLayout) -> tuple[float, float]:
+    """Width and height of a setting [pt]."""
+    lines = setting.text.split("\n")
+    long = max(map(_width, lines)) * setting.size
+    high = LINE * len(lines) * setting.size
+    return (high, long) if setting.turned else (long, high)
+
+
+@lru_cache(maxsize=4096)
+def _width(line: str) -> float:
+    """Of a line, in font sizes."""
+    font = FontProperties(size=10)
+    width, _, _ = text_to_path.get_text_width_height_descent(line, font, ismath=False)
+    return float(width) / 10 + SLACK
+
+
+def _boxes(middles: NDArray[np.float64], width: float, height: float) -> Any:
+    (x, y), across, up = middles.T, width / 2, height / 2
+    return shapely.box(x - across, y - up, x + across, y + up)
+
+
+def _spots(area: Any, width: float, height: float) -> NDArray[np.float64]:
+    """Where the middle of a box may lie, those near the middle of the area first."""
+    xmin, ymin, xmax, ymax = area.bounds
+    if width > xmax - xmin or height > ymax - ymin:
+        return np.empty((0, 2))
+    xs = np.linspace(xmin + width / 2, xmax - width / 2, PLACES)
+    ys = np.linspace(ymin + height / 2, ymax - height / 2, PLACES)
+    spots = np.stack(np.meshgrid(xs, ys), axis=-1).reshape(-1, 2)
+    spots = spots[shapely.contains(area, _boxes(spots, width, height))]
+    away = np.hypot(
+        *((spots - ((xmin + xmax) / 2, (ymin + ymax) / 2)) / (xmax - xmin, ymax - ymin)).T
+    )
+    return np.asarray(spots[np.argsort(away, kind="stable")])
+
+
+def _write(ax: Axes, room: Room, setting: NameLayout, x: float, y: float) -> None:
+    ax.text(
+        x,
+        y,
+        setting.text,
+        ha="center",
+        va="center",
+        rotation=90 if setting.turned else 0,
+        fontsize=setting.size,
+        linespacing=LINE,
+        color=FAINT_INK if room.outdoor and not room.paved else INK,
+        zorder=4,
+        clip_on=True,
+    )
 
 
 # --- scale and direction ---------------------------------------------------------------

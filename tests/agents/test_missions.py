@@ -102,7 +102,7 @@ CAR = RobotProfile(
 def test_a_car_that_cannot_turn_on_the_spot_turns_in_the_corridor(heading: float) -> None:
     fleet = Fleet()
     robot = fleet.robot(1, (*WEST, heading), to((13.1, 12.0), (13.1, 20.0)), CAR)
-    assert robot.body.turning_radius > 0.3
+    assert robot.body.motors.turning_radius > 0.3
     fleet.run(60.0)
     assert robot.end == ("done", "")
     assert untouched(robot)

@@ -153,9 +153,9 @@ def test_the_room_around_a_point_is_its_distance_from_the_nearest_wall():
 
 def test_the_same_things_in_the_way_cost_one_map_however_many_ask():
     planner = Planner(make_site([]), 0.3)
-    one, again = (planner._roadmap.around([Disc(5.0, 5.0, radius)]) for radius in (0.7, 0.7))
+    one, again = (planner._roadmap.around((Disc(5.0, 5.0, radius),)) for radius in (0.7, 0.7))
     assert one is again
-    assert planner._roadmap.around([Disc(5.0, 5.0, 0.8)]) is not one
+    assert planner._roadmap.around((Disc(5.0, 5.0, 0.8),)) is not one
 
 
 @pytest.mark.parametrize("off", [0.0, 3.6e-15, -3.6e-15, 1e-9, -1e-9])

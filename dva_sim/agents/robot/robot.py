@@ -130,7 +130,7 @@ class MissionLoop:
             around.guard,
             name=body.name,
             reach=around.reach,
-            turning_radius=body.turning_radius,
+            turning_radius=body.motors.turning_radius,
         )
         self._number += 1
         number = self._number

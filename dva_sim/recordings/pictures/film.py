@@ -14,10 +14,13 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, Any
 
 import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
 from numpy.typing import NDArray
+from PIL import Image, ImageColor
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.recordings.pictures import style
@@ -25,11 +28,6 @@ from dva_sim.recordings.pictures.moments import ROBOT, Moments, pattern_name, ve
 from dva_sim.recordings.pictures.scene import Scene
 from dva_sim.recordings.pictures.style import Sheet, heading_of
 from dva_sim.simulation.full import Playback
-
-if TYPE_CHECKING:
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-
 
 WINDOW_S = 10.0
 
@@ -223,8 +221,6 @@ def _whole(path: Path) -> Iterator[Path]:
 
 
 def _write_gif(film: Film, path: Path) -> None:
-    from PIL import Image, ImageColor
-
     # One palette, from pictures spread over the run, keeps the file small.
     times = [film.duration * (n + 1) / SAMPLES for n in range(SAMPLES)]
     samples = [Image.fromarray(film.at(time)) for time in times]

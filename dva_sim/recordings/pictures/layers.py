@@ -8,19 +8,22 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from contourpy import contour_generator
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.colors import to_rgb, to_rgba
+from matplotlib.markers import MarkerStyle
+from matplotlib.patches import Circle, Wedge
+from matplotlib.path import Path
 from numpy.typing import NDArray
 
 from dva_sim.recordings.pictures import style
 from dva_sim.recordings.pictures.moments import BYSTANDER, FRESH, ROBOT, Moments, kind_of
 from dva_sim.worlds.hazards import Hazard, Raster
-
-if TYPE_CHECKING:
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-
 
 LARGER = 1.25  # bodies are drawn a little larger than they are
 STEP = 0.5  # between the points of a trail [s]
@@ -37,8 +40,6 @@ class DrawnBody:
     """
 
     def __init__(self, ax: Axes, moments: Moments, name: str) -> None:
-        from matplotlib.collections import LineCollection
-
         self.name, self.kind = name, kind_of(name)
         self._ax, self._moments = ax, moments
         person = self.kind == BYSTANDER
@@ -85,8 +86,6 @@ class DrawnBody:
 
     def _draw_trail(self, time: float) -> None:
         """Where it was, the paler the longer ago, in the colours of what it did then."""
-        from matplotlib.colors import to_rgba
-
         past = self._moments.past(self.name, time)
         step = max(1, round(STEP / max(1e-3, (past[-1].time - past[0].time) / len(past))))
         past = [*past[:-1:step], past[-1]]
@@ -105,8 +104,6 @@ class _Ghost:
     """Where the operator takes a robot to be, while there is a picture."""
 
     def __init__(self, ax: Axes, moments: Moments, name: str) -> None:
-        from matplotlib.patches import Circle, Wedge
-
         recording = moments.recording
         self._views = recording.recorder.views.get(recording.robot_named(name) or "", [])
         self._times = [p.time for p in self._views]
@@ -134,9 +131,6 @@ class _Ghost:
 
 def _pointed(outline: tuple[tuple[float, float], ...]) -> Any:
     """A marker from the outline of a body that heads east."""
-    from matplotlib.markers import MarkerStyle
-    from matplotlib.path import Path
-
     return MarkerStyle(Path([*outline, outline[0]], closed=True))
 
 
@@ -212,8 +206,6 @@ class _Contours:
     """Lines of equal values."""
 
     def __init__(self, ax: Axes, levels: tuple[float, ...], colour: str) -> None:
-        from matplotlib.collections import LineCollection
-
         self._levels = levels
         widths = np.linspace(0.6, 1.4, len(levels))
         self._lines = [
@@ -225,8 +217,6 @@ class _Contours:
 
     def show(self, raster: Raster) -> list[Artist]:
         """Those of a field."""
-        from contourpy import contour_generator
-
         west, east, south, north = raster.extent
         rows, columns = raster.values.shape
         x = west + (np.arange(columns) + 0.5) * (east - west) / columns
@@ -274,8 +264,6 @@ def _over(upper: NDArray[Any], under: NDArray[Any]) -> NDArray[Any]:
 
 def _tinted(colour: str, cover: NDArray[Any]) -> NDArray[Any]:
     """One colour that covers the floor more or less, `(rows, columns, 4)`."""
-    from matplotlib.colors import to_rgb
-
     picture = np.empty((*cover.shape, 4))
     picture[..., :3] = to_rgb(colour)
     picture[..., 3] = cover

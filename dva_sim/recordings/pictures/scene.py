@@ -6,19 +6,21 @@ One run on one map: the site, its hazards, everybody on it, what is told, and ho
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.patheffects import withStroke
+from matplotlib.spines import Spine
 
 from dva_sim.kernel.recorder import Moment
 from dva_sim.recordings.pictures import style
 from dva_sim.recordings.pictures.layers import LAYER, DrawnBody, DrawnFields
 from dva_sim.recordings.pictures.moments import BYSTANDER, GUARD, ROBOT, Moments, RunVerdict
-
-if TYPE_CHECKING:
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-
+from dva_sim.worlds.view import draw_site
+from dva_sim.worlds.view_marks import points_per_metre
 
 # Where a name may stand about a body: above, below, right, left, and the corners.
 SIDES = ((0, 1), (0, -1), (1, 0), (-1, 0), (1, 1), (-1, 1), (1, -1), (-1, -1))
@@ -56,8 +58,6 @@ class Names:
     """
 
     def __init__(self, ax: Axes, bodies: Sequence[DrawnBody]) -> None:
-        from matplotlib.patheffects import withStroke
-
         self._ax, self._bodies = ax, bodies
         self._fixed = [text for text in ax.texts if text.get_text()]
         halo = [withStroke(linewidth=2.2, foreground=style.HALO)]
@@ -167,9 +167,6 @@ class Scene:
 
     def _draw_ground(self) -> tuple[Any, Any]:
         """The site; the limits of what is seen."""
-        from dva_sim.worlds.view import draw_site
-        from dva_sim.worlds.view_marks import points_per_metre
-
         ax, site = self._ax, self._moments.recording.site
         draw_site(ax, site, small_marks=points_per_metre(ax) > style.ROOMY, least=style.LEAST)
         # What hazards must not cover is drawn after them.
@@ -249,9 +246,6 @@ class _Sheet:
 
 def _stands_out(artist: Artist) -> bool:
     """Whether a part of the site lies above hazards: walls, doors, names."""
-    from matplotlib.axis import Axis
-    from matplotlib.spines import Spine
-
     return artist.get_zorder() > LAYER and not isinstance(artist, Axis | Spine)
 
 

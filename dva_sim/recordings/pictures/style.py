@@ -7,16 +7,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
 from dva_sim.recordings.pictures.moments import BYSTANDER, GUARD, ROBOT, Moments, pattern_name
 from dva_sim.simulation.full import Playback
-
-if TYPE_CHECKING:
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
+from dva_sim.worlds.view import limits, set_limits
 
 INK, HALO, GHOST = "#2b3038", "white", "#e07a00"
 WIDTH = 8.4  # of a picture [in]: a page shows 840 pixels of it
@@ -83,8 +85,6 @@ def colour_of(kind: str, mode: str) -> str:
 
 def legend(moments: Iterable[Moments]) -> list[Artist]:
     """A key for what occurs in some runs."""
-    from matplotlib.lines import Line2D
-
     runs, handles, met = list(moments), [], set()
     for kind in (ROBOT, GUARD, BYSTANDER):
         names = [(run, name) for run in runs for name in run.names(kind)]
@@ -105,9 +105,6 @@ def legend(moments: Iterable[Moments]) -> list[Artist]:
 
 
 def _fields(shown: set[str]) -> list[Artist]:
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
-
     handles: list[Artist] = []
     if "smoke" in shown:
         handles.append(Patch(fc=SMOKE, alpha=0.5, label="smoke"))
@@ -123,8 +120,6 @@ def _fields(shown: set[str]) -> list[Artist]:
 
 
 def _dot(shape: str, colour: str, label: str) -> Any:
-    from matplotlib.lines import Line2D
-
     return Line2D([], [], ls="none", marker=shape, mfc=colour, mec="white", ms=7, label=label)
 
 
@@ -198,8 +193,6 @@ class Sheet:
 
     def _map(self, column: int, top: float, size: tuple[float, float], run: Moments) -> Axes:
         """A map in the middle of its column."""
-        from dva_sim.worlds.view import set_limits
-
         width, height = size
         left = self._left(column) + (self._across - width) / 2
         ax = self._axes(left, MARGIN + top + TITLE_HEIGHT, width, height)
@@ -228,9 +221,6 @@ def heading_of(recordings: Sequence[Playback]) -> str:
 
 def _new_figure(dpi: float) -> Figure:
     """A figure that is drawn without any window."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     figure = Figure(figsize=(WIDTH, WIDTH), dpi=dpi)
     canvas: Any = FigureCanvasAgg
     canvas(figure)
@@ -239,8 +229,6 @@ def _new_figure(dpi: float) -> Figure:
 
 def _size_of_map(recording: Playback, across: float) -> tuple[float, float]:
     """Width and height of a map that is so wide at most."""
-    from dva_sim.worlds.view import limits
-
     (left, right), (low, high) = limits(recording.site)
     shape = (high - low) / (right - left)
     height = min(TALLEST, across * shape)

@@ -221,13 +221,15 @@ class Machines:
 
     def _look_at_drive(self, robot: RobotAgent) -> None:
         """Count what motors of a user got wrong, and tell of the first time."""
-        device, failures = robot.device, robot.body.drive_failures
+        device, failures = robot.device, robot.body.motors.failures
         known = self._failures.get(device.label, 0)
         if failures > known:
             device.recorder.counters["failed: an answer of a drive"] += failures - known
             self._failures[device.label] = failures
             if not known:
-                device.tell(f"brakes, as its drive fails: {robot.body.first_failure}", "mode")
+                device.tell(
+                    f"brakes, as its drive fails: {robot.body.motors.first_failure}", "mode"
+                )
 
 
 class Power:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from io import BytesIO
 from typing import Any
 
 import numpy as np
@@ -34,7 +33,6 @@ GLOWING = 1.7  # flames are so much brighter than paint, and outshine some smoke
 CLOSEST = 0.25  # what stands nearer to the lens is not drawn [m]
 LIGHT_REACH = 9.0  # of a fire [m], assumed
 MIRROR = 0.85  # share that water mirrors at a grazing angle, assumed
-QUALITY = 75  # of JPEG
 
 
 class Camera:
@@ -47,7 +45,6 @@ class Camera:
         width: Pixels across.
         height: Pixels down.
         field_of_view: Across [rad].
-        eye_height: Of the lens above the floor [m].
     """
 
     def __init__(
@@ -56,9 +53,8 @@ class Camera:
         width: int = 320,
         height: int = 240,
         field_of_view: float = FIELD_OF_VIEW,
-        eye_height: float = EYE_HEIGHT,
     ) -> None:
-        self.width, self.height, self.eye_height = width, height, eye_height
+        self.width, self.height = width, height
         self.focal_length = width / 2 / math.tan(field_of_view / 2)  # [pixels]
         self._ceiling = site.ceiling
         self._surfaces, self._rooms = Surfaces(site), RoomGrid(site)
@@ -68,7 +64,7 @@ class Camera:
         # How far below the axis each row looks, per metre ahead.
         row = np.arange(height, dtype=np.float32) + 0.5 - height / 2
         self._fall: Floats = (row / self.focal_length).astype(np.float32)
-        self._floors = Floors(site, self._rooms, self._fall, eye_height)
+        self._floors = Floors(site, self._rooms, self._fall, EYE_HEIGHT)
         self._open_air = any(room.outdoor for room in site.rooms)
         self._texels_per_metre = TEXELS / site.ceiling
 
@@ -107,7 +103,7 @@ class Camera:
             self._flood(scene, depth, rays, water, walls.depth, time)
         self._add_things(scene, depth, pose, (*hazards, *figures), time)
         if smoke is not None:
-            heights = self.eye_height, self._ceiling
+            heights = EYE_HEIGHT, self._ceiling
             add_smoke(scene, depth, rays, self._fall, smoke, heights)
         np.clip(scene, 0, 255, out=scene)
         picture = np.empty((self.height, self.width, 3), dtype=np.uint8)
@@ -155,7 +151,7 @@ class Camera:
     def _edges(self, hits: Hits) -> Floats:
         """Rows of the upper and lower edge of each hit `(2, n)` [pixels]."""
         heights = np.stack([self._surfaces.high[hits.surface], self._surfaces.low[hits.surface]])
-        rows = self.height / 2 + (self.eye_height - heights) * (self.focal_length / hits.depth)
+        rows = self.height / 2 + (EYE_HEIGHT - heights) * (self.focal_length / hits.depth)
         return np.asarray(rows, dtype=np.float32)
 
     def _looks(self, hits: Hits) -> tuple[Floats, Floats]:
@@ -166,7 +162,7 @@ class Camera:
 
     def _texels(self, fall: Floats) -> Any:
         """How many texels above the floor is what lies so far below the lens [m]."""
-        texel = ((self.eye_height - fall) * self._texels_per_metre).astype(np.int32)
+        texel = ((EYE_HEIGHT - fall) * self._texels_per_metre).astype(np.int32)
         return np.clip(texel, 0, TEXELS - 1, out=texel)
 
     def _first_texels(self, hits: Hits, pose: Pose) -> Any:
@@ -205,8 +201,8 @@ class Camera:
         y = rays.origin[1] + depth[first:] * rays.y
         deep = np.zeros_like(depth)
         deep[first:] = look_up(x, y, water)[0] * (depth[first:] == self._floors.depth[first:])
-        base = self.height / 2 + self.eye_height * self.focal_length / far
-        steep = self.eye_height / np.hypot(self._floors.depth[:, 0], self.eye_height)
+        base = self.height / 2 + EYE_HEIGHT * self.focal_length / far
+        steep = EYE_HEIGHT / np.hypot(self._floors.depth[:, 0], EYE_HEIGHT)
         grazing = np.asarray(MIRROR * (1 - steep) ** 2, dtype=np.float32)
         add_water(scene, deep, base, grazing, time)
 
@@ -239,7 +235,7 @@ class Camera:
         """One picture in the picture, where nothing nearer hides it."""
         scale = self.focal_length / ahead
         left = self.width / 2 + right * scale - sprite.size[0] / 2 * scale
-        top = self.height / 2 + (self.eye_height - sprite.size[1]) * scale
+        top = self.height / 2 + (EYE_HEIGHT - sprite.size[1]) * scale
         texels = sprite.cover.shape
         rows, source_rows = _pixels(top, sprite.size[1] * scale, self.height, texels[0])
         columns, source_columns = _pixels(left, sprite.size[0] * scale, self.width, texels[1])
@@ -254,20 +250,6 @@ class Camera:
             paint *= cover
             block += paint
         np.copyto(depth[rows, columns], np.float32(ahead), where=cover > 0.5)
-
-
-def encode(picture: Picture, quality: int = QUALITY) -> bytes:
-    """A picture as JPEG.
-
-    Args:
-        picture: Red, green and blue, `(height, width, 3)`.
-        quality: From 1 to 95.
-    """
-    from PIL import Image
-
-    stream = BytesIO()
-    Image.fromarray(picture).save(stream, "JPEG", quality=quality)
-    return stream.getvalue()
 
 
 def _place_of(thing: Figure | Hazard) -> tuple[float, float]:

@@ -201,8 +201,6 @@ def doorways(site: Site) -> tuple[NDArray[np.float64], Floats]:
 
 def _shut(doors: NDArray[np.float64], walls: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Which doors have a wall right across them: ways out that nobody drives through `(n,)`."""
-    import shapely
-
     lines: Any = shapely.linestrings(walls.reshape(-1, 2, 2))
     middles: Any = shapely.points((doors[:, :2] + doors[:, 2:]) / 2)
     gaps = shapely.distance(middles[:, None], lines[None, :])

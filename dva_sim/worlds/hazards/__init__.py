@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from dva_sim.worlds.hazards.building import Building, SitePoints, building_of
 from dva_sim.worlds.hazards.conditions import CLEAR, QUANTITIES, Conditions
-from dva_sim.worlds.hazards.dose import Dose, pace_in_smoke, pace_in_water, visibility
+from dva_sim.worlds.hazards.dose import Dose, pace_in_smoke, pace_in_water
 from dva_sim.worlds.hazards.fire import GROWTH_S, Fire
 from dva_sim.worlds.hazards.flood import Flood
 from dva_sim.worlds.hazards.gas_leak import GASES, GasLeak
 from dva_sim.worlds.hazards.hazard import Hazard, HazardField, detection_time, first_detection
-from dva_sim.worlds.hazards.registry import KINDS, find_hazard, known_hazards, make_hazard
+from dva_sim.worlds.hazards.registry import KINDS, find_hazard, make_hazard
 from dva_sim.worlds.hazards.surroundings import Raster, Surroundings
 
 __all__ = [
@@ -38,9 +38,7 @@ __all__ = [
     "detection_time",
     "find_hazard",
     "first_detection",
-    "known_hazards",
     "make_hazard",
     "pace_in_smoke",
     "pace_in_water",
-    "visibility",
 ]

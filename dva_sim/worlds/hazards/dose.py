@@ -4,7 +4,6 @@ References:
     ISO 13571:2012, Life-threatening components of fire: heat.
     D. A. Purser and J. L. McAllister, in: SFPE Handbook of Fire Protection Engineering, 5th ed.,
     chapter 63: carbon monoxide, lack of oxygen.
-    T. Jin, J. Fire and Flammability 9 (1978) 135: visibility in smoke.
     H. Frantzich and D. Nilsson, Lund University, report 3126, 2003: walking in smoke.
 """
 
@@ -25,7 +24,6 @@ LUKEWARM = 60.0  # air does no harm below [deg C]; assumed
 
 SMOKE_SLOWS = 0.057 / 0.706  # share of walking speed lost per 1/m of extinction, in 0.706 m/s
 CRAWLING = 0.1  # nobody gets slower in smoke than this share
-REFLECTING, LIGHTED = 3.0, 8.0  # visibility times extinction, of signs without and with a lamp
 KNEE = 0.5  # water in which people walk at half their speed [m]; assumed
 WADING = 0.3  # nobody who still stands gets slower in water than this share; assumed
 
@@ -75,13 +73,6 @@ def toxic_rate(conditions: Conditions) -> float:
     if lack > 100.0 * LEAST_OXYGEN_LACK:
         rate += 1.0 / math.exp(8.13 - 0.54 * lack)
     return float(rate)
-
-
-def visibility(extinction: float, lighted: bool = False) -> float:
-    """How far signs can be recognised [m]; infinite in clean air."""
-    if extinction <= 0.0:
-        return math.inf
-    return (LIGHTED if lighted else REFLECTING) / extinction
 
 
 def pace_in_smoke(extinction: float) -> float:

@@ -60,7 +60,6 @@ class Mesh:
         a: Node on one side of each border, shape `(k,)`.
         b: Node on the other side.
         shape: Length of each border over the distance between its nodes.
-        across: That distance [m].
         nodes: Node of each cell of the grid, or -1, shape `(rows, columns)`.
         grid: Gives the cells.
     """
@@ -69,15 +68,12 @@ class Mesh:
     a: Integers
     b: Integers
     shape: Floats
-    across: Floats
     nodes: NDArray[np.int32]
     grid: OccupancyGrid
 
     def node_at(self, x: float, y: float) -> int:
         """The node around a point [m]; -1 in walls and outdoors."""
-        row, column = self.grid.to_cell(x, y)
-        rows, columns = self.nodes.shape
-        return int(self.nodes[row, column]) if 0 <= row < rows and 0 <= column < columns else -1
+        return int(self.grid.look_up(self.nodes, x, y, -1))
 
     def nearest(self, x: float, y: float) -> int:
         """The node around a point [m], or the one nearest to it."""
@@ -90,8 +86,9 @@ class Mesh:
         return node
 
 
-def mesh_of(building: Building) -> Mesh:
-    """The mesh of all floor indoors."""
+@lru_cache(maxsize=8)
+def mesh_in(building: Building) -> Mesh:
+    """The mesh of all floor indoors, once per process."""
     inside = (building.grid.cells == FREE) & (building.labels != NOWHERE)
     return make_mesh(building.grid, inside, side_for(inside.sum() * building.grid.resolution**2))
 
@@ -129,12 +126,11 @@ def make_mesh(grid: OccupancyGrid, free: NDArray[np.bool_], cell: float = CELL) 
         _borders(node[p[:, ~s]], middles[axis], count, block)
         for axis, (p, s) in enumerate(zip(pairs, same, strict=True))
     ]
-    a, b, shape, across = np.hstack(borders)
+    a, b, shape = np.hstack(borders)
     nodes = np.full(free.shape, -1, np.int32)
     nodes[rows, columns] = node
     area = cells.astype(np.float64) * grid.resolution**2
-    far = across * grid.resolution
-    return Mesh(area, a.astype(np.int64), b.astype(np.int64), shape, far, nodes, grid)
+    return Mesh(area, a.astype(np.int64), b.astype(np.int64), shape, nodes, grid)
 
 
 def _edges(number: NDArray[np.int32], axis: int) -> NDArray[np.int32]:
@@ -154,12 +150,12 @@ def _borders(pairs: Integers, middles: Floats, count: int, block: int) -> Floats
         block: Side of a coarse cell [cells].
 
     Returns:
-        Rows a, b, length over distance, distance [cells].
+        Rows a, b, length over distance.
     """
     code, edges = np.unique(pairs[0] * count + pairs[1], return_counts=True)
     a, b = code // count, code % count
     across = np.clip(middles[b] - middles[a], 1.0, block)
-    return np.stack([a, b, edges / across, across])
+    return np.stack([a, b, edges / across])
 
 
 class Draught(NamedTuple):
@@ -178,7 +174,6 @@ class Air:
         diffusivity: [m^2/s]
         loss: Fresh air, in volumes per second.
         draught: A steady flow through the rooms, if there is one.
-        height: From floor to ceiling [m].
 
     Raises:
         ConfigError: the draught is blown in where no way leads to where it is sucked off.
@@ -190,31 +185,26 @@ class Air:
         diffusivity: float,
         loss: float,
         draught: Draught | None = None,
-        height: float = MIXED_HEIGHT,
     ) -> None:
-        self.mesh, self.height = mesh, height
+        self.mesh = mesh
         self._spread = diffusivity * mesh.shape
-        self.flow = _potential_flow(mesh, draught, height)
+        self.flow = _potential_flow(mesh, draught)
         self._out = loss * mesh.area  # air that leaves each node [m^2/s]
         if draught is not None:
-            self._out[draught.exhaust] += draught.rate / height
+            self._out[draught.exhaust] += draught.rate / MIXED_HEIGHT
         self._solvers: dict[float, Any] = {}
 
     def still(self) -> Floats:
         """Clean air: the share in every node and, last, what was carried out [m^3]."""
         return np.zeros(len(self.mesh.area) + 1)
 
-    def amount(self, state: Floats) -> float:
-        """Gas in the air [m^3]."""
-        return float((state[:-1] * self.mesh.area).sum()) * self.height
-
     def step(self, state: Floats, node: int, rate: float, dt: float) -> Floats:
         """The state `dt` [s] later, with a source [m^3/s] in a node."""
         source = self.mesh.area / dt * state[:-1]
-        source[node] += rate / self.height
+        source[node] += rate / MIXED_HEIGHT
         share = self._solver(dt).solve(source)
         out = float((self._out * share).sum())  # in one thread, whatever the machine
-        return np.append(share, state[-1] + dt * self.height * out)
+        return np.append(share, state[-1] + dt * MIXED_HEIGHT * out)
 
     def _solver(self, dt: float) -> Any:
         """The factors of a step's equations, once for each length of a step."""
@@ -248,7 +238,7 @@ def _carried(spread: Floats, flow: Floats) -> Floats:
     return np.asarray(spread * np.where(small, 1.0 - ratio / 2.0, safe / np.expm1(safe)))
 
 
-def _potential_flow(mesh: Mesh, draught: Draught | None, height: float) -> Floats:
+def _potential_flow(mesh: Mesh, draught: Draught | None) -> Floats:
     """Air that passes each border from a to b [m^2/s]: without whirls, and none is lost."""
     if draught is None:
         return np.zeros(len(mesh.a))
@@ -267,15 +257,9 @@ def _potential_flow(mesh: Mesh, draught: Draught | None, height: float) -> Float
     own = np.bincount(mesh.a, mesh.shape, count) + np.bincount(mesh.b, mesh.shape, count)
     matrix = (link + coo_array((own, (np.arange(count),) * 2)).tocsr())[here][:, here]
     potential, source = np.zeros(count), np.zeros(count)
-    source[draught.supply] = draught.rate / height
+    source[draught.supply] = draught.rate / MIXED_HEIGHT
     potential[here] = spsolve(matrix.tocsc(), source[here])
     return np.asarray(mesh.shape * (potential[mesh.a] - potential[mesh.b]))
-
-
-@lru_cache(maxsize=8)
-def mesh_in(building: Building) -> Mesh:
-    """The mesh of a building, once per process."""
-    return mesh_of(building)
 
 
 @lru_cache(maxsize=8)

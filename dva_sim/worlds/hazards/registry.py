@@ -25,11 +25,6 @@ PLUGINS: Final = Plugins[Hazard](
 )
 
 
-def known_hazards() -> list[str]:
-    """Names that a scenario can use: shipped and installed ones; files come on top."""
-    return PLUGINS.known()
-
-
 def find_hazard(kind: str) -> type[Hazard]:
     """The class that `kind` means.
 

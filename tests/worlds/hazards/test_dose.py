@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from dva_sim.worlds.hazards import CLEAR, Conditions, Dose, pace_in_smoke, pace_in_water, visibility
+from dva_sim.worlds.hazards import CLEAR, Conditions, Dose, pace_in_smoke, pace_in_water
 
 
 def seconds_to_collapse(conditions: Conditions) -> float:
@@ -69,11 +69,8 @@ def test_doses_add_up() -> None:
     assert dose.toxic == pytest.approx(2.0 / 28.2, rel=0.01)
 
 
-def test_smoke_hides_signs_and_slows_people() -> None:
-    """Jin: 3 over the extinction. Frantzich and Nilsson: 0.706 - 0.057 K m/s, of 0.706."""
-    assert visibility(0.0) == math.inf
-    assert visibility(1.0) == 3.0
-    assert visibility(1.0, lighted=True) == 8.0
+def test_smoke_slows_people() -> None:
+    """Frantzich and Nilsson: 0.706 - 0.057 K m/s, of 0.706."""
     assert pace_in_smoke(0.0) == 1.0
     assert 0.706 * pace_in_smoke(5.0) == pytest.approx(0.706 - 0.057 * 5.0)
     assert pace_in_smoke(100.0) == 0.1
