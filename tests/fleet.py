@@ -13,11 +13,11 @@ from dva_sim.agents.robot.manoeuvres import Sensed
 from dva_sim.agents.robot.missions import PERIOD, MissionGoal, Pilot, PilotStep
 from dva_sim.agents.robot.robot import Surrounded
 from dva_sim.kernel.clock import Clock
+from dva_sim.worlds.bodies import RobotBody
 from dva_sim.worlds.drives import DriveSpec
 from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.physics import PersonBody, World
 from dva_sim.worlds.planning import Planner
-from dva_sim.worlds.robot_body import RobotBody
 from dva_sim.worlds.site import Site, load_site
 
 Point = tuple[float, float]

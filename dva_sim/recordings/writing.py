@@ -10,8 +10,10 @@ import io
 import json
 import math
 import os
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import IO, Any
@@ -178,66 +180,40 @@ def _write(playback: Playback, file: IO[bytes], tables: Tables | None, about: An
 
 
 def _add_messages(writer: Any, playback: Playback, files: Mapping[str, bytes]) -> None:
-    channels = _Channels(writer, playback)
-    plan = next((data for name, data in files.items() if name.endswith(".geojson")), None)
+    """All messages in order of time; schemas and channels are opened when first used."""
+    ids = {name: device for device, name in channels.names_of(playback.labels).items()}
+    counts: Counter[int] = Counter()
+
+    @cache
+    def schema_of(name: str) -> int:
+        if name == XML:
+            xsd = resources.find("dva", "protocol", ".xsd").read_bytes()
+            return int(writer.register_schema("dva", "xsd", xsd))
+        return int(writer.register_schema(name, "jsonschema", _json(SCHEMAS[name])))
+
+    @cache
+    def channel_of(topic: str, schema: str) -> int:
+        number = schema_of(schema)
+        if schema != XML:
+            return int(writer.register_channel(topic, "json", number, {}))
+        source, destination = (ids[name] for name in topic.split("/")[-2:])
+        ends = {"source": source, "destination": destination}
+        return int(writer.register_channel(topic, XML, number, ends))
+
     every = [_packed(message) for message in every_message(playback)]
+    plan = next((data for name, data in files.items() if name.endswith(".geojson")), None)
     if plan is not None:
-        every.insert(
-            0, _packed(ChannelMessage(0.0, "/plan", "foxglove.GeoJSON", {"geojson": plan.decode()}))
-        )
-    every.sort(key=lambda entry: entry[0])
-    for time, topic, schema, data in every:
-        channel = channels.of(topic, schema)
-        writer.add_message(channel, time, data, time, channels.count(channel))
+        told = ChannelMessage(0.0, "/plan", "foxglove.GeoJSON", {"geojson": plan.decode()})
+        every.insert(0, _packed(told))
+    for time, topic, schema, data in sorted(every, key=lambda entry: entry[0]):
+        channel = channel_of(topic, schema)
+        counts[channel] += 1
+        writer.add_message(channel, time, data, time, counts[channel])
 
 
 def _packed(message: ChannelMessage) -> tuple[int, str, str, bytes]:
     content = message.content if message.schema == XML else _json(message.content)
     return messages.nanoseconds(message.time), message.topic, message.schema, content
-
-
-class _Channels:
-    """The channels of a file, opened when first used.
-
-    Args:
-        writer: Of the file.
-        playback: Tells who the ends of a channel of messages are.
-    """
-
-    def __init__(self, writer: Any, playback: Playback) -> None:
-        self._writer = writer
-        self._ids = {name: device for device, name in channels.names_of(playback.labels).items()}
-        self._schemas: dict[str, int] = {}
-        self._channels: dict[str, int] = {}
-        self._counts: dict[int, int] = {}
-
-    def of(self, topic: str, schema: str) -> int:
-        """The channel of a topic."""
-        if topic not in self._channels:
-            encoding, metadata = ("json", {}) if schema != XML else (XML, self._ends(topic))
-            self._channels[topic] = self._writer.register_channel(
-                topic, encoding, self._schema(schema), metadata
-            )
-        return self._channels[topic]
-
-    def count(self, channel: int) -> int:
-        """How many messages a channel has had, this one included."""
-        self._counts[channel] = self._counts.get(channel, 0) + 1
-        return self._counts[channel]
-
-    def _ends(self, topic: str) -> dict[str, str]:
-        source, destination = topic.split("/")[-2:]
-        return {"source": self._ids[source], "destination": self._ids[destination]}
-
-    def _schema(self, name: str) -> int:
-        if name not in self._schemas:
-            if name == XML:
-                xsd = resources.find("dva", "protocol", ".xsd").read_bytes()
-                new = self._writer.register_schema("dva", "xsd", xsd)
-            else:
-                new = self._writer.register_schema(name, "jsonschema", _json(SCHEMAS[name]))
-            self._schemas[name] = new
-        return self._schemas[name]
 
 
 # --- what goes with it -----------------------------------------------------------------

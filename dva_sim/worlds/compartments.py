@@ -8,10 +8,11 @@ from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
 from dva_sim.worlds.maps import OccupancyGrid, cells_inside, segments
-from dva_sim.worlds.site_parts import CEILING, Compartment, Lookup, Opening, Room
+from dva_sim.worlds.site_parts import CEILING, Compartment, Lookup, Opening, Room, beyond
 
 Floats = NDArray[np.float64]
 Labels = NDArray[np.int16]
@@ -21,7 +22,6 @@ BLOCK = 8.0  # side of a block of a bare map's floor [m]
 LEAST_BLOCK = 4.0  # smaller pieces join their neighbour [m^2]
 LEAST_BORDER = 0.3  # shorter openings without a wall are slips of the pen [m]
 NEAR = 0.05  # rooms this near to each other touch [m]
-PROBES = (0.06, 0.2, 0.35, 0.5)  # how far from a door to look for its rooms [m]
 
 
 class FloorPartition(NamedTuple):
@@ -66,7 +66,8 @@ def _passage(
     """A door with the rooms on both sides; none if it joins a room to itself."""
     x1, y1, x2, y2 = ends
     width = math.hypot(x2 - x1, y2 - y1)
-    sides = [_beside(rooms, ends, side / width) for side in (1, -1)]
+    x, y, left = (x1 + x2) / 2, (y1 + y2) / 2, math.atan2(x2 - x1, y1 - y2)
+    sides = [beyond(rooms, x, y, heading) for heading in (left, left + math.pi)]
     a, b = (None if room is None or room.outdoor else room.name for room in sides)
     if a is None:
         a, b = b, None
@@ -74,24 +75,10 @@ def _passage(
         yield Opening(a, b, x1, y1, x2, y2, width, height, kind)
 
 
-def _beside(rooms: Lookup[Room], ends: Sequence[float], side: float) -> Room | None:
-    """The room on one side of a door's middle."""
-    x1, y1, x2, y2 = ends
-    for far in PROBES:
-        x = (x1 + x2) / 2 - side * far * (y2 - y1)
-        y = (y1 + y2) / 2 + side * far * (x2 - x1)
-        room = rooms.at(x, y)
-        if room is not None:
-            return room
-    return None
-
-
 def _borders(
     rooms: Sequence[Room], walls: Floats, doors: Sequence[Sequence[float]]
 ) -> Iterator[Opening]:
     """Straight pieces of border between two rooms without a wall or a door."""
-    import shapely
-
     areas = [shapely.Polygon(room.polygon) for room in rooms]
     lines = np.vstack([walls, np.reshape(doors, (-1, 4))]).reshape(-1, 2, 2)
     barriers = [shapely.LineString(line).buffer(NEAR) for line in lines]
@@ -112,8 +99,6 @@ def _borders(
 
 def _straight(lines: Any) -> Floats:
     """The straight pieces of some lines, `(n, 4)` [m]."""
-    import shapely
-
     parts = [part for part in shapely.get_parts(lines) if part.geom_type == "LineString"]
     if not parts:
         return np.empty((0, 4))
@@ -123,8 +108,6 @@ def _straight(lines: Any) -> Floats:
 
 def _up_to(closed: Any, ends: Sequence[float]) -> tuple[float, float, float, float]:
     """An opening lengthened where it was cut `NEAR` a wall."""
-    import shapely
-
     a, b = np.array(ends[:2]), np.array(ends[2:])
     along = (b - a) / np.hypot(*(b - a)) * NEAR
     a, b = (

@@ -15,8 +15,10 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+from shapely.geometry import mapping, shape
 
 from dva_sim.kernel.config import load_yaml, validate
 from dva_sim.kernel.errors import ConfigError
@@ -37,6 +39,7 @@ from dva_sim.worlds.site_parts import (
     RadioCoverage,
     Room,
     Zone,
+    beyond,
 )
 
 Points = NDArray[np.float64]
@@ -211,9 +214,6 @@ def _error(path: Path, index: int, problem: str) -> ConfigError:
 
 
 def _feature(feature: Any, frame: GeoFrame, fail: Fail) -> Feature:
-    import shapely
-    from shapely.geometry import shape
-
     properties, geometry = feature["properties"], feature["geometry"]
     kind = properties.get("kind")
     if kind not in KINDS:
@@ -240,9 +240,6 @@ def _to_xy(points: Points, frame: GeoFrame) -> Points:
 # --- writing ---------------------------------------------------------------------------
 def write_features(path: Path, features: Iterable[Feature], frame: GeoFrame) -> None:
     """A GeoJSON file that `read_features` reads, one feature a line."""
-    import shapely
-    from shapely.geometry import mapping
-
     lines = []
     for feature in features:
         there = shapely.transform(feature.shape, lambda points: _to_degrees(points, frame))
@@ -265,7 +262,6 @@ def _to_degrees(points: Points, frame: GeoFrame) -> Points:
 
 DOOR_REACH = 0.15  # a door opens walls this near to its line [m]
 SILL = 0.5  # floor on both sides of a door, in case the rooms drawn do not meet [m]
-BEYOND = (0.06, 0.2, 0.35, 0.5)  # how far from an exit to look for what lies there [m]
 LEAST_EXIT = 0.5  # [m]
 NOTHING = 2  # further out than rooms (0) and ground outdoors (1)
 GROUND = ("room", "path", "yard")  # where two overlap, the first of these counts
@@ -322,8 +318,6 @@ def _numbered(kinds: dict[str, list[Feature]], kind: str) -> list[tuple[Feature,
 
 
 def _corners(feature: Feature) -> Points:
-    import shapely
-
     return shapely.get_coordinates(feature.shape.exterior)[:-1]
 
 
@@ -381,12 +375,8 @@ def _ends(line: Any) -> list[float]:
 
 def _how_far_out(rooms: Lookup[Room], x: float, y: float, heading: float) -> int:
     """What lies beyond a door: 0 a room, 1 ground outdoors, 2 nothing drawn."""
-    for far in BEYOND:
-        px, py = x + far * math.cos(heading), y + far * math.sin(heading)
-        room = rooms.at(px, py)
-        if room is not None:
-            return int(room.outdoor)
-    return NOTHING
+    room = beyond(rooms, x, y, heading)
+    return NOTHING if room is None else int(room.outdoor)
 
 
 def _open_walls(
@@ -399,8 +389,6 @@ def _open_walls(
 
     An exit opens the wall only where ground is drawn beyond it: nobody drives off the plan.
     """
-    import shapely
-
     walls = [feature.shape for feature in kinds["wall"]]
     solids = [wall for wall in walls if wall.geom_type == "Polygon"]
     drawn = shapely.union_all([wall for wall in walls if wall.geom_type != "Polygon"])

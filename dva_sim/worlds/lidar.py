@@ -14,9 +14,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.worlds.bodies import Body
+from dva_sim.worlds.bodies import Body, RobotBody
 from dva_sim.worlds.physics import World
-from dva_sim.worlds.robot_body import RobotBody
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
@@ -130,8 +131,6 @@ def outline(grid: OccupancyGrid, free: NDArray[np.bool_]) -> NDArray[np.float64]
     Returns:
         Segments x1, y1, x2, y2 `(n, 4)` [m].
     """
-    import shapely
-
     inside = np.pad(free, 1)
     rows, left, right = _runs(inside[1:, 1:-1] != inside[:-1, 1:-1])
     columns, low, high = _runs((inside[1:-1, 1:] != inside[1:-1, :-1]).T)
@@ -144,8 +143,6 @@ def outline(grid: OccupancyGrid, free: NDArray[np.bool_]) -> NDArray[np.float64]
 
 def segments(geometry: Any) -> NDArray[np.float64]:
     """All straight pieces of shapely lines or of the rings of polygons, `(n, 4)` [m]."""
-    import shapely
-
     polygons = shapely.get_parts(geometry)
     areas = shapely.get_type_id(polygons) == shapely.GeometryType.POLYGON
     lines = shapely.get_parts(np.where(areas, shapely.boundary(polygons), polygons))

@@ -1,8 +1,7 @@
-"""How an office block is cut up: corridors, cross corridors, a lobby, and cells along them.
+"""Office blocks of any size from a seed: the same seed and size give the same house to the bit.
 
-What rooms of an office block are for, and what stands in them.
-
-Office blocks of any size from a seed: the same seed and size give the same house to the bit.
+First a rectangle is cut up into corridors, cross corridors, a lobby and cells along them; then the
+cells get a use, a name, and what stands in rooms of that use.
 """
 
 from __future__ import annotations
@@ -10,13 +9,14 @@ from __future__ import annotations
 import itertools
 import string
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
+from shapely import LineString, Point, Polygon
 
 from dva_sim.kernel.config import Config
 from dva_sim.kernel.streams import Streams
@@ -71,6 +71,16 @@ class FloorCell(NamedTuple):
     def door_y(self) -> float:
         """Of the wall at the corridor [m]."""
         return self.y2 if self.door_north else self.y1
+
+    @property
+    def back_y(self) -> float:
+        """Of the wall opposite to that [m]."""
+        return self.y1 if self.door_north else self.y2
+
+    @property
+    def outwards(self) -> float:
+        """Where its door is: 1 in the north, -1 in the south."""
+        return 1.0 if self.door_north else -1.0
 
     def box(self, left: float, right: float, near: float, far: float) -> Box:
         """A rectangle in it, by its gaps [m] to the sides, to the corridor and opposite."""
@@ -288,7 +298,8 @@ def assign(layout: Layout, bases: int) -> list[tuple[FloorCell, Use, str]]:
     """
     left, uses = list(layout.cells), dict[FloorCell, tuple[Use, str]]()
     for use, name, wish in _needs(layout):
-        if use is not ROBOT_BAY or sum(_capacity(c, *uses[c]) for c in uses) < bases:
+        bays = [bay for bay in uses if uses[bay][0] is ROBOT_BAY]
+        if use is not ROBOT_BAY or sum(len(stands(bay)) for bay in bays) < bases:
             cell = min(left, key=wish, default=None)
             if cell is not None:
                 left.remove(cell)
@@ -312,10 +323,6 @@ def _needs(layout: Layout) -> Iterator[tuple[Use, str, Callable[[FloorCell], flo
     for number, use in enumerate(SINGLE):
         x = layout.width * (0.15 + 0.7 * (number * 0.618 % 1))
         yield use, use.name, partial(_unfit_for_one, x)
-
-
-def _capacity(cell: FloorCell, use: Use, _: str) -> int:
-    return len(stands(cell)) if use is ROBOT_BAY else 0
 
 
 def _unfit_for_stairs(north: bool, x: float, cell: FloorCell) -> float:
@@ -352,14 +359,10 @@ def stands(bay: FloorCell) -> list[tuple[float, float]]:
     """Where robots stand in a bay [m]: rows from the wall opposite to its door."""
     columns = 1 + int((bay.width - 2 * BASE_WALL) / BASE_GAP + 1e-6)
     rows = 1 + int((bay.depth - BASE_WALL - APPROACH) / BASE_GAP + 1e-6)
-    inwards = 1.0 if bay.door_north else -1.0
-    back = bay.y1 if bay.door_north else bay.y2
     first = (bay.x1 + bay.x2 - (columns - 1) * BASE_GAP) / 2
-    return [
-        (tenths(first + column * BASE_GAP), tenths(back + inwards * (BASE_WALL + row * BASE_GAP)))
-        for row in range(rows)
-        for column in range(columns)
-    ]
+    ys = [bay.back_y + bay.outwards * (BASE_WALL + row * BASE_GAP) for row in range(rows)]
+    xs = [first + column * BASE_GAP for column in range(columns)]
+    return [(tenths(x), tenths(y)) for y in ys for x in xs]
 
 
 POST_ROOM = 0.5  # of a guard post from the walls [m]
@@ -408,23 +411,13 @@ def _feature(kind: str, shape: Any, **properties: Any) -> Feature:
     return Feature(kind, shape, properties)
 
 
-def _line(*points: tuple[float, float]) -> Any:
-    from shapely import LineString
-
-    return LineString(points)
-
-
-def _box(box: Box) -> Any:
+def _box(box: Sequence[float]) -> Any:
     """Corners counter-clockwise from the south-west."""
-    from shapely import Polygon
-
     x1, y1, x2, y2 = box
     return Polygon([(x1, y1), (x2, y1), (x2, y2), (x1, y2)])
 
 
 def _point(x: float, y: float) -> Any:
-    from shapely import Point
-
     return Point(tenths(x), tenths(y))
 
 
@@ -445,15 +438,16 @@ def _exits(layout: Layout, rooms: Iterable[tuple[FloorCell, Use, str]]) -> Itera
     """At both ends of every corridor, in the lobby, and past every flight of stairs."""
     for number, (_, low, width, high) in enumerate(layout.corridors, 1):
         for x, side in ((0.0, "West"), (width, "East")):
-            ends = _line((x, tenths(low + 0.4)), (x, tenths(high - 0.4)))
+            ends = LineString([(x, tenths(low + 0.4)), (x, tenths(high - 0.4))])
             yield _feature("exit", ends, name=f"{side} exit {number}")
     x1, _, x2, _ = layout.lobby
     middle = tenths((x1 + x2) / 2)
-    yield _feature("exit", _line((middle - 1.0, 0.0), (middle + 1.0, 0.0)), name="Main entrance")
+    doors = LineString([(middle - 1.0, 0.0), (middle + 1.0, 0.0)])
+    yield _feature("exit", doors, name="Main entrance")
     for cell, use, name in rooms:
         if use is STAIRS and cell.facade:
-            y = cell.y1 if cell.door_north else cell.y2
-            ends = _line((tenths(cell.x2 - 1.3), y), (tenths(cell.x2 - 0.3), y))
+            y = cell.back_y
+            ends = LineString([(tenths(cell.x2 - 1.3), y), (tenths(cell.x2 - 0.3), y)])
             yield _feature("exit", ends, name=f"{name} exit")
 
 
@@ -462,7 +456,7 @@ def _rooms(
     rooms: Iterable[tuple[FloorCell, Use, str]], rng: np.random.Generator
 ) -> Iterator[Feature]:
     for cell, use, name in rooms:
-        outline = _box((cell.x1, cell.y1, cell.x2, cell.y2))
+        outline = _box(cell[:4])
         yield _feature("room", outline, name=name)
         yield _feature("wall", outline.exterior)
         yield _door(cell, use, rng)
@@ -470,7 +464,8 @@ def _rooms(
             yield _feature("wall", _box(piece))
         for number, kind in enumerate(use.detectors):
             x = cell.x1 + cell.width * (number + 1) / (len(use.detectors) + 1)
-            yield _feature(f"{kind}_detector", _point(x, _clear_of_the_door(cell)))
+            # Where no furniture stands: a metre from the corridor.
+            yield _feature(f"{kind}_detector", _point(x, cell.door_y - cell.outwards))
         if use.name in RESTRICTED:
             yield _feature("zone", outline, name=name, use="restricted")
 
@@ -478,13 +473,7 @@ def _rooms(
 def _door(cell: FloorCell, use: Use, rng: np.random.Generator) -> Feature:
     width = min(use.door, tenths(cell.width - 0.8))
     x = tenths(rng.uniform(cell.x1 + 0.4, cell.x2 - 0.4 - width))
-    ends = _line((x, cell.door_y), (tenths(x + width), cell.door_y))
-    return _feature("door", ends)
-
-
-def _clear_of_the_door(cell: FloorCell) -> float:
-    """Where no furniture stands: a metre from the corridor [m]."""
-    return cell.y2 - 1.0 if cell.door_north else cell.y1 + 1.0
+    return _feature("door", LineString([(x, cell.door_y), (tenths(x + width), cell.door_y)]))
 
 
 # --- who and what is in the house ------------------------------------------------------
@@ -494,19 +483,16 @@ def _people_and_robots(
     bays = [cell for cell, _, name in rooms if name.startswith("Robot bay")]
     spots = [(bay, spot) for bay in bays for spot in stands(bay)]
     for bay, spot in spots[: block.robot_bases]:
-        heading = 90.0 if bay.door_north else -90.0
-        yield _feature("robot_base", _point(*spot), heading_deg=heading)
+        yield _feature("robot_base", _point(*spot), heading_deg=90.0 * bay.outwards)
     for bay in bays:
-        area = _box((bay.x1, bay.y1, bay.x2, bay.y2))
-        yield _feature("zone", area, name="Charging", use="charging")
+        yield _feature("zone", _box(bay[:4]), name="Charging", use="charging")
     for x, y, heading in _posts(layout)[: block.guard_posts]:
         yield _feature("guard_post", _point(x, y), heading_deg=heading)
     control = next(cell for cell, use, _ in rooms if use is CONTROL)
     for number in range(block.operator_desks):
         x = control.x1 + control.width * (number + 0.5) / block.operator_desks
         y = (control.y1 + control.y2) / 2
-        heading = -90.0 if control.door_north else 90.0
-        yield _feature("operator_desk", _point(x, y), heading_deg=heading)
+        yield _feature("operator_desk", _point(x, y), heading_deg=-90.0 * control.outwards)
 
 
 def _posts(layout: Layout) -> list[tuple[float, float, float]]:

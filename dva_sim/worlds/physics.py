@@ -1,7 +1,7 @@
 """Moving bodies seen from above: robots and people that push, slip and stop (pymunk, no gravity).
 
-What a robot's motors do is in `drives`, what its wheels hold in `robot_body`, what counts as a
-contact or a jam in `bodies`. A bare hall with walls as one likes is where drives are tried.
+What a robot's motors do is in `drives`; what its wheels hold, and what counts as a contact or a
+jam, in `bodies`. A bare hall with walls as one likes is where drives are tried.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from typing import Final
 
 import numpy as np
 import pymunk
+import shapely
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.worlds.bodies import (
@@ -25,6 +26,7 @@ from dva_sim.worlds.bodies import (
     AskedFor,
     Body,
     Contacts,
+    RobotBody,
     Timing,
     set_force,
     set_velocity,
@@ -32,7 +34,6 @@ from dva_sim.worlds.bodies import (
 from dva_sim.worlds.drives import DriveSpec
 from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.maps import FREE, rasterise
-from dva_sim.worlds.robot_body import RobotBody
 from dva_sim.worlds.site import DEFAULT_FRAME, Site
 
 MASS: Final = 75.0  # of an adult [kg]
@@ -270,8 +271,6 @@ Segment = tuple[float, float, float, float]
 
 def hall(width: float, depth: float, walls: Sequence[Segment] = ()) -> Site:
     """A hall with a corner at 0, 0, and walls in it [m], thin as all walls are."""
-    import shapely
-
     corners = [(0, 0), (width, 0), (width, depth), (0, depth), (0, 0)]
     border = [(*a, *b) for a, b in itertools.pairwise(corners)]
     lines = np.array([*border, *walls], float)

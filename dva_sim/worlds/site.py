@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
@@ -182,16 +183,12 @@ class Site(FloorPlan):
         cells = np.flatnonzero(reached & (self.grid.clearance >= clearance))
         if room is None:
             return cells
-        import shapely
-
         columns = self.grid.cells.shape[1]
         middles = self.grid.to_xy(cells // columns + 0.5, cells % columns + 0.5)
         return cells[shapely.contains_xy(self.ground_of(self.room(room)), middles)]
 
     def ground_of(self, room: Room) -> Any:
         """The shapely area of a room; of ground outdoors what nothing else is drawn over."""
-        import shapely
-
         area: Any = shapely.Polygon(room.polygon)
         if not room.outdoor:
             return area

@@ -94,6 +94,16 @@ class Room(NamedArea):
     paved: bool = True
 
 
+PROBES = (0.06, 0.2, 0.35, 0.5)  # how far from a door to look for what lies there [m]
+
+
+def beyond(rooms: Lookup[Room], x: float, y: float, heading: float) -> Room | None:
+    """What lies on one side of a door: its middle [m], and where that side is [rad]."""
+    cos, sin = math.cos(heading), math.sin(heading)
+    found = (rooms.at(x + far * cos, y + far * sin) for far in PROBES)
+    return next((room for room in found if room is not None), None)
+
+
 @dataclass(frozen=True, eq=False)
 class Zone(NamedArea):
     """A part of the floor with a rule or a purpose: `use` is restricted, charging or assembly."""

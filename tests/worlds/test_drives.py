@@ -6,13 +6,7 @@ import pytest
 
 from dva_sim.agents.robot.profile import load_robot
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.worlds.drives import (
-    Differential,
-    DriveSpec,
-    GuardedDrive,
-    ThreeWay,
-    load_drive,
-)
+from dva_sim.worlds.drives import Differential, DriveSpec, GuardedDrive, ThreeWay, load_drive
 from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.physics import World, hall
 

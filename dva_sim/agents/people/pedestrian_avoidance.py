@@ -28,8 +28,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.worlds.bodies import Body
-from dva_sim.worlds.robot_body import RobotBody
+from dva_sim.worlds.bodies import Body, RobotBody
 
 RADIUS: Final = 0.2
 """Of the disc that stands for a person, seen from above [m]: as much floor as an ellipse of

@@ -41,10 +41,9 @@ from dva_sim.agents.people.pedestrian_avoidance import (
 )
 from dva_sim.agents.route_following import Ahead, Route
 from dva_sim.kernel.clock import Clock
-from dva_sim.worlds.bodies import Body
+from dva_sim.worlds.bodies import Body, RobotBody
 from dva_sim.worlds.physics import PersonBody, World
 from dva_sim.worlds.planning import Disc, Planner
-from dva_sim.worlds.robot_body import RobotBody
 
 STEP: Final = 0.2  # between looks at the way [s]
 CALM: Final = 0.4  # the same while nobody is near and the end is not [s]

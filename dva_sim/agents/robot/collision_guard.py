@@ -20,8 +20,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dva_sim.worlds.bodies import RobotBody
 from dva_sim.worlds.physics import PersonBody, World
-from dva_sim.worlds.robot_body import RobotBody
 
 Point = tuple[float, float]
 

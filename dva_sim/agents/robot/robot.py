@@ -31,10 +31,10 @@ from dva_sim.kernel.recorder import DriveLog
 from dva_sim.network.messaging import Subscription
 from dva_sim.network.patterns import Pattern
 from dva_sim.protocol import messages as m
+from dva_sim.worlds.bodies import RobotBody
 from dva_sim.worlds.geo import GeoFrame
 from dva_sim.worlds.physics import World
 from dva_sim.worlds.planning import Planner
-from dva_sim.worlds.robot_body import RobotBody
 
 SENSOR_REACH = 8.0  # in which others are seen [m]; assumed, as that of the lidar
 

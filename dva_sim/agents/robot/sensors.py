@@ -27,10 +27,10 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import unknown
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.errors import ProtocolError
+from dva_sim.worlds.bodies import RobotBody
 from dva_sim.worlds.hazards import Conditions
 from dva_sim.worlds.lidar import Lidar
 from dva_sim.worlds.physics import World
-from dva_sim.worlds.robot_body import RobotBody
 
 LEASE = 60.0  # a subscription that is not renewed ends by itself after this [s]
 MOST = 64  # subscriptions at one robot

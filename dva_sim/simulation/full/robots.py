@@ -23,12 +23,11 @@ from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.recorder import DriveLog
 from dva_sim.simulation.full.stage import DVA, Stage, place_of
-from dva_sim.worlds.bodies import GRIP
+from dva_sim.worlds.bodies import GRIP, RobotBody
 from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.hazards import Surroundings
 from dva_sim.worlds.lidar import Lidar
 from dva_sim.worlds.physics import World
-from dva_sim.worlds.robot_body import RobotBody
 from dva_sim.worlds.site import FOOTPRINT
 
 TRIES = 200

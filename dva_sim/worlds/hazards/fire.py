@@ -29,16 +29,15 @@ from dva_sim.worlds.hazards.hazard import Hazard, March, Point, SolvedField, Ste
 from dva_sim.worlds.hazards.smoke import (
     CO_RATIO,
     DENSITY,
-    HEAT,
     HEAT_CAPACITY,
     HEAT_OF_COMBUSTION,
     KELVIN,
-    MASS,
     RADIATIVE_FRACTION,
     SOOT,
     SOOT_EXTINCTION,
     SOOT_YIELD,
     SmokeLayers,
+    volumes,
 )
 from dva_sim.worlds.line_of_sight import Sight
 from dva_sim.worlds.site import Site
@@ -361,8 +360,7 @@ class FireField(SolvedField):
     def _filled(self, state: Floats) -> tuple[Floats, Floats]:
         """Of each space: volume of its smoke [m^3], and the share of the space that it fills."""
         spaces = self.building.spaces
-        volume = (state[:, MASS] + state[:, HEAT] / (HEAT_CAPACITY * KELVIN)) / DENSITY
-        volume = np.maximum(volume, 1e-9)
+        volume = np.maximum(volumes(state), 1e-9)
         return volume, np.minimum(1.0, volume / (spaces.area * spaces.ceiling))
 
     def is_hazy(self, time: float) -> bool:
