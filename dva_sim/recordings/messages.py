@@ -21,10 +21,6 @@ NS = 1_000_000_000
 FRAME = "map"  # the plane of the site: x east, y north [m]
 PLACES = 4  # decimals of a length [m]
 TURNS = 6  # decimals of a quaternion
-HERE = {
-    "position": {"x": 0.0, "y": 0.0, "z": 0.0},
-    "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0},
-}
 XML = "xml"  # in the place of a schema's name: the content is bytes of the protocol
 
 
@@ -79,6 +75,9 @@ def heading_of(rotation: dict[str, float]) -> float:
 def pose(x: float, y: float, heading: float = 0.0, z: float = 0.0) -> dict[str, Any]:
     """Where something is [m] and where it heads [rad]."""
     return {"position": point(x, y, z), "orientation": turned(heading)}
+
+
+HERE = pose(0.0, 0.0)
 
 
 def colour(code: str, opacity: float = 1.0) -> dict[str, float]:

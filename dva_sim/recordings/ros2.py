@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -73,12 +73,8 @@ def _entries(playback: Playback, types: Any) -> Iterator[Entry]:
             yield here.time, "/tf", make.transform(_ros_name(name), here)
         for before, after in itertools.pairwise(track):
             if after.time > before.time:
-                moved = _velocity(before, after)
-                yield (
-                    after.time,
-                    f"{topic}/velocity",
-                    make.twist(after.time, _ros_name(name), *moved),
-                )
+                moved = make.twist(after.time, _ros_name(name), *_velocity(before, after))
+                yield after.time, f"{topic}/velocity", moved
     for drive in playback.recorder.drives:
         name = _ros_name(playback.labels[drive.robot])
         for time, speed, turn_rate in drive.commands:
@@ -114,11 +110,8 @@ class _Maker:
 
     def transform(self, name: str, p: TrackPoint) -> Any:
         """tf2_msgs/TFMessage with one transform."""
-        pose = self._pose(p)
-        place = pose.position
-        there = self._new(
-            "geometry_msgs/msg/Transform", self._vector(place.x, place.y), pose.orientation
-        )
+        turn = self._pose(p).orientation
+        there = self._new("geometry_msgs/msg/Transform", self._vector(p.x, p.y), turn)
         stamped = self._new("geometry_msgs/msg/TransformStamped", self._header(p.time), name, there)
         return self._new("tf2_msgs/msg/TFMessage", [stamped])
 
@@ -131,11 +124,9 @@ class _Maker:
     def grid(self, grid: OccupancyGrid) -> Any:
         """nav_msgs/OccupancyGrid: 0 free, 100 occupied, -1 unknown."""
         rows, columns = grid.cells.shape
-        origin = TrackPoint(0.0, *grid.origin, "")
-        info = self._new(
-            "nav_msgs/msg/MapMetaData", self._time(0.0), grid.resolution, columns, rows,
-            self._pose(origin),
-        )  # fmt: skip
+        origin = self._pose(TrackPoint(0.0, *grid.origin, ""))
+        data = self._time(0.0), grid.resolution, columns, rows, origin
+        info = self._new("nav_msgs/msg/MapMetaData", *data)
         cells = np.where(grid.cells == UNKNOWN, -1, grid.cells.astype(np.int16)).astype(np.int8)
         return self._new("nav_msgs/msg/OccupancyGrid", self._header(0.0), info, cells.ravel())
 
@@ -145,8 +136,7 @@ class _Maker:
         return self._new("rcl_interfaces/msg/Log", stamp, level, moment.who, moment.what, "", "", 0)
 
     def _new(self, kind: str, *values: Any) -> Any:
-        make: Callable[..., Any] = self._types[kind]
-        return make(*values)
+        return self._types[kind](*values)
 
     def _time(self, time: float) -> Any:
         stamp = messages.stamp(time)

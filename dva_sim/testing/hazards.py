@@ -13,6 +13,7 @@ import numpy as np
 from dva_sim.testing.promises import Case, Outcome, kept, line, part_by_part
 from dva_sim.worlds.hazards import (
     CLEAR,
+    PLUGINS,
     QUANTITIES,
     Conditions,
     Dose,
@@ -23,7 +24,6 @@ from dva_sim.worlds.hazards import (
     detection_time,
 )
 from dva_sim.worlds.hazards.detectors import DETECTORS
-from dva_sim.worlds.hazards.registry import PLUGINS
 from dva_sim.worlds.site import Site, load_site
 from dva_sim.worlds.site_parts import Detector
 

@@ -121,7 +121,7 @@ TRIALS: Final[dict[str, CheckedKind]] = {
         ),
         CheckedKind(
             "hazard",
-            "dva_sim.worlds.hazards.registry:PLUGINS",
+            "dva_sim.worlds.hazards:PLUGINS",
             "dva_sim.testing.hazards:check_hazard",
             "{tries} questions, {us:.0f} microseconds an answer",
         ),

@@ -41,11 +41,10 @@ class Traffic:
     """
 
     def __init__(self, ax: Axes, moments: Moments) -> None:
-        self._moments, recording = moments, moments.recording
-        robots = set(recording.radii)
-        traffic = recording.recorder.traffic or []
-        self._up = np.array([sent.time for sent in traffic if sent.destination in robots])
-        self._down = np.array([sent.time for sent in traffic if sent.source in robots])
+        self._moments, robots = moments, set(moments.recording.radii)
+        traffic = moments.recording.recorder.traffic or []
+        up = np.array([sent.time for sent in traffic if sent.destination in robots])
+        down = np.array([sent.time for sent in traffic if sent.source in robots])
         ax.set_xlim(-WINDOW_S, 0)
         ax.set_ylim(-1, 1)
         ax.set_yticks([0.5, -0.5], ["to robots", "from robots"], fontsize=style.FONT)
@@ -53,20 +52,18 @@ class Traffic:
         ax.spines[["top", "right", "left"]].set_visible(False)
         ax.axhline(0, color="0.7", lw=0.6)
         ax.tick_params(length=0)
-        self._lines = [
-            ax.vlines([], 0, height, color=colour, lw=0.7, animated=True)
-            for height, colour in ((0.85, "#3f90da"), (-0.85, "0.55"))
+        self._strips = [
+            (times, height, ax.vlines([], 0, height, color=colour, lw=0.7, animated=True))
+            for times, height, colour in ((up, 0.85, "#3f90da"), (down, -0.85, "0.55"))
         ]
 
     def show(self, time: float) -> list[Artist]:
         """The strip at a moment [s]; after the end of the run its last one."""
         time = self._moments.within(time)
-        for lines, times, height in zip(
-            self._lines, (self._up, self._down), (0.85, -0.85), strict=True
-        ):
+        for times, height, lines in self._strips:
             inside = times[(times > time - WINDOW_S) & (times <= time)] - time
             lines.set_segments([np.array([[x, 0.0], [x, height]]) for x in inside])
-        return list(self._lines)
+        return [lines for *_, lines in self._strips]
 
 
 FPS = 8

@@ -240,7 +240,7 @@ class _Source:
 
     def show(self, moments: Moments, time: float) -> list[Artist]:
         """Those of a kind that go on."""
-        hazards = [incident.hazard for incident in moments.going_on(time)]
+        hazards = (incident.hazard for incident in moments.going_on(time))
         places = [hazard.position for hazard in hazards if hazard.title == self._title]
         if not places:
             return []

@@ -31,7 +31,8 @@ def strip(recordings: Sequence[Playback], times: Sequence[float]) -> Figure:
     """A run at several moments [s], from left to right and from top to bottom; of several runs
     each has a column."""
     count = len(recordings)
-    return _sheet(recordings, times, count if count > 1 else _columns(len(times)))
+    # Of a single run one column or two: more would be too small to read.
+    return _sheet(recordings, times, count if count > 1 else min(len(times), 2))
 
 
 def best_time(recordings: Sequence[Playback]) -> float:
@@ -70,11 +71,6 @@ def check_times(recordings: Sequence[Playback], times: Sequence[float]) -> None:
     wrong = [time for time in times if not 0 <= time <= ends]
     if wrong:
         raise ConfigError(f"--at {wrong[0]:g} is not within the run, which lasts {ends:.0f} s")
-
-
-def _columns(panels: int) -> int:
-    """One or two: more would be too small to read."""
-    return min(panels, 2)
 
 
 def _sheet(recordings: Sequence[Playback], times: Sequence[float], columns: int) -> Figure:

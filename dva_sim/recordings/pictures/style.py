@@ -26,7 +26,7 @@ FONT = 8.0  # of labels [points]: 11 pixels on such a page
 TITLE = 10.0  # [points]
 LEAST = 6.5  # of names on the ground [points]: 9 pixels on such a page
 ROOMY = 10.0  # from this scale on a map has room for small marks [points/m]
-AHEAD, BEHIND, FAILED = "#1b7a3d", "#59606a", "#a03030"  # how a run ended
+AHEAD, BEHIND, FAILED = ENDS = "#1b7a3d", "#59606a", "#a03030"  # how a run ended
 SMALLEST = {ROBOT: 8.5, GUARD: 7.5, BYSTANDER: 4.5}  # diameters, however large the site [points]
 TRAIL_S = 40.0  # a trail's colour falls to a third in that time [s]
 
@@ -62,15 +62,7 @@ OUTLINES = {
 LENGTHS = {ROBOT: 1.6, GUARD: 1.64, BYSTANDER: 1.64}  # of the marker box, twice the bow
 
 FIRE, GAS, WATER, SMOKE = "#d1332e", "#b59a00", "#2a7fb8", "#55585e"  # over the floor
-SMALL = (
-    *ROBOT_MODES.values(),
-    *ACTIVITIES.values(),
-    *(FIRE, GAS, WATER),
-    GHOST,
-    AHEAD,
-    BEHIND,
-    FAILED,
-)
+SMALL = (*ROBOT_MODES.values(), *ACTIVITIES.values(), FIRE, GAS, WATER, GHOST, *ENDS)
 GAS_LEVELS = (0.1, 0.2, 0.5, 1.0)  # of the lower explosive limit
 HEAT_LEVELS = (1.0, 2.5, 10.0)  # [kW/m2]; skin bears 2.5 for long
 
@@ -85,21 +77,18 @@ def colour_of(kind: str, mode: str) -> str:
 
 def legend(moments: Iterable[Moments]) -> list[Artist]:
     """A key for what occurs in some runs."""
-    runs, handles, met = list(moments), [], set()
+    runs, handles = list(moments), []
     for kind in (ROBOT, GUARD, BYSTANDER):
         names = [(run, name) for run in runs for name in run.names(kind)]
         modes = {p.mode: None for run, name in names for p in run.tracks[name]}
         for mode in sorted(modes, key=_order):
-            met.add(kind)
             handles.append(_dot(SHAPES[kind], colour_of(kind, mode), f"{kind}: {mode.lower()}"))
     looks = {title: hazard for run in runs for title, hazard in run.looks.items()}
     for title, hazard in sorted(looks.items()):
         handles.append(_dot(hazard.mark, hazard.colour, title))
     if any(run.recording.recorder.views for run in runs):
         seen = "as the operator sees it"
-        handles.append(
-            Line2D([], [], ls="none", marker="o", mfc="none", mec=GHOST, ms=7, label=seen)
-        )
+        handles.append(_dot("o", "none", seen, GHOST))
     handles += _fields({what for run in runs for what in run.shown})
     return handles
 
@@ -119,8 +108,8 @@ def _fields(shown: set[str]) -> list[Artist]:
     return handles
 
 
-def _dot(shape: str, colour: str, label: str) -> Any:
-    return Line2D([], [], ls="none", marker=shape, mfc=colour, mec="white", ms=7, label=label)
+def _dot(shape: str, colour: str, label: str, edge: str = "white") -> Any:
+    return Line2D([], [], ls="none", marker=shape, mfc=colour, mec=edge, ms=7, label=label)
 
 
 def _order(mode: str) -> tuple[int, str]:
@@ -130,11 +119,7 @@ def _order(mode: str) -> tuple[int, str]:
 
 
 MARGIN, GAP = 0.06, 0.16  # around everything; between columns
-HEADING, TITLE_HEIGHT, LINE = (
-    0.24,
-    0.22,
-    0.32,
-)  # heights of lines: above all, above a map, below a map
+HEADING, TITLE_HEIGHT, LINE = 0.24, 0.22, 0.32  # of lines above all, above and below a map
 TALLEST = 7.5  # a map
 
 

@@ -7,6 +7,9 @@ of which kind one is. It may import sites, maps and messages' words, no agents. 
 
 from __future__ import annotations
 
+from typing import Final, cast
+
+from dva_sim.kernel.plugins import Plugins
 from dva_sim.worlds.hazards.building import Building, SitePoints, building_of
 from dva_sim.worlds.hazards.conditions import CLEAR, QUANTITIES, Conditions
 from dva_sim.worlds.hazards.dose import Dose, pace_in_smoke, pace_in_water
@@ -14,7 +17,6 @@ from dva_sim.worlds.hazards.fire import GROWTH_S, Fire
 from dva_sim.worlds.hazards.flood import Flood
 from dva_sim.worlds.hazards.gas_leak import GASES, GasLeak
 from dva_sim.worlds.hazards.hazard import Hazard, HazardField, detection_time, first_detection
-from dva_sim.worlds.hazards.registry import KINDS, find_hazard, make_hazard
 from dva_sim.worlds.hazards.surroundings import Raster, Surroundings
 
 __all__ = [
@@ -42,3 +44,47 @@ __all__ = [
     "pace_in_smoke",
     "pace_in_water",
 ]
+
+KINDS: Final[dict[str, type[Hazard]]] = {kind.reported_as: kind for kind in (Fire, GasLeak, Flood)}
+"""The shipped kinds: there is one for each that messages know."""
+
+PLUGINS: Final = Plugins[Hazard](
+    "hazard",
+    Hazard,
+    KINDS,
+    folder="worlds/hazards",
+    group="dva_sim.hazards",
+    key="events.0.kind",
+    needs="field(site)",
+    public="dva_sim.worlds.hazards.Hazard",
+)
+
+
+def find_hazard(kind: str) -> type[Hazard]:
+    """The class that `kind` means.
+
+    Args:
+        kind: A shipped kind such as `fire`, a class in a file such as `mine.py:Mine`, or the
+            name under which an installed package offers one (entry point, `dva_sim.hazards`).
+
+    Raises:
+        ConfigError: there is none of that name, or it cannot be loaded, or is no hazard.
+    """
+    return cast(type[Hazard], PLUGINS.find(kind))
+
+
+def make_hazard(
+    kind: str, position: tuple[float, float], start: float, **settings: str | float
+) -> Hazard:
+    """A hazard at a place [m], from `start` [s] on.
+
+    Args:
+        kind: See `find_hazard`.
+        position: Its middle [m].
+        start: [s]
+        settings: What else belongs to its kind: `growth`, `gas`, `rate`, `inflow`, ...
+
+    Raises:
+        ConfigError: a kind or setting that is not known, or a value that it cannot have.
+    """
+    return PLUGINS.make(kind, find_hazard(kind), settings, position, start)

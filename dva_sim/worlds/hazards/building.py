@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -62,18 +61,7 @@ class Building:
 
     def space_at(self, x: float, y: float) -> int:
         """Index of the space around a point [m], or `NOWHERE`."""
-        x0, y0, cos, sin = self._turn
-        column = math.floor(cos * (x - x0) + sin * (y - y0))
-        row = math.floor(cos * (y - y0) - sin * (x - x0))
-        rows, columns = self.labels.shape
-        return int(self.labels[row, column]) if 0 <= row < rows and 0 <= column < columns else -1
-
-    @cached_property
-    def _turn(self) -> tuple[float, float, float, float]:
-        """The grid's corner [m], and how its axes lie [cells/m]."""
-        origin, per_metre = self.grid.origin, 1.0 / self.grid.resolution
-        cos, sin = math.cos(origin.heading), math.sin(origin.heading)
-        return origin.x, origin.y, per_metre * cos, per_metre * sin
+        return int(self.grid.look_up(self.labels, x, y, NOWHERE))
 
 
 class SitePoints:
