@@ -26,7 +26,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from typing import Final, Generic, NamedTuple, Protocol, TypeVar
+from typing import Final, Generic, NamedTuple, TypeVar
 
 import pymunk
 from pymunk._chipmunk_cffi import lib
@@ -93,6 +93,7 @@ class Jam:
         return way < JAM_WAY and abs(heading - self._heading) < JAM_TURN
 
 
+US: Final = 1_000_000
 G: Final = 9.81  # [m/s^2]
 GRIP: Final = 0.8  # friction coefficient of rubber on a dry floor
 FRICTION, ELASTICITY = 0.3, 0.1  # of bumpers and walls; both multiply in a contact
@@ -141,25 +142,57 @@ class AskedFor(Generic[T]):
         return self.now
 
 
-class Timing(Protocol):
-    """What a body needs to know of the world that steps it."""
+class Ticks:
+    """A space stepped in whole ticks up to when somebody looks.
 
-    @property
-    def space(self) -> pymunk.Space:
-        """What its shape, and what holds it, belong to."""
+    Who stands and is asked nothing sleeps: it costs nothing until it is asked or touched.
+
+    Args:
+        dt: Length of a tick [s], a whole number of microseconds.
+
+    Attributes:
+        space: What the shapes of bodies, and what holds them, belong to.
+    """
+
+    def __init__(self, dt: float) -> None:
+        self.dt, self.space = dt, pymunk.Space()
+        self._tick_us = round(dt * US)
+        self._tick, self._now_us = 0, 0
+        self._awake: dict[Body, None] = {}  # a set that keeps its order
+
+    def wake(self, body: Body) -> None:
+        """A body was asked for something, or was touched: it is pushed from the next tick on."""
+        self._awake[body] = None
+
+    def forget(self, body: Body) -> None:
+        """A body is not pushed any more."""
+        self._awake.pop(body, None)
+
+    def tick_at(self, time: float) -> float:
+        """The first tick that begins at `time` [s] or later."""
+        return math.inf if time == math.inf else -(round(-max(time, 0.0) * US) // self._tick_us)
 
     @property
     def time(self) -> float:
         """Of the last whole tick [s]."""
+        return self._tick * self.dt
 
     def next_tick(self) -> int:
         """The first tick that a set point given now can reach."""
+        return max(self._tick, -(-self._now_us // self._tick_us))
 
-    def tick_at(self, time: float) -> float:
-        """The first tick that begins at `time` [s] or later."""
-
-    def wake(self, body: Body) -> None:
-        """The body has to be pushed from the next tick on."""
+    def advance_to(self, time: float) -> None:
+        """Let the bodies move up to `time` [s], in whole ticks; never back."""
+        self._now_us = max(self._now_us, round(time * US))
+        due = self._now_us // self._tick_us
+        step, dt = self.space.step, self.dt
+        while self._tick < due and self._awake:
+            for body in [body for body in self._awake if not body.push(self._tick, dt)]:
+                del self._awake[body]
+            if self._awake:
+                step(dt)
+            self._tick += 1
+        self._tick = max(self._tick, due)
 
 
 class Body:
@@ -174,7 +207,7 @@ class Body:
 
     kind: int
 
-    def __init__(self, world: Timing, name: str, body: pymunk.Body, shape: pymunk.Shape) -> None:
+    def __init__(self, world: Ticks, name: str, body: pymunk.Body, shape: pymunk.Shape) -> None:
         self.name, self._world, self.body, self.shape = name, world, body, shape
         self._raw = body._body  # what the functions of the library take
         self.radius, self.impulse = 0.0, 0.0
@@ -231,7 +264,9 @@ class Body:
 
     def feels(self, other: Body | None, impulse: float) -> None:
         """A contact with somebody, or a wall (None), has stopped or pushed it [N s]."""
-        raise NotImplementedError
+        self._world.wake(self)
+        if self.counts(other):
+            self.impulse += impulse
 
 
 REST: Final = 8.0  # time constants after which nothing is left of a speed of 1 m/s
@@ -300,7 +335,7 @@ class RobotBody(Body):
 
     kind = ROBOT
 
-    def __init__(self, world: Timing, name: str, spec: DriveSpec, pose: Pose) -> None:
+    def __init__(self, world: Ticks, name: str, spec: DriveSpec, pose: Pose) -> None:
         if spec.corners:
             moment = pymunk.moment_for_poly(spec.mass, spec.corners)
         else:
@@ -457,8 +492,3 @@ class RobotBody(Body):
         """All; those with people by themselves, too."""
         person = other is not None and other.kind == PERSON
         return (self._touch, self._people) if person else (self._touch,)
-
-    def feels(self, other: Body | None, impulse: float) -> None:
-        """A contact with somebody, or a wall (None), has stopped or pushed it [N s]."""
-        self.impulse += impulse
-        self._world.wake(self)

@@ -27,7 +27,7 @@ from dva_sim.worlds.bodies import (
     Body,
     Contacts,
     RobotBody,
-    Timing,
+    Ticks,
     set_force,
     set_velocity,
 )
@@ -54,7 +54,7 @@ class PersonBody(Body):
 
     kind = PERSON
 
-    def __init__(self, world: Timing, name: str, pose: Pose, radius: float) -> None:
+    def __init__(self, world: Ticks, name: str, pose: Pose, radius: float) -> None:
         body = pymunk.Body(MASS, math.inf)
         body.position = pose.x, pose.y
         shape = pymunk.Circle(body, radius)
@@ -97,14 +97,7 @@ class PersonBody(Body):
         """Only those with robots."""
         return (self._touch,) if other is not None and other.kind == ROBOT else ()
 
-    def feels(self, other: Body | None, impulse: float) -> None:
-        """A contact with somebody, or a wall (None), has stopped or pushed it [N s]."""
-        self._world.wake(self)
-        if other is not None and other.kind == ROBOT:
-            self.impulse += impulse
 
-
-US = 1_000_000
 SLOP = 0.005  # overlap that a contact may keep; pymunk's default is for pixels [m]
 OVERLAP = 0.02  # overlap with a wall that is forgiven when a body is placed [m]
 
@@ -112,10 +105,8 @@ _FIXED, _MOVING = 0b01, 0b10  # categories: what is asked of the space can leave
 _MOVERS = pymunk.ShapeFilter(mask=_MOVING)
 
 
-class World:
-    """Walls, robots and people of one site, stepped in whole ticks up to when somebody looks.
-
-    Who stands and is asked nothing sleeps: it costs nothing until it is asked or touched.
+class World(Ticks):
+    """Walls, robots and people of one site.
 
     Args:
         site: Gives the walls.
@@ -127,14 +118,11 @@ class World:
     """
 
     def __init__(self, site: Site, dt: float = 0.02) -> None:
-        self.dt, self.site = dt, site
+        super().__init__(dt)
+        self.site = site
         self.robots: list[RobotBody] = []
         self.people: list[PersonBody] = []
-        self.space = pymunk.Space()
         self.space.collision_slop = SLOP
-        self._tick_us = round(dt * US)
-        self._tick, self._now_us = 0, 0
-        self._awake: dict[Body, None] = {}  # a set that keeps its order
         self._by_shape: dict[pymunk.Shape, Body] = {}
         self.space.add(*(_wall(self.space, *ends) for ends in site.walls.tolist()))
         for one, other in ((ROBOT, WALL), (ROBOT, ROBOT), (ROBOT, PERSON), (PERSON, PERSON)):
@@ -172,7 +160,7 @@ class World:
     def remove(self, person: PersonBody) -> None:
         """Take somebody away who has left the site; where it was last, it still says."""
         self.people.remove(person)
-        self._awake.pop(person, None)
+        self.forget(person)
         self.space.remove(person.body, person.shape)
         del self._by_shape[person.shape]
 
@@ -204,38 +192,6 @@ class World:
             if distance <= within:
                 found.append((body, distance))
         return sorted(found, key=lambda pair: (pair[1], pair[0].name))
-
-    # --- time --------------------------------------------------------------------------
-
-    def wake(self, body: Body) -> None:
-        """A body was asked for something, or was touched: it is pushed again."""
-        self._awake[body] = None
-
-    def tick_at(self, time: float) -> float:
-        """The first tick that begins at `time` [s] or later."""
-        return math.inf if time == math.inf else -(round(-max(time, 0.0) * US) // self._tick_us)
-
-    @property
-    def time(self) -> float:
-        """Of the last whole tick [s]."""
-        return self._tick * self.dt
-
-    def next_tick(self) -> int:
-        """The first tick that a set point given now can reach."""
-        return max(self._tick, -(-self._now_us // self._tick_us))
-
-    def advance_to(self, time: float) -> None:
-        """Let the bodies move up to `time` [s], in whole ticks; never back."""
-        self._now_us = max(self._now_us, round(time * US))
-        due = self._now_us // self._tick_us
-        step, dt = self.space.step, self.dt
-        while self._tick < due and self._awake:
-            for body in [body for body in self._awake if not body.push(self._tick, dt)]:
-                del self._awake[body]
-            if self._awake:
-                step(dt)
-            self._tick += 1
-        self._tick = max(self._tick, due)
 
     # --- contacts ----------------------------------------------------------------------
 

@@ -51,7 +51,7 @@ def test_the_curve_of_a_car_has_the_radius_of_its_wheelbase_and_steering_angle(t
     robot.drive(0.5, turn_rate, math.inf)
     world.advance_to(3.0)
     assert robot.turn_rate == pytest.approx(side * robot.speed / RADIUS, rel=1e-3)
-    assert robot.turning_radius == pytest.approx(RADIUS)
+    assert robot.motors.turning_radius == pytest.approx(RADIUS)
     points = []
     for _ in range(400):
         world.advance_to(world.time + DT)
