@@ -37,6 +37,7 @@ MOVED = {
     "timed": "simulation.shift",
     "worlds.drawing": "worlds.geojson",
     "worlds.layout": "worlds.site",
+    "worlds.robot_body": "worlds.bodies",
 }
 
 

@@ -1,5 +1,5 @@
 """Where runs take place: sites, maps, physics, hazards, and what robots' cameras make of them.
 
 It knows no agents, no network and no DVA; of messages it knows the words alone. Begin with
-`layout.py`, what a site is, and `site.py`, sites by name.
+`site.py`, what a site is and sites by name, and `site_parts.py`, what it is made of.
 """
