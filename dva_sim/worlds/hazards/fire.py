@@ -22,8 +22,8 @@ from dva_sim.worlds.hazards.detectors import (
     LATEST,
     SMOKE_ALARM,
     SMOKE_LAYER,
-    CoAlarm,
     DetectorAlarm,
+    alarm_in,
 )
 from dva_sim.worlds.hazards.hazard import Hazard, March, Point, SolvedField, Step
 from dva_sim.worlds.hazards.smoke import (
@@ -385,19 +385,16 @@ class FireField(SolvedField):
 
     def alarm(self, detector: str, x: float, y: float) -> DetectorAlarm:
         """See `HazardField`: under a ceiling, where the jet arrives and smoke gathers."""
-        space, carbon_monoxide = self.building.space_at(x, y), CoAlarm()
+        space = self.building.space_at(x, y)
 
-        def sounds(age: float, dt: float) -> bool:
+        def air(age: float) -> Conditions:
             layer = self.layer(space, age) if space >= 0 else None
             if layer is None or layer.depth < SMOKE_LAYER:
-                return False
-            if detector == "smoke":
-                return layer.extinction >= SMOKE_ALARM
-            if detector == "heat":
-                return layer.temperature >= HEAT_ALARM
-            return carbon_monoxide.add(layer.co, dt)
+                return CLEAR
+            return Conditions(layer.temperature, 0.0, layer.extinction, layer.co)
 
-        return DetectorAlarm(sounds, *self._jet_at(detector, x, y))
+        reached, at_latest = self._jet_at(detector, x, y)
+        return alarm_in(detector, air)._replace(reached=reached, at_latest=at_latest)
 
     def _jet_at(self, detector: str, x: float, y: float) -> tuple[float, float]:
         """Ages at which the ceiling jet reaches a detector, and sets it off [s]."""

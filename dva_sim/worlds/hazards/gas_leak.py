@@ -13,7 +13,7 @@ from pydantic import Field
 
 from dva_sim.worlds.hazards.building import NOWHERE, Floats, SitePoints
 from dva_sim.worlds.hazards.conditions import BREATHING_HEIGHT, Conditions
-from dva_sim.worlds.hazards.detectors import CoAlarm, DetectorAlarm
+from dva_sim.worlds.hazards.detectors import DetectorAlarm, alarm_in
 from dva_sim.worlds.hazards.gas_dispersion import MIXED_HEIGHT, Air, Draught, air_in, mesh_in, plume
 from dva_sim.worlds.hazards.hazard import LARGEST, Hazard, March, SolvedField, Step
 from dva_sim.worlds.site import Site
@@ -35,7 +35,6 @@ class Gas(NamedTuple):
         lower: Lower explosive limit.
         upper: Upper explosive limit.
         danger: People should not be where there is more.
-        alarm: Detectors for fuel gas notice it from there on.
         leak: A serious leak in a building [m^3/s]; assumed.
 
     References:
@@ -46,16 +45,15 @@ class Gas(NamedTuple):
     lower: float
     upper: float
     danger: float
-    alarm: float
     leak: float
 
 
-# Fuel gases alarm at 10 % and are dangerous from 20 % of the lower explosive limit on, the two
-# levels that fixed gas detectors are usually set to.
+# Fuel gases are dangerous from 20 % of the lower explosive limit on: the second of the two levels
+# that fixed gas detectors are usually set to.
 GASES = {
-    "methane": Gas(0.044, 0.17, 0.0088, 0.0044, 0.010),
-    "propane": Gas(0.017, 0.109, 0.0034, 0.0017, 0.004),
-    "carbon_monoxide": Gas(0.109, 0.74, 1200e-6, math.inf, 1e-4),
+    "methane": Gas(0.044, 0.17, 0.0088, 0.010),
+    "propane": Gas(0.017, 0.109, 0.0034, 0.004),
+    "carbon_monoxide": Gas(0.109, 0.74, 1200e-6, 1e-4),
 }
 
 
@@ -204,7 +202,9 @@ class LeakField(SolvedField):
 
     def at(self, x: float, y: float, time: float) -> Conditions:
         """See `HazardField`; carbon monoxide kills long before it could explode."""
-        share = self.share(x, y, time)
+        return self._air_with(self.share(x, y, time))
+
+    def _air_with(self, share: float) -> Conditions:
         if self._leak.gas == "carbon_monoxide":
             return Conditions(co=1e6 * share)
         return Conditions(gas=share, explosive=share / self._leak.kind_of_gas.lower)
@@ -246,11 +246,8 @@ class LeakField(SolvedField):
 
     def alarm(self, detector: str, x: float, y: float) -> DetectorAlarm:
         """See `HazardField`: of the leak as it is seen from there."""
-        share, carbon_monoxide = self.seen_from(x, y), CoAlarm()
-        if detector == "co":
-            return DetectorAlarm(lambda age, dt: carbon_monoxide.add(1e6 * share(age), dt))
-        alarm = self._leak.kind_of_gas.alarm
-        return DetectorAlarm(lambda age, dt: share(age) >= alarm)
+        share = self.seen_from(x, y)
+        return alarm_in(detector, lambda age: self._air_with(share(age)))
 
     def _outdoors(self, x: float, y: float, time: float) -> float:
         """In the plume: what is there was set free when the wind set out from the leak."""
