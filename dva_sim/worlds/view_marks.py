@@ -142,7 +142,7 @@ def mast() -> Path:
     return Path.make_compound_path(pole, *waves)
 
 
-# --- names of rooms ----------------------------------------------------------------------
+# --- names of rooms --------------------------------------------------------------------
 SIZES = (7.5, 6.5, 5.5, 4.8, 4.2, 3.6)  # [pt]
 LINE = 1.15  # height of a line, in font sizes
 SLACK = 0.3  # of a line, as fonts are drawn in whole dots [font sizes]
