@@ -104,7 +104,7 @@ class Fleet:
             around.guard,
             name=body.name,
             reach=around.reach,
-            turning_radius=body.turning_radius,
+            turning_radius=body.motors.turning_radius,
         )
         robot = Robot(body, around, pilot)
         self.robots.append(robot)
