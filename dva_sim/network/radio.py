@@ -6,15 +6,10 @@ from collections.abc import Callable
 from typing import Protocol
 
 from dva_sim.kernel.streams import Streams
-from dva_sim.network.link import (
-    ConstantRate,
-    Direction,
-    Link,
-    LinkConfig,
-    Serialiser,
-    Weather,
-    make_serialiser,
-)
+from dva_sim.network.link.config import Direction, LinkConfig
+from dva_sim.network.link.link import Link, make_serialiser
+from dva_sim.network.link.rates import ConstantRate, Serialiser
+from dva_sim.network.link.time_noise import Weather
 from dva_sim.network.link.delays import Wobble
 
 

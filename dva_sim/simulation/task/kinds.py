@@ -15,10 +15,10 @@ from pydantic import Field, model_validator
 
 from dva_sim.kernel.config import Config
 
-Positive = Annotated[float, Field(gt=0, le=1000)]  # nobody does a task that is longer
+Length = Annotated[float, Field(gt=0, le=1000)]  # nobody does a task that is longer
 NonNegative = Annotated[float, Field(ge=0)]
-Several = Annotated[tuple[Positive, ...], Field(min_length=1, max_length=50)]
-Values = Positive | Several
+Several = Annotated[tuple[Length, ...], Field(min_length=1, max_length=50)]
+Values = Length | Several
 
 
 def values_of(given: float | tuple[float, ...]) -> tuple[float, ...]:
@@ -169,7 +169,7 @@ class Slalom(Config):
     kind: Literal["slalom"] = "slalom"
     cones: Annotated[int, Field(ge=1, le=100)] = 6
     spacing_m: Values = 4.0
-    swing_m: Positive = 1.0
+    swing_m: Length = 1.0
     width_m: Values = 1.5
 
     def conditions(self) -> Iterator[tuple[float, float]]:
