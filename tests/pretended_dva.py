@@ -21,8 +21,8 @@ from dva_sim.protocol import messages as m
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full.control_room import add_operator
 from dva_sim.simulation.full.field import Field
-from dva_sim.simulation.full.robots import Machines, Starts
 from dva_sim.simulation.full.stage import Stage, id_of
+from dva_sim.simulation.full.team import Machines, Starts
 from dva_sim.worlds.geo import Pose
 
 GUARD, ROBOT, OTHER_ROBOT = id_of("guard", 1), id_of("robot", 1), id_of("robot", 2)

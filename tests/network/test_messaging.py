@@ -8,9 +8,9 @@ import pytest
 
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.streams import Streams
+from dva_sim.network.connections import MAX_IN_FLIGHT, Connection, Stream
 from dva_sim.network.link import ConstantRate, Link, LinkConfig
 from dva_sim.network.messaging import Request, Requester
-from dva_sim.network.stream import MAX_IN_FLIGHT, Connection, Stream
 from dva_sim.network.virtual import VirtualNetwork
 
 

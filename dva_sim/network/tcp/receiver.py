@@ -16,7 +16,7 @@ from math import inf
 from dva_sim.kernel.clock import Clock
 from dva_sim.network.tcp.options import TcpOptions
 from dva_sim.network.tcp.retransmission_timer import RoundTrip, Timer
-from dva_sim.network.tcp.send_buffer import SMALLEST
+from dva_sim.network.tcp.send_queue import SMALLEST
 
 FIRST_WINDOW = 65_160  # 45 full segments [B]
 LARGEST_WINDOW = 3_145_728  # half of tcp_rmem's third value [B]

@@ -15,7 +15,7 @@ from math import inf
 from dva_sim.network.tcp.congestion import RateReduction, Reno
 from dva_sim.network.tcp.options import TcpOptions
 from dva_sim.network.tcp.retransmission_timer import RoundTrip
-from dva_sim.network.tcp.scoreboard import Scoreboard, SentSegment
+from dva_sim.network.tcp.send_queue import Scoreboard, SentSegment
 
 DUPLICATES = 3
 _MICROSECOND = 1e-6  # the clock's step

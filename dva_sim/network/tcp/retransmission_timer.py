@@ -22,7 +22,7 @@ from math import ceil, inf
 
 from dva_sim.kernel.clock import Clock
 from dva_sim.network.tcp.options import TcpOptions
-from dva_sim.network.tcp.scoreboard import Scoreboard
+from dva_sim.network.tcp.send_queue import Scoreboard
 
 
 class RoundTrip:

@@ -15,8 +15,7 @@ from dva_sim.network.tcp.congestion import HyStart, make_window
 from dva_sim.network.tcp.options import TcpOptions
 from dva_sim.network.tcp.recovery import OPEN, Recovery
 from dva_sim.network.tcp.retransmission_timer import PROBE, REORDER, WINDOW, Alarm, RoundTrip
-from dva_sim.network.tcp.scoreboard import Gain, Scoreboard, SentSegment
-from dva_sim.network.tcp.send_buffer import SendBuffer
+from dva_sim.network.tcp.send_queue import Gain, Scoreboard, SendBuffer, SentSegment
 
 Emit = Callable[[int, int, float], object]
 Blocks = tuple[tuple[int, int], ...]

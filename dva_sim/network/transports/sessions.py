@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Sequence
 
 from dva_sim.kernel.clock import Clock
 from dva_sim.network.link import Link
-from dva_sim.network.tcp import TcpOptions
-from dva_sim.network.transports.bottleneck import Bottleneck, TcpTransport
+from dva_sim.network.tcp import TcpConnection, TcpEndpoint, TcpOptions
 from dva_sim.network.transports.config import (
     Btp,
+    Deliver,
     Ends,
     Irtp,
     Rtnp,
@@ -30,20 +31,6 @@ from dva_sim.network.transports.datagrams import (
 )
 from dva_sim.network.transports.rate_control import Aimd, LeastRoundTrip, RateLaw, ThreeTerms
 from dva_sim.network.zmtp import ZmtpConnection, ZmtpOptions, framed
-
-NAME = "teleoperation"
-
-
-def ends_at(
-    bottleneck: Bottleneck,
-    config: TransportConfig,
-    on_command: Callable[[int], object],
-    on_picture: Callable[[int], object],
-) -> Ends:
-    """Where a session stands: its two links, with priority at the end hosts if it has that."""
-    first = isinstance(config, Rtnp)
-    up, down = bottleneck.link(NAME, "up", first), bottleneck.link(NAME, "down", first)
-    return Ends(up, down, on_command, on_picture)
 
 
 def open_session(clock: Clock, config: TransportConfig, ends: Ends) -> TransportSession:
@@ -174,3 +161,72 @@ def answer_each_other(one: DatagramSender, other: DatagramSender) -> None:
     """Let the acknowledgements of two directions ride on each other's datagrams."""
     one.ride, other.ride = other.echoes, one.echoes
     one.on_arrival, other.on_arrival = other.hear, one.hear
+
+
+ALL = 1 << 30  # more than is ever readable [B]
+
+
+class OrderedMessages:
+    """Messages written to one end of a connection and read from the other, in order.
+
+    What the send buffer has no room for waits in the program, without end.
+
+    Args:
+        writer: Where they are written.
+        reader: Where they are read.
+        deliver: Told of every message once all of it is read.
+    """
+
+    def __init__(self, writer: TcpEndpoint, reader: TcpEndpoint, deliver: Deliver) -> None:
+        self._writer, self._reader, self._deliver = writer, reader, deliver
+        self._unwritten, self._read, self._ends_at = 0, 0, 0
+        self._ends: deque[tuple[int, int]] = deque()  # of the messages under way
+        self._is_open = False
+        writer.on_writable = self._write
+        reader.on_readable = self._take
+
+    def open(self) -> None:
+        """From now on the connection takes what is written."""
+        self._is_open = True
+        self._write()
+
+    def send(self, message: TransportMessage) -> None:
+        """Write a message, or as much as there is room for."""
+        self._ends_at += message.size
+        self._ends.append((self._ends_at, message.number))
+        self._unwritten += message.size
+        self._write()
+
+    def _write(self) -> None:
+        if self._is_open and self._unwritten:
+            self._unwritten -= self._writer.write(self._unwritten)
+
+    def _take(self) -> None:
+        self._read += self._reader.read(self._reader.readable)
+        while self._ends and self._ends[0][0] <= self._read:
+            self._deliver(self._ends.popleft()[1])
+
+
+class TcpTransport:
+    """One connection for both directions; nothing frames the messages.
+
+    Args:
+        clock: Virtual time.
+        ends: What it stands between.
+        options: Of the connection, alike at both ends.
+    """
+
+    def __init__(self, clock: Clock, ends: Ends, options: TcpOptions) -> None:
+        self._connection = TcpConnection(clock, ends.up, ends.down, options, options)
+        operator, robot = self._connection.opener, self._connection.peer
+        self._up = OrderedMessages(operator, robot, ends.on_command)
+        self._down = OrderedMessages(robot, operator, ends.on_picture)
+        self._connection.open(self._up.open, self._down.open)
+
+    def command(self, message: TransportMessage) -> None:
+        """See `Transport`."""
+        self._up.send(message)
+
+    def picture(self, message: TransportMessage) -> None:
+        """See `Transport`."""
+        self._down.send(message)

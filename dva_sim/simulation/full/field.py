@@ -15,9 +15,8 @@ from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.kernel.recorder import DriveLog
 from dva_sim.protocol import messages as m
 from dva_sim.simulation.full.hazards import Hearsay, RunHazard, draw_incidents
-from dva_sim.simulation.full.people import People
-from dva_sim.simulation.full.robots import Machines, Starts
 from dva_sim.simulation.full.stage import DVA, Stage
+from dva_sim.simulation.full.team import Machines, People, Starts
 from dva_sim.worlds.hazards import Conditions, Surroundings
 from dva_sim.worlds.physics import World
 

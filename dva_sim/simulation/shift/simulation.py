@@ -20,14 +20,22 @@ from dva_sim.core.travel_times import Start
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.streams import Streams
 from dva_sim.protocol import messages as m
-from dva_sim.simulation.shift import knowledge
+from dva_sim.simulation.shift import control_room
+from dva_sim.simulation.shift.control_room import Mail
 from dva_sim.simulation.shift.demand import CALLERS, Demand, Incident
 from dva_sim.simulation.shift.distributions import Draws, Law, times
-from dva_sim.simulation.shift.mailbox import Mail
-from dva_sim.simulation.shift.recording import TimedRecording, UnitRecord
+from dva_sim.simulation.shift.recording import (
+    CODES,
+    STEPS_IN_ORDER,
+    Floats,
+    Ledger,
+    Level,
+    Slices,
+    TimedRecording,
+    UnitRecord,
+)
 from dva_sim.simulation.shift.responders import Job, Unit
 from dva_sim.simulation.shift.scenario import TimedScenario
-from dva_sim.simulation.shift.statistics import CODES, STEPS_IN_ORDER, Floats, Ledger, Level, Slices
 from dva_sim.simulation.shift.travel import Occurrence, Place, Terrain, terrain_of
 
 SLACK = 1e-3  # deadlines are looked at exactly, but for the clock's step [s]
@@ -113,11 +121,11 @@ class Shift:
         self.demand = Demand(
             scenario, self.streams, self.terrain, self.clock, self._happens, self._noticed
         )
-        self.stations = knowledge.stations(scenario, self.terrain)
-        self.units = knowledge.hire(self, self.streams, self.stations)
+        self.stations = control_room.stations(scenario, self.terrain)
+        self.units = control_room.hire(self, self.streams, self.stations)
         self.by_device = {unit.device: unit for unit in self.units}
         self.numbers = {unit.device: unit.number for unit in self.units}
-        self.desk = knowledge.open_desk(self, policy)
+        self.desk = control_room.open_desk(self, policy)
         self.mail = self._open_mail(policy)
         self.records = [UnitRecord(unit.name, unit.kind) for unit in self.units]
         self.events: dict[int, list[Incident]] = {}
@@ -125,14 +133,16 @@ class Shift:
         self.unnoticed: dict[int, Incident] = {}
         self.total, self.settled = 0, Counter[str]()
         self.violations: Counter[str] = Counter()
-        self.driven = {knowledge.id_of("operator", n): 0.0 for n in range(scenario.operators.count)}
+        self.driven = {
+            control_room.id_of("operator", n): 0.0 for n in range(scenario.operators.count)
+        }
         self.told: list[m.Position | None] = [None] * len(self.units)
         self.half_way: dict[Unit, Place] = {}
         self._served: set[int] = set()
         self._newest = 0
         self._moving: dict[Unit, None] = {}
         self._luck: dict[tuple[str, int, str, int], Draws[float]] = {}
-        knowledge.register(self)
+        control_room.register(self)
         self.mail.carry()
         for start in sorted({group.from_s for group in scenario.responders}):
             on_duty = [unit for unit in self.units if unit.group.from_s == start]
@@ -232,7 +242,7 @@ class Shift:
     def _report(self, incident: Incident, kind: str) -> None:
         stream = self.scenario.demand[incident.stream]
         caller = incident.index % CALLERS if stream.patience or stream.repeats else 0
-        source = knowledge.id_of(kind, incident.stream * CALLERS + caller)
+        source = control_room.id_of(kind, incident.stream * CALLERS + caller)
         incident.sources.append(source)
         self.mail.say(source, incident.report("detected"), incident)
         self.mail.carry()
@@ -320,7 +330,7 @@ class Shift:
 
     def travel(self, starts: Sequence[Start], goals: Sequence[m.Position]) -> tuple[Floats, Floats]:
         """What the DVA is told of ways: see `core.travel_times.Travel`."""
-        return knowledge.travel(self, starts, goals)
+        return control_room.travel(self, starts, goals)
 
     def _tell_who_moves(self) -> None:
         """Before each decision the DVA hears where those are who move and may be called."""

@@ -30,16 +30,6 @@ from dva_sim.simulation.scenario.scenario import population
 from dva_sim.simulation.task import measures
 from dva_sim.simulation.task.delays import Channel, RecordedChannel, RecordedDelays, normals
 from dva_sim.simulation.task.devices import Joystick, Pair, Unicycle
-from dva_sim.simulation.task.kinds import (
-    Corner,
-    Course,
-    Pointing,
-    ReachTask,
-    Slalom,
-    Task,
-    Tracking,
-    Tunnel,
-)
 from dva_sim.simulation.task.pointing import (
     CursorTrial,
     Goal,
@@ -48,7 +38,18 @@ from dva_sim.simulation.task.pointing import (
     TrackGoal,
     TunnelGoal,
 )
-from dva_sim.simulation.task.scenario import OneWayDelay, TaskScenario
+from dva_sim.simulation.task.scenario import (
+    Corner,
+    Course,
+    OneWayDelay,
+    Pointing,
+    ReachTask,
+    Slalom,
+    Task,
+    TaskScenario,
+    Tracking,
+    Tunnel,
+)
 from dva_sim.simulation.task.trial import Seat, Trace, Trial
 
 RUN_OUT = 5.0  # the way goes on so far beyond the finish, so that nobody stops before it [m]

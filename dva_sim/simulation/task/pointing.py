@@ -37,8 +37,14 @@ from dva_sim.kernel.streams import Streams
 from dva_sim.simulation.task import measures
 from dva_sim.simulation.task.delays import Channel
 from dva_sim.simulation.task.devices import Cursor, Pair, make_device
-from dva_sim.simulation.task.kinds import Pointing, ReachTask, Tracking, Tunnel
-from dva_sim.simulation.task.scenario import OneWayDelay, TaskScenario
+from dva_sim.simulation.task.scenario import (
+    OneWayDelay,
+    Pointing,
+    ReachTask,
+    TaskScenario,
+    Tracking,
+    Tunnel,
+)
 from dva_sim.simulation.task.trial import MACHINE_GAIN, Seat, Trace, Trial
 
 MOVED = 1e-3  # a cursor that has gone so far has moved [m]; assumed
