@@ -13,7 +13,7 @@ from dva_sim.agents.people.guard import GuardAgent
 from dva_sim.agents.robot.controller import Mode
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.recorder import Recorder, TrackPoint
-from dva_sim.network.connections import HEADERS, MSS, Connector, Load
+from dva_sim.network.connections import Connector, Load
 from dva_sim.network.link import (
     ConstantRate,
     Direction,
@@ -23,6 +23,7 @@ from dva_sim.network.link import (
     part_links,
 )
 from dva_sim.network.link.link import Reception, make_link
+from dva_sim.network.tcp.options import HEADERS, MSS
 from dva_sim.network.virtual import VirtualNetwork
 from dva_sim.simulation.full.control_room import add_dva, add_operator
 from dva_sim.simulation.full.field import Danger, Field, is_dangerous
