@@ -95,12 +95,6 @@ class Field:
         """The log of a robot's newest drive, where its operator's recorder is ours."""
         return self.stage.recorder.newest_drive.get(robot)
 
-    def in_danger(self, x: float, y: float, now: float) -> bool:
-        """Whether a place [m] is one where people should not be."""
-        return self.is_near(self.dangers(now), x, y) or is_dangerous(
-            self.surroundings.at(x, y, now)
-        )
-
     def is_near(self, dangers: Iterable[Danger], x: float, y: float) -> bool:
         """Whether a place [m] is within a danger's radius, with no wall between."""
         sees = self.stage.planner.line_of_sight

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections import Counter, deque
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -153,7 +154,6 @@ class Team(ShiftWorld, Protocol):
 
     scenario: TimedScenario
     streams: Streams
-    terrain: Terrain
     demand: Demand
     stations: dict[str, Place]
     units: list[Unit]
@@ -162,9 +162,6 @@ class Team(ShiftWorld, Protocol):
 
     def trip(self, unit: Unit, start: Place, goal: Place) -> float:
         """Time to get somewhere [s]."""
-
-    def travel(self, starts: Sequence[Start], goals: Sequence[m.Position]) -> tuple[Floats, Floats]:
-        """What the DVA is told of ways."""
 
 
 def travel(
@@ -339,7 +336,7 @@ def open_desk(shift: Team, policy: Policy) -> Dva:
     ground = ground_of(shift) if policy.relocates or config.preferences else SiteKnowledge()
     desk = Dva(
         policy,
-        shift.travel,
+        partial(travel, shift),
         rules,
         rng=shift.streams["dva/policy"],
         sessions=sessions,

@@ -471,14 +471,8 @@ def _exposure(recording: TimedRecording) -> Row:
 
 def _desk(recording: TimedRecording) -> Row:
     counted = recording.counters
-    return {
-        "preempted": counted["preempted"],
-        "relocated": counted["relocated"],
-        "auctions": counted["auctions"],
-        "overruled": counted["overruled"],
-        "policy_failed": counted["policy failed"],
-        "messages": recording.messages,
-    }
+    row: Row = {what: counted[what] for what in ("preempted", "relocated", "auctions", "overruled")}
+    return row | {"policy_failed": counted["policy failed"], "messages": recording.messages}
 
 
 def _responder_row(recording: TimedRecording, unit: UnitRecord) -> Row:

@@ -331,25 +331,10 @@ class TimedRecording:
         count, total, _ = self.total(measure, stream)
         return total / count if count else math.nan
 
-    def batch_means(self, measure: str, stream: int | None = None) -> Floats:
-        """Mean of one of `MEASURES` in each batch [s], shape `(batches,)`; nan: none there."""
-        place = MEASURES.index(measure)
-        cells = self._of(self.cells, stream).sum(axis=0)
-        counts, sums = cells[:, COUNT + place], cells[:, SUM + place]
-        return np.asarray(np.where(counts > 0, sums / np.maximum(counts, 1.0), math.nan))
-
     def waited(self, stream: int | None = None) -> float:
         """Share of the events somebody was sent to that had to wait for it."""
         count = self.total("wait", stream)[0]
         return float(self._of(self.cells, stream)[..., WAITED].sum()) / count if count else math.nan
-
-    def mean_waiting(self, stream: int | None = None) -> float:
-        """How many events wait, on average over the measured time."""
-        return float(self._of(self.waiting, stream).sum()) / self.duration
-
-    def mean_served(self, stream: int | None = None) -> float:
-        """How many events somebody is at, on average over the measured time."""
-        return float(self._of(self.served, stream).sum()) / self.duration
 
     def utilisation(self, unit: int) -> float:
         """Share of the measured time that a responder had an order."""

@@ -9,14 +9,13 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
 from dva_sim.core.dispatch import Policy
 from dva_sim.core.events import Event, State
-from dva_sim.core.travel_times import Start
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.streams import Streams
 from dva_sim.protocol import messages as m
@@ -27,7 +26,6 @@ from dva_sim.simulation.shift.distributions import Draws, Law, times
 from dva_sim.simulation.shift.recording import (
     CODES,
     STEPS_IN_ORDER,
-    Floats,
     Ledger,
     Level,
     Slices,
@@ -81,16 +79,7 @@ def _team(shift: Shift) -> Iterator[str]:
     for event in shift.desk.book.in_state(State.ASSIGNED, State.ON_SCENE):
         if event.responder is None:
             yield "an event that somebody should be at has nobody"
-    for event in shift.desk.book.open.values():
-        if (
-            event.responder is not None
-            and event.responder == event.actor
-            and event.state
-            in (
-                State.ASSIGNED,
-                State.ON_SCENE,
-            )
-        ):
+        elif event.responder == event.actor:
             yield "somebody is to do two things at once"
 
 
@@ -328,21 +317,12 @@ class Shift:
         self.terrain.forget(incident.place)
         self.demand.closed(incident, now)
 
-    def travel(self, starts: Sequence[Start], goals: Sequence[m.Position]) -> tuple[Floats, Floats]:
-        """What the DVA is told of ways: see `core.travel_times.Travel`."""
-        return control_room.travel(self, starts, goals)
-
     def _tell_who_moves(self) -> None:
         """Before each decision the DVA hears where those are who move and may be called."""
         for unit in self._moving:
             self._publish(unit, unit.here(), "walking")
 
     # --- what units may ask, and tell: see `responders.ShiftWorld` ---------------------------
-
-    @property
-    def now(self) -> float:
-        """Time [s]."""
-        return self.clock.now
 
     def after(self, delay: float, action: Any, *args: Any) -> None:
         """Do something later [s]; what it says is heard when it is done."""
@@ -377,24 +357,14 @@ class Shift:
             self.mail.publish(unit.device, m.PersonStatus(activity, place.position))
         else:
             mode = "Idle" if unit.job is None else "Teleoperation"
-            body = m.RobotStatus(mode, place.position, 0.0, 0.0, 0.0, round(self.now * 1000.0))
+            body = m.RobotStatus(
+                mode, place.position, 0.0, 0.0, 0.0, round(self.clock.now * 1000.0)
+            )
             self.mail.publish(unit.device, body)
 
     def incident_at(self, event: int) -> Incident:
         """What an event of the DVA really is: the first of what was reported as it."""
         return self.events[event][0]
-
-    def length(self, a: Place, b: Place) -> float:
-        """Length of the way [m]; infinite if there is none."""
-        return self.terrain.length(a, b)
-
-    def place_at(self, position: m.Position) -> Place:
-        """The place a message speaks of."""
-        return self.terrain.known_at(position)
-
-    def along(self, a: Place, b: Place, gone: float) -> Place:
-        """Where somebody is who has gone so far [m]."""
-        return self.terrain.along(a, b, gone)
 
     def mobilisation(self, unit: Unit, incident: Incident) -> float:
         """What it takes this unit this time to get ready [s]."""

@@ -87,20 +87,6 @@ def test_a_link_is_ideal_whatever_its_delay_rate_and_queue() -> None:
     assert not make_link(LinkConfig(), "up", Streams(1), "x", lambda: None).is_ideal()
 
 
-def test_round_trips_that_few_exceed_are_known_of_both_directions(tmp_path: Any) -> None:
-    log = tmp_path / "a.log"
-    log.write_text("0 100\n1 300\n")
-    normal = {"law": "normal", "sd_s": 0.02}
-    for config, expected in (
-        ({"delay_s": 0.1, "jitter_s": 0.05}, 0.3),
-        ({"delay_s": 0.1, "delay_law": normal}, 0.28),
-        ({"delay_s": 0.1, "up": {"delay_s": 0.3}, "delay_law": normal}, 0.48),
-        ({"delay_log": str(log)}, 0.4),
-    ):
-        slow = validate(LinkConfig, config).slow_round_trip()
-        assert slow == pytest.approx(expected), config
-
-
 def test_what_no_queue_can_be_is_refused() -> None:
     with pytest.raises(ConfigError, match="queue_packets: should be at least"):
         validate(LinkConfig, {"queue_packets": 0})
