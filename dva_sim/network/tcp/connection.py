@@ -85,11 +85,6 @@ class TcpEndpoint:
         return self._receiver.edge
 
     @property
-    def round_trip(self) -> float:
-        """Smoothed round trip [s]; 0 before the first sample."""
-        return self.sender.times.smoothed
-
-    @property
     def congestion_window(self) -> float:
         """[segments]."""
         return self.sender.window.window

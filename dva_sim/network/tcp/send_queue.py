@@ -147,7 +147,6 @@ class Gain:
     __slots__ = ("ambiguous", "delivered", "released", "taken")
 
     def __init__(self) -> None:
-        self.taken: list[SentSegment] = []
         self.delivered: list[SentSegment] = []
         self.released = 0
         self.ambiguous = False
@@ -186,7 +185,6 @@ class Scoreboard:
             count += 1
             self._remove(sent, gain)
         if count:
-            gain.taken = queue[:count]
             del queue[:count]
         if queue and queue[0].start < acknowledged:
             self._trim(queue[0], acknowledged, gain)

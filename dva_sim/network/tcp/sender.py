@@ -37,7 +37,6 @@ class Sender:
         first: First byte not acknowledged.
         edge: First byte that the receive window does not take.
         end_mark: Where the stream ends, once it is finished.
-        segments: Segments with data sent so far, repetitions included.
         retransmitted: Repetitions.
         timeouts: Retransmission time-outs.
         tail_probes: Tail-loss probes.
@@ -54,7 +53,7 @@ class Sender:
         self._clock, self._options, self._emit, self._give_up = clock, options, emit, give_up
         self.total = self.next = self.first = self.edge = 0
         self.end_mark: float = inf
-        self.segments = self.retransmitted = self.timeouts = self.tail_probes = 0
+        self.retransmitted = self.timeouts = self.tail_probes = 0
         self.buffer = SendBuffer(options.send_buffer, options.initial_window)
         self.board = Scoreboard()
         self.times = RoundTrip(options.tick)
@@ -254,7 +253,6 @@ class Sender:
         self._leave(sent.start, sent.end, now)
 
     def _leave(self, start: int, end: int, now: float) -> None:
-        self.segments += 1
         self.recovery.sent()
         self._last_sent = now
         self._emit(start, end, now)

@@ -161,7 +161,6 @@ class Bulk:
     """
 
     def __init__(self, clock: Clock, out: Link, back: Link) -> None:
-        self.received = 0
         self._connection = TcpConnection(clock, out, back)
         self._connection.opener.on_writable = self._write
         self._connection.peer.on_readable = self._take
@@ -176,7 +175,7 @@ class Bulk:
 
     def _take(self) -> None:
         peer = self._connection.peer
-        self.received += peer.read(peer.readable)
+        peer.read(peer.readable)
 
 
 DRAIN_S = 5.0  # the last messages that count may still arrive; assumed

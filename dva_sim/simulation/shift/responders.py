@@ -231,9 +231,7 @@ class Unit:
         if incident is not self._near:
             self._leave()
         self._near = None
-        self.job = job = Job(
-            order, incident, voice, world.clock.now, inside=order.task != "stand_by"
-        )
+        self.job = job = Job(order, incident, voice, now, inside=order.task != "stand_by")
         self.since = now
         if at_hand:
             delay = 0.0

@@ -199,7 +199,7 @@ class Plane(Terrain):
     ) -> None:
         super().__init__(list(zones) or ["area"], apart=APART)
         self._boxes = list(zones.values()) or [(0.0, 0.0, width, height)]
-        self._named, self._whole = bool(zones), (0.0, 0.0, width, height)
+        self._whole = (0.0, 0.0, width, height)
         self._straight = straight
         self._centres: dict[int, Place] = {}
 

@@ -378,7 +378,7 @@ class PointGoal(ToTarget):
         self._at = amplitude * self._axis[0], amplitude * self._axis[1]
         self._press, self._pressed_at = press, math.inf
         self._inside_since: float | None = None
-        self._entered = self._selected = False
+        self._selected = False
         self._end, self._left = 0.0, 0
         self._touched: list[Pair] = []
 
@@ -399,7 +399,7 @@ class PointGoal(ToTarget):
         dx, dy = x - self._at[0], y - self._at[1]
         inside = dx * dx + dy * dy <= self.tolerance * self.tolerance
         if inside and self._inside_since is None:
-            self._inside_since, self._entered = now, True
+            self._inside_since = now
         elif not inside and self._inside_since is not None:
             self._inside_since = None
             self._left += 1
