@@ -138,7 +138,6 @@ class Gain:
     """What one acknowledgement brought.
 
     Attributes:
-        taken: Segments newly acknowledged in order, those already known by selection too.
         delivered: Segments of which nothing was known before, in order or by selection.
         released: Charge of the segments that left the scoreboard [B].
         ambiguous: One of those acknowledged in order had been sent more than once.

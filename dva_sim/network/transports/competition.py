@@ -155,9 +155,6 @@ class Bulk:
         clock: Virtual time.
         out: The link that its data take.
         back: The link that its acknowledgements take.
-
-    Attributes:
-        received: Bytes read at the other end [B].
     """
 
     def __init__(self, clock: Clock, out: Link, back: Link) -> None:
