@@ -447,9 +447,7 @@ def build(
     Raises:
         ConfigError: an unknown key or name, a wrong type, a value out of range.
     """
-    return key_changes.build(
-        TaskScenario, source, changes or {}, _complete, lambda data, folders: None
-    )
+    return key_changes.build(TaskScenario, source, changes, _complete)
 
 
 def _complete(scenario: TaskScenario, error: Fail) -> TaskScenario:

@@ -93,9 +93,7 @@ def build(
     Raises:
         ConfigError: an unknown key or name, a wrong type, a value out of range.
     """
-    return key_changes.build(
-        TransportScenario, source, changes or {}, _complete, lambda data, folders: None
-    )
+    return key_changes.build(TransportScenario, source, changes, _complete)
 
 
 def _complete(scenario: TransportScenario, error: Fail) -> TransportScenario:
