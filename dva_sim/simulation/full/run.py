@@ -26,7 +26,8 @@ from dva_sim.network.link.link import Reception, make_link
 from dva_sim.network.tcp.options import HEADERS, MSS
 from dva_sim.network.virtual import VirtualNetwork
 from dva_sim.simulation.full.control_room import add_dva, add_operator
-from dva_sim.simulation.full.field import Danger, Field, is_dangerous
+from dva_sim.simulation.full.field import Field, is_dangerous
+from dva_sim.simulation.full.hazards import Danger
 from dva_sim.simulation.full.recording import PersonLog, Recording, ending_of, event_about
 from dva_sim.simulation.full.safety_checks import broken_event_rules, broken_rules
 from dva_sim.simulation.full.stage import Stage, id_of
@@ -234,7 +235,7 @@ class Run:
             label = robot.device.label
             if robot.controller.mode is Mode.MISSION:
                 self._last_mission[label] = now
-            drive = self.field.newest_drive(robot.device.id_tag)
+            drive = recorder.newest_drive.get(robot.device.id_tag)
             mission = self._last_mission.get(label, 0.0)
             command = recorder.newest_command.get(robot.device.id_tag)
             limits = self.scenario.robot

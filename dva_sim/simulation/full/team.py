@@ -7,7 +7,6 @@ battery, sensors and a computer; people on foot share physics and air with it.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,18 +21,17 @@ from dva_sim.agents.people.walking import Walking
 from dva_sim.agents.robot.battery import Battery
 from dva_sim.agents.robot.command_queue import service_times
 from dva_sim.agents.robot.controller import Limits, RobotController
-from dva_sim.agents.robot.field_of_view import FieldOfView, HazardSpot
+from dva_sim.agents.robot.field_of_view import FieldOfView
 from dva_sim.agents.robot.profile import RobotProfile
 from dva_sim.agents.robot.robot import FRAME, RobotAgent, RobotSetup
 from dva_sim.agents.robot.sensors import make_ports, sources_of
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.kernel.recorder import DriveLog
+from dva_sim.simulation.full.hazards import Scene
 from dva_sim.simulation.full.stage import DVA, Stage, place_of
 from dva_sim.simulation.scenario import bystander_profile, guard_profile
 from dva_sim.worlds.bodies import GRIP
 from dva_sim.worlds.geo import Pose
-from dva_sim.worlds.hazards import Surroundings
 from dva_sim.worlds.layout import FOOTPRINT
 from dva_sim.worlds.lidar import Lidar
 from dva_sim.worlds.physics import PersonBody, World
@@ -43,121 +41,38 @@ TRIES = 200
 APART = 1.5  # between the middles of two who begin [m]
 
 Point = tuple[float, float]
+WET_GRIP = 0.4  # friction coefficient of rubber on a wet floor; assumed
+WET = 0.002  # deeper water than this makes a floor slippery [m]
+HOUSEKEEPING = 1.0  # how often a robot looks at its battery, and the floor at the robot [s]
+AT_BASE = 0.5  # so near its base a robot that stands is charged [m]
+STANDING = 0.02  # slower than this it stands [m/s]
+PLACES = 3  # where a bystander works, by turns
+FLAMES_SEEN = 15.0  # from so far, if nothing stands between and smoke lets one see [m]
+FLAMES_THROUGH = 8.0  # optical depth at which what shines is lost in smoke (T. Jin, SFPE Handbook)
 
 
-class Starts:
-    """Gives everybody a place to begin at.
+class Team:
+    """Makes who takes part, and puts them where they begin.
 
     Whoever is to begin a given way from the event begins on the way to it from anywhere else on
     the site, chosen by the run's seed: that way, cut off where so much of it is left.
 
     Args:
         stage: Where.
-        goal: Where the first event is [m].
-    """
-
-    def __init__(self, stage: Stage, goal: Point) -> None:
-        self._stage, self._goal = stage, goal
-        self._taken: list[Point] = []
-
-    def of_robot(self, number: int) -> Pose:
-        """Where the `number`-th robot begins, and is charged.
-
-        Raises:
-            ConfigError: there is no such place.
-        """
-        stage = self._stage
-        way, bases = stage.scenario.robot.way_m, stage.site.robot_bases
-        if way is None:
-            return place_of(bases, number, "robot base", stage.site)
-        return self._away(f"robot-{number}", way)
-
-    def of_guard(self, number: int) -> Pose:
-        """Where the `number`-th guard waits.
-
-        Raises:
-            ConfigError: there is no such place.
-        """
-        stage = self._stage
-        way, posts = stage.scenario.guard.way_m, stage.site.guard_posts
-        if way is None:
-            return place_of(posts, number, "guard post", stage.site)
-        return self._away(f"guard-{number}", way)
-
-    def _away(self, label: str, length: float) -> Pose:
-        """A place so far [m] from the event, looking along the way there."""
-        site, rng = self._stage.site, self._stage.streams.fresh(f"{label}/start")
-        longest = 0.0
-        for _ in range(TRIES):
-            way = self._stage.planner.path(site.sample_free(rng, FOOTPRINT), self._goal)
-            if way is None:
-                continue
-            longest = max(longest, _length(way))
-            pose = _cut(way, length)
-            if pose is not None and self._is_free(pose):
-                self._taken.append((pose.x, pose.y))
-                return pose
-        problem = f"site {site.name!r} has no place {length:g} m from the event for {label}"
-        raise ConfigError(f"{problem}; the longest way tried was {longest:.0f} m")
-
-    def _is_free(self, pose: Pose) -> bool:
-        here = pose.x, pose.y
-        alone = all(math.dist(here, other) >= APART for other in self._taken)
-        return alone and self._stage.site.is_free(*here, FOOTPRINT)
-
-
-def _length(way: NDArray[np.float64]) -> float:
-    return float(np.hypot(*np.diff(way, axis=0).T).sum())
-
-
-def _cut(way: NDArray[np.float64], left: float) -> Pose | None:
-    """Where so much of a way `(n, 2)` is left [m], looking along it; None if it is shorter."""
-    steps = np.hypot(*np.diff(way, axis=0).T)
-    gone = np.concatenate([[0.0], np.cumsum(steps)])
-    at = float(gone[-1]) - left
-    if at < 0.0:
-        return None
-    place = min(int(np.searchsorted(gone, at, side="right")) - 1, len(steps) - 1)
-    (x, y), ahead = way[place], way[place + 1] - way[place]
-    share = (at - gone[place]) / steps[place] if steps[place] > 0.0 else 0.0
-    heading = math.atan2(ahead[1], ahead[0])
-    return Pose(float(x + share * ahead[0]), float(y + share * ahead[1]), heading)
-
-
-WET_GRIP = 0.4  # friction coefficient of rubber on a wet floor; assumed
-WET = 0.002  # deeper water than this makes a floor slippery [m]
-HOUSEKEEPING = 1.0  # how often a robot looks at its battery, and the floor at the robot [s]
-AT_BASE = 0.5  # so near its base a robot that stands is charged [m]
-STANDING = 0.02  # slower than this it stands [m/s]
-
-
-class Machines:
-    """Makes robots and keeps them going.
-
-    Args:
-        stage: Where.
         world: The physics.
-        around: The hazards.
-        spots: What cameras may see of them, at a time [s].
-        drive_of: The log of a robot's newest drive, if it had any.
-        starts: Where they begin.
+        scene: What is going on there.
     """
 
-    def __init__(
-        self,
-        stage: Stage,
-        world: World,
-        around: Surroundings,
-        spots: Callable[[float], list[HazardSpot]],
-        drive_of: Callable[[str], DriveLog | None],
-        starts: Starts,
-    ) -> None:
-        self._stage, self._world, self._around = stage, world, around
-        self._spots, self._drive_of, self._starts = spots, drive_of, starts
-        self._lidar = Lidar(world)
+    def __init__(self, stage: Stage, world: World, scene: Scene) -> None:
+        self._stage, self._world, self._scene = stage, world, scene
+        self._around, self._lidar = scene.surroundings, Lidar(world)
+        self._air: AirAt = self._around.at if self._around.has_any else clean_air
+        self._refuges = refuges_of(stage.site)
+        self._taken: list[Point] = []
+        self._first_places: list[Point] = []
         self._failures: dict[str, int] = {}
 
-    def add(self, number: int) -> RobotAgent:
+    def add_robot(self, number: int) -> RobotAgent:
         """The `number`-th robot, in its place; it registers and begins to work.
 
         Raises:
@@ -165,7 +80,7 @@ class Machines:
         """
         stage, config = self._stage, self._stage.scenario.robot
         profile = stage.robots[number - 1]
-        base = self._starts.of_robot(number)
+        base = self._start("robot", number)
         device = stage.device("robot", number)
         body = self._world.add_robot(device.label, profile.drive_spec(), base)
         controller = RobotController(
@@ -184,7 +99,7 @@ class Machines:
             body=body,
             planner=stage.planner,
             setup=setup,
-            drive_of=self._drive_of,
+            drive_of=stage.recorder.newest_drive.get,
         )
         device.register(robot.start)
         stage.clock.every(HOUSEKEEPING, lambda: self._look_after(robot, power))
@@ -202,8 +117,8 @@ class Machines:
             service=service_times(processing, stage.streams.fresh(f"{body.name}/processing")),
             frame_rate=camera.rate_hz,
             frame_bytes=camera.frame_bytes,
-            view=FieldOfView(angle, camera.range_m, stage.planner.line_of_sight, self._smoke),
-            hazards=self._spots,
+            view=FieldOfView(angle, camera.range_m, stage.planner.line_of_sight, self._scene.smoke),
+            hazards=self._scene.spots,
             sensors=make_ports(
                 configs, sources, lambda what: stage.streams.fresh(f"{body.name}/sensor/{what}")
             ),
@@ -213,9 +128,6 @@ class Machines:
             conflates=scenario.zeromq.conflates_receiver,
             limit=scenario.zeromq.high_water_mark,
         )
-
-    def _smoke(self, a: tuple[float, float], b: tuple[float, float]) -> float:
-        return self._around.optical_depth(a, b, self._stage.clock.now)
 
     def _look_after(self, robot: RobotAgent, power: Power) -> None:
         """Once a second: is there power, does its drive answer, and is the floor wet?"""
@@ -237,79 +149,14 @@ class Machines:
             if not known:
                 device.tell(f"brakes, as its drive fails: {robot.body.first_failure}", "mode")
 
-
-class Power:
-    """A robot's battery, if it has one, and the base that charges it.
-
-    Args:
-        profile: Of the robot.
-        charge: Share of the capacity that it begins with.
-        body: Says how far it went, and what that took.
-        base: Where it is charged.
-        clock: The run's.
-    """
-
-    def __init__(
-        self, profile: RobotProfile, charge: float, body: RobotBody, base: Pose, clock: Clock
-    ) -> None:
-        self._battery = None
-        if profile.battery is not None:
-            self._battery = Battery(profile.battery, profile.mass_kg, charge)
-        self._body, self._base, self._clock = body, base, clock
-
-    def share(self) -> float:
-        """Of the capacity that is left now; 1 without a battery."""
-        battery, body = self._battery, self._body
-        if battery is None:
-            return 1.0
-        near = math.dist((body.x, body.y), (self._base.x, self._base.y)) < AT_BASE
-        at_base = near and abs(body.speed) < STANDING
-        battery.advance(self._clock.now, body.distance, body.work, at_base)
-        return battery.share
-
-
-PLACES = 3  # where a bystander works, by turns
-FLAMES_SEEN = 15.0  # from so far, if nothing stands between and smoke lets one see [m]
-FLAMES_THROUGH = 8.0  # optical depth at which what shines is lost in smoke (T. Jin, SFPE Handbook)
-
-
-class People:
-    """Makes guards and bystanders.
-
-    Args:
-        stage: Where.
-        world: The physics.
-        around: The hazards.
-        spots: What can be seen of them, at a time [s].
-        is_there: Whether something of a kind really is near a place [m].
-        contain: Told of what kind is dealt with near a place [m].
-        starts: Where guards wait.
-    """
-
-    def __init__(
-        self,
-        stage: Stage,
-        world: World,
-        around: Surroundings,
-        spots: Callable[[float], list[HazardSpot]],
-        is_there: Callable[[str, float, float], bool],
-        contain: Callable[[str, float, float], object],
-        starts: Starts,
-    ) -> None:
-        self._stage, self._world, self._around, self._spots = stage, world, around, spots
-        self._is_there, self._contain, self._starts = is_there, contain, starts
-        self._air: AirAt = around.at if around.has_any else clean_air
-        self._refuges = refuges_of(stage.site)
-        self._first_places: list[Point] = []
-
     def add_guard(self, number: int) -> GuardAgent:
         """The `number`-th guard, at its post; it registers and is on duty.
 
         Raises:
             ConfigError: the site has no post for it.
         """
-        stage = self._stage
-        post = self._starts.of_guard(number)
+        stage, scene = self._stage, self._scene
+        post = self._start("guard", number)
         device = stage.device("guard", number)
         walker = Walker.draw(guard_profile(stage.scenario), stage.streams[f"{device.label}/walker"])
         body = self._world.add_person(device.label, post, radius=RADIUS)
@@ -318,11 +165,11 @@ class People:
             walker,
             stage.planner,
             self._legs(body, walker.speed),
-            is_there=self._is_there,
-            contain=self._contain,
+            is_there=scene.is_there,
+            contain=scene.contain,
             air=self._air,
             refuges=self._refuges,
-            smoke=self._smoke,
+            smoke=scene.smoke,
         )
         device.register(guard.start)
         return guard
@@ -370,9 +217,6 @@ class People:
         self._first_places.append(places[0])
         return places
 
-    def _smoke(self, a: Point, b: Point) -> float:
-        return self._around.optical_depth(a, b, self._stage.clock.now)
-
     def _sees_flames(self, x: float, y: float, time: float) -> bool:
         sees = self._stage.planner.line_of_sight
         return any(
@@ -380,5 +224,91 @@ class People:
             and math.dist((x, y), (spot.x, spot.y)) < FLAMES_SEEN
             and sees((x, y), (spot.x, spot.y))
             and self._around.optical_depth((x, y), (spot.x, spot.y), time) < FLAMES_THROUGH
-            for spot in self._spots(time)
+            for spot in self._scene.spots(time)
         )
+
+    # --- where they begin ----------------------------------------------------------------
+
+    def _start(self, kind: str, number: int) -> Pose:
+        """Where the `number`-th robot begins and is charged, or the `number`-th guard waits.
+
+        Raises:
+            ConfigError: there is no such place.
+        """
+        scenario, site = self._stage.scenario, self._stage.site
+        if kind == "robot":
+            way, places, what = scenario.robot.way_m, site.robot_bases, "robot base"
+        else:
+            way, places, what = scenario.guard.way_m, site.guard_posts, "guard post"
+        if way is None:
+            return place_of(places, number, what, site)
+        return self._away(f"{kind}-{number}", way)
+
+    def _away(self, label: str, length: float) -> Pose:
+        """A place so far [m] from the event, looking along the way there."""
+        site, rng = self._stage.site, self._stage.streams.fresh(f"{label}/start")
+        goal, longest = self._scene.incidents[0].hazard.position, 0.0
+        for _ in range(TRIES):
+            way = self._stage.planner.path(site.sample_free(rng, FOOTPRINT), goal)
+            if way is None:
+                continue
+            longest = max(longest, _length(way))
+            pose = _cut(way, length)
+            if pose is not None and self._is_free(pose):
+                self._taken.append((pose.x, pose.y))
+                return pose
+        problem = f"site {site.name!r} has no place {length:g} m from the event for {label}"
+        raise ConfigError(f"{problem}; the longest way tried was {longest:.0f} m")
+
+    def _is_free(self, pose: Pose) -> bool:
+        here = pose.x, pose.y
+        alone = all(math.dist(here, other) >= APART for other in self._taken)
+        return alone and self._stage.site.is_free(*here, FOOTPRINT)
+
+
+class Power:
+    """A robot's battery, if it has one, and the base that charges it.
+
+    Args:
+        profile: Of the robot.
+        charge: Share of the capacity that it begins with.
+        body: Says how far it went, and what that took.
+        base: Where it is charged.
+        clock: The run's.
+    """
+
+    def __init__(
+        self, profile: RobotProfile, charge: float, body: RobotBody, base: Pose, clock: Clock
+    ) -> None:
+        self._battery = None
+        if profile.battery is not None:
+            self._battery = Battery(profile.battery, profile.mass_kg, charge)
+        self._body, self._base, self._clock = body, base, clock
+
+    def share(self) -> float:
+        """Of the capacity that is left now; 1 without a battery."""
+        battery, body = self._battery, self._body
+        if battery is None:
+            return 1.0
+        near = math.dist((body.x, body.y), (self._base.x, self._base.y)) < AT_BASE
+        at_base = near and abs(body.speed) < STANDING
+        battery.advance(self._clock.now, body.distance, body.work, at_base)
+        return battery.share
+
+
+def _length(way: NDArray[np.float64]) -> float:
+    return float(np.hypot(*np.diff(way, axis=0).T).sum())
+
+
+def _cut(way: NDArray[np.float64], left: float) -> Pose | None:
+    """Where so much of a way `(n, 2)` is left [m], looking along it; None if it is shorter."""
+    steps = np.hypot(*np.diff(way, axis=0).T)
+    gone = np.concatenate([[0.0], np.cumsum(steps)])
+    at = float(gone[-1]) - left
+    if at < 0.0:
+        return None
+    place = min(int(np.searchsorted(gone, at, side="right")) - 1, len(steps) - 1)
+    (x, y), ahead = way[place], way[place + 1] - way[place]
+    share = (at - gone[place]) / steps[place] if steps[place] > 0.0 else 0.0
+    heading = math.atan2(ahead[1], ahead[0])
+    return Pose(float(x + share * ahead[0]), float(y + share * ahead[1]), heading)
