@@ -32,22 +32,6 @@ class Wobble(Protocol):
         """Of a packet sent at `now` [s]."""
 
 
-class Jitter:
-    """A uniform law around the delay.
-
-    Args:
-        width: Half of it [s].
-        luck: Gives each packet its number.
-    """
-
-    def __init__(self, width: float, luck: UniformNumbers) -> None:
-        self._width, self._luck = width, luck
-
-    def deviation(self, now: float) -> float:
-        """See `Wobble`."""
-        return self._width * (2.0 * self._luck.draw(now) - 1.0)
-
-
 class ByQuantile:
     """Any law.
 

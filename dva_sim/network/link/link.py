@@ -16,7 +16,7 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.streams import Streams
 from dva_sim.kernel.suggestions import hint
 from dva_sim.network.link.config import Direction, LinkConfig
-from dva_sim.network.link.delays import Jitter, Wobble
+from dva_sim.network.link.delays import ByQuantile, Wobble
 from dva_sim.network.link.losses import Chance, Fate, Gap, Gaps, Partition
 from dva_sim.network.link.rates import ConstantRate, PacketQueue, Serialiser, TraceRate
 from dva_sim.network.link.recorded import Replay, period_of, read_delay_log, read_trace
@@ -158,7 +158,8 @@ def _make_fates(
 def _make_wobble(way: LinkConfig, streams: Streams, name: str) -> Wobble | None:
     """What spreads the delay of one direction by chance, if anything does."""
     if way.jitter_s:
-        return Jitter(way.jitter_s, Weather(streams, f"{name}/jitter"))
+        width = way.jitter_s
+        return ByQuantile(lambda u: width * (2.0 * u - 1.0), Weather(streams, f"{name}/jitter"))
     if way.law is not None:
         return way.law.play(way.delay_s, streams, f"{name}/delay")
     return None

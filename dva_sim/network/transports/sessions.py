@@ -26,7 +26,6 @@ from dva_sim.network.transports.datagrams import (
     Assembly,
     DatagramSender,
     Echo,
-    MessagePart,
     parts_of,
 )
 from dva_sim.network.transports.rate_control import Aimd, LeastRoundTrip, RateLaw, ThreeTerms
@@ -36,105 +35,60 @@ from dva_sim.network.zmtp import ZmtpConnection, ZmtpOptions, framed
 def open_session(clock: Clock, config: TransportConfig, ends: Ends) -> TransportSession:
     """A session over a transport, as configured."""
     if isinstance(config, Tcp):
-        return TcpTransport(clock, ends, TcpOptions(send_buffer=config.send_buffer_bytes))
+        return tcp_session(clock, ends, TcpOptions(send_buffer=config.send_buffer_bytes))
     if isinstance(config, Zeromq):
-        return ZeromqTransport(clock, ends, config)
+        return zeromq_session(clock, ends, config)
     if isinstance(config, Trinomial | Irtp | Btp):
-        return RateSession(clock, ends, config)
-    return PlainSession(clock, ends, config.header_bytes if isinstance(config, Rtnp) else 0)
+        return rate_session(clock, ends, config)
+    return plain_session(clock, ends, config.header_bytes if isinstance(config, Rtnp) else 0)
 
 
-class PlainSession:
-    """Every datagram at once, none of them twice.
+def plain_session(clock: Clock, ends: Ends, header: int) -> TransportSession:
+    """Every datagram at once, none of them twice; the header [B] is besides IP and UDP."""
 
-    Args:
-        clock: Virtual time.
-        ends: What it stands between.
-        header: Besides IP and UDP [B].
-    """
+    def sends(link: Link, deliver: Deliver) -> Callable[[TransportMessage], object]:
+        add = Assembly(deliver).add
 
-    def __init__(self, clock: Clock, ends: Ends, header: int) -> None:
-        self._clock, self._ends, self._header = clock, ends, header
-        self._at_robot, self._at_operator = Assembly(ends.on_command), Assembly(ends.on_picture)
+        def send(message: TransportMessage) -> None:
+            for part in parts_of(message, header):
+                arrival = link.carry(clock.now, part.size + header + IP_UDP)
+                if arrival is not None:
+                    clock.call_at(arrival, add, part)
 
-    def command(self, message: TransportMessage) -> None:
-        """See `TransportSession`."""
-        self._send(message, self._ends.up, self._at_robot.add)
+        return send
 
-    def picture(self, message: TransportMessage) -> None:
-        """See `TransportSession`."""
-        self._send(message, self._ends.down, self._at_operator.add)
-
-    def _send(
-        self, message: TransportMessage, link: Link, add: Callable[[MessagePart], object]
-    ) -> None:
-        for part in parts_of(message, self._header):
-            arrival = link.carry(self._clock.now, part.size + self._header + IP_UDP)
-            if arrival is not None:
-                self._clock.call_at(arrival, add, part)
+    return TransportSession(sends(ends.up, ends.on_command), sends(ends.down, ends.on_picture))
 
 
-class RateSession:
-    """Two directions, each with a law of rate of its own.
-
-    Args:
-        clock: Virtual time.
-        ends: What it stands between.
-        config: Trinomial, IRTP or BTP.
-    """
-
-    def __init__(self, clock: Clock, ends: Ends, config: Trinomial | Irtp | Btp) -> None:
-        header, repeats = config.header_bytes, isinstance(config, Irtp)
-        ways = ((ends.up, ends.on_command), (ends.down, ends.on_picture))
-        self._up, self._down = (
-            DatagramSender(clock, link, header, law_of(config), told, repeats)
-            for link, told in ways
-        )
-        if isinstance(config, Btp):
-            answer_each_other(self._up, self._down)
-        else:
-            answer_each(clock, self._up, ends.down, header)
-            answer_each(clock, self._down, ends.up, header)
-
-    def command(self, message: TransportMessage) -> None:
-        """See `TransportSession`."""
-        self._up.offer(message)
-
-    def picture(self, message: TransportMessage) -> None:
-        """See `TransportSession`."""
-        self._down.offer(message)
+def rate_session(clock: Clock, ends: Ends, config: Trinomial | Irtp | Btp) -> TransportSession:
+    """Two directions, each with a law of rate of its own."""
+    header, repeats = config.header_bytes, isinstance(config, Irtp)
+    up, down = (
+        DatagramSender(clock, link, header, law_of(config), told, repeats)
+        for link, told in ((ends.up, ends.on_command), (ends.down, ends.on_picture))
+    )
+    if isinstance(config, Btp):
+        answer_each_other(up, down)
+    else:
+        answer_each(clock, up, ends.down, header)
+        answer_each(clock, down, ends.up, header)
+    return TransportSession(up.offer, down.offer)
 
 
-class ZeromqTransport:
-    """Two publishers, each with one subscriber, on two connections that the operator opens.
-
-    Args:
-        clock: Virtual time.
-        ends: What it stands between.
-        config: What is kept, and where.
-    """
-
-    def __init__(self, clock: Clock, ends: Ends, config: Zeromq) -> None:
-        options = ZmtpOptions(
-            conflate=config.conflate, tcp=TcpOptions(send_buffer=config.send_buffer_bytes)
-        )
-        commands, pictures = (
-            ZmtpConnection(
-                clock, ends.up, ends.down, ends.on_command, ends.on_picture, options, options
-            )
-            for _ in range(2)
-        )
-        for connection in (commands, pictures):
-            connection.open(lambda: None)
-        self._operator, self._robot = commands.opener, pictures.peer
-
-    def command(self, message: TransportMessage) -> None:
-        """See `TransportSession`."""
-        self._operator.send(message.number, framed(message.size))
-
-    def picture(self, message: TransportMessage) -> None:
-        """See `TransportSession`."""
-        self._robot.send(message.number, framed(message.size))
+def zeromq_session(clock: Clock, ends: Ends, config: Zeromq) -> TransportSession:
+    """Two publishers, each with one subscriber, on two connections that the operator opens."""
+    tcp = TcpOptions(send_buffer=config.send_buffer_bytes)
+    options = ZmtpOptions(conflate=config.conflate, tcp=tcp)
+    told = ends.on_command, ends.on_picture
+    commands, pictures = (
+        ZmtpConnection(clock, ends.up, ends.down, *told, options, options) for _ in range(2)
+    )
+    for connection in (commands, pictures):
+        connection.open(lambda: None)
+    return TransportSession(
+        lambda message: commands.opener.send(message.number, framed(message.size)),
+        lambda message: pictures.peer.send(message.number, framed(message.size)),
+    )
 
 
 def law_of(config: Trinomial | Irtp | Btp) -> RateLaw:
@@ -207,26 +161,11 @@ class OrderedMessages:
             self._deliver(self._ends.popleft()[1])
 
 
-class TcpTransport:
-    """One connection for both directions; nothing frames the messages.
-
-    Args:
-        clock: Virtual time.
-        ends: What it stands between.
-        options: Of the connection, alike at both ends.
-    """
-
-    def __init__(self, clock: Clock, ends: Ends, options: TcpOptions) -> None:
-        self._connection = TcpConnection(clock, ends.up, ends.down, options, options)
-        operator, robot = self._connection.opener, self._connection.peer
-        self._up = OrderedMessages(operator, robot, ends.on_command)
-        self._down = OrderedMessages(robot, operator, ends.on_picture)
-        self._connection.open(self._up.open, self._down.open)
-
-    def command(self, message: TransportMessage) -> None:
-        """See `Transport`."""
-        self._up.send(message)
-
-    def picture(self, message: TransportMessage) -> None:
-        """See `Transport`."""
-        self._down.send(message)
+def tcp_session(clock: Clock, ends: Ends, options: TcpOptions) -> TransportSession:
+    """One connection for both directions, alike at both ends; nothing frames the messages."""
+    connection = TcpConnection(clock, ends.up, ends.down, options, options)
+    operator, robot = connection.opener, connection.peer
+    up = OrderedMessages(operator, robot, ends.on_command)
+    down = OrderedMessages(robot, operator, ends.on_picture)
+    connection.open(up.open, down.open)
+    return TransportSession(up.send, down.send)

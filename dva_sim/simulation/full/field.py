@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 from dva_sim.agents.device import AgentDevice
 from dva_sim.agents.observation import Observation
@@ -57,6 +57,13 @@ class Field(Scene):
             self.robots[robot.device.id_tag] = robot
         self.guards += [team.add_guard(n + 1) for n in range(scenario.guard.count)]
         self.bystanders += [team.add_bystander(n + 1) for n in range(scenario.bystander.count)]
+
+    def people(self) -> Iterator[tuple[str, GuardAgent | BystanderAgent]]:
+        """Who is on foot, by name."""
+        for guard in self.guards:
+            yield guard.device.label, guard
+        for bystander in self.bystanders:
+            yield bystander.name, bystander
 
     def schedule_incidents(self) -> None:
         """Let the hazards break out, and those who notice them report."""
