@@ -16,13 +16,13 @@ from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.recorder import Recorder
 from dva_sim.kernel.streams import Streams
 from dva_sim.network.link import ConstantRate, Link, LinkConfig
-from dva_sim.network.virtual import VirtualNetwork
+from dva_sim.network.virtual_network import VirtualNetwork
 from dva_sim.protocol import messages as m
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full.control_room import add_operator
-from dva_sim.simulation.full.field import Field
+from dva_sim.simulation.full.physical_world import Field
 from dva_sim.simulation.full.stage import Stage, id_of
-from dva_sim.simulation.full.team import Team
+from dva_sim.simulation.full.team import TeamBuilder
 from dva_sim.worlds.geo import Pose
 
 GUARD, ROBOT, OTHER_ROBOT = id_of("guard", 1), id_of("robot", 1), id_of("robot", 2)
@@ -71,7 +71,7 @@ class PretendedDva:
         scenario = scenarios.build(scenarios.load("drive-to-event"), counts | changes)
         self.stage = Stage(scenario, 1, self.network, Recorder())
         self.field = field = Field(self.stage)
-        team = Team(self.stage, field.world, field)
+        team = TeamBuilder(self.stage, field.world, field)
         for number in range(1, robots + 1):
             robot = team.add_robot(number)
             field.robots[robot.device.id_tag] = robot

@@ -24,7 +24,7 @@ from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.config import AlsoCalled, Config, Key
 from dva_sim.network.link import Link
 from dva_sim.network.tcp import TcpOptions
-from dva_sim.network.tcp.options import HEADERS, MSS
+from dva_sim.network.tcp.parameters import HEADERS, MSS
 from dva_sim.network.zmtp import HIGH_WATER_MARK, ZmtpConnection, ZmtpOptions
 
 MIN_RTO, FIRST_RTO, MAX_RTO = 0.2, 1.0, 60.0

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from math import inf
 
-from dva_sim.network.tcp.options import TcpOptions
+from dva_sim.network.tcp.parameters import TcpOptions
 
 MIN_WINDOW = 2.0  # ssthresh is never below two segments (RFC 5681, equation 4)
 

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 from dva_sim.kernel.clock import Clock
-from dva_sim.network.tcp.options import FIRST_RTO, HEADERS, TcpOptions
+from dva_sim.network.tcp.parameters import FIRST_RTO, HEADERS, TcpOptions
 from dva_sim.network.tcp.receiver import BLOCKS, Receiver
 from dva_sim.network.tcp.retransmission_timer import Timer
 from dva_sim.network.tcp.sender import Sender

@@ -14,7 +14,7 @@ from collections.abc import Callable
 from math import inf
 
 from dva_sim.kernel.clock import Clock
-from dva_sim.network.tcp.options import MSS, TcpOptions
+from dva_sim.network.tcp.parameters import MSS, TcpOptions
 from dva_sim.network.tcp.retransmission_timer import RoundTrip, Timer
 from dva_sim.network.tcp.send_queue import SMALLEST
 

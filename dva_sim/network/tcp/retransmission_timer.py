@@ -21,7 +21,7 @@ from collections.abc import Callable
 from math import ceil, inf
 
 from dva_sim.kernel.clock import Clock
-from dva_sim.network.tcp.options import FIRST_RTO, MAX_RTO, MIN_RTO
+from dva_sim.network.tcp.parameters import FIRST_RTO, MAX_RTO, MIN_RTO
 from dva_sim.network.tcp.send_queue import Scoreboard
 
 

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections import deque
 
-from dva_sim.network.tcp.options import MSS
+from dva_sim.network.tcp.parameters import MSS
 
 PACKET_COST = 832  # beside the payload, of each packet that waits or is under way [B]
 SMALLEST = 4608  # the least that SO_SNDBUF gives, after doubling [B]

@@ -12,7 +12,7 @@ from math import inf
 
 from dva_sim.kernel.clock import Clock
 from dva_sim.network.tcp.congestion import HyStart, make_window
-from dva_sim.network.tcp.options import MSS, TcpOptions
+from dva_sim.network.tcp.parameters import MSS, TcpOptions
 from dva_sim.network.tcp.recovery import OPEN, Recovery
 from dva_sim.network.tcp.retransmission_timer import PROBE, REORDER, WINDOW, Alarm, RoundTrip
 from dva_sim.network.tcp.send_queue import Gain, Scoreboard, SendBuffer, SentSegment

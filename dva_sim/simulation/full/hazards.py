@@ -133,7 +133,7 @@ def _watched_rooms(kind: type[Hazard], site: Site) -> list[str | None]:
     return [room.name for room in site.rooms if room.name in watched] or [None]
 
 
-class Scene:
+class RunHazards:
     """What is going on at the site: what is there and can be seen, and what has been dealt with.
 
     Args:

@@ -22,10 +22,10 @@ from dva_sim.network.link import (
     part_links,
 )
 from dva_sim.network.link.link import Reception, make_link
-from dva_sim.network.tcp.options import HEADERS, MSS
-from dva_sim.network.virtual import VirtualNetwork
+from dva_sim.network.tcp.parameters import HEADERS, MSS
+from dva_sim.network.virtual_network import VirtualNetwork
 from dva_sim.simulation.full.control_room import add_dva, add_operator
-from dva_sim.simulation.full.field import Field, is_dangerous
+from dva_sim.simulation.full.physical_world import Field, is_dangerous
 from dva_sim.simulation.full.recording import PersonLog, Recording, ending_of, event_about
 from dva_sim.simulation.full.safety_checks import broken_event_rules, broken_rules
 from dva_sim.simulation.full.stage import Stage, id_of

@@ -27,7 +27,7 @@ from dva_sim.agents.robot.robot import FRAME, RobotAgent, RobotSetup
 from dva_sim.agents.robot.sensors import make_ports, sources_of
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.simulation.full.hazards import Scene
+from dva_sim.simulation.full.hazards import RunHazards
 from dva_sim.simulation.full.stage import DVA, Stage, place_of
 from dva_sim.simulation.scenario import bystander_profile, guard_profile
 from dva_sim.worlds.bodies import GRIP
@@ -51,7 +51,7 @@ FLAMES_SEEN = 15.0  # from so far, if nothing stands between and smoke lets one 
 FLAMES_THROUGH = 8.0  # optical depth at which what shines is lost in smoke (T. Jin, SFPE Handbook)
 
 
-class Team:
+class TeamBuilder:
     """Makes who takes part, and puts them where they begin.
 
     Whoever is to begin a given way from the event begins on the way to it from anywhere else on
@@ -63,7 +63,7 @@ class Team:
         scene: What is going on there.
     """
 
-    def __init__(self, stage: Stage, world: World, scene: Scene) -> None:
+    def __init__(self, stage: Stage, world: World, scene: RunHazards) -> None:
         self._stage, self._world, self._scene = stage, world, scene
         self._around, self._lidar = scene.surroundings, Lidar(world)
         self._air: AirAt = self._around.at if self._around.has_any else clean_air

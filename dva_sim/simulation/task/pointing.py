@@ -36,13 +36,7 @@ from dva_sim.agents.route_following import REACH, Route
 from dva_sim.kernel.streams import Streams
 from dva_sim.simulation.task import measures
 from dva_sim.simulation.task.devices import Cursor, Pair, make_device
-from dva_sim.simulation.task.scenario import (
-    Pointing,
-    ReachTask,
-    TaskScenario,
-    Tracking,
-    Tunnel,
-)
+from dva_sim.simulation.task.scenario import Pointing, ReachTask, TaskScenario, Tracking, Tunnel
 from dva_sim.simulation.task.trial import MACHINE_GAIN, Seat, Trace, Trial, WayKept
 
 MOVED = 1e-3  # a cursor that has gone so far has moved [m]; assumed

@@ -10,8 +10,8 @@ import pytest
 from dva_sim.core.events import State
 from dva_sim.kernel.streams import Streams
 from dva_sim.simulation import scenario as scenarios
-from dva_sim.simulation.full.field import Field, is_dangerous
 from dva_sim.simulation.full.hazards import HEARSAY_LATE, HEARSAY_WITHIN, draw_incidents
+from dva_sim.simulation.full.physical_world import Field, is_dangerous
 from dva_sim.simulation.full.recording import Recording
 from dva_sim.simulation.full.run import Run
 from dva_sim.simulation.full.stage import id_of

@@ -12,9 +12,9 @@ from dva_sim.agents.people.bystander import BystanderAgent
 from dva_sim.agents.people.guard import GuardAgent
 from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.protocol import messages as m
-from dva_sim.simulation.full.hazards import Danger, Hearsay, RunHazard, Scene
+from dva_sim.simulation.full.hazards import Danger, Hearsay, RunHazard, RunHazards
 from dva_sim.simulation.full.stage import DVA, Stage
-from dva_sim.simulation.full.team import Team
+from dva_sim.simulation.full.team import TeamBuilder
 from dva_sim.worlds.hazards import Conditions
 from dva_sim.worlds.physics import World
 
@@ -31,7 +31,7 @@ DANGEROUS = Conditions(
 """What makes a place dangerous, by the limits of `danger_radius` (worlds/HAZARDS.md)."""
 
 
-class Field(Scene):
+class Field(RunHazards):
     """Everything that has a place.
 
     Args:
@@ -51,7 +51,7 @@ class Field(Scene):
 
     def populate(self) -> None:
         """Put everybody in place and let them register."""
-        scenario, team = self.stage.scenario, Team(self.stage, self.world, self)
+        scenario, team = self.stage.scenario, TeamBuilder(self.stage, self.world, self)
         for number in range(1, scenario.robot.count + 1):
             robot = team.add_robot(number)
             self.robots[robot.device.id_tag] = robot
