@@ -6,22 +6,15 @@ A TCP connection over two links: two ends and how they are opened.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
 
 from dva_sim.kernel.clock import Clock
+from dva_sim.network.link import Link
 from dva_sim.network.tcp.parameters import FIRST_RTO, HEADERS, TcpOptions
 from dva_sim.network.tcp.receiver import BLOCKS, Receiver
 from dva_sim.network.tcp.retransmission_timer import Timer
 from dva_sim.network.tcp.sender import Sender
 
 RESET_BYTES = 40  # IPv4 + TCP without options
-
-
-class Carrier(Protocol):
-    """One direction of a link, as far as TCP asks."""
-
-    def carry(self, now: float, size: int) -> float | None:
-        """When a packet of `size` bytes [B] offered at `now` [s] arrives [s], or None."""
 
 
 def _nothing() -> None:
@@ -52,7 +45,7 @@ class TcpEndpoint:
         self,
         clock: Clock,
         options: TcpOptions,
-        link: Carrier,
+        link: Link,
         greet: Callable[[], object] = _nothing,
     ) -> None:
         self._clock, self._link, self._greet = clock, link, greet
@@ -259,8 +252,8 @@ class TcpConnection:
     def __init__(
         self,
         clock: Clock,
-        out: Carrier,
-        back: Carrier,
+        out: Link,
+        back: Link,
         opener: TcpOptions | None = None,
         peer: TcpOptions | None = None,
     ) -> None:

@@ -60,12 +60,12 @@ class TeamBuilder:
     Args:
         stage: Where.
         world: The physics.
-        scene: What is going on there.
+        hazards: What is going on there.
     """
 
-    def __init__(self, stage: Stage, world: World, scene: RunHazards) -> None:
-        self._stage, self._world, self._scene = stage, world, scene
-        self._around, self._lidar = scene.surroundings, Lidar(world)
+    def __init__(self, stage: Stage, world: World, hazards: RunHazards) -> None:
+        self._stage, self._world, self._hazards = stage, world, hazards
+        self._around, self._lidar = hazards.surroundings, Lidar(world)
         self._air: AirAt = self._around.at if self._around.has_any else clean_air
         self._refuges = refuges_of(stage.site)
         self._taken: list[Point] = []
@@ -106,7 +106,7 @@ class TeamBuilder:
         return robot
 
     def _setup(self, profile: RobotProfile, body: RobotBody, power: Power) -> RobotSetup:
-        stage, scenario = self._stage, self._stage.scenario
+        stage, scenario, hazards = self._stage, self._stage.scenario, self._hazards
         camera, robot = scenario.camera, scenario.robot
         angle = math.radians(camera.field_of_view_deg)
         sources = sources_of(self._world, body, self._around, self._lidar, power.share)
@@ -117,8 +117,8 @@ class TeamBuilder:
             service=service_times(processing, stage.streams.fresh(f"{body.name}/processing")),
             frame_rate=camera.rate_hz,
             frame_bytes=camera.frame_bytes,
-            view=FieldOfView(angle, camera.range_m, stage.planner.line_of_sight, self._scene.smoke),
-            hazards=self._scene.spots,
+            view=FieldOfView(angle, camera.range_m, stage.planner.line_of_sight, hazards.smoke),
+            hazards=hazards.spots,
             sensors=make_ports(
                 configs, sources, lambda what: stage.streams.fresh(f"{body.name}/sensor/{what}")
             ),
@@ -155,7 +155,7 @@ class TeamBuilder:
         Raises:
             ConfigError: the site has no post for it.
         """
-        stage, scene = self._stage, self._scene
+        stage, hazards = self._stage, self._hazards
         post = self._start("guard", number)
         device = stage.device("guard", number)
         walker = Walker.draw(guard_profile(stage.scenario), stage.streams[f"{device.label}/walker"])
@@ -165,11 +165,11 @@ class TeamBuilder:
             walker,
             stage.planner,
             self._legs(body, walker.speed),
-            is_there=scene.is_there,
-            contain=scene.contain,
+            is_there=hazards.is_there,
+            contain=hazards.contain,
             air=self._air,
             refuges=self._refuges,
-            smoke=scene.smoke,
+            smoke=hazards.smoke,
         )
         device.register(guard.start)
         return guard
@@ -224,7 +224,7 @@ class TeamBuilder:
             and math.dist((x, y), (spot.x, spot.y)) < FLAMES_SEEN
             and sees((x, y), (spot.x, spot.y))
             and self._around.optical_depth((x, y), (spot.x, spot.y), time) < FLAMES_THROUGH
-            for spot in self._scene.spots(time)
+            for spot in self._hazards.spots(time)
         )
 
     # --- where they begin ----------------------------------------------------------------
@@ -247,7 +247,7 @@ class TeamBuilder:
     def _away(self, label: str, length: float) -> Pose:
         """A place so far [m] from the event, looking along the way there."""
         site, rng = self._stage.site, self._stage.streams.fresh(f"{label}/start")
-        goal, longest = self._scene.incidents[0].hazard.position, 0.0
+        goal, longest = self._hazards.incidents[0].hazard.position, 0.0
         for _ in range(TRIES):
             way = self._stage.planner.path(site.sample_free(rng, FOOTPRINT), goal)
             if way is None:

@@ -152,6 +152,9 @@ class Terrain:
         """Where responders wait by default."""
         return self._middle(0)
 
+    def _between(self, a: Place, b: Place, share: float) -> Place:
+        return self.place(a.x + share * (b.x - a.x), a.y + share * (b.y - a.y))
+
     def _middle(self, zone: int) -> Place:
         place = self._known.get(_ORIGIN)
         if place is None:
@@ -248,8 +251,7 @@ class Plane(Terrain):
             return b
         if gone <= 0.0:
             return a
-        share = gone / whole
-        return self.place(a.x + share * (b.x - a.x), a.y + share * (b.y - a.y))
+        return self._between(a, b, gone / whole)
 
 
 def terrain_of(scenario: TimedScenario) -> Terrain:
@@ -442,8 +444,7 @@ class Rooms(Terrain):
         if gone <= 0.0:
             return a
         if self._way == "straight":
-            share = gone / self.length(a, b)
-            return self.place(a.x + share * (b.x - a.x), a.y + share * (b.y - a.y))
+            return self._between(a, b, gone / self.length(a, b))
         points = self._ways.path(a.point, b.point)
         if points is None:
             return b
