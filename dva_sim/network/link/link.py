@@ -16,8 +16,8 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.streams import Streams
 from dva_sim.kernel.suggestions import hint
 from dva_sim.network.link.config import Direction, LinkConfig
-from dva_sim.network.link.delays import ByQuantile, Wobble
-from dva_sim.network.link.losses import Chance, Fate, Gap, Gaps, Partition
+from dva_sim.network.link.delays import Wobble, by_quantile
+from dva_sim.network.link.losses import Fate, Gap, Partition, chance, gaps_of
 from dva_sim.network.link.rates import ConstantRate, PacketQueue, Serialiser, TraceRate
 from dva_sim.network.link.recorded import Replay, period_of, read_delay_log, read_trace
 from dva_sim.network.link.time_noise import Weather
@@ -58,7 +58,7 @@ class Link:
             self.room = way.queue_packets * SMALLEST_PACKET
         self._serialiser, self._offer = serialiser, serialiser.offer
         self._fates = _make_fates(way, streams, name, replay)
-        self._wobble = replay or _make_wobble(way, streams, name)
+        self._wobble = replay.deviation if replay else _make_wobble(way, streams, name)
         self._may_overtake, self._last_arrival = way.reorder, 0.0
         self._is_steady = not self._fates and self._wobble is None
         self._takes_trains = self._is_steady and way.queue_packets is None
@@ -85,13 +85,13 @@ class Link:
             return None
         self.bytes += size
         for fate in self._fates:
-            if fate.takes(now, left_at):
+            if fate(now, left_at):
                 self.lost += 1
                 return None
         arrival = left_at + self._base
         if self._wobble is None:
             return arrival
-        arrival += self._wobble.deviation(now)
+        arrival += self._wobble(now)
         if not self._may_overtake:
             arrival = self._last_arrival = max(arrival, self._last_arrival)
         return arrival
@@ -145,13 +145,13 @@ def _make_fates(
     way: LinkConfig, streams: Streams, name: str, replay: Replay | None
 ) -> tuple[Fate, ...]:
     """All that may take a packet of one direction."""
-    fates: list[Fate] = [replay] if replay else []
+    fates: list[Fate] = [replay.takes] if replay else []
     if way.loss:
         luck = Weather(streams, f"{name}/loss")
         bursts = way.bursts and way.bursts.play(way.loss, streams, f"{name}/bursts", luck)
-        fates.append(bursts or Chance(way.loss, luck))
+        fates.append(bursts or chance(way.loss, luck))
     if way.outages:
-        fates.append(Gaps(way.outages))
+        fates.append(gaps_of(way.outages))
     return tuple(fates)
 
 
@@ -159,7 +159,7 @@ def _make_wobble(way: LinkConfig, streams: Streams, name: str) -> Wobble | None:
     """What spreads the delay of one direction by chance, if anything does."""
     if way.jitter_s:
         width = way.jitter_s
-        return ByQuantile(lambda u: width * (2.0 * u - 1.0), Weather(streams, f"{name}/jitter"))
+        return by_quantile(lambda u: width * (2.0 * u - 1.0), Weather(streams, f"{name}/jitter"))
     if way.law is not None:
         return way.law.play(way.delay_s, streams, f"{name}/delay")
     return None
@@ -301,8 +301,10 @@ class RadioLink(Link):
         self._luck = Weather(streams, f"{name}/radio")
         self._air, self._air_room = ConstantRate(way.rate_bps), way.queue_bytes
         self._newest = 0.0
-        self._noted = _Noted(self._wobble) if self._wobble and not way.jitter_s else None
-        self._wobble = self._noted or self._wobble
+        self._law = None if way.jitter_s else self._wobble
+        self._deviation = 0.0  # of the last packet, by this law
+        if self._law is not None:
+            self._wobble = self._noted
 
     def is_ideal(self) -> bool:
         """See `Link`: the next place may have no reception."""
@@ -336,31 +338,24 @@ class RadioLink(Link):
         """See `Link`."""
         return max(super().backlog_bytes(now), self._air.backlog_bytes(now))
 
+    def _noted(self, now: float) -> float:
+        assert self._law is not None
+        self._deviation = self._law(now)
+        return self._deviation
+
     def _lag(self) -> float:
         """From leaving the air to arriving [s]: what the link's own law gave the last packet.
 
         Uniform jitter is the exception, a packet that the air holds up takes its mean: what was
         found out with it stays as it was.
         """
-        return self.delay if self._noted is None else self._base + self._noted.last
+        return self.delay if self._law is None else self._base + self._deviation
 
     def _full(self, now: float, size: int, rate_bps: float) -> bool:
         """Whether the queue before the air is full; the air takes up the rate of the place."""
         if rate_bps != self._air.rate_bps:
             self._air.change_rate(now, rate_bps)
         return self._air.backlog_bytes(now) + size > self._air_room
-
-
-class _Noted:
-    """Deviations of a link's delay; the last one is remembered."""
-
-    def __init__(self, wobble: Wobble) -> None:
-        self._wobble, self.last = wobble, 0.0
-
-    def deviation(self, now: float) -> float:
-        """See `Wobble`."""
-        self.last = self._wobble.deviation(now)
-        return self.last
 
 
 def make_link(

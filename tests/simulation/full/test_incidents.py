@@ -64,7 +64,7 @@ def test_of_a_false_alarm_nothing_is_seen_felt_or_dangerous() -> None:
         field = Run(scenario({"false_alarm": false_alarm}), 1).field
         x, y = field.incidents[0].hazard.position
         assert in_danger(field, x, y, LATE) is not false_alarm
-        assert bool(field._spots(LATE)) is not false_alarm
+        assert bool(field.spots(LATE)) is not false_alarm
         assert (field.surroundings.at(x + 1.0, y, LATE).heat_flux > 0.0) is not false_alarm
 
 
@@ -124,13 +124,13 @@ def test_what_a_guard_has_contained_is_not_there_any_more() -> None:
     field, (x, y) = played.field, Run(scenario({}), 1).field.incidents[0].hazard.position
     played.clock.run(LATE)
     field.contained.clear()
-    assert field._is_there("fire", x, y)
-    field._contain("gas_leak", x, y)
-    field._contain("fire", x + 10.0, y)
-    assert field._is_there("fire", x, y)
+    assert field.is_there("fire", x, y)
+    field.contain("gas_leak", x, y)
+    field.contain("fire", x + 10.0, y)
+    assert field.is_there("fire", x, y)
     flames = field.surroundings.at(x + 1.0, y, LATE).heat_flux
-    field._contain("fire", x + 1.0, y)
-    assert not field._is_there("fire", x, y)
+    field.contain("fire", x + 1.0, y)
+    assert not field.is_there("fire", x, y)
     assert not field.is_near(field.dangers(LATE), x, y)
     # The hot smoke under the ceiling still radiates.
     assert field.surroundings.at(x + 1.0, y, LATE + 0.1).heat_flux < 0.1 * flames
