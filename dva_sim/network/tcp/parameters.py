@@ -1,4 +1,4 @@
-"""What can be set on one end of a TCP connection, and which mechanisms it has.
+"""The constants of a TCP connection, and what can be set on one end of it.
 
 References:
     The sysctl names in brackets are those of the Linux kernel's administration guide

@@ -1,4 +1,4 @@
-"""The field: robots and people of a site, the physics around them, and the hazards."""
+"""Everything that has a place: robots and people of a site, physics around them, hazards."""
 
 from __future__ import annotations
 

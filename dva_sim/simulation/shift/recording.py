@@ -10,6 +10,7 @@ import math
 from array import array
 from collections import Counter, defaultdict
 from dataclasses import dataclass, field
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -77,6 +78,13 @@ WAITED, COUNT, SUM, SQUARES = 0, 1, 1 + len(MEASURES), 1 + 2 * len(MEASURES)
 CELL = 1 + 3 * len(MEASURES)
 AT_ONCE = 1e-9  # shorter waits are none [s]
 _NAN = math.nan
+
+
+# The first ten columns.
+_known_of = attrgetter(
+    *("number", "stream", "index", "place.zone", "place.x", "place.y"),
+    *("true", "severity", "occurred", "noticed"),
+)
 
 
 class Slices:
@@ -205,19 +213,7 @@ def _sum_up(cell: list[float], since: float, event: Event) -> None:
 def _row(
     incident: Incident, event: Event | None, outcome: int, units: dict[str, int]
 ) -> tuple[float, ...]:
-    place = incident.place
-    known = (
-        incident.number,
-        incident.stream,
-        incident.index,
-        place.zone,
-        place.x,
-        place.y,
-        incident.true,
-        incident.severity,
-        incident.occurred,
-        incident.noticed,
-    )
+    known = _known_of(incident)
     if event is None:
         return (*known, *(_NAN,) * len(TIMES), outcome, -1, -1, 0, 0, 0, -1, incident.shared)
     get = event.times.get
@@ -261,7 +257,7 @@ class UnitRecord:
         return sum(self.spent.values())
 
 
-@dataclass
+@dataclass(kw_only=True)
 class TimedRecording:
     """One run.
 
