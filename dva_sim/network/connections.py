@@ -33,6 +33,20 @@ MAX_IN_FLIGHT = 1000  # ZeroMQ's default high-water mark, in messages
 Deliver = Callable[[Any], object]
 
 
+def _offer_each(link: Link, now: float, size: int, largest: int, header: int) -> tuple[float, int]:
+    """Send packet by packet [B]: when the last that arrives is there [s], and what is lost [B]."""
+    arrival, missing = 0.0, 0
+    while size > 0:
+        part = min(size, largest)
+        size -= part
+        at = link.carry(now, part + header)
+        if at is None:
+            missing += part
+        elif at > arrival:
+            arrival = at
+    return arrival, missing
+
+
 class Stream:
     """One direction of a connection.
 
@@ -90,7 +104,7 @@ class Stream:
         if self.closed:
             return
         now = self._clock.now
-        arrival, missing = self._offer_each(now, size)
+        arrival, missing = _offer_each(self._forward, now, size, MSS, HEADERS)
         if missing:
             self.retransmitted += 1
             wait = self._recovery_time(tries)
@@ -102,19 +116,6 @@ class Stream:
             self._measure(arrival - now + self._backward.delay)
             arrival = last
         self._clock.call_at(arrival, self._arrive, seq, payload)
-
-    def _offer_each(self, now: float, size: int) -> tuple[float, int]:
-        """Offer a message packet by packet: when the last one arrives [s], and the bytes lost."""
-        arrival, missing = 0.0, 0
-        while size > 0:
-            part = min(size, MSS)
-            size -= part
-            at = self._forward.carry(now, part + HEADERS)
-            if at is None:
-                missing += part
-            elif at > arrival:
-                arrival = at
-        return arrival, missing
 
     def _arrive(self, seq: int, payload: Any) -> None:
         if self.closed:
@@ -148,7 +149,23 @@ class Stream:
         return float(min(MAX_RTO, rto * 2.0 ** (tries - 1)))
 
 
-class StreamEnd:
+class _PlainEnd:
+    """An end that holds nothing back: what waits, waits before its link."""
+
+    _link: Link
+
+    def pause(self) -> None:
+        """Nothing waits here: what a program cannot take is for it to drop."""
+
+    def resume(self) -> None:
+        """See `pause`."""
+
+    def backlog_bytes(self, now: float) -> float:
+        """Bytes that wait before the link [B]."""
+        return self._link.backlog_bytes(now)
+
+
+class StreamEnd(_PlainEnd):
     """One end of a connection.
 
     Args:
@@ -167,16 +184,6 @@ class StreamEnd:
     def closed(self) -> bool:
         """Whether nothing is sent any more."""
         return self._out.closed
-
-    def pause(self) -> None:
-        """Nothing waits here: what a program cannot take is for it to drop."""
-
-    def resume(self) -> None:
-        """See `pause`."""
-
-    def backlog_bytes(self, now: float) -> float:
-        """Bytes that wait before the link [B]."""
-        return self._link.backlog_bytes(now)
 
 
 class Connection:
@@ -252,7 +259,7 @@ UDP_HEADER, IP_HEADER = 8, 20  # [B]
 FRAGMENT = 1480  # payload of a full IPv4 packet on Ethernet [B]
 
 
-class DatagramEnd:
+class DatagramEnd(_PlainEnd):
     """One end: what it sends travels over `link` and is taken by `deliver` there.
 
     Attributes:
@@ -273,7 +280,8 @@ class DatagramEnd:
         packets = -(-total // FRAGMENT)
         arrival = self._link.carry_train(now, packets, total + packets * IP_HEADER)
         if arrival is None:
-            arrival = self._offer_each(now, total)
+            last, missing = _offer_each(self._link, now, total, FRAGMENT, IP_HEADER)
+            arrival = None if missing else last
         if arrival is not None:
             self._clock.call_at(arrival, self.other.take, payload)
         return True
@@ -282,29 +290,6 @@ class DatagramEnd:
         """A message has arrived."""
         if not self.closed:
             self._deliver(payload)
-
-    def pause(self) -> None:
-        """Nobody waits: what a program cannot take is for it to drop."""
-
-    def resume(self) -> None:
-        """See `pause`."""
-
-    def backlog_bytes(self, now: float) -> float:
-        """Bytes that wait before the link [B]."""
-        return self._link.backlog_bytes(now)
-
-    def _offer_each(self, now: float, total: int) -> float | None:
-        """Send fragment by fragment: when the last arrives [s], None if one is lost."""
-        last, whole = 0.0, True
-        while total > 0:
-            part = min(total, FRAGMENT)
-            total -= part
-            arrival = self._link.carry(now, part + IP_HEADER)
-            if arrival is None:
-                whole = False
-            else:
-                last = max(last, arrival)
-        return last if whole else None
 
 
 class DatagramConnection:
