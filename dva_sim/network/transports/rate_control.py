@@ -112,14 +112,14 @@ class ThreeTerms(Aimd):
 
     def __init__(self, linear: float, square: float, decrease: float) -> None:
         super().__init__(linear, decrease)
-        self.square, self._passed = square, 0
+        self.linear, self.square, self._passed = linear, square, 0
 
     def passed(self, round_trip: float, held: bool) -> None:
         """See `RateLaw`."""
         if held:
             self._passed += 1
             odd = 2 * self._passed - 1  # from one square to the next
-            self.rate += (self.increase + self.square * odd) / round_trip
+            self.rate += (self.linear + self.square * odd) / round_trip
 
     def lost(self) -> None:
         """See `RateLaw`."""
