@@ -16,13 +16,13 @@ from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.recorder import Recorder
 from dva_sim.kernel.streams import Streams
 from dva_sim.network.link import ConstantRate, Link, LinkConfig
-from dva_sim.network.virtual import VirtualNetwork
+from dva_sim.network.virtual_network import VirtualNetwork
 from dva_sim.protocol import messages as m
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full.control_room import add_operator
-from dva_sim.simulation.full.field import Field
-from dva_sim.simulation.full.robots import Machines, Starts
+from dva_sim.simulation.full.physical_world import Field
 from dva_sim.simulation.full.stage import Stage, id_of
+from dva_sim.simulation.full.team import TeamBuilder
 from dva_sim.worlds.geo import Pose
 
 GUARD, ROBOT, OTHER_ROBOT = id_of("guard", 1), id_of("robot", 1), id_of("robot", 2)
@@ -67,16 +67,13 @@ class PretendedDva:
         config = LinkConfig(delay_s=0.001)
         links = [Link(config, ConstantRate(config.rate_bps), Streams(1), way) for way in "ab"]
         self.network = VirtualNetwork(Clock(), lambda *_: (links[0], links[1]))
-        team = {"robot.count": robots, "guard.count": 1}
-        scenario = scenarios.build(scenarios.load("drive-to-event"), team | changes)
+        counts = {"robot.count": robots, "guard.count": 1}
+        scenario = scenarios.build(scenarios.load("drive-to-event"), counts | changes)
         self.stage = Stage(scenario, 1, self.network, Recorder())
         self.field = field = Field(self.stage)
-        starts = Starts(self.stage, field.incidents[0].hazard.position)
-        machines = Machines(
-            *(self.stage, field.world, field.surroundings, field._spots, field.newest_drive, starts)
-        )
+        team = TeamBuilder(self.stage, field.world, field)
         for number in range(1, robots + 1):
-            robot = machines.add(number)
+            robot = team.add_robot(number)
             field.robots[robot.device.id_tag] = robot
         self.device = self.stage.device("dva", 1)
         self.device.serve(self._hear)

@@ -33,7 +33,7 @@ from dva_sim.network.messaging import (
 )
 from dva_sim.network.realtime import LiveClock
 from dva_sim.network.sockets import NetworkError, SocketNetwork
-from dva_sim.network.virtual import VirtualNetwork
+from dva_sim.network.virtual_network import VirtualNetwork
 from dva_sim.worlds.geo import GeoFrame
 
 DVA, ROBOT, PHONE, TABLET = (f"02:00:00:00:00:0{i}" for i in range(1, 5))

@@ -23,7 +23,7 @@ from dva_sim.simulation.full import Playback, Recording
 from dva_sim.simulation.full.measures import RUN_COLUMNS
 from dva_sim.simulation.models import Tables, model_for
 from dva_sim.simulation.shift import TimedRecording, TimedScenario
-from dva_sim.simulation.shift.statistics import OUTCOMES
+from dva_sim.simulation.shift.recording import OUTCOMES
 from dva_sim.simulation.task import TaskScenario
 from dva_sim.simulation.transport import TransportScenario
 

@@ -34,9 +34,9 @@ def parse_changes(pairs: Iterable[str]) -> dict[str, Any]:
 def build(
     model: type[M],
     source: Document | Mapping[str, Any],
-    changes: Mapping[str, Any],
+    changes: Mapping[str, Any] | None,
     complete: Callable[[M, Fail], M],
-    locate: Callable[[dict[str, Any], Sequence[Path]], object],
+    locate: Callable[[dict[str, Any], Sequence[Path]], object] = lambda data, folders: None,
 ) -> M:
     """A configuration with some keys changed, whose mistakes are told with their place.
 
@@ -56,9 +56,9 @@ def build(
         return _built(model, source, some, complete, locate)
 
     try:
-        return make(changes)
+        return make(changes or {})
     except ConfigError as error:
-        raise blame(error, changes, make, source) from None
+        raise blame(error, changes or {}, make, source) from None
 
 
 def _built(

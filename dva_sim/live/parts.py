@@ -23,7 +23,7 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import either
 from dva_sim.live.options import PARTS, LiveOptions
 from dva_sim.simulation.full.control_room import add_dva, add_operator
-from dva_sim.simulation.full.field import Field
+from dva_sim.simulation.full.physical_world import Field
 from dva_sim.simulation.full.stage import Stage
 
 SESSION_EPOCH = 1_735_689_600  # 2025-01-01, UTC [s]

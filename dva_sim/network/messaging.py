@@ -1,7 +1,7 @@
 """Asking and telling behind one promise, whatever carries the bytes.
 
 A `Transport` is a set of nodes that can ask each other (request/reply) and tell each other
-(publish/subscribe). `dva_sim.network.virtual` keeps the promise in virtual time,
+(publish/subscribe). `dva_sim.network.virtual_network` keeps the promise in virtual time,
 `dva_sim.network.sockets` over ZeroMQ sockets; agents know only what stands here.
 """
 

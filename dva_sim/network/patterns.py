@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import inspect
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
-from pathlib import Path
-from typing import Any, Final, Protocol
+from collections.abc import Callable
+from typing import Final, Protocol
 
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.plugins import Plugins
@@ -222,27 +221,6 @@ def meaning_of(kind: type[Pattern]) -> str:
     return first[:1].lower() + first[1:].removesuffix(".")
 
 
-def known_patterns() -> list[str]:
-    """Names that a scenario can use: shipped and installed ones; files come on top."""
-    return PLUGINS.known()
-
-
-def load_pattern(
-    name: str | Callable[..., Pattern],
-    options: Mapping[str, Any] | None = None,
-    base: Path | None = None,
-) -> Callable[[], Pattern]:
-    """What makes the pattern that `name` means, one for each drive.
-
-    Args:
-        name: A shipped name, a class in a file such as `mine.py:Mine`, or the name under which
-            an installed package offers one (entry point, `dva_sim.patterns`).
-        options: Keyword arguments of its constructor.
-        base: Folder that a file is looked for in first; then the working folder, and
-            `protocol/patterns`.
-
-    Raises:
-        ConfigError: there is none of that name, its file or package cannot be loaded, or it is
-            not a pattern; a bad option is told when it is made.
-    """
-    return PLUGINS.load(name, options, base)
+known_patterns = PLUGINS.known
+load_pattern = PLUGINS.load
+"""What makes the pattern that a name means, one for each drive; see `Plugins.load`."""

@@ -265,16 +265,13 @@ class Security:
         Raises:
             ConfigError: the pair of keys of `device` is not at hand.
         """
-        socket.setsockopt(zmq.HANDSHAKE_IVL, HANDSHAKE_LIMIT)
+        self._give_keys(socket, device)
         if self._ring is not None:
-            public, secret = self._ring.pair(device)
             socket.setsockopt(zmq.CURVE_SERVER, 1)
-            socket.setsockopt(zmq.CURVE_PUBLICKEY, public)
-            socket.setsockopt(zmq.CURVE_SECRETKEY, secret)
             socket.setsockopt(zmq.ZAP_DOMAIN, device.encode())
             # Else a server whom nobody tells which keys are good takes any.
             socket.setsockopt(zmq.ZAP_ENFORCE_DOMAIN, 1)
-        self._watch(_Watch(socket, device, None))
+        self._watch(socket, device, None)
 
     def connect_client(self, socket: Socket, device: str, peer: str) -> None:
         """Make `socket`, before it connects, one of `device` that reaches nobody but `peer`.
@@ -284,15 +281,12 @@ class Security:
         Raises:
             ConfigError: the pair of `device` or the public key of `peer` is not at hand.
         """
-        socket.setsockopt(zmq.HANDSHAKE_IVL, HANDSHAKE_LIMIT)
+        self._give_keys(socket, device)
         socket.setsockopt(zmq.RECONNECT_IVL, RECONNECT_FIRST)
         socket.setsockopt(zmq.RECONNECT_IVL_MAX, RECONNECT_MAX)
         if self._ring is not None:
-            public, secret = self._ring.pair(device)
             socket.setsockopt(zmq.CURVE_SERVERKEY, self._ring.public(peer))
-            socket.setsockopt(zmq.CURVE_PUBLICKEY, public)
-            socket.setsockopt(zmq.CURVE_SECRETKEY, secret)
-        self._watch(_Watch(socket, device, peer))
+        self._watch(socket, device, peer)
 
     def sockets(self) -> list[Socket]:
         """The sockets that `handle` wants; they are in the poller already."""
@@ -355,15 +349,22 @@ class Security:
         self._poller.register(zap, zmq.POLLIN)
         return zap
 
-    def _watch(self, watch: _Watch) -> None:
+    def _give_keys(self, socket: Socket, device: str) -> None:
+        socket.setsockopt(zmq.HANDSHAKE_IVL, HANDSHAKE_LIMIT)
+        if self._ring is not None:
+            public, secret = self._ring.pair(device)
+            socket.setsockopt(zmq.CURVE_PUBLICKEY, public)
+            socket.setsockopt(zmq.CURVE_SECRETKEY, secret)
+
+    def _watch(self, socket: Socket, device: str, peer: str | None) -> None:
         address = f"inproc://dva-sim.monitor.{next(_names)}"
-        watch.socket.monitor(address, _EVENTS)
+        socket.monitor(address, _EVENTS)
         monitor = self._context.socket(zmq.PAIR)
         monitor.setsockopt(zmq.LINGER, 0)
         monitor.setsockopt(zmq.RCVHWM, _MONITOR_ROOM)
         monitor.connect(address)
         self._poller.register(monitor, zmq.POLLIN)
-        self._watches[monitor] = watch
+        self._watches[monitor] = _Watch(socket, device, peer)
 
     def _drop(self, monitor: Socket) -> None:
         """End a monitor, its source first: libzmq would wait for a reader that has gone."""

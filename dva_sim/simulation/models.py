@@ -28,13 +28,10 @@ from dva_sim.simulation.run_measures import RunMeasure, values_of
 from dva_sim.simulation.scenario import Scenario, contradictions
 from dva_sim.simulation.shift import TimedScenario
 from dva_sim.simulation.shift import measures as of_shift
-from dva_sim.simulation.shift import scenario as shifts
 from dva_sim.simulation.task import TaskScenario
 from dva_sim.simulation.task import measures as of_task
-from dva_sim.simulation.task import scenario as tasks
 from dva_sim.simulation.transport import TransportScenario
 from dva_sim.simulation.transport import measures as of_transport
-from dva_sim.simulation.transport import scenario as transports
 
 Tables = dict[str, list[dict[str, Any]]]
 
@@ -190,24 +187,16 @@ class _Full(_Operated[Scenario]):
     }
     is_recorded = True
     teller = "dva_sim.cli.stories:tell_full"
+    build = staticmethod(scenarios.build)
+    contradictions = staticmethod(contradictions)
+    rehearse = staticmethod(full.rehearse)
+    simulate = staticmethod(full.simulate)
 
     def measures(self, scenario: Scenario | None = None) -> tuple[str, ...]:
         return super().measures() if scenario is None else of_full.measures_of(scenario)
 
-    def build(self, source: Document | Mapping[str, Any], changes: Mapping[str, Any]) -> Scenario:
-        return scenarios.build(source, changes)
-
     def team(self, scenario: Scenario) -> int:
         return scenario.operator.count
-
-    def rehearse(self, scenario: Scenario, seed: int) -> None:
-        full.rehearse(scenario, seed)
-
-    def contradictions(self, scenario: Scenario) -> list[str]:
-        return contradictions(scenario)
-
-    def simulate(self, scenario: Scenario, seed: int) -> full.Recording:
-        return full.simulate(scenario, seed)
 
     def rows(self, recording: full.Recording, with_tracks: bool = False) -> Tables:
         tracks = {"tracks": of_full.track_rows(recording)} if with_tracks else {}
@@ -224,20 +213,12 @@ class _Timed(Model[TimedScenario]):
         "responders": of_shift.RESPONDER_COLUMNS,
     }
     teller = "dva_sim.cli.stories:tell_shift"
+    build = staticmethod(shift.build)
+    rehearse = staticmethod(shift.rehearse_timed)
+    simulate = staticmethod(shift.simulate_timed)
 
     def measures(self, scenario: TimedScenario | None = None) -> tuple[str, ...]:
         return super().measures() if scenario is None else of_shift.measures_of(scenario)
-
-    def build(
-        self, source: Document | Mapping[str, Any], changes: Mapping[str, Any]
-    ) -> TimedScenario:
-        return shifts.build(source, changes)
-
-    def rehearse(self, scenario: TimedScenario, seed: int) -> None:
-        shift.rehearse_timed(scenario, seed)
-
-    def simulate(self, scenario: TimedScenario, seed: int) -> shift.TimedRecording:
-        return shift.simulate_timed(scenario, seed)
 
     def rows(self, recording: shift.TimedRecording, with_tracks: bool = False) -> Tables:
         return of_shift.tables(recording)
@@ -249,21 +230,15 @@ class _Task(_Operated[TaskScenario]):
     scenario = TaskScenario
     columns: ClassVar[Columns] = {"runs": of_task.RUN_COLUMNS, "trials": of_task.TRIAL_COLUMNS}
     teller = "dva_sim.cli.stories:tell_task"
+    build = staticmethod(task.build)
+    simulate = staticmethod(task.play)
     still = "dva_sim.experiments.report.figures.trial:draw_trial"
 
     def measures(self, scenario: TaskScenario | None = None) -> tuple[str, ...]:
         return super().measures() if scenario is None else of_task.measures_of(scenario)
 
-    def build(
-        self, source: Document | Mapping[str, Any], changes: Mapping[str, Any]
-    ) -> TaskScenario:
-        return tasks.build(source, changes)
-
     def rehearse(self, scenario: TaskScenario, seed: int) -> None:
         task.rehearse(scenario)
-
-    def simulate(self, scenario: TaskScenario, seed: int) -> list[of_task.Row]:
-        return task.play(scenario, seed)
 
     def rows(self, recording: list[of_task.Row], with_tracks: bool = False) -> Tables:
         return {"runs": [of_task.run_row(recording)], "trials": recording}
@@ -278,17 +253,11 @@ class _Transports(_Operated[TransportScenario]):
         "flows": of_transport.FLOW_COLUMNS,
     }
     teller = "dva_sim.cli.stories:tell_session"
-
-    def build(
-        self, source: Document | Mapping[str, Any], changes: Mapping[str, Any]
-    ) -> TransportScenario:
-        return transports.build(source, changes)
+    build = staticmethod(transport.build)
+    simulate = staticmethod(transport.simulate_session)
 
     def rehearse(self, scenario: TransportScenario, seed: int) -> None:
         transport.rehearse(scenario)
-
-    def simulate(self, scenario: TransportScenario, seed: int) -> transport.SessionRecording:
-        return transport.simulate_session(scenario, seed)
 
     def rows(self, recording: transport.SessionRecording, with_tracks: bool = False) -> Tables:
         return transport.tables(recording)

@@ -18,7 +18,7 @@ from dva_sim.kernel.streams import Streams
 from dva_sim.network.link import ConstantRate, Link, LinkConfig
 from dva_sim.network.messaging import Requester, Subscription, Transport
 from dva_sim.network.patterns import Pattern, load_pattern
-from dva_sim.network.virtual import VirtualNetwork
+from dva_sim.network.virtual_network import VirtualNetwork
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode, encode
 from dva_sim.protocol.errors import ProtocolError

@@ -22,7 +22,7 @@ from dva_sim.agents.population import Population, draw_person
 from dva_sim.agents.route_following import Route
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full import simulate
-from dva_sim.simulation.full.field import PHYSICS_TICK
+from dva_sim.simulation.full.physical_world import PHYSICS_TICK
 from dva_sim.simulation.full.stage import planner_of
 from dva_sim.worlds.drives import DriveSpec
 from dva_sim.worlds.physics import World

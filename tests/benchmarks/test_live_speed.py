@@ -18,7 +18,7 @@ from dva_sim.network.realtime import LiveClock
 from dva_sim.network.sockets import SocketNetwork
 from dva_sim.protocol import messages as m
 from dva_sim.simulation import scenario as scenarios
-from dva_sim.simulation.full.field import Field
+from dva_sim.simulation.full.physical_world import Field
 from dva_sim.simulation.full.stage import DVA, Stage, id_of
 
 ROBOT, OPERATOR = id_of("robot", 1), id_of("operator", 1)

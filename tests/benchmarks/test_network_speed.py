@@ -22,7 +22,7 @@ from dva_sim.kernel.streams import Streams
 from dva_sim.network.connections import Connector
 from dva_sim.network.link import ConstantRate, Link, LinkConfig
 from dva_sim.network.messaging import Request, Requester
-from dva_sim.network.virtual import VirtualNetwork
+from dva_sim.network.virtual_network import VirtualNetwork
 
 MESSAGES, AT_ONCE, ROUNDS = 20_000, 100, 7
 MOST_SHARE = 0.4

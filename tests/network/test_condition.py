@@ -6,7 +6,13 @@ from pathlib import Path
 import pytest
 
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.network.condition import COLUMN_WORDS, CONDITION, EMULATOR_RESULTS, RESULTS, Condition
+from dva_sim.network.pattern_runs import (
+    COLUMN_WORDS,
+    CONDITION,
+    EMULATOR_RESULTS,
+    RESULTS,
+    Condition,
+)
 from dva_sim.network.patterns import PATTERNS
 
 REFERENCE = Path(__file__).parents[2].parent / "shared" / "targets" / "network.csv"

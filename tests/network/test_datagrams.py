@@ -11,7 +11,7 @@ from dva_sim.kernel.streams import Streams
 from dva_sim.network.connections import Connector, DatagramConnection
 from dva_sim.network.link import Link, LinkConfig, make_serialiser
 from dva_sim.network.messaging import Request, Requester
-from dva_sim.network.virtual import VirtualNetwork
+from dva_sim.network.virtual_network import VirtualNetwork
 
 
 def links(seed: int = 1, **config: Any) -> tuple[Link, Link]:

@@ -8,10 +8,10 @@ import pytest
 
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.streams import Streams
+from dva_sim.network.connections import MAX_IN_FLIGHT, Connection, Stream
 from dva_sim.network.link import ConstantRate, Link, LinkConfig
 from dva_sim.network.messaging import Request, Requester
-from dva_sim.network.stream import MAX_IN_FLIGHT, Connection, Stream
-from dva_sim.network.virtual import VirtualNetwork
+from dva_sim.network.virtual_network import VirtualNetwork
 
 
 def pair(seed: int = 1, **config: float) -> tuple[Link, Link]:

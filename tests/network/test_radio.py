@@ -9,9 +9,9 @@ import pytest
 
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.streams import Streams
+from dva_sim.network.connections import Stream
 from dva_sim.network.link import Link, LinkConfig
-from dva_sim.network.radio import make_link
-from dva_sim.network.stream import Stream
+from dva_sim.network.link.link import make_link
 
 
 class Quality(NamedTuple):

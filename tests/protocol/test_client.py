@@ -13,7 +13,7 @@ from dva_sim.network.realtime import LiveClock
 from dva_sim.network.sockets import SocketNetwork
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full.control_room import add_dva
-from dva_sim.simulation.full.field import Field
+from dva_sim.simulation.full.physical_world import Field
 from dva_sim.simulation.full.stage import Stage, id_of
 
 SPECIFICATION = Path(__file__).parents[2] / "protocol" / "README.md"

@@ -11,8 +11,8 @@ from searching import search
 
 from dva_sim.agents.robot.profile import load_robot
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.simulation.full.field import PHYSICS_TICK
-from dva_sim.simulation.full.robots import WET_GRIP
+from dva_sim.simulation.full.physical_world import PHYSICS_TICK
+from dva_sim.simulation.full.team import WET_GRIP
 from dva_sim.worlds.drives import LONGEST_TICK, DriveSpec
 from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.physics import World, hall

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from dva_sim.experiments.analysis.run_grid import StudyView, Table, codes_of, nan_mean, person_means
 from dva_sim.simulation.labels import setting
-from dva_sim.simulation.shift.bounds import Floats, share_of_the_way
-from dva_sim.simulation.shift.measures import FOLLOW_S
+from dva_sim.simulation.shift.measures import FOLLOW_S, Floats, share_of_the_way
 from dva_sim.statistics import LEVEL, Band, band
 
 POLICY, INTENSITY = "dispatch.policy", "intensity"

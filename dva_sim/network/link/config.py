@@ -18,7 +18,6 @@ Rate = Annotated[float, Field(ge=1e3)]
 Room = Annotated[int, Field(ge=3_000)]
 Packets = Annotated[int, Field(ge=1)]
 Share = Annotated[float, Field(gt=0, le=1)]
-_SLOW_SDS = 2.0  # few packets are later than that; assumed
 
 
 class Way(Config):
@@ -150,17 +149,3 @@ class LinkConfig(Config):
         if self.law is not None:
             return self.law.moments(self.delay_s)
         return self.delay_s, self.jitter_s / 3.0**0.5
-
-    def slow_round_trip(self) -> float:
-        """A round trip that few packets exceed [s], without queues and losses.
-
-        Raises:
-            ConfigError: a file cannot be read.
-        """
-        return sum(self.toward(direction)._slow() for direction in ("up", "down"))
-
-    def _slow(self) -> float:
-        if self.jitter_s:
-            return self.delay_s + self.jitter_s
-        mean, sd = self.moments()
-        return mean + _SLOW_SDS * sd

@@ -10,7 +10,7 @@ import math
 from abc import abstractmethod
 from collections.abc import Callable
 from statistics import fmean, pstdev
-from typing import Annotated, Any, Literal, Protocol
+from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
@@ -25,43 +25,13 @@ PositiveSeconds = Annotated[float, Field(gt=0, le=30)]
 _SDS = 3.0  # a normal law keeps so many standard deviations above zero
 
 
-class Wobble(Protocol):
-    """Deviations from a link's `delay_s`, packet by packet."""
-
-    def deviation(self, now: float) -> float:
-        """Of a packet sent at `now` [s]."""
+Wobble = Callable[[float], float]
+"""How much later than usual a packet arrives that is sent at a time [s]; less than 0 is sooner."""
 
 
-class Jitter:
-    """A uniform law around the delay.
-
-    Args:
-        width: Half of it [s].
-        luck: Gives each packet its number.
-    """
-
-    def __init__(self, width: float, luck: UniformNumbers) -> None:
-        self._width, self._luck = width, luck
-
-    def deviation(self, now: float) -> float:
-        """See `Wobble`."""
-        return self._width * (2.0 * self._luck.draw(now) - 1.0)
-
-
-class ByQuantile:
-    """Any law.
-
-    Args:
-        quantile: The deviation [s] that is not exceeded with a given probability.
-        luck: Gives each packet its number.
-    """
-
-    def __init__(self, quantile: Quantile, luck: UniformNumbers) -> None:
-        self._quantile, self._luck = quantile, luck
-
-    def deviation(self, now: float) -> float:
-        """See `Wobble`."""
-        return self._quantile(self._luck.draw(now))
+def by_quantile(quantile: Quantile, luck: UniformNumbers) -> Wobble:
+    """Any law: the deviation [s] that is not exceeded with the probability that luck gives."""
+    return lambda now: quantile(luck.draw(now))
 
 
 class ConstantDelay(Config):
@@ -112,7 +82,7 @@ class _Law(Config):
         luck: UniformNumbers = Weather(streams, name)
         if self.correlation_s:
             luck = SlowWeather(streams, name, self.correlation_s)
-        return ByQuantile(self.quantile(delay), luck)
+        return by_quantile(self.quantile(delay), luck)
 
 
 class Normal(_Law):

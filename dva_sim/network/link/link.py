@@ -2,23 +2,22 @@
 
 A packet's fate is known when it is sent, because the queue is first-in-first-out:
 no event is spent inside the link. Luck is a function of virtual time, so that two
-patterns that send at different moments still meet the same weather.
-
-One link as a pair of nodes meets it whom a partition of the network keeps apart.
+patterns that send at different moments still meet the same weather. A link may end in a last hop
+through the air, whose quality depends on the place, and a partition may keep two nodes apart.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from fnmatch import fnmatchcase
-from typing import Any
+from typing import Any, Protocol
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.streams import Streams
 from dva_sim.kernel.suggestions import hint
 from dva_sim.network.link.config import Direction, LinkConfig
-from dva_sim.network.link.delays import Jitter, Wobble
-from dva_sim.network.link.losses import Chance, Fate, Gap, Gaps, Partition
+from dva_sim.network.link.delays import Wobble, by_quantile
+from dva_sim.network.link.losses import Fate, Gap, Partition, chance, gaps_of
 from dva_sim.network.link.rates import ConstantRate, PacketQueue, Serialiser, TraceRate
 from dva_sim.network.link.recorded import Replay, period_of, read_delay_log, read_trace
 from dva_sim.network.link.time_noise import Weather
@@ -59,7 +58,7 @@ class Link:
             self.room = way.queue_packets * SMALLEST_PACKET
         self._serialiser, self._offer = serialiser, serialiser.offer
         self._fates = _make_fates(way, streams, name, replay)
-        self._wobble = replay or _make_wobble(way, streams, name)
+        self._wobble = replay.deviation if replay else _make_wobble(way, streams, name)
         self._may_overtake, self._last_arrival = way.reorder, 0.0
         self._is_steady = not self._fates and self._wobble is None
         self._takes_trains = self._is_steady and way.queue_packets is None
@@ -86,13 +85,13 @@ class Link:
             return None
         self.bytes += size
         for fate in self._fates:
-            if fate.takes(now, left_at):
+            if fate(now, left_at):
                 self.lost += 1
                 return None
         arrival = left_at + self._base
         if self._wobble is None:
             return arrival
-        arrival += self._wobble.deviation(now)
+        arrival += self._wobble(now)
         if not self._may_overtake:
             arrival = self._last_arrival = max(arrival, self._last_arrival)
         return arrival
@@ -146,20 +145,21 @@ def _make_fates(
     way: LinkConfig, streams: Streams, name: str, replay: Replay | None
 ) -> tuple[Fate, ...]:
     """All that may take a packet of one direction."""
-    fates: list[Fate] = [replay] if replay else []
+    fates: list[Fate] = [replay.takes] if replay else []
     if way.loss:
         luck = Weather(streams, f"{name}/loss")
         bursts = way.bursts and way.bursts.play(way.loss, streams, f"{name}/bursts", luck)
-        fates.append(bursts or Chance(way.loss, luck))
+        fates.append(bursts or chance(way.loss, luck))
     if way.outages:
-        fates.append(Gaps(way.outages))
+        fates.append(gaps_of(way.outages))
     return tuple(fates)
 
 
 def _make_wobble(way: LinkConfig, streams: Streams, name: str) -> Wobble | None:
     """What spreads the delay of one direction by chance, if anything does."""
     if way.jitter_s:
-        return Jitter(way.jitter_s, Weather(streams, f"{name}/jitter"))
+        width = way.jitter_s
+        return by_quantile(lambda u: width * (2.0 * u - 1.0), Weather(streams, f"{name}/jitter"))
     if way.law is not None:
         return way.law.play(way.delay_s, streams, f"{name}/delay")
     return None
@@ -252,3 +252,132 @@ def part_links(
         PartedLink(links[0], out) if out else links[0],
         PartedLink(links[1], back) if back else links[1],
     )
+
+
+class Reception(Protocol):
+    """The quality of a radio link at one place, on top of what the link is like anyway."""
+
+    @property
+    def loss(self) -> float:
+        """Probability that a packet is lost, each way; 1: there is no reception."""
+
+    @property
+    def rate_bps(self) -> float:
+        """Upper bound of the rate [bit/s]."""
+
+    @property
+    def extra_delay_s(self) -> float:
+        """One-way delay added [s]."""
+
+
+class RadioLink(Link):
+    """A link whose quality depends on where the robot is.
+
+    Packets keep their order when reception changes, unless the link may reorder them. While there
+    is none every packet is lost, and what rides on the link has to send again. The queue before
+    the air counts bytes.
+
+    Args:
+        config: Delay, loss, queue of the link as such.
+        serialiser: What gives its rate.
+        streams: The run's luck.
+        name: Name of this direction, for its luck.
+        direction: Which it is.
+        reception: The quality where the robot is now; None: nothing is added.
+    """
+
+    def __init__(
+        self,
+        config: LinkConfig,
+        serialiser: Serialiser,
+        streams: Streams,
+        name: str,
+        direction: Direction,
+        reception: Callable[[], Reception | None],
+    ) -> None:
+        super().__init__(config, serialiser, streams, name, direction)
+        way = config.toward(direction)
+        self._reception = reception
+        self._luck = Weather(streams, f"{name}/radio")
+        self._air, self._air_room = ConstantRate(way.rate_bps), way.queue_bytes
+        self._newest = 0.0
+        self._law = None if way.jitter_s else self._wobble
+        self._deviation = 0.0  # of the last packet, by this law
+        if self._law is not None:
+            self._wobble = self._noted
+
+    def is_ideal(self) -> bool:
+        """See `Link`: the next place may have no reception."""
+        return False
+
+    def carry(self, now: float, size: int) -> float | None:
+        """See `Link`."""
+        here = self._reception()
+        if here is not None and self._full(now, size, here.rate_bps):
+            self.offered += 1
+            self.dropped += 1
+            return None
+        arrival = super().carry(now, size)
+        if arrival is None:
+            return None
+        if here is not None:
+            if here.loss and self._luck.draw(now) < here.loss:
+                self.lost += 1
+                return None
+            arrival = max(arrival, self._air.depart(now, size) + self._lag()) + here.extra_delay_s
+        if self._may_overtake:
+            return arrival
+        self._newest = max(self._newest, arrival)
+        return self._newest
+
+    def carry_train(self, now: float, packets: int, size: int) -> float | None:
+        """See `Link`: in the air each packet has a fate of its own."""
+        return None
+
+    def backlog_bytes(self, now: float) -> float:
+        """See `Link`."""
+        return max(super().backlog_bytes(now), self._air.backlog_bytes(now))
+
+    def _noted(self, now: float) -> float:
+        assert self._law is not None
+        self._deviation = self._law(now)
+        return self._deviation
+
+    def _lag(self) -> float:
+        """From leaving the air to arriving [s]: what the link's own law gave the last packet.
+
+        Uniform jitter is the exception, a packet that the air holds up takes its mean: what was
+        found out with it stays as it was.
+        """
+        return self.delay if self._law is None else self._base + self._deviation
+
+    def _full(self, now: float, size: int, rate_bps: float) -> bool:
+        """Whether the queue before the air is full; the air takes up the rate of the place."""
+        if rate_bps != self._air.rate_bps:
+            self._air.change_rate(now, rate_bps)
+        return self._air.backlog_bytes(now) + size > self._air_room
+
+
+def make_link(
+    config: LinkConfig,
+    direction: Direction,
+    streams: Streams,
+    name: str,
+    reception: Callable[[], Reception | None] | None = None,
+) -> Link:
+    """The `up` or `down` direction of a configured link.
+
+    Args:
+        config: What it is like.
+        direction: `up` or `down`.
+        streams: The run's luck.
+        name: Of the link, for its luck.
+        reception: The quality of its radio hop now, if it has one.
+
+    Raises:
+        ConfigError: a file that it names cannot be read.
+    """
+    serialiser, own_name = make_serialiser(config, direction, streams, name), f"{name}/{direction}"
+    if reception is None:
+        return Link(config, serialiser, streams, own_name, direction)
+    return RadioLink(config, serialiser, streams, own_name, direction, reception)

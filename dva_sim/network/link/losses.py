@@ -5,9 +5,9 @@ What takes packets off a link by chance or by the clock.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from fnmatch import fnmatchcase
-from typing import Annotated, Literal, Protocol
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -18,6 +18,9 @@ from dva_sim.network.link.time_noise import Spells, UniformNumbers
 
 Seconds = Annotated[float, Field(ge=0, le=1e7)]
 PositiveSeconds = Annotated[float, Field(gt=0, le=1e7)]
+
+Fate = Callable[[float, float], bool]
+"""Whether a packet sent at a time [s], which left the queue at another [s], is lost."""
 
 
 class Gap(Config):
@@ -126,52 +129,24 @@ class Bursts(Config):
         share = loss / self.loss  # of time, or of packets, that is in a burst
         if self.mean_s is not None:
             spells = Spells(streams, name, self.mean_s * (1.0 - share) / share, self.mean_s)
-            return TimedBursts(spells, self.loss, luck)
+            return timed_bursts(spells, self.loss, luck)
         assert self.mean_packets is not None
-        return CountedBursts(streams.fresh(name), share, self.mean_packets, self.loss, luck)
+        return counted_bursts(streams.fresh(name), share, self.mean_packets, self.loss, luck)
 
 
-class Fate(Protocol):
-    """Something that may take a packet."""
-
-    def takes(self, now: float, left_at: float) -> bool:
-        """Whether it takes a packet that was sent at `now` [s] and has left the queue later."""
+def chance(loss: float, luck: UniformNumbers) -> Fate:
+    """Every packet by itself, with a probability; luck gives each its number."""
+    return lambda now, left_at: luck.draw(now) < loss
 
 
-class Chance:
-    """Every packet by itself.
-
-    Args:
-        loss: Probability.
-        luck: Gives each packet its number.
-    """
-
-    def __init__(self, loss: float, luck: UniformNumbers) -> None:
-        self._loss, self._luck = loss, luck
-
-    def takes(self, now: float, left_at: float) -> bool:
-        """See `Fate`."""
-        return self._luck.draw(now) < self._loss
+def timed_bursts(spells: Spells, loss: float, luck: UniformNumbers) -> Fate:
+    """Packets sent in bad times, with the probability then; luck gives each its number."""
+    return lambda now, left_at: spells.is_on(now) and luck.draw(now) < loss
 
 
-class TimedBursts:
-    """Packets sent in bad times.
-
-    Args:
-        spells: When times are bad.
-        loss: Probability then.
-        luck: Gives each packet its number.
-    """
-
-    def __init__(self, spells: Spells, loss: float, luck: UniformNumbers) -> None:
-        self._spells, self._loss, self._luck = spells, loss, luck
-
-    def takes(self, now: float, left_at: float) -> bool:
-        """See `Fate`."""
-        return self._spells.is_on(now) and self._luck.draw(now) < self._loss
-
-
-class CountedBursts:
+def counted_bursts(
+    rng: np.random.Generator, share: float, length: float, loss: float, luck: UniformNumbers
+) -> Fate:
     """Runs of packets, whenever they come.
 
     Args:
@@ -181,40 +156,22 @@ class CountedBursts:
         loss: Probability in a burst.
         luck: Gives each packet its number.
     """
+    ends, begins = 1.0 / length, share / (1.0 - share) / length
+    steps = _uniform(rng)
+    is_on = next(steps) < share
 
-    def __init__(
-        self,
-        rng: np.random.Generator,
-        share: float,
-        length: float,
-        loss: float,
-        luck: UniformNumbers,
-    ) -> None:
-        self._ends, self._begins = 1.0 / length, share / (1.0 - share) / length
-        self._loss, self._luck = loss, luck
-        self._steps = _uniform(rng)
-        self._is_on = next(self._steps) < share
+    def takes(now: float, left_at: float) -> bool:
+        nonlocal is_on
+        if next(steps) < (ends if is_on else begins):
+            is_on = not is_on
+        return is_on and luck.draw(now) < loss
 
-    def takes(self, now: float, left_at: float) -> bool:
-        """See `Fate`."""
-        if next(self._steps) < (self._ends if self._is_on else self._begins):
-            self._is_on = not self._is_on
-        return self._is_on and self._luck.draw(now) < self._loss
+    return takes
 
 
-class Gaps:
-    """What would cross the link when there is none.
-
-    Args:
-        gaps: When that is.
-    """
-
-    def __init__(self, gaps: Sequence[Gap]) -> None:
-        self._gaps = gaps
-
-    def takes(self, now: float, left_at: float) -> bool:
-        """See `Fate`."""
-        return any(gap.covers(left_at) for gap in self._gaps)
+def gaps_of(gaps: Sequence[Gap]) -> Fate:
+    """What would cross the link when there is none."""
+    return lambda now, left_at: any(gap.covers(left_at) for gap in gaps)
 
 
 def _uniform(rng: np.random.Generator) -> Iterator[float]:

@@ -6,22 +6,15 @@ A TCP connection over two links: two ends and how they are opened.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
 
 from dva_sim.kernel.clock import Clock
-from dva_sim.network.tcp.options import TcpOptions
+from dva_sim.network.link import Link
+from dva_sim.network.tcp.parameters import FIRST_RTO, HEADERS, TcpOptions
 from dva_sim.network.tcp.receiver import BLOCKS, Receiver
 from dva_sim.network.tcp.retransmission_timer import Timer
 from dva_sim.network.tcp.sender import Sender
 
 RESET_BYTES = 40  # IPv4 + TCP without options
-
-
-class Carrier(Protocol):
-    """One direction of a link, as far as TCP asks."""
-
-    def carry(self, now: float, size: int) -> float | None:
-        """When a packet of `size` bytes [B] offered at `now` [s] arrives [s], or None."""
 
 
 def _nothing() -> None:
@@ -52,11 +45,10 @@ class TcpEndpoint:
         self,
         clock: Clock,
         options: TcpOptions,
-        link: Carrier,
+        link: Link,
         greet: Callable[[], object] = _nothing,
     ) -> None:
         self._clock, self._link, self._greet = clock, link, greet
-        self._headers = options.headers
         self.on_readable: Callable[[], object] = _nothing
         self.on_writable: Callable[[], object] = _nothing
         self.on_end: Callable[[], object] = _nothing
@@ -84,11 +76,6 @@ class TcpEndpoint:
     def window_edge(self) -> int:
         """First byte that this end has no room for, as first announced."""
         return self._receiver.edge
-
-    @property
-    def round_trip(self) -> float:
-        """Smoothed round trip [s]; 0 before the first sample."""
-        return self.sender.times.smoothed
 
     @property
     def congestion_window(self) -> float:
@@ -198,7 +185,7 @@ class TcpEndpoint:
         receiver = self._receiver
         duplicate = receiver.duplicate
         receiver.leaves(now, end > start)
-        arrival = self._link.carry(now, end - start + self._headers)
+        arrival = self._link.carry(now, end - start + HEADERS)
         if arrival is None:
             return
         blocks = tuple(receiver.blocks[:BLOCKS])
@@ -221,7 +208,8 @@ class TcpEndpoint:
 
 
 OPENING_BYTES = 60  # a SYN: IPv4, TCP and its options
-SYNACK_RETRIES = 5  # tcp_synack_retries
+SYN_RETRIES, SYNACK_RETRIES = 6, 5  # tcp_syn_retries, tcp_synack_retries
+SYN_LINEAR = 4  # openings repeated at a fixed interval before doubling: tcp_syn_linear_timeouts
 
 
 class TcpConnection:
@@ -264,14 +252,14 @@ class TcpConnection:
     def __init__(
         self,
         clock: Clock,
-        out: Carrier,
-        back: Carrier,
+        out: Link,
+        back: Link,
         opener: TcpOptions | None = None,
         peer: TcpOptions | None = None,
     ) -> None:
         self._clock, self._out, self._back = clock, out, back
-        self._options, peer = opener or TcpOptions(), peer or TcpOptions()
-        self.opener = TcpEndpoint(clock, self._options, out)
+        opener, peer = opener or TcpOptions(), peer or TcpOptions()
+        self.opener = TcpEndpoint(clock, opener, out)
         self.peer = TcpEndpoint(clock, peer, back, self._accept)
         self.opener.join(self.peer)
         self.peer.join(self.opener)
@@ -279,7 +267,7 @@ class TcpConnection:
         self._accepted: Callable[[], object] = _nothing
         self._asked = self._answered = 0
         self._asked_at = self._answered_at = 0.0
-        self._asking = Timer(clock, self._ask, self._options.tick)
+        self._asking = Timer(clock, self._ask, opener.tick)
         self._answering = Timer(clock, self._answer, peer.tick)
 
     def open(
@@ -287,12 +275,7 @@ class TcpConnection:
     ) -> None:
         """Shake hands: `then()` when the opener may write, `accepted()` when the peer may."""
         self._then, self._accepted = then, accepted or _nothing
-        if self._options.handshake:
-            self._ask()
-        else:
-            self._establish(self.opener, self.peer, None, 0)
-            self._accept()
-            then()
+        self._ask()
 
     def close(self) -> None:
         """Forget everything: nothing more is sent, delivered or called."""
@@ -303,15 +286,15 @@ class TcpConnection:
 
     def _ask(self) -> None:
         """Send the opening segment, again and again."""
-        tried, linear = self._asked, self._options.syn_linear
+        tried = self._asked
         if self.opener.gone:
             return
-        if tried > self._options.syn_retries + linear:
+        if tried > SYN_RETRIES + SYN_LINEAR:
             self.opener.reset()
             return
         self._asked += 1
         self._asked_at = now = self._clock.now
-        self._asking.set(now + self._options.first_rto * 2.0 ** max(0, tried - linear))
+        self._asking.set(now + FIRST_RTO * 2.0 ** max(0, tried - SYN_LINEAR))
         arrival = self._out.carry(now, OPENING_BYTES)
         if arrival is not None:
             self._clock.call_at(arrival, self._asked_for, now)
@@ -327,7 +310,7 @@ class TcpConnection:
             return
         stamp = stamp or self._asked_at
         now = self._clock.now
-        self._answering.set(now + self._options.first_rto * 2.0**self._answered)
+        self._answering.set(now + FIRST_RTO * 2.0**self._answered)
         self._answered += 1
         self._answered_at = now
         arrival = self._back.carry(now, OPENING_BYTES)

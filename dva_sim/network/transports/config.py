@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, Literal, Protocol
+from typing import Annotated, Literal, NamedTuple
 
 from pydantic import Field
 
@@ -192,11 +192,13 @@ class Ends:
     on_picture: Deliver
 
 
-class TransportSession(Protocol):
-    """A session between operator and robot."""
+class TransportSession(NamedTuple):
+    """A session over a transport.
 
-    def command(self, message: TransportMessage) -> None:
-        """The operator has a command."""
+    Attributes:
+        command: Sends a command to the robot.
+        picture: Sends a picture to the operator.
+    """
 
-    def picture(self, message: TransportMessage) -> None:
-        """The robot has a picture."""
+    command: Callable[[TransportMessage], object]
+    picture: Callable[[TransportMessage], object]

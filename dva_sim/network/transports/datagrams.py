@@ -136,21 +136,6 @@ class Feedback:
         return gone
 
 
-class Echoes:
-    """What a receiver tells of: the last datagrams, and since when it has had them."""
-
-    def __init__(self) -> None:
-        self._seen: deque[Echo] = deque(maxlen=REPEATED)
-
-    def saw(self, now: float, number: int) -> None:
-        """Datagram `number` arrived at `now` [s]."""
-        self._seen.append((number, now))
-
-    def at(self, now: float) -> list[Echo]:
-        """What an acknowledgement says at `now` [s]."""
-        return [(number, now - since) for number, since in self._seen]
-
-
 FIRST_FLIGHT = 10  # datagrams before the first answer: the initial window of RFC 6928
 
 
@@ -280,7 +265,8 @@ class DatagramSender:
     ) -> None:
         self._clock, self._link, self._header = clock, link, header
         self._repeats, self._assembly = repeats_crucial, Assembly(deliver)
-        self._feedback, self._echoes = Feedback(), Echoes()
+        self._feedback = Feedback()
+        self._seen: deque[Echo] = deque(maxlen=REPEATED)  # what has arrived, and since when
         self._pace = Pace(law, self._feedback)
         self._waiting: TransportMessage | None = None
         self._parts: deque[MessagePart] = deque()
@@ -308,7 +294,8 @@ class DatagramSender:
 
     def echoes(self) -> Sequence[Echo]:
         """What the receiver at the other end tells now."""
-        return self._echoes.at(self._clock.now)
+        now = self._clock.now
+        return [(number, now - since) for number, since in self._seen]
 
     def _lose(self, now: float, gone: Sequence[int]) -> None:
         """Datagrams are lost: the law hears of it, and the crucial ones go again."""
@@ -370,6 +357,6 @@ class DatagramSender:
 
     def _arrive(self, number: int, part: MessagePart, riding: Sequence[Echo]) -> None:
         """At the other end."""
-        self._echoes.saw(self._clock.now, number)
+        self._seen.append((number, self._clock.now))
         self._assembly.add(part)
         self.on_arrival(riding)

@@ -74,7 +74,7 @@ class Aimd:
         self.rate *= 1.0 - self.decrease
 
 
-class ThreeTerms:
+class ThreeTerms(Aimd):
     """In the manner of the trinomial protocol: a rate of three terms in the time since a loss.
 
     n round trips R after a loss that left the rate r0, the rate is
@@ -111,29 +111,19 @@ class ThreeTerms:
     """
 
     def __init__(self, linear: float, square: float, decrease: float) -> None:
-        self.linear, self.square, self.decrease = linear, square, decrease
-        self.rate, self._passed = 0.0, 0
-
-    @property
-    def gap(self) -> float:
-        """See `RateLaw`."""
-        return 1.0 / self.rate if self.rate else math.inf
-
-    def begin(self, round_trip: float) -> None:
-        """See `RateLaw`."""
-        self.rate = 1.0 / round_trip
+        super().__init__(linear, decrease)
+        self.linear, self.square, self._passed = linear, square, 0
 
     def passed(self, round_trip: float, held: bool) -> None:
         """See `RateLaw`."""
-        if not held:
-            return
-        self._passed += 1
-        odd = 2 * self._passed - 1  # from one square to the next
-        self.rate += (self.linear + self.square * odd) / round_trip
+        if held:
+            self._passed += 1
+            odd = 2 * self._passed - 1  # from one square to the next
+            self.rate += (self.linear + self.square * odd) / round_trip
 
     def lost(self) -> None:
         """See `RateLaw`."""
-        self.rate *= 1.0 - self.decrease
+        super().lost()
         self._passed = 0
 
 

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Sequence
 
 from dva_sim.kernel.clock import Clock
 from dva_sim.network.link import Link
-from dva_sim.network.tcp import TcpOptions
-from dva_sim.network.transports.bottleneck import Bottleneck, TcpTransport
+from dva_sim.network.tcp import TcpConnection, TcpEndpoint, TcpOptions
 from dva_sim.network.transports.config import (
     Btp,
+    Deliver,
     Ends,
     Irtp,
     Rtnp,
@@ -20,134 +21,68 @@ from dva_sim.network.transports.config import (
     Trinomial,
     Zeromq,
 )
-from dva_sim.network.transports.datagrams import (
-    IP_UDP,
-    Assembly,
-    DatagramSender,
-    Echo,
-    MessagePart,
-    parts_of,
-)
+from dva_sim.network.transports.datagrams import IP_UDP, Assembly, DatagramSender, Echo, parts_of
 from dva_sim.network.transports.rate_control import Aimd, LeastRoundTrip, RateLaw, ThreeTerms
 from dva_sim.network.zmtp import ZmtpConnection, ZmtpOptions, framed
-
-NAME = "teleoperation"
-
-
-def ends_at(
-    bottleneck: Bottleneck,
-    config: TransportConfig,
-    on_command: Callable[[int], object],
-    on_picture: Callable[[int], object],
-) -> Ends:
-    """Where a session stands: its two links, with priority at the end hosts if it has that."""
-    first = isinstance(config, Rtnp)
-    up, down = bottleneck.link(NAME, "up", first), bottleneck.link(NAME, "down", first)
-    return Ends(up, down, on_command, on_picture)
 
 
 def open_session(clock: Clock, config: TransportConfig, ends: Ends) -> TransportSession:
     """A session over a transport, as configured."""
     if isinstance(config, Tcp):
-        return TcpTransport(clock, ends, TcpOptions(send_buffer=config.send_buffer_bytes))
+        return tcp_session(clock, ends, TcpOptions(send_buffer=config.send_buffer_bytes))
     if isinstance(config, Zeromq):
-        return ZeromqTransport(clock, ends, config)
+        return zeromq_session(clock, ends, config)
     if isinstance(config, Trinomial | Irtp | Btp):
-        return RateSession(clock, ends, config)
-    return PlainSession(clock, ends, config.header_bytes if isinstance(config, Rtnp) else 0)
+        return rate_session(clock, ends, config)
+    return plain_session(clock, ends, config.header_bytes if isinstance(config, Rtnp) else 0)
 
 
-class PlainSession:
-    """Every datagram at once, none of them twice.
+def plain_session(clock: Clock, ends: Ends, header: int) -> TransportSession:
+    """Every datagram at once, none of them twice; the header [B] is besides IP and UDP."""
 
-    Args:
-        clock: Virtual time.
-        ends: What it stands between.
-        header: Besides IP and UDP [B].
-    """
+    def sends(link: Link, deliver: Deliver) -> Callable[[TransportMessage], object]:
+        add = Assembly(deliver).add
 
-    def __init__(self, clock: Clock, ends: Ends, header: int) -> None:
-        self._clock, self._ends, self._header = clock, ends, header
-        self._at_robot, self._at_operator = Assembly(ends.on_command), Assembly(ends.on_picture)
+        def send(message: TransportMessage) -> None:
+            for part in parts_of(message, header):
+                arrival = link.carry(clock.now, part.size + header + IP_UDP)
+                if arrival is not None:
+                    clock.call_at(arrival, add, part)
 
-    def command(self, message: TransportMessage) -> None:
-        """See `TransportSession`."""
-        self._send(message, self._ends.up, self._at_robot.add)
+        return send
 
-    def picture(self, message: TransportMessage) -> None:
-        """See `TransportSession`."""
-        self._send(message, self._ends.down, self._at_operator.add)
-
-    def _send(
-        self, message: TransportMessage, link: Link, add: Callable[[MessagePart], object]
-    ) -> None:
-        for part in parts_of(message, self._header):
-            arrival = link.carry(self._clock.now, part.size + self._header + IP_UDP)
-            if arrival is not None:
-                self._clock.call_at(arrival, add, part)
+    return TransportSession(sends(ends.up, ends.on_command), sends(ends.down, ends.on_picture))
 
 
-class RateSession:
-    """Two directions, each with a law of rate of its own.
-
-    Args:
-        clock: Virtual time.
-        ends: What it stands between.
-        config: Trinomial, IRTP or BTP.
-    """
-
-    def __init__(self, clock: Clock, ends: Ends, config: Trinomial | Irtp | Btp) -> None:
-        header, repeats = config.header_bytes, isinstance(config, Irtp)
-        ways = ((ends.up, ends.on_command), (ends.down, ends.on_picture))
-        self._up, self._down = (
-            DatagramSender(clock, link, header, law_of(config), told, repeats)
-            for link, told in ways
-        )
-        if isinstance(config, Btp):
-            answer_each_other(self._up, self._down)
-        else:
-            answer_each(clock, self._up, ends.down, header)
-            answer_each(clock, self._down, ends.up, header)
-
-    def command(self, message: TransportMessage) -> None:
-        """See `TransportSession`."""
-        self._up.offer(message)
-
-    def picture(self, message: TransportMessage) -> None:
-        """See `TransportSession`."""
-        self._down.offer(message)
+def rate_session(clock: Clock, ends: Ends, config: Trinomial | Irtp | Btp) -> TransportSession:
+    """Two directions, each with a law of rate of its own."""
+    header, repeats = config.header_bytes, isinstance(config, Irtp)
+    up, down = (
+        DatagramSender(clock, link, header, law_of(config), told, repeats)
+        for link, told in ((ends.up, ends.on_command), (ends.down, ends.on_picture))
+    )
+    if isinstance(config, Btp):
+        answer_each_other(up, down)
+    else:
+        answer_each(clock, up, ends.down, header)
+        answer_each(clock, down, ends.up, header)
+    return TransportSession(up.offer, down.offer)
 
 
-class ZeromqTransport:
-    """Two publishers, each with one subscriber, on two connections that the operator opens.
-
-    Args:
-        clock: Virtual time.
-        ends: What it stands between.
-        config: What is kept, and where.
-    """
-
-    def __init__(self, clock: Clock, ends: Ends, config: Zeromq) -> None:
-        options = ZmtpOptions(
-            conflate=config.conflate, tcp=TcpOptions(send_buffer=config.send_buffer_bytes)
-        )
-        commands, pictures = (
-            ZmtpConnection(
-                clock, ends.up, ends.down, ends.on_command, ends.on_picture, options, options
-            )
-            for _ in range(2)
-        )
-        for connection in (commands, pictures):
-            connection.open(lambda: None)
-        self._operator, self._robot = commands.opener, pictures.peer
-
-    def command(self, message: TransportMessage) -> None:
-        """See `TransportSession`."""
-        self._operator.send(message.number, framed(message.size))
-
-    def picture(self, message: TransportMessage) -> None:
-        """See `TransportSession`."""
-        self._robot.send(message.number, framed(message.size))
+def zeromq_session(clock: Clock, ends: Ends, config: Zeromq) -> TransportSession:
+    """Two publishers, each with one subscriber, on two connections that the operator opens."""
+    tcp = TcpOptions(send_buffer=config.send_buffer_bytes)
+    options = ZmtpOptions(conflate=config.conflate, tcp=tcp)
+    told = ends.on_command, ends.on_picture
+    commands, pictures = (
+        ZmtpConnection(clock, ends.up, ends.down, *told, options, options) for _ in range(2)
+    )
+    for connection in (commands, pictures):
+        connection.open(lambda: None)
+    return TransportSession(
+        lambda message: commands.opener.send(message.number, framed(message.size)),
+        lambda message: pictures.peer.send(message.number, framed(message.size)),
+    )
 
 
 def law_of(config: Trinomial | Irtp | Btp) -> RateLaw:
@@ -174,3 +109,57 @@ def answer_each_other(one: DatagramSender, other: DatagramSender) -> None:
     """Let the acknowledgements of two directions ride on each other's datagrams."""
     one.ride, other.ride = other.echoes, one.echoes
     one.on_arrival, other.on_arrival = other.hear, one.hear
+
+
+ALL = 1 << 30  # more than is ever readable [B]
+
+
+class OrderedMessages:
+    """Messages written to one end of a connection and read from the other, in order.
+
+    What the send buffer has no room for waits in the program, without end.
+
+    Args:
+        writer: Where they are written.
+        reader: Where they are read.
+        deliver: Told of every message once all of it is read.
+    """
+
+    def __init__(self, writer: TcpEndpoint, reader: TcpEndpoint, deliver: Deliver) -> None:
+        self._writer, self._reader, self._deliver = writer, reader, deliver
+        self._unwritten, self._read, self._ends_at = 0, 0, 0
+        self._ends: deque[tuple[int, int]] = deque()  # of the messages under way
+        self._is_open = False
+        writer.on_writable = self._write
+        reader.on_readable = self._take
+
+    def open(self) -> None:
+        """From now on the connection takes what is written."""
+        self._is_open = True
+        self._write()
+
+    def send(self, message: TransportMessage) -> None:
+        """Write a message, or as much as there is room for."""
+        self._ends_at += message.size
+        self._ends.append((self._ends_at, message.number))
+        self._unwritten += message.size
+        self._write()
+
+    def _write(self) -> None:
+        if self._is_open and self._unwritten:
+            self._unwritten -= self._writer.write(self._unwritten)
+
+    def _take(self) -> None:
+        self._read += self._reader.read(self._reader.readable)
+        while self._ends and self._ends[0][0] <= self._read:
+            self._deliver(self._ends.popleft()[1])
+
+
+def tcp_session(clock: Clock, ends: Ends, options: TcpOptions) -> TransportSession:
+    """One connection for both directions, alike at both ends; nothing frames the messages."""
+    connection = TcpConnection(clock, ends.up, ends.down, options, options)
+    operator, robot = connection.opener, connection.peer
+    up = OrderedMessages(operator, robot, ends.on_command)
+    down = OrderedMessages(robot, operator, ends.on_picture)
+    connection.open(up.open, down.open)
+    return TransportSession(up.send, down.send)

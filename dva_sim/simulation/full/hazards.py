@@ -10,8 +10,9 @@ import numpy as np
 from dva_sim.agents.robot.field_of_view import HazardSpot
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.streams import Streams
+from dva_sim.simulation.full.stage import Stage
 from dva_sim.simulation.scenario import EventConfig
-from dva_sim.worlds.hazards import Hazard, find_hazard, first_detection, make_hazard
+from dva_sim.worlds.hazards import Hazard, Surroundings, find_hazard, first_detection, make_hazard
 from dva_sim.worlds.site import Site
 from dva_sim.worlds.site_parts import Detector
 
@@ -21,6 +22,9 @@ FAR_ENOUGH = 6.0  # from every base, so that there is a way to go [m]
 TRIES = 200
 HEARSAY_WITHIN = 3.0  # so far from the true place do other people report it [m]
 HEARSAY_LATE = (2.0, 20.0)  # so long after the first report [s]
+SAME_PLACE = 4.0  # what is so near a place is what is there [m]
+
+Danger = tuple[tuple[float, float], float]  # the middle and the radius of a place to keep off [m]
 
 
 @dataclass(frozen=True)
@@ -127,3 +131,63 @@ def _watched_rooms(kind: type[Hazard], site: Site) -> list[str | None]:
     """Rooms with a detector for a kind of event; `None`, which is anywhere, if there are none."""
     watched = {site.room_at(d.x, d.y) for d in site.detectors if d.kind in kind.detectors}
     return [room.name for room in site.rooms if room.name in watched] or [None]
+
+
+class RunHazards:
+    """What is going on at the site: what is there and can be seen, and what has been dealt with.
+
+    Args:
+        stage: Where.
+
+    Attributes:
+        incidents: Of the scenario, in its order.
+        surroundings: What the hazards make of the air and the floor.
+        contained: When an incident was dealt with [s], by its place in `incidents`.
+
+    Raises:
+        ConfigError: the site cannot hold the events.
+    """
+
+    def __init__(self, stage: Stage) -> None:
+        self.stage = stage
+        self.incidents = draw_incidents(stage.scenario.events, stage.site, stage.streams)
+        self._real = [n for n, i in enumerate(self.incidents) if not i.false_alarm]
+        self.surroundings = Surroundings(
+            stage.site, [self.incidents[number].hazard for number in self._real]
+        )
+        self.contained: dict[int, float] = {}
+
+    def dangers(self, now: float) -> list[Danger]:
+        """Where people should not be."""
+        return [(i.hazard.position, i.hazard.danger_radius(now)) for i in self._going_on(now)]
+
+    def spots(self, now: float) -> list[HazardSpot]:
+        """What can be seen of the hazards."""
+        return [spot for i in self._going_on(now) if (spot := i.spot(now)) is not None]
+
+    def contain(self, kind: str, x: float, y: float) -> None:
+        """Somebody has dealt with what is at a place [m]: from now on it harms nobody."""
+        now = self.stage.clock.now
+        for number, incident in enumerate(self.incidents):
+            near = math.dist(incident.hazard.position, (x, y)) < SAME_PLACE
+            there = incident.is_there(now) and number not in self.contained
+            if incident.kind == kind and near and there:
+                self.contained[number] = now
+                self.surroundings.contain(self._real.index(number), now)
+
+    def is_there(self, kind: str, x: float, y: float) -> bool:
+        """Whether something of a kind really is near a place [m]."""
+        spots = self.spots(self.stage.clock.now)
+        return any(s.kind == kind and math.dist((s.x, s.y), (x, y)) < SAME_PLACE for s in spots)
+
+    def smoke(self, a: tuple[float, float], b: tuple[float, float]) -> float:
+        """How much of the light between two places [m] is lost now: an optical depth."""
+        return self.surroundings.optical_depth(a, b, self.stage.clock.now)
+
+    def _going_on(self, now: float) -> list[RunHazard]:
+        """What has begun, is real, and was not dealt with yet."""
+        return [
+            incident
+            for number, incident in enumerate(self.incidents)
+            if incident.is_there(now) and now < self.contained.get(number, math.inf)
+        ]

@@ -191,10 +191,9 @@ def run_row(recording: Recording) -> Row:
     row |= (
         _event_measures(recording) | _people_measures(recording) | workload.run_measures(recording)
     )
-    row["replans"] = recording.recorder.counters["replans"]
-    row["messages"] = recording.recorder.counters["messages"]
-    row["traffic_bytes"] = recording.recorder.counters["bytes"]
-    row["refused"] = recording.recorder.counters["refused"]
+    counted = {"replans": "replans", "messages": "messages", "traffic_bytes": "bytes"}
+    for name, counter in (counted | {"refused": "refused"}).items():
+        row[name] = recording.recorder.counters[counter]
     row["plugin_failures"] = plugin_failures(recording)
     row["violations"] = sum(recording.recorder.violations.values())
     row["simulated_s"] = recording.duration
@@ -249,18 +248,11 @@ def _people_measures(recording: Recording) -> Row:
 
 def people_rows(recording: Recording) -> list[Row]:
     """One row per guard and bystander; times that never came are missing."""
+    names = [column.name for column in PEOPLE_COLUMNS]
+    never = math.inf
     return [
-        {
-            "person_name": p.name,
-            "kind": p.kind,
-            "activity": p.activity,
-            "exposure_s": p.exposure,
-            "dose_heat": p.heat,
-            "dose_toxic": p.toxic,
-            "t_leaves_s": p.leaves if p.leaves < math.inf else NAN,
-            "t_out_s": p.out if p.out < math.inf else NAN,
-        }
-        for p in recording.people
+        {name: NAN if value == never else value for name, value in zip(names, log, strict=True)}
+        for log in recording.people
     ]
 
 
@@ -411,15 +403,9 @@ def outcome_of(event: Event) -> str:
 
 def track_rows(recording: Recording) -> list[Row]:
     """Where the robots were, one row per sampled moment."""
+    names = [column.name for column in TRACK_COLUMNS]
     return [
-        {
-            "agent": agent,
-            "t_s": point.time,
-            "x_m": point.x,
-            "y_m": point.y,
-            "heading_rad": point.heading,
-            "mode": point.mode,
-        }
+        dict(zip(names, (agent, *point), strict=True))
         for agent, points in recording.recorder.tracks.items()
         if agent.startswith("robot")
         for point in points

@@ -9,7 +9,6 @@ import math
 from functools import partial
 
 from dva_sim.agents.people.bystander import ALARMED, EVACUATING, SAFE, BystanderAgent
-from dva_sim.agents.people.guard import GuardAgent
 from dva_sim.agents.robot.controller import Mode
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.recorder import Recorder, TrackPoint
@@ -22,11 +21,11 @@ from dva_sim.network.link import (
     check_partitions,
     part_links,
 )
-from dva_sim.network.radio import Reception, make_link
-from dva_sim.network.stream import HEADERS, MSS
-from dva_sim.network.virtual import VirtualNetwork
+from dva_sim.network.link.link import Reception, make_link
+from dva_sim.network.tcp.parameters import HEADERS, MSS
+from dva_sim.network.virtual_network import VirtualNetwork
 from dva_sim.simulation.full.control_room import add_dva, add_operator
-from dva_sim.simulation.full.field import Danger, Field, is_dangerous
+from dva_sim.simulation.full.physical_world import Field, is_dangerous
 from dva_sim.simulation.full.recording import PersonLog, Recording, ending_of, event_about
 from dva_sim.simulation.full.safety_checks import broken_event_rules, broken_rules
 from dva_sim.simulation.full.stage import Stage, id_of
@@ -141,18 +140,15 @@ class Run:
         )
 
     def _people(self) -> list[PersonLog]:
-        exposure, field = self.recorder.exposure, self.field
-        return [
-            PersonLog(name, "guard", g.activity, exposure[name], g.dose.heat, g.dose.toxic)
-            for g in field.guards
-            for name in (g.device.label,)
-        ] + [
-            PersonLog(
-                *(b.name, "bystander", b.activity, exposure[b.name], b.dose.heat, b.dose.toxic),
-                *(b.leaves_at, b.out_at),
-            )
-            for b in field.bystanders
-        ]
+        logs = []
+        for name, who in self.field.people():
+            kind, left = "guard", (math.inf, math.inf)
+            if isinstance(who, BystanderAgent):
+                kind, left = "bystander", (who.leaves_at, who.out_at)
+            dose = who.dose.heat, who.dose.toxic
+            exposure = self.recorder.exposure[name]
+            logs.append(PersonLog(name, kind, who.activity, exposure, *dose, *left))
+        return logs
 
     def _settled(self) -> bool:
         """Whether every incident is known and closed, nobody drives, and nobody is leaving."""
@@ -220,10 +216,12 @@ class Run:
         self.field.world.advance_to(now)
         self._watch_robots(now)
         dangers = self.field.dangers(now)
-        for guard in self.field.guards:
-            self._watch_person(guard.device.label, guard, now, dangers)
-        for bystander in self.field.bystanders:
-            self._watch_person(bystander.name, bystander, now, dangers)
+        for name, who in self.field.people():
+            if who.activity == SAFE:
+                continue
+            x, y = who.walking.place
+            if is_dangerous(who.exposure.conditions) or self.field.is_near(dangers, x, y):
+                self.recorder.exposure[name] += WATCH_PERIOD
         deadline = self.scenario.dispatch.rules().escalate_after
         for rule, what in broken_event_rules(self.dva.desk.book, deadline, now):
             self.recorder.violated(rule, now, "dva", what)
@@ -234,21 +232,12 @@ class Run:
             label = robot.device.label
             if robot.controller.mode is Mode.MISSION:
                 self._last_mission[label] = now
-            drive = self.field.newest_drive(robot.device.id_tag)
+            drive = recorder.newest_drive.get(robot.device.id_tag)
             mission = self._last_mission.get(label, 0.0)
             command = recorder.newest_command.get(robot.device.id_tag)
             limits = self.scenario.robot
             for rule, what in broken_rules(robot, drive, command, limits, mission, now):
                 recorder.violated(rule, now, label, what)
-
-    def _watch_person(
-        self, name: str, who: GuardAgent | BystanderAgent, now: float, dangers: list[Danger]
-    ) -> None:
-        if who.activity == SAFE:
-            return
-        x, y = who.walking.place
-        if is_dangerous(who.exposure.conditions) or self.field.is_near(dangers, x, y):
-            self.recorder.exposure[name] += WATCH_PERIOD
 
     def _sample(self) -> None:
         """Note where everybody is who is on the site."""
@@ -257,11 +246,7 @@ class Run:
         for robot in self.field.robots.values():
             pose, mode = robot.body.pose(), robot.controller.mode.value
             tracks[robot.device.label].append(TrackPoint(now, pose.x, pose.y, pose.heading, mode))
-        people: list[tuple[str, GuardAgent | BystanderAgent]] = [
-            *((guard.device.label, guard) for guard in self.field.guards),
-            *((bystander.name, bystander) for bystander in self.field.bystanders),
-        ]
-        for name, who in people:
+        for name, who in self.field.people():
             x, y = who.walking.place
             if who.activity != SAFE:
                 tracks[name].append(TrackPoint(now, x, y, who.heading, who.activity))

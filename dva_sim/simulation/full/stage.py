@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 import shapely
@@ -122,16 +123,10 @@ class Stage:
         )
 
 
-_PLANNERS: dict[tuple[str, float], tuple[Site, Planner]] = {}
-
-
+@lru_cache(maxsize=4)
 def planner_of(site: Site, radius: float) -> Planner:
-    """The planner of a site, kept for the next run on it in this process."""
-    key = site.name, radius
-    known = _PLANNERS.get(key)
-    if known is None or known[0] is not site:
-        known = _PLANNERS[key] = site, Planner(site, radius)
-    return known[1]
+    """Ways through a site for what has a radius [m]; the same site is planned for once."""
+    return Planner(site, radius)
 
 
 def place_of(places: tuple[Pose, ...], number: int, what: str, site: Site) -> Pose:

@@ -157,7 +157,7 @@ def build(
     Raises:
         ConfigError: an unknown key, a wrong type, a value out of range, a missing profile.
     """
-    return key_changes.build(Scenario, source, changes or {}, _complete, locate_files)
+    return key_changes.build(Scenario, source, changes, _complete, locate_files)
 
 
 def _complete(scenario: Scenario, error: Fail) -> Scenario:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from itertools import accumulate, count
 
 from dva_sim.core.events import Event
@@ -21,6 +22,7 @@ from dva_sim.simulation.shift.travel import Place, Rooms, Terrain
 from dva_sim.worlds.hazards import Hazard, make_hazard
 
 
+@dataclass(slots=True, eq=False)
 class Incident:
     """One event of the world, with all the luck that is its own.
 
@@ -41,46 +43,24 @@ class Incident:
         over: When there was no danger any more, or others took over [s].
     """
 
-    __slots__ = (
-        "_hazard",
-        "confidence",
-        "event",
-        "index",
-        "kind",
-        "noticed",
-        "number",
-        "occurred",
-        "over",
-        "place",
-        "severity",
-        "shared",
-        "sources",
-        "stream",
-        "true",
-    )
+    stream: int
+    index: int
+    number: int
+    kind: str
+    place: Place
+    true: bool
+    severity: float
+    confidence: float
+    occurred: float
+    noticed: float = math.nan
+    sources: list[str] = field(default_factory=list)
+    event: Event | None = None
+    shared: bool = False
+    over: float = math.inf
+    _hazard: Hazard | None = None
 
-    def __init__(
-        self,
-        stream: int,
-        index: int,
-        number: int,
-        kind: str,
-        place: Place,
-        true: bool,
-        severity: float,
-        confidence: float,
-        occurred: float,
-    ) -> None:
-        self.stream, self.index, self.number = stream, index, number
-        self.kind, self.place, self.true = kind, place, true
-        self.severity, self.confidence, self.occurred = severity, confidence, occurred
-        self.noticed = math.nan
-        self.sources: list[str] = []
-        self.event: Event | None = None
-        self.shared = False
-        self.over = math.inf
-        self._hazard: Hazard | None = None
-        place.about = self
+    def __post_init__(self) -> None:
+        self.place.about = self
 
     def danger_radius(self, now: float) -> float:
         """Within which people should not be [m]; 0 where there is nothing, or no more."""

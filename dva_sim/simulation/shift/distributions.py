@@ -45,11 +45,6 @@ class _Law(Config):
         """[s^2]"""
         return max(0.0, self.second - self.mean**2)
 
-    @property
-    def cv2(self) -> float:
-        """Variance over squared mean; 1 for the exponential law, 0 if the mean is."""
-        return self.variance / self.mean**2 if self.mean else 0.0
-
     @abstractmethod
     def sample(self, rng: np.random.Generator, count: int) -> Floats:
         """That many draws [s], shape `(count,)`."""
@@ -76,16 +71,22 @@ class Constant(_Law):
         return np.full(count, self.mean_s)
 
 
-class Exponential(_Law):
-    """Without memory."""
+class _OfMean(_Law):
+    """A law that is given by its mean."""
 
-    law: Literal["exponential"]
+    law: str
     mean_s: PositiveSeconds
 
     @property
     def mean(self) -> float:
         """See `Law`."""
         return self.mean_s
+
+
+class Exponential(_OfMean):
+    """Without memory."""
+
+    law: Literal["exponential"]
 
     @property
     def second(self) -> float:
@@ -125,17 +126,11 @@ class Uniform(_Law):
         return self.low_s + (self.high_s - self.low_s) * rng.random(count)
 
 
-class Erlang(_Law):
+class Erlang(_OfMean):
     """The sum of a number of equal exponential phases."""
 
     law: Literal["erlang"]
-    mean_s: PositiveSeconds
     phases: Annotated[int, Field(ge=1, le=1000)]
-
-    @property
-    def mean(self) -> float:
-        """See `Law`."""
-        return self.mean_s
 
     @property
     def second(self) -> float:
@@ -147,7 +142,7 @@ class Erlang(_Law):
         return self.mean_s / self.phases * rng.standard_gamma(float(self.phases), count)
 
 
-class Hyperexponential(_Law):
+class Hyperexponential(_OfMean):
     """One of two exponential laws, each with the same part in the mean ("balanced means").
 
     Attributes:
@@ -155,18 +150,12 @@ class Hyperexponential(_Law):
     """
 
     law: Literal["hyperexponential"]
-    mean_s: PositiveSeconds
     squared_cv: Annotated[float, Field(gt=1, le=1e4)]
 
     @property
     def share(self) -> float:
         """How often the faster of the two is drawn."""
         return 0.5 * (1.0 + math.sqrt((self.squared_cv - 1.0) / (self.squared_cv + 1.0)))
-
-    @property
-    def mean(self) -> float:
-        """See `Law`."""
-        return self.mean_s
 
     @property
     def second(self) -> float:
@@ -223,17 +212,11 @@ class Lognormal(_Law):
         return np.asarray(self.median * np.exp(self.spread * rng.standard_normal(count)))
 
 
-class Gamma(_Law):
+class Gamma(_OfMean):
     """Erlang's law with any number of phases, whole or not."""
 
     law: Literal["gamma"]
-    mean_s: PositiveSeconds
     shape: Shape
-
-    @property
-    def mean(self) -> float:
-        """See `Law`."""
-        return self.mean_s
 
     @property
     def second(self) -> float:
@@ -245,21 +228,15 @@ class Gamma(_Law):
         return self.mean_s / self.shape * rng.standard_gamma(self.shape, count)
 
 
-class Weibull(_Law):
+class Weibull(_OfMean):
     """A hazard rate that grows (shape above 1) or falls (below 1) with age."""
 
     law: Literal["weibull"]
-    mean_s: PositiveSeconds
     shape: Annotated[float, Field(ge=0.1, le=1e3)]
 
     @property
     def _scale(self) -> float:
         return self.mean_s / math.gamma(1.0 + 1.0 / self.shape)
-
-    @property
-    def mean(self) -> float:
-        """See `Law`."""
-        return self.mean_s
 
     @property
     def second(self) -> float:

@@ -19,10 +19,11 @@ from collections import Counter
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from dva_sim.kernel.clock import Clock
 from dva_sim.protocol import messages as m
 from dva_sim.simulation.shift.demand import Incident
 from dva_sim.simulation.shift.scenario import Group
-from dva_sim.simulation.shift.travel import Place
+from dva_sim.simulation.shift.travel import Place, Terrain
 
 HALVINGS = 30
 
@@ -69,9 +70,8 @@ def leaving(incident: Incident, now: float, speed: float) -> float:
 class ShiftWorld(Protocol):
     """What a unit may ask of the world, and tell it."""
 
-    @property
-    def now(self) -> float:
-        """Time [s]."""
+    clock: Clock
+    terrain: Terrain
 
     def after(self, delay: float, action: Any, *args: Any) -> None:
         """Do something later [s]."""
@@ -87,15 +87,6 @@ class ShiftWorld(Protocol):
 
     def incident_at(self, event: int) -> Incident:
         """What an event of the DVA really is."""
-
-    def length(self, a: Place, b: Place) -> float:
-        """Length of the way [m]; infinite if there is none."""
-
-    def place_at(self, position: m.Position) -> Place:
-        """The place a message speaks of."""
-
-    def along(self, a: Place, b: Place, gone: float) -> Place:
-        """Where somebody is who has gone so far [m]."""
 
     def mobilisation(self, unit: Unit, incident: Incident) -> float:
         """What it takes this unit this time to get ready [s]."""
@@ -216,7 +207,7 @@ class Unit:
         if isinstance(body, m.OrderProgress):
             return self._stand_down(body)
         if isinstance(body, m.Relocation):
-            return self._wait_at(self.world.place_at(body.position))
+            return self._wait_at(self.world.terrain.known_at(body.position))
         if isinstance(body, m.TaskAnnouncement):
             return self._bid(body)
         if isinstance(body, m.TaskAward):
@@ -225,7 +216,7 @@ class Unit:
 
     def order(self, order: m.Order, voice: str) -> bool:
         """Begin something, or go on with it; what was begun before is dropped."""
-        world, job = self.world, self.job
+        world, job, now = self.world, self.job, self.world.clock.now
         if job is not None and job.order.event_id == order.event_id:
             job.voice = voice
             if job.order.task != "stand_by" or order.task != "contain":
@@ -240,15 +231,15 @@ class Unit:
         if incident is not self._near:
             self._leave()
         self._near = None
-        self.job = job = Job(order, incident, voice, world.now, inside=order.task != "stand_by")
-        self.since = world.now
+        self.job = job = Job(order, incident, voice, now, inside=order.task != "stand_by")
+        self.since = now
         if at_hand:
             delay = 0.0
         elif ready_at is not None:
-            delay = ready_at - world.now
+            delay = ready_at - now
         else:
             delay = world.mobilisation(self, incident)
-        self._ready_at = world.now + delay
+        self._ready_at = now + delay
         self._then(delay, self._depart, job)
         return True
 
@@ -275,7 +266,7 @@ class Unit:
         if len(self._offers) > 64:
             self._offers.pop(next(iter(self._offers)))
         self._offers[offer.event_id] = offer
-        arrival = self.expected(self.world.place_at(offer.position))
+        arrival = self.expected(self.world.terrain.known_at(offer.position))
         if math.isinf(arrival):
             return False
         self.world.say(self.device, m.TaskBid(offer.event_id, arrival))
@@ -302,11 +293,11 @@ class Unit:
         self.equipped = True
         start, goal = self.here(), job.incident.place
         self._stop()
-        length, seconds = self.world.length(start, goal), self.world.trip(self, start, goal)
+        length, seconds = self.world.terrain.length(start, goal), self.world.trip(self, start, goal)
         if math.isinf(length):
             self._finish(job, "failed")
             return
-        now = self.world.now
+        now = self.world.clock.now
         if seconds > 0.0:  # else the arrival says it all
             self.world.say(job.voice, m.OrderProgress(job.order.event_id, "departed"))
         if not job.inside and length > 0.0:
@@ -321,7 +312,7 @@ class Unit:
         assert leg is not None
         self._stop()
         if not job.inside and leg.length > 0.0:
-            self.place = self.world.along(leg.start, incident.place, leg.length)
+            self.place = self.world.terrain.along(leg.start, incident.place, leg.length)
         else:
             self.place = incident.place
         self.world.says_arrived(self, job)
@@ -336,8 +327,8 @@ class Unit:
     def _enter(self, job: Job) -> None:
         """From outside, wherever the growing danger has driven one, into it."""
         self._turn_to(job, "travel")
-        goal, now = job.incident.place, self.world.now
-        apart = self.world.length(self.place, goal) > 0.0  # else ways play no part
+        goal, now = job.incident.place, self.world.clock.now
+        apart = self.world.terrain.length(self.place, goal) > 0.0  # else ways play no part
         length = job.incident.danger_radius(now) if apart else 0.0
         job.inside = True
         seconds = length / self.speed
@@ -369,7 +360,7 @@ class Unit:
         self._turn_to(job, "return")
         self.world.say(job.voice, body)
         if finding == "contained" or not job.incident.true:
-            job.incident.over = min(job.incident.over, self.world.now)
+            job.incident.over = min(job.incident.over, self.world.clock.now)
         self._near = job.incident
         self._come_back(job)
 
@@ -377,17 +368,17 @@ class Unit:
         """Step out of the danger, unless one has been called back to it."""
         near, self._near = self._near, None
         if near is not None and self.kind == "guard":
-            self.world.exposed(self, "leave", leaving(near, self.world.now, self.speed))
+            self.world.exposed(self, "leave", leaving(near, self.world.clock.now, self.speed))
 
     def _come_back(self, job: Job) -> None:
         """Free at once, or when back at base; one who may be needed here is free at once."""
         needed = self.kind == "guard" and self.world.needs_people(job.incident)
-        length = self.world.length(self.place, self.base)
+        length = self.world.terrain.length(self.place, self.base)
         if self.group.after != "return" or needed or math.isinf(length):
             self._finish(job, DONE)
             return
         self._leave()
-        now, seconds = self.world.now, length / self.speed
+        now, seconds = self.world.clock.now, length / self.speed
         self.leg = Leg(self.place, self.base, now, length, now + seconds)
         self._then(seconds, self._back, job)
 
@@ -400,7 +391,7 @@ class Unit:
     def _finish(self, job: Job, state: str) -> None:
         """The order is settled, or given back."""
         world = self.world
-        if world.now > self.since:
+        if world.clock.now > self.since:
             world.spent(self, job.phase, self.since)
         world.freed(self, job)
         self.job = None
@@ -431,10 +422,10 @@ class Unit:
 
     def _walk_idle(self, goal: Place) -> None:
         start = self.here()
-        length = self.world.length(start, goal)
+        length = self.world.terrain.length(start, goal)
         if math.isinf(length):
             return
-        now = self.world.now
+        now = self.world.clock.now
         self.place = start
         self.leg = Leg(start, goal, now, length, now + length / self.speed)
         self.world.moving(self, True)
@@ -455,11 +446,11 @@ class Unit:
         leg = self.leg
         if leg is None:
             return self.place
-        return self.world.along(leg.start, leg.goal, self._gone(leg))
+        return self.world.terrain.along(leg.start, leg.goal, self._gone(leg))
 
     def _gone(self, leg: Leg) -> float:
         whole = leg.until - leg.since
-        share = (self.world.now - leg.since) / whole if whole > 0.0 else 1.0
+        share = (self.world.clock.now - leg.since) / whole if whole > 0.0 else 1.0
         return leg.length * min(1.0, share)
 
     def _stop(self) -> None:
@@ -467,9 +458,9 @@ class Unit:
         leg = self.leg
         if leg is None:
             return
-        now, gone, job = self.world.now, self._gone(leg), self.job
+        now, gone, job = self.world.clock.now, self._gone(leg), self.job
         if now < leg.until - ROUNDING:
-            self.place = self.world.along(leg.start, leg.goal, gone)
+            self.place = self.world.terrain.along(leg.start, leg.goal, gone)
         self.distance += gone
         self.leg = None
         self.world.moving(self, False)
@@ -499,7 +490,7 @@ class Unit:
 
     def _turn_to(self, job: Job, phase: str) -> None:
         """Another phase of the same job begins."""
-        world, now = self.world, self.world.now
+        world, now = self.world, self.world.clock.now
         if now > self.since:
             world.spent(self, job.phase, self.since)
             if self.kind == "guard" and job.phase in ("look", "act"):

@@ -48,7 +48,10 @@ def instance_of(shift: Shift, incidents: list[Incident]) -> Instance:
     )
     there = np.array(
         [
-            [shift.look(u, i) + shift.length(i.place, u.base) / u.speed for u in shift.units]
+            [
+                shift.look(u, i) + shift.terrain.length(i.place, u.base) / u.speed
+                for u in shift.units
+            ]
             for i in incidents
         ]
     )

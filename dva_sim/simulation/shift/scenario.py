@@ -397,7 +397,7 @@ def build(
     Raises:
         ConfigError: an unknown key or name, a wrong type, a value out of range.
     """
-    return key_changes.build(TimedScenario, source, changes or {}, check_names, locate_files)
+    return key_changes.build(TimedScenario, source, changes, check_names, locate_files)
 
 
 def limit_of(value: float | None) -> float:

@@ -9,25 +9,31 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
 from dva_sim.core.dispatch import Policy
 from dva_sim.core.events import Event, State
-from dva_sim.core.travel_times import Start
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.streams import Streams
 from dva_sim.protocol import messages as m
-from dva_sim.simulation.shift import knowledge
+from dva_sim.simulation.shift import control_room
+from dva_sim.simulation.shift.control_room import Mail
 from dva_sim.simulation.shift.demand import CALLERS, Demand, Incident
 from dva_sim.simulation.shift.distributions import Draws, Law, times
-from dva_sim.simulation.shift.mailbox import Mail
-from dva_sim.simulation.shift.recording import TimedRecording, UnitRecord
+from dva_sim.simulation.shift.recording import (
+    CODES,
+    STEPS_IN_ORDER,
+    Ledger,
+    Level,
+    Slices,
+    TimedRecording,
+    UnitRecord,
+)
 from dva_sim.simulation.shift.responders import Job, Unit
 from dva_sim.simulation.shift.scenario import TimedScenario
-from dva_sim.simulation.shift.statistics import CODES, STEPS_IN_ORDER, Floats, Ledger, Level, Slices
 from dva_sim.simulation.shift.travel import Occurrence, Place, Terrain, terrain_of
 
 SLACK = 1e-3  # deadlines are looked at exactly, but for the clock's step [s]
@@ -73,16 +79,7 @@ def _team(shift: Shift) -> Iterator[str]:
     for event in shift.desk.book.in_state(State.ASSIGNED, State.ON_SCENE):
         if event.responder is None:
             yield "an event that somebody should be at has nobody"
-    for event in shift.desk.book.open.values():
-        if (
-            event.responder is not None
-            and event.responder == event.actor
-            and event.state
-            in (
-                State.ASSIGNED,
-                State.ON_SCENE,
-            )
-        ):
+        elif event.responder == event.actor:
             yield "somebody is to do two things at once"
 
 
@@ -113,11 +110,11 @@ class Shift:
         self.demand = Demand(
             scenario, self.streams, self.terrain, self.clock, self._happens, self._noticed
         )
-        self.stations = knowledge.stations(scenario, self.terrain)
-        self.units = knowledge.hire(self, self.streams, self.stations)
+        self.stations = control_room.stations(scenario, self.terrain)
+        self.units = control_room.hire(self, self.streams, self.stations)
         self.by_device = {unit.device: unit for unit in self.units}
         self.numbers = {unit.device: unit.number for unit in self.units}
-        self.desk = knowledge.open_desk(self, policy)
+        self.desk = control_room.open_desk(self, policy)
         self.mail = self._open_mail(policy)
         self.records = [UnitRecord(unit.name, unit.kind) for unit in self.units]
         self.events: dict[int, list[Incident]] = {}
@@ -125,14 +122,16 @@ class Shift:
         self.unnoticed: dict[int, Incident] = {}
         self.total, self.settled = 0, Counter[str]()
         self.violations: Counter[str] = Counter()
-        self.driven = {knowledge.id_of("operator", n): 0.0 for n in range(scenario.operators.count)}
+        self.driven = {
+            control_room.id_of("operator", n): 0.0 for n in range(scenario.operators.count)
+        }
         self.told: list[m.Position | None] = [None] * len(self.units)
         self.half_way: dict[Unit, Place] = {}
         self._served: set[int] = set()
         self._newest = 0
         self._moving: dict[Unit, None] = {}
         self._luck: dict[tuple[str, int, str, int], Draws[float]] = {}
-        knowledge.register(self)
+        control_room.register(self)
         self.mail.carry()
         for start in sorted({group.from_s for group in scenario.responders}):
             on_duty = [unit for unit in self.units if unit.group.from_s == start]
@@ -190,24 +189,24 @@ class Shift:
         for unit, record in zip(self.units, self.records, strict=True):
             record.distance, record.jobs = unit.distance, unit.jobs
         return TimedRecording(
-            scenario,
-            self.seed,
-            self.terrain.zones,
-            scenario.stream_names,
-            [unit.name for unit in self.units],
-            self.ledger.columns() if scenario.keep == "events" else {},
-            self.ledger.cells,
-            self.ledger.outcomes,
-            np.array([level.areas for level in self.waiting]),
-            np.array([level.areas for level in self.served]),
-            self.records,
-            list(self.driven.values()),
-            counters,
-            self.violations,
-            self.total,
-            self.mail.sent,
-            now,
-            max(0.0, min(now, scenario.horizon_s) - scenario.warm_up_s),
+            scenario=scenario,
+            seed=self.seed,
+            zones=self.terrain.zones,
+            streams=scenario.stream_names,
+            responders=[unit.name for unit in self.units],
+            columns=self.ledger.columns() if scenario.keep == "events" else {},
+            cells=self.ledger.cells,
+            outcomes=self.ledger.outcomes,
+            waiting=np.array([level.areas for level in self.waiting]),
+            served=np.array([level.areas for level in self.served]),
+            units=self.records,
+            operators=list(self.driven.values()),
+            counters=counters,
+            violations=self.violations,
+            events=self.total,
+            messages=self.mail.sent,
+            ended=now,
+            duration=max(0.0, min(now, scenario.horizon_s) - scenario.warm_up_s),
         )
 
     # --- what happens --------------------------------------------------------------------
@@ -232,7 +231,7 @@ class Shift:
     def _report(self, incident: Incident, kind: str) -> None:
         stream = self.scenario.demand[incident.stream]
         caller = incident.index % CALLERS if stream.patience or stream.repeats else 0
-        source = knowledge.id_of(kind, incident.stream * CALLERS + caller)
+        source = control_room.id_of(kind, incident.stream * CALLERS + caller)
         incident.sources.append(source)
         self.mail.say(source, incident.report("detected"), incident)
         self.mail.carry()
@@ -318,21 +317,12 @@ class Shift:
         self.terrain.forget(incident.place)
         self.demand.closed(incident, now)
 
-    def travel(self, starts: Sequence[Start], goals: Sequence[m.Position]) -> tuple[Floats, Floats]:
-        """What the DVA is told of ways: see `core.travel_times.Travel`."""
-        return knowledge.travel(self, starts, goals)
-
     def _tell_who_moves(self) -> None:
         """Before each decision the DVA hears where those are who move and may be called."""
         for unit in self._moving:
             self._publish(unit, unit.here(), "walking")
 
     # --- what units may ask, and tell: see `responders.ShiftWorld` ---------------------------
-
-    @property
-    def now(self) -> float:
-        """Time [s]."""
-        return self.clock.now
 
     def after(self, delay: float, action: Any, *args: Any) -> None:
         """Do something later [s]; what it says is heard when it is done."""
@@ -367,24 +357,14 @@ class Shift:
             self.mail.publish(unit.device, m.PersonStatus(activity, place.position))
         else:
             mode = "Idle" if unit.job is None else "Teleoperation"
-            body = m.RobotStatus(mode, place.position, 0.0, 0.0, 0.0, round(self.now * 1000.0))
+            body = m.RobotStatus(
+                mode, place.position, 0.0, 0.0, 0.0, round(self.clock.now * 1000.0)
+            )
             self.mail.publish(unit.device, body)
 
     def incident_at(self, event: int) -> Incident:
         """What an event of the DVA really is: the first of what was reported as it."""
         return self.events[event][0]
-
-    def length(self, a: Place, b: Place) -> float:
-        """Length of the way [m]; infinite if there is none."""
-        return self.terrain.length(a, b)
-
-    def place_at(self, position: m.Position) -> Place:
-        """The place a message speaks of."""
-        return self.terrain.known_at(position)
-
-    def along(self, a: Place, b: Place, gone: float) -> Place:
-        """Where somebody is who has gone so far [m]."""
-        return self.terrain.along(a, b, gone)
 
     def mobilisation(self, unit: Unit, incident: Incident) -> float:
         """What it takes this unit this time to get ready [s]."""

@@ -151,6 +151,9 @@ class Terrain:
         """Where responders wait by default."""
         return self._middle(0)
 
+    def _between(self, a: Place, b: Place, share: float) -> Place:
+        return self.place(a.x + share * (b.x - a.x), a.y + share * (b.y - a.y))
+
     def _middle(self, zone: int) -> Place:
         place = self._known.get(_ORIGIN)
         if place is None:
@@ -198,7 +201,7 @@ class Plane(Terrain):
     ) -> None:
         super().__init__(list(zones) or ["area"], apart=APART)
         self._boxes = list(zones.values()) or [(0.0, 0.0, width, height)]
-        self._named, self._whole = bool(zones), (0.0, 0.0, width, height)
+        self._whole = (0.0, 0.0, width, height)
         self._straight = straight
         self._centres: dict[int, Place] = {}
 
@@ -247,8 +250,7 @@ class Plane(Terrain):
             return b
         if gone <= 0.0:
             return a
-        share = gone / whole
-        return self.place(a.x + share * (b.x - a.x), a.y + share * (b.y - a.y))
+        return self._between(a, b, gone / whole)
 
 
 def terrain_of(scenario: TimedScenario) -> Terrain:
@@ -441,8 +443,7 @@ class Rooms(Terrain):
         if gone <= 0.0:
             return a
         if self._way == "straight":
-            share = gone / self.length(a, b)
-            return self.place(a.x + share * (b.x - a.x), a.y + share * (b.y - a.y))
+            return self._between(a, b, gone / self.length(a, b))
         points = self._ways.path(a.point, b.point)
         if points is None:
             return b

@@ -28,18 +28,8 @@ from dva_sim.agents.route_following import Route
 from dva_sim.kernel.streams import Streams, derive_seed
 from dva_sim.simulation.scenario.scenario import population
 from dva_sim.simulation.task import measures
-from dva_sim.simulation.task.delays import Channel, RecordedChannel, RecordedDelays, normals
+from dva_sim.simulation.task.delays import RecordedChannel, RecordedDelays, normals
 from dva_sim.simulation.task.devices import Joystick, Pair, Unicycle
-from dva_sim.simulation.task.kinds import (
-    Corner,
-    Course,
-    Pointing,
-    ReachTask,
-    Slalom,
-    Task,
-    Tracking,
-    Tunnel,
-)
 from dva_sim.simulation.task.pointing import (
     CursorTrial,
     Goal,
@@ -48,8 +38,18 @@ from dva_sim.simulation.task.pointing import (
     TrackGoal,
     TunnelGoal,
 )
-from dva_sim.simulation.task.scenario import OneWayDelay, TaskScenario
-from dva_sim.simulation.task.trial import Seat, Trace, Trial
+from dva_sim.simulation.task.scenario import (
+    Corner,
+    Course,
+    Pointing,
+    ReachTask,
+    Slalom,
+    Task,
+    TaskScenario,
+    Tracking,
+    Tunnel,
+)
+from dva_sim.simulation.task.trial import Seat, Trace, Trial, WayKept
 
 RUN_OUT = 5.0  # the way goes on so far beyond the finish, so that nobody stops before it [m]
 MACHINE_LOOK = 1.0  # of a machine that steers by itself [m]; assumed
@@ -105,6 +105,7 @@ class DriveTrial(Trial[Observation]):
     """
 
     STEP = 0.01
+    plant: Unicycle
 
     def __init__(
         self,
@@ -117,20 +118,16 @@ class DriveTrial(Trial[Observation]):
         plant = scenario.plant
         assert plant.speed_mps is not None
         self._top = plant.speed_mps, math.radians(plant.turn_rate_deg_s)
-        super().__init__(scenario, seat, Reach(*self._top), streams, reaction)
+        unit = scenario.device.model_copy(update={"gain": 1.0})
+        device = Joystick(unit, seat.person, streams, self.STEP)
+        super().__init__(scenario, seat, Reach(*self._top), device, streams, reaction)
         self.points = way_of(scenario.task, *condition)
         self.length, self.width = length_of(self.points), condition[1]
-        self._limit = 0.5 * (self.width - plant.width_m)
+        self._kept = WayKept(0.5 * (self.width - plant.width_m))
         self._seen_way, self._way = (extended(self.points, RUN_OUT) for _ in range(2))
         self.plant = Unicycle(plant.lag_s, *self._top)
         self.plant.heading = math.atan2(self.points[1][1], self.points[1][0])
-        unit = scenario.device.model_copy(update={"gain": 1.0})
-        self.device = Joystick(unit, seat.person, streams, self.STEP)
-        way = OneWayDelay() if self.is_oracle else scenario.link.up
-        self._up: Channel[Pair] = Channel(way, 0.0, streams, "up")
         self._errors = normals(streams.fresh("judgement"))
-        self._next_reading, self.path = 0.0, 0.0
-        self._squares, self._crossings, self._inside = 0.0, 0, True
 
     def replay(self, recording: RecordedDelays, begin: float) -> None:
         """Take the link from a recording, from `begin` [s] in it on; no link reaches the oracle."""
@@ -166,19 +163,16 @@ class DriveTrial(Trial[Observation]):
 
     def advance(self, dt: float) -> None:
         """See `Trial`."""
-        now, plant = self.now, self.plant
-        self.device.move(dt)
-        if now >= self._next_reading - 0.5 * dt:
-            self._up.put(now, self.device.reading())
-            self._next_reading += self.device.period
-        arrived = self._up.take(now + 0.5 * dt)
-        speed, turn = self.device.command(arrived[-1] if arrived else None, dt)
+        plant = self.plant
+        speed, turn = self.commanded(dt)
         wanted = Intent(speed * self._top[0], turn * self._top[1])
         if self.scenario.automation:
             wanted = self._corrected(self.scenario.automation, wanted)
         plant.step(wanted.speed, wanted.turn_rate, dt)
         self.path += plant.speed * dt
-        self._check(dt)
+        ahead = self._way.ahead(plant.x, plant.y, 0.0, 0.0)
+        self._kept.note(ahead.offset, (plant.x, plant.y), dt)
+        self.over = ahead.remaining <= RUN_OUT
 
     def _corrected(self, share: float, wanted: Intent) -> Intent:
         """The machine helps to steer (pure pursuit); the speed stays the person's."""
@@ -187,33 +181,18 @@ class DriveTrial(Trial[Observation]):
         own = at.speed * 2.0 * math.sin(ahead.bearing) / max(ahead.distance, 0.1)
         return Intent(wanted.speed, (1.0 - share) * wanted.turn_rate + share * own)
 
-    def _check(self, dt: float) -> None:
-        ahead = self._way.ahead(self.plant.x, self.plant.y, 0.0, 0.0)
-        self._squares += ahead.offset * ahead.offset * dt
-        inside = ahead.offset <= self._limit
-        if self._inside and not inside:
-            self._crossings += 1
-            self.trace.touched.append((self.plant.x, self.plant.y))
-        self._inside = inside
-        self.over = ahead.remaining <= RUN_OUT
-
     def row(self) -> dict[str, Any]:
         """What is measured."""
         return {
             "steering_id": measures.steering_id(self.length, self.width),
             "movement_time_s": self.now,
             "completed": float(self.over),
-            "error": float(self._crossings > 0),
-            "wall_crossings": self._crossings,
-            "path_error_rms_m": math.sqrt(self._squares / self.now),
+            **self._kept.row(self.now),
         }
-
-    def place_now(self) -> Pair:
-        """See `Trial`."""
-        return self.plant.x, self.plant.y
 
     def draw_goal(self) -> None:
         """Add the geometry to the trace."""
+        self.trace.touched += self._kept.touched
         for side in (-1.0, 1.0):
             self.trace.walls.append(beside(self.points, side * 0.5 * self.width))
         task = self.scenario.task

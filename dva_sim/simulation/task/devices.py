@@ -42,28 +42,41 @@ class HandDevice(ABC):
     Attributes:
         top: The fastest cursor that it can ask for [m/s].
         period: Between two readings [s].
+        is_place: Whether the cursor goes where the hand is; else as fast as it is far from rest.
         failures: How often a filter of a user gave no answer that is one.
     """
 
     top: float
     period: float
+    is_place = False
     failures = 0
 
-    @abstractmethod
+    def __init__(self, config: DeviceConfig, rate_hz: float) -> None:
+        self._gain, self.period = config.gain, 1.0 / rate_hz
+        self._aim = self._told = (0.0, 0.0)
+
     def aim(self, vx: float, vy: float) -> None:
         """From now on the person wants this velocity of the cursor [m/s]."""
+        self._aim = vx / self._gain, vy / self._gain
 
-    @abstractmethod
-    def move(self, dt: float) -> None:
+    def command(self, reading: Pair | None, dt: float) -> Pair:
+        """At the machine: the velocity [m/s] for a step, given what has arrived, if anything."""
+        gain, (x, y) = self._gain, self._told
+        if self.is_place:
+            if reading is None:
+                return 0.0, 0.0
+            self._told = reading
+            return gain * (reading[0] - x) / dt, gain * (reading[1] - y) / dt
+        if reading is not None:
+            self._told = gain * reading[0], gain * reading[1]
+        return self._told
+
+    def move(self, dt: float) -> None:  # noqa: B027
         """Let `dt` [s] pass for the hand."""
 
     @abstractmethod
     def reading(self) -> Pair:
         """What the device sends now."""
-
-    @abstractmethod
-    def command(self, reading: Pair | None, dt: float) -> Pair:
-        """At the machine: the velocity [m/s] for a step, given what has arrived, if anything."""
 
     def farthest(self) -> dict[str, float]:
         """How far the hand went from rest, as a column; nothing where there is no rest."""
@@ -73,16 +86,14 @@ class HandDevice(ABC):
 class Mouse(HandDevice):
     """The hand's place is the cursor's."""
 
+    is_place = True
+
     def __init__(self, config: DeviceConfig, person: Person, streams: Streams, dt: float) -> None:
-        self._gain, self.period = config.gain, 1.0 / config.rate_hz
+        super().__init__(config, config.rate_hz)
         self.top = HAND_SPEED * config.gain
         self._keep = keep_of(person.hand_lag, dt)
         self._noise = noise_of(person, streams, dt)
-        self._aim = self._velocity = self._place = self._told = (0.0, 0.0)
-
-    def aim(self, vx: float, vy: float) -> None:
-        """See `HandDevice`."""
-        self._aim = vx / self._gain, vy / self._gain
+        self._velocity = self._place = (0.0, 0.0)
 
     def move(self, dt: float) -> None:
         """See `HandDevice`."""
@@ -95,22 +106,16 @@ class Mouse(HandDevice):
         """See `HandDevice`."""
         return self._place
 
-    def command(self, reading: Pair | None, dt: float) -> Pair:
-        """See `HandDevice`."""
-        if reading is None:
-            return 0.0, 0.0
-        last, self._told = self._told, reading
-        return _velocity(last, reading, self._gain, dt)
-
 
 class Joystick(HandDevice):
     """The deflection is the velocity; both axes spring back to the middle."""
 
     def __init__(self, config: DeviceConfig, person: Person, streams: Streams, dt: float) -> None:
-        self.top, self.period = config.gain, 1.0 / config.rate_hz
+        super().__init__(config, config.rate_hz)
+        self.top = config.gain
         self._keep = keep_of(person.hand_lag, dt)
         self._noise = noise_of(person, streams, dt)
-        self._aim = self._hand = self._shown = self._told = (0.0, 0.0)
+        self._hand = self._shown = (0.0, 0.0)
         self._most = 0.0
 
     def aim(self, vx: float, vy: float) -> None:
@@ -129,12 +134,6 @@ class Joystick(HandDevice):
         """See `HandDevice`."""
         return self._shown
 
-    def command(self, reading: Pair | None, dt: float) -> Pair:
-        """See `HandDevice`."""
-        if reading is not None:
-            self._told = self.top * reading[0], self.top * reading[1]
-        return self._told
-
     def farthest(self) -> dict[str, float]:
         """See `HandDevice`: the largest deflection, in shares of a full one."""
         return {"deflection_max": self._most}
@@ -150,7 +149,7 @@ class Tilt(HandDevice):
     def __init__(self, config: DeviceConfig, person: Person, streams: Streams, dt: float) -> None:
         part = load_part(config.accelerometer)
         rate = min(config.rate_hz, part.rate_hz)
-        self._gain, self.period = config.gain, 1.0 / rate
+        super().__init__(config, rate)
         self._limit = math.radians(config.limit_deg)
         noise = person.motor_noise
         self._hand = Hand(
@@ -160,11 +159,7 @@ class Tilt(HandDevice):
         self._filter = load_guarded_filter(config.filter, config.filter_options)(self.period)
         rest = [self._measured(0.0, 0.0) for _ in range(CALIBRATING)]
         self._rest = sum(r for r, _ in rest) / CALIBRATING, sum(p for _, p in rest) / CALIBRATING
-        self._aim = self._told = (0.0, 0.0)
         self._most = 0.0
-
-    def move(self, dt: float) -> None:
-        """The hand moves when the sensor looks; its steps are exact for any length."""
 
     def reading(self) -> Pair:
         """See `HandDevice`: one more sample, filtered."""
@@ -193,19 +188,11 @@ class TiltVelocity(Tilt):
         super().__init__(config, person, streams, dt)
         self.top = self._gain * self._limit
 
-    def aim(self, vx: float, vy: float) -> None:
-        """See `HandDevice`."""
-        self._aim = vx / self._gain, vy / self._gain
-
-    def command(self, reading: Pair | None, dt: float) -> Pair:
-        """See `HandDevice`."""
-        if reading is not None:
-            self._told = self._gain * reading[0], self._gain * reading[1]
-        return self._told
-
 
 class TiltPosition(Tilt):
     """The tilt is the cursor's place, so that the hand aims at a tilt that moves."""
+
+    is_place = True
 
     def __init__(self, config: DeviceConfig, person: Person, streams: Streams, dt: float) -> None:
         super().__init__(config, person, streams, dt)
@@ -220,18 +207,6 @@ class TiltPosition(Tilt):
         """See `HandDevice`."""
         limit, (x, y), (vx, vy) = self._limit, self._aim, self._rate
         self._aim = clamped(x + vx * dt, limit), clamped(y + vy * dt, limit)
-
-    def command(self, reading: Pair | None, dt: float) -> Pair:
-        """See `HandDevice`."""
-        if reading is None:
-            return 0.0, 0.0
-        last, self._told = self._told, reading
-        return _velocity(last, reading, self._gain, dt)
-
-
-def _velocity(last: Pair, place: Pair, gain: float, dt: float) -> Pair:
-    """Of a cursor that goes `gain` times the way from the last place to this one in `dt` [m/s]."""
-    return gain * (place[0] - last[0]) / dt, gain * (place[1] - last[1]) / dt
 
 
 KINDS: dict[str, Callable[[DeviceConfig, Person, Streams, float], HandDevice]] = {

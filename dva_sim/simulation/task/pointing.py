@@ -35,11 +35,9 @@ from dva_sim.agents.operator.strategies import (
 from dva_sim.agents.route_following import REACH, Route
 from dva_sim.kernel.streams import Streams
 from dva_sim.simulation.task import measures
-from dva_sim.simulation.task.delays import Channel
 from dva_sim.simulation.task.devices import Cursor, Pair, make_device
-from dva_sim.simulation.task.kinds import Pointing, ReachTask, Tracking, Tunnel
-from dva_sim.simulation.task.scenario import OneWayDelay, TaskScenario
-from dva_sim.simulation.task.trial import MACHINE_GAIN, Seat, Trace, Trial
+from dva_sim.simulation.task.scenario import Pointing, ReachTask, TaskScenario, Tracking, Tunnel
+from dva_sim.simulation.task.trial import MACHINE_GAIN, Seat, Trace, Trial, WayKept
 
 MOVED = 1e-3  # a cursor that has gone so far has moved [m]; assumed
 SUMMED = 0.1  # over so long vision sums motion before it tells a velocity [s]
@@ -155,6 +153,7 @@ class CursorTrial(Trial[Sighting]):
     """
 
     STEP = 0.004
+    plant: Cursor
 
     def __init__(
         self,
@@ -168,15 +167,12 @@ class CursorTrial(Trial[Sighting]):
         config = scenario.device
         if isinstance(scenario.task, ReachTask):
             config = config.model_copy(update={"gain": top})
-        self.device = make_device(config, seat.person, streams, self.STEP)
+        device = make_device(config, seat.person, streams, self.STEP)
         self.plant = Cursor(scenario.plant.lag_s, top)
-        reach = Reach(min(top, self.device.top), 0.0)
-        super().__init__(scenario, seat, reach, streams, reaction)
+        reach = Reach(min(top, device.top), 0.0)
+        super().__init__(scenario, seat, reach, device, streams, reaction)
         self.goal = goal
-        way = OneWayDelay() if self.is_oracle else scenario.link.up
-        self._up: Channel[Pair] = Channel(way, 0.0, streams, "up")
         self._motion, self._summed = Motion(), summed_over(scenario.frames.rate_hz)
-        self._next_reading, self.path = 0.0, 0.0
         self.moved_at: float | None = None
 
     def sight(self) -> Sighting:
@@ -211,13 +207,7 @@ class CursorTrial(Trial[Sighting]):
 
     def advance(self, dt: float) -> None:
         """See `Trial`."""
-        now, device, plant, goal = self.now, self.device, self.plant, self.goal
-        device.move(dt)
-        if now >= self._next_reading - 0.5 * dt:
-            self._up.put(now, device.reading())
-            self._next_reading += device.period
-        arrived = self._up.take(now + 0.5 * dt)
-        wanted = device.command(arrived[-1] if arrived else None, dt)
+        now, plant, goal, wanted = self.now, self.plant, self.goal, self.commanded(dt)
         if self.scenario.automation:
             wanted = goal.corrected(self.scenario.automation, now, plant, wanted)
         if goal.holds(now):
@@ -227,10 +217,6 @@ class CursorTrial(Trial[Sighting]):
         if self.moved_at is None and self.path > MOVED:
             self.moved_at = now + dt
         self.over = goal.check(now + dt, plant.x, plant.y, dt)
-
-    def place_now(self) -> Pair:
-        """See `Trial`."""
-        return self.plant.x, self.plant.y
 
     def draw_goal(self) -> None:
         """Add the geometry to the trace."""
@@ -260,9 +246,7 @@ class TunnelGoal(Goal):
         self.tolerance = 0.5 * width
         self._radius = length / (2.0 * math.pi) if task.shape == "circular" else 0.0
         self.path = Route(self._way(), min(REACH, WITHIN * length))
-        self._along, self._inside, self._errors = 0.0, True, 0
-        self._squares, self._time = 0.0, 0.0
-        self._touched: list[Pair] = []
+        self._kept, self._along, self._time = WayKept(self.tolerance), 0.0, 0.0
 
     def target(self, now: float) -> Pair:
         """The end of the tunnel."""
@@ -282,13 +266,8 @@ class TunnelGoal(Goal):
     def check(self, now: float, x: float, y: float, dt: float) -> bool:
         """See `Goal`."""
         self._along, offset, _ = self.place(x, y)
-        self._squares += offset * offset * dt
         self._time += dt
-        inside = abs(offset) <= self.tolerance
-        if self._inside and not inside:
-            self._errors += 1
-            self._touched.append((x, y))
-        self._inside = inside
+        inside = self._kept.note(offset, (x, y), dt)
         return self._along >= self.length or (self._task.on_error == "over" and not inside)
 
     def corrected(self, share: float, now: float, at: Cursor, wanted: Velocity) -> Velocity:
@@ -306,16 +285,14 @@ class TunnelGoal(Goal):
             "steering_id": measures.steering_id(self.length, self.width),
             "movement_time_s": trial.now - (trial.moved_at or 0.0),
             "completed": float(through),
-            "error": float(self._errors > 0),
-            "wall_crossings": self._errors,
-            "path_error_rms_m": math.sqrt(self._squares / self._time) if self._time else math.nan,
+            **self._kept.row(self._time),
         }
 
     def draw(self, trace: Trace) -> None:
         """See `Goal`."""
         for side in (-self.tolerance, self.tolerance):
             trace.walls.append([(x, y) for x, y in self._line(side).tolist()])
-        trace.touched += self._touched
+        trace.touched += self._kept.touched
 
     def _way(self) -> Floats:
         """The middle, going on after the end as before it: nobody has to stop there."""
@@ -372,7 +349,7 @@ class PointGoal(ToTarget):
         self._at = amplitude * self._axis[0], amplitude * self._axis[1]
         self._press, self._pressed_at = press, math.inf
         self._inside_since: float | None = None
-        self._entered = self._selected = False
+        self._selected = False
         self._end, self._left = 0.0, 0
         self._touched: list[Pair] = []
 
@@ -393,7 +370,7 @@ class PointGoal(ToTarget):
         dx, dy = x - self._at[0], y - self._at[1]
         inside = dx * dx + dy * dy <= self.tolerance * self.tolerance
         if inside and self._inside_since is None:
-            self._inside_since, self._entered = now, True
+            self._inside_since = now
         elif not inside and self._inside_since is not None:
             self._inside_since = None
             self._left += 1

@@ -23,10 +23,10 @@ from dva_sim.agents.operator.strategies import Driver, Oracle, Reach, Strategy
 from dva_sim.agents.population import Person
 from dva_sim.kernel.streams import Streams
 from dva_sim.simulation.task.delays import Channel
-from dva_sim.simulation.task.scenario import TaskScenario
+from dva_sim.simulation.task.devices import Cursor, HandDevice, Pair, Unicycle
+from dva_sim.simulation.task.scenario import OneWayDelay, TaskScenario
 
 S = TypeVar("S")  # what a frame shows
-Pair = tuple[float, float]
 
 WAIT_FROM = 0.1  # who wants nothing for so long waits [s]; assumed
 MACHINE_GAIN = 2.0  # of a machine that corrects by itself [rad/s]; assumed
@@ -94,6 +94,41 @@ class Waits:
             self._since = now
 
 
+class WayKept:
+    """How well one stays on a way: a crossing of its edge counts once, until one is back.
+
+    Args:
+        limit: How far the middle may be from that of the way [m].
+
+    Attributes:
+        crossings: How often the edge was crossed.
+        touched: Where [m].
+    """
+
+    def __init__(self, limit: float) -> None:
+        self._limit, self._squares, self._inside = limit, 0.0, True
+        self.crossings = 0
+        self.touched: list[Pair] = []
+
+    def note(self, offset: float, place: Pair, dt: float) -> bool:
+        """So far from the middle [m] for a step [s]; whether that is inside."""
+        self._squares += offset * offset * dt
+        inside = abs(offset) <= self._limit
+        if self._inside and not inside:
+            self.crossings += 1
+            self.touched.append(place)
+        self._inside = inside
+        return inside
+
+    def row(self, seconds: float) -> dict[str, float]:
+        """What is measured, over so long a time [s]."""
+        return {
+            "error": float(self.crossings > 0),
+            "wall_crossings": self.crossings,
+            "path_error_rms_m": math.sqrt(self._squares / seconds) if seconds else math.nan,
+        }
+
+
 class Trial(ABC, Generic[S]):
     """What all trials have in common.
 
@@ -101,6 +136,7 @@ class Trial(ABC, Generic[S]):
         scenario: Rates, links, horizon.
         seat: Who does it.
         reach: What can be done with what is moved.
+        device: What is in the hand.
         streams: The luck of this trial.
         reaction: From the first frame on the screen to the first that is acted on, perception in
             it [s]; 0 for who expects the goal: it acts as soon as it has perceived a frame.
@@ -108,21 +144,26 @@ class Trial(ABC, Generic[S]):
     Attributes:
         now: Since the trial began [s].
         over: Whether it is done.
+        plant: What is moved.
+        path: How far that has gone [m].
         first_move: When the person first wanted to move anything [s], or None.
     """
 
     STEP: float  # [s]
+    plant: Cursor | Unicycle
 
     def __init__(
         self,
         scenario: TaskScenario,
         seat: Seat,
         reach: Reach,
+        device: HandDevice,
         streams: Streams,
         reaction: float = 0.0,
     ) -> None:
         self.scenario, self.seat, self.trace = scenario, seat, Trace()
         self.waits, self.now, self.over = Waits(), 0.0, False
+        self.device, self.path, self._next_reading = device, 0.0, 0.0
         self.first_move: float | None = None
         self._driver = seat.strategy(seat.person, reach)
         perception = seat.person.perceptual_delay
@@ -131,6 +172,8 @@ class Trial(ABC, Generic[S]):
         self._newest: S | None = None
         self._late = scenario.frames.extra_s + perception
         self._frames: Channel[S] = Channel(scenario.link.down, self._late, streams, "down")
+        way = OneWayDelay() if self.is_oracle else scenario.link.up
+        self._up: Channel[Pair] = Channel(way, 0.0, streams, "up")
 
     @abstractmethod
     def sight(self) -> S:
@@ -143,10 +186,6 @@ class Trial(ABC, Generic[S]):
     @abstractmethod
     def advance(self, dt: float) -> None:
         """Let `dt` [s] pass for hand, link and what is moved."""
-
-    @abstractmethod
-    def place_now(self) -> Pair:
-        """Where it is, for the picture [m]."""
 
     def run(self, keep: bool = False) -> None:
         """Play the trial to its end; `keep` its trace to be drawn."""
@@ -177,6 +216,16 @@ class Trial(ABC, Generic[S]):
             self.first_move = self.now
         if self.first_move is not None:
             self.waits.note(self.now, moves)
+
+    def commanded(self, dt: float) -> Pair:
+        """What the machine is told in a step [s]: the hand moves, is read, and that arrives."""
+        now, device = self.now, self.device
+        device.move(dt)
+        if now >= self._next_reading - 0.5 * dt:
+            self._up.put(now, device.reading())
+            self._next_reading += device.period
+        arrived = self._up.take(now + 0.5 * dt)
+        return device.command(arrived[-1] if arrived else None, dt)
 
     def _look_of(self) -> float:
         """Between two frames [s]."""
@@ -222,7 +271,7 @@ class Trial(ABC, Generic[S]):
             self.decide(self._driver, newest, self.seat.begun + now)
 
     def _draw(self) -> None:
-        place, trace = self.place_now(), self.trace
+        place, trace = (self.plant.x, self.plant.y), self.trace
         if trace.times:
             since = self.now - trace.times[-1]
             trace.speeds.append(math.dist(place, trace.places[-1]) / since)

@@ -1,7 +1,13 @@
 """The model `transports`: a session on a congested link, and a drive over what it delivers."""
 
-from dva_sim.simulation.transport.run import SessionRecording, rehearse, simulate_session, tables
-from dva_sim.simulation.transport.scenario import TransportScenario, build
+from dva_sim.simulation.transport.scenario import (
+    SessionRecording,
+    TransportScenario,
+    build,
+    rehearse,
+    simulate_session,
+    tables,
+)
 
 __all__ = [
     "SessionRecording",

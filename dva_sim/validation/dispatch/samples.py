@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dva_sim.simulation.shift import TimedRecording, TimedScenario
-from dva_sim.simulation.shift.statistics import OUTCOMES, TIMES
+from dva_sim.simulation.shift.recording import OUTCOMES, TIMES
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -12,8 +12,7 @@ from dva_sim.experiments.execution.scheduling import run_all
 from dva_sim.experiments.study.cell_grid import StudyJob
 from dva_sim.kernel.errors import RunsFailed
 from dva_sim.kernel.streams import Streams, derive_seed
-from dva_sim.network.condition import Condition
-from dva_sim.network.measures import Measures
+from dva_sim.network.pattern_runs import Condition, Measures
 from dva_sim.simulation.models import AnyScenario, Tables
 from dva_sim.validation.network.pooling import (
     Pooled,

@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.network.condition import Condition
+from dva_sim.network.pattern_runs import Condition
 from dva_sim.validation.network.emulator.cell import PACKETS
 from dva_sim.validation.network.emulator.measuring import Progress, measure_all
 from dva_sim.validation.network.reference import (

@@ -13,8 +13,7 @@ from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
 from dva_sim.kernel.clock import Clock
-from dva_sim.network.condition import Condition
-from dva_sim.network.measures import RunLog
+from dva_sim.network.pattern_runs import Condition, RunLog
 from dva_sim.network.zmtp import ReceivePipe
 
 

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.network.condition import Condition
+from dva_sim.network.pattern_runs import Condition
 from dva_sim.statistics import holm
 from dva_sim.validation.network.verdicts import (
     MEASURES,

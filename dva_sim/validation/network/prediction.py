@@ -11,13 +11,18 @@ from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.streams import Streams
 from dva_sim.kernel.suggestions import unknown
-from dva_sim.network.condition import COMMAND_BYTES, REPLY_BYTES, Condition
-from dva_sim.network.connections import AnyConnection, DatagramConnection, Load, is_calm
+from dva_sim.network.connections import AnyConnection, Connection, DatagramConnection, Load, is_calm
 from dva_sim.network.link import Link, LinkConfig
+from dva_sim.network.link.link import make_link
 from dva_sim.network.link.losses import Bursts
-from dva_sim.network.measures import Measures, RunLog, measure_log
-from dva_sim.network.radio import make_link
-from dva_sim.network.stream import Connection
+from dva_sim.network.pattern_runs import (
+    COMMAND_BYTES,
+    REPLY_BYTES,
+    Condition,
+    Measures,
+    RunLog,
+    measure_log,
+)
 from dva_sim.network.tcp import TcpOptions
 from dva_sim.network.zmtp import ZmtpConnection, ZmtpOptions, framed
 from dva_sim.validation.network.model_programs import (

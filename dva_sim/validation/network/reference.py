@@ -18,7 +18,7 @@ from dva_sim.kernel import resources
 from dva_sim.kernel.config import Config, load_yaml, validate
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import unknown
-from dva_sim.network.condition import CONDITION, Condition
+from dva_sim.network.pattern_runs import CONDITION, Condition
 
 FOLDER = "experiments/validation"
 NUMBERS = (

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
-from dva_sim.network.condition import Condition
+from dva_sim.network.pattern_runs import Condition
 from dva_sim.validation.frame import ResultSheet, Row, ValidationResult
 from dva_sim.validation.frame import short_number as number
 from dva_sim.validation.network.comparison import NetworkComparison

@@ -16,7 +16,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.network.condition import COMMAND_BYTES, REPLY_BYTES, Condition
+from dva_sim.network.pattern_runs import COMMAND_BYTES, REPLY_BYTES, Condition
 from dva_sim.validation.network.reference import SocketRun
 
 ConditionKind = Literal["lossless", "overload", "single", "pooled"]

@@ -14,7 +14,7 @@ from dva_sim.kernel.recorder import DriveLog, Recorder
 from dva_sim.kernel.streams import Streams
 from dva_sim.network.link import ConstantRate, Link, LinkConfig
 from dva_sim.network.patterns import Pattern, PubSub
-from dva_sim.network.virtual import VirtualNetwork
+from dva_sim.network.virtual_network import VirtualNetwork
 from dva_sim.protocol.codec import decode
 from dva_sim.protocol.messages import SetTeleOp
 from dva_sim.worlds.geo import GeoFrame

@@ -10,7 +10,7 @@ import pytest
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.streams import Streams
 from dva_sim.network.link import ConstantRate, Link, LinkConfig, TraceRate, read_trace
-from dva_sim.network.radio import make_link
+from dva_sim.network.link.link import make_link
 
 
 def link(**config: float) -> Link:

@@ -10,7 +10,7 @@ from dva_sim.kernel.config import validate
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.streams import Streams
 from dva_sim.network.link import Link, LinkConfig, check_partitions, part_links
-from dva_sim.network.radio import make_link
+from dva_sim.network.link.link import make_link
 
 
 def link(direction: Any = "up", **config: Any) -> Link:

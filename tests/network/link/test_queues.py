@@ -10,7 +10,7 @@ from dva_sim.kernel.config import validate
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.streams import Streams
 from dva_sim.network.link import Link, LinkConfig
-from dva_sim.network.radio import make_link
+from dva_sim.network.link.link import make_link
 
 
 def link(direction: Any = "up", **config: Any) -> Link:
@@ -85,20 +85,6 @@ def test_a_link_is_ideal_whatever_its_delay_rate_and_queue() -> None:
     assert link(delay_s=1.0, rate_bps=1e4, queue_packets=3).is_ideal()
     assert link("down", up={"loss": 0.01}).is_ideal()
     assert not make_link(LinkConfig(), "up", Streams(1), "x", lambda: None).is_ideal()
-
-
-def test_round_trips_that_few_exceed_are_known_of_both_directions(tmp_path: Any) -> None:
-    log = tmp_path / "a.log"
-    log.write_text("0 100\n1 300\n")
-    normal = {"law": "normal", "sd_s": 0.02}
-    for config, expected in (
-        ({"delay_s": 0.1, "jitter_s": 0.05}, 0.3),
-        ({"delay_s": 0.1, "delay_law": normal}, 0.28),
-        ({"delay_s": 0.1, "up": {"delay_s": 0.3}, "delay_law": normal}, 0.48),
-        ({"delay_log": str(log)}, 0.4),
-    ):
-        slow = validate(LinkConfig, config).slow_round_trip()
-        assert slow == pytest.approx(expected), config
 
 
 def test_what_no_queue_can_be_is_refused() -> None:

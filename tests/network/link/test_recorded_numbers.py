@@ -15,7 +15,7 @@ import pytest
 
 from dva_sim.kernel.streams import Streams
 from dva_sim.network.link import ConstantRate, Link, LinkConfig
-from dva_sim.network.radio import make_link
+from dva_sim.network.link.link import make_link
 
 CROWDED = {"loss": 0.1, "delay_s": 0.1, "jitter_s": 0.1, "rate_bps": 3e5, "queue_bytes": 9000}
 RECORDED = {

@@ -11,7 +11,7 @@ import pytest
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.streams import Streams
 from dva_sim.network.link import Link, LinkConfig, read_delay_log, read_trace
-from dva_sim.network.radio import make_link
+from dva_sim.network.link.link import make_link
 
 TRACES = Path(__file__).parents[3] / "experiments" / "traces"
 PING = """\

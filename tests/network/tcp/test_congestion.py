@@ -1,7 +1,7 @@
 import pytest
 
 from dva_sim.network.tcp.congestion import Cubic, HyStart, RateReduction, Reno
-from dva_sim.network.tcp.options import TcpOptions
+from dva_sim.network.tcp.parameters import TcpOptions
 
 OPTIONS = TcpOptions()
 

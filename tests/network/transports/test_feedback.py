@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from dva_sim.network.transports.datagrams import Echoes, Feedback, Pace, RoundTrips
+from dva_sim.network.transports.datagrams import Feedback, Pace, RoundTrips
 
 
 def test_the_first_sample_of_200_ms_gives_a_time_out_of_a_second_the_least_there_is():
@@ -46,19 +46,17 @@ def test_a_datagram_is_lost_when_three_later_ones_were_acknowledged():
 
 
 def test_what_a_lost_acknowledgement_said_the_next_one_says_too():
-    feedback, echoes = Feedback(), Echoes()
+    feedback = Feedback()
     for number in range(4):
         feedback.sent(0.0, number)
-        echoes.saw(0.1, number)
-    assert feedback.acknowledged(0.2, echoes.at(0.1)) == []
+    assert feedback.acknowledged(0.2, [(number, 0.0) for number in range(4)]) == []
     assert feedback.deadline == math.inf  # nothing is pending
 
 
 def test_how_long_the_other_side_held_a_datagram_is_no_part_of_the_round_trip():
-    feedback, echoes = Feedback(), Echoes()
+    feedback = Feedback()
     feedback.sent(1.0, 0)
-    echoes.saw(1.1, 0)
-    feedback.acknowledged(1.5, echoes.at(1.4))
+    feedback.acknowledged(1.5, [(0, 0.3)])
     assert feedback.samples == pytest.approx([0.2])
 
 

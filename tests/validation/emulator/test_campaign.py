@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from dva_sim.network.condition import Condition
+from dva_sim.network.pattern_runs import Condition
 from dva_sim.validation.network.emulator import measuring
 from dva_sim.validation.network.emulator.cell import EmulatedJob, EmulatedOutcome
 from dva_sim.validation.network.emulator.measuring import (

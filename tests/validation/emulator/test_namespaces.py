@@ -14,7 +14,7 @@ import pytest
 from emulated import all_end, need_link, networks, wait_for_children
 from patience import becomes
 
-from dva_sim.network.condition import Condition
+from dva_sim.network.pattern_runs import Condition
 from dva_sim.validation.network.emulator.cell import EmulatedJob, EmulatedOutcome
 from dva_sim.validation.network.emulator.measuring import COLUMNS, job_of, measure
 from dva_sim.validation.network.emulator.process import (

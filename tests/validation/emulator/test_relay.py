@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import pytest
 
 from dva_sim.kernel.streams import Streams
-from dva_sim.network.condition import Condition
+from dva_sim.network.pattern_runs import Condition
 from dva_sim.validation.network.emulator.measuring import measure
 from dva_sim.validation.network.emulator.process import EmulatorError
 from dva_sim.validation.network.emulator.relay import CHUNK_BYTES, Proxy

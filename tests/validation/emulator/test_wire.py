@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dva_sim.kernel.streams import Streams
-from dva_sim.network.condition import Condition
+from dva_sim.network.pattern_runs import Condition
 from dva_sim.validation.network.emulator.wire import EmulatedWire, WireConfig
 
 MANY = 20_000

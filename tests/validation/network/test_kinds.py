@@ -1,6 +1,6 @@
 """How a condition is judged follows from what was set, never from what was found."""
 
-from dva_sim.network.condition import Condition
+from dva_sim.network.pattern_runs import Condition
 from dva_sim.validation.network.reference import SocketRun
 from dva_sim.validation.network.verdicts import (
     grouped,

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.network.condition import Condition
+from dva_sim.network.pattern_runs import Condition
 from dva_sim.validation.network.prediction import depth_for, predict
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dva_sim.network.condition import Condition
+from dva_sim.network.pattern_runs import Condition
 from dva_sim.validation.network.reference import SocketRun
 from dva_sim.validation.network.verdicts import (
     BY_NAME,

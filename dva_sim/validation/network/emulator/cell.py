@@ -22,7 +22,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, Protocol
 
 from dva_sim.kernel.streams import Streams
-from dva_sim.network.condition import Condition
+from dva_sim.network.pattern_runs import Condition
 from dva_sim.validation.network.emulator import linux_calls
 from dva_sim.validation.network.emulator.linux_calls import OPERATOR_END, ROBOT_END, End, open_tun
 from dva_sim.validation.network.emulator.programs import (

@@ -27,8 +27,7 @@ import zmq
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.streams import derive_seed
-from dva_sim.network.condition import EMULATOR_RESULTS, RESULTS, Condition
-from dva_sim.network.measures import RunLog, measure_log
+from dva_sim.network.pattern_runs import EMULATOR_RESULTS, RESULTS, Condition, RunLog, measure_log
 from dva_sim.validation.network.emulator.cell import PACKETS, EmulatedJob, EmulatedOutcome
 from dva_sim.validation.network.emulator.process import EmulatorError, refuse_for_proxy, run_job
 from dva_sim.validation.network.emulator.programs import HANDSHAKE_LIMIT_S, Note, NoteKind

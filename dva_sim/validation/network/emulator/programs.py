@@ -22,7 +22,7 @@ from enum import IntEnum
 import zmq
 from zmq.utils.monitor import recv_monitor_message
 
-from dva_sim.network.condition import COMMAND_BYTES, REPLY_BYTES, Condition
+from dva_sim.network.pattern_runs import COMMAND_BYTES, REPLY_BYTES, Condition
 
 _COUNT = struct.Struct("q")
 _NOTE = struct.Struct("iid")

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.random import Generator
 
 from dva_sim.kernel.streams import Streams
-from dva_sim.network.condition import Condition
+from dva_sim.network.pattern_runs import Condition
 
 _BLOCK = 4096
 

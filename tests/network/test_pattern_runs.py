@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from dva_sim.network.measures import RunLog, measure_log
+from dva_sim.network.pattern_runs import RunLog, measure_log
 
 
 def log() -> RunLog:

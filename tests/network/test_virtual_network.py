@@ -13,7 +13,7 @@ from dva_sim.kernel.streams import Streams
 from dva_sim.network.connections import Connector, ZeromqConfig
 from dva_sim.network.link import Link, LinkConfig, make_serialiser
 from dva_sim.network.messaging import Request, Requester
-from dva_sim.network.virtual import RECONNECT, VirtualNetwork
+from dva_sim.network.virtual_network import RECONNECT, VirtualNetwork
 
 Depth = Literal["message", "segment"]
 DEPTHS = pytest.mark.parametrize("depth", ["message", "segment"])

@@ -1,24 +1,21 @@
-"""The field: robots and people of a site, the physics around them, and the hazards."""
+"""Everything that has a place: robots and people of a site, physics around them, hazards."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 from dva_sim.agents.device import AgentDevice
 from dva_sim.agents.observation import Observation
 from dva_sim.agents.operator.strategies import Truth
 from dva_sim.agents.people.bystander import BystanderAgent
 from dva_sim.agents.people.guard import GuardAgent
-from dva_sim.agents.robot.field_of_view import HazardSpot
 from dva_sim.agents.robot.robot import RobotAgent
-from dva_sim.kernel.recorder import DriveLog
 from dva_sim.protocol import messages as m
-from dva_sim.simulation.full.hazards import Hearsay, RunHazard, draw_incidents
-from dva_sim.simulation.full.people import People
-from dva_sim.simulation.full.robots import Machines, Starts
+from dva_sim.simulation.full.hazards import Danger, Hearsay, RunHazard, RunHazards
 from dva_sim.simulation.full.stage import DVA, Stage
-from dva_sim.worlds.hazards import Conditions, Surroundings
+from dva_sim.simulation.full.team import TeamBuilder
+from dva_sim.worlds.hazards import Conditions
 from dva_sim.worlds.physics import World
 
 PHYSICS_TICK = 0.04  # two centimetres at top speed [s]
@@ -32,34 +29,21 @@ DANGEROUS = Conditions(
     explosive=0.2,
 )
 """What makes a place dangerous, by the limits of `danger_radius` (worlds/HAZARDS.md)."""
-SAME_PLACE = 4.0  # what is so near a place is what is there [m]
-
-Danger = tuple[tuple[float, float], float]  # the middle and the radius of a place to keep off [m]
 
 
-class Field:
+class Field(RunHazards):
     """Everything that has a place.
 
     Args:
         stage: Where.
-
-    Attributes:
-        surroundings: What the hazards make of the air and the floor.
-        contained: When an incident was dealt with [s], by its place in `incidents`.
 
     Raises:
         ConfigError: the site cannot hold the team or the events.
     """
 
     def __init__(self, stage: Stage) -> None:
-        self.stage = stage
+        super().__init__(stage)
         self.world = World(stage.site, PHYSICS_TICK)
-        self.incidents = draw_incidents(stage.scenario.events, stage.site, stage.streams)
-        self._real = [n for n, i in enumerate(self.incidents) if not i.false_alarm]
-        self.surroundings = Surroundings(
-            stage.site, [self.incidents[number].hazard for number in self._real]
-        )
-        self.contained: dict[int, float] = {}
         self.robots: dict[str, RobotAgent] = {}
         self.guards: list[GuardAgent] = []
         self.bystanders: list[BystanderAgent] = []
@@ -67,21 +51,19 @@ class Field:
 
     def populate(self) -> None:
         """Put everybody in place and let them register."""
-        starts = Starts(self.stage, self.incidents[0].hazard.position)
-        machines = Machines(
-            *(self.stage, self.world, self.surroundings, self._spots, self.newest_drive, starts)
-        )
-        for number in range(1, self.stage.scenario.robot.count + 1):
-            robot = machines.add(number)
+        scenario, team = self.stage.scenario, TeamBuilder(self.stage, self.world, self)
+        for number in range(1, scenario.robot.count + 1):
+            robot = team.add_robot(number)
             self.robots[robot.device.id_tag] = robot
-        people = People(
-            *(self.stage, self.world, self.surroundings, self._spots),
-            *(self._is_there, self._contain, starts),
-        )
-        for number in range(1, self.stage.scenario.guard.count + 1):
-            self.guards.append(people.add_guard(number))
-        for number in range(1, self.stage.scenario.bystander.count + 1):
-            self.bystanders.append(people.add_bystander(number))
+        self.guards += [team.add_guard(n + 1) for n in range(scenario.guard.count)]
+        self.bystanders += [team.add_bystander(n + 1) for n in range(scenario.bystander.count)]
+
+    def people(self) -> Iterator[tuple[str, GuardAgent | BystanderAgent]]:
+        """Who is on foot, by name."""
+        for guard in self.guards:
+            yield guard.device.label, guard
+        for bystander in self.bystanders:
+            yield bystander.name, bystander
 
     def schedule_incidents(self) -> None:
         """Let the hazards break out, and those who notice them report."""
@@ -92,16 +74,6 @@ class Field:
         """The true state of a robot."""
         return Truth(self.robots[robot].observe())
 
-    def newest_drive(self, robot: str) -> DriveLog | None:
-        """The log of a robot's newest drive, where its operator's recorder is ours."""
-        return self.stage.recorder.newest_drive.get(robot)
-
-    def in_danger(self, x: float, y: float, now: float) -> bool:
-        """Whether a place [m] is one where people should not be."""
-        return self.is_near(self.dangers(now), x, y) or is_dangerous(
-            self.surroundings.at(x, y, now)
-        )
-
     def is_near(self, dangers: Iterable[Danger], x: float, y: float) -> bool:
         """Whether a place [m] is within a danger's radius, with no wall between."""
         sees = self.stage.planner.line_of_sight
@@ -109,10 +81,6 @@ class Field:
             math.dist(middle, (x, y)) < radius and sees(middle, (x, y))
             for middle, radius in dangers
         )
-
-    def dangers(self, now: float) -> list[Danger]:
-        """Where people should not be."""
-        return [(i.hazard.position, i.hazard.danger_radius(now)) for i in self._going_on(now)]
 
     # --- what happens ------------------------------------------------------------------
 
@@ -157,33 +125,6 @@ class Field:
         """What detectors and callers report is heard by all who are in the building."""
         for bystander in self.bystanders:
             bystander.alarm(self.stage.clock.now)
-
-    # --- what agents may ask of the world ----------------------------------------------
-
-    def _going_on(self, now: float) -> list[RunHazard]:
-        """What has begun, is real, and was not dealt with yet."""
-        return [
-            incident
-            for number, incident in enumerate(self.incidents)
-            if incident.is_there(now) and now < self.contained.get(number, math.inf)
-        ]
-
-    def _spots(self, now: float) -> list[HazardSpot]:
-        return [spot for i in self._going_on(now) if (spot := i.spot(now)) is not None]
-
-    def _contain(self, kind: str, x: float, y: float) -> None:
-        """Somebody has dealt with what is at a place [m]: from now on it harms nobody."""
-        now = self.stage.clock.now
-        for number, incident in enumerate(self.incidents):
-            near = math.dist(incident.hazard.position, (x, y)) < SAME_PLACE
-            there = incident.is_there(now) and number not in self.contained
-            if incident.kind == kind and near and there:
-                self.contained[number] = now
-                self.surroundings.contain(self._real.index(number), now)
-
-    def _is_there(self, kind: str, x: float, y: float) -> bool:
-        spots = self._spots(self.stage.clock.now)
-        return any(s.kind == kind and math.dist((s.x, s.y), (x, y)) < SAME_PLACE for s in spots)
 
 
 def is_dangerous(air: Conditions) -> bool:

@@ -1,0 +1,315 @@
+"""Who is in a run in the flesh: robots, guards and bystanders, made where they begin.
+
+They begin at the site's bases and posts, or a given way from the event. A robot has a body, a
+battery, sensors and a computer; people on foot share physics and air with it.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dva_sim.agents.observation import CAMERA_SCHEME
+from dva_sim.agents.people.bystander import BystanderAgent, draw_places
+from dva_sim.agents.people.evacuation import AirAt, clean_air, refuges_of
+from dva_sim.agents.people.guard import GuardAgent
+from dva_sim.agents.people.pedestrian_avoidance import RADIUS
+from dva_sim.agents.people.profiles import Occupant, Walker
+from dva_sim.agents.people.walking import Walking
+from dva_sim.agents.robot.battery import Battery
+from dva_sim.agents.robot.command_queue import service_times
+from dva_sim.agents.robot.controller import Limits, RobotController
+from dva_sim.agents.robot.field_of_view import FieldOfView
+from dva_sim.agents.robot.profile import RobotProfile
+from dva_sim.agents.robot.robot import FRAME, RobotAgent, RobotSetup
+from dva_sim.agents.robot.sensors import make_ports, sources_of
+from dva_sim.kernel.clock import Clock
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.simulation.full.hazards import RunHazards
+from dva_sim.simulation.full.stage import DVA, Stage, place_of
+from dva_sim.simulation.scenario import bystander_profile, guard_profile
+from dva_sim.worlds.bodies import GRIP, RobotBody
+from dva_sim.worlds.geo import Pose
+from dva_sim.worlds.lidar import Lidar
+from dva_sim.worlds.physics import PersonBody, World
+from dva_sim.worlds.site import FOOTPRINT
+
+TRIES = 200
+APART = 1.5  # between the middles of two who begin [m]
+
+Point = tuple[float, float]
+WET_GRIP = 0.4  # friction coefficient of rubber on a wet floor; assumed
+WET = 0.002  # deeper water than this makes a floor slippery [m]
+HOUSEKEEPING = 1.0  # how often a robot looks at its battery, and the floor at the robot [s]
+AT_BASE = 0.5  # so near its base a robot that stands is charged [m]
+STANDING = 0.02  # slower than this it stands [m/s]
+PLACES = 3  # where a bystander works, by turns
+FLAMES_SEEN = 15.0  # from so far, if nothing stands between and smoke lets one see [m]
+FLAMES_THROUGH = 8.0  # optical depth at which what shines is lost in smoke (T. Jin, SFPE Handbook)
+
+
+class TeamBuilder:
+    """Makes who takes part, and puts them where they begin.
+
+    Whoever is to begin a given way from the event begins on the way to it from anywhere else on
+    the site, chosen by the run's seed: that way, cut off where so much of it is left.
+
+    Args:
+        stage: Where.
+        world: The physics.
+        hazards: What is going on there.
+    """
+
+    def __init__(self, stage: Stage, world: World, hazards: RunHazards) -> None:
+        self._stage, self._world, self._hazards = stage, world, hazards
+        self._around, self._lidar = hazards.surroundings, Lidar(world)
+        self._air: AirAt = self._around.at if self._around.has_any else clean_air
+        self._refuges = refuges_of(stage.site)
+        self._taken: list[Point] = []
+        self._first_places: list[Point] = []
+        self._failures: dict[str, int] = {}
+
+    def add_robot(self, number: int) -> RobotAgent:
+        """The `number`-th robot, in its place; it registers and begins to work.
+
+        Raises:
+            ConfigError: the site has no base for it, or something is in its way.
+        """
+        stage, config = self._stage, self._stage.scenario.robot
+        profile = stage.robots[number - 1]
+        base = self._start("robot", number)
+        device = stage.device("robot", number)
+        body = self._world.add_robot(device.label, profile.drive_spec(), base)
+        controller = RobotController(
+            device.id_tag,
+            DVA,
+            Limits(config.watchdog_s, config.max_age_s),
+            camera_url=f"{CAMERA_SCHEME}{device.address}/{FRAME}",
+            clock_offset=float(stage.streams[f"{device.label}/clock"].uniform(10.0, 100_000.0)),
+        )
+        power = Power(profile, config.charge, body, base, stage.clock)
+        setup = self._setup(profile, body, power)
+        robot = RobotAgent(
+            device,
+            controller,
+            world=self._world,
+            body=body,
+            planner=stage.planner,
+            setup=setup,
+            drive_of=stage.recorder.newest_drive.get,
+        )
+        device.register(robot.start)
+        stage.clock.every(HOUSEKEEPING, lambda: self._look_after(robot, power))
+        return robot
+
+    def _setup(self, profile: RobotProfile, body: RobotBody, power: Power) -> RobotSetup:
+        stage, scenario, hazards = self._stage, self._stage.scenario, self._hazards
+        camera, robot = scenario.camera, scenario.robot
+        angle = math.radians(camera.field_of_view_deg)
+        sources = sources_of(self._world, body, self._around, self._lidar, power.share)
+        processing = profile.processing_s if robot.processing_s is None else robot.processing_s
+        configs = profile.sensors if robot.sensors is None else robot.sensors
+        return RobotSetup(
+            pattern=stage.pattern(),
+            service=service_times(processing, stage.streams.fresh(f"{body.name}/processing")),
+            frame_rate=camera.rate_hz,
+            frame_bytes=camera.frame_bytes,
+            view=FieldOfView(angle, camera.range_m, stage.planner.line_of_sight, hazards.smoke),
+            hazards=hazards.spots,
+            sensors=make_ports(
+                configs, sources, lambda what: stage.streams.fresh(f"{body.name}/sensor/{what}")
+            ),
+            guarded=scenario.control == "coordinated",
+            encode=camera.encode_s,
+            charge=power.share,
+            conflates=scenario.zeromq.conflates_receiver,
+            limit=scenario.zeromq.high_water_mark,
+        )
+
+    def _look_after(self, robot: RobotAgent, power: Power) -> None:
+        """Once a second: is there power, does its drive answer, and is the floor wet?"""
+        now, body = self._stage.clock.now, robot.body
+        self._world.advance_to(now)
+        robot.power(power.share() > 0.0)
+        self._look_at_drive(robot)
+        if self._around.may_be_wet:
+            wet = self._around.at(body.x, body.y, now).water > WET
+            body.grip = WET_GRIP if wet else GRIP
+
+    def _look_at_drive(self, robot: RobotAgent) -> None:
+        """Count what motors of a user got wrong, and tell of the first time."""
+        device, failures = robot.device, robot.body.motors.failures
+        known = self._failures.get(device.label, 0)
+        if failures > known:
+            device.recorder.counters["failed: an answer of a drive"] += failures - known
+            self._failures[device.label] = failures
+            if not known:
+                device.tell(
+                    f"brakes, as its drive fails: {robot.body.motors.first_failure}", "mode"
+                )
+
+    def add_guard(self, number: int) -> GuardAgent:
+        """The `number`-th guard, at its post; it registers and is on duty.
+
+        Raises:
+            ConfigError: the site has no post for it.
+        """
+        stage, hazards = self._stage, self._hazards
+        post = self._start("guard", number)
+        device = stage.device("guard", number)
+        walker = Walker.draw(guard_profile(stage.scenario), stage.streams[f"{device.label}/walker"])
+        body = self._world.add_person(device.label, post, radius=RADIUS)
+        guard = GuardAgent(
+            device,
+            walker,
+            stage.planner,
+            self._legs(body, walker.speed),
+            is_there=hazards.is_there,
+            contain=hazards.contain,
+            air=self._air,
+            refuges=self._refuges,
+            smoke=hazards.smoke,
+        )
+        device.register(guard.start)
+        return guard
+
+    def add_bystander(self, number: int) -> BystanderAgent:
+        """The `number`-th bystander, at the first of its places, at work.
+
+        Raises:
+            ConfigError: the site has no room for it.
+        """
+        stage, name = self._stage, f"bystander-{number}"
+        luck = stage.streams[f"{name}/who"]
+        occupant = Occupant.draw(bystander_profile(stage.scenario), luck)
+        places = self._places(name)
+        body = self._world.add_person(name, Pose(*places[0], 0.0), radius=RADIUS)
+        bystander = BystanderAgent(
+            name,
+            stage.clock,
+            occupant,
+            self._legs(body, occupant.speed),
+            planner=stage.planner,
+            places=places,
+            refuges=self._refuges,
+            luck=stage.streams[f"{name}/walks"],
+            air=self._air,
+            sees=self._sees_flames,
+            leaves=lambda: self._world.remove(body),
+            tell=lambda what: stage.recorder.tell(stage.clock.now, name, what, "person"),
+        )
+        bystander.start()
+        return bystander
+
+    def _legs(self, body: PersonBody, speed: float) -> Walking:
+        stage = self._stage
+        return Walking(
+            stage.clock, stage.planner, self._world, body, speed=speed, doors=stage.site.doors
+        )
+
+    def _places(self, name: str) -> list[Point]:
+        """Where a bystander works; at the first nobody stands yet."""
+        stage = self._stage
+        starts = (*stage.site.guard_posts, *stage.site.robot_bases)
+        taken = [*((pose.x, pose.y) for pose in starts), *self._first_places]
+        places = draw_places(stage.site, stage.streams[f"{name}/places"], PLACES, taken)
+        self._first_places.append(places[0])
+        return places
+
+    def _sees_flames(self, x: float, y: float, time: float) -> bool:
+        sees = self._stage.planner.line_of_sight
+        return any(
+            spot.shines
+            and math.dist((x, y), (spot.x, spot.y)) < FLAMES_SEEN
+            and sees((x, y), (spot.x, spot.y))
+            and self._around.optical_depth((x, y), (spot.x, spot.y), time) < FLAMES_THROUGH
+            for spot in self._hazards.spots(time)
+        )
+
+    # --- where they begin ----------------------------------------------------------------
+
+    def _start(self, kind: str, number: int) -> Pose:
+        """Where the `number`-th robot begins and is charged, or the `number`-th guard waits.
+
+        Raises:
+            ConfigError: there is no such place.
+        """
+        scenario, site = self._stage.scenario, self._stage.site
+        if kind == "robot":
+            way, places, what = scenario.robot.way_m, site.robot_bases, "robot base"
+        else:
+            way, places, what = scenario.guard.way_m, site.guard_posts, "guard post"
+        if way is None:
+            return place_of(places, number, what, site)
+        return self._away(f"{kind}-{number}", way)
+
+    def _away(self, label: str, length: float) -> Pose:
+        """A place so far [m] from the event, looking along the way there."""
+        site, rng = self._stage.site, self._stage.streams.fresh(f"{label}/start")
+        goal, longest = self._hazards.incidents[0].hazard.position, 0.0
+        for _ in range(TRIES):
+            way = self._stage.planner.path(site.sample_free(rng, FOOTPRINT), goal)
+            if way is None:
+                continue
+            longest = max(longest, _length(way))
+            pose = _cut(way, length)
+            if pose is not None and self._is_free(pose):
+                self._taken.append((pose.x, pose.y))
+                return pose
+        problem = f"site {site.name!r} has no place {length:g} m from the event for {label}"
+        raise ConfigError(f"{problem}; the longest way tried was {longest:.0f} m")
+
+    def _is_free(self, pose: Pose) -> bool:
+        here = pose.x, pose.y
+        alone = all(math.dist(here, other) >= APART for other in self._taken)
+        return alone and self._stage.site.is_free(*here, FOOTPRINT)
+
+
+class Power:
+    """A robot's battery, if it has one, and the base that charges it.
+
+    Args:
+        profile: Of the robot.
+        charge: Share of the capacity that it begins with.
+        body: Says how far it went, and what that took.
+        base: Where it is charged.
+        clock: The run's.
+    """
+
+    def __init__(
+        self, profile: RobotProfile, charge: float, body: RobotBody, base: Pose, clock: Clock
+    ) -> None:
+        self._battery = None
+        if profile.battery is not None:
+            self._battery = Battery(profile.battery, profile.mass_kg, charge)
+        self._body, self._base, self._clock = body, base, clock
+
+    def share(self) -> float:
+        """Of the capacity that is left now; 1 without a battery."""
+        battery, body = self._battery, self._body
+        if battery is None:
+            return 1.0
+        near = math.dist((body.x, body.y), (self._base.x, self._base.y)) < AT_BASE
+        at_base = near and abs(body.speed) < STANDING
+        battery.advance(self._clock.now, body.distance, body.work, at_base)
+        return battery.share
+
+
+def _length(way: NDArray[np.float64]) -> float:
+    return float(np.hypot(*np.diff(way, axis=0).T).sum())
+
+
+def _cut(way: NDArray[np.float64], left: float) -> Pose | None:
+    """Where so much of a way `(n, 2)` is left [m], looking along it; None if it is shorter."""
+    steps = np.hypot(*np.diff(way, axis=0).T)
+    gone = np.concatenate([[0.0], np.cumsum(steps)])
+    at = float(gone[-1]) - left
+    if at < 0.0:
+        return None
+    place = min(int(np.searchsorted(gone, at, side="right")) - 1, len(steps) - 1)
+    (x, y), ahead = way[place], way[place + 1] - way[place]
+    share = (at - gone[place]) / steps[place] if steps[place] > 0.0 else 0.0
+    heading = math.atan2(ahead[1], ahead[0])
+    return Pose(float(x + share * ahead[0]), float(y + share * ahead[1]), heading)
