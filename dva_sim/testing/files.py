@@ -14,8 +14,7 @@ from dva_sim.kernel.config import Document, load_yaml
 from dva_sim.kernel.errors import ConfigError, DvaSimError
 from dva_sim.kernel.suggestions import hint
 from dva_sim.protocol.limits import schema_file
-from dva_sim.testing.messages import READ_BYTES, check_message
-from dva_sim.testing.promises import Problem, not_text
+from dva_sim.testing.messages import READ_BYTES, Problem, check_message, not_text
 
 YAML_BYTES: Final = 256 * 1024
 PLAN_BYTES: Final = 16 * 1024 * 1024
@@ -100,15 +99,14 @@ def _flawed(path: Path, limit: int) -> list[Problem]:
 
 
 def _check_plan(path: Path) -> FileVerdict:
-    from dva_sim.testing.configs import check_plan
+    from dva_sim.testing.file_kinds import check_plan
 
     return FileVerdict("plan", _flawed(path, PLAN_BYTES) or check_plan(path))
 
 
 def _check_yaml(path: Path) -> FileVerdict:
     """A message needs none of what reads configurations: it is imported here."""
-    from dva_sim.testing.configs import check_config, doubts
-    from dva_sim.testing.file_kinds import recognise
+    from dva_sim.testing.file_kinds import check_config, doubts, recognise
 
     problems = _flawed(path, YAML_BYTES)
     document, problem = (None, problems[0]) if problems else _parse(path)

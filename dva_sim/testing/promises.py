@@ -1,12 +1,24 @@
-"""What came of trying something that users bring, and problems that were found in a file."""
+"""What came of trying something that users bring, and problems that were found in a file.
+
+Kinds of things that are tried rather than read: what `check` may be told to try, by word.
+
+An index, not the things: modules are named, and imported when one of their kind is asked for.
+To add a kind, add its `Trial` here, and the module that its `check` names.
+"""
 
 from __future__ import annotations
 
 import traceback
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Final
 
 from dva_sim.kernel.plugins import FAILURES
+
+if TYPE_CHECKING:
+    from dva_sim.kernel.plugins import Plugins
+
 
 Case = tuple[str, str]  # a promise in words, and what happened
 
@@ -76,41 +88,150 @@ def said(error: BaseException) -> str:
     return f"{text} ({frame.filename.rsplit('/', 1)[-1]}:{frame.lineno})"
 
 
-@dataclass(frozen=True, order=True)
-class Problem:
-    """One mistake.
+@dataclass(frozen=True)
+class CheckedKind:
+    """How one kind is tried.
 
     Attributes:
-        line: Line in the file, from 1.
-        column: Column in that line, from 1, in characters.
-        text: What is wrong; what would be right.
-        file: The file that holds it, if not the one that was checked.
+        kind: The word for one: `dva-sim check KIND NAME`.
+        plugins: Where its `Plugins` are: `module:NAME`.
+        check: What tries one, by name or as a class, with options: `module:function`.
+        told: How it was tried, in words, with `{tries}`, and `{ms}` or `{us}` of the slowest.
+        folder: Of the files that are named, where it is not the class itself that is.
     """
 
-    line: int
-    column: int
-    text: str
-    file: str | None = None
+    kind: str
+    plugins: str
+    check: str
+    told: str
+    folder: str = ""
+
+    @property
+    def many(self) -> str:
+        """What several are called."""
+        return plural(self.kind)
+
+    def load_plugins(self) -> Plugins[Any]:
+        """What users may add of this kind."""
+        found: Plugins[Any] = _named(self.plugins)
+        return found
+
+    def known(self) -> list[str]:
+        """Names that are shipped or installed."""
+        from dva_sim.kernel.resources import available  # late: start-up
+
+        return sorted(available(self.folder)) if self.folder else self.load_plugins().known()
+
+    def run(self, name: str, options: Mapping[str, Any]) -> Outcome:
+        """Try the one of a name.
+
+        Raises:
+            ConfigError: it cannot be had.
+        """
+
+        try:
+            outcome: Outcome = self.load_check()(name, options)
+        except BrokenPromises as error:
+            return error.outcome
+        return outcome
+
+    def load_check(self) -> Callable[..., Outcome]:
+        """What users call in tests of their own."""
+        found: Callable[..., Outcome] = _named(self.check)
+        return found
+
+    def ways(self, outcome: Outcome) -> str:
+        """How it was tried, in words."""
+        slowest = outcome.slowest
+        return self.told.format(tries=outcome.tries, ms=1e3 * slowest, us=1e6 * slowest)
 
 
-def at(data: bytes, offset: int, text: str) -> Problem:
-    """The mistake at a byte of a text in UTF-8, whichever way its lines end."""
-    before = data[:offset].decode("utf-8", "replace").replace("\r\n", "\n").replace("\r", "\n")
-    line_start = before.rfind("\n") + 1
-    return Problem(before.count("\n") + 1, len(before) - line_start + 1, text)
+def plural(kind: str) -> str:
+    """What several of a kind are called."""
+    return f"{kind.removesuffix('y')}ies" if kind.endswith("y") else f"{kind}s"
 
 
-def not_text(data: bytes) -> Problem | None:
-    """The first byte that text in UTF-8 cannot have, if there is one."""
-    zero = data.find(0)
-    try:
-        data.decode("utf-8")
-    except UnicodeDecodeError as error:
-        if zero < 0 or error.start < zero:
-            found = f"byte 0x{data[error.start]:02X} is not text in UTF-8"
-            return at(data, error.start, f"{found}; the file should be in UTF-8")
-    return (
-        at(data, zero, "a zero byte is not text; the file should be in UTF-8")
-        if zero >= 0
-        else None
+def _named(place: str) -> Any:
+    """What `module:name` names."""
+    module, _, name = place.partition(":")
+    return getattr(import_module(module), name)
+
+
+TRIALS: Final[dict[str, CheckedKind]] = {
+    trial.kind: trial
+    for trial in (
+        CheckedKind(
+            "pattern",
+            "dva_sim.network.patterns:PLUGINS",
+            "dva_sim.testing.patterns:check_pattern",
+            "{tries} drives, {us:.0f} microseconds a command",
+        ),
+        CheckedKind(
+            "policy",
+            "dva_sim.core.dispatch:PLUGINS",
+            "dva_sim.testing.policies:check_policy",
+            "{tries} situations, slowest decision {ms:.1f} ms",
+        ),
+        CheckedKind(
+            "operator",
+            "dva_sim.agents.operator.strategies.loading:PLUGINS",
+            "dva_sim.testing.operators:check_operator",
+            "{tries} drives, {us:.0f} microseconds a frame",
+        ),
+        CheckedKind(
+            "filter",
+            "dva_sim.agents.tilt.filters:PLUGINS",
+            "dva_sim.testing.tilt:check_filter",
+            "{tries} runs, {us:.1f} microseconds a reading",
+        ),
+        CheckedKind(
+            "mapping",
+            "dva_sim.agents.tilt.mappings:PLUGINS",
+            "dva_sim.testing.tilt:check_mapping",
+            "{tries} runs, {us:.1f} microseconds a reading",
+        ),
+        CheckedKind(
+            "hazard",
+            "dva_sim.worlds.hazards.registry:PLUGINS",
+            "dva_sim.testing.hazards:check_hazard",
+            "{tries} questions, {us:.0f} microseconds an answer",
+        ),
+        CheckedKind(
+            "measure",
+            "dva_sim.simulation.run_measures:PLUGINS",
+            "dva_sim.testing.measures:check_measure",
+            "{tries} runs, {ms:.1f} ms an answer",
+        ),
+        CheckedKind(
+            "model",
+            "dva_sim.simulation.models:PLUGINS",
+            "dva_sim.testing.models:check_model",
+            "{tries} runs, slowest {ms:.0f} ms",
+        ),
+        CheckedKind(
+            "figure",
+            "dva_sim.experiments.report.figures.registry:PLUGINS",
+            "dva_sim.testing.figures:check_figure",
+            "{tries} drawings, slowest {ms:.0f} ms",
+        ),
+        CheckedKind(
+            "measure",
+            "dva_sim.simulation.run_measures:PLUGINS",
+            "dva_sim.testing.measures:check_measure",
+            "{tries} answers, slowest {ms:.1f} ms",
+        ),
+        CheckedKind(
+            "model",
+            "dva_sim.simulation.models:PLUGINS",
+            "dva_sim.testing.models:check_model",
+            "{tries} runs, slowest {ms:.0f} ms",
+        ),
+        CheckedKind(
+            "robot",
+            "dva_sim.worlds.drives:PLUGINS",
+            "dva_sim.testing.robots:check_robot",
+            "{tries} drives, {us:.0f} microseconds a tick",
+            folder="agents/robots",
+        ),
     )
+}

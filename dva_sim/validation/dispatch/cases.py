@@ -21,8 +21,9 @@ from dva_sim.kernel.suggestions import unknown
 from dva_sim.simulation.shift import distributions
 from dva_sim.simulation.shift import scenario as timed
 from dva_sim.simulation.shift.scenario import TimedScenario
-from dva_sim.validation.dispatch.exact import FORMULAS, Measures
+from dva_sim.validation.dispatch.exact import FORMULAS
 from dva_sim.validation.dispatch.measures import check_name
+from dva_sim.validation.dispatch.queues import Measures
 
 _LAW: TypeAdapter[distributions.Law] = TypeAdapter(distributions.Law)
 _LAWS = tuple(

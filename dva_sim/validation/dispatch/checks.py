@@ -30,8 +30,7 @@ from dva_sim.validation.dispatch.estimation import (
     verdict,
 )
 from dva_sim.validation.dispatch.identities import IDENTITIES, check_identity
-from dva_sim.validation.dispatch.measures import Batches, sums
-from dva_sim.validation.dispatch.samples import Floats, Sample, occupied, sample_of
+from dva_sim.validation.dispatch.measures import Batches, Floats, Sample, occupied, sample_of, sums
 
 Columns = dict[str, Floats]
 LOOK_AGAIN = 4  # times as many runs, in all, for a case that seems to differ

@@ -20,7 +20,6 @@ References:
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -28,10 +27,9 @@ from numpy.typing import NDArray
 
 from dva_sim.simulation.shift.distributions import Exponential, Law
 from dva_sim.simulation.shift.scenario import TimedScenario
-from dva_sim.validation.dispatch import exact
-from dva_sim.validation.dispatch.exact.queues import laplace
-from dva_sim.validation.dispatch.measures import Batches
-from dva_sim.validation.dispatch.samples import Floats, Sample, one_server
+from dva_sim.validation.dispatch.exact import cobham, gm1
+from dva_sim.validation.dispatch.measures import Batches, Floats, Sample, one_server
+from dva_sim.validation.dispatch.queues import Moments, laplace
 
 FADING = (3.0, 10.0, 30.0, 100.0)  # [events]
 FASTER = 0.95  # what the one server beside one responder takes of its time
@@ -178,28 +176,20 @@ def _means(scenario: TimedScenario, pace: float, ranks: list[int]) -> list[float
     if len(laws) == 1 and isinstance(laws[0], Exponential) and between[0] is not None:
         if laws[0].mean * pace >= between[0].mean:
             return None
-        return [exact.gm1(between[0], laws[0].mean * pace)["wait_s"]]
+        return [gm1(between[0], laws[0].mean * pace)["wait_s"]]
     if not all(isinstance(law, Exponential) for law in between):
         return None
     rates = [1 / law.mean for law in between if law is not None]
-    scaled = [Scaled(law.mean * pace, law.second * pace**2) for law in laws]
+    scaled = [Moments(law.mean * pace, law.second * pace**2) for law in laws]
     if sum(r * law.mean for r, law in zip(rates, scaled, strict=True)) >= 1:
         return None
     if len(set(ranks)) < len(ranks):  # one queue for all
-        means = exact.cobham(rates, scaled)
+        means = cobham(rates, scaled)
         ahead = sum(r * law.second for r, law in zip(rates, scaled, strict=True)) / 2
         return [ahead / (1 - means["utilisation"])] * len(rates)
     order = sorted(range(len(ranks)), key=ranks.__getitem__)
-    means = exact.cobham([rates[n] for n in order], [scaled[n] for n in order])
+    means = cobham([rates[n] for n in order], [scaled[n] for n in order])
     return [means[f"wait_{rank + 1}_s"] for rank in ranks]
-
-
-@dataclass(frozen=True)
-class Scaled:
-    """A law of which only the moments matter."""
-
-    mean: float
-    second: float
 
 
 def _look_laws(scenario: TimedScenario) -> list[Law] | None:

@@ -5,7 +5,7 @@ import pytest
 
 from dva_sim.network.condition import Condition
 from dva_sim.validation.network.emulator import measuring
-from dva_sim.validation.network.emulator.cell import EmulatedJob, EmulatedOutcome
+from dva_sim.validation.network.emulator.cell import EmulatedJob, EmulatedOutcome, EmulatorError
 from dva_sim.validation.network.emulator.measuring import (
     COLUMNS,
     Progress,
@@ -14,7 +14,6 @@ from dva_sim.validation.network.emulator.measuring import (
     job_of,
     measure_all,
 )
-from dva_sim.validation.network.emulator.process import EmulatorError
 
 SLOW, FAST = Condition("pub", 10), Condition("pub", 50)
 Play = Callable[[Condition, int], None]
