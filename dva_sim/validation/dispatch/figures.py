@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dva_sim.experiments.report.figures.palette import FAINT, INK, SOFT
-from dva_sim.experiments.report.figures.style import Drawn, finish, panels, styled
+from dva_sim.experiments.report.figures.style import Drawn, panels, styled
 from dva_sim.validation.dispatch.checks import Check
 from dva_sim.validation.dispatch.estimation import ERRORS, PRECISION, TOLERANCE
+from dva_sim.validation.frame import captioned
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -49,16 +50,9 @@ def _deviations(checks: Sequence[Check]) -> Drawn:
             x, y = np.array(marks).T
             clipped = np.clip(x, -_LIMIT, _LIMIT)
             axes.plot(clipped, y, "o", color=colour, ms=4, label=verdict)
-    axes.set_xlim(-_LIMIT - 0.2, _LIMIT + 0.2)
-    axes.set_xlabel("simulated minus exact, in standard errors")
+    axes.set(xlim=(-_LIMIT - 0.2, _LIMIT + 0.2), xlabel="simulated minus exact, in standard errors")
     _key(axes)
-    text = (
-        f"Each mark is one comparison. The grey band holds {ERRORS:g} standard errors either way: "
-        "where everything is right 99.7 % of the marks lie in it, evenly around 0. A mark outside "
-        f"still agrees if it is within {100 * TOLERANCE:g} % of the exact value. "
-        "Marks at 0 that nothing is left to chance in are exact."
-    )
-    return finish(figure, "deviations", "How far off, in standard errors", text)
+    return captioned(figure, "deviations", errors=ERRORS, tolerance=100 * TOLERANCE)
 
 
 def _relative(checks: Sequence[Check]) -> Drawn:
@@ -80,12 +74,7 @@ def _relative(checks: Sequence[Check]) -> Drawn:
         axes.plot([], [], "o-", color=_COLOURS[verdict], ms=3.5, lw=1.2, label=verdict)
     axes.set_xlabel("simulated against exact [%]")
     _key(axes)
-    text = (
-        "The same comparisons as a share of the exact value, with 95 % intervals. The band is "
-        f"{100 * TOLERANCE:g} % either way; an interval wider than ±{196 * PRECISION:.2g} % is "
-        "too rough, where precision is asked for. The widest go on beyond the edge."
-    )
-    return finish(figure, "relative", "How far off, as a share of the exact value", text)
+    return captioned(figure, "relative", tolerance=100 * TOLERANCE, wide=196 * PRECISION)
 
 
 def _rows(checks: Sequence[Check]) -> tuple[Figure, Axes]:
@@ -144,15 +133,10 @@ def _distributions(curves: dict[str, list[Check]]) -> Drawn:
         axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axes.yaxis.set_major_formatter("{x:g}")
         axes.yaxis.set_minor_formatter("")
-        axes.set_title(title)
-        axes.set_xlabel("time [s]")
+        axes.set(title=title, xlabel="time [s]")
     rows[0][0].set_ylabel("share of events that wait longer")
     rows[0][0].legend(loc="upper right", labelcolor=INK)
-    text = (
-        "Where events are random and looking takes an exponential time the waits of those who "
-        "wait are exponential too: a straight line here. Bars are 95 % intervals."
-    )
-    return finish(figure, "waits", "The whole distribution of waits", text)
+    return captioned(figure, "waits")
 
 
 def _time(check: Check) -> float:

@@ -1,14 +1,12 @@
 """Published experiments: which task is played under which conditions, and how it is aggregated.
 
 Each aggregates as the publication did: means over all persons, lines through the means of
-conditions. How, was settled before anything was compared.
-
-Exact checks and experiments, spread over processes.
+conditions. How, was settled before anything was compared. At the end of the module they are
+played, with the exact checks, spread over processes.
 """
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -16,16 +14,14 @@ from typing import Any, cast
 
 import numpy as np
 
-from dva_sim.experiments.execution import executors
-from dva_sim.experiments.execution.scheduling import run_all
 from dva_sim.experiments.study.cell_grid import StudyJob
 from dva_sim.kernel import resources
 from dva_sim.kernel.config import load_yaml
-from dva_sim.kernel.errors import RunsFailed
 from dva_sim.kernel.streams import Streams, derive_seed
-from dva_sim.simulation.models import AnyScenario, Tables
+from dva_sim.simulation.models import Tables
 from dva_sim.simulation.task import TaskScenario, build, play
 from dva_sim.simulation.task.measures import fit_line
+from dva_sim.validation.frame import Progress, job_of, play_jobs
 from dva_sim.validation.operators.exact import EXACT
 from dva_sim.validation.operators.verdicts import (
     Cells,
@@ -273,10 +269,9 @@ EXPERIMENTS: tuple[Experiment, ...] = (
 
 
 PERSONS, QUICK_PERSONS = 24, 6
-_EXACT = "exact"
+FAILED = "{!r} could not be simulated"
 
 Traits = Mapping[str, float]
-Progress = Callable[[int], None]
 
 
 @dataclass(frozen=True)
@@ -308,8 +303,8 @@ def play_exact(
     Raises:
         RunsFailed: one of them could not be simulated.
     """
-    jobs = [_job(_EXACT, check, 0, setting.seed, None) for check in checks]
-    rows = _played(jobs, setting.workers, progress)
+    jobs = [job_of(check, setting.seed, None) for check in checks]
+    rows = play_jobs(jobs, perform_exact, setting.workers, FAILED, progress)
     values = ((job.config, row) for job in jobs for row in rows[job.key])
     return {f"{check}/{row['line']}": certain(float(row["value"])) for check, row in values}
 
@@ -325,13 +320,16 @@ def play_experiments(
         ConfigError: a task cannot be read, or there is no such strategy.
         RunsFailed: a trial failed.
     """
-    jobs = [job for e in experiments for job in _jobs(e, setting)]
-    rows = _played(jobs, setting.workers, progress)
-    played: dict[str, dict[str, list[tuple[int, Any]]]] = {}
-    for job in jobs:
-        cells = played.setdefault(job.part, {})
-        cells.setdefault(str(dict(job.cell)["name"]), []).append((job.person, rows[job.key]))
-    return {part: _collected(cells) for part, cells in played.items()}
+    jobs = {e.name: _jobs(e, setting) for e in experiments}
+    every = [job for cells in jobs.values() for own in cells.values() for job in own]
+    rows = play_jobs(every, perform, setting.workers, FAILED, progress)
+    return {
+        name: {
+            cell: collect([(job.person, rows[job.key]) for job in own])
+            for cell, own in cells.items()
+        }
+        for name, cells in jobs.items()
+    }
 
 
 def measured(
@@ -350,18 +348,21 @@ def jobs_of(experiments: Sequence[Experiment], setting: OperatorsSetting) -> int
     return sum(len(e.cells) for e in experiments) * setting.persons
 
 
+def perform_exact(job: StudyJob) -> Tables:
+    """One exact check."""
+    values = EXACT[job.config](job.seed)
+    return {"rows": [{"line": line, "value": value} for line, value in values.items()]}
+
+
 def perform(job: StudyJob) -> Tables:
-    """One exact check, or all trials of one person in one cell."""
-    if job.part == _EXACT:
-        values = EXACT[job.config](job.seed)
-        return {"rows": [{"line": line, "value": value} for line, value in values.items()]}
+    """All trials of one person in one cell."""
     return {"rows": play(cast(TaskScenario, job.scenario), job.seed)}
 
 
-def _jobs(experiment: Experiment, setting: OperatorsSetting) -> list[StudyJob]:
-    """A person meets the same luck in every cell."""
+def _jobs(experiment: Experiment, setting: OperatorsSetting) -> dict[str, list[StudyJob]]:
+    """Those of each cell; a person meets the same luck in all of them."""
     document = load_yaml(resources.find(experiment.scenario, FOLDER))
-    jobs = []
+    jobs: dict[str, list[StudyJob]] = {cell: [] for cell in experiment.cells}
     for cell, changes in experiment.cells.items():
         every = {**changes, **(experiment.quick if setting.quick else {})}
         every |= {"operator.strategy": setting.strategy, "operator.population_seed": setting.seed}
@@ -369,36 +370,6 @@ def _jobs(experiment: Experiment, setting: OperatorsSetting) -> list[StudyJob]:
         for person in range(setting.persons):
             scenario = build(document, {**every, "operator.person": person})
             seed = derive_seed("operators", experiment.name, setting.seed, person)
-            jobs.append(_job(experiment.name, cell, person, seed, scenario))
+            name = f"{experiment.name}/{cell}"
+            jobs[cell].append(job_of(name, seed, scenario, person=person))
     return jobs
-
-
-def _job(part: str, name: str, person: int, seed: int, scenario: TaskScenario | None) -> StudyJob:
-    return StudyJob(
-        part=part,
-        cell=(("name", name),),
-        index=0,
-        person=person,
-        trial=0,
-        seed=seed,
-        scenario=cast(AnyScenario, scenario),
-        config=name if part == _EXACT else f"{part}/{name}",
-    )
-
-
-def _played(
-    jobs: Sequence[StudyJob], workers: int, progress: Progress
-) -> dict[tuple[str, int], list[dict[str, Any]]]:
-    """The rows of each job by its key."""
-    rows: dict[tuple[str, int], list[dict[str, Any]]] = {}
-    for batch in run_all(jobs, perform, executors.local(workers)):
-        for outcome in batch:
-            if outcome.error is not None:
-                raise RunsFailed(f"{outcome.key[0]!r} could not be simulated: {outcome.error}")
-            rows[outcome.key] = json.loads(outcome.tables or "")["rows"]
-        progress(len(rows))
-    return rows
-
-
-def _collected(cells: Mapping[str, list[tuple[int, Any]]]) -> dict[str, Trials]:
-    return {name: collect(rows) for name, rows in cells.items()}

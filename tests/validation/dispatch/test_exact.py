@@ -18,7 +18,7 @@ from dva_sim.simulation.shift.distributions import (
     Weibull,
 )
 from dva_sim.validation.dispatch import exact
-from dva_sim.validation.dispatch.queues import erlang_b, erlang_c, laplace
+from dva_sim.validation.dispatch.queues import erlang_b, laplace
 
 TARGETS = Path(__file__).parents[4] / "shared/targets/dispatch.json"
 
