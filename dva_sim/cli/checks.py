@@ -12,7 +12,7 @@ from dva_sim.kernel.errors import ConfigError, ExitCode, error_line
 from dva_sim.kernel.key_changes import parse_changes
 from dva_sim.testing.files import FileVerdict, NotReadError, check_file, schema_text
 from dva_sim.testing.messages import READ_BYTES, check_message
-from dva_sim.testing.promises import TRIALS, CheckedKind, said
+from dva_sim.testing.promises import TRIALS, CheckedKind, said, tried
 
 STDIN: Final = "-"
 LINK: Final = "link"
@@ -77,7 +77,7 @@ def _try_all(kind: str, names: Sequence[str], options: Mapping[str, Any]) -> Exi
 def _try(kind: str, trial: CheckedKind, name: str, options: Mapping[str, Any]) -> ExitCode:
     """Try something and say what came of it."""
     try:
-        outcome = trial.run(name, options)
+        outcome = tried(trial.load_check(), name, options)
     except ConfigError as error:
         _say(f"{name}: {error}")
         return INVALID

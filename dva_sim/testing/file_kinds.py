@@ -1,9 +1,8 @@
 """What a YAML file is, by its keys and its folder, and where in it a mistake was made.
 
 It stands above all rooms whose files it knows. What is opened here tells of a file of another kind
-what it is, and which command takes it.
-
-Configurations: read and rehearsed by the same code that runs them.
+what it is, and which command takes it; what is checked is read and rehearsed by the same code that
+runs it. The table of all kinds stands at the end.
 """
 
 from __future__ import annotations
@@ -62,38 +61,29 @@ class FileKind(NamedTuple):
         model: Its keys.
         folder: Where files of this kind lie.
         command: What does something with it, if a command does.
+        load: Reads it as the program does, where that is more than its keys.
+        check: Gives every mistake, where there may be several.
     """
 
     name: str
     model: type[Config]
     folder: str
     command: str = ""
+    load: Callable[[Document], object] | None = None
+    check: Callable[[Document], Iterator[ConfigError]] | None = None
 
+    def mistakes(self, document: Document) -> Iterator[ConfigError]:
+        """What is wrong, by the code that runs it.
 
-_RUN, _PLAY, _DRAW = "dva-sim run", "dva-sim episode", "dva-sim site show"
-KINDS: Final = (
-    FileKind("study", Study, "experiments", _RUN),
-    FileKind("scenario", Scenario, "experiments/scenarios", _PLAY),
-    FileKind("timed scenario", TimedScenario, "experiments/scenarios", _PLAY),
-    FileKind("task", TaskScenario, "experiments/scenarios/tasks", _PLAY),
-    FileKind("transports", TransportScenario, "experiments/scenarios", _PLAY),
-    FileKind("own scenario", OwnScenario, "experiments/scenarios", _PLAY),
-    FileKind("validation cases", CaseFile, "experiments/validation"),
-    FileKind("targets", TargetFile, "experiments/validation"),
-    FileKind("measurements", PlanConfig, "experiments/validation"),
-    FileKind("split", SplitFile, "experiments/validation"),
-    FileKind("site", SiteFile, "worlds", _DRAW),
-    FileKind("ROS map", RosMap, "worlds", _DRAW),
-    FileKind("robot", RobotProfile, "agents/robots"),
-    FileKind("phone", PhoneProfile, "agents/phones"),
-    FileKind("accelerometer", AccelerometerPart, "agents/accelerometers"),
-    FileKind("guard", GuardProfile, "agents/people"),
-    FileKind("bystanders", BystanderProfile, "agents/people"),
-    FileKind("operators", Population, "agents/people"),
-    FileKind("bands of operators", Bands, "agents/people"),
-    FileKind("registration", Preregistration, "experiments"),
-    FileKind("tuned values", TunedValues, "experiments/tuned"),
-)
+        Raises:
+            ConfigError: the first mistake, where there is but one to be told.
+        """
+        if self.check is not None:
+            yield from self.check(document)
+        elif self.load is not None:
+            self.load(document)
+        else:
+            validate(self.model, document.data, document.error)
 
 
 def recognise(document: Document) -> FileKind | None:
@@ -240,21 +230,17 @@ def _placed(error: ConfigError, name: str, pairs: Sequence[str], seed: int) -> C
 # What readers may raise on files that nobody would write, besides what they say in words.
 _HOSTILE: Final = (ValueError, OverflowError, Image.DecompressionBombError)
 
-Check = Callable[[Document], Iterator[ConfigError]]
-
 
 def check_config(kind: FileKind, document: Document) -> list[Problem]:
     """What is wrong with a configuration, by the code that runs it."""
-    return _collect(
-        document.file, partial(CHECKS[kind.name], document), partial(blamed_in, document)
-    )
+    return _collect(document.file, partial(kind.mistakes, document), partial(blamed_in, document))
 
 
 def doubts(kind: FileKind, document: Document) -> list[str]:
     """What does not go together in a valid study or scenario."""
     if kind.model is Study:
         return contradictions_in(cell_grid.cells(load_study(document.file)))
-    if CHECKS[kind.name] is not _check_scenario:
+    if kind.load is not _rehearse:
         return []
     model = model_of(document)
     return model.contradictions(model.build(document, {}))
@@ -320,57 +306,25 @@ def _check_registration(document: Document) -> Iterator[ConfigError]:
         yield document.error(problem, ("plan",))
 
 
-def _check_scenario(document: Document) -> Iterator[ConfigError]:
+def _rehearse(document: Document) -> None:
     model = model_of(document)
     model.rehearse(model.build(document, {}), seed=1)
-    return iter(())
 
 
-def _check_cases(document: Document) -> Iterator[ConfigError]:
-    load_cases(document.file)
-    return iter(())
-
-
-def _check_plan(document: Document) -> Iterator[ConfigError]:
-    load_plan(str(document.file))
-    return iter(())
-
-
-def _check_split(document: Document) -> Iterator[ConfigError]:
-    load_split(str(document.file))
-    return iter(())
-
-
-def _check_site(document: Document) -> Iterator[ConfigError]:
-    load_site(document.file)
-    return iter(())
-
-
-def _check_map(document: Document) -> Iterator[ConfigError]:
+def _load_map(document: Document) -> None:
     validate(RosMap, document.data, document.error)
     map_site(document.file.resolve(), seed=1, robots=1, guards=1)
-    return iter(())
 
 
-def _check_robot(document: Document) -> Iterator[ConfigError]:
+def _load_robot(document: Document) -> None:
     """The profile, and its motors made once."""
     spec = read_robot(document).drive_spec()
     spec.drive(spec)
-    return iter(())
 
 
-def _check_phone(document: Document) -> Iterator[ConfigError]:
+def _load_phone(document: Document) -> None:
     """The profile, and all that it names made once."""
     try_phone(validate(PhoneProfile, document.data, document.error))
-    return iter(())
-
-
-def _check_model(model: type[Config]) -> Check:
-    def check(document: Document) -> Iterator[ConfigError]:
-        validate(model, document.data, document.error)
-        return iter(())
-
-    return check
 
 
 def _frame_of(path: Path) -> GeoFrame:
@@ -386,27 +340,28 @@ def _frame_of(path: Path) -> GeoFrame:
     return GeoFrame(latitude, longitude) if abs(latitude) < 89 else DEFAULT_FRAME
 
 
-CHECKS: Final[dict[str, Check]] = {
-    "study": _check_study,
-    "scenario": _check_scenario,
-    "timed scenario": _check_scenario,
-    "task": _check_scenario,
-    "transports": _check_scenario,
-    "own scenario": _check_scenario,
-    "validation cases": _check_cases,
-    "targets": _check_model(TargetFile),
-    "measurements": _check_plan,
-    "split": _check_split,
-    "site": _check_site,
-    "ROS map": _check_map,
-    "robot": _check_robot,
-    "phone": _check_phone,
-    "accelerometer": _check_model(AccelerometerPart),
-    "guard": _check_model(GuardProfile),
-    "bystanders": _check_model(BystanderProfile),
-    "operators": _check_model(Population),
-    "bands of operators": _check_model(Bands),
-    "registration": _check_registration,
-    "tuned values": _check_model(TunedValues),
-}
-"""How files of each kind are checked, by the names of `experiments.documents`."""
+_RUN, _PLAY, _DRAW = "dva-sim run", "dva-sim episode", "dva-sim site show"
+_SCENARIOS, _EVIDENCE = "experiments/scenarios", "experiments/validation"
+KINDS: Final = (
+    FileKind("study", Study, "experiments", _RUN, check=_check_study),
+    FileKind("scenario", Scenario, _SCENARIOS, _PLAY, _rehearse),
+    FileKind("timed scenario", TimedScenario, _SCENARIOS, _PLAY, _rehearse),
+    FileKind("task", TaskScenario, "experiments/scenarios/tasks", _PLAY, _rehearse),
+    FileKind("transports", TransportScenario, _SCENARIOS, _PLAY, _rehearse),
+    FileKind("own scenario", OwnScenario, _SCENARIOS, _PLAY, _rehearse),
+    FileKind("validation cases", CaseFile, _EVIDENCE, load=lambda d: load_cases(d.file)),
+    FileKind("targets", TargetFile, _EVIDENCE),
+    FileKind("measurements", PlanConfig, _EVIDENCE, load=lambda d: load_plan(str(d.file))),
+    FileKind("split", SplitFile, _EVIDENCE, load=lambda d: load_split(str(d.file))),
+    FileKind("site", SiteFile, "worlds", _DRAW, lambda d: load_site(d.file)),
+    FileKind("ROS map", RosMap, "worlds", _DRAW, _load_map),
+    FileKind("robot", RobotProfile, "agents/robots", load=_load_robot),
+    FileKind("phone", PhoneProfile, "agents/phones", load=_load_phone),
+    FileKind("accelerometer", AccelerometerPart, "agents/accelerometers"),
+    FileKind("guard", GuardProfile, "agents/people"),
+    FileKind("bystanders", BystanderProfile, "agents/people"),
+    FileKind("operators", Population, "agents/people"),
+    FileKind("bands of operators", Bands, "agents/people"),
+    FileKind("registration", Preregistration, "experiments", check=_check_registration),
+    FileKind("tuned values", TunedValues, "experiments/tuned"),
+)

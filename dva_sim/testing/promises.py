@@ -1,24 +1,18 @@
-"""What came of trying something that users bring, and problems that were found in a file.
+"""Kinds of things that are tried rather than read, and what comes of trying one.
 
-Kinds of things that are tried rather than read: what `check` may be told to try, by word.
-
-An index, not the things: modules are named, and imported when one of their kind is asked for.
-To add a kind, add its `Trial` here, and the module that its `check` names.
+`TRIALS` is an index, not the things: modules are named, and imported when one of their kind is
+asked for. To add a kind, add it there, and the module whose `check_KIND` tries one.
 """
 
 from __future__ import annotations
 
 import traceback
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from importlib import import_module
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
-from dva_sim.kernel.plugins import FAILURES
-
-if TYPE_CHECKING:
-    from dva_sim.kernel.plugins import Plugins
-
+from dva_sim.kernel.plugins import FAILURES, Plugins, resolved
+from dva_sim.kernel.resources import available
 
 Case = tuple[str, str]  # a promise in words, and what happened
 
@@ -52,15 +46,41 @@ class BrokenPromises(AssertionError):
         self.outcome = outcome
 
 
-def kept(outcome: Outcome) -> Outcome:
-    """What came of it, if all promises were kept.
+def kept(broken: Sequence[str], warnings: Sequence[str], tries: int, slowest: float) -> Outcome:
+    """What came of it, if all promises were kept; see `Outcome`.
 
     Raises:
         BrokenPromises: they were not.
     """
-    if outcome.broken:
+    outcome = Outcome(tuple(broken), tuple(warnings), tries, slowest)
+    if broken:
         raise BrokenPromises(outcome)
     return outcome
+
+
+def tried(check: Callable[..., Outcome], *given: Any, **options: Any) -> Outcome:
+    """What comes of a check, whether all promises are kept or not.
+
+    Raises:
+        ConfigError: there is nothing to try.
+    """
+    try:
+        return check(*given, **options)
+    except BrokenPromises as error:
+        return error.outcome
+
+
+def broken_in(cases: Iterable[Case]) -> list[str]:
+    """A line for each promise that is broken, with the first case of it."""
+    found: dict[str, list[str]] = {}
+    for promise, case in cases:
+        found.setdefault(promise, []).append(case)
+    return [line(promise, own) for promise, own in found.items()]
+
+
+def is_slow(slowest: float, slow: float, what: str) -> list[str]:
+    """A warning where one takes longer than it should [s]."""
+    return [f"is slow: {slowest:.2g} s {what}; should be {slow:g} s"] * (slowest > slow)
 
 
 def part_by_part(parts: Iterable[Callable[[], Iterable[Case]]]) -> Iterator[Case]:
@@ -94,15 +114,15 @@ class CheckedKind:
 
     Attributes:
         kind: The word for one: `dva-sim check KIND NAME`.
-        plugins: Where its `Plugins` are: `module:NAME`.
-        check: What tries one, by name or as a class, with options: `module:function`.
+        room: The module whose `PLUGINS` tells what there is of it, below `dva_sim`.
+        module: The one here whose `check_KIND` tries one.
         told: How it was tried, in words, with `{tries}`, and `{ms}` or `{us}` of the slowest.
         folder: Of the files that are named, where it is not the class itself that is.
     """
 
     kind: str
-    plugins: str
-    check: str
+    room: str
+    module: str
     told: str
     folder: str = ""
 
@@ -113,31 +133,16 @@ class CheckedKind:
 
     def load_plugins(self) -> Plugins[Any]:
         """What users may add of this kind."""
-        found: Plugins[Any] = _named(self.plugins)
+        found: Plugins[Any] = resolved(f"dva_sim.{self.room}:PLUGINS")
         return found
 
     def known(self) -> list[str]:
         """Names that are shipped or installed."""
-        from dva_sim.kernel.resources import available  # late: start-up
-
         return sorted(available(self.folder)) if self.folder else self.load_plugins().known()
 
-    def run(self, name: str, options: Mapping[str, Any]) -> Outcome:
-        """Try the one of a name.
-
-        Raises:
-            ConfigError: it cannot be had.
-        """
-
-        try:
-            outcome: Outcome = self.load_check()(name, options)
-        except BrokenPromises as error:
-            return error.outcome
-        return outcome
-
     def load_check(self) -> Callable[..., Outcome]:
-        """What users call in tests of their own."""
-        found: Callable[..., Outcome] = _named(self.check)
+        """What users call in tests of their own, by name or as a class, with options."""
+        found: Callable[..., Outcome] = resolved(f"dva_sim.testing.{self.module}:check_{self.kind}")
         return found
 
     def ways(self, outcome: Outcome) -> str:
@@ -151,87 +156,20 @@ def plural(kind: str) -> str:
     return f"{kind.removesuffix('y')}ies" if kind.endswith("y") else f"{kind}s"
 
 
-def _named(place: str) -> Any:
-    """What `module:name` names."""
-    module, _, name = place.partition(":")
-    return getattr(import_module(module), name)
-
-
+_US, _READINGS = "{us:.0f} microseconds", "{us:.1f} microseconds a reading"
+_STRATEGIES, _FIGURES = "agents.operator.strategies.loading", "experiments.report.figures.registry"
 TRIALS: Final[dict[str, CheckedKind]] = {
-    trial.kind: trial
-    for trial in (
-        CheckedKind(
-            "pattern",
-            "dva_sim.network.patterns:PLUGINS",
-            "dva_sim.testing.patterns:check_pattern",
-            "{tries} drives, {us:.0f} microseconds a command",
-        ),
-        CheckedKind(
-            "policy",
-            "dva_sim.core.dispatch:PLUGINS",
-            "dva_sim.testing.policies:check_policy",
-            "{tries} situations, slowest decision {ms:.1f} ms",
-        ),
-        CheckedKind(
-            "operator",
-            "dva_sim.agents.operator.strategies.loading:PLUGINS",
-            "dva_sim.testing.operators:check_operator",
-            "{tries} drives, {us:.0f} microseconds a frame",
-        ),
-        CheckedKind(
-            "filter",
-            "dva_sim.agents.tilt.filters:PLUGINS",
-            "dva_sim.testing.tilt:check_filter",
-            "{tries} runs, {us:.1f} microseconds a reading",
-        ),
-        CheckedKind(
-            "mapping",
-            "dva_sim.agents.tilt.mappings:PLUGINS",
-            "dva_sim.testing.tilt:check_mapping",
-            "{tries} runs, {us:.1f} microseconds a reading",
-        ),
-        CheckedKind(
-            "hazard",
-            "dva_sim.worlds.hazards.registry:PLUGINS",
-            "dva_sim.testing.hazards:check_hazard",
-            "{tries} questions, {us:.0f} microseconds an answer",
-        ),
-        CheckedKind(
-            "measure",
-            "dva_sim.simulation.run_measures:PLUGINS",
-            "dva_sim.testing.measures:check_measure",
-            "{tries} runs, {ms:.1f} ms an answer",
-        ),
-        CheckedKind(
-            "model",
-            "dva_sim.simulation.models:PLUGINS",
-            "dva_sim.testing.models:check_model",
-            "{tries} runs, slowest {ms:.0f} ms",
-        ),
-        CheckedKind(
-            "figure",
-            "dva_sim.experiments.report.figures.registry:PLUGINS",
-            "dva_sim.testing.figures:check_figure",
-            "{tries} drawings, slowest {ms:.0f} ms",
-        ),
-        CheckedKind(
-            "measure",
-            "dva_sim.simulation.run_measures:PLUGINS",
-            "dva_sim.testing.measures:check_measure",
-            "{tries} answers, slowest {ms:.1f} ms",
-        ),
-        CheckedKind(
-            "model",
-            "dva_sim.simulation.models:PLUGINS",
-            "dva_sim.testing.models:check_model",
-            "{tries} runs, slowest {ms:.0f} ms",
-        ),
-        CheckedKind(
-            "robot",
-            "dva_sim.worlds.drives:PLUGINS",
-            "dva_sim.testing.robots:check_robot",
-            "{tries} drives, {us:.0f} microseconds a tick",
-            folder="agents/robots",
-        ),
+    row[0]: CheckedKind(*row)
+    for row in (
+        ("pattern", "network.patterns", "patterns", f"{{tries}} drives, {_US} a command"),
+        ("policy", "core.dispatch", "policies", "{tries} situations, slowest decision {ms:.1f} ms"),
+        ("operator", _STRATEGIES, "operators", f"{{tries}} drives, {_US} a frame"),
+        ("filter", "agents.tilt.filters", "tilt", f"{{tries}} runs, {_READINGS}"),
+        ("mapping", "agents.tilt.mappings", "tilt", f"{{tries}} runs, {_READINGS}"),
+        ("hazard", "worlds.hazards.registry", "hazards", f"{{tries}} questions, {_US} an answer"),
+        ("measure", "simulation.run_measures", "measures", "{tries} answers, slowest {ms:.1f} ms"),
+        ("model", "simulation.models", "models", "{tries} runs, slowest {ms:.0f} ms"),
+        ("figure", _FIGURES, "figures", "{tries} drawings, slowest {ms:.0f} ms"),
+        ("robot", "worlds.drives", "robots", f"{{tries}} drives, {_US} a tick", "agents/robots"),
     )
 }

@@ -27,9 +27,9 @@ from numpy.typing import NDArray
 
 from dva_sim.simulation.shift.distributions import Exponential, Law
 from dva_sim.simulation.shift.scenario import TimedScenario
-from dva_sim.validation.dispatch.exact import cobham, gm1
+from dva_sim.validation.dispatch.exact import cobham
 from dva_sim.validation.dispatch.measures import Batches, Floats, Sample, one_server
-from dva_sim.validation.dispatch.queues import Moments, laplace
+from dva_sim.validation.dispatch.queues import Moments, gm1, laplace
 
 FADING = (3.0, 10.0, 30.0, 100.0)  # [events]
 FASTER = 0.95  # what the one server beside one responder takes of its time

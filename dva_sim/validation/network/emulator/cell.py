@@ -24,7 +24,7 @@ import time
 import traceback
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
-from typing import IO, Any, Protocol
+from typing import IO, Any
 
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.kernel.streams import Streams
@@ -43,6 +43,7 @@ from dva_sim.validation.network.emulator.programs import (
 )
 from dva_sim.validation.network.emulator.wire import (
     FORWARDER_PRIORITY,
+    EmulatedLink,
     EmulatedWire,
     Forwarder,
     Proxy,
@@ -209,19 +210,6 @@ class EmulatedOutcome:
         return cls(**data)
 
 
-class EmulatedLink(Protocol):
-    """What joins both ends while they run."""
-
-    def run(self, watched: list[int], deadline: float) -> int | None:
-        """Work until one of the watched file descriptors is readable, or the deadline."""
-
-    def told(self) -> Told:
-        """The columns of the emulator."""
-
-    def close(self) -> None:
-        """Let go of devices and sockets."""
-
-
 class EmulatedCell:
     """One run, from set-up to the last kill.
 
@@ -258,7 +246,7 @@ class EmulatedCell:
             problem = "the operator failed"
         return EmulatedOutcome(notes[0], notes[-1], told, self._way, realtime, problem)
 
-    def _set_up(self) -> tuple[EmulatedLink, bytes]:
+    def _set_up(self) -> tuple[EmulatedLink[Any], bytes]:
         """The link with both ends, and what the operator is told to begin."""
         operator, robot = _programs(self._job)
         if self._job.link == PROXY:
@@ -275,7 +263,7 @@ class EmulatedCell:
         self._nodes.append(start_node(name, program, self._job.room))
         return self._nodes[-1]
 
-    def _run(self, link: EmulatedLink) -> str:
+    def _run(self, link: EmulatedLink[Any]) -> str:
         """Let both ends run until the operator's program is over; what went wrong, if it did."""
         operator, robot = self._nodes
         watched = [operator.ended, robot.ended, _STDIN]

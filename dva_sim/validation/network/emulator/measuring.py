@@ -19,11 +19,10 @@ import os
 import platform
 import re
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
+from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import zmq
@@ -53,14 +52,19 @@ from dva_sim.validation.network.reference import (
 Machine = dict[str, str | int | bool | None]
 
 
-def describe_machine(link: str, way: str, realtime: bool) -> Machine:
+def describe_machine(link: str) -> Machine:
     """Versions, clock and processor; no names of machines, people or folders.
+
+    A run of nothing shows what the machine allows: how the namespaces were made, and whether
+    real-time priority was granted.
 
     Args:
         link: `packets` or `proxy`.
-        way: How the namespaces were made.
-        realtime: Whether real-time priority was granted.
+
+    Raises:
+        EmulatorError: the link cannot be set up.
     """
+    outcome = run_job(EmulatedJob("nothing", link=link))
     return {
         "kernel": f"{platform.system()} {platform.release()}",
         "timer_hz": _timer_hz(),
@@ -70,8 +74,8 @@ def describe_machine(link: str, way: str, realtime: bool) -> Machine:
         "pyzmq": zmq.pyzmq_version(),
         "libzmq": zmq.zmq_version(),
         "link": link,
-        "namespaces": way,
-        "realtime": realtime,
+        "namespaces": outcome.way,
+        "realtime": outcome.realtime,
     }
 
 
@@ -174,7 +178,7 @@ def _written(results: Mapping[str, float]) -> Row:
     }
 
 
-class Table:
+class Table(AbstractContextManager["Table"]):
     """A CSV file of one campaign, and beside it the machine it was measured on.
 
     A row is one write that is forced to the disk; what a killed writer left of a row is cut off
@@ -202,15 +206,7 @@ class Table:
             os.close(self._file)
             raise
 
-    def __enter__(self) -> Table:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         os.close(self._file)
 
     def append(self, row: Mapping[str, str]) -> None:
@@ -308,7 +304,7 @@ def measure_all(
         ConfigError: the file cannot be written, or holds something else.
         EmulatorError: the link cannot be set up, or fails again and again.
     """
-    machine = _look_at_machine(link)
+    machine = describe_machine(link)
     wanted = [(condition, seed) for seed in seeds for condition in conditions]
     with Table(path, (*_IDENTITY, *COLUMNS)) as table:
         table.sign(machine)
@@ -341,16 +337,6 @@ def _measure_left(
                 raise
         tell(Progress(done, total, _time_of(left[turn:]), cell, problem))
     return failures
-
-
-def _look_at_machine(link: str) -> dict[str, str | int | bool | None]:
-    """The machine, after a run of nothing that shows what it allows.
-
-    Raises:
-        EmulatorError: the link cannot be set up.
-    """
-    outcome = run_job(EmulatedJob("nothing", link=link))
-    return describe_machine(link, outcome.way, outcome.realtime)
 
 
 def _identity(cell: str, group: str, seed: int, condition: Condition) -> Row:

@@ -20,11 +20,13 @@ import os
 import select
 import socket
 import time
+from abc import ABC, abstractmethod
 from array import array
 from collections import deque
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from typing import Generic, TypeVar
 
 import numpy as np
 from numpy.random import Generator
@@ -187,9 +189,60 @@ _MOST_AT_ONCE = 32  # packets of one device before what is due is looked at agai
 _VERSION_4 = 4
 
 Told = dict[str, float | int]
+T = TypeVar("T")
 
 
-class Forwarder:
+class EmulatedLink(ABC, Generic[T]):
+    """What joins both ends while they run: what is on its way, and comes out when it is due.
+
+    Args:
+        wires: From the operator to the robot, and back.
+    """
+
+    def __init__(self, wires: tuple[EmulatedWire, EmulatedWire]) -> None:
+        self._wires = wires
+        self._due: list[tuple[float, int, T, bytes]] = []
+        self._number = 0
+        self._late = array("d")
+
+    @abstractmethod
+    def run(self, watched: Sequence[int], deadline: float) -> int | None:
+        """Forward until one of the watched file descriptors has something to say.
+
+        Returns:
+            That one; None when the deadline has passed.
+        """
+
+    @abstractmethod
+    def close(self) -> None:
+        """Let go of devices and sockets."""
+
+    @abstractmethod
+    def _put(self, out: T, data: bytes) -> None:
+        """Hand on what is due."""
+
+    def told(self) -> Told:
+        """The columns of the emulator; chunks of a relay count as packets."""
+        return tell(self._wires, self._late)
+
+    def _offer(self, wire: EmulatedWire, size: int, out: T, data: bytes) -> None:
+        """Let a wire of the link decide when something of so many bytes comes out, if at all."""
+        release = wire.offer(time.monotonic(), size)
+        if release is not None:
+            self._number += 1
+            heapq.heappush(self._due, (release, self._number, out, data))
+
+    def _release(self, now: float, deadline: float) -> float:
+        """Hand on everything that is due; when there is something to do next [s]."""
+        while self._due and self._due[0][0] <= now:
+            release, _, out, data = heapq.heappop(self._due)
+            self._put(out, data)
+            now = time.monotonic()
+            self._late.append(now - release)
+        return min(deadline, self._due[0][0]) if self._due else deadline
+
+
+class Forwarder(EmulatedLink[int]):
     """Both directions of an emulated link.
 
     Args:
@@ -198,22 +251,14 @@ class Forwarder:
     """
 
     def __init__(self, tuns: tuple[int, int], wires: tuple[EmulatedWire, EmulatedWire]) -> None:
+        super().__init__(wires)
         self._ways = {tuns[0]: (wires[0], tuns[1]), tuns[1]: (wires[1], tuns[0])}
-        self._wires = wires
-        self._due: list[tuple[float, int, int, bytes]] = []
-        self._number = 0
-        self._late = array("d")
 
     def run(self, watched: Sequence[int], deadline: float) -> int | None:
-        """Forward until one of the watched file descriptors has something to say.
-
-        Returns:
-            That one; None when the deadline has passed.
-        """
+        """See `EmulatedLink`."""
         tuns = list(self._ways)
         while (now := time.monotonic()) < deadline:
-            self._release(now)
-            until = min(deadline, self._due[0][0]) if self._due else deadline
+            until = self._release(now, deadline)
             pause = max(0.0, until - time.monotonic())
             ready = select.select([*tuns, *watched], [], [], pause)[0]
             for file in ready:
@@ -222,12 +267,8 @@ class Forwarder:
                 self._take(file)
         return None
 
-    def told(self) -> Told:
-        """The columns of the emulator."""
-        return tell(self._wires, self._late)
-
     def close(self) -> None:
-        """Let go of the devices."""
+        """See `EmulatedLink`."""
         for tun in self._ways:
             os.close(tun)
 
@@ -239,20 +280,11 @@ class Forwarder:
                 packet = os.read(tun, _LARGEST)
                 if not packet or packet[0] >> 4 != _VERSION_4:
                     continue
-                release = wire.offer(time.monotonic(), len(packet))
-                if release is not None:
-                    self._number += 1
-                    heapq.heappush(self._due, (release, self._number, out, packet))
+                self._offer(wire, len(packet), out, packet)
 
-    def _release(self, now: float) -> None:
-        """Write everything that is due."""
-        due = self._due
-        while due and due[0][0] <= now:
-            release, _, out, packet = heapq.heappop(due)
-            with suppress(OSError):  # a namespace that has just ended takes nothing more
-                os.write(out, packet)
-            now = time.monotonic()
-            self._late.append(now - release)
+    def _put(self, out: int, data: bytes) -> None:
+        with suppress(OSError):  # a namespace that has just ended takes nothing more
+            os.write(out, data)
 
 
 def tell(wires: tuple[EmulatedWire, EmulatedWire], late: Sequence[float]) -> Told:
@@ -312,7 +344,7 @@ class RelayedStream:
             self.open = False
 
 
-class Proxy:
+class Proxy(EmulatedLink[RelayedStream]):
     """Relays connections to the robot.
 
     Args:
@@ -321,14 +353,11 @@ class Proxy:
     """
 
     def __init__(self, wires: tuple[EmulatedWire, EmulatedWire], target: str) -> None:
+        super().__init__(wires)
         host, _, port = target.removeprefix("tcp://").rpartition(":")
         self._target = (host, int(port))
-        self._wires = wires
         self._listener = socket.create_server(("127.0.0.1", 0))
         self._streams: list[RelayedStream] = []
-        self._due: list[tuple[float, int, RelayedStream, bytes]] = []
-        self._number = 0
-        self._late = array("d")
 
     @property
     def address(self) -> str:
@@ -336,10 +365,10 @@ class Proxy:
         return f"tcp://127.0.0.1:{self._listener.getsockname()[1]}"
 
     def run(self, watched: Sequence[int], deadline: float) -> int | None:
-        """See `Forwarder.run`."""
+        """See `EmulatedLink`."""
         while (now := time.monotonic()) < deadline:
-            self._release(now)
-            until = min(deadline, self._due[0][0] if self._due else deadline)
+            until = self._release(now, deadline)
+            self._forget_closed()
             if any(stream.open and not stream.has_room(now) for stream in self._streams):
                 until = min(until, now + _LOOK_AGAIN_S)
             pause = max(0.0, until - time.monotonic())
@@ -358,12 +387,8 @@ class Proxy:
                     self._take(sources[file])
         return None
 
-    def told(self) -> Told:
-        """The columns of the emulator; chunks count as packets."""
-        return tell(self._wires, self._late)
-
     def close(self) -> None:
-        """Close everything."""
+        """See `EmulatedLink`."""
         self._listener.close()
         for stream in self._streams:
             stream.source.close()
@@ -388,20 +413,12 @@ class Proxy:
         except OSError:
             chunk = b""
         stream.open = bool(chunk)
-        release = stream.wire.offer(time.monotonic(), len(chunk) + _HEADERS_BYTES)
-        if release is not None:
-            self._number += 1
-            heapq.heappush(self._due, (release, self._number, stream, chunk))
+        self._offer(stream.wire, len(chunk) + _HEADERS_BYTES, stream, chunk)
 
-    def _release(self, now: float) -> None:
-        while self._due and self._due[0][0] <= now:
-            release, _, stream, chunk = heapq.heappop(self._due)
-            stream.waiting += chunk
-            stream.closing = not chunk
-            stream.flush()
-            now = time.monotonic()
-            self._late.append(now - release)
-        self._forget_closed()
+    def _put(self, out: RelayedStream, data: bytes) -> None:
+        out.waiting += data
+        out.closing = not data
+        out.flush()
 
     def _forget_closed(self) -> None:
         """Close connections whose two streams have ended."""
