@@ -35,6 +35,7 @@ MOVED = {
     "streams": "kernel.streams",
     "tasks": "simulation.task",
     "timed": "simulation.shift",
+    "validation.operators.experiment_runs": "validation.operators.experiments",
     "worlds.drawing": "worlds.geojson",
 }
 

@@ -123,15 +123,15 @@ def open_study(
     try:
         return load_study(name, settings, version=version, pilot=pilot)
     except ConfigError as error:
-        document = _yaml(name)
+        document = _opened(lambda: load_yaml(resources.find(str(name), FOLDER, is_asked=True)))
         if document is None or error.file != str(document.file):
             raise
         raise of_other_kind(document, "dva-sim run", "study") or error from None
 
 
-def _yaml(name: str | Path) -> Document | None:
+def _opened(load: Callable[[], Document]) -> Document | None:
     try:
-        return load_yaml(resources.find(str(name), FOLDER, is_asked=True))
+        return load()
     except ConfigError:
         return None
 
@@ -195,22 +195,15 @@ def mistakes_of(name: str, pairs: Sequence[str], seed: int) -> Iterator[None]:
 
 
 def _of_other_kind(error: ConfigError, name: str) -> ConfigError | None:
-    document = _document(name)
+    document = _opened(lambda: scenarios.load(name))
     if document is None or error.file != str(document.file):
         return None
     return of_other_kind(document, "dva-sim episode", "scenario")
 
 
-def _document(name: str) -> Document | None:
-    try:
-        return scenarios.load(name)
-    except ConfigError:
-        return None
-
-
 def _placed(error: ConfigError, name: str, pairs: Sequence[str], seed: int) -> ConfigError:
     """A mistake that has no place yet, if it is one of the scenario."""
-    document = _document(name)
+    document = _opened(lambda: scenarios.load(name))
     if document is None:
         return error
     changes = parse_changes(pairs)

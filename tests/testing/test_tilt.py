@@ -6,13 +6,7 @@ import math
 
 import pytest
 
-from dva_sim.agents.tilt import (
-    Filter,
-    PhoneProfile,
-    known_filters,
-    known_mappings,
-    try_phone,
-)
+from dva_sim.agents.tilt import Filter, PhoneProfile, known_filters, known_mappings, try_phone
 from dva_sim.agents.tilt.filters import GuardedFilter, NoFilter
 from dva_sim.agents.tilt.mappings import AbsoluteMapping, DifferentialMapping
 from dva_sim.cli import checks

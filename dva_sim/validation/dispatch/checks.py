@@ -15,13 +15,14 @@ from dva_sim.simulation.models import Tables
 from dva_sim.simulation.shift import simulate_timed
 from dva_sim.simulation.shift.scenario import TimedScenario
 from dva_sim.validation.dispatch.cases import Case
-from dva_sim.validation.dispatch.control_variates import controls, inputs
 from dva_sim.validation.dispatch.estimation import (
     PRECISION,
     CheckVerdict,
     Estimate,
     certain,
+    controls,
     estimate,
+    inputs,
     verdict,
 )
 from dva_sim.validation.dispatch.identities import IDENTITIES, check_identity

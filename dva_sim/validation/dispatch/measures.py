@@ -1,8 +1,7 @@
-"""What a run shows, in columns: events in the order of their detection, and who was busy when.
+"""Measures of a run, each a sum over a sum in every batch, by the names that cases use.
 
-Queues are computed here too, event by event, by other means than the simulation's.
-
-Measures of a run, each a sum over a sum in every batch, by the names that cases use.
+A run is seen in columns: events in the order of their detection, and who was busy when. Queues are
+computed here too, event by event, by other means than the simulation's.
 
 A name may be narrowed: `wait_s@urgent` to the events of one stream; `utilisation/guard` to a
 group, `utilisation/operators` to those who drive robots; `workload/guard-1`,

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 from dva_sim.experiments.study.cell_grid import StudyJob
 from dva_sim.kernel.streams import Streams, derive_seed
-from dva_sim.network.condition import Condition
-from dva_sim.network.measures import Measures
+from dva_sim.network.condition import RESULTS, Condition
 from dva_sim.simulation.models import Tables
 from dva_sim.validation.frame import Progress, job_of, play_jobs
 from dva_sim.validation.network.pooling import (
@@ -22,6 +21,7 @@ from dva_sim.validation.network.pooling import (
     to_be_pooled,
 )
 from dva_sim.validation.network.prediction import WITHOUT, Depth, depth_for, predict
+from dva_sim.validation.network.reference import NUMBERS
 from dva_sim.validation.network.verdicts import (
     KINDS,
     MIN_INSIDE,
@@ -36,11 +36,7 @@ from dva_sim.validation.network.verdicts import (
 )
 
 CHUNK = 10  # runs of one job
-KEPT = (
-    *("n_sent", "n_applied", "n_distinct", "send_hz", "applied_hz", "skip_frac", "first_seq"),
-    *("age_mean", "age_p50", "age_p95", "rtt_p50", "rtt_p95", "stale_p50", "stale_p95"),
-    *("timeouts", "alerts", "t_hs_ms"),
-)
+KEPT = tuple(name for name in NUMBERS if name in RESULTS)
 
 
 @dataclass(frozen=True)
@@ -90,11 +86,8 @@ def perform(job: StudyJob) -> Tables:
     seeds = [
         derive_seed("network", condition.hash, job.seed, run) for run in range(first, first + count)
     ]
-    return {"rows": [_kept(predict(condition, seed, depth, without)) for seed in seeds]}
-
-
-def _kept(row: Measures) -> dict[str, Any]:
-    return {name: row[name] for name in KEPT}
+    rows = (predict(condition, seed, depth, without) for seed in seeds)
+    return {"rows": [{name: row[name] for name in KEPT} for row in rows]}
 
 
 def _jobs(order: ModelRuns, seed: int) -> list[StudyJob]:
@@ -297,11 +290,7 @@ def runs_in(groups: Sequence[ConditionGroup], setting: NetworkSetting) -> int:
 
 def depths_of(comparison: NetworkComparison) -> dict[str, int]:
     """How many conditions were played how deep."""
-    found: dict[str, int] = {}
-    for group in comparison.groups:
-        depth = depth_for(group.condition)
-        found[depth] = found.get(depth, 0) + 1
-    return found
+    return Counter(depth_for(group.condition) for group in comparison.groups)
 
 
 def _cells(

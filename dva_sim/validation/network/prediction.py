@@ -1,11 +1,8 @@
-"""The operator's programs: one sends on a fixed grid, the other asks and waits for the reply.
+"""The model plays a condition: the operator's and the robot's program over a virtual link.
 
-They end with their last command: as soon as the next one would lie beyond the window, and a
-requester whose reply is still missing when the window ends.
-
-The robot's program: it takes one command at a time, works on it, and answers.
-
-The model plays a condition: the operator's and the robot's program over a virtual link.
+The operator's program sends on a fixed grid, or asks and waits for the reply. It ends with its last
+command: as soon as the next one would lie beyond the window, and a requester whose reply is still
+missing when the window ends. The robot's takes one command at a time, works on it, and answers.
 """
 
 from __future__ import annotations

@@ -1,17 +1,15 @@
-"""Delayed loops on their own: where they become unstable, and what a prediction makes of one.
+"""Answers that nobody measured on persons: theory, the dissertation's app, standards.
 
-The loops are closed by the strategies themselves and stepped in time; theory is only what they are
-compared with. Who steers is the person in the middle of the population, but for the limits that
-keep it from unstable loops: those are far away.
+Delayed loops on their own: where they become unstable, and what a prediction makes of one. The
+strategies close the loops themselves, stepped in time; theory is only what they are compared with.
+Who steers is the person in the middle of the population, but for the limits that keep it from
+unstable loops: those are far away.
 
-The dissertation's filter on its own: how old its values are, and how it freezes and ratchets.
+The dissertation's filter on its own: how old its values are, and how it freezes and ratchets. The
+app takes the value when 20 samples have come or the longest delay has passed, and what it takes
+stands until the next time. Samples come evenly; the filters are those of the phone.
 
-The app takes the value when 20 samples have come or the longest delay has passed, and what it
-takes stands until the next time. Samples come evenly; the filters are those of the phone.
-
-Fires, alarms, walkers, plumes and helpers, asked for the numbers of standards and textbooks.
-
-Answers that nobody measured on persons: theory, the dissertation's app, standards.
+Fires, alarms, walkers, plumes and helpers are asked for the numbers of standards and textbooks.
 """
 
 from __future__ import annotations
@@ -120,21 +118,6 @@ def pure_pursuit(speed_delay: float) -> list[float]:
         x, y = x + wanted.speed * math.cos(middle) * dt, y + wanted.speed * math.sin(middle) * dt
         heading += wanted.turn_rate * dt
         frames.append((x, y, heading))
-        errors.append(y)
-    return errors
-
-
-def linear_pursuit(speed_delay: float) -> list[float]:
-    """The same for small errors: heading' = -2 v/L (y/L + heading), y' = v heading."""
-    dt, speed = 1.0 / STEPS, speed_delay
-    y, heading, errors = 1e-3, 0.0, []
-    frames = deque([(y, heading)] * STEPS, maxlen=STEPS)
-    for _ in range(DELAYS * STEPS):
-        seen_y, seen_heading = frames[0]
-        turn = -2.0 * speed * (seen_y + seen_heading)
-        y += speed * (heading + 0.5 * turn * dt) * dt
-        heading += turn * dt
-        frames.append((y, heading))
         errors.append(y)
     return errors
 

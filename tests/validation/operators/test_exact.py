@@ -1,6 +1,7 @@
 """The exact checks pass, and the loops under them find what theory says."""
 
 import math
+from collections import deque
 
 import pytest
 
@@ -32,10 +33,23 @@ def test_a_delayed_integrator_is_stable_below_half_pi():
     assert exact.critical(exact.integrator, 1.0, 2.2) == pytest.approx(math.pi / 2, rel=1e-3)
 
 
+def linear_pursuit(speed_delay):
+    """Pure pursuit for small errors: heading' = -2 v/L (y/L + heading), y' = v heading."""
+    dt, speed = 1.0 / exact.STEPS, speed_delay
+    y, heading, errors = 1e-3, 0.0, []
+    frames = deque([(y, heading)] * exact.STEPS, maxlen=exact.STEPS)
+    for _ in range(exact.DELAYS * exact.STEPS):
+        seen_y, seen_heading = frames[0]
+        turn = -2.0 * speed * (seen_y + seen_heading)
+        y += speed * (heading + 0.5 * turn * dt) * dt
+        heading += turn * dt
+        frames.append((y, heading))
+        errors.append(y)
+    return errors
+
+
 def test_linear_and_true_pursuit_become_unstable_at_the_same_speed():
-    linear, true = (
-        exact.critical(loop, 0.4, 0.7) for loop in (exact.linear_pursuit, exact.pure_pursuit)
-    )
+    linear, true = (exact.critical(loop, 0.4, 0.7) for loop in (linear_pursuit, exact.pure_pursuit))
     assert linear == pytest.approx(0.5205, rel=5e-3)
     assert true == pytest.approx(linear, rel=1e-3)
 

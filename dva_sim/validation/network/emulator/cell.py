@@ -4,9 +4,8 @@ It happens in a fresh interpreter with one thread, told what to do by one line o
 `start`). Its standard input stays open as long as somebody waits for the answer: when it closes,
 the run ends. Each end is a process with a network of its own where packets are emulated. A
 namespace here has no name: it ends with its process, and the process ends with the one that
-started it. So nothing can be left behind, whoever is killed.
-
-Starts the process of a run, waits for its outcome, and says in one line why there is none.
+started it. So nothing can be left behind, whoever is killed. `run_job` starts such a process, waits
+for its outcome, and says in one line why there is none.
 """
 
 from __future__ import annotations
@@ -29,8 +28,7 @@ from typing import IO, Any
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.kernel.streams import Streams
 from dva_sim.network.condition import Condition
-from dva_sim.validation.network.emulator import linux_calls
-from dva_sim.validation.network.emulator.linux_calls import OPERATOR_END, ROBOT_END, End, open_tun
+from dva_sim.validation.network.emulator import start
 from dva_sim.validation.network.emulator.programs import (
     Note,
     Notes,
@@ -41,6 +39,7 @@ from dva_sim.validation.network.emulator.programs import (
     run_robot,
     run_sender,
 )
+from dva_sim.validation.network.emulator.start import OPERATOR_END, ROBOT_END, End, open_tun
 from dva_sim.validation.network.emulator.wire import (
     FORWARDER_PRIORITY,
     EmulatedLink,
@@ -122,9 +121,9 @@ def _live(parent: int, program: Program, channel: socket.socket, notes: Notes) -
     """All that a node's process does; it never returns."""
     code = 1
     try:
-        linux_calls.die_with_parent(parent)
+        start.die_with_parent(parent)
         gc.disable()  # a pause would look like delay
-        linux_calls.be_punctual(PROGRAM_PRIORITY)
+        start.be_punctual(PROGRAM_PRIORITY)
         program(channel, notes)
         code = 0
     except BaseException:
@@ -230,7 +229,7 @@ class EmulatedCell:
         problem, realtime = "", False
         told: Told = {}
         try:
-            realtime = linux_calls.be_punctual(FORWARDER_PRIORITY)
+            realtime = start.be_punctual(FORWARDER_PRIORITY)
             link, word = self._set_up()
             gc.disable()  # a pause would look like delay
             self._nodes[0].channel.send(word)
@@ -279,7 +278,7 @@ def _networked(program: Program, end: End, congestion: str) -> Program:
     """The program in a network of its own, whose device goes to whoever started it."""
 
     def run(channel: socket.socket, notes: Notes) -> None:
-        linux_calls.enter_network_namespace()
+        start.enter_network_namespace()
         tun = open_tun(end, congestion)
         socket.send_fds(channel, [b"device"], [tun])
         os.close(tun)

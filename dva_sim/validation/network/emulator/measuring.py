@@ -1,9 +1,8 @@
 """Real TCP and ZeroMQ measured: real programs over the emulated link, many conditions, many times.
 
-A measurement can be stopped, killed and taken up again: its table grows by whole rows, also when
-its writer is killed. Beside it stands the machine it was made on, as far as a reader needs that.
-
-Measuring on real sockets: the whole design into a table, or some of it to look at now.
+The whole design goes into a table, or some of it is measured to look at now. A measurement can be
+stopped, killed and taken up again: its table grows by whole rows, also when its writer is killed.
+Beside it stands the machine it was made on, as far as a reader needs that.
 """
 
 from __future__ import annotations

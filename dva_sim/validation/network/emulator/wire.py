@@ -1,15 +1,14 @@
-"""One direction of the emulated link: decides when a packet that is offered now comes out.
+"""The emulated link: when a packet that is offered now comes out, and what moves it then.
 
-Drop-tail queue, serialisation at the rate, loss, delay with jitter, in this order. It knows no
-device and no clock: the forwarder asks it with real packets, and moves them between the two TUN
-devices when it says, noting how late it is; tests ask it with scripted ones.
+A wire is one direction: drop-tail queue, serialisation at the rate, loss, delay with jitter, in
+this order. It knows no device and no clock: the forwarder asks it with real packets, and moves them
+between the two TUN devices when it says, noting how late it is; tests ask it with scripted ones.
 
-Where packets cannot be emulated: a relay of TCP over the loopback, with delay, jitter and rate.
-
-It cannot lose a packet, because the kernel repeats what is lost before the relay would see it,
-and TCP's own set-up and acknowledgements do not feel its delay. Each chunk that it reads counts
-as one packet of the wire; when the wire's queue is full it reads no more, so that the sender is
-held back as by a full send buffer.
+Where packets cannot be emulated a relay of TCP over the loopback takes the forwarder's place, with
+delay, jitter and rate. It cannot lose a packet, because the kernel repeats what is lost before the
+relay would see it, and TCP's own set-up and acknowledgements do not feel its delay. Each chunk that
+it reads counts as one packet of the wire; when the wire's queue is full it reads no more, so that
+the sender is held back as by a full send buffer.
 """
 
 from __future__ import annotations
