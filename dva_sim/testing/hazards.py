@@ -108,7 +108,8 @@ class _Trial:
         if hazard.position != SOURCE or hazard.start != START:
             yield "is not where or when it was put", f"{hazard.position}, {hazard.start:g} s"
         settings = hazard.model_dump(mode="json")
-        again = type(hazard)(SOURCE, settings.pop("start"), **_without(settings, "position"))
+        settings.pop("position", None)
+        again = type(hazard)(SOURCE, settings.pop("start"), **settings)
         if again != hazard:
             yield "is not the same from its own settings", repr(again)
 
@@ -249,10 +250,6 @@ class _Trial:
             yield f"draws slowly: {self._picture:.2g} s a picture; picture() may be defined"
         if not self._hazard().noticed_by():
             yield "is noticed by no detector: somebody has to report it"
-
-
-def _without(settings: dict[str, object], name: str) -> dict[str, object]:
-    return {key: value for key, value in settings.items() if key != name}
 
 
 def _odd(air: Conditions, where: str) -> Iterator[Case]:

@@ -9,10 +9,11 @@ from __future__ import annotations
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Final
 
-from dva_sim.kernel.plugins import FAILURES, Plugins, resolved
-from dva_sim.kernel.resources import available
+if TYPE_CHECKING:
+    from dva_sim.kernel.plugins import Plugins
 
 Case = tuple[str, str]  # a promise in words, and what happened
 
@@ -85,6 +86,8 @@ def is_slow(slowest: float, slow: float, what: str) -> list[str]:
 
 def part_by_part(parts: Iterable[Callable[[], Iterable[Case]]]) -> Iterator[Case]:
     """What the first part finds broken that finds anything: each builds on those before it."""
+    from dva_sim.kernel.plugins import FAILURES  # late: start-up
+
     for part in parts:
         try:
             broken = list(part())
@@ -133,16 +136,19 @@ class CheckedKind:
 
     def load_plugins(self) -> Plugins[Any]:
         """What users may add of this kind."""
-        found: Plugins[Any] = resolved(f"dva_sim.{self.room}:PLUGINS")
+        found: Plugins[Any] = import_module(f"dva_sim.{self.room}").PLUGINS
         return found
 
     def known(self) -> list[str]:
         """Names that are shipped or installed."""
+        from dva_sim.kernel.resources import available  # late: start-up
+
         return sorted(available(self.folder)) if self.folder else self.load_plugins().known()
 
     def load_check(self) -> Callable[..., Outcome]:
         """What users call in tests of their own, by name or as a class, with options."""
-        found: Callable[..., Outcome] = resolved(f"dva_sim.testing.{self.module}:check_{self.kind}")
+        module = import_module(f"dva_sim.testing.{self.module}")
+        found: Callable[..., Outcome] = getattr(module, f"check_{self.kind}")
         return found
 
     def ways(self, outcome: Outcome) -> str:

@@ -11,7 +11,7 @@ import dataclasses
 import math
 from collections import deque
 from collections.abc import Callable, Sequence
-from typing import Any, Literal, NamedTuple, Protocol
+from typing import Any, Literal, NamedTuple
 
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.errors import ConfigError
@@ -29,16 +29,6 @@ from dva_sim.network.zmtp import ReceivePipe, ZmtpConnection, ZmtpOptions, frame
 from dva_sim.validation.network.verdicts import OVERLOAD, PACKET_BYTES, is_bounded, load
 
 
-class Socket(Protocol):
-    """What a program does with the operator's socket."""
-
-    def send(self, number: int) -> None:
-        """Send a command."""
-
-    def reopen(self) -> None:
-        """Close it without lingering and open another one."""
-
-
 class ModelProgram:
     """What both programs have in common.
 
@@ -52,7 +42,7 @@ class ModelProgram:
         ended: When the program ended [s]; None as long as it runs.
     """
 
-    def __init__(self, clock: Clock, condition: Condition, log: RunLog, socket: Socket) -> None:
+    def __init__(self, clock: Clock, condition: Condition, log: RunLog, socket: Session) -> None:
         self._clock, self._condition, self._log, self._socket = clock, condition, log, socket
         self._period = 1.0 / condition.hz
         self._end = 0.0
@@ -348,7 +338,7 @@ class Session:
     # --- the operator's socket -------------------------------------------------------------
 
     def send(self, number: int) -> None:
-        """See `Socket`: a publisher without subscriber, or at its mark, sends nothing.
+        """Send a command: a publisher without subscriber, or at its mark, sends nothing.
 
         A request that is made during the handshake waits for its end.
         """
@@ -358,7 +348,7 @@ class Session:
             self._connection.opener.send(number, self._size)
 
     def reopen(self) -> None:
-        """See `Socket`."""
+        """Close the socket without lingering and open another one."""
         self._connection.close()
         self._ready = False
         self._connect()
