@@ -112,8 +112,8 @@ def test_two_conditions_with_one_seed_do_not_share_their_luck() -> None:
     assert job_of(SLOW, 1).seed != job_of(FAST, 1).seed != job_of(FAST, 2).seed
 
 
-def test_the_description_of_a_machine_names_nobody() -> None:
-    machine = describe_machine("packets", "root", True)
+def test_the_description_of_a_machine_names_nobody(played: list[tuple[str, int]]) -> None:
+    machine = describe_machine("packets")
     text = " ".join(str(value) for value in machine.values())
     assert "/" not in text
     assert machine["libzmq"]

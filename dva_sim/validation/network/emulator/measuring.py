@@ -265,15 +265,11 @@ class Progress:
         done: Rows that are there.
         total: Rows that are wanted.
         left_s: About the time it still takes [s].
-        cell: What was measured last; empty at the beginning.
-        problem: Why it could not be measured; empty if it could.
     """
 
     done: int
     total: int
     left_s: float
-    cell: str = ""
-    problem: str = ""
 
 
 def measure_all(
@@ -305,41 +301,26 @@ def measure_all(
     """
     machine = describe_machine(link)
     wanted = [(condition, seed) for seed in seeds for condition in conditions]
+    failures, in_a_row = list[str](), 0
     with Table(path, (*_IDENTITY, *COLUMNS)) as table:
         table.sign(machine)
         known = {(row["cond_id"], row["seed"]) for row in table.rows}
         left = [(c, s) for c, s in wanted if (c.hash, str(s)) not in known]
-        return _measure_left(left, len(wanted), table, tell, group, link)
-
-
-def _measure_left(
-    left: Sequence[tuple[Condition, int]],
-    total: int,
-    table: Table,
-    tell: Callable[[Progress], object],
-    group: str,
-    link: str,
-) -> list[str]:
-    """Measure what is not there yet; what failed, a line each."""
-    done, failures, in_a_row = total - len(left), [], 0
-    tell(Progress(done, total, _time_of(left)))
-    for turn, (condition, seed) in enumerate(left, start=1):
-        cell, problem = f"{group}_{condition.label}_s{seed}", ""
-        try:
-            row = measure(condition, seed, link)
-            table.append(_identity(cell, group, seed, condition) | row)
-            done, in_a_row = done + 1, 0
-        except EmulatorError as error:
-            problem, in_a_row = str(error), in_a_row + 1
-            failures.append(f"{cell}: {problem}")
-            if in_a_row == _MOST_FAILURES:
-                raise
-        tell(Progress(done, total, _time_of(left[turn:]), cell, problem))
+        done = len(wanted) - len(left)
+        tell(Progress(done, len(wanted), _time_of(left)))
+        for turn, (condition, seed) in enumerate(left, start=1):
+            cell = f"{group}_{condition.label}_s{seed}"
+            identity = dict(zip(_IDENTITY, (cell, group, str(seed), condition.hash), strict=True))
+            try:
+                table.append(identity | measure(condition, seed, link))
+                done, in_a_row = done + 1, 0
+            except EmulatorError as error:
+                failures.append(f"{cell}: {error}")
+                in_a_row += 1
+                if in_a_row == _MOST_FAILURES:
+                    raise
+            tell(Progress(done, len(wanted), _time_of(left[turn:])))
     return failures
-
-
-def _identity(cell: str, group: str, seed: int, condition: Condition) -> Row:
-    return {"cell": cell, "group": group, "seed": str(seed), "cond_id": condition.hash}
 
 
 def _time_of(left: Sequence[tuple[Condition, int]]) -> float:
