@@ -28,7 +28,8 @@ from typing import IO, Any
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.kernel.streams import Streams
 from dva_sim.network.condition import Condition
-from dva_sim.validation.network.emulator import start
+from dva_sim.validation.network.emulator import linux_calls
+from dva_sim.validation.network.emulator.linux_calls import OPERATOR_END, ROBOT_END, End, open_tun
 from dva_sim.validation.network.emulator.programs import (
     Note,
     Notes,
@@ -39,7 +40,6 @@ from dva_sim.validation.network.emulator.programs import (
     run_robot,
     run_sender,
 )
-from dva_sim.validation.network.emulator.start import OPERATOR_END, ROBOT_END, End, open_tun
 from dva_sim.validation.network.emulator.wire import (
     FORWARDER_PRIORITY,
     EmulatedLink,
@@ -121,9 +121,9 @@ def _live(parent: int, program: Program, channel: socket.socket, notes: Notes) -
     """All that a node's process does; it never returns."""
     code = 1
     try:
-        start.die_with_parent(parent)
+        linux_calls.die_with_parent(parent)
         gc.disable()  # a pause would look like delay
-        start.be_punctual(PROGRAM_PRIORITY)
+        linux_calls.be_punctual(PROGRAM_PRIORITY)
         program(channel, notes)
         code = 0
     except BaseException:
@@ -229,7 +229,7 @@ class EmulatedCell:
         problem, realtime = "", False
         told: Told = {}
         try:
-            realtime = start.be_punctual(FORWARDER_PRIORITY)
+            realtime = linux_calls.be_punctual(FORWARDER_PRIORITY)
             link, word = self._set_up()
             gc.disable()  # a pause would look like delay
             self._nodes[0].channel.send(word)
@@ -278,7 +278,7 @@ def _networked(program: Program, end: End, congestion: str) -> Program:
     """The program in a network of its own, whose device goes to whoever started it."""
 
     def run(channel: socket.socket, notes: Notes) -> None:
-        start.enter_network_namespace()
+        linux_calls.enter_network_namespace()
         tun = open_tun(end, congestion)
         socket.send_fds(channel, [b"device"], [tun])
         os.close(tun)
