@@ -120,7 +120,9 @@ class _Trial:
         made = self._make(person, reach)
         if not isinstance(made, Strategy):
             raise ConfigError("is told the truth, and sees nothing: there is nothing to try")
-        return made.strategy if isinstance(made, GuardedStrategy) else made
+        while isinstance(made, GuardedStrategy):  # more than once, where it was loaded before
+            made = made.strategy
+        return made
 
     # --- whatever is seen --------------------------------------------------------------
 

@@ -99,7 +99,9 @@ class _Trial:
     def _new(self) -> Drive:
         """The motors themselves."""
         drive = self.spec.drive(self.spec)
-        return drive.drive if isinstance(drive, GuardedDrive) else drive
+        while isinstance(drive, GuardedDrive):  # more than once, where it was loaded before
+            drive = drive.drive
+        return drive
 
     def _command(self) -> tuple[float, float]:
         """Something within the limits; often one of the limits, or nothing."""

@@ -44,7 +44,7 @@ from dva_sim.simulation.shift.distributions import Exponential, Law
 from dva_sim.simulation.shift.scenario import TimedScenario
 from dva_sim.validation.dispatch.exact import cobham
 from dva_sim.validation.dispatch.measures import Batches, Floats, Sample, one_server
-from dva_sim.validation.dispatch.queues import Moments, gm1, laplace
+from dva_sim.validation.dispatch.queues import LawMoments, gm1, laplace
 
 CheckVerdict = Literal["agrees", "too rough", "differs"]
 
@@ -320,7 +320,7 @@ def _means(scenario: TimedScenario, pace: float, ranks: list[int]) -> list[float
     if not all(isinstance(law, Exponential) for law in between):
         return None
     rates = [1 / law.mean for law in between if law is not None]
-    scaled = [Moments(law.mean * pace, law.second * pace**2) for law in laws]
+    scaled = [LawMoments(law.mean * pace, law.second * pace**2) for law in laws]
     if sum(r * law.mean for r, law in zip(rates, scaled, strict=True)) >= 1:
         return None
     if len(set(ranks)) < len(ranks):  # one queue for all

@@ -26,9 +26,9 @@ from numpy.typing import NDArray
 from dva_sim.validation.dispatch.queues import (
     DurationLaw,
     Floats,
+    LawMoments,
     Measures,
     Memoryless,
-    Moments,
     birth_death,
     erlang_a,
     erlang_c,
@@ -291,7 +291,7 @@ def sqm(
     """
     way, square = CENTRE * side_m / speed_mps, side_m**2 / 6 / speed_mps**2
     second = 4 * square + 4 * way * service.mean + service.second
-    measures = mg1(arrival_rate, Moments(2 * way + service.mean, second))
+    measures = mg1(arrival_rate, LawMoments(2 * way + service.mean, second))
     return measures | {"travel_s": way, "response_s": measures["wait_s"] + way}
 
 

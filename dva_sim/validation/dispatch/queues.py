@@ -95,7 +95,7 @@ class DurationLaw(Protocol):
         """Expected square [s^2]."""
 
 
-class Moments(NamedTuple):
+class LawMoments(NamedTuple):
     """A law of which only these matter; see `DurationLaw`."""
 
     mean: float
