@@ -11,8 +11,7 @@ from pathlib import Path
 import pytest
 from patience import PATIENCE_S, becomes
 
-from dva_sim.validation.network.emulator.cell import EmulatedJob
-from dva_sim.validation.network.emulator.process import EmulatorError, run_job
+from dva_sim.validation.network.emulator.cell import EmulatedJob, EmulatorError, run_job
 
 
 @cache

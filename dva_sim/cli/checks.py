@@ -11,9 +11,8 @@ from typing import Any, Final
 from dva_sim.kernel.errors import ConfigError, ExitCode, error_line
 from dva_sim.kernel.key_changes import parse_changes
 from dva_sim.testing.files import FileVerdict, NotReadError, check_file, schema_text
-from dva_sim.testing.kinds import TRIALS, CheckedKind
 from dva_sim.testing.messages import READ_BYTES, check_message
-from dva_sim.testing.promises import said
+from dva_sim.testing.promises import TRIALS, CheckedKind, said, tried
 
 STDIN: Final = "-"
 LINK: Final = "link"
@@ -52,12 +51,12 @@ def _check_link(names: Sequence[str], options: Sequence[str]) -> ExitCode:
     Raises:
         EmulatorError: there is none here: why, and what there is instead.
     """
-    from dva_sim.validation.network.emulator import process, self_check  # late: start-up
+    from dva_sim.validation.network.emulator import cell, self_check  # late: start-up
 
     if names or options:
         raise ConfigError("check link: there is one link, without names and options")
-    if why := process.why_no_packets():
-        raise process.EmulatorError(f"{why}; {OFFER}")
+    if why := cell.why_no_packets():
+        raise cell.EmulatorError(f"{why}; {OFFER}")
     findings = self_check.check_link()
     for finding in findings:
         print(finding)
@@ -78,7 +77,7 @@ def _try_all(kind: str, names: Sequence[str], options: Mapping[str, Any]) -> Exi
 def _try(kind: str, trial: CheckedKind, name: str, options: Mapping[str, Any]) -> ExitCode:
     """Try something and say what came of it."""
     try:
-        outcome = trial.run(name, options)
+        outcome = tried(trial.load_check(), name, options)
     except ConfigError as error:
         _say(f"{name}: {error}")
         return INVALID

@@ -11,7 +11,7 @@ from typer import Argument, Option
 from dva_sim.cli.options import Jobs, Json, Quiet, Verbose, one_of, whole
 from dva_sim.cli.verbosity import loudness, print_json
 from dva_sim.kernel.suggestions import either
-from dva_sim.testing.kinds import TRIALS
+from dva_sim.testing.promises import TRIALS
 
 _TRIED = either(TRIALS)
 

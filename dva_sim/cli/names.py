@@ -19,7 +19,7 @@ from dva_sim.kernel.config import parse_scalar
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.plugins import Plugins
 from dva_sim.kernel.suggestions import hint
-from dva_sim.testing.kinds import TRIALS, plural
+from dva_sim.testing.promises import TRIALS, plural
 
 _CHECKED = {trial.load_plugins().kind: trial.kind for trial in TRIALS.values()}
 KINDS: Final[dict[str, Plugins[Any]]] = {

@@ -24,13 +24,13 @@ from dva_sim.validation.dispatch import cases, identities
 from dva_sim.validation.dispatch import checks as dispatch
 from dva_sim.validation.dispatch import result_page as dispatch_page
 from dva_sim.validation.frame import ResultSheet, ValidationResult
-from dva_sim.validation.network import comparison, measurement, reference
+from dva_sim.validation.network import comparison, reference
 from dva_sim.validation.network import result_page as network_page
-from dva_sim.validation.network.emulator.cell import PACKETS, PROXY
+from dva_sim.validation.network.emulator import measuring
+from dva_sim.validation.network.emulator.cell import PACKETS, PROXY, why_no_packets
 from dva_sim.validation.network.emulator.measuring import Progress
-from dva_sim.validation.network.emulator.process import why_no_packets
 from dva_sim.validation.network.verdicts import ConditionGroup, grouped
-from dva_sim.validation.operators import experiment_runs as operators
+from dva_sim.validation.operators import experiments as operators
 from dva_sim.validation.operators import result_page as operators_page
 from dva_sim.validation.operators.exact import EXACT
 from dva_sim.validation.operators.experiments import EXPERIMENTS
@@ -225,7 +225,7 @@ def _network(
     plan = reference.load_plan(case_file or reference.SHIPPED)
     if measure is not None:
         with _bar() as bar:
-            failures = measurement.measure_design(plan.own.blocks, measure, _teller(bar))
+            failures = measuring.measure_design(plan.own.blocks, measure, _teller(bar))
         _complain([*failures, f"{measure} holds what could be measured."])
         return ExitCode.RUNS_FAILED if failures else ExitCode.OK
     if not live:
@@ -234,7 +234,7 @@ def _network(
     with TemporaryDirectory() as folder:
         path = (out or Path(folder)) / "measured.csv"
         runs = _measured_now(plan.own.blocks, path, setting.quick)
-        return judge_runs(runs, {"measured on": measurement.made_with(path)}, out, setting)
+        return judge_runs(runs, {"measured on": measuring.made_with(path)}, out, setting)
 
 
 def judge_runs(
@@ -274,12 +274,12 @@ def _measured_now(
         _complain([why, f"{relay}; it can neither lose nor reorder packets."])
     with _bar() as bar:
         link = PROXY if why else PACKETS
-        runs, problems = measurement.measure_now(blocks, path, quick, link, _teller(bar))
+        runs, problems = measuring.measure_now(blocks, path, quick, link, _teller(bar))
     _complain(problems)
     return runs
 
 
-def _teller(bar: bars.Progress) -> measurement.Tell:
+def _teller(bar: bars.Progress) -> measuring.Tell:
     """Moves a bar of its own for each block."""
     tasks: dict[str, bars.TaskID] = {}
 

@@ -38,6 +38,7 @@ MOVED = {
     "streams": "kernel.streams",
     "tasks": "simulation.task",
     "timed": "simulation.shift",
+    "validation.operators.experiment_runs": "validation.operators.experiments",
     "worlds.drawing": "worlds.geojson",
     "worlds.layout": "worlds.site",
     "worlds.robot_body": "worlds.bodies",

@@ -13,7 +13,7 @@ import all but `cli` and `api`; begin reading at `kinds`, or at the policies.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from dva_sim.testing.kinds import TRIALS
+from dva_sim.testing.promises import TRIALS
 
 if TYPE_CHECKING:
     from dva_sim.testing.figures import check_figure as check_figure

@@ -22,7 +22,7 @@ from dva_sim.experiments.report.summary import Reading
 from dva_sim.experiments.results.results import Results
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.plugins import FAILURES
-from dva_sim.testing.promises import Case, Outcome, kept, line, said
+from dva_sim.testing.promises import Case, Outcome, broken_in, kept, said
 from dva_sim.testing.results import SHAPES, Shape, make_up
 
 if TYPE_CHECKING:
@@ -49,51 +49,45 @@ TOUCHES: Final = "changes what it was given"
 
 
 def check_figure(
-    figure: str | Callable[..., ReportFigure], options: Mapping[str, Any] | None = None
+    figure: str | Callable[..., ReportFigure],
+    options: Mapping[str, Any] | None = None,
+    *,
+    slow: float = SLOW,
+    shapes: Mapping[str, Shape] = SHAPES,
 ) -> Outcome:
-    """See that a figure keeps what every figure promises.
+    """See that a figure keeps what every figure promises, drawn twice of results of every shape.
 
     Args:
         figure: By name, as in a study, or its class.
         options: Keyword arguments of its constructor.
+        slow: A figure that takes longer earns a warning [s].
+        shapes: Of the results, by what is special about them.
 
     Raises:
         BrokenPromises: it does not; a line for each promise.
         ConfigError: there is none of that name, or it cannot be made with these options.
     """
-    return kept(try_figure(PLUGINS.load(figure, options)))
+    make, took = PLUGINS.load(figure, options), list[float]()
+    broken = broken_in(_every_shape(make, shapes, took))
+    if not took and not broken:
+        one = make()
+        needs = ", ".join((*one.tables, *one.columns))
+        why = f"it applies to no results of any shape, although they have {needs}"
+        broken = [f"{NEVER}: {why}"]
+    slowest = max(took, default=0.0)
+    warnings = [f"is slow: {slowest:.1f} s; should be {slow:g} s"] * (slowest > slow)
+    return kept(broken, warnings, len(took), slowest)
 
 
-def try_figure(
-    make: Callable[[], ReportFigure],
-    slow: float = SLOW,
-    shapes: Mapping[str, Shape] = SHAPES,
-) -> Outcome:
-    """Draw a figure of results of every shape, twice.
-
-    Args:
-        make: Makes it.
-        slow: A figure that takes longer earns a warning [s].
-        shapes: Of the results, by what is special about them.
-
-    Raises:
-        ConfigError: it cannot be made.
-    """
-    found: dict[str, list[str]] = {}
-    took: list[float] = []
+def _every_shape(
+    make: Callable[[], ReportFigure], shapes: Mapping[str, Shape], took: list[float]
+) -> Iterator[Case]:
     figure = make()
     with tempfile.TemporaryDirectory() as folder:
         for number, (name, shape) in enumerate(shapes.items()):
             reading = _reading(Path(folder) / str(number), shape, figure)
             for promise, case in _tried(make, reading, shape, took):
-                found.setdefault(promise, []).append(f"{case} ({name})")
-    if not took and not found:
-        needs = ", ".join((*figure.tables, *figure.columns))
-        found[NEVER] = [f"it applies to no results of any shape, although they have {needs}"]
-    slowest = max(took, default=0.0)
-    warnings = (f"is slow: {slowest:.1f} s; should be {slow:g} s",) if slowest > slow else ()
-    broken = tuple(line(promise, cases) for promise, cases in found.items())
-    return Outcome(broken, warnings, len(took), slowest)
+                yield promise, f"{case} ({name})"
 
 
 def _reading(folder: Path, shape: Shape, figure: ReportFigure) -> Reading:

@@ -7,6 +7,8 @@ import re
 import stat
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import reduce
+from operator import or_
 from pathlib import Path
 from typing import Any, Final
 
@@ -14,8 +16,7 @@ from dva_sim.kernel.config import Document, load_yaml
 from dva_sim.kernel.errors import ConfigError, DvaSimError
 from dva_sim.kernel.suggestions import hint
 from dva_sim.protocol.limits import schema_file
-from dva_sim.testing.messages import READ_BYTES, check_message
-from dva_sim.testing.promises import Problem, not_text
+from dva_sim.testing.messages import READ_BYTES, Problem, check_message, not_text
 
 YAML_BYTES: Final = 256 * 1024
 PLAN_BYTES: Final = 16 * 1024 * 1024
@@ -100,15 +101,14 @@ def _flawed(path: Path, limit: int) -> list[Problem]:
 
 
 def _check_plan(path: Path) -> FileVerdict:
-    from dva_sim.testing.configs import check_plan
+    from dva_sim.testing.file_kinds import check_plan
 
     return FileVerdict("plan", _flawed(path, PLAN_BYTES) or check_plan(path))
 
 
 def _check_yaml(path: Path) -> FileVerdict:
     """A message needs none of what reads configurations: it is imported here."""
-    from dva_sim.testing.configs import check_config, doubts
-    from dva_sim.testing.file_kinds import recognise
+    from dva_sim.testing.file_kinds import check_config, doubts, recognise
 
     problems = _flawed(path, YAML_BYTES)
     document, problem = (None, problems[0]) if problems else _parse(path)
@@ -130,6 +130,12 @@ def _parse(path: Path) -> tuple[Document | None, Problem | None]:
 
 
 KINDS: Final = ("message", "study", "scenario", "cases", "site", "agent")
+_FILES: Final[dict[str, tuple[str, ...]]] = {
+    "study": ("study",),
+    "scenario": ("scenario", "timed scenario", "task", "transports"),
+    "cases": ("validation cases",),
+    "site": ("site",),
+}  # by their names; an agent is whatever lies in a folder of agents
 _KEYS: Final = "Attributes"  # the section of a model's description that tells its keys
 _KEY: Final = re.compile(r"^ {4}(?P<key>\w+): (?P<text>.*(?:\n {5,}.*)*)", re.MULTILINE)
 _DIALECT: Final = "https://json-schema.org/draft/2020-12/schema"
@@ -163,33 +169,14 @@ def _describe_keys(model: dict[str, Any]) -> None:
 
 
 def _json_schema(kind: str) -> dict[str, Any]:
-    """From the models that read the files; an agent may be of any of seven kinds."""
+    """From the models that read the files, of which a scenario and an agent have several."""
     from pydantic import TypeAdapter
 
-    from dva_sim.agents.people.profiles import BystanderProfile, GuardProfile
-    from dva_sim.agents.population import Population
-    from dva_sim.agents.robot.profile import RobotProfile
-    from dva_sim.agents.tilt import AccelerometerPart, PhoneProfile
-    from dva_sim.experiments.study.robustness_grid import Bands
-    from dva_sim.experiments.study.study import Study
-    from dva_sim.simulation.scenario import Scenario
-    from dva_sim.simulation.shift.scenario import TimedScenario
-    from dva_sim.simulation.task import TaskScenario
-    from dva_sim.simulation.transport import TransportScenario
-    from dva_sim.validation.dispatch.cases import CaseFile
-    from dva_sim.worlds.site import SiteFile
+    from dva_sim.testing.file_kinds import KINDS as FILES
 
-    kinds: dict[str, Any] = {
-        "study": Study,
-        "scenario": Scenario | TimedScenario | TaskScenario | TransportScenario,
-        "cases": CaseFile,
-        "site": SiteFile,
-        "agent": RobotProfile
-        | PhoneProfile
-        | AccelerometerPart
-        | GuardProfile
-        | BystanderProfile
-        | Population
-        | Bands,
-    }
-    return TypeAdapter(kinds[kind]).json_schema()
+    models = [
+        file.model
+        for file in FILES
+        if file.name in _FILES.get(kind, ()) or file.folder.startswith(f"{kind}s/")
+    ]
+    return TypeAdapter[Any](reduce(or_, models)).json_schema()

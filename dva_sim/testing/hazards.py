@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from dva_sim.testing.promises import Case, Outcome, kept, line, part_by_part
+from dva_sim.testing.promises import Case, Outcome, broken_in, is_slow, kept, part_by_part
 from dva_sim.worlds.hazards import (
     CLEAR,
     PLUGINS,
@@ -50,40 +50,27 @@ MOST: Final = Conditions(3000.0, 1e4, 1e4, 1e6, 1.0, 100.0, 1e3)
 
 
 def check_hazard(
-    hazard: str | Callable[..., Hazard], options: Mapping[str, Any] | None = None
+    hazard: str | Callable[..., Hazard],
+    options: Mapping[str, Any] | None = None,
+    *,
+    slow: float = SLOW,
 ) -> Outcome:
-    """See that a hazard keeps what every hazard promises.
+    """See that a hazard keeps what every hazard promises, by itself and on a site.
 
     Args:
         hazard: By name, as in a scenario, or its class.
         options: Keyword arguments of its constructor, besides place and start.
+        slow: An answer that takes longer on the average earns a warning [s].
 
     Raises:
         BrokenPromises: it does not; a line for each promise.
         ConfigError: there is none of that name, or it cannot be made with these options.
     """
-    return kept(try_hazard(PLUGINS.load(hazard, options)))
-
-
-def try_hazard(make: Make, seed: int = 1, slow: float = SLOW) -> Outcome:
-    """Try a hazard, by itself and on a site.
-
-    Args:
-        make: Makes it at a place [m] with a start [s].
-        seed: Of the order in which it is asked.
-        slow: An answer that takes longer on the average earns a warning [s].
-
-    Raises:
-        ConfigError: it cannot be made.
-    """
+    make = PLUGINS.load(hazard, options)
     make(SOURCE, START)
-    trial = _Trial(make, load_site(SITE), np.random.default_rng(seed))
-    found: dict[str, list[str]] = {}
-    for promise, case in part_by_part(trial.parts):
-        found.setdefault(promise, []).append(case)
-    warnings = [] if found else list(trial.doubts(slow))
-    broken = tuple(line(promise, cases) for promise, cases in found.items())
-    return Outcome(broken, tuple(warnings), trial.asked, trial.mean)
+    trial = _Trial(make, load_site(SITE), np.random.default_rng(1))
+    broken = broken_in(part_by_part(trial.parts))
+    return kept(broken, [] if broken else list(trial.doubts(slow)), trial.asked, trial.mean)
 
 
 class _Trial:
@@ -120,7 +107,8 @@ class _Trial:
         if hazard.position != SOURCE or hazard.start != START:
             yield "is not where or when it was put", f"{hazard.position}, {hazard.start:g} s"
         settings = hazard.model_dump(mode="json")
-        again = type(hazard)(SOURCE, settings.pop("start"), **_without(settings, "position"))
+        settings.pop("position", None)
+        again = type(hazard)(SOURCE, settings.pop("start"), **settings)
         if again != hazard:
             yield "is not the same from its own settings", repr(again)
 
@@ -256,16 +244,11 @@ class _Trial:
 
     def doubts(self, slow: float) -> Iterator[str]:
         """What is allowed, and hardly meant."""
-        if self.mean > slow:
-            yield f"is slow: {self.mean:.2g} s an answer; should be {slow:g} s"
+        yield from is_slow(self.mean, slow, "an answer")
         if self._picture > SLOW_PICTURE * slow / SLOW:
             yield f"draws slowly: {self._picture:.2g} s a picture; picture() may be defined"
         if not self._hazard().noticed_by():
             yield "is noticed by no detector: somebody has to report it"
-
-
-def _without(settings: dict[str, object], name: str) -> dict[str, object]:
-    return {key: value for key, value in settings.items() if key != name}
 
 
 def _odd(air: Conditions, where: str) -> Iterator[Case]:

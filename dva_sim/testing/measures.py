@@ -12,7 +12,7 @@ from dva_sim.kernel.plugins import FAILURES
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.models import MODELS, Model, model_of
 from dva_sim.simulation.run_measures import RunMeasure, load_measure, reads
-from dva_sim.testing.promises import Case, Outcome, kept, line, part_by_part
+from dva_sim.testing.promises import Case, Outcome, broken_in, is_slow, kept, part_by_part
 
 SHORT: Final[dict[str, tuple[tuple[str, Mapping[str, Any]], ...]]] = {
     "full": (
@@ -27,54 +27,42 @@ SHORT: Final[dict[str, tuple[tuple[str, Mapping[str, Any]], ...]]] = {
     "transports": (("congested-link", {"measure_s": 5, "warm_up_s": 2}),),
 }
 """Scenarios that are run of each model, made short."""
+SEED: Final = 1  # of the runs
 SLOW: Final = 1.0  # [s] of one answer; above that a study takes much longer
 
 
 def check_measure(
-    measure: str | Callable[[], RunMeasure], options: Mapping[str, Any] | None = None
+    measure: str | Callable[[], RunMeasure],
+    options: Mapping[str, Any] | None = None,
+    *,
+    slow: float = SLOW,
 ) -> Outcome:
-    """See that a measure keeps what every measure promises.
+    """See that a measure keeps what every measure promises, on runs of our models.
+
+    One of a user's own model is tried with that.
 
     Args:
         measure: By name, as in a study, or its class.
         options: It has none.
-
-    Raises:
-        BrokenPromises: it does not; a line for each promise.
-        ConfigError: there is none of that name, or options were given.
-    """
-    if options:
-        raise ConfigError(f"measure {measure!r} has no option {next(iter(options))!r}; it has none")
-    if isinstance(measure, str):
-        return kept(try_measure(type(load_measure(measure))))
-    return kept(try_measure(measure))
-
-
-def try_measure(make: Callable[[], RunMeasure], seed: int = 1, slow: float = SLOW) -> Outcome:
-    """Try a measure on runs of our models; one of a user's own model is tried with that.
-
-    Args:
-        make: Makes a copy.
-        seed: Of the runs.
         slow: An answer that takes longer earns a warning [s].
 
     Raises:
-        ConfigError: it cannot be made, or reads none of our models.
+        BrokenPromises: it does not; a line for each promise.
+        ConfigError: there is none of that name, it cannot be made, it reads none of our models,
+            or options were given.
     """
+    if options:
+        raise ConfigError(f"measure {measure!r} has no option {next(iter(options))!r}; it has none")
+    make = type(load_measure(measure)) if isinstance(measure, str) else measure
     known = [name for name in MODELS if reads(make(), name)]
     if not known:
         raise ConfigError(f"should read one of our models to be tried: models = {tuple(MODELS)}")
-    trial = _Trial(make, known, seed)
-    found: dict[str, list[str]] = {}
-    for promise, case in trial.all():
-        found.setdefault(promise, []).append(case)
-    warnings = []
-    if not found and not any(map(math.isfinite, trial.answers)):
-        warnings.append("says nothing of any run that was tried")
-    if max(trial.took, default=0.0) > slow:
-        warnings.append(f"is slow: {max(trial.took):.2g} s an answer; should be {slow:g} s")
-    broken = tuple(line(promise, cases) for promise, cases in found.items())
-    return Outcome(broken, tuple(warnings), len(trial.took), max(trial.took, default=0.0))
+    trial = _Trial(make, known)
+    broken = broken_in(part_by_part((trial.says_what_it_is, trial.answer_all)))
+    slowest = max(trial.took, default=0.0)
+    is_mute = not broken and not any(map(math.isfinite, trial.answers))
+    warnings = ["says nothing of any run that was tried"] * is_mute
+    return kept(broken, warnings + is_slow(slowest, slow, "an answer"), len(trial.took), slowest)
 
 
 class _Trial:
@@ -85,16 +73,13 @@ class _Trial:
         answers: What it said of each run, nan for nothing.
     """
 
-    def __init__(self, make: Callable[[], RunMeasure], models: list[str], seed: int) -> None:
-        self._make, self._models, self._seed = make, models, seed
+    def __init__(self, make: Callable[[], RunMeasure], models: list[str]) -> None:
+        self._make, self._models = make, models
         self._used = make()
         self.took, self.answers = list[float](), list[float]()
 
-    def all(self) -> Iterator[Case]:
-        """Every promise that is broken, with a case."""
-        return part_by_part((self._says_what_it_is, self._answers))
-
-    def _says_what_it_is(self) -> Iterator[Case]:
+    def says_what_it_is(self) -> Iterator[Case]:
+        """Its name, its meaning and its bounds."""
         about = self._used.about
         if not about.meaning.strip():
             yield "does not say what it means", f"about.meaning of {about.name!r} is empty"
@@ -104,14 +89,15 @@ class _Trial:
         if any(about.name == c.name for name in self._models for c in MODELS[name].columns["runs"]):
             yield "is called as another measure is", about.name
 
-    def _answers(self) -> Iterator[Case]:
+    def answer_all(self) -> Iterator[Case]:
+        """What it says of short runs of all models that it reads."""
         for name in self._models:
             for scenario, changes in SHORT[name]:
                 document = scenarios.load(scenario)
                 model = model_of(document)
                 built = model.build(document, changes)
-                runs = [model.simulate(built, self._seed) for _ in range(2)]
-                yield from self._of_run(model, runs, f"of {scenario}, seed {self._seed}")
+                runs = [model.simulate(built, SEED) for _ in range(2)]
+                yield from self._of_run(model, runs, f"of {scenario}, seed {SEED}")
 
     def _of_run(self, model: Model[Any], runs: list[Any], where: str) -> Iterator[Case]:
         """What it says of a run, of the same once more, and of the same run made anew."""

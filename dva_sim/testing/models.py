@@ -12,38 +12,30 @@ from typing import Any, Final
 from dva_sim.kernel.config import Document
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.simulation.models import Model, Tables, model_of
-from dva_sim.testing.promises import Case, Outcome, kept, line, part_by_part
+from dva_sim.testing.promises import Case, Outcome, broken_in, is_slow, kept, part_by_part
 
 SEEDS: Final = (1, 2, 3)
 SLOW: Final = 60.0  # [s] of one run; above that it earns a warning
 FACTORS: Final = (0.0, 0.5, 2.0)  # by which each number of the scenario is changed in turn
 
 
-def check_model(name: str, options: Mapping[str, Any] | None = None) -> Outcome:
+def check_model(
+    name: str, options: Mapping[str, Any] | None = None, *, slow: float = SLOW
+) -> Outcome:
     """See that a model keeps what every model promises.
+
+    It is tried with the scenario that its defaults and some keys make.
 
     Args:
         name: Of the model, as in a scenario.
         options: Keys of its scenario; those that have no default must be there.
+        slow: A run that takes longer earns a warning [s].
 
     Raises:
         BrokenPromises: it does not; a line for each promise.
         ConfigError: there is no such model, or no such scenario of it.
     """
-    return kept(try_model(name, options or {}))
-
-
-def try_model(name: str, keys: Mapping[str, Any], slow: float = SLOW) -> Outcome:
-    """Try a model with the scenario that some keys make of its defaults.
-
-    Args:
-        name: Of the model, as in a scenario.
-        keys: Of the scenario; those that have no default must be there.
-        slow: A run that takes longer earns a warning [s].
-
-    Raises:
-        ConfigError: there is no such model, or no such scenario of it.
-    """
+    keys = options or {}
     document = Document({"model": name}, Path("scenario.yaml").absolute())
     model = model_of(document)
     try:
@@ -51,17 +43,12 @@ def try_model(name: str, keys: Mapping[str, Any], slow: float = SLOW) -> Outcome
     except ConfigError as error:
         raise ConfigError(f"{error.problem}; --set gives keys of its scenario") from None
     trial = _Trial(model, scenario, document, keys)
-    found: dict[str, list[str]] = {}
-    for promise, case in trial.all():
-        found.setdefault(promise, []).append(case)
+    broken = broken_in(part_by_part(trial.parts))
     slowest = max(trial.took, default=0.0)
-    warnings = []
-    if slowest > slow:
-        warnings.append(f"is slow: {slowest:.2g} s a run; should be {slow:g} s")
-    if not found and len(set(trial.seen)) == 1:
+    warnings = is_slow(slowest, slow, "a run")
+    if not broken and len(set(trial.seen)) == 1:
         warnings.append("comes to the same with every seed")
-    broken = tuple(line(promise, cases) for promise, cases in found.items())
-    return Outcome(broken, tuple(warnings), len(trial.took), slowest)
+    return kept(broken, warnings, len(trial.took), slowest)
 
 
 class _Trial:
@@ -78,10 +65,7 @@ class _Trial:
         self._model, self._scenario = model, scenario
         self._document, self._keys = document, keys
         self.took, self.seen = list[float](), list[str]()
-
-    def all(self) -> Iterator[Case]:
-        """Every promise that is broken, with a case."""
-        return part_by_part((self._travels, self._runs, self._columns, self._rehearses))
+        self.parts = self._travels, self._runs, self._columns, self._rehearses
 
     def _run(self, scenario: Any, seed: int) -> Tables:
         started = time.perf_counter()

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from itertools import pairwise
 from typing import Any, Final, NamedTuple
 
 import numpy as np
+from shapely import LineString, Point
 
 from dva_sim.agents.observation import Observation
 from dva_sim.agents.operator.strategies import (
@@ -26,7 +26,7 @@ from dva_sim.agents.operator.strategies import (
 from dva_sim.agents.population import Person, Population, draw_person, median_person
 from dva_sim.agents.route_following import Route
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.testing.promises import Case, Outcome, kept, line, part_by_part
+from dva_sim.testing.promises import Case, Outcome, broken_in, kept, part_by_part
 
 FRAME: Final = 0.1  # from one picture to the next [s]
 ROBOTS: Final = (Reach(0.5, math.pi / 6), Reach(0.8, 1.4, 0.56))  # one turns on the spot
@@ -55,48 +55,34 @@ GUESSES: Final = (0.0, 0.05, 0.4, 3.0, 60.0)  # of the delay [s]
 
 
 def check_operator(
-    operator: str | Callable[..., Driver], options: Mapping[str, Any] | None = None
+    operator: str | Callable[..., Driver],
+    options: Mapping[str, Any] | None = None,
+    *,
+    slow: float = SLOW,
 ) -> Outcome:
     """See that a way of steering keeps what all promise.
+
+    It is tried on things seen at random, then in drives of an ideal robot. What users bring is
+    held within the limits when it runs; here it is tried without that, so that nothing is hidden.
 
     Args:
         operator: A strategy by name, as in a scenario, or its class.
         options: Keyword arguments of its constructor, besides person and reach.
-
-    Raises:
-        BrokenPromises: it does not; a line for each promise.
-        ConfigError: there is none of that name, or it cannot be made with these options.
-    """
-    return kept(try_operator(load_strategy(operator, options)))
-
-
-def try_operator(
-    make: Callable[[Person, Reach], Driver], seed: int = 1, slow: float = SLOW
-) -> Outcome:
-    """Try a way of steering: on things seen at random, then in drives of an ideal robot.
-
-    What users bring is held within the limits when it runs; here it is tried without that, so
-    that nothing is hidden.
-
-    Args:
-        make: Makes the strategy for a person, and what it steers.
-        seed: Of what is seen.
         slow: An answer that takes longer earns a warning [s].
 
     Raises:
-        ConfigError: it cannot be made, or sees nothing: the oracle.
+        BrokenPromises: it does not; a line for each promise.
+        ConfigError: there is none of that name, it cannot be made with these options, or it sees
+            nothing: the oracle.
     """
-    found: dict[str, list[str]] = {}
-    trial = _Trial(make, np.random.default_rng(seed))
+    trial = _Trial(load_strategy(operator, options), np.random.default_rng(1))
     trial.new(median_person(Population()), ROBOTS[0])
-    for promise, case in trial.all():
-        found.setdefault(promise, []).append(case)
+    broken = broken_in(part_by_part(trial.parts))
     slowest = min(trial.took, default=0.0)
     warnings = [f"is slow: {what}" for what in trial.late]
     if slowest > slow:
         warnings.append(f"thinks slowly: {slowest:.2g} s an answer; should be {slow:g} s")
-    broken = tuple(line(promise, cases) for promise, cases in found.items())
-    return Outcome(broken, tuple(warnings), trial.count, slowest)
+    return kept(broken, warnings, trial.count, slowest)
 
 
 class _Step(NamedTuple):
@@ -123,10 +109,7 @@ class _Trial:
         population = Population()
         drawn = (draw_person(population, 1, index) for index in range(2))
         self._persons = (median_person(population), *drawn)
-
-    def all(self) -> Iterator[Case]:
-        """Every promise that is broken, with a case."""
-        return part_by_part((self._robots, self._cursors, self._alike, self._blind, self._ways))
+        self.parts = self._robots, self._cursors, self._alike, self._blind, self._ways
 
     def new(self, person: Person, reach: Reach) -> Strategy:
         """The strategy itself.
@@ -137,7 +120,9 @@ class _Trial:
         made = self._make(person, reach)
         if not isinstance(made, Strategy):
             raise ConfigError("is told the truth, and sees nothing: there is nothing to try")
-        return made.strategy if isinstance(made, GuardedStrategy) else made
+        while isinstance(made, GuardedStrategy):  # more than once, where it was loaded before
+            made = made.strategy
+        return made
 
     # --- whatever is seen --------------------------------------------------------------
 
@@ -210,11 +195,12 @@ class _Trial:
     def _ways(self) -> Iterator[Case]:
         """Ways to their end, within a wide corridor; and there it stays."""
         for name, corners in ROUTES.items():
+            way = LineString(corners)
             for delay in DELAYS:
                 case = f"{name}, delay {delay:g} s"
                 full = _way(corners).length / ROBOTS[0].speed
                 track = self._drive(self._persons[0], ROBOTS[0], name, delay, PATIENCE * full)
-                off = max(_off(corners, step) for step in track)
+                off = max(way.distance(Point(step.x, step.y)) for step in track)
                 arrived = [s.time for s in track if math.dist((s.x, s.y), corners[-1]) < 1.5 * STOP]
                 if off > CORRIDOR:
                     yield "leaves a wide corridor", f"{case}: by {off:.1f} m"
@@ -281,17 +267,3 @@ def _is_pair(got: Any) -> bool:
         return math.isfinite(one) and math.isfinite(other)
     except (TypeError, ValueError):
         return False
-
-
-def _off(corners: Sequence[tuple[float, float]], step: _Step) -> float:
-    """Distance of a place from a way [m]."""
-    return min(_from(leg, step.x, step.y) for leg in pairwise(corners))
-
-
-def _from(leg: tuple[tuple[float, float], tuple[float, float]], x: float, y: float) -> float:
-    """Distance of a place from a straight piece [m]."""
-    (ax, ay), (bx, by) = leg
-    dx, dy = bx - ax, by - ay
-    share = ((x - ax) * dx + (y - ay) * dy) / (dx * dx + dy * dy)
-    share = min(max(share, 0.0), 1.0)
-    return math.hypot(ax + share * dx - x, ay + share * dy - y)

@@ -23,7 +23,7 @@ from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode, encode
 from dva_sim.protocol.errors import ProtocolError
 from dva_sim.protocol.exchange import Outbox
-from dva_sim.testing.promises import Case, Outcome, kept, line, part_by_part
+from dva_sim.testing.promises import Case, Outcome, broken_in, is_slow, kept, part_by_part
 
 PHONE, ROBOT = "02:00:00:03:00:01", "02:00:00:01:00:01"
 RATE: Final = 10.0  # commands per second
@@ -42,41 +42,31 @@ SLOW: Final = 50e-6  # [s] of one command; above that an episode is no longer fa
 
 
 def check_pattern(
-    pattern: str | Callable[..., Pattern], options: Mapping[str, Any] | None = None
+    pattern: str | Callable[..., Pattern],
+    options: Mapping[str, Any] | None = None,
+    *,
+    slow: float = SLOW,
 ) -> Outcome:
     """See that a messaging pattern keeps what every pattern promises.
+
+    It is tried on good links and bad ones, with a robot that is slow, gone, or refuses.
 
     Args:
         pattern: By name, as in a scenario, or its class.
         options: Keyword arguments of its constructor.
+        slow: A command that takes longer earns a warning [s].
 
     Raises:
         BrokenPromises: it does not; a line for each promise.
         ConfigError: there is none of that name, or it cannot be made with these options.
     """
-    return kept(try_pattern(load_pattern(pattern, options)))
-
-
-def try_pattern(make: Callable[[], Pattern], slow: float = SLOW) -> Outcome:
-    """Try a pattern: on good links and bad ones, with a robot that is slow, gone, or refuses.
-
-    Args:
-        make: Makes a copy, as for each drive.
-        slow: A command that takes longer earns a warning [s].
-
-    Raises:
-        ConfigError: it cannot be made.
-    """
+    make = load_pattern(pattern, options)
     make()
-    trial, found = _Trial(make), dict[str, list[str]]()
-    for promise, case in trial.all():
-        found.setdefault(promise, []).append(case)
+    trial = _Trial(make)
+    broken = broken_in(part_by_part(trial.parts))
     slowest = min(trial.took, default=0.0)
-    warnings = [] if found else list(trial.doubts)
-    if slowest > slow:
-        warnings.append(f"is slow: {slowest:.2g} s a command; should be {slow:g} s")
-    broken = tuple(line(promise, cases) for promise, cases in found.items())
-    return Outcome(broken, tuple(warnings), trial.count, slowest)
+    doubts = [] if broken else trial.doubts
+    return kept(broken, doubts + is_slow(slowest, slow, "a command"), trial.count, slowest)
 
 
 @dataclass(frozen=True)
@@ -281,12 +271,9 @@ class _Trial:
     def __init__(self, make: Callable[[], Pattern]) -> None:
         self._make = make
         self.count, self.took, self.doubts = 0, list[float](), list[str]()
-
-    def all(self) -> Iterator[Case]:
-        """Every promise that is broken, with a case."""
         links = self._facts, self._good_links, self._copies, self._bad_link
         robots = self._slow_robot, self._gone, self._back_again, self._refused
-        return part_by_part((*links, *robots, self._after_the_end))
+        self.parts = (*links, *robots, self._after_the_end)
 
     def _drive(self, delay: float, loss: float = 0.0, **of_drive: Any) -> TriedDrive:
         """A drive that has just begun, over links of so many seconds and losses."""

@@ -6,10 +6,10 @@ They are ordinary ones, and all the corners that a run can come to.
 from __future__ import annotations
 
 import operator
+import pickle
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from functools import partial
 from itertools import cycle, islice
 from typing import Any, Final, Literal
 
@@ -29,7 +29,7 @@ from dva_sim.core.dispatch import (
 )
 from dva_sim.kernel.plugins import FAILURES
 from dva_sim.protocol.messages import EVENT_KINDS
-from dva_sim.testing.promises import Case, Outcome, kept, line, said
+from dva_sim.testing.promises import Case, Outcome, is_slow, kept, line, said
 
 _PLACE: Final = 400.0  # edge of the site [m]
 _PACE: Final = {"guard": (1.3, 20.0), "robot": (0.35, 4.0)}  # [m/s], mobilisation [s]
@@ -240,49 +240,41 @@ TOO_MANY_ROBOTS: Final = "sends more robots than operators are free; the core dr
 
 
 def check_policy(
-    policy: str | Callable[..., Policy], options: Mapping[str, Any] | None = None
+    policy: str | Callable[..., Policy],
+    options: Mapping[str, Any] | None = None,
+    *,
+    count: int = SITUATIONS,
+    slow: float = SLOW,
 ) -> Outcome:
     """See that a policy keeps what every policy promises.
+
+    Two of it are made, and shown the same generated situations, all kinds in turn, with the same
+    luck: they must advise the same. What the quicker one took is how long a decision takes,
+    without what is only done once.
 
     Args:
         policy: By name, as in a scenario, or its class.
         options: Keyword arguments of its constructor.
+        count: How many situations.
+        slow: A decision that takes longer earns a warning [s].
 
     Raises:
         BrokenPromises: it does not; a line for each promise.
         ConfigError: there is none of that name, or it cannot be made with these options.
     """
-    return kept(try_policy(partial(load_policy, policy, options)))
-
-
-def try_policy(
-    make: Callable[[], Policy], count: int = SITUATIONS, seed: int = 1, slow: float = SLOW
-) -> Outcome:
-    """Try a policy in generated situations, all kinds in turn.
-
-    Two of it are made, and shown the same with the same luck: they must advise the same. What
-    the quicker one took is how long a decision takes, without what is only done once.
-
-    Args:
-        make: Makes the policy.
-        count: How many situations.
-        seed: Of their luck.
-        slow: A decision that takes longer earns a warning [s].
-    """
-    policy, twin = make(), make()
+    one, twin = (load_policy(policy, options) for _ in range(2))
     found: dict[str, list[str]] = {}
     slowest = 0.0, ""
-    for number, (kind, situation) in enumerate(situations(policy, count, seed), start=1):
+    for number, (kind, situation) in enumerate(situations(one, count, 1), start=1):
         where = f"situation {number} ({kind})"
-        answer, other = _ask(policy, situation, number), _ask(twin, situation, number)
+        answer, other = _ask(one, situation, number), _ask(twin, situation, number)
         slowest = max(slowest, (min(answer.took, other.took), where))
-        for promise, case in _broken(policy, situation, answer, other):
+        for promise, case in _broken(one, situation, answer, other):
             found.setdefault(promise, []).append(f"{case}in {where}")
-    warnings = [line(p, cases) for p, cases in found.items() if p == TOO_MANY_ROBOTS]
-    if slowest[0] > slow:
-        warnings.append(f"is slow: {slowest[0]:.2g} s in {slowest[1]}; should be {slow:g} s")
-    broken = tuple(line(p, cases) for p, cases in found.items() if p != TOO_MANY_ROBOTS)
-    return Outcome(broken, tuple(warnings), count, slowest[0])
+    dropped = found.pop(TOO_MANY_ROBOTS, [])
+    warnings = [line(TOO_MANY_ROBOTS, dropped)] if dropped else []
+    warnings += is_slow(slowest[0], slow, f"in {slowest[1]}")
+    return kept([line(*each) for each in found.items()], warnings, count, slowest[0])
 
 
 @dataclass(frozen=True)
@@ -404,15 +396,6 @@ def _told(place: int, task: Any) -> str:
     return f"task {place} ({task.stage}{due}, auction {task.auction or 'none'})"
 
 
-def _contents(value: Any) -> dict[str, Any]:
+def _contents(situation: Situation) -> bytes:
     """All that a situation holds, arrays as they are now."""
-    held: dict[str, Any] = {}
-    for field in fields(value):
-        inner = getattr(value, field.name)
-        if isinstance(inner, np.ndarray):
-            held[field.name] = (inner.shape, inner.tobytes())
-        elif field.name == "cover" and inner is not None:
-            held[field.name] = _contents(inner)
-        else:
-            held[field.name] = inner
-    return held
+    return pickle.dumps([getattr(situation, field.name) for field in fields(situation)])

@@ -1,12 +1,19 @@
-"""What came of trying something that users bring, and problems that were found in a file."""
+"""Kinds of things that are tried rather than read, and what comes of trying one.
+
+`TRIALS` is an index, not the things: modules are named, and imported when one of their kind is
+asked for. To add a kind, add it there, and the module whose `check_KIND` tries one.
+"""
 
 from __future__ import annotations
 
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Final
 
-from dva_sim.kernel.plugins import FAILURES
+if TYPE_CHECKING:
+    from dva_sim.kernel.plugins import Plugins
 
 Case = tuple[str, str]  # a promise in words, and what happened
 
@@ -40,19 +47,47 @@ class BrokenPromises(AssertionError):
         self.outcome = outcome
 
 
-def kept(outcome: Outcome) -> Outcome:
-    """What came of it, if all promises were kept.
+def kept(broken: Sequence[str], warnings: Sequence[str], tries: int, slowest: float) -> Outcome:
+    """What came of it, if all promises were kept; see `Outcome`.
 
     Raises:
         BrokenPromises: they were not.
     """
-    if outcome.broken:
+    outcome = Outcome(tuple(broken), tuple(warnings), tries, slowest)
+    if broken:
         raise BrokenPromises(outcome)
     return outcome
 
 
+def tried(check: Callable[..., Outcome], *given: Any, **options: Any) -> Outcome:
+    """What comes of a check, whether all promises are kept or not.
+
+    Raises:
+        ConfigError: there is nothing to try.
+    """
+    try:
+        return check(*given, **options)
+    except BrokenPromises as error:
+        return error.outcome
+
+
+def broken_in(cases: Iterable[Case]) -> list[str]:
+    """A line for each promise that is broken, with the first case of it."""
+    found: dict[str, list[str]] = {}
+    for promise, case in cases:
+        found.setdefault(promise, []).append(case)
+    return [line(promise, own) for promise, own in found.items()]
+
+
+def is_slow(slowest: float, slow: float, what: str) -> list[str]:
+    """A warning where one takes longer than it should [s]."""
+    return [f"is slow: {slowest:.2g} s {what}; should be {slow:g} s"] * (slowest > slow)
+
+
 def part_by_part(parts: Iterable[Callable[[], Iterable[Case]]]) -> Iterator[Case]:
     """What the first part finds broken that finds anything: each builds on those before it."""
+    from dva_sim.kernel.plugins import FAILURES  # late: start-up
+
     for part in parts:
         try:
             broken = list(part())
@@ -76,41 +111,71 @@ def said(error: BaseException) -> str:
     return f"{text} ({frame.filename.rsplit('/', 1)[-1]}:{frame.lineno})"
 
 
-@dataclass(frozen=True, order=True)
-class Problem:
-    """One mistake.
+@dataclass(frozen=True)
+class CheckedKind:
+    """How one kind is tried.
 
     Attributes:
-        line: Line in the file, from 1.
-        column: Column in that line, from 1, in characters.
-        text: What is wrong; what would be right.
-        file: The file that holds it, if not the one that was checked.
+        kind: The word for one: `dva-sim check KIND NAME`.
+        room: The module whose `PLUGINS` tells what there is of it, below `dva_sim`.
+        module: The one here whose `check_KIND` tries one.
+        told: How it was tried, in words, with `{tries}`, and `{ms}` or `{us}` of the slowest.
+        folder: Of the files that are named, where it is not the class itself that is.
     """
 
-    line: int
-    column: int
-    text: str
-    file: str | None = None
+    kind: str
+    room: str
+    module: str
+    told: str
+    folder: str = ""
+
+    @property
+    def many(self) -> str:
+        """What several are called."""
+        return plural(self.kind)
+
+    def load_plugins(self) -> Plugins[Any]:
+        """What users may add of this kind."""
+        found: Plugins[Any] = import_module(f"dva_sim.{self.room}").PLUGINS
+        return found
+
+    def known(self) -> list[str]:
+        """Names that are shipped or installed."""
+        from dva_sim.kernel.resources import available  # late: start-up
+
+        return sorted(available(self.folder)) if self.folder else self.load_plugins().known()
+
+    def load_check(self) -> Callable[..., Outcome]:
+        """What users call in tests of their own, by name or as a class, with options."""
+        module = import_module(f"dva_sim.testing.{self.module}")
+        found: Callable[..., Outcome] = getattr(module, f"check_{self.kind}")
+        return found
+
+    def ways(self, outcome: Outcome) -> str:
+        """How it was tried, in words."""
+        slowest = outcome.slowest
+        return self.told.format(tries=outcome.tries, ms=1e3 * slowest, us=1e6 * slowest)
 
 
-def at(data: bytes, offset: int, text: str) -> Problem:
-    """The mistake at a byte of a text in UTF-8, whichever way its lines end."""
-    before = data[:offset].decode("utf-8", "replace").replace("\r\n", "\n").replace("\r", "\n")
-    line_start = before.rfind("\n") + 1
-    return Problem(before.count("\n") + 1, len(before) - line_start + 1, text)
+def plural(kind: str) -> str:
+    """What several of a kind are called."""
+    return f"{kind.removesuffix('y')}ies" if kind.endswith("y") else f"{kind}s"
 
 
-def not_text(data: bytes) -> Problem | None:
-    """The first byte that text in UTF-8 cannot have, if there is one."""
-    zero = data.find(0)
-    try:
-        data.decode("utf-8")
-    except UnicodeDecodeError as error:
-        if zero < 0 or error.start < zero:
-            found = f"byte 0x{data[error.start]:02X} is not text in UTF-8"
-            return at(data, error.start, f"{found}; the file should be in UTF-8")
-    return (
-        at(data, zero, "a zero byte is not text; the file should be in UTF-8")
-        if zero >= 0
-        else None
+_US, _READINGS = "{us:.0f} microseconds", "{us:.1f} microseconds a reading"
+_STRATEGIES, _FIGURES = "agents.operator.strategies.loading", "experiments.report.figures.registry"
+TRIALS: Final[dict[str, CheckedKind]] = {
+    row[0]: CheckedKind(*row)
+    for row in (
+        ("pattern", "network.patterns", "patterns", f"{{tries}} drives, {_US} a command"),
+        ("policy", "core.dispatch", "policies", "{tries} situations, slowest decision {ms:.1f} ms"),
+        ("operator", _STRATEGIES, "operators", f"{{tries}} drives, {_US} a frame"),
+        ("filter", "agents.tilt.filters", "tilt", f"{{tries}} runs, {_READINGS}"),
+        ("mapping", "agents.tilt.mappings", "tilt", f"{{tries}} runs, {_READINGS}"),
+        ("hazard", "worlds.hazards.registry", "hazards", f"{{tries}} questions, {_US} an answer"),
+        ("measure", "simulation.run_measures", "measures", "{tries} answers, slowest {ms:.1f} ms"),
+        ("model", "simulation.models", "models", "{tries} runs, slowest {ms:.0f} ms"),
+        ("figure", _FIGURES, "figures", "{tries} drawings, slowest {ms:.0f} ms"),
+        ("robot", "worlds.drives", "robots", f"{{tries}} drives, {_US} a tick", "agents/robots"),
     )
+}

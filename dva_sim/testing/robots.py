@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from dva_sim.agents.robot.profile import RobotProfile, load_robot
-from dva_sim.testing.promises import Case, Outcome, kept, line, part_by_part
+from dva_sim.testing.promises import Case, Outcome, broken_in, is_slow, kept, part_by_part
 from dva_sim.worlds.drives import LONGEST_TICK, Drive, DriveSpec, GuardedDrive, load_drive
 from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.physics import World, hall
@@ -27,50 +27,39 @@ HOSTILE: Final = (math.nan, math.inf, -math.inf, 1e308, -1e308, -1.0, 1e-300, 0.
 
 
 def check_robot(
-    robot: str | Callable[..., Drive], options: Mapping[str, Any] | None = None
+    robot: str | Callable[..., Drive],
+    options: Mapping[str, Any] | None = None,
+    *,
+    slow: float = SLOW,
 ) -> Outcome:
-    """See that a robot's motors keep what all promise, alone and in its body.
-
-    Args:
-        robot: A profile, by name or path; or motors, as a profile names them or as a class,
-            in the body of a profile that says nothing else.
-        options: Of the motors.
-
-    Raises:
-        BrokenPromises: they do not; a line for each promise.
-        ConfigError: there is none of that name, or it cannot be made with these options.
-    """
-    if callable(robot):
-        usual = RobotProfile().drive_spec()
-        return kept(try_robot(replace(usual, drive=load_drive(robot, options))))
-    profile = RobotProfile(drive=robot) if ".py" in robot else load_robot(robot)
-    changed = profile.model_copy(update={"options": {**profile.options, **(options or {})}})
-    return kept(try_robot(changed.drive_spec()))
-
-
-def try_robot(spec: DriveSpec, seed: int = 1, slow: float = SLOW) -> Outcome:
-    """Try the motors of a robot, first by themselves, then in its body.
+    """See that a robot's motors keep what all promise, first by themselves, then in its body.
 
     What users bring is held within the limits when it runs; here it is tried without that, so
     that nothing is hidden.
 
     Args:
-        spec: The robot.
-        seed: Of the commands.
+        robot: A profile, by name or path; or motors, as a profile names them or as a class,
+            in the body of a profile that says nothing else.
+        options: Of the motors.
         slow: An answer that takes longer earns a warning [s].
 
     Raises:
-        ConfigError: the motors cannot be made.
+        BrokenPromises: they do not; a line for each promise.
+        ConfigError: there is none of that name, or it cannot be made with these options.
     """
+    spec = _spec(robot, options or {})
     spec.drive(spec)
-    found: dict[str, list[str]] = {}
-    trial = _Trial(spec, np.random.default_rng(seed))
-    for promise, case in trial.all():
-        found.setdefault(promise, []).append(case)
+    trial = _Trial(spec, np.random.default_rng(1))
+    broken = broken_in(part_by_part(trial.parts))
     slowest = min(trial.took, default=0.0)
-    warnings = (f"is slow: {slowest:.2g} s an answer; should be {slow:g} s",) * (slowest > slow)
-    broken = tuple(line(promise, cases) for promise, cases in found.items())
-    return Outcome(broken, warnings, trial.count, slowest)
+    return kept(broken, is_slow(slowest, slow, "an answer"), trial.count, slowest)
+
+
+def _spec(robot: str | Callable[..., Drive], options: Mapping[str, Any]) -> DriveSpec:
+    if callable(robot):
+        return replace(RobotProfile().drive_spec(), drive=load_drive(robot, options))
+    profile = RobotProfile(drive=robot) if ".py" in robot else load_robot(robot)
+    return profile.model_copy(update={"options": {**profile.options, **options}}).drive_spec()
 
 
 @dataclass
@@ -104,17 +93,15 @@ class _Trial:
     def __init__(self, spec: DriveSpec, rng: np.random.Generator) -> None:
         self.spec, self.rng = spec, rng
         self.count, self.took = 0, list[float]()
-
-    def all(self) -> Iterator[Case]:
-        """Every promise that is broken, with a case."""
-        return part_by_part(
-            (self._set_points, self._answers, self._drives, self._stops, self._obeys, self._walls)
-        )
+        alone = self._set_points, self._answers, self._drives, self._stops
+        self.parts = (*alone, self._obeys, self._walls)
 
     def _new(self) -> Drive:
         """The motors themselves."""
         drive = self.spec.drive(self.spec)
-        return drive.drive if isinstance(drive, GuardedDrive) else drive
+        while isinstance(drive, GuardedDrive):  # more than once, where it was loaded before
+            drive = drive.drive
+        return drive
 
     def _command(self) -> tuple[float, float]:
         """Something within the limits; often one of the limits, or nothing."""

@@ -12,8 +12,7 @@ import numpy as np
 from dva_sim.agents.tilt import Filter, Mapping, filters, load_filter, load_mapping
 from dva_sim.agents.tilt.calibration import LEVELS, MAX_TURN_DEG
 from dva_sim.agents.tilt.filters import is_age
-from dva_sim.kernel.plugins import FAILURES
-from dva_sim.testing.promises import Case, Outcome, kept, line, said
+from dva_sim.testing.promises import Case, Outcome, broken_in, is_slow, kept, part_by_part
 
 Pair = tuple[float, float]
 Part = Callable[[], Iterator[Case]]
@@ -30,84 +29,58 @@ HOSTILE: Final = (0.0, 1e-300, -1e-300, 1e3, -1e3, 1e9, -1e9)
 
 
 def check_filter(
-    filter_: str | Callable[..., Filter], options: dict[str, Any] | None = None
+    filter_: str | Callable[..., Filter],
+    options: dict[str, Any] | None = None,
+    *,
+    slow: float = SLOW,
 ) -> Outcome:
     """See that a filter keeps what all promise.
+
+    It is tried sample by sample; one that works in batches, batch by batch.
 
     Args:
         filter_: By name, as a phone names it, or its class.
         options: Keyword arguments of its constructor, besides the time between samples.
+        slow: A sample that takes longer earns a warning [s].
 
     Raises:
         BrokenPromises: it does not; a line for each promise.
         ConfigError: there is none of that name, or no phone could work with it.
     """
-    return kept(try_filter(load_filter(filter_, options)))
+    make = load_filter(filter_, options)
+    filters.check_filter(make(PERIOD))
+    trial = _FilterTrial(lambda: make(PERIOD), np.random.default_rng(1))
+    return _concluded(trial.parts, trial.sticks, trial.took, slow)
 
 
 def check_mapping(
-    mapping: str | Callable[..., Mapping], options: dict[str, Any] | None = None
+    mapping: str | Callable[..., Mapping],
+    options: dict[str, Any] | None = None,
+    *,
+    slow: float = SLOW,
 ) -> Outcome:
-    """See that a mapping keeps what all promise; see `check_filter`.
+    """See that a mapping keeps what all promise, by itself and with a hand that steers.
+
+    See `check_filter`.
 
     Raises:
         BrokenPromises: it does not; a line for each promise.
         ConfigError: there is none of that name, or it cannot be made with these options.
     """
-    return kept(try_mapping(load_mapping(mapping, options)))
-
-
-def try_filter(make: Callable[[float], Filter], seed: int = 1, slow: float = SLOW) -> Outcome:
-    """Try a filter, sample by sample; one that works in batches, batch by batch.
-
-    Args:
-        make: Makes a copy, told the time between samples.
-        seed: Of the samples.
-        slow: A sample that takes longer earns a warning [s].
-
-    Raises:
-        ConfigError: it cannot be made, or no phone could work with it.
-    """
-    filters.check_filter(make(PERIOD))
-    trial = _FilterTrial(lambda: make(PERIOD), np.random.default_rng(seed))
-    return _outcome(trial.parts, trial.sticks, trial.took, slow)
-
-
-def try_mapping(make: Callable[[], Mapping], seed: int = 1, slow: float = SLOW) -> Outcome:
-    """Try a mapping, by itself and with a hand that steers by the display.
-
-    Args:
-        make: Makes a copy.
-        seed: Of the readings.
-        slow: A reading that takes longer earns a warning [s].
-
-    Raises:
-        ConfigError: it cannot be made.
-    """
+    make = load_mapping(mapping, options)
     make()
-    trial = _MappingTrial(make, np.random.default_rng(seed))
-    return _outcome(trial.parts, lambda: iter(()), trial.took, slow)
+    trial = _MappingTrial(make, np.random.default_rng(1))
+    return _concluded(trial.parts, lambda: iter(()), trial.took, slow)
 
 
-def _outcome(
+def _concluded(
     parts: Sequence[Part], doubts: Callable[[], Iterator[str]], took: list[float], slow: float
 ) -> Outcome:
     """What came of all parts; after one that is broken the next ones mean nothing."""
-    found: dict[str, list[str]] = {}
-    for part in parts:
-        try:
-            for promise, case in part():
-                found.setdefault(promise, []).append(case)
-        except FAILURES as error:
-            found.setdefault("raises", []).append(said(error))
-        if found:
-            break
+    broken = broken_in(part_by_part(parts))
     slowest = min(took, default=0.0)
-    warnings = [] if found else list(doubts())
-    if slowest > slow:
-        warnings.append(f"is slow: {slowest:.2g} s a reading; should be {slow:g} s")
-    broken = tuple(line(promise, cases) for promise, cases in found.items())
-    return Outcome(broken, tuple(warnings), RUNS, slowest)
+    warnings = [] if broken else list(doubts())
+    return kept(broken, warnings + is_slow(slowest, slow, "a reading"), RUNS, slowest)
 
 
 class _FilterTrial:

@@ -1,6 +1,7 @@
-"""What every validation comes to, and what it leaves behind: tables, figures and a page.
+"""How every validation plays its jobs, what it comes to, and what it leaves behind.
 
-Each kind judges by rules of its own and puts its lines into words; from there on all are alike.
+Each kind judges by rules of its own and puts its lines into words; all else is alike: runs that
+are spread over processes, tables, figures and a page.
 """
 
 from __future__ import annotations
@@ -8,16 +9,74 @@ from __future__ import annotations
 import base64
 import csv
 import io
+import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, cast
 
-from dva_sim.experiments.report.figures import Drawn
-from dva_sim.kernel.errors import DvaSimError
+from dva_sim.experiments.execution import executors
+from dva_sim.experiments.execution.scheduling import run_all
+from dva_sim.experiments.report.figures.style import Drawn, finish
+from dva_sim.experiments.study.cell_grid import StudyJob
+from dva_sim.kernel.config import load_yaml
+from dva_sim.kernel.errors import DvaSimError, RunsFailed
+from dva_sim.simulation.models import AnyScenario, Tables
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 Row = dict[str, Any]
+Key = tuple[str, int]
+Progress = Callable[[int], None]
 _KINDS = {str: "VARCHAR", float: "DOUBLE", int: "BIGINT", bool: "BOOLEAN"}
+
+
+def job_of(
+    name: str, seed: int, scenario: object, *, person: int = 0, **asked: str | int
+) -> StudyJob:
+    """A job of a validation.
+
+    Args:
+        name: With its seed it is no other's.
+        seed: Of its luck.
+        scenario: What is played; what needs none finds all that it is in `asked`.
+        person: Whose it is.
+        asked: What else its program has to know.
+    """
+    cell = tuple(asked.items())
+    return StudyJob(name, cell, 0, person, 0, seed, name, cast(AnyScenario, scenario))
+
+
+def play_jobs(
+    jobs: Sequence[StudyJob],
+    program: Callable[[StudyJob], Tables],
+    workers: int,
+    failed: str,
+    progress: Progress = lambda done: None,
+    count: Callable[[list[Row]], int] = lambda rows: 1,
+) -> dict[Key, list[Row]]:
+    """The rows of each job by its key.
+
+    Args:
+        jobs: What to play.
+        program: Plays one; all its rows are in a table `rows`.
+        workers: Processes.
+        failed: What is said of one that failed, with a place for its name.
+        progress: Told how much is finished.
+        count: For how much the rows of a job count there.
+
+    Raises:
+        RunsFailed: one of them failed.
+    """
+    rows: dict[Key, list[Row]] = {}
+    for batch in run_all(jobs, program, executors.local(workers)):
+        for outcome in batch:
+            if outcome.error is not None:
+                raise RunsFailed(f"{failed.format(outcome.key[0])}: {outcome.error}")
+            rows[outcome.key] = json.loads(outcome.tables or "")["rows"]
+        progress(sum(map(count, rows.values())))
+    return rows
 
 
 @dataclass(frozen=True)
@@ -118,6 +177,18 @@ class ValidationResult:
         style = study.partition("<style>")[2].partition("</style>")[0]
         template = environment.get_template(f"{self.name}.html.j2")
         return template.render(style=style, found=self, drawn=drawn)
+
+
+def captioned(figure: Figure, name: str, **numbers: object) -> Drawn:
+    """A figure with its title and caption, which are in `templates/captions.yaml`.
+
+    Args:
+        figure: What is drawn.
+        name: Of the figure.
+        numbers: That its caption has places for.
+    """
+    words = load_yaml(Path(__file__).parent / "templates/captions.yaml").data[name]
+    return finish(figure, name, words["title"], words["text"].format(**numbers))
 
 
 def short_number(value: float | None) -> str:

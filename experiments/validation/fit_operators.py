@@ -41,8 +41,7 @@ from numpy.typing import NDArray
 from dva_sim.agents.operator.published import TargetLine, lines_of, load_split, load_targets
 from dva_sim.experiments.study.robustness_grid import latin_hypercube
 from dva_sim.kernel.streams import Streams
-from dva_sim.validation.operators.experiment_runs import OperatorsSetting, play_experiments
-from dva_sim.validation.operators.experiments import EXPERIMENTS
+from dva_sim.validation.operators.experiments import EXPERIMENTS, OperatorsSetting, play_experiments
 
 HERE = Path(__file__).parent
 PEOPLE = HERE.parents[1] / "agents/people"

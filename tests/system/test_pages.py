@@ -3,7 +3,8 @@
 from pathlib import Path
 
 from dva_sim.agents.operator.strategies import load_strategy
-from dva_sim.testing.operators import try_operator
+from dva_sim.testing.operators import check_operator
+from dva_sim.testing.promises import tried
 
 PAGES = Path(__file__).parents[2]
 
@@ -13,5 +14,5 @@ def test_the_operator_on_the_page_of_agents_keeps_its_promises(tmp_path: Path) -
     blocks = [part.partition("```")[0] for part in page.split("```python\n")[1:]]
     (code,) = [block for block in blocks if "class Cautious" in block]
     (tmp_path / "mine.py").write_text(code, encoding="utf-8")
-    outcome = try_operator(load_strategy("mine.py:Cautious", base=tmp_path), slow=60.0)
+    outcome = tried(check_operator, load_strategy("mine.py:Cautious", base=tmp_path), slow=60.0)
     assert outcome.broken == ()

@@ -11,7 +11,7 @@ from command_line import call
 from dva_sim.cli import checks
 from dva_sim.experiments.study import cell_grid
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.validation.network.emulator import process, self_check
+from dva_sim.validation.network.emulator import cell, self_check
 from dva_sim.validation.network.emulator.self_check import LinkFinding
 
 ROOT = Path(__file__).parents[2]
@@ -267,7 +267,7 @@ def test_the_printed_schema_can_be_written_to_a_file(here):
 
 
 def test_the_word_link_asks_for_the_emulated_link(check, monkeypatch):
-    monkeypatch.setattr(process, "why_no_packets", lambda: "")
+    monkeypatch.setattr(cell, "why_no_packets", lambda: "")
     for found, code in ((50.2, 0), (52.0, 1)):
         finding = LinkFinding("delay, median", "ms", 50.0, found, 1.0)
         monkeypatch.setattr(self_check, "check_link", lambda finding=finding: [finding])

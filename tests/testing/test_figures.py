@@ -12,7 +12,8 @@ from dva_sim.experiments.report.figures.palette import is_of_palette
 from dva_sim.experiments.report.figures.registry import PLUGINS, SHIPPED
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.testing import figures
-from dva_sim.testing.figures import try_figure
+from dva_sim.testing.figures import check_figure
+from dva_sim.testing.promises import tried
 from dva_sim.testing.results import SHAPES
 
 FEW = {name: SHAPES[name] for name in ("two words", "no value at all")}
@@ -135,13 +136,13 @@ class Refusing(Plain):
     ],
 )
 def test_a_figure_that_breaks_a_promise_is_told_of_it(bad, promise, told):
-    outcome = try_figure(bad, shapes=FEW)
+    outcome = tried(check_figure, bad, shapes=FEW)
     assert [text for text in outcome.broken if text.startswith(f"{promise}: ") and told in text]
 
 
 @pytest.mark.parametrize("good", [Plain, Refusing])
 def test_a_figure_that_keeps_its_promises_breaks_none(good):
-    outcome = try_figure(good, shapes=FEW)
+    outcome = tried(check_figure, good, shapes=FEW)
     assert (outcome.broken, outcome.warnings) == ((), ())
 
 
@@ -174,7 +175,7 @@ def test_a_figure_without_a_way_to_be_drawn_is_refused_in_a_line(tmp_path):
 @pytest.mark.soak
 @pytest.mark.parametrize("figure", SHIPPED, ids=lambda figure: figure.name)
 def test_every_figure_that_is_shipped_keeps_its_promises(figure):
-    outcome = try_figure(lambda: figure, slow=60.0)
+    outcome = tried(check_figure, lambda: figure, slow=60.0)
     promises = {text.partition(":")[0] for text in outcome.broken}
     if figure.name in COMPUTED:
         promises -= {figures.NUMBERS}

@@ -12,7 +12,8 @@ import pytest
 
 from dva_sim.cli import checks
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.testing.hazards import try_hazard
+from dva_sim.testing.hazards import check_hazard
+from dva_sim.testing.promises import tried
 from dva_sim.worlds.hazards import CLEAR, Conditions, Hazard, HazardField, make_hazard
 from dva_sim.worlds.hazards.detectors import DetectorAlarm
 
@@ -29,7 +30,9 @@ EXAMPLE = "steam_leak.py:SteamLeak"
     ],
 )
 def test_every_hazard_that_is_shipped_keeps_its_promises(kind: str, settings: dict) -> None:
-    outcome = try_hazard(lambda at, start: make_hazard(kind, at, start, **settings), slow=60.0)
+    outcome = tried(
+        check_hazard, lambda at, start: make_hazard(kind, at, start, **settings), slow=60.0
+    )
     assert (outcome.broken, outcome.warnings) == ((), ())
 
 
@@ -194,7 +197,7 @@ class Sniffed(Good):
 
 
 def test_the_hazard_that_the_faulty_ones_are_made_from_keeps_its_promises() -> None:
-    assert try_hazard(Good, slow=60.0).broken == ()
+    assert tried(check_hazard, Good, slow=60.0).broken == ()
 
 
 @pytest.mark.parametrize(
@@ -224,7 +227,7 @@ def test_the_hazard_that_the_faulty_ones_are_made_from_keeps_its_promises() -> N
     ],
 )
 def test_a_faulty_hazard_is_found_out(kind: type[Hazard], problem: str) -> None:
-    broken = try_hazard(kind, slow=60.0).broken
+    broken = tried(check_hazard, kind, slow=60.0).broken
     assert any(line.startswith(problem) for line in broken), broken
 
 
@@ -232,7 +235,7 @@ def test_a_slow_hazard_and_one_that_nothing_notices_earn_warnings() -> None:
     class Unnoticed(Good):
         detectors = ()
 
-    slow, unnoticed = try_hazard(Unnoticed, slow=0.0).warnings[::2]
+    slow, unnoticed = tried(check_hazard, Unnoticed, slow=0.0).warnings[::2]
     assert slow.startswith("is slow")
     assert unnoticed.startswith("is noticed by no detector")
 

@@ -7,7 +7,7 @@ from dva_sim.agents.operator.strategies import Pursuit
 from dva_sim.agents.tilt.filters import MovingMedian
 from dva_sim.core.dispatch import MinEta
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.testing.kinds import TRIALS, plural
+from dva_sim.testing.promises import TRIALS, plural
 
 
 class Greedy(MinEta):

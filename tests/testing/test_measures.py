@@ -9,7 +9,8 @@ from dva_sim.cli import checks
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.measure import Measure
 from dva_sim.simulation.run_measures import RunMeasure, load_measure
-from dva_sim.testing.measures import try_measure
+from dva_sim.testing.measures import check_measure
+from dva_sim.testing.promises import tried
 
 
 def measure(
@@ -45,13 +46,13 @@ def changes_a_trial(self, trials):
 
 
 def test_a_measure_that_keeps_its_promises_is_told_nothing():
-    outcome = try_measure(measure(mean_time))
+    outcome = tried(check_measure, measure(mean_time))
     assert (outcome.broken, outcome.warnings, outcome.tries) == ((), (), 6)
 
 
 def test_the_shipped_example_keeps_its_promises():
     name = "nearest_person.py:NearestPerson"
-    assert try_measure(lambda: type(load_measure(name))(), slow=60.0).broken == ()
+    assert tried(check_measure, name, slow=60.0).broken == ()
     assert checks.check(["measure", name], []) == 0
 
 
@@ -74,24 +75,24 @@ def test_the_shipped_example_keeps_its_promises():
     ],
 )
 def test_a_broken_promise_is_told_in_a_plain_line(make, said):
-    outcome = try_measure(make)
+    outcome = tried(check_measure, make)
     assert any(line.startswith(said) for line in outcome.broken), outcome.broken
 
 
 def test_a_measure_that_never_says_anything_earns_a_warning():
-    outcome = try_measure(measure(lambda *_: None))
+    outcome = tried(check_measure, measure(lambda *_: None))
     assert outcome.broken == ()
     assert outcome.warnings == ("says nothing of any run that was tried",)
 
 
 def test_a_slow_measure_earns_a_warning():
-    (warning,) = try_measure(measure(mean_time), slow=0.0).warnings
+    (warning,) = tried(check_measure, measure(mean_time), slow=0.0).warnings
     assert warning.startswith("is slow: ")
 
 
 def test_a_measure_of_no_model_of_ours_cannot_be_tried():
     with pytest.raises(ConfigError, match="should read one of our models to be tried"):
-        try_measure(measure(mean_time, models=("mine.py:Mine",)))
+        tried(check_measure, measure(mean_time, models=("mine.py:Mine",)))
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,8 @@ import pytest
 
 from dva_sim.cli import checks
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.testing.models import try_model
+from dva_sim.testing.models import check_model
+from dva_sim.testing.promises import tried
 
 COIN = """\
 import math, random
@@ -46,12 +47,12 @@ def coin(tmp_path, *changes):
 
 
 def test_a_model_that_keeps_its_promises_is_told_nothing(tmp_path):
-    outcome = try_model(coin(tmp_path), {})
+    outcome = tried(check_model, coin(tmp_path), {})
     assert (outcome.broken, outcome.warnings) == ((), ())
 
 
 def test_the_shipped_example_keeps_its_promises():
-    assert try_model("alarm_queue.py:AlarmQueue", {}).broken == ()
+    assert tried(check_model, "alarm_queue.py:AlarmQueue", {}).broken == ()
     assert checks.check(["model", "alarm_queue.py:AlarmQueue"], []) == 0
 
 
@@ -83,18 +84,18 @@ ROWS = '"heads": sum(recording), '
     ],
 )  # fmt: skip
 def test_a_broken_promise_is_told_in_a_plain_line(tmp_path, old, new, said):
-    outcome = try_model(coin(tmp_path, (old, new)), {})
+    outcome = tried(check_model, coin(tmp_path, (old, new)), {})
     assert any(line.startswith(said) for line in outcome.broken), outcome.broken
 
 
 def test_a_model_that_heeds_no_seed_earns_a_warning(tmp_path):
-    outcome = try_model(coin(tmp_path, ("Streams(seed)", "Streams(1)")), {})
+    outcome = tried(check_model, coin(tmp_path, ("Streams(seed)", "Streams(1)")), {})
     assert outcome.warnings == ("comes to the same with every seed",)
 
 
 def test_a_scenario_that_cannot_be_is_told_before_anything_is_tried(tmp_path):
     with pytest.raises(ConfigError, match="nobody throws; --set gives keys of its scenario"):
-        try_model(coin(tmp_path), {"throws": 0})
+        tried(check_model, coin(tmp_path), {"throws": 0})
 
 
 def test_the_example_waits_as_long_as_erlang_says():

@@ -18,7 +18,8 @@ from dva_sim.agents.operator.strategies import (
 )
 from dva_sim.cli import checks
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.testing.operators import try_operator
+from dva_sim.testing.operators import check_operator
+from dva_sim.testing.promises import tried
 
 STAND = Intent(0.0, 0.0)
 SHIPPED = [name for name in known_strategies() if name != "oracle"]
@@ -26,7 +27,7 @@ SHIPPED = [name for name in known_strategies() if name != "oracle"]
 
 @pytest.mark.parametrize("name", [*SHIPPED, "stepwise.py:Stepwise"])
 def test_every_strategy_that_is_shipped_keeps_its_promises(name):
-    outcome = try_operator(load_strategy(name), slow=60.0)
+    outcome = tried(check_operator, name, slow=60.0)
     assert (outcome.broken, outcome.warnings) == ((), ())
     assert outcome.tries == 21
 
@@ -130,7 +131,7 @@ class Restless(Pursuit):
     ],
 )
 def test_a_broken_promise_is_found(kind, promise):
-    told = [text.partition(":")[0] for text in try_operator(kind, slow=60.0).broken]
+    told = [text.partition(":")[0] for text in tried(check_operator, kind, slow=60.0).broken]
     assert promise in told
 
 
@@ -147,23 +148,23 @@ class Thinking(Pursuit):
 
 
 def test_who_is_only_slow_is_warned():
-    outcome = try_operator(Crawling, slow=60.0)
+    outcome = tried(check_operator, Crawling, slow=60.0)
     assert outcome.broken == ()
     assert any(text.startswith("is slow: ") for text in outcome.warnings)
-    (text,) = try_operator(Thinking, slow=0.0).warnings
+    (text,) = tried(check_operator, Thinking, slow=0.0).warnings
     assert text.startswith("thinks slowly: ")
 
 
 def test_the_oracle_sees_nothing_and_so_there_is_nothing_to_try():
     with pytest.raises(ConfigError, match="is told the truth, and sees nothing"):
-        try_operator(load_strategy("oracle"))
+        tried(check_operator, "oracle")
 
 
 def test_a_strategy_is_tried_without_the_limits_that_it_is_held_within_when_it_runs(tmp_path):
     head = "from dva_sim.agents.operator.strategies import Intent, Strategy\n"
     body = "class Mine(Strategy):\n def drive(self, route, view, stop_before): return 9, 9\n"
     (tmp_path / "mine.py").write_text(head + body)
-    outcome = try_operator(load_strategy("mine.py:Mine", base=tmp_path))
+    outcome = tried(check_operator, load_strategy("mine.py:Mine", base=tmp_path))
     assert outcome.broken[0].startswith("wants a speed beyond reach: (9, 9)")
     assert issubclass(Pursuit, Strategy)
 

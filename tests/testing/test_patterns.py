@@ -15,8 +15,8 @@ from dva_sim.network.patterns import (
     known_patterns,
     load_pattern,
 )
-from dva_sim.testing.patterns import check_pattern, try_pattern
-from dva_sim.testing.promises import BrokenPromises
+from dva_sim.testing.patterns import check_pattern
+from dva_sim.testing.promises import BrokenPromises, tried
 
 EXAMPLE = "acknowledged_pub_sub.py:AcknowledgedPubSub"
 GROWS_OLD = {"pub-sub": ("lets commands grow old at a slow robot: 22 s",)}
@@ -24,7 +24,7 @@ GROWS_OLD = {"pub-sub": ("lets commands grow old at a slow robot: 22 s",)}
 
 @pytest.mark.parametrize("name", [*known_patterns(), EXAMPLE])
 def test_every_pattern_that_is_shipped_keeps_its_promises(name: str) -> None:
-    outcome = try_pattern(load_pattern(name), slow=60.0)
+    outcome = tried(check_pattern, name, slow=60.0)
     assert (outcome.broken, outcome.warnings) == ((), GROWS_OLD.get(name, ()))
 
 
@@ -194,7 +194,7 @@ FAULTS = {
     ("kind", "promise"), FAULTS.items(), ids=lambda x: getattr(x, "__name__", "")
 )
 def test_a_pattern_that_breaks_a_promise_is_found_out(kind: type[Pattern], promise: str) -> None:
-    broken = try_pattern(kind, slow=60.0).broken
+    broken = tried(check_pattern, kind, slow=60.0).broken
     assert any(told.startswith(promise) for told in broken), broken
 
 
@@ -207,7 +207,7 @@ class Sleepy(LatestWins):
 
 
 def test_a_slow_pattern_is_a_warning() -> None:
-    outcome = try_pattern(Sleepy, slow=1e-6)
+    outcome = tried(check_pattern, Sleepy, slow=1e-6)
     assert outcome.broken == ()
     assert outcome.warnings[-1].startswith("is slow: ")
 

@@ -2,7 +2,6 @@
 
 import random
 import time
-from functools import partial
 from itertools import count
 from pathlib import Path
 
@@ -19,11 +18,11 @@ from dva_sim.core.dispatch import (
     OraclePolicy,
     Policy,
     Relocation,
-    load_policy,
     solve,
 )
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.testing.policies import try_policy
+from dva_sim.testing.policies import check_policy
+from dva_sim.testing.promises import tried
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = [f"{path.name}:{path.stem.title()}" for path in (ROOT / "agents/policies").glob("*.py")]
@@ -31,7 +30,7 @@ EXAMPLES = [f"{path.name}:{path.stem.title()}" for path in (ROOT / "agents/polic
 
 @pytest.mark.parametrize("name", [*sorted(POLICIES.keys() - {"oracle"}), *EXAMPLES])
 def test_every_policy_that_is_shipped_keeps_its_promises(name):
-    outcome = try_policy(partial(load_policy, name), slow=60.0)
+    outcome = tried(check_policy, name, slow=60.0)
     assert (outcome.broken, outcome.warnings, outcome.tries) == ((), (), 200)
 
 
@@ -39,7 +38,7 @@ def test_the_oracle_keeps_them_too():
     ways = np.array([[10.0, 20.0], [30.0, 5.0], [9.0, 9.0]])
     plan = solve(Instance(np.array([0.0, 10.0, 20.0]), ways, 2 * ways))
     devices = "02:00:00:01:00:00", "02:00:00:01:00:01"
-    assert not try_policy(lambda: OraclePolicy(plan, devices), slow=60.0).broken
+    assert not tried(check_policy, lambda: OraclePolicy(plan, devices), slow=60.0).broken
 
 
 def policy(advise, **flags):
@@ -113,12 +112,12 @@ def moves_all(self, situation, rng):
     ],
 )  # fmt: skip
 def test_a_broken_promise_is_told_in_a_plain_line(make, said):
-    outcome = try_policy(make, count=41)
+    outcome = tried(check_policy, make, count=41)
     assert any(line.startswith(said) for line in outcome.broken), outcome.broken
 
 
 def test_robots_beyond_the_operators_are_a_warning():
-    outcome = try_policy(policy(every_robot_goes))
+    outcome = tried(check_policy, policy(every_robot_goes))
     assert outcome.broken == ()
     assert outcome.warnings[0].startswith("sends more robots than operators are free; the core dr")
 
@@ -126,7 +125,7 @@ def test_robots_beyond_the_operators_are_a_warning():
 def test_a_slow_decision_is_a_warning(monkeypatch):
     seconds = count()
     monkeypatch.setattr(time, "perf_counter", lambda: float(next(seconds)))
-    outcome = try_policy(MinEta, slow=0.5)
+    outcome = tried(check_policy, MinEta, slow=0.5)
     assert outcome.broken == ()
     assert outcome.warnings == (
         "is slow: 1 s in situation 99 (lists of preference); should be 0.5 s",

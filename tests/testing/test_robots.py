@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from dva_sim.agents.robot.profile import load_robot
 from dva_sim.cli import checks
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.testing.robots import try_robot
-from dva_sim.worlds.drives import Differential, DriveSpec, GuardedDrive
+from dva_sim.testing.promises import tried
+from dva_sim.testing.robots import check_robot
+from dva_sim.worlds.drives import Differential
 
 ROOT = Path(__file__).parents[2]
 NAMES = sorted(path.stem for path in (ROOT / "agents/robots").glob("*.yaml"))
@@ -17,7 +17,7 @@ NAMES = sorted(path.stem for path in (ROOT / "agents/robots").glob("*.yaml"))
 
 @pytest.mark.parametrize("name", NAMES)
 def test_every_robot_that_is_shipped_keeps_its_promises(name):
-    outcome = try_robot(load_robot(name).drive_spec(), slow=60.0)
+    outcome = tried(check_robot, name, slow=60.0)
     assert (outcome.broken, outcome.warnings) == ((), ())
     assert outcome.tries > 100
 
@@ -106,7 +106,7 @@ class Failing(Differential):
     ],
 )
 def test_a_broken_promise_is_told_in_a_plain_line(drive, said):
-    outcome = try_robot(DriveSpec(drive=lambda spec: GuardedDrive(drive(spec))))
+    outcome = tried(check_robot, drive)
     assert any(line.startswith(said) for line in outcome.broken), outcome.broken
 
 

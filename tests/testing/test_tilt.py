@@ -6,20 +6,13 @@ import math
 
 import pytest
 
-from dva_sim.agents.tilt import (
-    Filter,
-    PhoneProfile,
-    known_filters,
-    known_mappings,
-    load_filter,
-    load_mapping,
-    try_phone,
-)
+from dva_sim.agents.tilt import Filter, PhoneProfile, known_filters, known_mappings, try_phone
 from dva_sim.agents.tilt.filters import GuardedFilter, NoFilter
 from dva_sim.agents.tilt.mappings import AbsoluteMapping, DifferentialMapping
 from dva_sim.cli import checks
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.testing.tilt import try_filter, try_mapping
+from dva_sim.testing.promises import tried
+from dva_sim.testing.tilt import check_filter, check_mapping
 
 STICKS = {
     "median20-copy": ("sticks where only 6 of 20 samples are fresh: 0 for 2",),
@@ -29,13 +22,13 @@ STICKS = {
 
 @pytest.mark.parametrize("name", [*known_filters(), "faithful.py:Faithful"])
 def test_every_filter_that_is_shipped_keeps_its_promises(name: str) -> None:
-    outcome = try_filter(load_filter(name), slow=60.0)
+    outcome = tried(check_filter, name, slow=60.0)
     assert (outcome.broken, outcome.warnings) == ((), STICKS.get(name, ()))
 
 
 @pytest.mark.parametrize("name", [*known_mappings(), "cubic.py:Cubic"])
 def test_every_mapping_that_is_shipped_keeps_its_promises(name: str) -> None:
-    outcome = try_mapping(load_mapping(name), slow=60.0)
+    outcome = tried(check_mapping, name, slow=60.0)
     assert (outcome.broken, outcome.warnings) == ((), ())
 
 
@@ -120,7 +113,7 @@ class Raising(NoFilter):
     ],
 )
 def test_a_promise_that_a_filter_breaks_is_told_in_a_plain_line(kind, told) -> None:
-    outcome = try_filter(kind, slow=60.0)
+    outcome = tried(check_filter, kind, slow=60.0)
     assert any(line.startswith(told) for line in outcome.broken), outcome.broken
 
 
@@ -180,7 +173,7 @@ class OneSided(AbsoluteMapping):
     ],
 )
 def test_a_promise_that_a_mapping_breaks_is_told_in_a_plain_line(kind, told) -> None:
-    outcome = try_mapping(kind, slow=60.0)
+    outcome = tried(check_mapping, kind, slow=60.0)
     assert any(line.startswith(told) for line in outcome.broken), outcome.broken
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, get_args, get_type_hints
+from typing import Annotated, Any, TypeVar, get_args, get_type_hints
 
 from pydantic import Field, TypeAdapter, ValidationError, field_validator
 
@@ -21,9 +21,11 @@ from dva_sim.kernel.suggestions import unknown
 from dva_sim.simulation.shift import distributions
 from dva_sim.simulation.shift import scenario as timed
 from dva_sim.simulation.shift.scenario import TimedScenario
-from dva_sim.validation.dispatch.exact import FORMULAS, Measures
+from dva_sim.validation.dispatch.exact import FORMULAS
 from dva_sim.validation.dispatch.measures import check_name
+from dva_sim.validation.dispatch.queues import Measures
 
+A = TypeVar("A")
 _LAW: TypeAdapter[distributions.Law] = TypeAdapter(distributions.Law)
 _LAWS = tuple(
     type_ for type_ in get_args(get_args(distributions.Law)[0]) if isinstance(type_, type)
@@ -109,9 +111,9 @@ def _suited(key: str, hint: Any, value: Any, scenario: TimedScenario) -> Any:
     if isinstance(value, list):
         return [_suited(key, hint, item, scenario) for item in value]
     if _wants_law(hint):
-        return _law(key, value)
+        return _valid(_LAW, value, f"{key} should be a law")
     if isinstance(value, dict):
-        value = _law(key, value)
+        value = _valid(_LAW, value, f"{key} should be a law")
     if not isinstance(value, distributions._Law):
         return value
     is_rate = key.startswith("arrival_rate")
@@ -126,23 +128,20 @@ def _checked(key: str, hint: Any, value: Any, said: Any) -> Any:
     """A parameter, if it is of the kind that the formula wants."""
     if _wants_law(hint):
         return value
+    return _valid(TypeAdapter(hint), value, f"{key} {said!r} does not fit")
+
+
+def _valid(adapter: TypeAdapter[A], value: Any, wrong: str) -> A:
+    """The value as an annotation wants it; else what is wrong, and the first reason."""
     try:
-        return TypeAdapter(hint).validate_python(value)
+        return adapter.validate_python(value)
     except ValidationError as error:
         problem = error.errors(include_url=False)[0]["msg"]
-        raise ConfigError(f"{key} {said!r} does not fit: {problem}") from None
+        raise ConfigError(f"{wrong}: {problem}") from None
 
 
 def _wants_law(hint: Any) -> bool:
     return _mentions(hint, lambda h: h in _LAWS or getattr(h, "__name__", "") == "DurationLaw")
-
-
-def _law(key: str, value: Any) -> distributions.Law:
-    try:
-        return _LAW.validate_python(value)
-    except ValidationError as error:
-        problem = error.errors(include_url=False)[0]["msg"]
-        raise ConfigError(f"{key} should be a law: {problem}") from None
 
 
 def _mentions(hint: Any, test: Any) -> bool:

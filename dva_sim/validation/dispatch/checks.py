@@ -3,37 +3,34 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import cast
 
 import numpy as np
 
-from dva_sim.experiments.execution import executors
-from dva_sim.experiments.execution.checkpoint import RunOutcome
-from dva_sim.experiments.execution.scheduling import run_all
 from dva_sim.experiments.study.cell_grid import StudyJob
-from dva_sim.kernel.errors import RunsFailed
 from dva_sim.kernel.streams import derive_seed
 from dva_sim.simulation.models import Tables
-from dva_sim.simulation.scenario import Scenario
 from dva_sim.simulation.shift import simulate_timed
 from dva_sim.simulation.shift.scenario import TimedScenario
 from dva_sim.validation.dispatch.cases import Case
-from dva_sim.validation.dispatch.control_variates import controls, inputs
 from dva_sim.validation.dispatch.estimation import (
     PRECISION,
     CheckVerdict,
     Estimate,
     certain,
+    controls,
     estimate,
+    inputs,
     verdict,
 )
 from dva_sim.validation.dispatch.identities import IDENTITIES, check_identity
-from dva_sim.validation.dispatch.measures import Batches, sums
-from dva_sim.validation.dispatch.samples import Floats, Sample, occupied, sample_of
+from dva_sim.validation.dispatch.measures import Batches, Floats, Sample, occupied, sample_of, sums
+from dva_sim.validation.frame import Key, Progress, Row, job_of, play_jobs
 
 Columns = dict[str, Floats]
+FAILED = "a run of case {!r} failed"
 LOOK_AGAIN = 4  # times as many runs, in all, for a case that seems to differ
 
 
@@ -81,7 +78,7 @@ def check_cases(
     seed: int,
     quick: bool,
     workers: int,
-    progress: Callable[[int], None] = lambda done: None,
+    progress: Progress = lambda done: None,
 ) -> list[Check]:
     """Play all cases and compare.
 
@@ -98,36 +95,20 @@ def check_cases(
     Raises:
         RunsFailed: a run failed.
     """
-    outcomes: dict[tuple[str, int], RunOutcome] = {}
     everything = [job for case in cases for job in _jobs(case, seed, _runs(case, quick))]
-    _perform(everything, workers, outcomes, progress)
+    rows = play_jobs(everything, play, workers, FAILED, progress)
     checks = []
     for case in cases:
         runs = _runs(case, quick)
-        found = _compare(case, _columns(_jobs(case, seed, runs), outcomes))
+        found = _compare(case, _columns(_jobs(case, seed, runs), rows))
         off = [c for c in found if c.verdict == "differs" and c.found.error > 0]
         if off:
             again = _jobs(case, seed, LOOK_AGAIN * runs)
-            _perform(again[runs:], workers, outcomes, lambda done: None)
+            rows |= play_jobs(again[runs:], play, workers, FAILED)
             why = ", ".join(f"{c.measure} {c.deviation:+.2f} SE" for c in off)
-            found = [replace(c, again=why) for c in _compare(case, _columns(again, outcomes))]
+            found = [replace(c, again=why) for c in _compare(case, _columns(again, rows))]
         checks += found
     return checks
-
-
-def _perform(
-    jobs: Sequence[StudyJob],
-    workers: int,
-    outcomes: dict[tuple[str, int], RunOutcome],
-    progress: Callable[[int], None],
-) -> None:
-    """Play some runs, and add how they ended."""
-    for batch in run_all(jobs, play, executors.local(workers)):
-        for outcome in batch:
-            if outcome.error is not None:
-                raise RunsFailed(f"a run of case {outcome.key[0]!r} failed: {outcome.error}")
-            outcomes[outcome.key] = outcome
-        progress(len(outcomes))
 
 
 def play(job: StudyJob) -> Tables:
@@ -151,10 +132,10 @@ def play(job: StudyJob) -> Tables:
     for name, values in controls(batches, scenario).items():
         columns[f"control {name}"] = values
     names, rows = list(columns), np.column_stack(list(columns.values()))
-    return {"batches": [dict(zip(names, row.tolist(), strict=True)) for row in rows]}
+    return {"rows": [dict(zip(names, row.tolist(), strict=True)) for row in rows]}
 
 
-def check_identities(seed: int, progress: Callable[[int], None] = lambda done: None) -> list[Check]:
+def check_identities(seed: int, progress: Progress = lambda done: None) -> list[Check]:
     """Look at everything that must hold exactly, in any world.
 
     Args:
@@ -181,20 +162,11 @@ def _runs(case: Case, quick: bool) -> int:
 
 
 def _jobs(case: Case, seed: int, runs: int) -> list[StudyJob]:
-    cell = (("batches", case.batches), ("measures", json.dumps(list(case.exact))))
-    scenario = cast(Scenario, case.scenario)
+    measures = json.dumps(list(case.exact))
+    luck = [derive_seed("validation", case.name, seed, trial) for trial in range(runs)]
     return [
-        StudyJob(
-            part=case.name,
-            cell=cell,
-            index=0,
-            person=0,
-            trial=trial,
-            seed=derive_seed("validation", case.name, seed, trial),
-            scenario=scenario,
-            config=case.name,
-        )
-        for trial in range(runs)
+        job_of(case.name, own, case.scenario, batches=case.batches, measures=measures)
+        for own in luck
     ]
 
 
@@ -217,10 +189,10 @@ def _little(sample: Sample, batches: Batches) -> dict[str, tuple[Floats, Floats]
     }
 
 
-def _columns(jobs: Sequence[StudyJob], outcomes: dict[tuple[str, int], RunOutcome]) -> Columns:
+def _columns(jobs: Sequence[StudyJob], rows: Mapping[Key, list[Row]]) -> Columns:
     """The batches of all runs of a case, run after run."""
-    rows = [row for job in jobs for row in json.loads(outcomes[job.key].tables or "")["batches"]]
-    return {name: np.array([row[name] for row in rows], dtype=float) for name in rows[0]}
+    found = [row for job in jobs for row in rows[job.key]]
+    return {name: np.array([row[name] for row in found], dtype=float) for name in found[0]}
 
 
 def _compare(case: Case, columns: Columns) -> list[Check]:

@@ -12,8 +12,19 @@ would be taken off too, and a control whose mean comes from a wrong formula woul
 is wrong. Therefore the means and shapes of the inputs are checks of their own, and the
 estimate *without* controls has to agree as well.
 
+The controls are sums over batches whose mean is zero, whatever serves whom. First order: how many
+events came, how long looking and going took, against what the scenario says of their means. Second
+order: whether long services met short intervals *in a row*. The product of one service's surplus
+with the faded surplus of those before it has mean zero too, since each is drawn anew; where it is
+large, queues were longer than the averages explain. And a queue beside it: the same events at *one*
+server, as fast as all responders together. Its waits follow from the inputs alone, and their mean
+is known (Pollaczek and Khinchine; Cobham; G/M/1). Where there is one responder only, that server is
+5 % faster: an exact copy would leave nothing to be estimated.
+
 References:
-    S. S. Lavenberg & P. D. Welch, Manage. Sci. 27 (1981) 322-335 (control variates);
+    S. S. Lavenberg & P. D. Welch, Manage. Sci. 27 (1981) 322-335 (control variates; external
+    controls: a similar system with a known answer, fed with the same numbers); S. S. Lavenberg,
+    T. L. Moeller & P. D. Welch, Oper. Res. 30 (1982) 182-202 (work and flow variables as controls);
     A. N. Avramidis & J. R. Wilson, Oper. Res. Lett. 14 (1993) 187-198 (splitting: weights from
     other batches); W. G. Cochran, Sampling Techniques, 3rd ed. (1977), chapter 6 (ratios).
 """
@@ -21,6 +32,7 @@ References:
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 from typing import Literal
@@ -28,7 +40,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from dva_sim.simulation.shift.distributions import Exponential, Law
+from dva_sim.simulation.shift.scenario import TimedScenario
+from dva_sim.validation.dispatch.exact import cobham
+from dva_sim.validation.dispatch.measures import Batches, Floats, Sample, one_server
+from dva_sim.validation.dispatch.queues import LawMoments, gm1, laplace
+
 CheckVerdict = Literal["agrees", "too rough", "differs"]
 
 ERRORS = 3.0  # an estimate may be so many standard errors off
@@ -152,3 +169,191 @@ def _error(values: Floats) -> float:
         return math.nan
     error = float(values.std(ddof=1)) / math.sqrt(len(values))
     return error if error > 1e-14 * float(abs(values).max()) else 0.0
+
+
+FADING = (3.0, 10.0, 30.0, 100.0)  # [events]
+FASTER = 0.95  # what the one server beside one responder takes of its time
+
+
+def controls(batches: Batches, scenario: TimedScenario) -> dict[str, Floats]:
+    """Each control's value in each batch, the most telling first; all have mean zero."""
+    sample, counts = batches.sample, _counts(batches, scenario)
+    look, square = _looks(sample, scenario)
+    beside = _beside(batches, scenario)
+    found = beside | {"look": batches.total(look, sample.served)}
+    if counts:
+        found["events"] = sum(counts.values(), np.zeros(len(batches.lengths)))
+    if not beside:  # which tells all that the others would, and has no such long tails
+        if all(stream.between is not None for stream in scenario.demand):
+            found |= _products(batches, scenario, look)
+        found["look_square"] = batches.total(square, sample.served)
+    return found | {f"events@{name}": count for name, count in list(counts.items())[1:]}
+
+
+def inputs(batches: Batches, scenario: TimedScenario) -> dict[str, tuple[Floats, Floats]]:
+    """What was put in, and what the scenario lets expect of it: events and looking time.
+
+    A control takes the luck of the inputs off; that the inputs are right must be seen apart:
+    their means, and their shapes by one value of the Laplace transform. That is a mean of
+    numbers between 0 and 1, so that even long tails leave it an honest error.
+    """
+    found: dict[str, tuple[Floats, Floats]] = {}
+    sample = batches.sample
+    for name, surplus in _counts(batches, scenario).items():
+        number = scenario.stream_names.index(name)
+        came = batches.count(sample.stream == number)
+        found[f"events of {name}"] = came, came - surplus
+        law = scenario.demand[number].between
+        assert law is not None
+        gaps, known = _gaps(sample, number)
+        found[f"gaps of {name}, transform"] = _transforms(batches, [(law, gaps, known)])
+    took = np.where(sample.served, sample.confirmed - sample.arrived, 0.0)
+    looks = batches.total(took, sample.served)
+    expected = looks - batches.total(_looks(sample, scenario)[0], sample.served)
+    if expected.any():
+        found["looking"] = looks, expected
+        laws = _look_law_of(sample, scenario)
+        each = [(law, took, which) for law, which in laws if law.variance > 0]
+        if each:
+            found["looking, transform"] = _transforms(batches, each)
+    return found
+
+
+def _transforms(
+    batches: Batches, parts: list[tuple[Law, Floats, NDArray[np.bool_]]]
+) -> tuple[Floats, Floats]:
+    """Sum of exp(-time / mean) over some times, and what their laws let expect of it."""
+    seen = expected = np.zeros(len(batches.lengths))
+    for law, times, which in parts:
+        seen = seen + batches.total(np.exp(-times / law.mean), which)
+        expected = expected + _transform(law) * batches.count(which)
+    return seen, expected
+
+
+@cache
+def _transform(law: Law) -> float:
+    return laplace(law, 1 / law.mean)
+
+
+def _gaps(sample: Sample, number: int) -> tuple[Floats, NDArray[np.bool_]]:
+    """From the event before of the same stream to each event, and where that is known."""
+    gaps, known = np.zeros(len(sample.stream)), np.zeros(len(sample.stream), dtype=bool)
+    places = np.flatnonzero(sample.stream == number)[1:]
+    gaps[places] = np.diff(sample.detected[sample.stream == number])
+    known[places] = True
+    return gaps, known
+
+
+def _counts(batches: Batches, scenario: TimedScenario) -> dict[str, Floats]:
+    """How many events of each stream came, above what its intervals let expect."""
+    found = {}
+    for number, (name, stream) in enumerate(
+        zip(scenario.stream_names, scenario.demand, strict=True)
+    ):
+        if stream.between is not None and stream.between.variance > 0:
+            came = batches.count(batches.sample.stream == number)
+            found[name] = came - batches.lengths / stream.between.mean
+    return found
+
+
+def _look_law_of(
+    sample: Sample, scenario: TimedScenario
+) -> Iterator[tuple[Law, NDArray[np.bool_]]]:
+    """Each law of looking, and which of the events that were looked at it is the law of."""
+    groups = {group.name: group.look for group in scenario.responders}
+    for number, stream in enumerate(scenario.demand):
+        for unit, group in enumerate(sample.groups):
+            law: Law = stream.look if stream.look is not None else groups[group]
+            yield law, sample.served & (sample.stream == number) & (sample.unit == unit)
+
+
+def _looks(sample: Sample, scenario: TimedScenario) -> tuple[Floats, Floats]:
+    """How much longer than its mean each look took, and its square; 0 where nobody looked."""
+    surplus, square = np.zeros(len(sample.stream)), np.zeros(len(sample.stream))
+    took = sample.confirmed - sample.arrived
+    for law, which in _look_law_of(sample, scenario):
+        surplus[which] = took[which] - law.mean
+        square[which] = surplus[which] ** 2 - law.variance
+    return surplus, square
+
+
+def _beside(batches: Batches, scenario: TimedScenario) -> dict[str, Floats]:
+    """Waits, above their means, if one fast server had served the same events.
+
+    None where not all events are served, or where no formula knows that server's waits.
+    """
+    sample, dispatch = batches.sample, scenario.dispatch
+    limited = dispatch.escalate_after_s is not None or dispatch.most_waiting is not None
+    limited |= any(stream.patience is not None for stream in scenario.demand)
+    lookers = len(sample.units) if len(set(sample.kinds)) == 1 else sample.kinds.count("robot")
+    pace = (FASTER if lookers == 1 else 1.0) / lookers
+    by_rank = dispatch.policy == "priority_eta" and dispatch.options.get("ageing_per_s") == 0
+    if limited or scenario.way != "none":
+        return {}
+    ranks = _ranks(scenario) if by_rank else [0] * len(scenario.demand)
+    means = _means(scenario, pace, ranks)
+    if means is None:
+        return {}
+    looks = pace * (sample.confirmed - sample.arrived)
+    waits = one_server(sample.detected, looks, np.array(ranks)[sample.stream])
+    surplus = waits - np.array(means)[sample.stream]
+    every = {f"beside@{n}": sample.stream == n for n in range(len(means))}
+    return {name: batches.total(surplus, which) for name, which in every.items()}
+
+
+def _ranks(scenario: TimedScenario) -> list[int]:
+    """Place of each stream, the most severe first."""
+    severities = [stream.severity for stream in scenario.demand]
+    levels = sorted({s for s in severities if isinstance(s, float)}, reverse=True)
+    return [levels.index(s) if isinstance(s, float) else 0 for s in severities]
+
+
+def _means(scenario: TimedScenario, pace: float, ranks: list[int]) -> list[float] | None:
+    """Mean wait of each stream at one server that takes `pace` of its time for everything."""
+    laws, between = _look_laws(scenario), [s.between for s in scenario.demand]
+    if laws is None:
+        return None
+    if len(laws) == 1 and isinstance(laws[0], Exponential) and between[0] is not None:
+        if laws[0].mean * pace >= between[0].mean:
+            return None
+        return [gm1(between[0], laws[0].mean * pace)["wait_s"]]
+    if not all(isinstance(law, Exponential) for law in between):
+        return None
+    rates = [1 / law.mean for law in between if law is not None]
+    scaled = [LawMoments(law.mean * pace, law.second * pace**2) for law in laws]
+    if sum(r * law.mean for r, law in zip(rates, scaled, strict=True)) >= 1:
+        return None
+    if len(set(ranks)) < len(ranks):  # one queue for all
+        means = cobham(rates, scaled)
+        ahead = sum(r * law.second for r, law in zip(rates, scaled, strict=True)) / 2
+        return [ahead / (1 - means["utilisation"])] * len(rates)
+    order = sorted(range(len(ranks)), key=ranks.__getitem__)
+    means = cobham([rates[n] for n in order], [scaled[n] for n in order])
+    return [means[f"wait_{rank + 1}_s"] for rank in ranks]
+
+
+def _look_laws(scenario: TimedScenario) -> list[Law] | None:
+    """How long looking takes for each stream; None if it depends on who looks."""
+    robots = any(group.kind == "robot" for group in scenario.responders)
+    kind = "robot" if robots else "guard"
+    own = {group.look for group in scenario.responders if group.kind == kind}
+    common = own.pop() if len(own) == 1 else None
+    laws = [stream.look if stream.look is not None else common for stream in scenario.demand]
+    return None if any(law is None for law in laws) else [law for law in laws if law is not None]
+
+
+def _products(batches: Batches, scenario: TimedScenario, look: Floats) -> dict[str, Floats]:
+    """Surplus of each step of the queue times the faded surplus of the steps before."""
+    from scipy.signal import lfilter
+
+    rate = sum(1 / stream.between.mean for stream in scenario.demand if stream.between)
+    gaps = np.diff(batches.sample.detected, prepend=np.nan) - 1 / rate
+    step = np.concatenate([[0.0], look[:-1] / len(batches.sample.units)]) - gaps
+    step[:1] = 0.0
+    everything = np.ones(len(step), dtype=bool)
+    found = {}
+    for length in FADING:
+        keep = 1 - 1 / length
+        before = np.concatenate([[0.0], lfilter([1.0], [1.0, -keep], step)[:-1]])
+        found[f"row_{length:g}"] = batches.total(step * before, everything)
+    return found

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from dva_sim.core.dispatch import Assignment, Responder, Situation, Task, load_policy
 from dva_sim.kernel.streams import derive_seed
 from dva_sim.simulation.shift import TimedRecording, build, simulate_timed
-from dva_sim.validation.dispatch.samples import Floats, Ints, many_servers, sample_of
+from dva_sim.validation.dispatch.measures import Floats, Ints, many_servers, sample_of
 
 POLICIES = (
     "nearest_idle",
@@ -33,7 +33,10 @@ Flags = NDArray[np.bool_]
 
 
 def changed_choices(seed: int) -> Iterator[tuple[str, float]]:
-    """How often each policy chooses otherwise once a place is turned and its team shuffled."""
+    """A policy's choice does not depend on where north is, nor on who is listed first.
+
+    How often each chooses otherwise once a place is turned and its team shuffled.
+    """
     changed = dict.fromkeys(POLICIES, 0)
     rng = np.random.Generator(np.random.PCG64(seed))
     for _ in range(INSTANCES):
@@ -186,11 +189,6 @@ def _relabelling(seed: int) -> Deviations:
     yield "moments in another order of guards [s]", _beyond(_apart(plain, _run(turned, seed)))
 
 
-def _rotation(seed: int) -> Deviations:
-    """A policy's choice does not depend on where north is, nor on who is listed first."""
-    yield from changed_choices(seed)
-
-
 # --- better and worse ------------------------------------------------------------------
 def _best_of_all(seed: int) -> Deviations:
     """All events at once: the best assignment is never worse than the nearest first."""
@@ -227,10 +225,12 @@ def _oracle(seed: int) -> Deviations:
     others = ("nearest_idle", "min_eta", "batch_optimal", "priority_eta", "random")
     worse = dict.fromkeys(others, 0)
     for trial in range(20):
-        best = _total_response(_run(scenario | {"dispatch": {"policy": "oracle"}}, seed + trial))
+        best = _total_way(
+            _run(scenario | {"dispatch": {"policy": "oracle"}}, seed + trial), since="detected"
+        )
         for policy in others:
             run = _run(scenario | {"dispatch": {"policy": policy}}, seed + trial)
-            worse[policy] += best > _total_response(run) + SLACK_S
+            worse[policy] += best > _total_way(run, since="detected") + SLACK_S
     for policy, count in worse.items():
         yield f"of 20 small days: the oracle worse than {policy}", float(count)
 
@@ -240,7 +240,7 @@ IDENTITIES: dict[str, Callable[[int], Deviations]] = {
     "conservation": _conservation,
     "time scaling": _time_scaling,
     "relabelling": _relabelling,
-    "rotation": _rotation,
+    "rotation": changed_choices,
     "best assignment": _best_of_all,
     "oracle": _oracle,
 }
@@ -277,9 +277,5 @@ def _apart(one: TimedRecording, other: TimedRecording, factor: float = 1.0) -> f
     return max(float(np.nanmax(abs(a - b), initial=0.0)) for a, b in pairs)
 
 
-def _total_way(run: TimedRecording) -> float:
-    return float((run.columns["arrived"] - run.columns["assigned"]).sum())
-
-
-def _total_response(run: TimedRecording) -> float:
-    return float((run.columns["arrived"] - run.columns["detected"]).sum())
+def _total_way(run: TimedRecording, since: str = "assigned") -> float:
+    return float((run.columns["arrived"] - run.columns[since]).sum())

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, cast
 
-from dva_sim.experiments.execution import executors
-from dva_sim.experiments.execution.scheduling import run_all
 from dva_sim.experiments.study.cell_grid import StudyJob
-from dva_sim.kernel.errors import RunsFailed
 from dva_sim.kernel.streams import Streams, derive_seed
-from dva_sim.network.pattern_runs import Condition, Measures
-from dva_sim.simulation.models import AnyScenario, Tables
+from dva_sim.network.pattern_runs import RESULTS, Condition
+from dva_sim.simulation.models import Tables
+from dva_sim.validation.frame import Progress, job_of, play_jobs
 from dva_sim.validation.network.pooling import (
     Pooled,
     is_steady,
@@ -23,6 +21,7 @@ from dva_sim.validation.network.pooling import (
     to_be_pooled,
 )
 from dva_sim.validation.network.prediction import WITHOUT, Depth, depth_for, predict
+from dva_sim.validation.network.reference import NUMBERS
 from dva_sim.validation.network.verdicts import (
     KINDS,
     MIN_INSIDE,
@@ -37,13 +36,7 @@ from dva_sim.validation.network.verdicts import (
 )
 
 CHUNK = 10  # runs of one job
-KEPT = (
-    *("n_sent", "n_applied", "n_distinct", "send_hz", "applied_hz", "skip_frac", "first_seq"),
-    *("age_mean", "age_p50", "age_p95", "rtt_p50", "rtt_p95", "stale_p50", "stale_p95"),
-    *("timeouts", "alerts", "t_hs_ms"),
-)
-
-Progress = Callable[[int], None]
+KEPT = tuple(name for name in NUMBERS if name in RESULTS)
 
 
 @dataclass(frozen=True)
@@ -82,16 +75,8 @@ def play_all(
     jobs = [job for order in orders for job in _jobs(order, seed)]
     # The longest first, so that the processes finish together.
     jobs.sort(key=lambda job: -_effort(job))
-    rows: dict[tuple[str, int], list[Row]] = {}
-    done = 0
-    for batch in run_all(jobs, perform, executors.local(workers)):
-        for outcome in batch:
-            if outcome.error is not None:
-                raise RunsFailed(f"{outcome.key[0]} could not be played: {outcome.error}")
-            rows[outcome.key] = json.loads(outcome.tables or "")["rows"]
-            done += len(rows[outcome.key])
-        progress(done)
-    return {order: _joined(order, seed, rows) for order in orders}
+    rows = play_jobs(jobs, perform, workers, "{} could not be played", progress, len)
+    return {order: [row for job in _jobs(order, seed) for row in rows[job.key]] for order in orders}
 
 
 def perform(job: StudyJob) -> Tables:
@@ -101,21 +86,18 @@ def perform(job: StudyJob) -> Tables:
     seeds = [
         derive_seed("network", condition.hash, job.seed, run) for run in range(first, first + count)
     ]
-    return {"rows": [_kept(predict(condition, seed, depth, without)) for seed in seeds]}
-
-
-def _kept(row: Measures) -> dict[str, Any]:
-    return {name: row[name] for name in KEPT}
+    rows = (predict(condition, seed, depth, without) for seed in seeds)
+    return {"rows": [{name: row[name] for name in KEPT} for row in rows]}
 
 
 def _jobs(order: ModelRuns, seed: int) -> list[StudyJob]:
+    left_out = f" without {', '.join(order.without)}" if order.without else ""
+    told = f"{order.condition.label} ({order.condition.hash}) {order.depth}{left_out}"
     jobs = []
     for first in range(0, order.runs, CHUNK):
         count = min(CHUNK, order.runs - first)
         asked = order.condition.to_row(), order.depth, order.without, first, count
-        cell = (("order", json.dumps(asked)),)
-        name, nobody = _name(order, first), cast(AnyScenario, None)
-        jobs.append(StudyJob("network", cell, 0, 0, 0, seed, name, nobody))
+        jobs.append(job_of(f"{told}, runs from {first}", seed, None, order=json.dumps(asked)))
     return jobs
 
 
@@ -124,20 +106,10 @@ def _asked(job: StudyJob) -> tuple[dict[str, str], Depth, tuple[str, ...], int, 
     return row, depth, tuple(without), first, count
 
 
-def _name(order: ModelRuns, first: int) -> str:
-    left_out = f" without {', '.join(order.without)}" if order.without else ""
-    condition = f"{order.condition.label} ({order.condition.hash})"
-    return f"{condition} {order.depth}{left_out}, runs from {first}"
-
-
 def _effort(job: StudyJob) -> float:
     """Commands to be played, about."""
     row, _, _, _, count = _asked(job)
     return count * float(row["hz"]) * float(row["dur_s"])
-
-
-def _joined(order: ModelRuns, seed: int, rows: Mapping[tuple[str, int], list[Row]]) -> list[Row]:
-    return [row for first in range(0, order.runs, CHUNK) for row in rows[_name(order, first), seed]]
 
 
 RUNS, QUICK_RUNS = 200, 40  # of a condition under loss
@@ -215,6 +187,23 @@ class NetworkComparison:
         """Whether enough lies inside: everything, of single runs under loss nine of ten."""
         inside, judged = share_inside(self.of_kind(kind))
         return inside >= (MIN_INSIDE if kind == "single" else 1.0) * judged
+
+    @property
+    def cells(self) -> list[ComparedCell]:
+        """All that is compared."""
+        pooled = [scored.cell for scored in self.pooled.scored]
+        return [*(v.cell for v in self.verdicts), *pooled, *self.rarely]
+
+    @property
+    def outside(self) -> set[int]:
+        """The ids of those that lie outside, or are significantly off."""
+        outside = [v.cell for v in self.verdicts if v.word == "outside"]
+        return {id(c) for c in [*outside, *(scored.cell for scored in self.pooled.significant)]}
+
+    @property
+    def variants(self) -> dict[str, Pooled]:
+        """The model as it is, what is too simple, and with a mechanism left out."""
+        return {"nothing": self.pooled, **self.controls, **self.ablated}
 
     @property
     def fooled(self) -> list[str]:
@@ -301,11 +290,7 @@ def runs_in(groups: Sequence[ConditionGroup], setting: NetworkSetting) -> int:
 
 def depths_of(comparison: NetworkComparison) -> dict[str, int]:
     """How many conditions were played how deep."""
-    found: dict[str, int] = {}
-    for group in comparison.groups:
-        depth = depth_for(group.condition)
-        found[depth] = found.get(depth, 0) + 1
-    return found
+    return Counter(depth_for(group.condition) for group in comparison.groups)
 
 
 def _cells(

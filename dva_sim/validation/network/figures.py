@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from dva_sim.experiments.report.figures.palette import FAINT, INK, SOFT
-from dva_sim.experiments.report.figures.style import Drawn, finish, panels, styled
+from dva_sim.experiments.report.figures.style import Drawn, panels, styled
+from dva_sim.validation.frame import captioned
 from dva_sim.validation.network.comparison import NetworkComparison
 from dva_sim.validation.network.pooling import standard_error
 from dva_sim.validation.network.verdicts import (
@@ -62,44 +63,48 @@ def _scatter(comparison: NetworkComparison) -> Drawn:
     figure, axes = panels(len(KINDS), len(_PAIRS), 2.5)
     for panel in _panels(comparison, axes):
         for cell, marker, colour in panel.marks:
-            low, high = _bar(panel.kind, cell)
-            if high > low:
-                panel.axes.plot([cell.real] * 2, [low, high], color=colour, lw=0.6, alpha=0.5)
-            panel.axes.plot(cell.real, cell.model, marker, color=colour, ms=3, mew=0, alpha=0.85)
+            bar = _bar(panel.kind, cell)
+            _mark(panel.axes, cell.real, cell.model, bar, marker, colour, faint=0.5)
         if panel.marks:
             _diagonal(panel.axes, panel.kind, panel.is_time)
     _label(figure, axes, "predicted")
-    text = (
-        "Each mark is one measure of one condition. The grey band is the one that is asked for "
-        f"without loss ({100 * SHARES['lossless']:.0f} % and {TIME_MS:g} ms; in overload "
-        f"{100 * SHARES['overload']:.0f} %, dashed {100 * BOUNDED_SHARE:.0f} % with bounded "
-        "buffers). Under loss the bars are the "
-        "model's own: of single runs the 95 % prediction interval, of pooled ones the 95 % "
-        "interval of the mean of as many runs as were measured."
+    return captioned(
+        figure,
+        "scatter",
+        lossless=100 * SHARES["lossless"],
+        overload=100 * SHARES["overload"],
+        bounded=100 * BOUNDED_SHARE,
+        time=TIME_MS,
     )
-    return finish(figure, "scatter", "Predicted against measured", text)
 
 
 def _ratios(comparison: NetworkComparison) -> Drawn:
     """The same as predicted over measured: what is off can be seen."""
     figure, axes = panels(len(KINDS), len(_PAIRS), 1.9)
     for panel in _panels(comparison, axes):
-        ax = panel.axes
         for cell, marker, colour in panel.marks:
-            ratio = cell.model / cell.real
-            clipped = min(max(ratio, 1 / _FARTHEST), _FARTHEST)
+            clipped = min(max(cell.model / cell.real, 1 / _FARTHEST), _FARTHEST)
             low, high = (value / cell.real for value in _bar(panel.kind, cell))
-            if high > low:
-                ax.plot([cell.real] * 2, [low, high], color=colour, lw=0.6, alpha=0.4)
-            ax.plot(cell.real, clipped, marker, color=colour, ms=3, mew=0, alpha=0.85)
+            _mark(panel.axes, cell.real, clipped, (low, high), marker, colour, faint=0.4)
         if panel.marks:
-            _level(ax, panel.kind, panel.is_time)
+            _level(panel.axes, panel.kind, panel.is_time)
     _label(figure, axes, "predicted / measured")
-    text = (
-        f"What is more than {_FARTHEST:g} times off stands at the edge. Bands and bars are those "
-        "of the figure above."
-    )
-    return finish(figure, "ratios", "Predicted over measured", text)
+    return captioned(figure, "ratios", farthest=_FARTHEST)
+
+
+def _mark(
+    axes: Axes,
+    x: float,
+    y: float,
+    bar: tuple[float, float],
+    marker: str,
+    colour: str,
+    faint: float,
+) -> None:
+    """A mark on the bar that the model expects it on, if that has a length."""
+    if bar[1] > bar[0]:
+        axes.plot([x] * 2, bar, color=colour, lw=0.6, alpha=faint)
+    axes.plot(x, y, marker, color=colour, ms=3, mew=0, alpha=0.85)
 
 
 @dataclass(frozen=True)
@@ -113,8 +118,7 @@ class _Panel:
 
 
 def _panels(comparison: NetworkComparison, axes: list[list[Axes]]) -> list[_Panel]:
-    outside = {id(v.cell) for v in comparison.verdicts if v.word == "outside"}
-    outside |= {id(scored.cell) for scored in comparison.pooled.significant}
+    outside = comparison.outside
     shown = {id(v.cell) for v in comparison.verdicts if v.word == "shown only"}
     cells = [v.cell for v in comparison.verdicts]
     cells += [scored.cell for scored in comparison.pooled.scored]
@@ -165,8 +169,7 @@ def _bar(kind: ConditionKind, cell: ComparedCell) -> tuple[float, float]:
 
 def _diagonal(axes: Axes, kind: ConditionKind, is_time: bool) -> None:
     """Where both agree, and the band around it."""
-    axes.set_xscale("log")
-    axes.set_yscale("log")
+    axes.set(xscale="log", yscale="log")
     low = min(axes.get_xlim()[0], axes.get_ylim()[0])
     high = max(axes.get_xlim()[1], axes.get_ylim()[1])
     x = np.geomspace(low, high, 60)
@@ -186,8 +189,7 @@ def _level(axes: Axes, kind: ConditionKind, is_time: bool) -> None:
     """The same for predicted over measured."""
     from matplotlib.ticker import FixedLocator, NullLocator
 
-    axes.set_xscale("log")
-    axes.set_yscale("log")
+    axes.set(xscale="log", yscale="log")
     low, high = axes.get_xlim()
     x = np.geomspace(low, high, 60)
     if kind in ("lossless", "overload"):
@@ -230,8 +232,9 @@ def _scores(comparison: NetworkComparison) -> Drawn:
     low, high = pooled.expected
     words = f"root mean square {pooled.rms:.2f}\nexpected {low:.2f} to {high:.2f}"
     left.text(0.03, 0.96, words, transform=left.transAxes, va="top", fontsize=8)
-    left.set_xlabel("z: predicted minus measured, in standard errors")
-    left.set_ylabel("measures of conditions")
+    left.set(
+        xlabel="z: predicted minus measured, in standard errors", ylabel="measures of conditions"
+    )
     left.legend(loc="upper right", fontsize=8)
     significant = {id(scored) for scored in pooled.significant}
     names = [name for name in BY_NAME if any(s.cell.measure.name == name for s in pooled.scored)]
@@ -249,13 +252,7 @@ def _scores(comparison: NetworkComparison) -> Drawn:
     right.set_yticks(range(len(names)), [BY_NAME[name].words for name in reversed(names)])
     right.set_xlabel("z")
     right.grid(visible=False)
-    text = (
-        "Means over at least six runs on sockets against the model's, under loss. If the model is "
-        "right, z follows the normal law about, and 95 of 100 lie in the grey band. Orange: "
-        "significant also when it is considered how many are looked at (Holm). "
-        f"Arrows and the outermost bars: farther than {far:g}."
-    )
-    return finish(figure, "scores", "Pooled runs under loss, in standard errors", text)
+    return captioned(figure, "scores", far=far)
 
 
 def _spread(count: int) -> Floats:
@@ -274,22 +271,14 @@ def _variants(comparison: NetworkComparison) -> Drawn:
     for place, (_, pooled) in enumerate(ordered):
         colour = _GOOD if pooled.passes else _BAD
         axes.plot([pooled.rms], [place], "o", color=colour, ms=7)
-        axes.annotate(
-            f"{pooled.rms:.2f}",
-            (pooled.rms, place),
-            (8, 0),
-            textcoords="offset points",
-            va="center",
-        )
-    axes.set_xscale("log")
-    axes.set_xlim(min(0.5, 0.9 * low), 2.0 * max(pooled.rms for pooled in found.values()))
+        where: dict[str, Any] = {"textcoords": "offset points", "va": "center"}
+        axes.annotate(f"{pooled.rms:.2f}", (pooled.rms, place), (8, 0), **where)
+    axes.set(
+        xscale="log", xlim=(min(0.5, 0.9 * low), 2.0 * max(pooled.rms for pooled in found.values()))
+    )
     axes.xaxis.set_major_formatter("{x:g}")
     axes.set_xlabel("root mean square of z over pooled runs under loss")
     axes.set_yticks(range(len(ordered)), [name for name, _ in ordered])
     axes.set_ylim(-0.6, len(ordered) - 0.4)
     axes.grid(visible=False)
-    text = (
-        "Grey: where the root mean square lies in 95 of 100 comparisons if the model is right. "
-        "Blue passes all three criteria for pooled runs, orange fails at least one."
-    )
-    return finish(figure, "variants", "What each mechanism is worth", text)
+    return captioned(figure, "variants")

@@ -16,13 +16,12 @@ from dva_sim.validation.frame import ResultSheet, Row, ValidationResult
 from dva_sim.validation.frame import short_number as number
 from dva_sim.validation.network.comparison import NetworkComparison
 from dva_sim.validation.network.figures import draw_all
-from dva_sim.validation.network.pooling import Pooled, Scored, bias_limit
+from dva_sim.validation.network.pooling import Pooled, bias_limit
 from dva_sim.validation.network.prediction import depth_for
 from dva_sim.validation.network.verdicts import (
     BY_NAME,
     KINDS,
     MIN_INSIDE,
-    CellVerdict,
     ComparedCell,
     ConditionGroup,
     ConditionKind,
@@ -39,8 +38,14 @@ _ALONE = ("delivered", "queue", "timeouts", "alerts")
 
 def table(comparison: NetworkComparison, kind: ConditionKind) -> list[list[str]]:
     """A row for each condition of a kind: measured, an arrow, predicted; and a verdict."""
-    cells = _by_condition(comparison)
-    misses = _misses(comparison)
+    cells: dict[Condition, dict[str, ComparedCell]] = {}
+    misses: dict[Condition, list[str]] = {}
+    outside = comparison.outside
+    for cell in comparison.cells:
+        condition, name = cell.group.condition, cell.measure.name
+        cells.setdefault(condition, {})[name] = cell
+        if id(cell) in outside:
+            misses.setdefault(condition, []).append(name)
     return [
         _line(group, cells[group.condition], misses.get(group.condition, []))
         for group in comparison.groups
@@ -68,64 +73,46 @@ def _both(cell: ComparedCell | None, change: Any = lambda value: value) -> str:
     return f"{number(change(cell.real))} → {number(change(cell.model))}"
 
 
-def _by_condition(comparison: NetworkComparison) -> dict[Condition, dict[str, ComparedCell]]:
-    found: dict[Condition, dict[str, ComparedCell]] = {}
-    for cell in _all_cells(comparison):
-        found.setdefault(cell.group.condition, {})[cell.measure.name] = cell
-    return found
-
-
-def _all_cells(comparison: NetworkComparison) -> list[ComparedCell]:
-    pooled = [scored.cell for scored in comparison.pooled.scored]
-    return [*(v.cell for v in comparison.verdicts), *pooled, *comparison.rarely]
-
-
-def _misses(comparison: NetworkComparison) -> dict[Condition, list[str]]:
-    """The measures of each condition that lie outside, or are significantly off."""
-    found: dict[Condition, list[str]] = {}
-    for cell in _outside(comparison):
-        found.setdefault(cell.group.condition, []).append(cell.measure.name)
-    return found
-
-
-def _outside(comparison: NetworkComparison) -> list[ComparedCell]:
-    outside = [v.cell for v in comparison.verdicts if v.word == "outside"]
-    return outside + [scored.cell for scored in comparison.pooled.significant]
-
-
 def rows_of(comparison: NetworkComparison) -> list[Row]:
     """A row for each measure of each condition."""
-    rows = [_row(v.cell) | _judged(v) for v in comparison.verdicts]
-    significant = {id(scored) for scored in comparison.pooled.significant}
-    rows += [_row(s.cell) | _scored(s, id(s) in significant) for s in comparison.pooled.scored]
-    return rows + [_row(cell) | _untold() for cell in comparison.rarely]
+    outside = comparison.outside
+    rows = [_row(v.cell, v.word, v.why, _known(v.low), _known(v.high)) for v in comparison.verdicts]
+    for scored in comparison.pooled.scored:
+        word = "outside" if id(scored.cell) in outside else "inside"
+        rows.append(_row(scored.cell, word, z=scored.z, p=scored.p))
+    return rows + [_row(cell, "shown only", "tells too little") for cell in comparison.rarely]
 
 
-def _row(cell: ComparedCell) -> Row:
+def _row(
+    cell: ComparedCell,
+    verdict: str,
+    why: str = "",
+    low: float | None = None,
+    high: float | None = None,
+    z: float | None = None,
+    p: float | None = None,
+) -> Row:
     group = cell.group
-    row: Row = {"condition": group.condition.label, "cond_id": group.condition.hash}
-    row |= {"kind": group.kind, "groups": " ".join(sorted({run.group for run in group.runs}))}
-    row |= {"source": " ".join(sorted({run.source for run in group.runs}))}
-    row |= {"depth": depth_for(group.condition), "measure": cell.measure.name}
-    row |= {"unit": cell.measure.unit, "runs": len(cell.measured)}
-    row |= {"model_runs": len(cell.predicted)}
-    return row | {"measured": _known(cell.real), "predicted": _known(cell.model)}
-
-
-def _judged(verdict: CellVerdict) -> Row:
-    low, high = _known(verdict.low), _known(verdict.high)
-    row: Row = {"low": low, "high": high, "z": None, "p": None}
-    return row | {"verdict": verdict.word, "why": verdict.why}
-
-
-def _scored(scored: Scored, significant: bool) -> Row:
-    row: Row = {"low": None, "high": None, "z": scored.z, "p": scored.p}
-    return row | {"verdict": "outside" if significant else "inside", "why": ""}
-
-
-def _untold() -> Row:
-    row: Row = {"low": None, "high": None, "z": None, "p": None}
-    return row | {"verdict": "shown only", "why": "tells too little"}
+    return {
+        "condition": group.condition.label,
+        "cond_id": group.condition.hash,
+        "kind": group.kind,
+        "groups": " ".join(sorted({run.group for run in group.runs})),
+        "source": " ".join(sorted({run.source for run in group.runs})),
+        "depth": depth_for(group.condition),
+        "measure": cell.measure.name,
+        "unit": cell.measure.unit,
+        "runs": len(cell.measured),
+        "model_runs": len(cell.predicted),
+        "measured": _known(cell.real),
+        "predicted": _known(cell.model),
+        "low": low,
+        "high": high,
+        "z": z,
+        "p": p,
+        "verdict": verdict,
+        "why": why,
+    }
 
 
 def _known(value: float) -> float | None:
@@ -134,7 +121,6 @@ def _known(value: float) -> float | None:
 
 def variant_rows(comparison: NetworkComparison) -> list[Row]:
     """Root mean square of z of each variant, over all measures and for each."""
-    found = {"nothing": comparison.pooled, **comparison.controls, **comparison.ablated}
     return [
         {
             "left_out": name,
@@ -145,7 +131,7 @@ def variant_rows(comparison: NetworkComparison) -> list[Row]:
             "compared": len(pooled.scored),
             **{f"bias_{m}": pooled.biases.get(measure) for m, measure in BY_NAME.items()},
         }
-        for name, pooled in found.items()
+        for name, pooled in comparison.variants.items()
     ]
 
 
@@ -277,47 +263,35 @@ def summary(comparison: NetworkComparison) -> list[tuple[str, str, str, str]]:
 
 
 def _pooled_rows(pooled: Pooled) -> list[tuple[str, str, str, str]]:
-    low, high = pooled.expected
-    count = len(pooled.scored)
+    what = "pooled under loss, {}".format
+    found, none = _significant(pooled), _passes(not pooled.significant)
+    rms, spread = f"{pooled.rms:.2f}", _passes(pooled.spread_is_right)
     rows = [
-        (
-            "pooled under loss, significant after Holm",
-            f"{len(pooled.significant)} of {count}",
-            "none",
-            _passes(not pooled.significant),
-        ),
-        (
-            "pooled under loss, root mean square of z",
-            f"{pooled.rms:.2f}",
-            f"{low:.2f} to {high:.2f}",
-            _passes(pooled.spread_is_right),
-        ),
+        (what("significant after Holm"), found, "none", none),
+        (what("root mean square of z"), rms, _expected(pooled), spread),
     ]
     if pooled.biases:
         worst = max(pooled.biases, key=lambda m: abs(pooled.biases[m]) / bias_limit(m))
         bias = f"{100 * pooled.biases[worst]:+.1f} % ({worst.words})"
         asked = f"below {100 * bias_limit(worst):.0f} %"
-        what = "pooled under loss, worst median bias"
-        rows.append((what, bias, asked, _passes(not pooled.biased)))
+        rows.append((what("worst median bias"), bias, asked, _passes(not pooled.biased)))
     return rows
 
 
 def ablation(comparison: NetworkComparison) -> list[tuple[str, str, str, str]]:
     """Root mean square of z with something left out, the worst first."""
-    own = comparison.pooled
-    found = {"nothing": own, **comparison.controls, **comparison.ablated}
     if not comparison.ablated:
         return []
-    ordered = sorted(found.items(), key=lambda item: -item[1].rms)
-    return [
-        (
-            name,
-            f"{pooled.rms:.2f}",
-            f"{own.expected[0]:.2f} to {own.expected[1]:.2f}",
-            f"{len(pooled.significant)} of {len(pooled.scored)}",
-        )
-        for name, pooled in ordered
-    ]
+    ordered = sorted(comparison.variants.items(), key=lambda item: -item[1].rms)
+    return [(name, f"{p.rms:.2f}", _expected(p), _significant(p)) for name, p in ordered]
+
+
+def _expected(pooled: Pooled) -> str:
+    return f"{pooled.expected[0]:.2f} to {pooled.expected[1]:.2f}"
+
+
+def _significant(pooled: Pooled) -> str:
+    return f"{len(pooled.significant)} of {len(pooled.scored)}"
 
 
 def left_out(comparison: NetworkComparison) -> list[tuple[str, str]]:
@@ -339,13 +313,8 @@ def _passes(passes: bool) -> str:
 def worst(comparison: NetworkComparison) -> list[list[str]]:
     """The largest z, the largest first."""
     ordered = sorted(comparison.pooled.scored, key=lambda s: -abs(s.z))[:WORST]
+    cells = [(scored.cell, f"{scored.z:.1f}") for scored in ordered]
     return [
-        [
-            scored.cell.group.condition.label,
-            number(scored.cell.real),
-            number(scored.cell.model),
-            f"{scored.z:.1f}",
-            scored.cell.measure.name,
-        ]
-        for scored in ordered
+        [c.group.condition.label, number(c.real), number(c.model), z, c.measure.name]
+        for c, z in cells
     ]

@@ -1,20 +1,40 @@
 """Published experiments: which task is played under which conditions, and how it is aggregated.
 
 Each aggregates as the publication did: means over all persons, lines through the means of
-conditions. How, was settled before anything was compared.
+conditions. How, was settled before anything was compared. At the end of the module they are
+played, with the exact checks, spread over processes.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
+from dva_sim.experiments.study.cell_grid import StudyJob
+from dva_sim.kernel import resources
+from dva_sim.kernel.config import load_yaml
+from dva_sim.kernel.streams import Streams, derive_seed
+from dva_sim.simulation.models import Tables
+from dva_sim.simulation.task import TaskScenario, build, play
 from dva_sim.simulation.task.measures import fit_line
-from dva_sim.validation.operators.verdicts import Cells, Floats, Trials, Values, mean, person_means
+from dva_sim.validation.frame import Progress, job_of, play_jobs
+from dva_sim.validation.operators.exact import EXACT
+from dva_sim.validation.operators.verdicts import (
+    Cells,
+    Floats,
+    Found,
+    Trials,
+    Values,
+    certain,
+    collect,
+    mean,
+    person_means,
+    with_intervals,
+)
 
 FOLDER = "experiments/scenarios/tasks"
 
@@ -246,3 +266,110 @@ EXPERIMENTS: tuple[Experiment, ...] = (
     Experiment("frames", "frame-rate", _frame_cells(), frame_values, _ONE),
 )
 """Every experiment; which of them may be fitted to, the split file says."""
+
+
+PERSONS, QUICK_PERSONS = 24, 6
+FAILED = "{!r} could not be simulated"
+
+Traits = Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class OperatorsSetting:
+    """How experiments are played.
+
+    Attributes:
+        strategy: How the persons steer.
+        seed: Of all luck, who the persons are included.
+        persons: How many.
+        quick: Few trials.
+        workers: Processes.
+        traits: Medians that take the place of the population's, for a fit.
+    """
+
+    strategy: str
+    seed: int = 1
+    persons: int = PERSONS
+    quick: bool = False
+    workers: int = 1
+    traits: Traits | None = None
+
+
+def play_exact(
+    checks: Sequence[str], setting: OperatorsSetting, progress: Progress = lambda done: None
+) -> dict[str, Found]:
+    """The value of each line of some exact checks, by its id.
+
+    Raises:
+        RunsFailed: one of them could not be simulated.
+    """
+    jobs = [job_of(check, setting.seed, None) for check in checks]
+    rows = play_jobs(jobs, perform_exact, setting.workers, FAILED, progress)
+    values = ((job.config, row) for job in jobs for row in rows[job.key])
+    return {f"{check}/{row['line']}": certain(float(row["value"])) for check, row in values}
+
+
+def play_experiments(
+    experiments: Sequence[Experiment],
+    setting: OperatorsSetting,
+    progress: Progress = lambda done: None,
+) -> dict[str, Cells]:
+    """The trials of each experiment, by its name.
+
+    Raises:
+        ConfigError: a task cannot be read, or there is no such strategy.
+        RunsFailed: a trial failed.
+    """
+    jobs = {e.name: _jobs(e, setting) for e in experiments}
+    every = [job for cells in jobs.values() for own in cells.values() for job in own]
+    rows = play_jobs(every, perform, setting.workers, FAILED, progress)
+    return {
+        name: {
+            cell: collect([(job.person, rows[job.key]) for job in own])
+            for cell, own in cells.items()
+        }
+        for name, cells in jobs.items()
+    }
+
+
+def measured(
+    experiments: Sequence[Experiment], played: Mapping[str, Cells], seed: int
+) -> dict[str, Found]:
+    """The value of each line with its interval, by its id."""
+    found: dict[str, Found] = {}
+    for experiment in experiments:
+        rng = Streams(seed).fresh(f"resampling/{experiment.name}")
+        found |= with_intervals(experiment.measure, played[experiment.name], rng)
+    return found
+
+
+def jobs_of(experiments: Sequence[Experiment], setting: OperatorsSetting) -> int:
+    """How many jobs the experiments take."""
+    return sum(len(e.cells) for e in experiments) * setting.persons
+
+
+def perform_exact(job: StudyJob) -> Tables:
+    """One exact check."""
+    values = EXACT[job.config](job.seed)
+    return {"rows": [{"line": line, "value": value} for line, value in values.items()]}
+
+
+def perform(job: StudyJob) -> Tables:
+    """All trials of one person in one cell."""
+    return {"rows": play(cast(TaskScenario, job.scenario), job.seed)}
+
+
+def _jobs(experiment: Experiment, setting: OperatorsSetting) -> dict[str, list[StudyJob]]:
+    """Those of each cell; a person meets the same luck in all of them."""
+    document = load_yaml(resources.find(experiment.scenario, FOLDER))
+    jobs: dict[str, list[StudyJob]] = {cell: [] for cell in experiment.cells}
+    for cell, changes in experiment.cells.items():
+        every = {**changes, **(experiment.quick if setting.quick else {})}
+        every |= {"operator.strategy": setting.strategy, "operator.population_seed": setting.seed}
+        every |= {f"operator.traits.{t}": v for t, v in (setting.traits or {}).items()}
+        for person in range(setting.persons):
+            scenario = build(document, {**every, "operator.person": person})
+            seed = derive_seed("operators", experiment.name, setting.seed, person)
+            name = f"{experiment.name}/{cell}"
+            jobs[cell].append(job_of(name, seed, scenario, person=person))
+    return jobs

@@ -15,7 +15,7 @@ from dva_sim.agents.operator.published import LineKind, TargetLine
 from dva_sim.validation.frame import ResultSheet, Row, ValidationResult, short_number
 from dva_sim.validation.operators.experiments import TRIED
 from dva_sim.validation.operators.figures import draw_all
-from dva_sim.validation.operators.verdicts import Cells, Found, LineVerdict, Tally, mean
+from dva_sim.validation.operators.verdicts import Cells, LineVerdict, Tally, mean
 
 NAME = "operators"
 HEADS = ("line", "what", "published (band)", "simulated (95 % interval)", "verdict")
@@ -207,9 +207,5 @@ def _row(verdict: LineVerdict) -> Row:
     row |= {"kind": line.kind, "unit": line.unit, "target": line.target}
     row |= {"band_low": line.low, "band_high": line.high}
     row |= {"surely_above": line.above, "surely_below": line.below}
-    row |= _numbers(found)
+    row |= {"simulated": found.value, "simulated_low": found.low, "simulated_high": found.high}
     return row | {"persons": found.persons, "inside": verdict.inside, "verdict": verdict.word}
-
-
-def _numbers(found: Found) -> dict[str, float]:
-    return {"simulated": found.value, "simulated_low": found.low, "simulated_high": found.high}

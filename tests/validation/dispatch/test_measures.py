@@ -8,15 +8,16 @@ import pytest
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.simulation.shift import build, simulate_timed
-from dva_sim.validation.dispatch.control_variates import controls, inputs
-from dva_sim.validation.dispatch.estimation import estimate
-from dva_sim.validation.dispatch.measures import Batches, check_name, sums
-from dva_sim.validation.dispatch.samples import (
+from dva_sim.validation.dispatch.estimation import controls, estimate, inputs
+from dva_sim.validation.dispatch.measures import (
+    Batches,
     Sample,
+    check_name,
     many_servers,
     occupied,
     one_server,
     sample_of,
+    sums,
 )
 
 NAN = math.nan

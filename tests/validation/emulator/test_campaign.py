@@ -5,7 +5,7 @@ import pytest
 
 from dva_sim.network.pattern_runs import Condition
 from dva_sim.validation.network.emulator import measuring
-from dva_sim.validation.network.emulator.cell import EmulatedJob, EmulatedOutcome
+from dva_sim.validation.network.emulator.cell import EmulatedJob, EmulatedOutcome, EmulatorError
 from dva_sim.validation.network.emulator.measuring import (
     COLUMNS,
     Progress,
@@ -14,7 +14,6 @@ from dva_sim.validation.network.emulator.measuring import (
     job_of,
     measure_all,
 )
-from dva_sim.validation.network.emulator.process import EmulatorError
 
 SLOW, FAST = Condition("pub", 10), Condition("pub", 50)
 Play = Callable[[Condition, int], None]
@@ -113,8 +112,8 @@ def test_two_conditions_with_one_seed_do_not_share_their_luck() -> None:
     assert job_of(SLOW, 1).seed != job_of(FAST, 1).seed != job_of(FAST, 2).seed
 
 
-def test_the_description_of_a_machine_names_nobody() -> None:
-    machine = describe_machine("packets", "root", True)
+def test_the_description_of_a_machine_names_nobody(played: list[tuple[str, int]]) -> None:
+    machine = describe_machine("packets")
     text = " ".join(str(value) for value in machine.values())
     assert "/" not in text
     assert machine["libzmq"]

@@ -3,8 +3,8 @@ import pytest
 
 from dva_sim.cli.checks import check
 from dva_sim.kernel.streams import Streams
-from dva_sim.validation.network.emulator import process, self_check
-from dva_sim.validation.network.emulator.process import EmulatorError
+from dva_sim.validation.network.emulator import cell, self_check
+from dva_sim.validation.network.emulator.cell import EmulatorError
 from dva_sim.validation.network.emulator.self_check import (
     PROBES,
     Crossing,
@@ -80,7 +80,7 @@ def test_a_finding_says_what_was_wanted_and_whether_it_passed() -> None:
 def test_a_missed_finding_is_the_exit_code(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(process, "why_no_packets", lambda: "")
+    monkeypatch.setattr(cell, "why_no_packets", lambda: "")
     for found, code in ((50.5, 0), (52.0, 1)):
         findings = [LinkFinding("delay, median", "ms", 50.0, found, 1.0)]
         monkeypatch.setattr(self_check, "check_link", lambda findings=findings: findings)
@@ -91,6 +91,6 @@ def test_a_missed_finding_is_the_exit_code(
 def test_where_there_is_no_link_the_check_says_why_and_offers_the_relay(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(process, "why_no_packets", lambda: "the emulated link needs Linux")
+    monkeypatch.setattr(cell, "why_no_packets", lambda: "the emulated link needs Linux")
     with pytest.raises(EmulatorError, match="needs Linux; a relay of TCP over the loopback can"):
         check(["link"])

@@ -15,14 +15,15 @@ from emulated import all_end, need_link, networks, wait_for_children
 from patience import becomes
 
 from dva_sim.network.pattern_runs import Condition
-from dva_sim.validation.network.emulator.cell import EmulatedJob, EmulatedOutcome
-from dva_sim.validation.network.emulator.measuring import COLUMNS, job_of, measure
-from dva_sim.validation.network.emulator.process import (
+from dva_sim.validation.network.emulator.cell import (
+    EmulatedJob,
+    EmulatedOutcome,
     EmulatorError,
     run_job,
     start_job,
     why_no_packets,
 )
+from dva_sim.validation.network.emulator.measuring import COLUMNS, job_of, measure
 from dva_sim.validation.network.emulator.self_check import PROBES, Crossing, find_bursts, find_loss
 
 pytestmark = pytest.mark.system
@@ -30,7 +31,7 @@ pytestmark = pytest.mark.system
 LONG = Condition("pub", 10, dur_s=600)
 WAITING = """
 from dva_sim.validation.network.emulator.measuring import measure
-from dva_sim.network.condition import Condition
+from dva_sim.network.pattern_runs import Condition
 measure(Condition("pub", 10, dur_s=600), 1)
 """
 
@@ -189,7 +190,7 @@ def test_where_devices_are_forbidden_one_line_says_what_is_needed(
     def refuse(job: EmulatedJob) -> None:
         raise EmulatorError("a user namespace is refused: Operation not permitted")
 
-    monkeypatch.setattr("dva_sim.validation.network.emulator.process.run_job", refuse)
+    monkeypatch.setattr("dva_sim.validation.network.emulator.cell.run_job", refuse)
     told = why_no_packets()
     assert told.startswith("the emulated link needs Linux, /dev/net/tun open for reading")
     assert told.endswith("here a user namespace is refused: Operation not permitted")

@@ -8,10 +8,9 @@ import pytest
 
 from dva_sim.kernel.streams import Streams
 from dva_sim.network.pattern_runs import Condition
+from dva_sim.validation.network.emulator.cell import EmulatorError
 from dva_sim.validation.network.emulator.measuring import measure
-from dva_sim.validation.network.emulator.process import EmulatorError
-from dva_sim.validation.network.emulator.relay import CHUNK_BYTES, Proxy
-from dva_sim.validation.network.emulator.wire import EmulatedWire, WireConfig
+from dva_sim.validation.network.emulator.wire import CHUNK_BYTES, EmulatedWire, Proxy, WireConfig
 
 CONDITION = Condition("req", 20, timeout_ms=2500, attempts=3, delay_ms=50, dur_s=1, warm_s=0)
 FOREVER = 1e9

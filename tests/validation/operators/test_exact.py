@@ -1,11 +1,12 @@
 """The exact checks pass, and the loops under them find what theory says."""
 
 import math
+from collections import deque
 
 import pytest
 
 from dva_sim.agents.operator.published import lines_of, load_split, load_targets
-from dva_sim.validation.operators import delayed_loops
+from dva_sim.validation.operators import exact
 from dva_sim.validation.operators.exact import EXACT
 
 LINES = [line for line in lines_of(load_targets(), load_split()) if line.kind == "exact"]
@@ -29,31 +30,41 @@ def test_nine_in_ten_helpers_are_as_quick_as_the_standard_asks():
 
 
 def test_a_delayed_integrator_is_stable_below_half_pi():
-    assert delayed_loops.critical(delayed_loops.integrator, 1.0, 2.2) == pytest.approx(
-        math.pi / 2, rel=1e-3
-    )
+    assert exact.critical(exact.integrator, 1.0, 2.2) == pytest.approx(math.pi / 2, rel=1e-3)
+
+
+def linear_pursuit(speed_delay):
+    """Pure pursuit for small errors: heading' = -2 v/L (y/L + heading), y' = v heading."""
+    dt, speed = 1.0 / exact.STEPS, speed_delay
+    y, heading, errors = 1e-3, 0.0, []
+    frames = deque([(y, heading)] * exact.STEPS, maxlen=exact.STEPS)
+    for _ in range(exact.DELAYS * exact.STEPS):
+        seen_y, seen_heading = frames[0]
+        turn = -2.0 * speed * (seen_y + seen_heading)
+        y += speed * (heading + 0.5 * turn * dt) * dt
+        heading += turn * dt
+        frames.append((y, heading))
+        errors.append(y)
+    return errors
 
 
 def test_linear_and_true_pursuit_become_unstable_at_the_same_speed():
-    linear, true = (
-        delayed_loops.critical(loop, 0.4, 0.7)
-        for loop in (delayed_loops.linear_pursuit, delayed_loops.pure_pursuit)
-    )
+    linear, true = (exact.critical(loop, 0.4, 0.7) for loop in (linear_pursuit, exact.pure_pursuit))
     assert linear == pytest.approx(0.5205, rel=5e-3)
     assert true == pytest.approx(linear, rel=1e-3)
 
 
 def test_a_loop_that_is_stable_at_both_ends_has_no_critical_value():
     with pytest.raises(ValueError, match=r"stable at 0.5 and unstable at 1"):
-        delayed_loops.critical(delayed_loops.integrator, 0.5, 1.0)
+        exact.critical(exact.integrator, 0.5, 1.0)
 
 
 def test_a_smith_predictor_answers_nothing_before_the_delay_and_then_as_if_there_were_none():
-    places = delayed_loops.smith_response(4.0, 0.5, 1.0)
-    assert max(places[: delayed_loops.SMITH_STEPS]) == 0.0
+    places = exact.smith_response(4.0, 0.5, 1.0)
+    assert max(places[: exact.SMITH_STEPS]) == 0.0
     assert places[-1] == pytest.approx(1 - math.exp(-2.0), abs=2e-3)
 
 
 def test_three_stale_slots_of_twenty_make_a_command_one_and_a_half_samples_older():
-    ages = delayed_loops.ages()
+    ages = exact.ages()
     assert ages["stale"] - ages["clean"] == pytest.approx(1.5 / 34, rel=1e-6)

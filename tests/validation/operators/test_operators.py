@@ -7,13 +7,13 @@ import pytest
 from dva_sim.agents.operator.published import lines_of, load_split, load_targets
 from dva_sim.cli.validation import validate
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.validation.operators import experiment_runs
-from dva_sim.validation.operators.experiment_runs import (
+from dva_sim.validation.operators import experiments
+from dva_sim.validation.operators.experiments import (
+    EXPERIMENTS,
     OperatorsSetting,
     measured,
     play_experiments,
 )
-from dva_sim.validation.operators.experiments import EXPERIMENTS
 from dva_sim.validation.operators.verdicts import judge, outcome_of
 
 LINES = lines_of(load_targets(), load_split())
@@ -66,7 +66,7 @@ def test_the_number_of_processes_changes_nothing():
 
 
 def test_an_unknown_strategy_is_refused_before_anything_is_played(monkeypatch):
-    monkeypatch.setattr(experiment_runs, "play_exact", lambda *given: pytest.fail("it was played"))
+    monkeypatch.setattr(experiments, "play_exact", lambda *given: pytest.fail("it was played"))
     with pytest.raises(ConfigError, match="'telepathy'"):
         validate("operators", None, quick=True, jobs=1, strategy="telepathy")
 
@@ -86,7 +86,7 @@ def test_what_does_not_belong_together_is_refused(what, options, words):
 
 @pytest.mark.soak
 def test_what_is_written_is_the_same_bytes_each_time(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(experiment_runs, "QUICK_PERSONS", 3)
+    monkeypatch.setattr(experiments, "QUICK_PERSONS", 3)
     for name in ("one", "two"):
         assert validate("operators", tmp_path / name, quick=True, jobs=2, strategy="oracle") == 4
     assert "negative" not in capsys.readouterr().err

@@ -3,5 +3,5 @@
 `wire` decides when a packet arrives, and a `cell` moves real packets by it between two TUN
 devices; `relay` takes its place where namespaces are forbidden, without loss. It may import the
 network's condition and measures, the kernel, and no model of the network. Begin reading at
-`campaign`, which measures many conditions, or at `self_check`, which measures the link itself.
+`measuring`, which measures many conditions, or at `self_check`, which measures the link itself.
 """

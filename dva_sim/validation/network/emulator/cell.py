@@ -4,7 +4,8 @@ It happens in a fresh interpreter with one thread, told what to do by one line o
 `start`). Its standard input stays open as long as somebody waits for the answer: when it closes,
 the run ends. Each end is a process with a network of its own where packets are emulated. A
 namespace here has no name: it ends with its process, and the process ends with the one that
-started it. So nothing can be left behind, whoever is killed.
+started it. So nothing can be left behind, whoever is killed. `run_job` starts such a process, waits
+for its outcome, and says in one line why there is none.
 """
 
 from __future__ import annotations
@@ -15,12 +16,16 @@ import json
 import os
 import signal
 import socket
+import subprocess
+import sys
+import tempfile
 import time
 import traceback
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
-from typing import Any, Protocol
+from typing import IO, Any
 
+from dva_sim.kernel.errors import DvaSimError
 from dva_sim.kernel.streams import Streams
 from dva_sim.network.pattern_runs import Condition
 from dva_sim.validation.network.emulator import linux_calls
@@ -35,11 +40,12 @@ from dva_sim.validation.network.emulator.programs import (
     run_robot,
     run_sender,
 )
-from dva_sim.validation.network.emulator.relay import Proxy
 from dva_sim.validation.network.emulator.wire import (
     FORWARDER_PRIORITY,
+    EmulatedLink,
     EmulatedWire,
     Forwarder,
+    Proxy,
     Told,
     WireConfig,
 )
@@ -203,19 +209,6 @@ class EmulatedOutcome:
         return cls(**data)
 
 
-class EmulatedLink(Protocol):
-    """What joins both ends while they run."""
-
-    def run(self, watched: list[int], deadline: float) -> int | None:
-        """Work until one of the watched file descriptors is readable, or the deadline."""
-
-    def told(self) -> Told:
-        """The columns of the emulator."""
-
-    def close(self) -> None:
-        """Let go of devices and sockets."""
-
-
 class EmulatedCell:
     """One run, from set-up to the last kill.
 
@@ -252,7 +245,7 @@ class EmulatedCell:
             problem = "the operator failed"
         return EmulatedOutcome(notes[0], notes[-1], told, self._way, realtime, problem)
 
-    def _set_up(self) -> tuple[EmulatedLink, bytes]:
+    def _set_up(self) -> tuple[EmulatedLink[Any], bytes]:
         """The link with both ends, and what the operator is told to begin."""
         operator, robot = _programs(self._job)
         if self._job.link == PROXY:
@@ -269,7 +262,7 @@ class EmulatedCell:
         self._nodes.append(start_node(name, program, self._job.room))
         return self._nodes[-1]
 
-    def _run(self, link: EmulatedLink) -> str:
+    def _run(self, link: EmulatedLink[Any]) -> str:
         """Let both ends run until the operator's program is over; what went wrong, if it did."""
         operator, robot = self._nodes
         watched = [operator.ended, robot.ended, _STDIN]
@@ -310,3 +303,91 @@ def _programs(job: EmulatedJob) -> tuple[Program, Program]:
             lambda channel, notes: run_counter(channel, notes, ROBOT_END.address),
         )
     return begin_nothing, await_nothing
+
+
+_SLACK_S = 30.0  # for starting and ending the processes
+NEEDS = (
+    "needs Linux, /dev/net/tun open for reading and writing, and network namespaces "
+    "(as root, or where unprivileged user namespaces are allowed)"
+)
+
+
+class EmulatorError(DvaSimError):
+    """A run on the emulated link came to nothing; another one may succeed."""
+
+
+def run_job(job: EmulatedJob) -> EmulatedOutcome:
+    """Run a job in a process of its own; whatever happens here, nothing of it is left.
+
+    Raises:
+        EmulatorError: it failed; the line says why.
+    """
+    with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
+        process = start_job(job, out, err)
+        try:
+            process.wait(job.bound_s + _SLACK_S)
+        except subprocess.TimeoutExpired:
+            raise EmulatorError(f"the run did not end within {job.bound_s:g} s") from None
+        finally:
+            process.kill()  # its children are killed with it
+            process.wait()
+            if process.stdin is not None:
+                process.stdin.close()
+        said, complaint = _text(out), _text(err)
+    if not said:
+        raise EmulatorError(f"the run ended without an answer: {_last_line(complaint)}")
+    outcome = EmulatedOutcome.from_json(said)
+    if outcome.problem:
+        raise EmulatorError(": ".join(filter(None, (outcome.problem, _last_line(complaint)))))
+    return outcome
+
+
+def start_job(job: EmulatedJob, out: IO[bytes], err: IO[bytes]) -> subprocess.Popen[bytes]:
+    """Start the process of a job; it ends when its standard input closes.
+
+    Args:
+        job: What to do.
+        out: Gets the outcome.
+        err: Gets complaints.
+    """
+    process = subprocess.Popen(
+        [sys.executable, "-m", "dva_sim.validation.network.emulator.start", str(os.getpid())],
+        stdin=subprocess.PIPE,
+        stdout=out,
+        stderr=err,
+        start_new_session=True,  # Ctrl-C is for whoever waits, who then ends this
+    )
+    assert process.stdin is not None
+    process.stdin.write(f"{job.to_json()}\n".encode())
+    process.stdin.flush()
+    return process
+
+
+def why_no_packets() -> str:
+    """One line that says why packets cannot be emulated here; empty where they can."""
+    if sys.platform != "linux":
+        return f"the emulated link {NEEDS}; this is {sys.platform}"
+    try:
+        run_job(EmulatedJob("nothing"))
+    except EmulatorError as error:
+        return f"the emulated link {NEEDS}; here {error}"
+    return ""
+
+
+def refuse_for_proxy(job: EmulatedJob) -> None:
+    """Raise where a relay cannot do what is asked.
+
+    Raises:
+        EmulatorError: it would have to lose or reorder packets.
+    """
+    if job.link == PROXY and (job.wire.loss > 0 or job.wire.reorder):
+        raise EmulatorError("a relay over the loopback can neither lose nor reorder packets")
+
+
+def _text(file: IO[bytes]) -> str:
+    file.seek(0)
+    return file.read().decode(errors="replace").strip()
+
+
+def _last_line(text: str) -> str:
+    return text.splitlines()[-1] if text else ""

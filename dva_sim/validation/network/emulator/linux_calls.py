@@ -1,13 +1,12 @@
-"""The few calls of Linux that Python does not offer: namespaces, parent's death, priority.
+"""The few calls of Linux that Python does not offer: namespaces, parent's death, priority, devices.
 
-Only the C library is needed; the numbers are part of the kernel's stable interface
-(unshare(2), prctl(2), user_namespaces(7), sched(7)).
+Only the C library is needed; the numbers are part of the kernel's stable interface (unshare(2),
+prctl(2), user_namespaces(7), sched(7)).
 
-A TUN device: what the kernel sends to it can be read here, what is written here it receives.
-
-Set up by ioctl and one rtnetlink message, so that no program has to be installed. A route holds
-the congestion control, because some kernels refuse the sysctl in a namespace
-(netdevice(7), rtnetlink(7), RFC 3549).
+What the kernel sends to a TUN device can be read here, what is written here it receives. It is set
+up by ioctl and one rtnetlink message, so that no program has to be installed. A route holds the
+congestion control, because some kernels refuse the sysctl in a namespace (netdevice(7),
+rtnetlink(7), RFC 3549).
 """
 
 from __future__ import annotations
@@ -37,8 +36,11 @@ def enter_network_namespace() -> None:
     _check(_libc().unshare(CLONE_NEWNET), "a network namespace")
 
 
-def become_owner() -> str:
+def become_owner(rootless: bool) -> str:
     """Be allowed to make network namespaces: as root, or as root of a new user namespace.
+
+    Args:
+        rootless: The latter also where the former would do.
 
     Returns:
         `root` or `user namespace`.
@@ -46,12 +48,12 @@ def become_owner() -> str:
     Raises:
         OSError: neither is allowed here.
     """
-    try:
-        enter_network_namespace()
-        return "root"
-    except PermissionError:
-        become_root_of_a_user_namespace()
-        return "user namespace"
+    if not rootless:
+        with suppress(PermissionError):
+            enter_network_namespace()
+            return "root"
+    become_root_of_a_user_namespace()
+    return "user namespace"
 
 
 def become_root_of_a_user_namespace() -> None:

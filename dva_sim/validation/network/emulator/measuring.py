@@ -1,7 +1,8 @@
 """Real TCP and ZeroMQ measured: real programs over the emulated link, many conditions, many times.
 
-A measurement can be stopped, killed and taken up again: its table grows by whole rows, also when
-its writer is killed. Beside it stands the machine it was made on, as far as a reader needs that.
+The whole design goes into a table, or some of it is measured to look at now. A measurement can be
+stopped, killed and taken up again: its table grows by whole rows, also when its writer is killed.
+Beside it stands the machine it was made on, as far as a reader needs that.
 """
 
 from __future__ import annotations
@@ -17,10 +18,10 @@ import os
 import platform
 import re
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
+from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import zmq
@@ -28,22 +29,40 @@ import zmq
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.streams import derive_seed
 from dva_sim.network.pattern_runs import EMULATOR_RESULTS, RESULTS, Condition, RunLog, measure_log
-from dva_sim.validation.network.emulator.cell import PACKETS, EmulatedJob, EmulatedOutcome
-from dva_sim.validation.network.emulator.process import EmulatorError, refuse_for_proxy, run_job
+from dva_sim.validation.network.emulator.cell import (
+    PACKETS,
+    EmulatedJob,
+    EmulatedOutcome,
+    EmulatorError,
+    refuse_for_proxy,
+    run_job,
+)
 from dva_sim.validation.network.emulator.programs import HANDSHAKE_LIMIT_S, Note, NoteKind
 from dva_sim.validation.network.emulator.wire import WireConfig
+from dva_sim.validation.network.reference import (
+    BlockConfig,
+    SocketRun,
+    SourceConfig,
+    conditions_of,
+    read_runs,
+)
 
 Machine = dict[str, str | int | bool | None]
 
 
-def describe_machine(link: str, way: str, realtime: bool) -> Machine:
+def describe_machine(link: str) -> Machine:
     """Versions, clock and processor; no names of machines, people or folders.
+
+    A run of nothing shows what the machine allows: how the namespaces were made, and whether
+    real-time priority was granted.
 
     Args:
         link: `packets` or `proxy`.
-        way: How the namespaces were made.
-        realtime: Whether real-time priority was granted.
+
+    Raises:
+        EmulatorError: the link cannot be set up.
     """
+    outcome = run_job(EmulatedJob("nothing", link=link))
     return {
         "kernel": f"{platform.system()} {platform.release()}",
         "timer_hz": _timer_hz(),
@@ -53,8 +72,8 @@ def describe_machine(link: str, way: str, realtime: bool) -> Machine:
         "pyzmq": zmq.pyzmq_version(),
         "libzmq": zmq.zmq_version(),
         "link": link,
-        "namespaces": way,
-        "realtime": realtime,
+        "namespaces": outcome.way,
+        "realtime": outcome.realtime,
     }
 
 
@@ -157,7 +176,7 @@ def _written(results: Mapping[str, float]) -> Row:
     }
 
 
-class Table:
+class Table(AbstractContextManager["Table"]):
     """A CSV file of one campaign, and beside it the machine it was measured on.
 
     A row is one write that is forced to the disk; what a killed writer left of a row is cut off
@@ -185,15 +204,7 @@ class Table:
             os.close(self._file)
             raise
 
-    def __enter__(self) -> Table:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         os.close(self._file)
 
     def append(self, row: Mapping[str, str]) -> None:
@@ -253,15 +264,11 @@ class Progress:
         done: Rows that are there.
         total: Rows that are wanted.
         left_s: About the time it still takes [s].
-        cell: What was measured last; empty at the beginning.
-        problem: Why it could not be measured; empty if it could.
     """
 
     done: int
     total: int
     left_s: float
-    cell: str = ""
-    problem: str = ""
 
 
 def measure_all(
@@ -291,54 +298,106 @@ def measure_all(
         ConfigError: the file cannot be written, or holds something else.
         EmulatorError: the link cannot be set up, or fails again and again.
     """
-    machine = _look_at_machine(link)
+    machine = describe_machine(link)
     wanted = [(condition, seed) for seed in seeds for condition in conditions]
+    failures, in_a_row = list[str](), 0
     with Table(path, (*_IDENTITY, *COLUMNS)) as table:
         table.sign(machine)
         known = {(row["cond_id"], row["seed"]) for row in table.rows}
         left = [(c, s) for c, s in wanted if (c.hash, str(s)) not in known]
-        return _measure_left(left, len(wanted), table, tell, group, link)
-
-
-def _measure_left(
-    left: Sequence[tuple[Condition, int]],
-    total: int,
-    table: Table,
-    tell: Callable[[Progress], object],
-    group: str,
-    link: str,
-) -> list[str]:
-    """Measure what is not there yet; what failed, a line each."""
-    done, failures, in_a_row = total - len(left), [], 0
-    tell(Progress(done, total, _time_of(left)))
-    for turn, (condition, seed) in enumerate(left, start=1):
-        cell, problem = f"{group}_{condition.label}_s{seed}", ""
-        try:
-            row = measure(condition, seed, link)
-            table.append(_identity(cell, group, seed, condition) | row)
-            done, in_a_row = done + 1, 0
-        except EmulatorError as error:
-            problem, in_a_row = str(error), in_a_row + 1
-            failures.append(f"{cell}: {problem}")
-            if in_a_row == _MOST_FAILURES:
-                raise
-        tell(Progress(done, total, _time_of(left[turn:]), cell, problem))
+        done = len(wanted) - len(left)
+        tell(Progress(done, len(wanted), _time_of(left)))
+        for turn, (condition, seed) in enumerate(left, start=1):
+            cell = f"{group}_{condition.label}_s{seed}"
+            identity = dict(zip(_IDENTITY, (cell, group, str(seed), condition.hash), strict=True))
+            try:
+                table.append(identity | measure(condition, seed, link))
+                done, in_a_row = done + 1, 0
+            except EmulatorError as error:
+                failures.append(f"{cell}: {error}")
+                in_a_row += 1
+                if in_a_row == _MOST_FAILURES:
+                    raise
+            tell(Progress(done, len(wanted), _time_of(left[turn:])))
     return failures
-
-
-def _look_at_machine(link: str) -> dict[str, str | int | bool | None]:
-    """The machine, after a run of nothing that shows what it allows.
-
-    Raises:
-        EmulatorError: the link cannot be set up.
-    """
-    outcome = run_job(EmulatedJob("nothing", link=link))
-    return describe_machine(link, outcome.way, outcome.realtime)
-
-
-def _identity(cell: str, group: str, seed: int, condition: Condition) -> Row:
-    return {"cell": cell, "group": group, "seed": str(seed), "cond_id": condition.hash}
 
 
 def _time_of(left: Sequence[tuple[Condition, int]]) -> float:
     return sum(c.warm_s + c.dur_s + 8e-3 * c.delay_ms + _OVERHEAD_S for c, _ in left)
+
+
+QUICK_S = 12.0  # measured of each condition; enough for twenty commands in nearly all
+
+
+Tell = Callable[[str, Progress], None]
+"""Hears which block is measured, and how far it is."""
+
+
+def measure_design(blocks: Sequence[BlockConfig], path: Path, tell: Tell) -> list[str]:
+    """Measure what a design wants and a table does not hold yet; what failed, a line each.
+
+    Raises:
+        ConfigError: the table cannot be written, or holds something else.
+        EmulatorError: the emulated link cannot be set up here.
+    """
+    return [
+        problem
+        for block in blocks
+        for problem in measure_all(
+            conditions_of(block),
+            list(range(1, block.seeds + 1)),
+            path,
+            partial(tell, block.group),
+            block.group,
+            PACKETS,
+        )
+    ]
+
+
+def measure_now(
+    blocks: Sequence[BlockConfig], path: Path, quick: bool, link: str, tell: Tell
+) -> tuple[list[SocketRun], list[str]]:
+    """Measure each condition of a design once; the runs, and what failed, a line each.
+
+    Args:
+        blocks: The design.
+        path: A new table.
+        quick: One pair of programs for each link, and a short time.
+        link: What the programs are joined by; a relay can neither lose nor reorder packets, so
+            that only conditions without loss are measured.
+        tell: Hears how far it is.
+
+    Raises:
+        ConfigError: the table is there already, or cannot be written.
+        EmulatorError: nothing can be measured here.
+    """
+    if path.exists():
+        raise ConfigError("is there already; --live measures afresh: remove it first", str(path))
+    problems: list[str] = []
+    for block in blocks:
+        conditions = shortened(block) if quick else conditions_of(block)
+        some = [c for c in conditions if link == PACKETS or not (c.loss or c.reorder)]
+        hear = partial(tell, block.group)
+        problems += measure_all(some, [1], path, hear, block.group, link)
+    return read_runs("live", SourceConfig(file=str(path), made_with={})), problems
+
+
+def made_with(path: Path) -> str:
+    """What a table was measured on, in words."""
+    machine = json.loads(path.with_suffix(".machine.json").read_text(encoding="utf-8"))
+    return "; ".join(f"{name} {value}" for name, value in machine.items())
+
+
+def shortened(block: BlockConfig) -> list[Condition]:
+    """Each link once, with programs by turns, measured for a short time."""
+    names = list(block.programs)
+    found = []
+    for turn, link in enumerate(block.links):
+        programs = names[turn % len(names)]
+        changes = {
+            "links": {link: block.links[link]},
+            "programs": {programs: block.programs[programs]},
+            "settings": {**block.settings, "dur_s": QUICK_S},
+        }
+        found += conditions_of(block.model_copy(update=changes))
+    return found

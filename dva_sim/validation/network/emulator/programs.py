@@ -315,9 +315,7 @@ def run_sender(
         sender.connect((address, _PORT))
         start = time.monotonic()
         for number in range(count):
-            left = start + number * interval_s - time.monotonic()
-            if left > 0:
-                time.sleep(left)
+            _pause_until(start + number * interval_s)
             notes.add(NoteKind.ISSUED, number, time.monotonic())
             sender.send(_NUMBER.pack(number) + payload)
         time.sleep(linger_s)

@@ -13,8 +13,7 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.validation.network.emulator.cell import EmulatedJob, EmulatedOutcome
-from dva_sim.validation.network.emulator.process import run_job
+from dva_sim.validation.network.emulator.cell import EmulatedJob, EmulatedOutcome, run_job
 from dva_sim.validation.network.emulator.wire import WireConfig
 
 Floats = NDArray[np.float64]

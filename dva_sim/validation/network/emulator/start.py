@@ -10,7 +10,7 @@ import json
 import os
 import sys
 
-from dva_sim.validation.network.emulator import linux_calls
+from dva_sim.validation.network.emulator.linux_calls import become_owner, die_with_parent
 
 
 def main() -> None:
@@ -24,10 +24,10 @@ def main() -> None:
     way, problem = told["link"], ""
     if way != "proxy":
         try:
-            way = _become_owner(told["rootless"])
+            way = become_owner(told["rootless"])
         except OSError as error:
             problem = error.strerror or str(error)
-    linux_calls.die_with_parent(int(sys.argv[1]))
+    die_with_parent(int(sys.argv[1]))
 
     from dva_sim.validation.network.emulator.cell import EmulatedCell, EmulatedJob, EmulatedOutcome
 
@@ -37,13 +37,6 @@ def main() -> None:
         else EmulatedCell(EmulatedJob.from_json(line), way).play()
     )
     print(outcome.to_json(), flush=True)
-
-
-def _become_owner(rootless: bool) -> str:
-    if not rootless:
-        return linux_calls.become_owner()
-    linux_calls.become_root_of_a_user_namespace()
-    return "user namespace"
 
 
 if __name__ == "__main__":

@@ -1,8 +1,14 @@
-"""One direction of the emulated link: decides when a packet that is offered now comes out.
+"""The emulated link: when a packet that is offered now comes out, and what moves it then.
 
-Drop-tail queue, serialisation at the rate, loss, delay with jitter, in this order. It knows no
-device and no clock: the forwarder asks it with real packets, and moves them between the two TUN
-devices when it says, noting how late it is; tests ask it with scripted ones.
+A wire is one direction: drop-tail queue, serialisation at the rate, loss, delay with jitter, in
+this order. It knows no device and no clock: the forwarder asks it with real packets, and moves them
+between the two TUN devices when it says, noting how late it is; tests ask it with scripted ones.
+
+Where packets cannot be emulated a relay of TCP over the loopback takes the forwarder's place, with
+delay, jitter and rate. It cannot lose a packet, because the kernel repeats what is lost before the
+relay would see it, and TCP's own set-up and acknowledgements do not feel its delay. Each chunk that
+it reads counts as one packet of the wire; when the wire's queue is full it reads no more, so that
+the sender is held back as by a full send buffer.
 """
 
 from __future__ import annotations
@@ -11,12 +17,15 @@ import heapq
 import math
 import os
 import select
+import socket
 import time
+from abc import ABC, abstractmethod
 from array import array
 from collections import deque
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from typing import Generic, TypeVar
 
 import numpy as np
 from numpy.random import Generator
@@ -179,9 +188,60 @@ _MOST_AT_ONCE = 32  # packets of one device before what is due is looked at agai
 _VERSION_4 = 4
 
 Told = dict[str, float | int]
+T = TypeVar("T")
 
 
-class Forwarder:
+class EmulatedLink(ABC, Generic[T]):
+    """What joins both ends while they run: what is on its way, and comes out when it is due.
+
+    Args:
+        wires: From the operator to the robot, and back.
+    """
+
+    def __init__(self, wires: tuple[EmulatedWire, EmulatedWire]) -> None:
+        self._wires = wires
+        self._due: list[tuple[float, int, T, bytes]] = []
+        self._number = 0
+        self._late = array("d")
+
+    @abstractmethod
+    def run(self, watched: Sequence[int], deadline: float) -> int | None:
+        """Forward until one of the watched file descriptors has something to say.
+
+        Returns:
+            That one; None when the deadline has passed.
+        """
+
+    @abstractmethod
+    def close(self) -> None:
+        """Let go of devices and sockets."""
+
+    @abstractmethod
+    def _put(self, out: T, data: bytes) -> None:
+        """Hand on what is due."""
+
+    def told(self) -> Told:
+        """The columns of the emulator; chunks of a relay count as packets."""
+        return tell(self._wires, self._late)
+
+    def _offer(self, wire: EmulatedWire, size: int, out: T, data: bytes) -> None:
+        """Let a wire of the link decide when something of so many bytes comes out, if at all."""
+        release = wire.offer(time.monotonic(), size)
+        if release is not None:
+            self._number += 1
+            heapq.heappush(self._due, (release, self._number, out, data))
+
+    def _release(self, now: float, deadline: float) -> float:
+        """Hand on everything that is due; when there is something to do next [s]."""
+        while self._due and self._due[0][0] <= now:
+            release, _, out, data = heapq.heappop(self._due)
+            self._put(out, data)
+            now = time.monotonic()
+            self._late.append(now - release)
+        return min(deadline, self._due[0][0]) if self._due else deadline
+
+
+class Forwarder(EmulatedLink[int]):
     """Both directions of an emulated link.
 
     Args:
@@ -190,22 +250,14 @@ class Forwarder:
     """
 
     def __init__(self, tuns: tuple[int, int], wires: tuple[EmulatedWire, EmulatedWire]) -> None:
+        super().__init__(wires)
         self._ways = {tuns[0]: (wires[0], tuns[1]), tuns[1]: (wires[1], tuns[0])}
-        self._wires = wires
-        self._due: list[tuple[float, int, int, bytes]] = []
-        self._number = 0
-        self._late = array("d")
 
     def run(self, watched: Sequence[int], deadline: float) -> int | None:
-        """Forward until one of the watched file descriptors has something to say.
-
-        Returns:
-            That one; None when the deadline has passed.
-        """
+        """See `EmulatedLink`."""
         tuns = list(self._ways)
         while (now := time.monotonic()) < deadline:
-            self._release(now)
-            until = min(deadline, self._due[0][0]) if self._due else deadline
+            until = self._release(now, deadline)
             pause = max(0.0, until - time.monotonic())
             ready = select.select([*tuns, *watched], [], [], pause)[0]
             for file in ready:
@@ -214,12 +266,8 @@ class Forwarder:
                 self._take(file)
         return None
 
-    def told(self) -> Told:
-        """The columns of the emulator."""
-        return tell(self._wires, self._late)
-
     def close(self) -> None:
-        """Let go of the devices."""
+        """See `EmulatedLink`."""
         for tun in self._ways:
             os.close(tun)
 
@@ -231,20 +279,11 @@ class Forwarder:
                 packet = os.read(tun, _LARGEST)
                 if not packet or packet[0] >> 4 != _VERSION_4:
                     continue
-                release = wire.offer(time.monotonic(), len(packet))
-                if release is not None:
-                    self._number += 1
-                    heapq.heappush(self._due, (release, self._number, out, packet))
+                self._offer(wire, len(packet), out, packet)
 
-    def _release(self, now: float) -> None:
-        """Write everything that is due."""
-        due = self._due
-        while due and due[0][0] <= now:
-            release, _, out, packet = heapq.heappop(due)
-            with suppress(OSError):  # a namespace that has just ended takes nothing more
-                os.write(out, packet)
-            now = time.monotonic()
-            self._late.append(now - release)
+    def _put(self, out: int, data: bytes) -> None:
+        with suppress(OSError):  # a namespace that has just ended takes nothing more
+            os.write(out, data)
 
 
 def tell(wires: tuple[EmulatedWire, EmulatedWire], late: Sequence[float]) -> Told:
@@ -259,3 +298,133 @@ def tell(wires: tuple[EmulatedWire, EmulatedWire], late: Sequence[float]) -> Tol
     for name, value in zip(("p50", "p99", "max"), shares, strict=True):
         told[f"emu_late_{name}_ms"] = 1e3 * float(value)
     return told
+
+
+CHUNK_BYTES = 1448
+_HEADERS_BYTES = 52
+_LOOK_AGAIN_S = 0.001  # whether a full queue has room
+
+
+@dataclass(eq=False)
+class RelayedStream:
+    """One direction of one connection.
+
+    Attributes:
+        source: Where bytes come from.
+        sink: Where they go.
+        wire: Decides when.
+        waiting: Bytes that are due and not yet taken.
+        open: More may come from the source.
+        closing: Nothing more comes after what waits.
+    """
+
+    source: socket.socket
+    sink: socket.socket
+    wire: EmulatedWire
+    waiting: bytearray = field(default_factory=bytearray)
+    open: bool = True
+    closing: bool = False
+
+    def has_room(self, now: float) -> bool:
+        """Whether more may be read."""
+        room = self.wire.backlog(now) < self.wire.config.queue_pkts
+        return self.open and not self.waiting and room
+
+    def flush(self) -> None:
+        """Hand on what is due, and the end of the stream after it."""
+        try:
+            with suppress(BlockingIOError):
+                while self.waiting:
+                    del self.waiting[: self.sink.send(self.waiting)]
+            if self.closing and not self.waiting:
+                self.sink.shutdown(socket.SHUT_WR)
+        except OSError:  # the other end has closed: nothing of this stream is wanted any more
+            self.waiting.clear()
+            self.open = False
+
+
+class Proxy(EmulatedLink[RelayedStream]):
+    """Relays connections to the robot.
+
+    Args:
+        wires: From the operator to the robot, and back.
+        target: Of the robot, such as `tcp://127.0.0.1:4000`.
+    """
+
+    def __init__(self, wires: tuple[EmulatedWire, EmulatedWire], target: str) -> None:
+        super().__init__(wires)
+        host, _, port = target.removeprefix("tcp://").rpartition(":")
+        self._target = (host, int(port))
+        self._listener = socket.create_server(("127.0.0.1", 0))
+        self._streams: list[RelayedStream] = []
+
+    @property
+    def address(self) -> str:
+        """Where the operator connects."""
+        return f"tcp://127.0.0.1:{self._listener.getsockname()[1]}"
+
+    def run(self, watched: Sequence[int], deadline: float) -> int | None:
+        """See `EmulatedLink`."""
+        while (now := time.monotonic()) < deadline:
+            until = self._release(now, deadline)
+            self._forget_closed()
+            if any(stream.open and not stream.has_room(now) for stream in self._streams):
+                until = min(until, now + _LOOK_AGAIN_S)
+            pause = max(0.0, until - time.monotonic())
+            sources = {s.source: s for s in self._streams if s.has_room(now)}
+            sinks = {s.sink: s for s in self._streams if s.waiting}
+            files: list[socket.socket | int] = [self._listener, *sources, *watched]
+            readable, writable, _ = select.select(files, list(sinks), [], pause)
+            for sink in writable:
+                sinks[sink].flush()
+            for file in readable:
+                if isinstance(file, int):
+                    return file
+                if file is self._listener:
+                    self._accept()
+                else:
+                    self._take(sources[file])
+        return None
+
+    def close(self) -> None:
+        """See `EmulatedLink`."""
+        self._listener.close()
+        for stream in self._streams:
+            stream.source.close()
+
+    def _accept(self) -> None:
+        near, _ = self._listener.accept()
+        far = socket.create_connection(self._target)
+        for end in (near, far):
+            end.setblocking(False)
+            end.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._streams += [
+            RelayedStream(near, far, self._wires[0]),
+            RelayedStream(far, near, self._wires[1]),
+        ]
+
+    def _take(self, stream: RelayedStream) -> None:
+        """Read a chunk; an empty one is the end of the stream, and crosses the wire as well."""
+        if not stream.has_room(time.monotonic()):
+            return  # another stream of this direction has just filled the queue
+        try:
+            chunk = stream.source.recv(CHUNK_BYTES)
+        except OSError:
+            chunk = b""
+        stream.open = bool(chunk)
+        self._offer(stream.wire, len(chunk) + _HEADERS_BYTES, stream, chunk)
+
+    def _put(self, out: RelayedStream, data: bytes) -> None:
+        out.waiting += data
+        out.closing = not data
+        out.flush()
+
+    def _forget_closed(self) -> None:
+        """Close connections whose two streams have ended."""
+        for stream in [s for s in self._streams if s.closing and not s.waiting]:
+            back = next(s for s in self._streams if s.source is stream.sink)
+            if back.closing or not back.open:
+                for ended in (stream, back):
+                    self._streams.remove(ended)
+                    ended.source.close()
+                return

@@ -20,13 +20,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Annotated, Protocol
+from typing import Annotated, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dva_sim.simulation.shift import distributions
-from dva_sim.simulation.shift import distributions as timed
 
 _NODES = 128
 
@@ -96,6 +95,19 @@ class DurationLaw(Protocol):
         """Expected square [s^2]."""
 
 
+class LawMoments(NamedTuple):
+    """A law of which only these matter; see `DurationLaw`."""
+
+    mean: float
+    second: float
+
+
+def _usual(utilisation: float, delayed: float, wait_s: float, service_s: float) -> Measures:
+    """The measures that most queues have."""
+    stay_s = wait_s + service_s
+    return {"utilisation": utilisation, "delayed": delayed, "wait_s": wait_s, "stay_s": stay_s}
+
+
 def erlang_b(servers: int, load: float) -> float:
     """Probability that all servers are busy if nobody waits.
 
@@ -139,12 +151,7 @@ def mmc(
     load = arrival_rate * mean_service_s
     delayed = erlang_c(servers, load)
     drain = servers / mean_service_s - arrival_rate
-    measures = {
-        "utilisation": load / servers,
-        "delayed": delayed,
-        "wait_s": delayed / drain,
-        "stay_s": delayed / drain + mean_service_s,
-    }
+    measures = _usual(load / servers, delayed, delayed / drain, mean_service_s)
     for percent in (50, 90, 95):
         beyond = 1 - percent / 100
         measures[f"wait_{percent}_s"] = max(0.0, math.log(delayed / beyond) / drain)
@@ -160,13 +167,7 @@ def mgcc(arrival_rate: float, mean_service_s: float, servers: int) -> Measures:
     """
     load = arrival_rate * mean_service_s
     lost = erlang_b(servers, load)
-    return {
-        "lost": lost,
-        "utilisation": load * (1 - lost) / servers,
-        "wait_s": 0.0,
-        "delayed": 0.0,
-        "stay_s": mean_service_s,
-    }
+    return {"lost": lost} | _usual(load * (1 - lost) / servers, 0.0, 0.0, mean_service_s)
 
 
 def mmck(arrival_rate: float, mean_service_s: Memoryless, servers: int, places: int) -> Measures:
@@ -181,13 +182,9 @@ def mmck(arrival_rate: float, mean_service_s: Memoryless, servers: int, places: 
     chance = birth_death(np.full(room, arrival_rate), busy[1:] / mean_service_s)
     admitted = 1 - chance[-1]
     wait = float(chance @ (inside - busy)) / (arrival_rate * admitted)  # Little
-    return {
-        "lost": float(chance[-1]),
-        "utilisation": float(chance @ busy) / servers,
-        "delayed": float(chance[servers:-1].sum()) / admitted,
-        "wait_s": wait,
-        "stay_s": wait + mean_service_s,
-    }
+    delayed = float(chance[servers:-1].sum()) / admitted
+    measures = _usual(float(chance @ busy) / servers, delayed, wait, mean_service_s)
+    return {"lost": float(chance[-1])} | measures
 
 
 def mg1(arrival_rate: float, service: DurationLaw) -> Measures:
@@ -198,16 +195,10 @@ def mg1(arrival_rate: float, service: DurationLaw) -> Measures:
     """
     load = arrival_rate * service.mean
     require_stable(load)
-    wait = arrival_rate * service.second / (2 * (1 - load))
-    return {
-        "utilisation": load,
-        "delayed": load,
-        "wait_s": wait,
-        "stay_s": wait + service.mean,
-    }
+    return _usual(load, load, arrival_rate * service.second / (2 * (1 - load)), service.mean)
 
 
-def gm1(between: timed.Law, mean_service_s: Memoryless) -> Measures:
+def gm1(between: distributions.Law, mean_service_s: Memoryless) -> Measures:
     """G/M/1: any law between arrivals, one server with exponential service.
 
     References:
@@ -221,12 +212,7 @@ def gm1(between: timed.Law, mean_service_s: Memoryless) -> Measures:
     # At sigma = 1 the equation always holds; the root sought lies below it.
     sigma = float(brentq(lambda x: laplace(between, rate * (1 - x)) - x, 0.0, 1 - 1e-9))
     wait = sigma * mean_service_s / (1 - sigma)
-    return {
-        "utilisation": mean_service_s / between.mean,
-        "delayed": sigma,
-        "wait_s": wait,
-        "stay_s": wait + mean_service_s,
-    }
+    return _usual(mean_service_s / between.mean, sigma, wait, mean_service_s)
 
 
 def erlang_a(
@@ -253,14 +239,9 @@ def erlang_a(
     served = servers * rate / (servers * rate + place * impatience)
     until = np.cumsum(1 / (servers * rate + place * impatience))
     wait = float(chance[servers:] @ (served * until)) / (1 - abandoned)
-    return {
-        "abandoned": abandoned,
-        "delayed": float(chance[servers:].sum()),
-        "wait_s": wait,
-        "wait_all_s": abandoned * mean_patience_s,
-        "stay_s": wait + mean_service_s,
-        "utilisation": float(chance @ busy) / servers,
-    }
+    delayed = float(chance[servers:].sum())
+    measures = _usual(float(chance @ busy) / servers, delayed, wait, mean_service_s)
+    return {"abandoned": abandoned, "wait_all_s": abandoned * mean_patience_s} | measures
 
 
 def tandem(
@@ -280,15 +261,11 @@ def tandem(
     """
     first = mmc(arrival_rate, first_service_s, first_servers)
     second = mmc(arrival_rate, second_service_s, second_servers)
-    return {
-        "utilisation_1": first["utilisation"],
-        "utilisation_2": second["utilisation"],
-        "delayed_1": first["delayed"],
-        "delayed_2": second["delayed"],
-        "wait_1_s": first["wait_s"],
-        "wait_2_s": second["wait_s"],
-        "stay_s": first["stay_s"] + second["stay_s"],
-    }
+    measures = {"stay_s": first["stay_s"] + second["stay_s"]}
+    for number, station in enumerate((first, second), start=1):
+        measures |= {f"{name}_{number}": station[name] for name in ("utilisation", "delayed")}
+        measures[f"wait_{number}_s"] = station["wait_s"]
+    return measures
 
 
 def birth_death(births: Floats, deaths: Floats) -> Floats:
@@ -304,7 +281,7 @@ def _longest_queue(arrival_rate: float, drain: float, impatience: float) -> int:
     return int(balance + 40 * math.sqrt(arrival_rate / impatience + 1) + 100)
 
 
-def require_stable(load: float) -> None:
-    """Refuse a load [share of what the servers can do] that no stationary state belongs to."""
+def require_stable(load: float, who: str = "servers") -> None:
+    """Refuse a load [share of what they can do] that no stationary state belongs to."""
     if not load < 1:
-        raise ValueError(f"the servers are offered {load:g} of what they can do; below 1 is stable")
+        raise ValueError(f"the {who} are offered {load:g} of what they can do; below 1 is stable")
