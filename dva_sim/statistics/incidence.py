@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dva_sim.statistics.persons import LEVEL, Floats, Interval
+from dva_sim.statistics.persons import Floats, Interval
 from dva_sim.statistics.proportions import interval_of_share
 
 Ints = NDArray[np.intp]
@@ -132,11 +132,7 @@ class IncidenceAtHorizon:
 
 
 def cumulative_incidence(
-    times: ArrayLike,
-    causes: Sequence[Any],
-    horizon: float,
-    person: ArrayLike,
-    level: float = LEVEL,
+    times: ArrayLike, causes: Sequence[Any], horizon: float, person: ArrayLike
 ) -> IncidenceAtHorizon:
     """Aalen and Johansen's cumulative incidence at a horizon, with intervals over persons.
 
@@ -152,7 +148,6 @@ def cumulative_incidence(
         causes: What happened `(n,)`; None or an empty string where nothing did until then.
         horizon: Later does not count.
         person: Whose run it was `(n,)`.
-        level: Confidence level.
 
     References:
         Aalen & Johansen, Scand. J. Stat. 5 (1978) 141-150; Andersen, Klein & Rosthoj,
@@ -174,7 +169,7 @@ def cumulative_incidence(
             for kept in (np.ones(len(owner), dtype=bool), *left_out)
         ]
     )
-    intervals = [_interval(share, len(persons), len(owner), level) for share in shares]
+    intervals = [_interval(share, len(persons), len(owner)) for share in shares]
     return IncidenceAtHorizon(horizon, dict(zip(names, intervals[:-1], strict=True)), intervals[-1])
 
 
@@ -185,11 +180,11 @@ def _shares(times: Floats, causes: Ints, count: int, horizon: float) -> list[flo
     return [*met, round(1.0 - sum(met), 12)]
 
 
-def _interval(share: Floats, persons: int, runs: int, level: float) -> Interval:
+def _interval(share: Floats, persons: int, runs: int) -> Interval:
     """From the share `[0]` and what it is without each person `[1:]`."""
     if persons < 2:
         estimate = float(share[0]) if persons else math.nan
         return Interval(estimate, math.nan, math.nan, persons)
     left_out = share[1:]
     variance = (persons - 1) / persons * float(((left_out - left_out.mean()) ** 2).sum())
-    return interval_of_share(float(share[0]), variance, persons, runs, level)
+    return interval_of_share(float(share[0]), variance, persons, runs)

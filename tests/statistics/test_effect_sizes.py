@@ -47,7 +47,7 @@ def test_the_interval_of_the_average_size_is_a_bootstrap_t_written_out():
         return size(*rows), math.sqrt(11 * np.var(left_out))
 
     estimate, error = with_error(np.stack([a, b]))
-    counts = draws(12, 1, 200).astype(int)
+    counts = draws(12, 200).astype(int)
     drawn = [with_error(np.repeat(np.stack([a, b]), own, axis=1)) for own in counts]
     ratios = np.sort([(size - estimate) / max(spread, error / 4) for size, spread in drawn])
     least = max(stats.t.isf(0.025, 11), np.sort(abs(ratios))[189])

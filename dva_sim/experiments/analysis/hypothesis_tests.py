@@ -213,7 +213,7 @@ def _compared(
         found,
         effect_size(*pairs),
         pair_correlation(pairs.first, pairs.second),
-        permutation_test(*pairs).p,
+        permutation_test(*pairs),
     )
 
 
@@ -232,7 +232,7 @@ def _tested(
 def _p(claim: Hypothesis, pairs: PairedRuns) -> float:
     """Of the claim's own test."""
     if claim.direction == "same":
-        return equivalence(*pairs, claim.margin).p
+        return equivalence(*pairs, claim.margin)
     margin = claim.margin if claim.direction == "above" else -claim.margin
     return one_sided_test(*pairs, margin, claim.direction)
 
