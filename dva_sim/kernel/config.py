@@ -440,8 +440,12 @@ def load_yaml(path: str | Path) -> Document:
     """
     path = Path(path)
     text = read_text(path)
+    places: dict[KeyPath, tuple[int, int]] = {(): (1, 1)}
     try:
         tree = YAML(typ="rt", pure=True).load(text)
+        if not isinstance(tree, CommentedMap):
+            raise ConfigError("should be a mapping of keys to values", path, 1, 1)
+        return Document(_plain(tree, (), places), path, places)
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         problem = (error.problem or "is not valid YAML").split("\n")[0]
@@ -451,19 +455,10 @@ def load_yaml(path: str | Path) -> Document:
         raise ConfigError(f"is not valid YAML: {str(error).splitlines()[0]}", path) from error
     except RecursionError:
         raise ConfigError("is nested too deeply", path) from None
-    except ValueError as error:  # such as the date 2001-13-32, or a number of 5000 digits
-        raise ConfigError(f"has a value that cannot be read: {error}", path) from error
-    if not isinstance(tree, CommentedMap):
-        raise ConfigError("should be a mapping of keys to values", path, 1, 1)
-    places: dict[KeyPath, tuple[int, int]] = {(): (1, 1)}
-    try:
-        data = _plain(tree, (), places)
     except _TooMuchError as error:
         raise ConfigError(str(error), path) from None
-    except RecursionError:
-        raise ConfigError("is nested too deeply", path) from None
-    assert isinstance(data, dict)
-    return Document(data, path, places)
+    except ValueError as error:  # such as the date 2001-13-32, or a number of 5000 digits
+        raise ConfigError(f"has a value that cannot be read: {error}", path) from error
 
 
 class _TooMuchError(ValueError):
@@ -505,7 +500,7 @@ def parse_scalar(text: str) -> Any:
 def validate(
     model: type[M],
     data: Mapping[str, Any],
-    error: Fail | None = None,
+    error: Fail = lambda problem, _: ConfigError(problem),
 ) -> M:
     """Build `model` from `data`.
 
@@ -521,8 +516,4 @@ def validate(
         return model.model_validate(data)
     except ValidationError as problems:
         text, path = first_mistake(model, data, problems.errors(include_url=False))
-        raise (error or _unplaced)(text, path) from None
-
-
-def _unplaced(problem: str, path: KeyPath) -> ConfigError:
-    return ConfigError(problem)
+        raise error(text, path) from None

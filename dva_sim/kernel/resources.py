@@ -11,7 +11,6 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import guess, hint
 
 _PACKAGE = Path(__file__).parent.parent
-FOLDERS = ("protocol", "worlds", "agents", "experiments")
 REGISTRATION = ".registration.yaml"  # ending of a file that belongs to the study beside it
 _RESULTS = "manifest.json"  # of a results folder
 
