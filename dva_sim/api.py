@@ -327,8 +327,7 @@ def _rehearsed(request: RunRequest) -> tuple[Study, list[DesignCell]]:
     from dva_sim.experiments.execution.dry_run import rehearse_all
     from dva_sim.testing.file_kinds import open_study
 
-    variant = request.variant
-    asked = open_study(request.study, request.changes, version=variant.version, pilot=variant.pilot)
+    asked = open_study(request.study, request.changes, version=request.version, pilot=request.pilot)
     return asked, rehearse_all(asked)
 
 

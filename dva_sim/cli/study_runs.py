@@ -92,8 +92,7 @@ def plan(request: RunRequest) -> None:
 
 def _loaded(request: RunRequest) -> tuple[Study, list[DesignCell]]:
     """A study without mistakes, and its configurations."""
-    variant = request.variant
-    study = open_study(request.study, request.changes, version=variant.version, pilot=variant.pilot)
+    study = open_study(request.study, request.changes, version=request.version, pilot=request.pilot)
     say(f"[bold]{escape(study.question)}[/bold]")
     cells = _checked(study)
     tell_cells(study, cells)

@@ -9,7 +9,8 @@ from pathlib import Path
 from dva_sim.experiments.execution import dry_run, kept_recordings, runner
 from dva_sim.experiments.execution.scheduling import LIMIT_S, Simulate
 from dva_sim.experiments.study.cell_grid import DesignCell
-from dva_sim.experiments.study.study import Study, Variant
+from dva_sim.experiments.study.study import Study, Version
+from dva_sim.kernel.errors import ConfigError
 
 Progress = Callable[[int, int], object]
 
@@ -41,18 +42,21 @@ class RunRequest:
     limit_s: float = LIMIT_S
 
     @property
-    def variant(self) -> Variant:
-        """Which variant of the study is meant.
+    def version(self) -> Version | None:
+        """The small or the larger version; None for the study as its file says.
 
         Raises:
-            ConfigError: two versions are asked for.
+            ConfigError: both are asked for.
         """
-        return Variant.of(quick=self.quick, full=self.full, pilot=self.pilot)
+        if self.quick and self.full:
+            raise ConfigError("--quick and --full are two versions of a study; give one of them")
+        return "quick" if self.quick else "full" if self.full else None
 
     @property
     def folder(self) -> Path:
-        """Where results go."""
-        return self.out if self.out is not None else self.variant.folder(str(self.study))
+        """Where results go; if nobody says, each variant of a study has its own folder."""
+        marks = [Path(self.study).stem, self.version, None if self.pilot is None else "pilot"]
+        return self.out or Path("results") / "-".join(filter(None, marks))
 
     def plan(
         self, study: Study, cells: Sequence[DesignCell], probe: Simulate | None = None
