@@ -17,7 +17,6 @@ from numpy.typing import ArrayLike
 
 from dva_sim.statistics.bands import LEAST_ERROR, reach
 from dva_sim.statistics.persons import LEVEL, Floats, Interval, draws, paired_means
-from dva_sim.statistics.proportions import share_interval
 
 RESAMPLES = 1000  # each takes as many jackknife steps as there are persons
 _ONE = 1 - 1e-12  # a perfect correlation, on Fisher's scale still finite
@@ -26,7 +25,7 @@ _FEWEST = 3  # persons; of two, any are perfectly correlated
 
 @dataclass(frozen=True)
 class EffectSize:
-    """A paired difference, three times without its unit.
+    """A paired difference, twice without its unit.
 
     Attributes:
         paired: Mean difference over the standard deviation of persons' differences
@@ -34,12 +33,10 @@ class EffectSize:
         average: Mean difference over the average standard deviation of persons under the two
             treatments (`d_av`, with Hedges' correction): how large it is beside how much
             persons differ.
-        superiority: Share of persons for whom the first lies above the second; ties half.
     """
 
     paired: Interval
     average: Interval
-    superiority: Interval
 
 
 def effect_size(
@@ -58,15 +55,13 @@ def effect_size(
     """
     first, second = paired_means(a, b, person)
     n = len(first)
-    above = np.where(first > second, 1.0, np.where(first < second, 0.0, 0.5))
-    superiority = share_interval(above, np.arange(n))
     if n < _FEWEST:
         nothing = Interval(math.nan, math.nan, math.nan, n)
-        return EffectSize(nothing, nothing, superiority)
+        return EffectSize(nothing, nothing)
     sizes = _beside_differences, _beside_persons
     found = _studentised(sizes, first, second, resamples)
     paired, average = (_times(each, _hedges(n)) for each in found)
-    return EffectSize(paired, average, superiority)
+    return EffectSize(paired, average)
 
 
 def _beside_differences(pairs: Pairs) -> Floats:

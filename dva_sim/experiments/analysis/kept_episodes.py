@@ -130,7 +130,7 @@ def _seen(
 ) -> tuple[Table, tuple[SeenIncident, ...]]:
     """Who was where and what happened, from the recording or else from the table."""
     if row in files:
-        from dva_sim.recordings.reading import read_lapse
+        from dva_sim.recordings.reading import read_lapse  # late: start-up
 
         lapse = read_lapse(files[row])
         places = [(i, i.hazard.position) for i in lapse.incidents]

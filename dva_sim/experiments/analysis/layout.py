@@ -20,13 +20,13 @@ from dva_sim.experiments.analysis.run_grid import (
     plain_level,
     present,
 )
+from dva_sim.experiments.results.tables import DESIGN_COLUMNS
 from dva_sim.experiments.study.parts import POINT, TUNING, Level
 from dva_sim.kernel.units import unit_of
 from dva_sim.simulation.labels import brief, measure_called
 from dva_sim.statistics import Interval, band
 
 ROW = "row"  # name of the factor whose levels are the rows of a list
-_KEYS = {"part", "cell", "config", "is_reference", "person", "trial", "seed"}
 
 
 def factors_of(study: Mapping[str, Any]) -> list[Factor]:
@@ -65,7 +65,7 @@ def points_of(study: Mapping[str, Any], runs: Table) -> list[str]:
     if POINT not in study.get("factors", {}) or POINT not in runs:
         return []
     design = list(runs)[: list(runs).index("is_reference")]
-    names = [n for n in design if n not in _KEYS and n not in study["factors"]]
+    names = [n for n in design if n not in DESIGN_COLUMNS and n not in study["factors"]]
     return [n for n in names if np.isfinite(as_floats(runs[n])).any()]
 
 
@@ -264,9 +264,8 @@ def _other(factors: Sequence[Factor], over: Factor | None) -> Factor | None:
 
 
 def _first_measure(part: RunGrid) -> str:
-    names = [c for c in part.treated if c not in _KEYS and part.has(c)]
-    factors = {f.name for f in part.factors}
-    measures = [c for c in names if c not in factors]
+    known = {*DESIGN_COLUMNS, *(f.name for f in part.factors)}
+    measures = [c for c in part.treated if c not in known and part.has(c)]
     times = (name for name in measures if measure_called(name).awaits)
     return next(times, next(iter(measures), "seed"))
 

@@ -17,6 +17,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from dva_sim.agents.robot.command_queue import mean_of
 from dva_sim.experiments.analysis.layout import interval_of
 from dva_sim.experiments.analysis.run_grid import Setting, StudyView
 from dva_sim.experiments.study.parts import TUNING, Level, Prediction, Range
@@ -24,6 +25,7 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.units import unit_of
 from dva_sim.kernel.wording import number, quantity
 from dva_sim.simulation.labels import level_name, measure_of, setting
+from dva_sim.simulation.scenario import build, phone_profile
 from dva_sim.statistics import Interval
 
 Verdict = Literal["held", "did not hold", "open", "not judged"]
@@ -181,9 +183,6 @@ def cadence(scenario: Mapping[str, Any], changes: Mapping[str, Level]) -> Cadenc
 
     A phone that looks only when its batch is full or its time is up wants no more than that.
     """
-    from dva_sim.agents.robot.command_queue import mean_of
-    from dva_sim.simulation.scenario import build, phone_profile
-
     try:
         resolved = build(scenario, changes)
         phone = phone_profile(resolved)

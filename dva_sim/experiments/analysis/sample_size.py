@@ -19,7 +19,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -110,9 +110,7 @@ def law_of(
     if len(means) < 2 or not np.ptp(means) > 0:
         return None
     plain = IntervalLaw(float(means.std(ddof=1)), len(means), level)
-    if reach is None:
-        return plain
-    return IntervalLaw(plain.spread, plain.persons, level, reach / plain.reach(len(means)))
+    return plain if reach is None else replace(plain, stretch=reach / plain.reach(len(means)))
 
 
 class Count(NamedTuple):

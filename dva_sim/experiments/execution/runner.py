@@ -14,6 +14,7 @@ from typing import Any
 
 from dva_sim.experiments.execution import executors, scheduling
 from dva_sim.experiments.execution.checkpoint import Checkpoint
+from dva_sim.experiments.execution.dask_cluster import DaskCluster
 from dva_sim.experiments.execution.executors import Workers, WorkersLost
 from dva_sim.experiments.execution.scheduling import Simulate, run_job
 from dva_sim.experiments.results.manifest import failures, machine, manifest_of, write_json
@@ -220,8 +221,6 @@ def _workers(jobs: int | None, scheduler: str | None) -> Iterator[Workers]:
         return
     if jobs is not None:
         raise ConfigError("give the number of processes or a scheduler, not both")
-    from dva_sim.experiments.execution.dask_cluster import DaskCluster
-
     with DaskCluster(scheduler) as cluster:
         yield cluster
 

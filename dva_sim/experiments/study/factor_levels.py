@@ -63,7 +63,6 @@ def rows_of(study: Study) -> list[Row]:
 
 
 def _ends_of(study: Study) -> list[Row]:
-
     spans = _ranges_of(study)
     middle: Row = {key: value_at(span, 0.5) for key, span in spans.items()}
     return [{**middle, key: value_at(spans[key], end)} for key in spans for end in (0.0, 1.0)]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import AfterValidator, ConfigDict, Field, field_validator, model_validator
+from pydantic import AfterValidator, ConfigDict, Field, model_validator
 
 from dva_sim.kernel.config import Config, Scalar
 
@@ -24,11 +24,8 @@ Direction = Literal["above", "below", "same"]
 
 
 def _distinct(levels: tuple[Level, ...]) -> tuple[Level, ...]:
-    seen: set[Level] = set()
-    for level in levels:
-        if level in seen:
-            raise ValueError(f"level {level!r} stands twice")
-        seen.add(level)
+    for level in (level for at, level in enumerate(levels) if level in levels[:at]):
+        raise ValueError(f"level {level!r} stands twice")
     return levels
 
 
@@ -258,7 +255,9 @@ class Tuning(Config):
     """
 
     key: str
-    levels: Annotated[tuple[Annotated[float, Field(gt=0)], ...], Field(min_length=2)]
+    levels: Annotated[
+        tuple[Annotated[float, Field(gt=0)], ...], Field(min_length=2), AfterValidator(_distinct)
+    ]
     by: Annotated[tuple[str, ...], Field(min_length=1)]
     at: dict[str, Level] = Field(default_factory=dict)
     part: str
@@ -266,12 +265,6 @@ class Tuning(Config):
     persons: Count = 8
     replications: Count = 2
     seed: Seed
-
-    @field_validator("levels")
-    @classmethod
-    def _tried_once(cls, value: tuple[float, ...]) -> tuple[float, ...]:
-        _distinct(value)
-        return value
 
 
 class RobustnessRule(Config):
