@@ -64,13 +64,7 @@ from dva_sim.statistics.effect_sizes import (
     pair_correlation,
     variance_reduction,
 )
-from dva_sim.statistics.incidence import (
-    CUT,
-    Incidence,
-    cumulative_incidence,
-    first_of,
-    incidence,
-)
+from dva_sim.statistics.incidence import CUT, Incidence, cumulative_incidence, first_of, incidence
 from dva_sim.statistics.paired_differences import (
     equivalence,
     holm,

@@ -17,8 +17,8 @@ from dva_sim.agents.robot.profile import read_robot
 from dva_sim.agents.tilt import AccelerometerPart, PhoneProfile, try_phone
 from dva_sim.experiments.execution.dry_run import contradictions_in
 from dva_sim.experiments.study import cell_grid
+from dva_sim.experiments.study.factor_levels import Bands
 from dva_sim.experiments.study.registration import departures, load_registration
-from dva_sim.experiments.study.robustness_grid import Bands
 from dva_sim.experiments.study.study import Study
 from dva_sim.experiments.study.study_file import load_study
 from dva_sim.experiments.study.tuning import TunedValues

@@ -170,7 +170,7 @@ def _json_schema(kind: str) -> dict[str, Any]:
     from dva_sim.agents.population import Population
     from dva_sim.agents.robot.profile import RobotProfile
     from dva_sim.agents.tilt import AccelerometerPart, PhoneProfile
-    from dva_sim.experiments.study.robustness_grid import Bands
+    from dva_sim.experiments.study.factor_levels import Bands
     from dva_sim.experiments.study.study import Study
     from dva_sim.simulation.scenario import Scenario
     from dva_sim.simulation.shift.scenario import TimedScenario

@@ -14,8 +14,8 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from dva_sim.experiments.analysis.layout import layout_of
 from dva_sim.experiments.analysis.run_grid import Floats, RunGrid, Setting, Table
+from dva_sim.experiments.analysis.study_view import layout_of
 from dva_sim.experiments.study.parts import ANSWER, POINT, Contrast, Hypothesis, Level
 from dva_sim.statistics import (
     LEVEL,

@@ -18,8 +18,8 @@ from typing import Any, Literal
 import numpy as np
 
 from dva_sim.agents.robot.command_queue import mean_of
-from dva_sim.experiments.analysis.layout import interval_of
-from dva_sim.experiments.analysis.run_grid import Setting, StudyView
+from dva_sim.experiments.analysis.run_grid import Setting
+from dva_sim.experiments.analysis.study_view import StudyView, interval_of
 from dva_sim.experiments.study.parts import TUNING, Level, Prediction, Range
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.units import unit_of

@@ -33,21 +33,13 @@ from dva_sim.experiments.analysis.hypothesis_tests import (
     pairs_of,
     places_of,
 )
-from dva_sim.experiments.analysis.layout import view_of
-from dva_sim.experiments.analysis.run_grid import Floats, Setting, StudyView, Table
+from dva_sim.experiments.analysis.run_grid import Floats, Setting, Table
+from dva_sim.experiments.analysis.study_view import StudyView, view_of
 from dva_sim.experiments.study.parts import ANSWER, Contrast, Hypothesis
 from dva_sim.kernel.units import unit_of
 from dva_sim.kernel.wording import quantity
 from dva_sim.simulation.labels import level_name, measure_of, setting
-from dva_sim.statistics import (
-    LEVEL,
-    Band,
-    Interval,
-    band,
-    mean_interval,
-    person_means,
-    students_t,
-)
+from dva_sim.statistics import LEVEL, Band, Interval, band, mean_interval, person_means, students_t
 
 POWERS = (0.8, 0.9)
 _ALPHA = 1 - LEVEL

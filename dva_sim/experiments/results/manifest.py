@@ -18,6 +18,7 @@ from dva_sim import __version__
 from dva_sim.experiments.results.tables import design_row
 from dva_sim.experiments.study import cell_grid
 from dva_sim.experiments.study.cell_grid import DesignCell, RunKey, StudyJob, StudyRun
+from dva_sim.experiments.study.factor_levels import parameter_sets
 from dva_sim.experiments.study.hashing import (
     fingerprint,
     fingerprint_of_judges,
@@ -26,7 +27,6 @@ from dva_sim.experiments.study.hashing import (
     stable_hash,
 )
 from dva_sim.experiments.study.own_measures import columns_told, own_measures
-from dva_sim.experiments.study.robustness_grid import parameter_sets
 from dva_sim.experiments.study.study import Status, Study
 from dva_sim.experiments.study.tuning import load_tuned
 from dva_sim.kernel.errors import DvaSimError, RunTooLong

@@ -12,22 +12,24 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from dva_sim.experiments.study.factor_levels import levels_at_ends, levels_of_cells, path_in_design
-from dva_sim.experiments.study.hashing import stable_hash
-from dva_sim.experiments.study.own_measures import names_of_own
-from dva_sim.experiments.study.parts import POINT, REPEATS, TUNED, TUNING, Level
-from dva_sim.experiments.study.robustness_grid import (
+from dva_sim.experiments.study.factor_levels import (
     PARAMETERS,
     TRAITS,
     factors_of_repeats,
+    levels_at_ends,
+    levels_of_cells,
     parameter_sets,
+    path_in_design,
     settings_of_repeats,
 )
+from dva_sim.experiments.study.hashing import stable_hash
+from dva_sim.experiments.study.own_measures import names_of_own
+from dva_sim.experiments.study.parts import POINT, REPEATS, TUNED, TUNING, Level
 from dva_sim.experiments.study.study import Study
 from dva_sim.experiments.study.tuning import TuningBasis, load_tuned
 from dva_sim.kernel.config import Document, KeyPath
+from dva_sim.kernel.config_overrides import blame
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.kernel.key_changes import blame
 from dva_sim.kernel.streams import derive_seed
 from dva_sim.kernel.suggestions import listed, unknown
 from dva_sim.simulation import scenario as scenarios

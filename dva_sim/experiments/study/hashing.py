@@ -85,7 +85,7 @@ _WORDS = ("agents/operator/published.py", "simulation/labels.py")
 _JUDGES = (
     "experiments/analysis/hypothesis_tests.py",
     "experiments/analysis/run_grid.py",
-    "experiments/analysis/layout.py",
+    "experiments/analysis/study_view.py",
     "statistics",
 )
 _EDITED = ("agents", "protocol", "worlds")

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from dva_sim.kernel import key_changes
+from dva_sim.kernel import config_overrides
 from dva_sim.kernel.config import Config, Document, Fail, Key
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.transports import ContestConfig
@@ -84,7 +84,7 @@ def build(
     Raises:
         ConfigError: an unknown key or name, a wrong type, a value out of range.
     """
-    return key_changes.build(
+    return config_overrides.build(
         TransportScenario, source, changes or {}, _complete, lambda data, folders: None
     )
 
