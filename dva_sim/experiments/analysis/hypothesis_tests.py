@@ -156,9 +156,8 @@ def pairs_of(
     table, factors = layout_of(study, runs)
     part = RunGrid(table, contrast.part, factors)
     known = {f.name: f.levels for f in part.factors}
-    wanted = dict(at) | {contrast.factor: contrast.contrast[0]}
-    there = all(name in known and level in known[name] for name, level in wanted.items())
-    if not there or contrast.contrast[1] not in known[contrast.factor]:
+    wanted = [*at.items(), *((contrast.factor, level) for level in contrast.contrast)]
+    if not all(level in known.get(name, ()) for name, level in wanted):
         return None
     in_excess = part.has_reference(contrast.measure)
     grid = part.excess(contrast.measure) if in_excess else part.grid(contrast.measure)
@@ -187,16 +186,11 @@ def claims_of(study: Mapping[str, Any]) -> dict[str, Hypothesis]:
 
 def places_of(study: Mapping[str, Any], contrast: Contrast) -> list[Setting]:
     """Each level that a contrast runs over, or the one place it is taken at."""
-    stops = _stops(study, contrast)
-    if not stops:
-        return [dict(contrast.within)]
-    return [dict(contrast.within) | {str(contrast.over): level} for level in stops]
-
-
-def _stops(study: Mapping[str, Any], contrast: Contrast) -> Sequence[Level]:
-    """The levels that a contrast runs over; none over points in ranges, which are like trials."""
+    at: Setting = dict(contrast.within)
     levels: Sequence[Level] = study.get("factors", {}).get(contrast.over, ())
-    return levels if contrast.over != POINT else ()
+    if contrast.over == POINT or not levels:  # points in ranges are like trials
+        return [at]
+    return [at | {str(contrast.over): level} for level in levels]
 
 
 def _compared(

@@ -72,8 +72,8 @@ def support_of_part(part: RunGrid, scenario: Mapping[str, Any]) -> Support | Non
 
 
 def _strategies(part: RunGrid, scenario: Mapping[str, Any]) -> tuple[str, ...]:
-    factor = next((f for f in part.factors if f.name == STRATEGY), None)
-    names = factor.levels if factor else (get(scenario, STRATEGY),)
+    levels = {f.name: f.levels for f in part.factors}
+    names = levels.get(STRATEGY, (get(scenario, STRATEGY),))
     return tuple(str(name) for name in names if name is not None)
 
 

@@ -160,11 +160,8 @@ def as_floats(values: NDArray[Any]) -> Floats:
     """Any column as floats: true is 1, nothing is nan, words are nan."""
     if values.dtype.kind in "biuf":
         return values.astype(float)
-    return np.array([_float(v) for v in values], dtype=float)
-
-
-def _float(value: Any) -> float:
-    return float(value) if isinstance(value, int | float | np.number | np.bool_) else np.nan
+    numbers = int | float | np.number | np.bool_
+    return np.array([float(v) if isinstance(v, numbers) else np.nan for v in values], dtype=float)
 
 
 def codes_of(table: Table, factor: Factor) -> NDArray[np.intp]:

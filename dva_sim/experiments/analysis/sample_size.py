@@ -307,8 +307,8 @@ def _count(chance: Callable[[int], float], wanted: float, known: int, least: int
     freedom = known - 1
     # The sum of squares over the true variance is chi-squared; persons go with the variance.
     low, high = (freedom / special.chdtri(freedom, tail) for tail in (0.025, 0.975))
-    counts = (persons, persons * low, persons * high)
-    return Count(*(_capped(max(count, least)) for count in counts))
+    counts = (max(count, least) for count in (persons, persons * low, persons * high))
+    return Count(*(math.inf if count > MOST_PERSONS else math.ceil(count) for count in counts))
 
 
 def _fewest(chance: Callable[[int], float], wanted: float) -> float:
@@ -322,10 +322,6 @@ def _fewest(chance: Callable[[int], float], wanted: float) -> float:
         middle = (low + high) // 2
         low, high = (low, middle) if chance(middle) >= wanted else (middle, high)
     return high
-
-
-def _capped(persons: float) -> float:
-    return math.inf if persons > MOST_PERSONS else math.ceil(persons)
 
 
 def _sides(contrast: Contrast, at: Setting) -> str:

@@ -242,12 +242,11 @@ def keys_of(study: Mapping[str, Any]) -> list[Factor]:
             for level in levels:
                 for key, value in named[level].items():
                     keys.setdefault(key, []).append(value)
-    return [Factor(key, _distinct(levels)) for key, levels in keys.items()]
-
-
-def _distinct(levels: Sequence[Any]) -> tuple[Any, ...]:
-    """Each level once; a treatment may set a whole block, such as a law."""
-    return tuple(level for i, level in enumerate(levels) if level not in levels[:i])
+    # Each level once; a treatment may set a whole block, such as a law, which has no hash.
+    return [
+        Factor(key, tuple(level for i, level in enumerate(levels) if level not in levels[:i]))
+        for key, levels in keys.items()
+    ]
 
 
 def view_of(study: Mapping[str, Any], runs: Table) -> StudyView | None:
@@ -262,12 +261,12 @@ def view_of(study: Mapping[str, Any], runs: Table) -> StudyView | None:
     part = RunGrid(table, name, factors) if name else None
     if part is None or not len(part):
         return None
-    over = _factor(part, declared.get("over"))
-    line = _factor(part, declared.get("factor"))
+    known = {f.name: f for f in part.factors}
+    over, line = known.get(declared.get("over", "")), known.get(declared.get("factor", ""))
     if over is None and not (line and "over" in declared):
         over = _longest_numeric([f for f in part.factors if f is not line])
-    line = line or _other(part.factors, over)
-    within = {k: v for k, v in (declared.get("within") or {}).items() if _factor(part, k)}
+    line = line or next((f for f in part.factors if f is not over), None)
+    within = {k: v for k, v in (declared.get("within") or {}).items() if k in known}
     measure = declared.get("measure") or _first_measure(part)
     return StudyView(
         part=part,
@@ -305,7 +304,8 @@ def finding_of(view: StudyView) -> Finding | None:
         missed=_missed(view),
         horizon=_horizon(view),
         widest=view.widest,
-        all_confirmed=_all_confirmed(view),
+        all_confirmed=view.part.has("confirmed")
+        and bool((present(view.part.grid("confirmed")) == 1).all()),
         everywhere="on average over the ranges" if view.averages_points else "",
         part=view.part.name,
     )
@@ -336,17 +336,9 @@ def _missed(view: StudyView) -> tuple[Missed, ...]:
     """Runs without confirmation at the last stop, for every line."""
     if not view.part.has("confirmed"):
         return ()
-    grid = view.part.grid("confirmed")
-    found = []
-    for level in view.lines:
-        seen = present(view.curve(grid, view.panels[0], level)[-1])
-        found.append(Missed(level, int((seen < 1).sum()), len(seen)))
-    return tuple(found)
-
-
-def _all_confirmed(view: StudyView) -> bool:
-    """Whether no run of any cell ended without a confirmation."""
-    return view.part.has("confirmed") and bool((present(view.part.grid("confirmed")) == 1).all())
+    grid, panel = view.part.grid("confirmed"), view.panels[0]
+    seen = [(level, present(view.curve(grid, panel, level)[-1])) for level in view.lines]
+    return tuple(Missed(level, int((runs < 1).sum()), len(runs)) for level, runs in seen)
 
 
 def _horizon(view: StudyView) -> float | None:
@@ -358,17 +350,9 @@ def _horizon(view: StudyView) -> float | None:
     return float(counted[0]) if len(counted) == 1 else None
 
 
-def _factor(part: RunGrid, name: str | None) -> Factor | None:
-    return next((f for f in part.factors if f.name == name), None)
-
-
 def _longest_numeric(factors: Sequence[Factor]) -> Factor | None:
     numeric = [f for f in factors if f.is_numeric and len(f.levels) > 1]
     return max(numeric, key=lambda f: len(f.levels), default=None) or next(iter(factors), None)
-
-
-def _other(factors: Sequence[Factor], over: Factor | None) -> Factor | None:
-    return next((f for f in factors if f is not over), None)
 
 
 def _first_measure(part: RunGrid) -> str:

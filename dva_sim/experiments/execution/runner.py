@@ -78,7 +78,8 @@ def run_study(
         workers = stack.enter_context(_workers(jobs, scheduler))
         checkpoint = stack.enter_context(_opened(out, manifest["hash"]))
         checkpoint.describe(manifest)
-        simulate = episode or _simulation(study)
+        own = tuple(own_measures(study))
+        simulate = episode or (partial(run_job, measures=own) if own else run_job)
         session = _Session(todo, checkpoint, workers, simulate, progress, limit_s)
         with session.told():
             carried_out, stopped = _run_rounds(study, todo, session)
@@ -186,7 +187,8 @@ def _run_rounds(
     why, number = None, 0
     for number, batch in enumerate(batches, 1):
         rest = session.left(batch)
-        if rest and chosen and _is_spent(study, session.checkpoint):
+        is_spent = study.budget_s is not None and session.checkpoint.wall_s >= study.budget_s
+        if rest and chosen and is_spent:
             why, number = "budget", number - 1
             break
         session.run(rest)
@@ -197,10 +199,6 @@ def _run_rounds(
     if why is not None:
         session.end()
     return _in_order(todo, chosen), {"rounds": number, "of": len(batches), "why": why}
-
-
-def _is_spent(study: Study, checkpoint: Checkpoint) -> bool:
-    return study.budget_s is not None and checkpoint.wall_s >= study.budget_s
 
 
 def _in_order(todo: Sequence[StudyJob], chosen: Sequence[StudyJob]) -> list[StudyJob]:
@@ -227,11 +225,6 @@ def _workers(jobs: int | None, scheduler: str | None) -> Iterator[Workers]:
         raise ConfigError("give the number of processes or a scheduler, not both")
     with DaskCluster(scheduler) as cluster:
         yield cluster
-
-
-def _simulation(study: Study) -> Simulate:
-    own = tuple(own_measures(study))
-    return partial(run_job, measures=own) if own else run_job
 
 
 def _tidy(out: Path) -> None:

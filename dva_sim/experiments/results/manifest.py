@@ -53,7 +53,10 @@ def manifest_of(
         "set": list(study.settings),
         "changes": dict(study.changes),
         "inputs": inputs((cell.scenario for cell in cells), own_measures(study)),
-        "cells": [_cell_row(cell) for cell in cells],
+        "cells": [
+            {"part": c.part, "cell": c.index, "config": c.config, "levels": dict(c.levels)}
+            for c in cells
+        ],
         "parameter_sets": parameter_sets(study),
         "tuned": load_tuned(study).model_dump(mode="json") if tuned else None,
         "basis": cell_grid.basis_of_tuning(study).model_dump(mode="json") if tuned else None,
@@ -128,11 +131,6 @@ def write_json(path: Path, data: dict[str, Any]) -> None:
         raise DvaSimError(f"{path} cannot be written: {error.strerror}") from None
 
 
-def _cell_row(cell: DesignCell) -> dict[str, Any]:
-    levels = dict(cell.levels)
-    return {"part": cell.part, "cell": cell.index, "config": cell.config, "levels": levels}
-
-
 def status_of(manifest: Mapping[str, Any]) -> Status:
     """What the result may be called; results that do not say are judged by what was set.
 
@@ -143,7 +141,8 @@ def status_of(manifest: Mapping[str, Any]) -> Status:
         manifest = _marked_partial(manifest)
         status = Status.model_validate(manifest["status"])
         return _judged_anew(_without(manifest.get("failures", []), status))
-    changes = [_as_words(change) for change in manifest.get("set", [])]
+    given = manifest.get("set", [])  # each a pair, or a list of its words
+    changes = [text if isinstance(text, str) else "=".join(map(str, text)) for text in given]
     if not changes:
         return Status(kind="declared")
     return Status(kind="exploratory", why=(f"changed on the command line: {', '.join(changes)}",))
@@ -185,8 +184,3 @@ def _without(failed: Sequence[Mapping[str, Any]], status: Status) -> Status:
             "reproducible": status.reproducible and not slow,
         }
     )
-
-
-def _as_words(change: Any) -> str:
-    """One `--set`, however the manifest keeps it."""
-    return change if isinstance(change, str) else "=".join(str(word) for word in change)

@@ -89,13 +89,10 @@ def change(
             changes[key] = value
             continue
         path = ("factors", key) if key in factors else _path(data, key, model)
-        _put(data, path, [value] if _is_level(path, value) else value)
+        is_level = path[0] == "factors" and len(path) == 2 and not isinstance(value, list)
+        _put(data, path, [value] if is_level else value)
         touched.append(path)
     return Changed(data, changes, tuple(touched))
-
-
-def _is_level(path: tuple[str, ...], value: Any) -> bool:
-    return path[0] == "factors" and len(path) == 2 and not isinstance(value, list)
 
 
 def _path(data: Any, key: str, kind: Any) -> tuple[str, ...]:
@@ -108,13 +105,14 @@ def _path(data: Any, key: str, kind: Any) -> tuple[str, ...]:
     while key:
         kind = _bare(kind)
         there = data if isinstance(data, dict) else {}
-        if isinstance(kind, type) and issubclass(kind, BaseModel):
+        if isinstance(kind, type(BaseModel)):
             step = key.partition(".")[0]
             field = kind.model_fields.get(step)
             kind = field.annotation if field is not None else None
         elif get_origin(kind) is dict:
-            kind = get_args(kind)[1]
-            step = _entry(there, key) if _holds_keys(_bare(kind)) else key
+            kind = _bare(get_args(kind)[1])
+            has_keys = get_origin(kind) is dict or isinstance(kind, type(BaseModel))
+            step = _entry(there, key) if has_keys else key
         else:
             raise ConfigError(f"{'.'.join(path)!r} holds no keys, so no {key!r}")
         path, key, data = (*path, step), key[len(step) + 1 :], there.get(step)
@@ -126,10 +124,6 @@ def _bare(kind: Any) -> Any:
     while get_origin(kind) in (Annotated, Union, UnionType):
         kind = get_args(kind)[0]
     return kind
-
-
-def _holds_keys(kind: Any) -> bool:
-    return get_origin(kind) is dict or (isinstance(kind, type) and issubclass(kind, BaseModel))
 
 
 def _entry(there: Mapping[str, Any], key: str) -> str:
