@@ -118,15 +118,13 @@ def incidence(time: ArrayLike, cause: ArrayLike, causes: int) -> Incidence:
 
 @dataclass(frozen=True)
 class IncidenceAtHorizon:
-    """How often each cause came first by the horizon; the shares sum to 1.
+    """How often each cause came first by a horizon; the shares sum to 1.
 
     Attributes:
-        horizon: Until when [the unit of the times].
         causes: Share of each cause, in the order of the causes' names.
         nothing: Share to which nothing has happened by then.
     """
 
-    horizon: float
     causes: dict[str, Interval]
     nothing: Interval
 
@@ -170,7 +168,7 @@ def cumulative_incidence(
         ]
     )
     intervals = [_interval(share, len(persons), len(owner)) for share in shares]
-    return IncidenceAtHorizon(horizon, dict(zip(names, intervals[:-1], strict=True)), intervals[-1])
+    return IncidenceAtHorizon(dict(zip(names, intervals[:-1], strict=True)), intervals[-1])
 
 
 def _shares(times: Floats, causes: Ints, count: int, horizon: float) -> list[float]:

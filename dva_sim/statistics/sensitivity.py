@@ -97,20 +97,12 @@ def _grid(
     person: NDArray[Any],
 ) -> Floats:
     """Persons' cell means `(levels of factor 1, ..., persons)`; nan where no run is."""
-    there = np.isfinite(values)
     persons, owner = np.unique(person, return_inverse=True)
-    codes = [_codes(np.asarray(levels[name]).tolist(), known[name])[there] for name in known]
-    shape = (*(len(of) for of in known.values()), len(persons))
-    place = np.ravel_multi_index((*codes, owner[there]), shape)
-    size = int(np.prod(shape))
-    count = np.bincount(place, minlength=size)
-    total = np.bincount(place, weights=values[there], minlength=size)
-    return np.where(count > 0, total / np.maximum(count, 1), np.nan).reshape(shape)
-
-
-def _codes(values: list[Any], known: list[Any]) -> NDArray[np.intp]:
-    code = {level: i for i, level in enumerate(known)}
-    return np.array([code[value] for value in values], dtype=np.intp)
+    codes = [[known[name].index(v) for v in np.asarray(levels[name]).tolist()] for name in known]
+    grid = np.full((*(len(of) for of in known.values()), len(persons)), np.nan)
+    at, means = person_means(values, np.ravel_multi_index((*codes, owner), grid.shape))
+    grid.flat[at] = means
+    return grid
 
 
 def _main_effects(grid: Floats, known: Mapping[str, list[Any]]) -> Iterator[_Contrast]:

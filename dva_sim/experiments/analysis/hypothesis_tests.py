@@ -235,7 +235,7 @@ def _p_against(claim: Hypothesis, pairs: PairedRuns) -> float:
     """Of the opposite: on the other side of the margin, or beyond either end of it."""
     if claim.direction == "above":
         return one_sided_test(*pairs, claim.margin, "below")
-    below = one_sided_test(*pairs, -claim.margin, "below") if claim.direction == "same" else 1.0
-    bound = claim.margin if claim.direction == "same" else -claim.margin
-    above = one_sided_test(*pairs, bound, "above")
-    return min(1.0, 2 * min(above, below)) if claim.direction == "same" else above
+    if claim.direction == "below":
+        return one_sided_test(*pairs, -claim.margin, "above")
+    above = one_sided_test(*pairs, claim.margin, "above")
+    return min(1.0, 2 * min(above, one_sided_test(*pairs, -claim.margin, "below")))

@@ -99,7 +99,9 @@ def _judge(prediction: Prediction, view: StudyView | None) -> Judged:
     unit = unit_of(view.measure)
     names = f"{level_name(factor, first)} minus {level_name(factor, second)}"
     expected = f"{names} in {measure_of(view.measure, view.part.name)}, {setting(where)}: "
-    expected += _SIDES[prediction.direction] + _range_words(prediction.expected, unit)
+    expected += _SIDES[prediction.direction]
+    if (range_ := prediction.expected) is not None:
+        expected += f", {number(range_[0])} to {quantity(range_[1], unit)}"
     if factor == TUNING and _chose_what_was(view, (first, second), where):
         return Judged(text, expected, _SAME_RUNS, "not judged")
     found = _measured(view, factor, (first, second), where)
@@ -109,10 +111,6 @@ def _judge(prediction: Prediction, view: StudyView | None) -> Judged:
     low, high = max(found.low, -view.widest), min(found.high, view.widest)
     words = f"{quantity(found.mean, unit)} ({number(low)} to {quantity(high, unit)})"
     return Judged(text, expected, words, verdict)
-
-
-def _range_words(expected: Range | None, unit: str) -> str:
-    return f", {number(expected[0])} to {quantity(expected[1], unit)}" if expected else ""
 
 
 def _asked(

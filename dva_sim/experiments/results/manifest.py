@@ -138,23 +138,17 @@ def status_of(manifest: Mapping[str, Any]) -> Status:
     another machine. Verdicts are made anew whenever they are told, by the program as it is then.
     """
     if "status" in manifest:
-        manifest = _marked_partial(manifest)
         status = Status.model_validate(manifest["status"])
+        if "partial" in manifest:
+            why = ("the study is not finished", *status.why)
+            found = {"kind": "exploratory", "why": why, "reproducible": False}
+            status = status.model_copy(update=found)
         return _judged_anew(_without(manifest.get("failures", []), status))
     given = manifest.get("set", [])  # each a pair, or a list of its words
     changes = [text if isinstance(text, str) else "=".join(map(str, text)) for text in given]
     if not changes:
         return Status(kind="declared")
     return Status(kind="exploratory", why=(f"changed on the command line: {', '.join(changes)}",))
-
-
-def _marked_partial(manifest: Mapping[str, Any]) -> Mapping[str, Any]:
-    """The manifest, whose status says so if the study is not finished."""
-    if "partial" not in manifest:
-        return manifest
-    why = ("the study is not finished", *manifest["status"]["why"])
-    found = {"kind": "exploratory", "why": why, "reproducible": False}
-    return {**manifest, "status": {**manifest["status"], **found}}
 
 
 def _judged_anew(status: Status) -> Status:

@@ -55,7 +55,7 @@ def says(*keys: str, not_: str = "") -> dict[str, Any]:
     }
 
 
-def refuse_keys_of_the_design(keys: Iterable[str]) -> None:
+def refuse_keys_of_the_design(keys: Keys) -> Keys:
     """Persons are the study's own to choose.
 
     Raises:
@@ -64,14 +64,10 @@ def refuse_keys_of_the_design(keys: Iterable[str]) -> None:
     for key in keys:
         if key in SET_BY_DESIGN:
             raise ValueError(f"{key!r} is set by the study; change {SET_BY_DESIGN[key]!r} instead")
-
-
-def _spared(keys: Keys) -> Keys:
-    refuse_keys_of_the_design(keys)
     return keys
 
 
-SPARES_THE_DESIGN = AfterValidator(_spared)  # no key that the study sets itself
+SPARES_THE_DESIGN = AfterValidator(refuse_keys_of_the_design)  # no key that the study sets itself
 ScenarioChanges = Annotated[Changes, SPARES_THE_DESIGN]
 
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, PrivateAttr, field_validator
+from pydantic import Field, PrivateAttr, ValidationInfo, field_validator
 
 from dva_sim.experiments.study.designs import ROWS, Design, Row
 from dva_sim.experiments.study.parts import (
@@ -111,18 +111,15 @@ class Study(Config):
     _status: Status = PrivateAttr(default_factory=Status)
     _usual: dict[str, Any] = PrivateAttr(default_factory=dict)
 
-    @field_validator("parts")
+    @field_validator("parts", "comparisons")
     @classmethod
-    def _leaves_room_for_repeats(cls, value: dict[str, StudyPart]) -> dict[str, StudyPart]:
-        if REPEATS in value:
-            raise ValueError(f"a part cannot be called {REPEATS!r}: the repeats are")
-        return value
-
-    @field_validator("comparisons")
-    @classmethod
-    def _leaves_room_for_the_answer(cls, value: dict[str, Contrast]) -> dict[str, Contrast]:
-        if ANSWER in value:
-            raise ValueError(f"a comparison cannot be called {ANSWER!r}: the declared contrast is")
+    def _leaves_room(cls, value: dict[str, Any], info: ValidationInfo) -> dict[str, Any]:
+        """The repeats are called as if they were a part, the answer as if it were a comparison."""
+        of_parts = ("a part", REPEATS, "the repeats are")
+        of_comparisons = ("a comparison", ANSWER, "the declared contrast is")
+        what, taken, by = of_parts if info.field_name == "parts" else of_comparisons
+        if taken in value:
+            raise ValueError(f"{what} cannot be called {taken!r}: {by}")
         return value
 
     @property
