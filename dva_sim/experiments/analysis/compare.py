@@ -19,7 +19,6 @@ import numpy as np
 
 from dva_sim.experiments.analysis.compare_rows import (
     Difference,
-    Floats,
     Levels,
     Matched,
     Pair,
@@ -30,7 +29,7 @@ from dva_sim.experiments.analysis.compare_rows import (
     match,
 )
 from dva_sim.experiments.analysis.fail_conditions import SIGNS, TESTS, Gate, Test, parse, percent_of
-from dva_sim.experiments.results.results import Frame, Results
+from dva_sim.experiments.results.results import Array, Frame, Results
 from dva_sim.experiments.study.parts import DESIGN
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import hint
@@ -380,7 +379,7 @@ def _passes(test: Test | None, value: Any) -> float:
     return float(TESTS[test.sign](str(value) if isinstance(test.than, str) else value, test.than))
 
 
-def _values(gate: Gate, rows: Rows) -> Floats:
+def _values(gate: Gate, rows: Rows) -> Array:
     if gate.statistic == "missing":
         return np.isnan(rows.values).astype(float)
     return rows.values[~np.isnan(rows.values)]

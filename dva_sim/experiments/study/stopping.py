@@ -10,18 +10,16 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dva_sim.experiments.study.cell_grid import StudyJob
 from dva_sim.experiments.study.factor_levels import factors_in_rows
 from dva_sim.experiments.study.parts import Contrast, Level, StopRule
 from dva_sim.experiments.study.study import Study
-from dva_sim.statistics import band, mean_interval
+from dva_sim.statistics import Floats, band, mean_interval
 
 _BATCH_IN_BUDGET = 2  # persons, where a budget alone ends a study
 
 Row = Mapping[str, Any]
-Floats = NDArray[np.float64]
 _Run = tuple[int, int]  # person, trial
 
 
