@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from dva_sim.experiments.analysis.compare import Comparison as Comparison
 from dva_sim.experiments.results.results import Frame, frame_of, plain
 from dva_sim.experiments.results.results import Results as ResultsData
-from dva_sim.experiments.study.overrides import Settings, pairs_of
+from dva_sim.experiments.study.study_file import Settings, pairs_of
 from dva_sim.kernel.errors import RunsFailed
 from dva_sim.kernel.suggestions import listed
 from dva_sim.simulation.models import AnyScenario, Tables, model_for
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from dva_sim.experiments.analysis.answer import Answer
     from dva_sim.experiments.execution.dry_run import DryRun
-    from dva_sim.experiments.execution.run_request import RunRequest
+    from dva_sim.experiments.execution.runner import RunRequest
     from dva_sim.experiments.report.summary import Reading
     from dva_sim.experiments.study.cell_grid import DesignCell
     from dva_sim.experiments.study.registration import Preregistration
@@ -317,7 +317,7 @@ def dry_run(
 def _request(
     study: str | Path, out: str | Path | None, pairs: list[str], **options: Any
 ) -> RunRequest:
-    from dva_sim.experiments.execution.run_request import RunRequest
+    from dva_sim.experiments.execution.runner import RunRequest
 
     return RunRequest(study, None if out is None else Path(out), pairs, **options)
 
@@ -327,8 +327,7 @@ def _rehearsed(request: RunRequest) -> tuple[Study, list[DesignCell]]:
     from dva_sim.experiments.execution.dry_run import rehearse_all
     from dva_sim.testing.file_kinds import open_study
 
-    variant = request.variant
-    asked = open_study(request.study, request.changes, version=variant.version, pilot=variant.pilot)
+    asked = open_study(request.study, request.changes, version=request.version, pilot=request.pilot)
     return asked, rehearse_all(asked)
 
 

@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
+from dva_sim.kernel.config_overrides import parse_changes
 from dva_sim.kernel.errors import ConfigError, ExitCode, error_line
-from dva_sim.kernel.key_changes import parse_changes
 from dva_sim.testing.files import FileVerdict, NotReadError, check_file, schema_text
 from dva_sim.testing.messages import READ_BYTES, check_message
 from dva_sim.testing.promises import TRIALS, CheckedKind, said, tried

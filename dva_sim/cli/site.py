@@ -77,8 +77,8 @@ def _open(name: str, changes: Sequence[str]) -> Site:
     """
     from dva_sim.kernel import resources  # late: start-up
     from dva_sim.kernel.config import load_yaml
+    from dva_sim.kernel.config_overrides import parse_changes
     from dva_sim.kernel.errors import ConfigError
-    from dva_sim.kernel.key_changes import parse_changes
     from dva_sim.worlds.site import load_site, map_site
 
     options = parse_changes(changes)

@@ -79,7 +79,7 @@ def run(
         dva-sim run mine.yaml --set 'link.delay_s=[0, 0.5]'  # other levels of a factor
     """
     from dva_sim.cli import study_runs
-    from dva_sim.experiments.execution.run_request import RunRequest
+    from dva_sim.experiments.execution.runner import RunRequest
 
     request = RunRequest(
         study,

@@ -16,7 +16,7 @@ from rich.progress import BarColumn, Progress, TextColumn
 from dva_sim.cli.console import console, say, warn
 from dva_sim.cli.verbosity import WRITTEN, detail, is_verbose, tell_cells, tell_files
 from dva_sim.experiments.execution.dry_run import DryRun, dry_run
-from dva_sim.experiments.execution.run_request import RunRequest
+from dva_sim.experiments.execution.runner import RunRequest
 from dva_sim.experiments.execution.scheduling import Simulate
 from dva_sim.experiments.results.results import Results
 from dva_sim.experiments.study.cell_grid import DesignCell
@@ -92,8 +92,7 @@ def plan(request: RunRequest) -> None:
 
 def _loaded(request: RunRequest) -> tuple[Study, list[DesignCell]]:
     """A study without mistakes, and its configurations."""
-    variant = request.variant
-    study = open_study(request.study, request.changes, version=variant.version, pilot=variant.pilot)
+    study = open_study(request.study, request.changes, version=request.version, pilot=request.pilot)
     say(f"[bold]{escape(study.question)}[/bold]")
     cells = _checked(study)
     tell_cells(study, cells)

@@ -82,7 +82,7 @@ class Key:
 def keys_said_of(model: Any) -> dict[str, Key]:
     """Every dotted key of a model that says how it is called, in the order of the model."""
     said: dict[str, Key] = {}
-    for path, info in _walk(model, "", _DEPTH):
+    for path, info in _walk(model):
         for key in (m for m in info.metadata if isinstance(m, Key)):
             said |= {path: said.get(path, key)} if key.title else {}
             said |= {f"{path}.{name}": inner for name, inner in key.inner.items()}
@@ -114,11 +114,6 @@ def meant(path: KeyPath, value: Any, *models: Any) -> str:
     return f"known here: {listed(sorted(here), most=24)}" if here else ""
 
 
-def keys_of(model: Any) -> dict[str, tuple[str, ...]]:
-    """Every dotted key of a model, and what else people call it."""
-    return {key: _others(info) for key, info in _walk(model, "", _DEPTH)}
-
-
 def fields_at(model: Any, path: KeyPath) -> Mapping[str, Any]:
     """The fields of the model that stands at `path` inside `model`, by name."""
     for step in path:
@@ -144,8 +139,8 @@ def model_in(annotation: Any) -> Any:
 def _every_name(models: tuple[Any, ...]) -> dict[str, str]:
     """All dotted keys by their names, and by what else they are called."""
     known: dict[str, str] = {}
-    for key, others in (item for model in models for item in keys_of(model).items()):
-        for name in (key, *others):
+    for key, info in (item for model in models for item in _walk(model)):
+        for name in (key, *_others(info)):
             known.setdefault(name, key)
     return known
 
@@ -171,7 +166,7 @@ def _ask(given: str, keys: list[str]) -> str:
     return f"did you mean {either(map(repr, keys))}?{told}"
 
 
-def _walk(model: Any, above: str, depth: int) -> Iterator[tuple[str, Any]]:
+def _walk(model: Any, above: str = "", depth: int = _DEPTH) -> Iterator[tuple[str, Any]]:
     for name, info in _fields(model).items():
         yield f"{above}{name}", info
         inner = model_in(info.annotation)
@@ -256,7 +251,7 @@ def _is_tag(part: str | int, data: Any, loc: Sequence[str | int]) -> bool:
 
 def _explain(model: type[BaseModel], problems: Sequence[Any], path: KeyPath) -> str:
     """One mistake in words, from all that was found at its place: one for each kind allowed."""
-    key, first = ".".join(str(p) for p in path), problems[0]
+    key, first = _dotted(path), problems[0]
     if first["type"] == "extra_forbidden":
         hint = meant(path, first["input"], model)
         return f"unknown key {key!r}; {hint}" if hint else f"unknown key {key!r}"
@@ -299,7 +294,7 @@ def _instead(model: type[BaseModel], problems: Sequence[Any], path: KeyPath) -> 
         return f"; did you mean {near!r}?" if near is not None else ""
     if kinds & {"model_type", "model_attributes_type"} and not isinstance(given, list | dict):
         keys = list(fields_at(model, path))
-        return f", such as {'.'.join(map(str, (*path, keys[0])))}" if keys and path else ""
+        return f", such as {_dotted((*path, keys[0]))}" if keys and path else ""
     return ""
 
 
@@ -440,8 +435,12 @@ def load_yaml(path: str | Path) -> Document:
     """
     path = Path(path)
     text = read_text(path)
+    places: dict[KeyPath, tuple[int, int]] = {(): (1, 1)}
     try:
         tree = YAML(typ="rt", pure=True).load(text)
+        if not isinstance(tree, CommentedMap):
+            raise ConfigError("should be a mapping of keys to values", path, 1, 1)
+        return Document(_plain(tree, (), places), path, places)
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         problem = (error.problem or "is not valid YAML").split("\n")[0]
@@ -451,19 +450,10 @@ def load_yaml(path: str | Path) -> Document:
         raise ConfigError(f"is not valid YAML: {str(error).splitlines()[0]}", path) from error
     except RecursionError:
         raise ConfigError("is nested too deeply", path) from None
-    except ValueError as error:  # such as the date 2001-13-32, or a number of 5000 digits
-        raise ConfigError(f"has a value that cannot be read: {error}", path) from error
-    if not isinstance(tree, CommentedMap):
-        raise ConfigError("should be a mapping of keys to values", path, 1, 1)
-    places: dict[KeyPath, tuple[int, int]] = {(): (1, 1)}
-    try:
-        data = _plain(tree, (), places)
     except _TooMuchError as error:
         raise ConfigError(str(error), path) from None
-    except RecursionError:
-        raise ConfigError("is nested too deeply", path) from None
-    assert isinstance(data, dict)
-    return Document(data, path, places)
+    except ValueError as error:  # such as the date 2001-13-32, or a number of 5000 digits
+        raise ConfigError(f"has a value that cannot be read: {error}", path) from error
 
 
 class _TooMuchError(ValueError):
@@ -505,7 +495,7 @@ def parse_scalar(text: str) -> Any:
 def validate(
     model: type[M],
     data: Mapping[str, Any],
-    error: Fail | None = None,
+    error: Fail = lambda problem, _: ConfigError(problem),
 ) -> M:
     """Build `model` from `data`.
 
@@ -521,8 +511,4 @@ def validate(
         return model.model_validate(data)
     except ValidationError as problems:
         text, path = first_mistake(model, data, problems.errors(include_url=False))
-        raise (error or _unplaced)(text, path) from None
-
-
-def _unplaced(problem: str, path: KeyPath) -> ConfigError:
-    return ConfigError(problem)
+        raise error(text, path) from None

@@ -10,7 +10,7 @@ MOVED = {
     "agents.camera": "agents.observation",
     "agents.operator.person": "agents.population",
     "agents.steering": "agents.route_following",
-    "changing": "kernel.key_changes",
+    "changing": "kernel.config_overrides",
     "checking": "testing",
     "clock": "kernel.clock",
     "config": "kernel.config",

@@ -170,7 +170,8 @@ class Plugins(Generic[T]):
         module = _run(path, self.kind)
         found = vars(module).get(wanted)
         if found is None:
-            there = [n for n, c in vars(module).items() if _is_own_class(c, module)]
+            classes = [c for c in vars(module).values() if isinstance(c, type)]
+            there = [c.__name__ for c in classes if c.__module__ == module.__name__]
             problem = f"there is no class {wanted!r} in {path}; {hint(wanted, there, 'classes')}"
             raise ConfigError(f"{self.kind} {name!r}: {problem}")
         return self._right_class(name, found)
@@ -195,14 +196,12 @@ class Plugins(Generic[T]):
             problem = unknown(self.kind, name, self.known())
             more = "" if problem.endswith("?") else "; or a file: mine.py:Mine"
             raise ConfigError(problem + more)
-        return self._right_class(name, self._offered(name, offers[name]))
-
-    def _offered(self, name: str, entry: EntryPoint) -> Any:
         try:
-            return entry.load()
+            found = offers[name].load()
         except FAILURES as error:
-            problem = f"{entry.value} cannot be loaded: {said(error)}"
+            problem = f"{offers[name].value} cannot be loaded: {said(error)}"
             raise ConfigError(f"{self.kind} {name!r}: {problem}") from error
+        return self._right_class(name, found)
 
     def _right_class(self, name: str, found: Any) -> type[T]:
         base = self.base
@@ -279,10 +278,6 @@ def _run(path: Path, kind: str) -> ModuleType:
     except FAILURES as error:
         raise ConfigError(f"cannot be loaded: {said(error)}", path, _line(error, path)) from error
     return module
-
-
-def _is_own_class(value: object, module: ModuleType) -> bool:
-    return isinstance(value, type) and value.__module__ == module.__name__
 
 
 def _line(error: BaseException, path: Path) -> int | None:

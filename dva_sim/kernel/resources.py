@@ -11,7 +11,6 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import guess, hint
 
 _PACKAGE = Path(__file__).parent.parent
-FOLDERS = ("protocol", "worlds", "agents", "experiments")
 REGISTRATION = ".registration.yaml"  # ending of a file that belongs to the study beside it
 _RESULTS = "manifest.json"  # of a results folder
 
@@ -89,53 +88,27 @@ def find(
     for candidate in _candidates(name, folder, suffix, base):
         if is_file(candidate):
             return candidate
-    problem = _Missing(name, folder, sorted(available(folder, f"*{suffix}")), is_asked)
-    raise ConfigError(problem.is_folder() or problem.is_other() or problem.is_nothing())
+    raise ConfigError(_missing(name, folder, sorted(available(folder, f"*{suffix}")), is_asked))
 
 
-class _Missing(NamedTuple):
-    """A name that no file of its kind has."""
-
-    name: str
-    folder: str
-    known: list[str]
-    is_asked: bool
-
-    @property
-    def kind(self) -> str:
-        return KINDS.get(self.folder, FolderKind(Path(self.folder).name.removesuffix("s"))).word
-
-    def is_folder(self) -> str:
-        """That it is the name of a folder, and what to do with it."""
-        path = Path(self.name)
-        if not self.name or not _is_there(path.is_dir):
-            return ""
+def _missing(name: str, folder: str, known: list[str], is_asked: bool) -> str:
+    """That no file of its kind has a name: what it is the name of, what was meant, or what is."""
+    kind = KINDS.get(folder, FolderKind(Path(folder).name.removesuffix("s"))).word
+    path, others = Path(name), {where: k for where, k in KINDS.items() if where != folder}
+    if name and _is_there(path.is_dir):
         if is_file(path / _RESULTS):
-            return f"{self.name!r} is a results folder, not a {self.kind}; try: dva-sim show {path}"
-        return f"{self.name!r} is a folder; give the file of a {self.kind}, or its name"
-
-    def is_other(self) -> str:
-        """That it, or a name most like it, is that of something else."""
-        others = {folder: kind for folder, kind in KINDS.items() if folder != self.folder}
-        for folder, kind in others.items():
-            if is_there(self.name, folder):
-                problem = f"{self.name!r} is a {kind.word}, not a {self.kind}"
-                return problem + self._try(kind, self.name)
-        for folder, kind in others.items() if not guess(self.name, self.known) else ():
-            near = guess(self.name, available(folder))
-            if near is not None and kind.command:
-                problem = f"{self.kind} {self.name!r} not found"
-                meant = f"did you mean the {kind.word} {near!r}?"
-                return f"{problem}; {meant}{self._try(kind, near).replace('; try', ' Try')}"
-        return ""
-
-    def is_nothing(self) -> str:
-        """What there is instead."""
-        told = hint(Path(self.name).stem, self.known, "available")
-        return f"{self.kind} {self.name!r} not found; {told}"
-
-    def _try(self, kind: FolderKind, name: str) -> str:
-        return f"; try: {kind.command} {name}" if kind.command and self.is_asked else ""
+            return f"{name!r} is a results folder, not a {kind}; try: dva-sim show {path}"
+        return f"{name!r} is a folder; give the file of a {kind}, or its name"
+    for where, other in others.items():
+        if is_there(name, where):
+            use = f"; try: {other.command} {name}" if other.command and is_asked else ""
+            return f"{name!r} is a {other.word}, not a {kind}{use}"
+    for where, other in others.items() if not guess(name, known) else ():
+        near = guess(name, available(where))
+        if near is not None and other.command:
+            use = f" Try: {other.command} {near}" if is_asked else ""
+            return f"{kind} {name!r} not found; did you mean the {other.word} {near!r}?{use}"
+    return f"{kind} {name!r} not found; {hint(path.stem, known, 'available')}"
 
 
 def is_file(path: Path) -> bool:

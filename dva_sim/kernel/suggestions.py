@@ -6,6 +6,8 @@ import re
 from collections.abc import Iterable
 from typing import Final
 
+from dva_sim.kernel.wording import listing
+
 _LETTERS: Final = 3  # at least, for the beginning of a name to tell which is meant
 _A_SLIP: Final = 4  # letters in which one slip is likely
 _LISTED: Final = 12  # names in one line; more are counted
@@ -56,11 +58,7 @@ def _slips(one: str, other: str) -> int:
 def _is_numbered(one: str, other: str) -> bool:
     """Whether two names differ in their number alone: no slip makes robot-9 of robot-1."""
     digits = re.compile(r"[0-9]+")
-    return (
-        one != other
-        and digits.search(one) is not None
-        and digits.sub("0", one) == digits.sub("0", other)
-    )
+    return one != other and digits.sub("0", one) == digits.sub("0", other)
 
 
 def hint(given: str, known: Iterable[str], there: str = "known") -> str:
@@ -84,8 +82,7 @@ def listed(names: Iterable[object], most: int = _LISTED) -> str:
 
 def either(names: Iterable[object]) -> str:
     """`a, b or c`."""
-    every = [str(name) for name in names]
-    return " or ".join(part for part in (", ".join(every[:-1]), every[-1] if every else "") if part)
+    return listing([str(name) for name in names], "or")
 
 
 def plain_name(name: str) -> str:

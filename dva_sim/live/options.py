@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from dva_sim.kernel.config_overrides import blame, parse_changes, set_by
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.kernel.key_changes import blame, parse_changes, set_by
 from dva_sim.simulation.scenario import Scenario, build, load
 
 PARTS = ("dva", "world", "operator")

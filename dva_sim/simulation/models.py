@@ -14,7 +14,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, ClassVar, Final, Generic, TypeVar
 
-from dva_sim.kernel import key_changes
+from dva_sim.kernel import config_overrides
 from dva_sim.kernel.config import Config, Document, Fail
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.measure import Columns, names_of
@@ -108,7 +108,7 @@ class Model(Generic[S]):
         Raises:
             ConfigError: it is not valid.
         """
-        return key_changes.build(self.scenario, source, changes, self.complete, self._sign)
+        return config_overrides.build(self.scenario, source, changes, self.complete, self._sign)
 
     def _sign(self, data: dict[str, Any], folders: Sequence[Path]) -> None:
         """A scenario names its model so that it is found from anywhere."""

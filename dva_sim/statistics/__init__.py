@@ -55,57 +55,41 @@ studies, 24 persons).
 """
 
 from dva_sim.statistics.bands import Band, band
-from dva_sim.statistics.differences import Components, components, mean_interval, paired_difference
 from dva_sim.statistics.effect_sizes import (
-    MOST_PERSONS,
+    Components,
     EffectSize,
-    IntervalLaw,
-    effect_size,
-    law_of,
-)
-from dva_sim.statistics.incidence import (
-    CUT,
-    Incidence,
-    IncidenceAtHorizon,
-    cumulative_incidence,
-    first_of,
-    incidence,
-)
-from dva_sim.statistics.persons import LEVEL, Interval, bootstrap_interval, person_means
-from dva_sim.statistics.proportions import quantile_interval, share_interval
-from dva_sim.statistics.sensitivity import Effect, SobolIndex, factorial_effects, sobol_indices
-from dva_sim.statistics.tests import (
-    Equivalence,
-    PermutationTest,
-    equivalence,
-    holm,
-    one_sided_test,
-    permutation_test,
-)
-from dva_sim.statistics.variance_reduction import (
     VarianceReduction,
+    components,
+    effect_size,
     pair_correlation,
     variance_reduction,
 )
+from dva_sim.statistics.incidence import CUT, Incidence, cumulative_incidence, first_of, incidence
+from dva_sim.statistics.paired_differences import (
+    equivalence,
+    holm,
+    mean_interval,
+    one_sided_test,
+    paired_difference,
+    permutation_test,
+)
+from dva_sim.statistics.persons import LEVEL, Floats, Interval, person_means, students_t
+from dva_sim.statistics.proportions import quantile_interval, share_interval
+from dva_sim.statistics.sensitivity import Effect, SobolIndex, factorial_effects, sobol_indices
 
 __all__ = [
     "CUT",
     "LEVEL",
-    "MOST_PERSONS",
     "Band",
     "Components",
     "Effect",
     "EffectSize",
-    "Equivalence",
+    "Floats",
     "Incidence",
-    "IncidenceAtHorizon",
     "Interval",
-    "IntervalLaw",
-    "PermutationTest",
     "SobolIndex",
     "VarianceReduction",
     "band",
-    "bootstrap_interval",
     "components",
     "cumulative_incidence",
     "effect_size",
@@ -114,7 +98,6 @@ __all__ = [
     "first_of",
     "holm",
     "incidence",
-    "law_of",
     "mean_interval",
     "one_sided_test",
     "pair_correlation",
@@ -124,5 +107,6 @@ __all__ = [
     "quantile_interval",
     "share_interval",
     "sobol_indices",
+    "students_t",
     "variance_reduction",
 ]

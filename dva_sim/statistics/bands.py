@@ -60,7 +60,7 @@ def moments(values: Floats, weights: Floats) -> tuple[Floats, Floats, Floats]:
     return mean + centre, error, count
 
 
-def studentised(values: Floats, mean: Floats, error: Floats, seed: int, resamples: int) -> Floats:
+def studentised(values: Floats, mean: Floats, error: Floats, resamples: int) -> Floats:
     """By how many standard errors a mean of persons drawn anew is too large `(resamples, k)`.
 
     A draw that happens to repeat the same few persons has next to no spread of its own; it is
@@ -72,12 +72,11 @@ def studentised(values: Floats, mean: Floats, error: Floats, seed: int, resample
         values: One row per person `(n_persons, k)`, nan where missing.
         mean: Of each level `(k,)`.
         error: Its standard error `(k,)`, above zero.
-        seed: Of the resampling.
         resamples: How many times persons are drawn.
     """
     if not len(mean):
         return np.empty((resamples, 0))
-    drawn, drawn_error, _ = moments(values, draws(len(values), seed, resamples))
+    drawn, drawn_error, _ = moments(values, draws(len(values), resamples))
     ratio = (drawn - mean) / np.maximum(drawn_error, LEAST_ERROR * error)
     return np.where(np.isnan(ratio), 0.0, ratio)
 
@@ -105,7 +104,7 @@ def reach(ratio: Floats, count: Floats, level: float) -> tuple[Floats, Floats]:
     )
 
 
-def chance_above(means: Floats, seed: int, resamples: int) -> float:
+def chance_above(means: Floats) -> float:
     """How likely persons' means `(n,)` are so far above zero if their true mean is zero.
 
     The one-sided p-value that belongs to `reach`: it is below 0.025 where the interval of 95 %
@@ -120,7 +119,7 @@ def chance_above(means: Floats, seed: int, resamples: int) -> float:
     students = float(special.stdtr(len(means) - 1, -off))
     if len(means) < FEWEST_TO_RESAMPLE:
         return students
-    ratio = studentised(means[:, np.newaxis], mean, error, seed, resamples)
+    ratio = studentised(means[:, np.newaxis], mean, error, RESAMPLES)
     either, above = (abs(ratio) >= off).mean() / 2, (ratio >= off).mean()
     return max(students, float(either), float(above))
 
@@ -154,9 +153,7 @@ class Band:
     n_persons: int
 
 
-def band(
-    differences: ArrayLike, level: float = LEVEL, seed: int = 1, resamples: int = RESAMPLES
-) -> Band:
+def band(differences: ArrayLike, level: float = LEVEL, resamples: int = RESAMPLES) -> Band:
     """A band that holds all levels at once with the given confidence.
 
     Its width comes from the largest studentised deviation over the levels when persons are
@@ -167,7 +164,6 @@ def band(
     Args:
         differences: One row per person `(n_persons, k)`, nan where a cell is missing.
         level: Confidence level.
-        seed: Of the resampling.
         resamples: How many times persons are drawn.
 
     References:
@@ -177,7 +173,7 @@ def band(
     values = values[np.isfinite(values).any(axis=1)]
     mean, error, count = (x[0] for x in moments(values, np.ones((1, len(values)))))
     judged = error > 0  # neither nan nor without spread
-    ratio = studentised(values[:, judged], mean[judged], error[judged], seed, resamples)
+    ratio = studentised(values[:, judged], mean[judged], error[judged], resamples)
     down, up = np.where(count > 1, 0.0, np.nan), np.where(count > 1, 0.0, np.nan)
     down[judged], up[judged] = reach(ratio, count[judged], level)
     critical = np.full(len(mean), np.nan)

@@ -1,41 +1,31 @@
-"""How large a difference is beside how much persons differ: sizes without a unit.
+"""How large a difference is beside how much persons differ, and what pairing did to its variance.
 
-How many persons a study needs, from a pilot or an earlier one: one law for every number told.
-
-What is shown is shown by an interval that leaves zero (or a margin) out. An interval of `n`
-persons reaches `stretch * t(n - 1) * spread / sqrt(n)` from its mean, where `t` is Student's
-quantile at the interval's level. How persons spread and how much farther than Student's their
-interval reaches, because they are skewed or because a band covers several levels at once, are
-taken from the study at hand: with as many persons as it has, the law gives the very interval that
-its report shows.
-
-References:
-    Cohen, Statistical Power Analysis for the Behavioral Sciences (1988), chapter 2 (noncentral t).
+Sizes without a unit; how alike two treatments' random numbers are; how much of the variance lies
+between persons. All but the last rest on statistics of persons' pairs of means, and on how far they
+would scatter with other persons: sums over persons, so that leaving one out is a subtraction.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dva_sim.statistics.persons import (
-    LEVEL,
-    Floats,
-    Interval,
-    paired_means,
-    person_means,
-    students_t,
-)
-from dva_sim.statistics.proportions import share_interval
-from dva_sim.statistics.variance_reduction import RESAMPLES, Pairs, studentised_intervals
+from dva_sim.statistics.bands import LEAST_ERROR, reach
+from dva_sim.statistics.persons import LEVEL, Floats, Interval, draws, paired_means
+
+RESAMPLES = 1000  # each takes as many jackknife steps as there are persons
+_ONE = 1 - 1e-12  # a perfect correlation, on Fisher's scale still finite
+_FEWEST = 3  # persons; of two, any are perfectly correlated
 
 
 @dataclass(frozen=True)
 class EffectSize:
-    """A paired difference, three times without its unit.
+    """A paired difference, twice without its unit.
 
     Attributes:
         paired: Mean difference over the standard deviation of persons' differences
@@ -43,21 +33,14 @@ class EffectSize:
         average: Mean difference over the average standard deviation of persons under the two
             treatments (`d_av`, with Hedges' correction): how large it is beside how much
             persons differ.
-        superiority: Share of persons for whom the first lies above the second; ties half.
     """
 
     paired: Interval
     average: Interval
-    superiority: Interval
 
 
 def effect_size(
-    a: ArrayLike,
-    b: ArrayLike,
-    person: ArrayLike,
-    level: float = LEVEL,
-    seed: int = 1,
-    resamples: int = RESAMPLES,
+    a: ArrayLike, b: ArrayLike, person: ArrayLike, resamples: int = RESAMPLES
 ) -> EffectSize:
     """Standardised sizes of `a - b`, over persons' means.
 
@@ -65,8 +48,6 @@ def effect_size(
         a: One treatment `(n,)`, nan where missing.
         b: The other `(n,)`, row by row the same person and trial.
         person: Whose run it was `(n,)`.
-        level: Confidence level.
-        seed: Of the resampling.
         resamples: How many times persons are drawn.
 
     References:
@@ -74,15 +55,13 @@ def effect_size(
     """
     first, second = paired_means(a, b, person)
     n = len(first)
-    above = np.where(first > second, 1.0, np.where(first < second, 0.0, 0.5))
-    superiority = share_interval(above, np.arange(n), level)
-    if n < 3:
+    if n < _FEWEST:
         nothing = Interval(math.nan, math.nan, math.nan, n)
-        return EffectSize(nothing, nothing, superiority)
+        return EffectSize(nothing, nothing)
     sizes = _beside_differences, _beside_persons
-    found = studentised_intervals(sizes, first, second, level, seed, resamples)
+    found = _studentised(sizes, first, second, resamples)
     paired, average = (_times(each, _hedges(n)) for each in found)
-    return EffectSize(paired, average, superiority)
+    return EffectSize(paired, average)
 
 
 def _beside_differences(pairs: Pairs) -> Floats:
@@ -110,67 +89,226 @@ def _hedges(n: int) -> float:
     return math.exp(math.lgamma(half) - math.lgamma(half - 0.5)) / math.sqrt(half)
 
 
-MOST_PERSONS = 10_000
+@dataclass(frozen=True)
+class VarianceReduction:
+    """What pairing did to the variance of a difference of two means.
+
+    Attributes:
+        correlation: Pearson's, of the persons' means under the two treatments.
+        ratio: Variance of the paired difference over the sum of the variances, which is what
+            other persons in each treatment would give: 0.5 halves the persons needed.
+    """
+
+    correlation: Interval
+    ratio: Interval
+
+    @property
+    def is_lower(self) -> bool:
+        """Whether the variance is lower beyond doubt; False where nothing can be told."""
+        return self.ratio.high < 1
+
+
+def pair_correlation(a: ArrayLike, b: ArrayLike) -> float:
+    """Pearson's correlation of paired runs: how much of their luck two treatments share.
+
+    Nan with fewer than two pairs, or where one side does not vary.
+    """
+    first, second = np.asarray(a, dtype=float), np.asarray(b, dtype=float)
+    both = np.isfinite(first) & np.isfinite(second)
+    first, second = first[both], second[both]
+    if len(first) < 2 or np.ptp(first) == 0 or np.ptp(second) == 0:
+        return math.nan
+    return float(np.corrcoef(first, second)[0, 1])
+
+
+def variance_reduction(
+    a: ArrayLike, b: ArrayLike, person: ArrayLike, resamples: int = RESAMPLES
+) -> VarianceReduction:
+    """The correlation and the ratio of variances that pairing achieved, with their intervals.
+
+    Args:
+        a: One treatment `(n,)`, nan where missing.
+        b: The other `(n,)`, row by row the same person and trial.
+        person: Whose run it was `(n,)`.
+        resamples: How many times persons are drawn.
+
+    References:
+        Fisher, Metron 1 (1921) 3-32 (the scale of correlations).
+    """
+    first, second = paired_means(a, b, person)
+    n = len(first)
+    if n < _FEWEST or np.ptp(first) == 0 or np.ptp(second) == 0:
+        nothing = Interval(math.nan, math.nan, math.nan, n)
+        return VarianceReduction(nothing, nothing)
+    scaled = _on_fishers_scale(_correlation), _on_fishers_scale(_shared)
+    found = _studentised(scaled, first, second, resamples)
+    correlation, shared = (_back(each) for each in found)
+    ratio = Interval(1 - shared.mean, 1 - shared.high, 1 - shared.low, n)
+    return VarianceReduction(correlation, ratio)
+
+
+def _on_fishers_scale(statistic: Statistic) -> Statistic:
+    """A correlation where it has no bounds and is spread evenly."""
+
+    def unbounded(pairs: Pairs) -> Floats:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.arctanh(np.clip(statistic(pairs), -_ONE, _ONE))
+
+    return unbounded
+
+
+def _back(found: Interval) -> Interval:
+    low, mean, high = np.tanh([found.low, found.mean, found.high]).tolist()
+    return Interval(mean, low, high, found.n_persons)
+
+
+def _correlation(pairs: Pairs) -> Floats:
+    joint = (pairs.first + pairs.second - pairs.apart) / 2
+    return np.asarray(joint / np.sqrt(pairs.first * pairs.second))
+
+
+def _shared(pairs: Pairs) -> Floats:
+    """Share of the sum of variances that goes by pairing."""
+    return np.asarray(1 - pairs.apart / (pairs.first + pairs.second))
 
 
 @dataclass(frozen=True)
-class IntervalLaw:
-    """How far an interval reaches from its mean, by the number of persons.
+class Components:
+    """The variance of one value per run, split.
 
     Attributes:
-        spread: Standard deviation of persons' means.
-        persons: From how many it is known.
-        level: Two-sided confidence level whose quantile of Student's shrinks with more persons.
-        stretch: How many times as far as Student's the interval reaches.
+        between: Of the persons' own means; never below zero.
+        within: Of one person's trials around that mean.
     """
 
-    spread: float
-    persons: int
-    level: float = LEVEL
-    stretch: float = 1.0
+    between: float
+    within: float
 
-    def reach(self, persons: int) -> float:
-        """Distance from the mean to the end of the interval."""
-        return self._critical(persons) * self.spread / math.sqrt(persons)
-
-    def power(self, effect: float, persons: int) -> float:
-        """The chance that the interval of so many lies beyond zero if the true mean is `effect`.
-
-        Beyond zero means on the side of the effect; the other side is no success.
-
-        Raises:
-            ValueError: fewer than two persons.
-        """
-        from scipy import special
-
-        if persons < 2:
-            raise ValueError(f"a study needs at least 2 persons, not {persons}")
-        shift, critical = abs(effect) / self.spread * math.sqrt(persons), self._critical(persons)
-        below = float(special.nctdtr(persons - 1, shift, critical))
-        # Far from all doubt the series does not converge; so many persons are as good as normal.
-        return float(special.ndtr(shift - critical)) if math.isnan(below) else 1 - below
-
-    def _critical(self, persons: int) -> float:
-        return self.stretch * students_t(self.level, persons)
+    @property
+    def share(self) -> float:
+        """How much of the variance of a single run lies between persons."""
+        total = self.between + self.within
+        return self.between / total if total > 0 else math.nan
 
 
-def law_of(
-    values: ArrayLike, person: ArrayLike, reach: float | None = None, level: float = LEVEL
-) -> IntervalLaw | None:
-    """The law that a study's own interval follows; None where its persons are all alike.
+def components(values: ArrayLike) -> Components:
+    """Split the variance of `(persons, trials)` by the method of moments; nan are left out.
+
+    The mean squares of a one-way analysis of variance are set equal to what they estimate,
+    with unequal numbers of trials allowed for. Nan with fewer than two persons, or where nobody
+    has a second trial.
+
+    References:
+        Searle, Casella & McCulloch, Variance Components (1992), chapter 3.
+    """
+    grid = np.asarray(values, dtype=float)
+    there = np.isfinite(grid)
+    grid, there = grid[there.any(axis=1)], there[there.any(axis=1)]
+    count = there.sum(axis=1)
+    persons, runs = len(count), int(count.sum())
+    if persons < 2 or runs <= persons:
+        return Components(math.nan, math.nan)
+    filled = np.where(there, grid, 0.0)
+    means = filled.sum(axis=1) / count
+    off = np.where(there, grid - means[:, np.newaxis], 0.0)
+    within = float((off**2).sum() / (runs - persons))
+    grand = filled.sum() / runs
+    square_between = float((count * (means - grand) ** 2).sum() / (persons - 1))
+    trials = (runs - float((count**2).sum()) / runs) / (persons - 1)
+    return Components(max(0.0, (square_between - within) / trials), within)
+
+
+class Pairs(NamedTuple):
+    """What is known of the pairs of means of some persons, each entry of the same shape.
+
+    Attributes:
+        persons: How many.
+        difference: Mean of first minus second.
+        first: Variance of the first means, divided by the number of persons.
+        second: Of the second.
+        apart: Of the differences.
+    """
+
+    persons: Floats
+    difference: Floats
+    first: Floats
+    second: Floats
+    apart: Floats
+
+
+Statistic = Callable[[Pairs], Floats]
+
+
+def _studentised(
+    statistics: Sequence[Statistic], first: Floats, second: Floats, resamples: int
+) -> list[Interval]:
+    """The bootstrap-t of smooth statistics, with the jackknife for their standard errors.
 
     Args:
-        values: One value per run `(n,)`, nan where missing: of a comparison, the difference of
-            the pair of runs.
-        person: Whose run it was `(n,)`.
-        reach: How far the study's interval or band reaches from its mean, towards the side that
-            counts; as far as Student's if left out.
-        level: Of that interval; of a band, that of each of its levels alone (Bonferroni).
+        statistics: Each on a scale without bounds.
+        first: Persons' means under one treatment `(n,)`, at least 3.
+        second: Under the other.
+        resamples: How many times persons are drawn.
+
+    References:
+        Efron & Tibshirani, An Introduction to the Bootstrap (1993), chapters 11 and 12.
     """
-    means = person_means(values, person)[1]
-    if len(means) < 2 or not np.ptp(means) > 0:
-        return None
-    plain = IntervalLaw(float(means.std(ddof=1)), len(means), level)
-    if reach is None:
-        return plain
-    return IntervalLaw(plain.spread, plain.persons, level, reach / plain.reach(len(means)))
+    n, rows, shift = len(first), _rows(first, second), float((first - second).mean())
+    whole, drawn = (
+        _Drawn(weights, rows, shift) for weights in (np.ones((1, n)), draws(n, resamples))
+    )
+    return [_interval(statistic, whole, drawn, n) for statistic in statistics]
+
+
+class _Drawn:
+    """Draws of persons, each also without each of its persons.
+
+    Args:
+        weights: How often each person is drawn `(b, n)`.
+        rows: What each adds to the sums `(6, n)`.
+        shift: Mean difference of all.
+    """
+
+    def __init__(self, weights: Floats, rows: Floats, shift: float) -> None:
+        self.weights = weights
+        sums = rows @ weights.T
+        self.whole = _pairs(sums, shift)
+        self.left_out = _pairs(sums[:, :, np.newaxis] - rows[:, np.newaxis, :], shift)
+
+    def of(self, statistic: Statistic) -> tuple[Floats, Floats]:
+        """A statistic of each draw and its jackknife standard error, each `(b,)`."""
+        left_out, n = statistic(self.left_out), self.weights.shape[1]
+        weights = np.where(np.isfinite(left_out), self.weights, 0.0)
+        left_out = np.where(weights > 0, left_out, 0.0)
+        total = weights.sum(axis=1)
+        centre = (weights * left_out).sum(axis=1) / np.maximum(total, 1)
+        square = (weights * (left_out - centre[:, np.newaxis]) ** 2).sum(axis=1)
+        error = np.where(total > 1, np.sqrt((n - 1) / n * square), np.nan)
+        return statistic(self.whole), error
+
+
+def _interval(statistic: Statistic, whole: _Drawn, drawn: _Drawn, n: int) -> Interval:
+    estimate, error = (float(x[0]) for x in whole.of(statistic))
+    if not error > 0:
+        width = 0.0 if error == 0 else np.nan
+        return Interval(estimate, estimate - width, estimate + width, n)
+    values, errors = drawn.of(statistic)
+    ratio = (values - estimate) / np.maximum(errors, LEAST_ERROR * error)
+    ratio = ratio[np.isfinite(ratio), np.newaxis]
+    (down,), (up,) = reach(ratio, np.array([n]), LEVEL)
+    return Interval(estimate, float(estimate - down * error), float(estimate + up * error), n)
+
+
+def _rows(first: Floats, second: Floats) -> Floats:
+    """What each person adds to the sums `(6, n)`, centred so that squares keep their digits."""
+    one, two, off = (x - x.mean() for x in (first, second, first - second))
+    return np.stack([np.ones(len(first)), one, two, one**2, two**2, off**2])
+
+
+def _pairs(sums: Floats, shift: float) -> Pairs:
+    """From sums over persons `(6, ...)`."""
+    count = sums[0]
+    one, two, *squares = sums[1:] / np.maximum(count, 1)
+    means = one, two, one - two
+    variances = (np.maximum(s - m**2, 0) for s, m in zip(squares, means, strict=True))
+    return Pairs(count, one - two + shift, *variances)

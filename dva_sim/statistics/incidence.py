@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dva_sim.statistics.persons import LEVEL, Floats, Interval
+from dva_sim.statistics.persons import Floats, Interval
 from dva_sim.statistics.proportions import interval_of_share
 
 Ints = NDArray[np.intp]
@@ -118,25 +118,19 @@ def incidence(time: ArrayLike, cause: ArrayLike, causes: int) -> Incidence:
 
 @dataclass(frozen=True)
 class IncidenceAtHorizon:
-    """How often each cause came first by the horizon; the shares sum to 1.
+    """How often each cause came first by a horizon; the shares sum to 1.
 
     Attributes:
-        horizon: Until when [the unit of the times].
         causes: Share of each cause, in the order of the causes' names.
         nothing: Share to which nothing has happened by then.
     """
 
-    horizon: float
     causes: dict[str, Interval]
     nothing: Interval
 
 
 def cumulative_incidence(
-    times: ArrayLike,
-    causes: Sequence[Any],
-    horizon: float,
-    person: ArrayLike,
-    level: float = LEVEL,
+    times: ArrayLike, causes: Sequence[Any], horizon: float, person: ArrayLike
 ) -> IncidenceAtHorizon:
     """Aalen and Johansen's cumulative incidence at a horizon, with intervals over persons.
 
@@ -152,7 +146,6 @@ def cumulative_incidence(
         causes: What happened `(n,)`; None or an empty string where nothing did until then.
         horizon: Later does not count.
         person: Whose run it was `(n,)`.
-        level: Confidence level.
 
     References:
         Aalen & Johansen, Scand. J. Stat. 5 (1978) 141-150; Andersen, Klein & Rosthoj,
@@ -174,8 +167,8 @@ def cumulative_incidence(
             for kept in (np.ones(len(owner), dtype=bool), *left_out)
         ]
     )
-    intervals = [_interval(share, len(persons), len(owner), level) for share in shares]
-    return IncidenceAtHorizon(horizon, dict(zip(names, intervals[:-1], strict=True)), intervals[-1])
+    intervals = [_interval(share, len(persons), len(owner)) for share in shares]
+    return IncidenceAtHorizon(dict(zip(names, intervals[:-1], strict=True)), intervals[-1])
 
 
 def _shares(times: Floats, causes: Ints, count: int, horizon: float) -> list[float]:
@@ -185,11 +178,11 @@ def _shares(times: Floats, causes: Ints, count: int, horizon: float) -> list[flo
     return [*met, round(1.0 - sum(met), 12)]
 
 
-def _interval(share: Floats, persons: int, runs: int, level: float) -> Interval:
+def _interval(share: Floats, persons: int, runs: int) -> Interval:
     """From the share `[0]` and what it is without each person `[1:]`."""
     if persons < 2:
         estimate = float(share[0]) if persons else math.nan
         return Interval(estimate, math.nan, math.nan, persons)
     left_out = share[1:]
     variance = (persons - 1) / persons * float(((left_out - left_out.mean()) ** 2).sum())
-    return interval_of_share(float(share[0]), variance, persons, runs, level)
+    return interval_of_share(float(share[0]), variance, persons, runs)

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from dva_sim.statistics.persons import LEVEL, Floats, Interval, students_t
 
 
-def share_interval(flags: ArrayLike, person: ArrayLike, level: float = LEVEL) -> Interval:
+def share_interval(flags: ArrayLike, person: ArrayLike) -> Interval:
     """How often something happened, with Korn and Graubard's interval.
 
     Runs of one person are worth less than as many runs of different persons: the number of
@@ -20,7 +20,6 @@ def share_interval(flags: ArrayLike, person: ArrayLike, level: float = LEVEL) ->
     Args:
         flags: True where it happened `(n,)`; nan or None where the run is missing.
         person: Whose run it was `(n,)`.
-        level: Confidence level.
 
     References:
         Korn & Graubard, Survey Methodology 24 (1998) 193-201.
@@ -29,12 +28,10 @@ def share_interval(flags: ArrayLike, person: ArrayLike, level: float = LEVEL) ->
     if not persons:
         return Interval(math.nan, math.nan, math.nan, 0)
     share = float(numbers.mean())
-    return interval_of_share(share, _variance(numbers, code), persons, len(numbers), level)
+    return interval_of_share(share, _variance(numbers, code), persons, len(numbers))
 
 
-def interval_of_share(
-    share: float, variance: float, persons: int, runs: int, level: float = LEVEL
-) -> Interval:
+def interval_of_share(share: float, variance: float, persons: int, runs: int) -> Interval:
     """Clopper and Pearson's interval on as many independent runs as would have this variance.
 
     Args:
@@ -42,22 +39,19 @@ def interval_of_share(
         variance: Of the estimate, from how persons differ.
         persons: The least number of runs that it counts as; of one, the ends are nan.
         runs: The greatest.
-        level: Confidence level.
     """
     from scipy import special
 
-    n = _runs_worth(share, variance, persons, runs, level)
+    n = _runs_worth(share, variance, persons, runs)
     if math.isnan(n):
         return Interval(share, math.nan, math.nan, persons)
-    beyond, seen = (1 - level) / 2, share * n
+    beyond, seen = (1 - LEVEL) / 2, share * n
     low = special.betaincinv(seen, n - seen + 1, beyond) if share > 0 else 0.0
     high = special.betaincinv(seen + 1, n - seen, 1 - beyond) if share < 1 else 1.0
     return Interval(share, float(low), float(high), persons)
 
 
-def quantile_interval(
-    values: ArrayLike, person: ArrayLike, q: float = 0.5, level: float = LEVEL
-) -> Interval:
+def quantile_interval(values: ArrayLike, person: ArrayLike, q: float = 0.5) -> Interval:
     """A quantile of all runs, between the values whose own shares are compatible with it.
 
     Of a high quantile few persons may not tell how high it is: if all of them can lie below it
@@ -68,7 +62,6 @@ def quantile_interval(
         values: One value per run `(n,)`, nan where missing.
         person: Whose run it was `(n,)`.
         q: Which quantile; 0.5 is the median.
-        level: Confidence level.
 
     References:
         Woodruff, JASA 47 (1952) 635-646.
@@ -80,8 +73,8 @@ def quantile_interval(
     if persons < 2:
         return Interval(estimate, math.nan, math.nan, 1)
     below, runs = (numbers <= estimate).astype(float), len(numbers)
-    n = _runs_worth(float(below.mean()), _variance(below, code), persons, runs, level)
-    compatible = np.flatnonzero(_is_compatible(np.arange(runs + 1) / runs, n, q, level))
+    n = _runs_worth(float(below.mean()), _variance(below, code), persons, runs)
+    compatible = np.flatnonzero(_is_compatible(np.arange(runs + 1) / runs, n, q))
     ends = np.concatenate([[-np.inf], np.sort(numbers), [np.inf]])
     return Interval(estimate, float(ends[compatible[0]]), float(ends[compatible[-1] + 1]), persons)
 
@@ -103,20 +96,20 @@ def _variance(flags: Floats, code: NDArray[np.intp]) -> float:
     return persons / (persons - 1) * float((surplus**2).sum()) / len(flags) ** 2
 
 
-def _runs_worth(share: float, variance: float, persons: int, runs: int, level: float) -> float:
+def _runs_worth(share: float, variance: float, persons: int, runs: int) -> float:
     """Independent runs worth as much as these, less for what the variance itself is unsure by."""
     if not 0 < share < 1:
         n = float(persons)
     else:
         n = min(max(share * (1 - share) / variance, persons), runs) if variance > 0 else runs
-    return n * (students_t(level, runs) / students_t(level, persons)) ** 2
+    return n * (students_t(LEVEL, runs) / students_t(LEVEL, persons)) ** 2
 
 
-def _is_compatible(share: Floats, n: float, q: float, level: float) -> NDArray[np.bool_]:
+def _is_compatible(share: Floats, n: float, q: float) -> NDArray[np.bool_]:
     """Whether `q` lies within the interval of each share `(k,)` of `n` independent runs."""
     from scipy import special
 
-    beyond, seen = (1 - level) / 2, share * n
+    beyond, seen = (1 - LEVEL) / 2, share * n
     with np.errstate(invalid="ignore"):
         is_below = special.betainc(seen, n - seen + 1, q) <= beyond
         is_above = special.betainc(seen + 1, n - seen, q) >= 1 - beyond

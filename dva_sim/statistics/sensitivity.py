@@ -51,8 +51,6 @@ def factorial_effects(
     levels: Mapping[str, ArrayLike],
     values: ArrayLike,
     person: ArrayLike,
-    level: float = LEVEL,
-    seed: int = 1,
     resamples: int = RESAMPLES,
 ) -> tuple[Effect, ...]:
     """Main effects and two-way interactions of a full factorial, with simultaneous intervals.
@@ -66,8 +64,6 @@ def factorial_effects(
             baseline.
         values: One value per run `(n,)`, nan where missing.
         person: Whose run it was `(n,)`.
-        level: Confidence level of all intervals together.
-        seed: Of the resampling.
         resamples: How many times persons are drawn.
 
     Returns:
@@ -82,7 +78,7 @@ def factorial_effects(
     if not contrasts:
         return ()
     matrix = np.column_stack([values for *_, values in contrasts])
-    found = band(matrix, level, seed, resamples)
+    found = band(matrix, resamples=resamples)
     counts = np.isfinite(matrix).sum(axis=0)
     ends = zip(found.mean, found.low, found.high, counts, strict=True)
     return tuple(
@@ -101,20 +97,12 @@ def _grid(
     person: NDArray[Any],
 ) -> Floats:
     """Persons' cell means `(levels of factor 1, ..., persons)`; nan where no run is."""
-    there = np.isfinite(values)
     persons, owner = np.unique(person, return_inverse=True)
-    codes = [_codes(np.asarray(levels[name]).tolist(), known[name])[there] for name in known]
-    shape = (*(len(of) for of in known.values()), len(persons))
-    place = np.ravel_multi_index((*codes, owner[there]), shape)
-    size = int(np.prod(shape))
-    count = np.bincount(place, minlength=size)
-    total = np.bincount(place, weights=values[there], minlength=size)
-    return np.where(count > 0, total / np.maximum(count, 1), np.nan).reshape(shape)
-
-
-def _codes(values: list[Any], known: list[Any]) -> NDArray[np.intp]:
-    code = {level: i for i, level in enumerate(known)}
-    return np.array([code[value] for value in values], dtype=np.intp)
+    codes = [[known[name].index(v) for v in np.asarray(levels[name]).tolist()] for name in known]
+    grid = np.full((*(len(of) for of in known.values()), len(persons)), np.nan)
+    at, means = person_means(values, np.ravel_multi_index((*codes, owner), grid.shape))
+    grid.flat[at] = means
+    return grid
 
 
 def _main_effects(grid: Floats, known: Mapping[str, list[Any]]) -> Iterator[_Contrast]:
@@ -161,8 +149,6 @@ def sobol_indices(
     values: ArrayLike,
     person: ArrayLike,
     cell: ArrayLike,
-    level: float = LEVEL,
-    seed: int = 1,
     resamples: int = SOBOL_RESAMPLES,
 ) -> tuple[SobolIndex, ...]:
     """First-order and total indices from the runs of a design `{saltelli: N}`.
@@ -176,8 +162,6 @@ def sobol_indices(
         values: One value per run `(n,)`, nan where missing.
         person: Whose run it was `(n,)`.
         cell: Which cell the run is of `(n,)`, ascending in the order of the design.
-        level: Confidence level of each interval.
-        seed: Of the resampling.
         resamples: How many times blocks and persons are drawn.
 
     Raises:
@@ -193,9 +177,9 @@ def sobol_indices(
     there = np.isfinite(table).astype(float)
     filled = np.where(there, table, 0.0)
     whole = _indices(filled, there, np.ones(blocks), np.ones(persons))
-    chosen = zip(draws(blocks, seed, resamples), draws(persons, seed + 1, resamples), strict=True)
+    chosen = zip(draws(blocks, resamples), draws(persons, resamples, seed=2), strict=True)
     drawn = np.array([_indices(filled, there, rows, columns) for rows, columns in chosen])
-    low, high = np.nanquantile(drawn, [(1 - level) / 2, (1 + level) / 2], axis=0)
+    low, high = np.nanquantile(drawn, [(1 - LEVEL) / 2, (1 + LEVEL) / 2], axis=0)
     first, total = (
         [Interval(float(x), float(lo), float(hi), persons) for x, lo, hi in zip(*part, strict=True)]
         for part in np.stack([whole, low, high], axis=1)

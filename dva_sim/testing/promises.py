@@ -172,7 +172,7 @@ TRIALS: Final[dict[str, CheckedKind]] = {
         ("operator", _STRATEGIES, "operators", f"{{tries}} drives, {_US} a frame"),
         ("filter", "agents.tilt.filters", "tilt", f"{{tries}} runs, {_READINGS}"),
         ("mapping", "agents.tilt.mappings", "tilt", f"{{tries}} runs, {_READINGS}"),
-        ("hazard", "worlds.hazards.registry", "hazards", f"{{tries}} questions, {_US} an answer"),
+        ("hazard", "worlds.hazards", "hazards", f"{{tries}} questions, {_US} an answer"),
         ("measure", "simulation.run_measures", "measures", "{tries} answers, slowest {ms:.1f} ms"),
         ("model", "simulation.models", "models", "{tries} runs, slowest {ms:.0f} ms"),
         ("figure", _FIGURES, "figures", "{tries} drawings, slowest {ms:.0f} ms"),

@@ -39,7 +39,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dva_sim.agents.operator.published import TargetLine, lines_of, load_split, load_targets
-from dva_sim.experiments.study.robustness_grid import latin_hypercube
+from dva_sim.experiments.study.factor_levels import latin_hypercube
 from dva_sim.kernel.streams import Streams
 from dva_sim.validation.operators.experiments import EXPERIMENTS, OperatorsSetting, play_experiments
 

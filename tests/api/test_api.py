@@ -13,9 +13,9 @@ import typer
 
 import dva_sim
 from dva_sim import cli
-from dva_sim.experiments.study.overrides import pairs_of
+from dva_sim.experiments.study.study_file import pairs_of
+from dva_sim.kernel.config_overrides import parse_changes
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.kernel.key_changes import parse_changes
 
 STUDY = """\
 question: Does a second of delay cost time?

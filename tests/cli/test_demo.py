@@ -4,7 +4,7 @@ import pytest
 
 from dva_sim.cli import demo as module
 from dva_sim.cli.demo import FILM, PICTURE, STUDY, demo
-from dva_sim.experiments.execution.run_request import RunRequest
+from dva_sim.experiments.execution.runner import RunRequest
 from dva_sim.kernel.errors import DvaSimError, ExitCode
 
 SLEEPS = "import time; time.sleep(600)"

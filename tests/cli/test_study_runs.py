@@ -12,8 +12,7 @@ import small_study as kit
 from dva_sim.cli import study_runs
 from dva_sim.cli.study_runs import RunPace, duration
 from dva_sim.experiments.execution.dry_run import DryRun, _spread, dry_run
-from dva_sim.experiments.execution.run_request import RunRequest
-from dva_sim.experiments.execution.runner import run_study
+from dva_sim.experiments.execution.runner import RunRequest, run_study
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,8 @@ from matplotlib.colors import to_hex
 from recordings.runs import drill
 
 from dva_sim.experiments.analysis.kept_episodes import Tables, typical_and_worst
-from dva_sim.experiments.analysis.run_grid import Factor, RunGrid, StudyView
+from dva_sim.experiments.analysis.run_grid import Factor, RunGrid
+from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.figures.palette import HAZARD, look_of
 from dva_sim.experiments.report.figures.site_map import TypicalRun, WorstRun, kind_of
 from dva_sim.experiments.report.figures.style import styled

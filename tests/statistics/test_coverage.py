@@ -152,7 +152,7 @@ def skilled_pairs(persons, n, rng):
 def unitless(a, b):
     size = effect_size(a, b, range(len(a)), resamples=500)
     pairing = variance_reduction(a, b, range(len(a)), resamples=500)
-    return size.paired, size.average, size.superiority, pairing.correlation, pairing.ratio
+    return size.paired, size.average, pairing.correlation, pairing.ratio
 
 
 def true_sizes(a, b):
@@ -160,7 +160,6 @@ def true_sizes(a, b):
     return (
         d.mean() / d.std(),
         d.mean() / ((a.std() + b.std()) / 2),
-        (d > 0).mean(),
         np.corrcoef(a, b)[0, 1],
         d.var() / (a.var() + b.var()),
     )
@@ -170,7 +169,7 @@ def true_sizes(a, b):
 def test_intervals_of_sizes_and_of_what_pairing_did_hold_in_93_to_98_of_100_skewed_studies():
     rng = np.random.default_rng(2016)
     truth = true_sizes(*skilled_pairs(2_000_000, 1, rng))
-    held = np.zeros(5)
+    held = np.zeros(4)
     for a, b in zip(*skilled_pairs(PERSONS, 2000, rng), strict=True):
         held += [holds(x, true) for x, true in zip(unitless(a, b), truth, strict=True)]
     assert np.all(held / 2000 >= 0.93)

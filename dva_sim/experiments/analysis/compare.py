@@ -19,7 +19,6 @@ import numpy as np
 
 from dva_sim.experiments.analysis.compare_rows import (
     Difference,
-    Floats,
     Levels,
     Matched,
     Pair,
@@ -29,8 +28,8 @@ from dva_sim.experiments.analysis.compare_rows import (
     difference,
     match,
 )
-from dva_sim.experiments.analysis.fail_conditions import SIGNS, TESTS, Gate, Test, percent_of
-from dva_sim.experiments.results.results import Frame, Results
+from dva_sim.experiments.analysis.fail_conditions import SIGNS, TESTS, Gate, Test, parse, percent_of
+from dva_sim.experiments.results.results import Array, Frame, Results
 from dva_sim.experiments.study.parts import DESIGN
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import hint
@@ -197,8 +196,6 @@ class Comparison:
         Raises:
             ConfigError: it is none, or nothing to decide it by.
         """
-        from dva_sim.experiments.analysis.fail_conditions import parse
-
         return judge(parse(fail_if), self)
 
     def changed(self) -> tuple[list[str], int]:
@@ -382,7 +379,7 @@ def _passes(test: Test | None, value: Any) -> float:
     return float(TESTS[test.sign](str(value) if isinstance(test.than, str) else value, test.than))
 
 
-def _values(gate: Gate, rows: Rows) -> Floats:
+def _values(gate: Gate, rows: Rows) -> Array:
     if gate.statistic == "missing":
         return np.isnan(rows.values).astype(float)
     return rows.values[~np.isnan(rows.values)]
@@ -394,10 +391,8 @@ def _statistic(gate: Gate, rows: Rows) -> float:
         return math.nan
     if percent is not None:
         return float(np.percentile(values, percent))
-    if gate.statistic == "median":
-        return float(np.median(values))
-    ends = {"min": values.min(), "max": values.max()}
-    return float(ends.get(gate.statistic, values.mean()))
+    taken: Any = {"median": np.median, "min": np.min, "max": np.max}.get(gate.statistic, np.mean)
+    return float(taken(values))
 
 
 def _refuse_undecided(gate: Gate, group: GateGroup, first: float, second: float) -> None:

@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dva_sim.experiments.results.results import Array, Results
 from dva_sim.experiments.study.cell_grid import REFERENCE
@@ -136,7 +135,6 @@ def _pair(a: _Cell, b: _Cell) -> Pair:
     return Pair(a["part"], common, a["cell"], b["cell"], a["config"] == b["config"])
 
 
-Floats = NDArray[np.float64]
 Run = tuple[int, int, int, int]
 
 

@@ -16,14 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.experiments.analysis.run_grid import (
-    Floats,
-    Setting,
-    StudyView,
-    Table,
-    as_floats,
-    codes_of,
-)
+from dva_sim.experiments.analysis.run_grid import Floats, Setting, Table, as_floats, codes_of
+from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.study.parts import Level
 from dva_sim.statistics import Interval, cumulative_incidence, paired_difference, share_interval
 

@@ -38,7 +38,8 @@ def conditions(
     stated = stated_conditions(dict.fromkeys(s.get("model", "full") for s in scenarios.values()))
     stated |= {key: factor_name(key) for key in also if key not in stated}
     for key, name in stated.items():
-        values = [_stated(get(s, key)) for s in scenarios.values()]
+        found = [get(s, key) for s in scenarios.values()]
+        values = [None if v is False or v == [] else v for v in found]  # which go without saying
         if key in varied:
             rows.append((name, [_VARIED] * len(values)))
         elif any(v is not None for v in values):
@@ -141,11 +142,6 @@ def _changes(study: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
     ]
     for levels in itertools.product(*factors, *ends):
         yield {key: value for level in levels for key, value in level.items()}
-
-
-def _stated(value: Any) -> Any:
-    """None for what goes without saying: that there is none of something."""
-    return None if value is False or value == [] else value
 
 
 def _site(scenario: Mapping[str, Any]) -> str:

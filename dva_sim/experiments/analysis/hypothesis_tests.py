@@ -14,8 +14,8 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from dva_sim.experiments.analysis.layout import layout_of
 from dva_sim.experiments.analysis.run_grid import Floats, RunGrid, Setting, Table
+from dva_sim.experiments.analysis.study_view import layout_of
 from dva_sim.experiments.study.parts import ANSWER, POINT, Contrast, Hypothesis, Level
 from dva_sim.statistics import (
     LEVEL,
@@ -156,9 +156,8 @@ def pairs_of(
     table, factors = layout_of(study, runs)
     part = RunGrid(table, contrast.part, factors)
     known = {f.name: f.levels for f in part.factors}
-    wanted = dict(at) | {contrast.factor: contrast.contrast[0]}
-    there = all(name in known and level in known[name] for name, level in wanted.items())
-    if not there or contrast.contrast[1] not in known[contrast.factor]:
+    wanted = [*at.items(), *((contrast.factor, level) for level in contrast.contrast)]
+    if not all(level in known.get(name, ()) for name, level in wanted):
         return None
     in_excess = part.has_reference(contrast.measure)
     grid = part.excess(contrast.measure) if in_excess else part.grid(contrast.measure)
@@ -187,16 +186,11 @@ def claims_of(study: Mapping[str, Any]) -> dict[str, Hypothesis]:
 
 def places_of(study: Mapping[str, Any], contrast: Contrast) -> list[Setting]:
     """Each level that a contrast runs over, or the one place it is taken at."""
-    stops = _stops(study, contrast)
-    if not stops:
-        return [dict(contrast.within)]
-    return [dict(contrast.within) | {str(contrast.over): level} for level in stops]
-
-
-def _stops(study: Mapping[str, Any], contrast: Contrast) -> Sequence[Level]:
-    """The levels that a contrast runs over; none over points in ranges, which are like trials."""
+    at: Setting = dict(contrast.within)
     levels: Sequence[Level] = study.get("factors", {}).get(contrast.over, ())
-    return levels if contrast.over != POINT else ()
+    if contrast.over == POINT or not levels:  # points in ranges are like trials
+        return [at]
+    return [at | {str(contrast.over): level} for level in levels]
 
 
 def _compared(
@@ -213,7 +207,7 @@ def _compared(
         found,
         effect_size(*pairs),
         pair_correlation(pairs.first, pairs.second),
-        permutation_test(*pairs).p,
+        permutation_test(*pairs),
     )
 
 
@@ -232,7 +226,7 @@ def _tested(
 def _p(claim: Hypothesis, pairs: PairedRuns) -> float:
     """Of the claim's own test."""
     if claim.direction == "same":
-        return equivalence(*pairs, claim.margin).p
+        return equivalence(*pairs, claim.margin)
     margin = claim.margin if claim.direction == "above" else -claim.margin
     return one_sided_test(*pairs, margin, claim.direction)
 
@@ -241,7 +235,7 @@ def _p_against(claim: Hypothesis, pairs: PairedRuns) -> float:
     """Of the opposite: on the other side of the margin, or beyond either end of it."""
     if claim.direction == "above":
         return one_sided_test(*pairs, claim.margin, "below")
-    below = one_sided_test(*pairs, -claim.margin, "below") if claim.direction == "same" else 1.0
-    bound = claim.margin if claim.direction == "same" else -claim.margin
-    above = one_sided_test(*pairs, bound, "above")
-    return min(1.0, 2 * min(above, below)) if claim.direction == "same" else above
+    if claim.direction == "below":
+        return one_sided_test(*pairs, -claim.margin, "above")
+    above = one_sided_test(*pairs, claim.margin, "above")
+    return min(1.0, 2 * min(above, one_sided_test(*pairs, -claim.margin, "below")))

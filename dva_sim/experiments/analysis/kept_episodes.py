@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dva_sim.experiments.analysis.run_grid import Floats, Setting, Table, as_floats, plain_level
-
-RECORDINGS = "recordings"
+from dva_sim.experiments.execution.kept_recordings import FOLDER
 
 
 class Tables(NamedTuple):
@@ -81,7 +80,7 @@ def typical_and_worst(
     here &= ~np.asarray(tables.runs["is_reference"]).astype(bool)
     runs = {name: np.asarray(values)[here] for name, values in tables.runs.items()}
     values = as_floats(runs[measure]) if measure in runs else np.full(here.sum(), np.nan)
-    files = _recorded(folder / RECORDINGS, part, runs)
+    files = _recorded(folder / FOLDER, part, runs)
     rows = np.array(sorted(files)) if files else _tracked(tables.tracks, part, runs)
     rows = rows[np.isfinite(values[rows])] if len(rows) else rows
     if not len(rows):
@@ -130,7 +129,7 @@ def _seen(
 ) -> tuple[Table, tuple[SeenIncident, ...]]:
     """Who was where and what happened, from the recording or else from the table."""
     if row in files:
-        from dva_sim.recordings.reading import read_lapse
+        from dva_sim.recordings.reading import read_lapse  # late: start-up
 
         lapse = read_lapse(files[row])
         places = [(i, i.hazard.position) for i in lapse.incidents]

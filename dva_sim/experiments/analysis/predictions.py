@@ -17,13 +17,15 @@ from typing import Any, Literal
 
 import numpy as np
 
-from dva_sim.experiments.analysis.layout import interval_of
-from dva_sim.experiments.analysis.run_grid import Setting, StudyView
+from dva_sim.agents.robot.command_queue import mean_of
+from dva_sim.experiments.analysis.run_grid import Setting
+from dva_sim.experiments.analysis.study_view import StudyView, interval_of
 from dva_sim.experiments.study.parts import TUNING, Level, Prediction, Range
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.units import unit_of
 from dva_sim.kernel.wording import number, quantity
 from dva_sim.simulation.labels import level_name, measure_of, setting
+from dva_sim.simulation.scenario import build, phone_profile
 from dva_sim.statistics import Interval
 
 Verdict = Literal["held", "did not hold", "open", "not judged"]
@@ -97,7 +99,9 @@ def _judge(prediction: Prediction, view: StudyView | None) -> Judged:
     unit = unit_of(view.measure)
     names = f"{level_name(factor, first)} minus {level_name(factor, second)}"
     expected = f"{names} in {measure_of(view.measure, view.part.name)}, {setting(where)}: "
-    expected += _SIDES[prediction.direction] + _range_words(prediction.expected, unit)
+    expected += _SIDES[prediction.direction]
+    if (range_ := prediction.expected) is not None:
+        expected += f", {number(range_[0])} to {quantity(range_[1], unit)}"
     if factor == TUNING and _chose_what_was(view, (first, second), where):
         return Judged(text, expected, _SAME_RUNS, "not judged")
     found = _measured(view, factor, (first, second), where)
@@ -107,10 +111,6 @@ def _judge(prediction: Prediction, view: StudyView | None) -> Judged:
     low, high = max(found.low, -view.widest), min(found.high, view.widest)
     words = f"{quantity(found.mean, unit)} ({number(low)} to {quantity(high, unit)})"
     return Judged(text, expected, words, verdict)
-
-
-def _range_words(expected: Range | None, unit: str) -> str:
-    return f", {number(expected[0])} to {quantity(expected[1], unit)}" if expected else ""
 
 
 def _asked(
@@ -181,9 +181,6 @@ def cadence(scenario: Mapping[str, Any], changes: Mapping[str, Level]) -> Cadenc
 
     A phone that looks only when its batch is full or its time is up wants no more than that.
     """
-    from dva_sim.agents.robot.command_queue import mean_of
-    from dva_sim.simulation.scenario import build, phone_profile
-
     try:
         resolved = build(scenario, changes)
         phone = phone_profile(resolved)

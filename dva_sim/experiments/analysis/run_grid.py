@@ -23,8 +23,6 @@ Floats = NDArray[np.float64]
 Setting = dict[str, Level]
 _Entry = TypeVar("_Entry", np.float64, np.bool_)
 
-MOST_PANELS = 4
-
 
 @dataclass(frozen=True)
 class Factor:
@@ -140,111 +138,6 @@ class RunGrid:
             yield {f.name: level for f, level in zip(free, levels, strict=True)}
 
 
-@dataclass(frozen=True)
-class StudyView:
-    """How a reader looks at a part: what runs along x, what is a line, what is a panel.
-
-    Attributes:
-        part: The runs.
-        measure: Column the question is about.
-        line: Factor with a line for each level, or None.
-        over: Factor along x, or None.
-        contrast: The two levels of `line` compared, the first minus the second; or None.
-        within: The panel that the answer speaks of.
-        smallest_effect: Smallest difference declared to matter, in the measure's unit.
-        outside: Whether each cell `(levels of factor 1, ...)` is an extrapolation, beyond the
-            delays at which people were watched; None where nothing is known of that.
-        possible: The least and the greatest value that the measure can take at all.
-        averages_points: Whether the trials are points in ranges, over which means are taken.
-    """
-
-    part: RunGrid
-    measure: str
-    line: Factor | None
-    over: Factor | None
-    contrast: tuple[Level, Level] | None
-    within: Setting
-    smallest_effect: float | None = None
-    outside: NDArray[np.bool_] | None = None
-    possible: tuple[float, float] = (-math.inf, math.inf)
-    averages_points: bool = False
-
-    @property
-    def lines(self) -> tuple[Level, ...]:
-        """Levels of the line factor; a single None where there is none."""
-        return self.line.levels if self.line else (None,)
-
-    @property
-    def stops(self) -> tuple[Level, ...]:
-        """Levels along x; a single None where there is none."""
-        return self.over.levels if self.over else (None,)
-
-    @property
-    def panels(self) -> list[Setting]:
-        """Settings of all other factors, the last fastest; of each, the answer's level first.
-
-        Settings that the design leaves out are no panels.
-        """
-        names = [f.name for f in (self.line, self.over) if f]
-        every = list(self.part.settings(but=names))
-        order = sorted(every, key=lambda panel: [self._is_aside(*item) for item in panel.items()])
-        return [panel for panel in order if self.part.where(self.part.ran, panel).any()] or order
-
-    @property
-    def shown(self) -> list[Setting]:
-        """The panels that a figure has room for."""
-        return self.panels[:MOST_PANELS]
-
-    def _is_aside(self, factor: str, level: Level) -> bool:
-        return level != self.within.get(factor, level)
-
-    @property
-    def widest(self) -> float:
-        """The greatest difference between two values that the measure can take."""
-        return self.possible[1] - self.possible[0]
-
-    def setting(self, panel: Setting, line: Level) -> Setting:
-        """The levels that a line of a panel stands for."""
-        return dict(panel) | ({self.line.name: line} if self.line else {})
-
-    def along_x(self) -> dict[str, Any]:
-        """The levels along x under their factor's name; nothing where there is no such factor."""
-        return {self.over.name: self.over.levels} if self.over else {}
-
-    def at_stop(self, stop: int) -> Setting:
-        """The level along x of one stop."""
-        return {self.over.name: self.over.levels[stop]} if self.over else {}
-
-    def curve(self, grid: Floats, panel: Setting, line: Level) -> Floats:
-        """Values along x as `(stops, persons, trials)`."""
-        values = self.part.where(grid, self.setting(panel, line))
-        return values if self.over else values[np.newaxis]
-
-    @property
-    def values(self) -> Floats:
-        """The measure as it is judged: in excess of the reference wherever there is one."""
-        if self.part.has_reference(self.measure):
-            return self.part.excess(self.measure)
-        return self.part.grid(self.measure)
-
-    def stops_outside(self, panel: Setting, lines: Sequence[Level] | None = None) -> list[int]:
-        """The stops of a panel at which at least one line, of some or all, is an extrapolation."""
-        if self.outside is None:
-            return []
-        some = self.lines if lines is None else lines
-        marks = np.array([self._marks(panel, line) for line in some]).any(axis=0)
-        return [int(stop) for stop in np.flatnonzero(marks)]
-
-    def _marks(self, panel: Setting, line: Level) -> NDArray[np.bool_]:
-        outside = np.asarray(self.outside, dtype=float)
-        return np.atleast_1d(self.part.where(outside, self.setting(panel, line)) > 0)
-
-    def difference(self, panel: Setting, first: Level, second: Level) -> Floats:
-        """First minus second, paired by person and trial, as person means `(persons, stops)`."""
-        grid = self.values
-        return person_means(self.curve(grid, panel, first) - self.curve(grid, panel, second))
-
-
 def person_means(values: Floats) -> Floats:
     """`(stops, persons, trials)` to means over trials `(persons, stops)`; nan where no trial."""
     return nan_mean(values, axis=-1).T
@@ -267,11 +160,8 @@ def as_floats(values: NDArray[Any]) -> Floats:
     """Any column as floats: true is 1, nothing is nan, words are nan."""
     if values.dtype.kind in "biuf":
         return values.astype(float)
-    return np.array([_float(v) for v in values], dtype=float)
-
-
-def _float(value: Any) -> float:
-    return float(value) if isinstance(value, int | float | np.number | np.bool_) else np.nan
+    numbers = int | float | np.number | np.bool_
+    return np.array([float(v) if isinstance(v, numbers) else np.nan for v in values], dtype=float)
 
 
 def codes_of(table: Table, factor: Factor) -> NDArray[np.intp]:

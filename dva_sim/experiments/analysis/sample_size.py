@@ -1,7 +1,17 @@
 """How many persons a study needs to show what it claims, counted from a pilot or an earlier one.
 
-Every number follows one law (`statistics.planning`): the interval or band that the report shows,
-narrowed as persons are added.
+Every number follows one law: the interval or band that the report shows, narrowed as persons are
+added.
+
+What is shown is shown by an interval that leaves zero (or a margin) out. An interval of `n`
+persons reaches `stretch * t(n - 1) * spread / sqrt(n)` from its mean, where `t` is Student's
+quantile at the interval's level. How persons spread and how much farther than Student's their
+interval reaches, because they are skewed or because a band covers several levels at once, are
+taken from the study at hand: with as many persons as it has, the law gives the very interval that
+its report shows.
+
+References:
+    Cohen, Statistical Power Analysis for the Behavioral Sciences (1988), chapter 2 (noncentral t).
 """
 
 from __future__ import annotations
@@ -9,10 +19,12 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
+from scipy import special
 
 from dva_sim.experiments.analysis.hypothesis_tests import (
     PairedRuns,
@@ -21,25 +33,76 @@ from dva_sim.experiments.analysis.hypothesis_tests import (
     pairs_of,
     places_of,
 )
-from dva_sim.experiments.analysis.layout import view_of
-from dva_sim.experiments.analysis.run_grid import Floats, Setting, StudyView, Table
+from dva_sim.experiments.analysis.run_grid import Floats, Setting, Table
+from dva_sim.experiments.analysis.study_view import StudyView, view_of
 from dva_sim.experiments.study.parts import ANSWER, Contrast, Hypothesis
 from dva_sim.kernel.units import unit_of
 from dva_sim.kernel.wording import quantity
 from dva_sim.simulation.labels import level_name, measure_of, setting
-from dva_sim.statistics import (
-    LEVEL,
-    MOST_PERSONS,
-    Band,
-    Interval,
-    IntervalLaw,
-    band,
-    law_of,
-    mean_interval,
-)
+from dva_sim.statistics import LEVEL, Band, Interval, band, mean_interval, person_means, students_t
 
 POWERS = (0.8, 0.9)
 _ALPHA = 1 - LEVEL
+MOST_PERSONS = 10_000
+
+
+@dataclass(frozen=True)
+class IntervalLaw:
+    """How far an interval reaches from its mean, by the number of persons.
+
+    Attributes:
+        spread: Standard deviation of persons' means.
+        persons: From how many it is known.
+        level: Two-sided confidence level whose quantile of Student's shrinks with more persons.
+        stretch: How many times as far as Student's the interval reaches.
+    """
+
+    spread: float
+    persons: int
+    level: float = LEVEL
+    stretch: float = 1.0
+
+    def reach(self, persons: int) -> float:
+        """Distance from the mean to the end of the interval."""
+        return self._critical(persons) * self.spread / math.sqrt(persons)
+
+    def power(self, effect: float, persons: int) -> float:
+        """The chance that the interval of so many lies beyond zero if the true mean is `effect`.
+
+        Beyond zero means on the side of the effect; the other side is no success.
+
+        Raises:
+            ValueError: fewer than two persons.
+        """
+        if persons < 2:
+            raise ValueError(f"a study needs at least 2 persons, not {persons}")
+        shift, critical = abs(effect) / self.spread * math.sqrt(persons), self._critical(persons)
+        below = float(special.nctdtr(persons - 1, shift, critical))
+        # Far from all doubt the series does not converge; so many persons are as good as normal.
+        return float(special.ndtr(shift - critical)) if math.isnan(below) else 1 - below
+
+    def _critical(self, persons: int) -> float:
+        return self.stretch * students_t(self.level, persons)
+
+
+def law_of(
+    values: ArrayLike, person: ArrayLike, reach: float | None = None, level: float = LEVEL
+) -> IntervalLaw | None:
+    """The law that a study's own interval follows; None where its persons are all alike.
+
+    Args:
+        values: One value per run `(n,)`, nan where missing: of a comparison, the difference of
+            the pair of runs.
+        person: Whose run it was `(n,)`.
+        reach: How far the study's interval or band reaches from its mean, towards the side that
+            counts; as far as Student's if left out.
+        level: Of that interval; of a band, that of each of its levels alone (Bonferroni).
+    """
+    means = person_means(values, person)[1]
+    if len(means) < 2 or not np.ptp(means) > 0:
+        return None
+    plain = IntervalLaw(float(means.std(ddof=1)), len(means), level)
+    return plain if reach is None else replace(plain, stretch=reach / plain.reach(len(means)))
 
 
 class Count(NamedTuple):
@@ -240,14 +303,12 @@ def _plan(test: _Test) -> SizePlan:
 
 def _count(chance: Callable[[int], float], wanted: float, known: int, least: int) -> Count:
     """The fewest persons with such a chance, and how far the spread of a few leaves it open."""
-    from scipy import special
-
     persons = _fewest(chance, wanted)
     freedom = known - 1
     # The sum of squares over the true variance is chi-squared; persons go with the variance.
     low, high = (freedom / special.chdtri(freedom, tail) for tail in (0.025, 0.975))
-    counts = (persons, persons * low, persons * high)
-    return Count(*(_capped(max(count, least)) for count in counts))
+    counts = (max(count, least) for count in (persons, persons * low, persons * high))
+    return Count(*(math.inf if count > MOST_PERSONS else math.ceil(count) for count in counts))
 
 
 def _fewest(chance: Callable[[int], float], wanted: float) -> float:
@@ -261,10 +322,6 @@ def _fewest(chance: Callable[[int], float], wanted: float) -> float:
         middle = (low + high) // 2
         low, high = (low, middle) if chance(middle) >= wanted else (middle, high)
     return high
-
-
-def _capped(persons: float) -> float:
-    return math.inf if persons > MOST_PERSONS else math.ceil(persons)
 
 
 def _sides(contrast: Contrast, at: Setting) -> str:

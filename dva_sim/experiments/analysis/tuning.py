@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import itertools
 from pathlib import Path
 
 from dva_sim import __version__
-from dva_sim.experiments.analysis.run_grid import Factor, Floats, RunGrid
+from dva_sim.experiments.analysis.run_grid import Factor, RunGrid, Setting
 from dva_sim.experiments.execution.runner import Progress, run_study
 from dva_sim.experiments.execution.scheduling import LIMIT_S, Simulate
 from dva_sim.experiments.results.results import Results
 from dva_sim.experiments.study.cell_grid import basis_of_tuning, refuse_unknown_measures
 from dva_sim.experiments.study.hashing import fingerprint
-from dva_sim.experiments.study.parts import Level, Tuning
+from dva_sim.experiments.study.parts import Tuning
 from dva_sim.experiments.study.study import Study
 from dva_sim.experiments.study.tuning import (
     ChosenValue,
@@ -62,40 +61,26 @@ def tune(
     part = RunGrid(results.table("runs"), rule.part, factors)
     if not part.has(rule.measure):
         raise ConfigError(f"tuning.measure {rule.measure!r} has no value in any of these runs")
-    seen = _seen(part, rule)
+    whens = list(part.settings(but=[f.name for f in part.factors if f.name not in rule.by]))
+    seen = [_tried(part, rule, when, value) for when in whens for value in rule.levels]
     return TunedValues(
         study=study.file.stem,
         made_with=f"{__version__} {fingerprint()}",
         basis=basis_of_tuning(study),
         tuning=rule,
-        chosen=tuple(_choice(seen, when) for when in _whens(part, rule)),
+        chosen=tuple(_choice(seen, when) for when in whens),
         seen=tuple(seen),
     )
 
 
-def _whens(part: RunGrid, rule: Tuning) -> list[dict[str, Level]]:
-    levels = {f.name: f.levels for f in part.factors if f.name in rule.by}
-    return [
-        dict(zip(levels, chosen, strict=True)) for chosen in itertools.product(*levels.values())
-    ]
-
-
-def _seen(part: RunGrid, rule: Tuning) -> list[TriedValue]:
-    grid = part.grid(rule.measure)
-    return [
-        _tried(part, part.where(grid, {**rule.at, **when, rule.key: value}), when, value)
-        for when in _whens(part, rule)
-        for value in rule.levels
-    ]
-
-
-def _tried(part: RunGrid, cell: Floats, when: dict[str, Level], value: float) -> TriedValue:
+def _tried(part: RunGrid, rule: Tuning, when: Setting, value: float) -> TriedValue:
     """One value, judged by `(persons, trials)` of the measure."""
+    cell = part.where(part.grid(rule.measure), {**rule.at, **when, rule.key: value})
     found = mean_interval(cell.ravel(), part.persons.repeat(len(part.trials)))
     low, high = (found.low, found.high) if found.n_persons > 1 else (found.mean, found.mean)
     mean, low, high = (round(x, _DIGITS) for x in (found.mean, low, high))
     return TriedValue(when=when, value=value, mean=mean, low=low, high=high)
 
 
-def _choice(seen: list[TriedValue], when: dict[str, Level]) -> ChosenValue:
+def _choice(seen: list[TriedValue], when: Setting) -> ChosenValue:
     return ChosenValue(when=when, value=choose({s.value: s.mean for s in seen if s.when == when}))

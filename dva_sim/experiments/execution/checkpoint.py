@@ -16,7 +16,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 from dva_sim.experiments.results.manifest import failures
@@ -115,12 +114,7 @@ class Checkpoint:
     def __enter__(self) -> Checkpoint:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._db.close()
 
     def add(self, batch: Iterable[RunOutcome], wall_s: float = 0.0) -> None:
@@ -133,7 +127,7 @@ class Checkpoint:
         Raises:
             DvaSimError: the disk is full, or another program holds the checkpoint.
         """
-        rows = [(*o.key, o.tables, o.cost_s, _error(o)) for o in batch]
+        rows = [(*o.key, o.tables, o.cost_s, o.error) for o in batch]
         with self._told(), self._transaction():
             self._db.executemany(_ADD, rows)
             self._db.execute("UPDATE study SET wall_s = wall_s + ?", [wall_s])
@@ -185,43 +179,38 @@ class Checkpoint:
 
     def manifest(self) -> dict[str, Any] | None:
         """What the study is, as `describe` was told; None if nobody has."""
-        columns = {row[1] for row in self._db.execute("PRAGMA table_info(study)")}
-        if "manifest" not in columns:
+        if "manifest" not in {row[1] for row in self._ask("PRAGMA table_info(study)")}:
             return None
-        with self._told():
-            (text,) = self._db.execute("SELECT manifest FROM study").fetchone()
+        ((text,),) = self._ask("SELECT manifest FROM study")
         return None if text is None else dict(json.loads(text))
 
     def done(self) -> set[RunKey]:
         """Keys of the runs that need not be run again."""
-        query = "SELECT config, seed FROM runs WHERE tables IS NOT NULL"
-        with self._told():
-            return set(self._db.execute(query))
+        return set(self._ask("SELECT config, seed FROM runs WHERE tables IS NOT NULL"))
 
     def failures(self) -> dict[RunKey, str]:
         """Runs that failed and have not succeeded since, with the reason."""
         query = "SELECT config, seed, error FROM runs WHERE tables IS NULL"
-        with self._told():
-            return {(config, seed): error for config, seed, error in self._db.execute(query)}
+        return {(config, seed): error for config, seed, error in self._ask(query)}
 
     def tables(self, key: RunKey) -> Tables | None:
         """The tables of a run; None if it is not done."""
         query = "SELECT tables FROM runs WHERE config = ? AND seed = ?"
-        with self._told():
-            row = self._db.execute(query, key).fetchone()
-        return json.loads(row[0]) if row is not None and row[0] is not None else None
+        return next((json.loads(text) for (text,) in self._ask(query, key) if text), None)
 
     def costs(self) -> dict[RunKey, float]:
         """What each run that is done has cost [CPU s]."""
         query = "SELECT config, seed, cost_s FROM runs WHERE tables IS NOT NULL"
-        with self._told():
-            return {(config, seed): cost for config, seed, cost in self._db.execute(query)}
+        return {(config, seed): cost for config, seed, cost in self._ask(query)}
 
     @property
     def wall_s(self) -> float:
         """How long the study has been run so far, in all sessions together [s]."""
+        return float(self._ask("SELECT wall_s FROM study")[0][0])
+
+    def _ask(self, query: str, values: Sequence[Any] = ()) -> list[Any]:
         with self._told():
-            return float(self._db.execute("SELECT wall_s FROM study").fetchone()[0])
+            return self._db.execute(query, values).fetchall()
 
     @contextmanager
     def _told(self) -> Iterator[None]:
@@ -235,10 +224,6 @@ class Checkpoint:
                 f"is not the journal of a study, or damaged ({error}); move it away to begin anew",
                 self.path,
             ) from None
-
-
-def _error(outcome: RunOutcome) -> str | None:
-    return None if outcome.tables is not None else outcome.error or "failed"
 
 
 def _remedy(problem: str) -> str:

@@ -19,10 +19,9 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError, Executor, ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 from functools import cache, partial
-from types import TracebackType
 from typing import Any, ParamSpec, TypeVar
 
-from dva_sim.experiments.execution.executors import WorkersLost
+from dva_sim.experiments.execution.executors import Workers, WorkersLost
 from dva_sim.experiments.results.manifest import versions
 from dva_sim.kernel.errors import ConfigError, DvaSimError
 
@@ -43,7 +42,7 @@ class OtherProgram(DvaSimError):
     """A worker has another program, or other packages, than who sent the work."""
 
 
-class DaskCluster:
+class DaskCluster(Workers):
     """The workers of a scheduler.
 
     Args:
@@ -52,8 +51,6 @@ class DaskCluster:
     Raises:
         ConfigError: dask.distributed is not installed, or nobody answers at the address.
     """
-
-    is_here = False
 
     def __init__(self, address: str) -> None:
         self.address = address
@@ -66,7 +63,7 @@ class DaskCluster:
                 "--scheduler needs dask.distributed, which is not installed: "
                 "pip install 'dva-sim[cluster]'"
             ) from None
-        self.deaths: tuple[type[Exception], ...] = (KilledWorker,)
+        self.deaths = (KilledWorker,)
         self._open = ExitStack()
         with self._open:
             self._open.enter_context(_quiet())
@@ -79,12 +76,7 @@ class DaskCluster:
     def __enter__(self) -> DaskCluster:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._open.close()
 
     @property

@@ -102,16 +102,16 @@ def dry_run(
     estimate = _estimate(left, known or tried.costs)
     workers = executors.local(jobs).width
     return DryRun(
-        len(todo),
-        len(todo) - len(left),
-        len(cells),
-        len(rounds(study, todo)),
-        workers,
-        None if estimate is None else estimate / min(workers, len(left) or 1),
-        len(tried.costs),
-        _remark(study),
-        tried.is_least,
-        tried.failed,
+        runs=len(todo),
+        done=len(todo) - len(left),
+        cells=len(cells),
+        rounds=len(rounds(study, todo)),
+        workers=workers,
+        estimate_s=None if estimate is None else estimate / min(workers, len(left) or 1),
+        tried=len(tried.costs),
+        remark=_remark(study),
+        is_least=tried.is_least,
+        failed=tried.failed,
     )
 
 

@@ -10,12 +10,13 @@ import os
 import signal
 import sys
 import threading
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
-from typing import Any, ParamSpec, Protocol, TypeVar
+from typing import Any, ParamSpec, TypeVar
 
 from dva_sim.kernel.errors import ConfigError, RunsFailed
 
@@ -28,21 +29,23 @@ class WorkersLost(RunsFailed):
     """Nobody is left to run anything; what has been run is kept."""
 
 
-class Workers(Protocol):
-    """Who makes the runs, wherever that is."""
+class Workers(ABC):
+    """Who makes the runs, wherever that is.
+
+    Attributes:
+        is_here: Whether runs are made in this process, one by one.
+        deaths: What a future raises whose worker has died.
+    """
+
+    is_here = False
+    deaths: tuple[type[Exception], ...] = ()
 
     @property
+    @abstractmethod
     def width(self) -> int:
         """Workers."""
 
-    @property
-    def is_here(self) -> bool:
-        """Whether runs are made in this process, one by one."""
-
-    @property
-    def deaths(self) -> tuple[type[Exception], ...]:
-        """What a future raises whose worker has died."""
-
+    @abstractmethod
     def executor(self, width: int, task: Callable[..., Any]) -> AbstractContextManager[Executor]:
         """Workers that are gone, or have nothing more to do, when the block ends.
 
@@ -53,9 +56,10 @@ class Workers(Protocol):
 
     def guarded(self, task: Callable[P, R]) -> Callable[P, R]:
         """The task as it should be handed out."""
+        return task
 
-    def look_after(self, is_idle: bool) -> None:
-        """Called now and then.
+    def look_after(self, is_idle: bool) -> None:  # noqa: B027
+        """Called now and then; nothing has to be done.
 
         Args:
             is_idle: Whether nothing has come for some seconds.
@@ -84,23 +88,15 @@ def cores() -> int:
     return os.cpu_count() or 1
 
 
-class ThisProcess:
+class ThisProcess(Workers):
     """This process."""
 
     width, is_here = 1, True
-    deaths: tuple[type[Exception], ...] = ()
 
     @contextmanager
     def executor(self, width: int, task: Callable[..., Any]) -> Iterator[Executor]:
         """One that has done what it is given when `submit` returns."""
         yield _AtOnce()
-
-    def guarded(self, task: Callable[P, R]) -> Callable[P, R]:
-        """As it is."""
-        return task
-
-    def look_after(self, is_idle: bool) -> None:
-        """Nothing to look after."""
 
 
 class _AtOnce(Executor):
@@ -110,15 +106,14 @@ class _AtOnce(Executor):
         return future
 
 
-class LocalProcesses:
+class LocalProcesses(Workers):
     """Processes of this machine."""
 
-    is_here = False
-    deaths: tuple[type[Exception], ...] = (BrokenProcessPool,)
+    width = 0  # each has its own
+    deaths = (BrokenProcessPool,)
 
     def __init__(self, width: int) -> None:
         self.width = width
-        self._pids: set[int] = set()
         self._stopped: set[int] = set()
 
     @contextmanager
@@ -137,10 +132,6 @@ class LocalProcesses:
             raise
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
-
-    def guarded(self, task: Callable[P, R]) -> Callable[P, R]:
-        """As it is: the processes are of this program."""
-        return task
 
     def look_after(self, is_idle: bool) -> None:
         """End a process that has been stopped for some time: another one does what it had."""

@@ -25,6 +25,7 @@ from dva_sim.experiments.study.hashing import stable_hash
 from dva_sim.experiments.study.own_measures import own_measures
 from dva_sim.experiments.study.study import Study
 from dva_sim.kernel.errors import DvaSimError
+from dva_sim.simulation.full import simulate
 from dva_sim.simulation.full.measures import tables_of
 from dva_sim.simulation.labels import measure_called
 from dva_sim.simulation.models import Tables, model_for
@@ -198,8 +199,7 @@ class Rerun:
         Raises:
             DvaSimError: the file cannot be written, or the run is not what it was.
         """
-        from dva_sim.recordings import write_recording
-        from dva_sim.simulation.full import simulate
+        from dva_sim.recordings import write_recording  # late: start-up
 
         assert isinstance(job.scenario, Scenario)
         name, run = name_of(job), simulate(job.scenario, job.seed, keep_traffic=True)

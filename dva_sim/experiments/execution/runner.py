@@ -1,4 +1,7 @@
-"""Run a study: what is not done yet, wherever it is run, kept as it comes, then as tables."""
+"""Run a study: what is not done yet, wherever it is run, kept as it comes, then as tables.
+
+`RunRequest` is what the command line, or a program, asks of a study.
+"""
 
 from __future__ import annotations
 
@@ -7,15 +10,17 @@ import shutil
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-from dva_sim.experiments.execution import executors, scheduling
+from dva_sim.experiments.execution import dry_run, executors, kept_recordings, scheduling
 from dva_sim.experiments.execution.checkpoint import Checkpoint
+from dva_sim.experiments.execution.dask_cluster import DaskCluster
 from dva_sim.experiments.execution.executors import Workers, WorkersLost
-from dva_sim.experiments.execution.scheduling import Simulate, run_job
+from dva_sim.experiments.execution.scheduling import LIMIT_S, Simulate, run_job
 from dva_sim.experiments.results.manifest import failures, machine, manifest_of, write_json
 from dva_sim.experiments.results.results import JOURNAL, MACHINE, MANIFEST, TABLES, digests
 from dva_sim.experiments.results.tables import design_row, write_tables
@@ -23,7 +28,7 @@ from dva_sim.experiments.study import cell_grid
 from dva_sim.experiments.study.cell_grid import DesignCell, StudyJob
 from dva_sim.experiments.study.own_measures import own_measures
 from dva_sim.experiments.study.stopping import is_enough, rounds
-from dva_sim.experiments.study.study import Study
+from dva_sim.experiments.study.study import Study, Version
 from dva_sim.kernel.errors import ConfigError, DvaSimError
 
 Progress = Callable[[int, int], object]
@@ -73,7 +78,8 @@ def run_study(
         workers = stack.enter_context(_workers(jobs, scheduler))
         checkpoint = stack.enter_context(_opened(out, manifest["hash"]))
         checkpoint.describe(manifest)
-        simulate = episode or _simulation(study)
+        own = tuple(own_measures(study))
+        simulate = episode or (partial(run_job, measures=own) if own else run_job)
         session = _Session(todo, checkpoint, workers, simulate, progress, limit_s)
         with session.told():
             carried_out, stopped = _run_rounds(study, todo, session)
@@ -181,7 +187,8 @@ def _run_rounds(
     why, number = None, 0
     for number, batch in enumerate(batches, 1):
         rest = session.left(batch)
-        if rest and chosen and _is_spent(study, session.checkpoint):
+        is_spent = study.budget_s is not None and session.checkpoint.wall_s >= study.budget_s
+        if rest and chosen and is_spent:
             why, number = "budget", number - 1
             break
         session.run(rest)
@@ -192,10 +199,6 @@ def _run_rounds(
     if why is not None:
         session.end()
     return _in_order(todo, chosen), {"rounds": number, "of": len(batches), "why": why}
-
-
-def _is_spent(study: Study, checkpoint: Checkpoint) -> bool:
-    return study.budget_s is not None and checkpoint.wall_s >= study.budget_s
 
 
 def _in_order(todo: Sequence[StudyJob], chosen: Sequence[StudyJob]) -> list[StudyJob]:
@@ -220,15 +223,8 @@ def _workers(jobs: int | None, scheduler: str | None) -> Iterator[Workers]:
         return
     if jobs is not None:
         raise ConfigError("give the number of processes or a scheduler, not both")
-    from dva_sim.experiments.execution.dask_cluster import DaskCluster
-
     with DaskCluster(scheduler) as cluster:
         yield cluster
-
-
-def _simulation(study: Study) -> Simulate:
-    own = tuple(own_measures(study))
-    return partial(run_job, measures=own) if own else run_job
 
 
 def _tidy(out: Path) -> None:
@@ -238,3 +234,74 @@ def _tidy(out: Path) -> None:
     for name in (MANIFEST, MACHINE):
         for path in out.glob(f".{name}.*"):
             path.unlink(missing_ok=True)
+
+
+@dataclass(frozen=True)
+class RunRequest:
+    """A study, which variant of it, where to, and on which processes.
+
+    Attributes:
+        study: By name or path.
+        out: Results folder; None for `results/` and the study's name.
+        changes: Keys to change, as `key=value`.
+        quick: The study's small version.
+        full: The study's larger version.
+        pilot: Only so many persons, with a random seed of their own.
+        jobs: Processes of this machine; by default one for each core.
+        scheduler: Address of a dask.distributed cluster to use instead.
+        limit_s: A run that takes longer, by the wall clock, has failed.
+    """
+
+    study: str | Path
+    out: Path | None = None
+    changes: Sequence[str] = ()
+    quick: bool = False
+    full: bool = False
+    pilot: int | None = None
+    jobs: int | None = None
+    scheduler: str | None = None
+    limit_s: float = LIMIT_S
+
+    @property
+    def version(self) -> Version | None:
+        """The small or the larger version; None for the study as its file says.
+
+        Raises:
+            ConfigError: both are asked for.
+        """
+        if self.quick and self.full:
+            raise ConfigError("--quick and --full are two versions of a study; give one of them")
+        return "quick" if self.quick else "full" if self.full else None
+
+    @property
+    def folder(self) -> Path:
+        """Where results go; if nobody says, each variant of a study has its own folder."""
+        marks = [Path(self.study).stem, self.version, None if self.pilot is None else "pilot"]
+        return self.out or Path("results") / "-".join(filter(None, marks))
+
+    def plan(
+        self, study: Study, cells: Sequence[DesignCell], probe: Simulate | None = None
+    ) -> dry_run.DryRun:
+        """What `run` would do; see `dry_run`."""
+        jobs = self.jobs if self.scheduler is None else 1  # who knows how many are free there
+        return dry_run.dry_run(study, self.folder, jobs=jobs, probe=probe, cells=cells)
+
+    def run(
+        self, study: Study, cells: Sequence[DesignCell], progress: Progress | None = None
+    ) -> None:
+        """Run what the folder does not hold yet; see `run_study`."""
+        run_study(
+            study,
+            self.folder,
+            jobs=self.jobs,
+            scheduler=self.scheduler,
+            progress=progress,
+            limit_s=self.limit_s,
+            cells=cells,
+        )
+
+    def record(self, study: Study, progress: Progress | None = None) -> list[str]:
+        """Make the recordings that the study asks for; see `record_study`."""
+        return kept_recordings.record_study(
+            study, self.folder, jobs=self.jobs, progress=progress, limit_s=self.limit_s
+        )

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dva_sim.experiments.analysis.run_grid import Floats, StudyView, nan_mean, person_means
+from dva_sim.experiments.analysis.run_grid import Floats, nan_mean, person_means
+from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.cell_table import CellTable
 from dva_sim.experiments.study.parts import POINT
 from dva_sim.kernel.units import unit_of

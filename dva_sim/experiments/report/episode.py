@@ -12,8 +12,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from dva_sim.kernel.config_overrides import parse_changes
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.kernel.key_changes import parse_changes
 from dva_sim.kernel.plugins import resolved
 from dva_sim.network.patterns import known_patterns
 from dva_sim.recordings import Opened, read_recording, write_recording

@@ -11,7 +11,8 @@ from typing import Any, ClassVar
 
 from dva_sim.experiments.analysis.answer import Answer, Finding, answer
 from dva_sim.experiments.analysis.conditions import conditions
-from dva_sim.experiments.analysis.run_grid import Factor, RunGrid, StudyView, Table
+from dva_sim.experiments.analysis.run_grid import Factor, RunGrid, Table
+from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.cell_table import SUMMARIES, CellTable, Summary
 
 

@@ -8,7 +8,8 @@ import numpy as np
 
 from dva_sim.experiments.analysis.answer import Finding, place_of
 from dva_sim.experiments.analysis.competing_risks import CLEARED, CONFIRMED, NOTHING, Ended, Endings
-from dva_sim.experiments.analysis.run_grid import Setting, StudyView
+from dva_sim.experiments.analysis.run_grid import Setting
+from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.cell_table import CellTable
 from dva_sim.experiments.study.parts import Level
 from dva_sim.kernel.wording import capital, listing, number, percent, quantity

@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dva_sim.experiments.analysis.conditions import conditions, timeout_remark
-from dva_sim.experiments.analysis.layout import factors_of, keys_of
 from dva_sim.experiments.analysis.predictions import Judged, judge_all
 from dva_sim.experiments.analysis.robustness import sentences
+from dva_sim.experiments.analysis.study_view import factors_of, keys_of
 from dva_sim.experiments.execution.checkpoint import load_so_far
 from dva_sim.experiments.report.answer_table import answer_table, size_of, spread_table
 from dva_sim.experiments.report.blocks import (

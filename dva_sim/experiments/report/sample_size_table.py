@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dva_sim.experiments.analysis.answer import Finding
-from dva_sim.experiments.analysis.run_grid import Floats, StudyView
-from dva_sim.experiments.analysis.sample_size import POWERS, Count, SizePlan
+from dva_sim.experiments.analysis.run_grid import Floats
+from dva_sim.experiments.analysis.sample_size import MOST_PERSONS, POWERS, Count, SizePlan
+from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.cell_table import CellTable
 from dva_sim.kernel.wording import number, quantity
 from dva_sim.simulation.labels import level_name
-from dva_sim.statistics import MOST_PERSONS, quantile_interval
+from dva_sim.statistics import quantile_interval
 
 
 def few_that_weigh(finding: Finding, view: StudyView) -> str:

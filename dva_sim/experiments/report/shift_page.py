@@ -9,8 +9,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from dva_sim.experiments.analysis.answer import Answer, Finding, answer
-from dva_sim.experiments.analysis.run_grid import Factor, RunGrid, Setting, StudyView, Table
+from dva_sim.experiments.analysis.run_grid import Factor, RunGrid, Setting, Table
 from dva_sim.experiments.analysis.shift_effects import BEST, POLICY, Shifts, is_dispatch, pooled
+from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.cell_table import CellTable, Summary, cell_table
 from dva_sim.experiments.report.model_page import ModelPage, correlated
 from dva_sim.kernel.wording import listing, number, percent

@@ -20,10 +20,20 @@ from dva_sim import statistics
 from dva_sim.experiments.analysis.answer import Answer, Finding, at, places, telling_stop
 from dva_sim.experiments.analysis.competing_risks import Endings, horizon_of, with_endings
 from dva_sim.experiments.analysis.conditions import get
-from dva_sim.experiments.analysis.extrapolation import support_of_part
 from dva_sim.experiments.analysis.hypothesis_tests import Judgement, judged
 from dva_sim.experiments.analysis.kept_episodes import KeptEpisode, Tables, typical_and_worst
-from dva_sim.experiments.analysis.layout import (
+from dva_sim.experiments.analysis.robustness import RepeatedAnswer, robustness_of, support_of_part
+from dva_sim.experiments.analysis.run_grid import (
+    Floats,
+    RunGrid,
+    Setting,
+    Table,
+    as_floats,
+    present,
+)
+from dva_sim.experiments.analysis.sample_size import SizePlan, plans
+from dva_sim.experiments.analysis.study_view import (
+    StudyView,
     finding_of,
     keys_of,
     layout_of,
@@ -33,17 +43,6 @@ from dva_sim.experiments.analysis.layout import (
     view_of,
     with_rows,
 )
-from dva_sim.experiments.analysis.robustness import RepeatedAnswer, robustness_of
-from dva_sim.experiments.analysis.run_grid import (
-    Floats,
-    RunGrid,
-    Setting,
-    StudyView,
-    Table,
-    as_floats,
-    present,
-)
-from dva_sim.experiments.analysis.sample_size import SizePlan, plans
 from dva_sim.experiments.report.cell_table import CellTable, cell_table
 from dva_sim.experiments.report.model_page import ModelPage
 from dva_sim.experiments.report.pages import page_of

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from dva_sim.experiments.analysis.run_grid import StudyView
+from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.cell_table import Summary
 from dva_sim.experiments.report.model_page import ModelPage, correlated
 from dva_sim.kernel.wording import number, percent

@@ -18,6 +18,7 @@ from dva_sim import __version__
 from dva_sim.experiments.results.tables import design_row
 from dva_sim.experiments.study import cell_grid
 from dva_sim.experiments.study.cell_grid import DesignCell, RunKey, StudyJob, StudyRun
+from dva_sim.experiments.study.factor_levels import parameter_sets
 from dva_sim.experiments.study.hashing import (
     fingerprint,
     fingerprint_of_judges,
@@ -26,7 +27,6 @@ from dva_sim.experiments.study.hashing import (
     stable_hash,
 )
 from dva_sim.experiments.study.own_measures import columns_told, own_measures
-from dva_sim.experiments.study.robustness_grid import parameter_sets
 from dva_sim.experiments.study.study import Status, Study
 from dva_sim.experiments.study.tuning import load_tuned
 from dva_sim.kernel.errors import DvaSimError, RunTooLong
@@ -53,7 +53,10 @@ def manifest_of(
         "set": list(study.settings),
         "changes": dict(study.changes),
         "inputs": inputs((cell.scenario for cell in cells), own_measures(study)),
-        "cells": [_cell_row(cell) for cell in cells],
+        "cells": [
+            {"part": c.part, "cell": c.index, "config": c.config, "levels": dict(c.levels)}
+            for c in cells
+        ],
         "parameter_sets": parameter_sets(study),
         "tuned": load_tuned(study).model_dump(mode="json") if tuned else None,
         "basis": cell_grid.basis_of_tuning(study).model_dump(mode="json") if tuned else None,
@@ -128,11 +131,6 @@ def write_json(path: Path, data: dict[str, Any]) -> None:
         raise DvaSimError(f"{path} cannot be written: {error.strerror}") from None
 
 
-def _cell_row(cell: DesignCell) -> dict[str, Any]:
-    levels = dict(cell.levels)
-    return {"part": cell.part, "cell": cell.index, "config": cell.config, "levels": levels}
-
-
 def status_of(manifest: Mapping[str, Any]) -> Status:
     """What the result may be called; results that do not say are judged by what was set.
 
@@ -140,22 +138,17 @@ def status_of(manifest: Mapping[str, Any]) -> Status:
     another machine. Verdicts are made anew whenever they are told, by the program as it is then.
     """
     if "status" in manifest:
-        manifest = _marked_partial(manifest)
         status = Status.model_validate(manifest["status"])
+        if "partial" in manifest:
+            why = ("the study is not finished", *status.why)
+            found = {"kind": "exploratory", "why": why, "reproducible": False}
+            status = status.model_copy(update=found)
         return _judged_anew(_without(manifest.get("failures", []), status))
-    changes = [_as_words(change) for change in manifest.get("set", [])]
+    given = manifest.get("set", [])  # each a pair, or a list of its words
+    changes = [text if isinstance(text, str) else "=".join(map(str, text)) for text in given]
     if not changes:
         return Status(kind="declared")
     return Status(kind="exploratory", why=(f"changed on the command line: {', '.join(changes)}",))
-
-
-def _marked_partial(manifest: Mapping[str, Any]) -> Mapping[str, Any]:
-    """The manifest, whose status says so if the study is not finished."""
-    if "partial" not in manifest:
-        return manifest
-    why = ("the study is not finished", *manifest["status"]["why"])
-    found = {"kind": "exploratory", "why": why, "reproducible": False}
-    return {**manifest, "status": {**manifest["status"], **found}}
 
 
 def _judged_anew(status: Status) -> Status:
@@ -185,8 +178,3 @@ def _without(failed: Sequence[Mapping[str, Any]], status: Status) -> Status:
             "reproducible": status.reproducible and not slow,
         }
     )
-
-
-def _as_words(change: Any) -> str:
-    """One `--set`, however the manifest keeps it."""
-    return change if isinstance(change, str) else "=".join(str(word) for word in change)

@@ -12,22 +12,24 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from dva_sim.experiments.study.factor_levels import levels_at_ends, levels_of_cells, path_in_design
-from dva_sim.experiments.study.hashing import stable_hash
-from dva_sim.experiments.study.own_measures import names_of_own
-from dva_sim.experiments.study.parts import POINT, REPEATS, TUNED, TUNING, Level
-from dva_sim.experiments.study.robustness_grid import (
+from dva_sim.experiments.study.factor_levels import (
     PARAMETERS,
     TRAITS,
     factors_of_repeats,
+    levels_at_ends,
+    levels_of_cells,
     parameter_sets,
+    path_in_design,
     settings_of_repeats,
 )
+from dva_sim.experiments.study.hashing import stable_hash
+from dva_sim.experiments.study.own_measures import names_of_own
+from dva_sim.experiments.study.parts import POINT, REPEATS, TUNED, TUNING, Level
 from dva_sim.experiments.study.study import Study
 from dva_sim.experiments.study.tuning import TuningBasis, load_tuned
 from dva_sim.kernel.config import Document, KeyPath
+from dva_sim.kernel.config_overrides import blame
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.kernel.key_changes import blame
 from dva_sim.kernel.streams import derive_seed
 from dva_sim.kernel.suggestions import listed, unknown
 from dva_sim.simulation import scenario as scenarios
@@ -45,7 +47,8 @@ def located(study: Study, part: str, error: ConfigError, changes: Mapping[str, A
     """
     if error.file is not None:
         return error
-    named = [key for key, value in changes.items() if _is_named(key, value, error.problem)]
+    told = error.problem
+    named = [k for k, v in changes.items() if k in told or (isinstance(v, str) and repr(v) in told)]
     keys = error.keys if len(error.keys) == 1 else (named or list(error.keys))
     for key in keys:
         if pair := study.setting_of(tuple(key.split("."))):
@@ -54,17 +57,9 @@ def located(study: Study, part: str, error: ConfigError, changes: Mapping[str, A
         for path in _places(study, part, key, changes[key]):
             if study.is_from_file(path):
                 return study.error(error.problem, path)
-    return in_setting(study, error) if keys else error
-
-
-def in_setting(study: Study, error: ConfigError) -> ConfigError:
-    """A mistake in what the study's file does not say: in the settings, if there are any."""
+    # What the study's file does not say is in the settings, if there are any.
     pairs = ", ".join(f"--set {pair}" for pair in study.settings)
-    return ConfigError(f"{pairs}: {error.problem}") if pairs else error
-
-
-def _is_named(key: str, value: Any, problem: str) -> bool:
-    return key in problem or (isinstance(value, str) and repr(value) in problem)
+    return ConfigError(f"{pairs}: {error.problem}") if keys and pairs else error
 
 
 def _places(study: Study, part: str, key: str, value: Any) -> Iterator[KeyPath]:
@@ -77,8 +72,7 @@ def _places(study: Study, part: str, key: str, value: Any) -> Iterator[KeyPath]:
             yield "treatments", factor, level, key
     if study.version is not None:
         yield study.version, key
-    in_design = path_in_design(study, key, value)
-    if in_design is not None:
+    if (in_design := path_in_design(study, key, value)) is not None:
         yield in_design
 
 
@@ -297,17 +291,12 @@ def _repeats_of(study: Study) -> Iterator[DesignCell]:
         return
     part, fixed, sets = study.answer.part, settings_of_repeats(study), parameter_sets(study)
     source, change = _source(study, part), _changer(study)
-    for index, levels in enumerate(_grid(factors)):
-        chosen = dict(levels)
-        traits = sets[int(str(chosen.pop(PARAMETERS)))]
+    for index, values in enumerate(itertools.product(*factors.values())):
+        levels = dict(zip(factors, values, strict=True))
+        traits = sets[int(str(levels[PARAMETERS]))]
+        chosen = {factor: level for factor, level in levels.items() if factor != PARAMETERS}
         changes = change(fixed | chosen) | ({TRAITS: traits} if traits else {})
         yield _cell(study, REPEATS, index, levels, source, changes)
-
-
-def _grid(factors: Mapping[str, Sequence[Level]]) -> Iterator[dict[str, Level]]:
-    """Every combination of levels, the last factor fastest."""
-    for levels in itertools.product(*factors.values()):
-        yield dict(zip(factors, levels, strict=True))
 
 
 def _changer(study: Study) -> Callable[[Mapping[str, Level]], dict[str, Any]]:

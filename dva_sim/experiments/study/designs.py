@@ -17,13 +17,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import (
-    AfterValidator,
-    BeforeValidator,
-    ConfigDict,
-    Field,
-    model_validator,
-)
+from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, model_validator
 
 from dva_sim.experiments.study.parts import (
     POINT,
@@ -125,9 +119,7 @@ class Design(Config):
     model_config = ConfigDict(json_schema_extra={"oneOf": _ONE_KIND})
 
     zip: Annotated[tuple[str, ...], Field(min_length=2)] | None = None
-    rows: Annotated[tuple[Annotated[Row, SPARES_THE_DESIGN], ...], Field(min_length=1)] | None = (
-        None
-    )
+    rows: Rows | None = None
     csv: str | None = None
     latin_hypercube: Points | None = None
     sobol: Dyadic | None = None
@@ -140,9 +132,7 @@ class Design(Config):
         if len(chosen) != 1:
             raise ValueError(f"should have one of {', '.join(KINDS)}")
         if self.is_sampled != bool(self.ranges):
-            raise ValueError(
-                f"{chosen[0]} needs ranges" if self.is_sampled else f"{chosen[0]} has no ranges"
-            )
+            raise ValueError(f"{chosen[0]} {'needs' if self.is_sampled else 'has no'} ranges")
         return self
 
     @property
@@ -205,12 +195,11 @@ def _places(design: Design, axes: int, rng: np.random.Generator) -> Floats:
     """
     from scipy.stats import qmc  # late: start-up
 
-    if design.latin_hypercube is not None:
-        return np.asarray(qmc.LatinHypercube(axes, rng=rng).random(design.latin_hypercube))
+    if design.saltelli is not None:
+        return saltelli(axes, design.saltelli, rng)
     if design.sobol is not None:
         return _sobol(axes, design.sobol, rng)
-    assert design.saltelli is not None
-    return saltelli(axes, design.saltelli, rng)
+    return np.asarray(qmc.LatinHypercube(axes, rng=rng).random(design.points))
 
 
 def _sobol(axes: int, points: int, rng: np.random.Generator) -> Floats:
@@ -266,7 +255,8 @@ def read_table(path: Path) -> Document:
     header: list[str] = []
     rows: list[dict[str, Level]] = []
     for number, line, cells in _cells(path, lines):
-        starts = _starts(line)[: len(cells)]  # the pattern also finds the empty end
+        # Columns, from 1, at which cells begin; the pattern also finds the empty end.
+        starts = [match.start() + 1 for match in _CELL.finditer(line)][: len(cells)]
         if not header:
             header = _header(path, number, starts, cells)
             continue
@@ -296,11 +286,6 @@ def _cells(path: Path, lines: list[str]) -> Iterator[tuple[int, str, list[str]]]
         except csv.Error as error:
             raise ConfigError(f"is not CSV: {error}", path, number, 1) from None
         yield number, line, cells
-
-
-def _starts(line: str) -> list[int]:
-    """Column, from 1, at which each cell of a line begins."""
-    return [match.start() + 1 for match in _CELL.finditer(line)]
 
 
 def _header(path: Path, number: int, starts: list[int], cells: list[str]) -> list[str]:

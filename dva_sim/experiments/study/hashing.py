@@ -20,8 +20,6 @@ import dva_sim
 from dva_sim.kernel import resources
 from dva_sim.kernel.config import Config
 
-_LONGEST_NAME = 1000  # of a file that is looked for
-
 
 def stable_hash(data: Any) -> str:
     """64 bits that depend on the data alone, not on the machine or the order of keys."""
@@ -43,18 +41,12 @@ def inputs(scenarios: Iterable[Config], others: Iterable[str] = ()) -> dict[str,
     """
     dumps = (scenario.model_dump(mode="json") for scenario in scenarios)
     names = sorted({*others, *(text for dump in dumps for text in _texts(dump) if "." in text)})
-    short = [name for name in names if "\n" not in name and len(name) < _LONGEST_NAME]
-    paths = [(name, Path(_file_of(name))) for name in short]
+    paths = {name: Path(name.rpartition(":")[0] if ".py:" in name else name) for name in names}
     return {
         name: hashlib.sha256(path.read_bytes()).hexdigest()[:16]
-        for name, path in paths
-        if path.is_file()
+        for name, path in paths.items()
+        if resources.is_file(path)
     }
-
-
-def _file_of(name: str) -> str:
-    """The file of a class that is named as `file.py:Class`; other names are files as they are."""
-    return name.rpartition(":")[0] if ".py:" in name else name
 
 
 def _texts(data: Any) -> Iterator[str]:
@@ -79,11 +71,13 @@ _CODE = (
     "kernel/streams.py",
     "experiments/execution/scheduling.py",
 )
+# Of these, what holds words that people read, and no run does.
+_WORDS = ("agents/operator/published.py", "simulation/labels.py")
 # What says whether a hypothesis held: a registration fixes it, other results may be judged anew.
 _JUDGES = (
     "experiments/analysis/hypothesis_tests.py",
     "experiments/analysis/run_grid.py",
-    "experiments/analysis/layout.py",
+    "experiments/analysis/study_view.py",
     "statistics",
 )
 _EDITED = ("agents", "protocol", "worlds")
@@ -112,7 +106,9 @@ def _code(parts: Iterable[str]) -> Iterator[tuple[str, Path]]:
     for part in parts:
         start = package / part
         for path in sorted(start.rglob("*.py")) if start.is_dir() else [start]:
-            yield path.relative_to(package).as_posix(), path
+            name = path.relative_to(package).as_posix()
+            if name not in _WORDS:
+                yield name, path
 
 
 def _edited() -> Iterator[tuple[str, Path]]:

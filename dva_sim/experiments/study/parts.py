@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import AfterValidator, ConfigDict, Field, field_validator, model_validator
+from pydantic import AfterValidator, ConfigDict, Field, model_validator
 
 from dva_sim.kernel.config import Config, Scalar
 
@@ -24,11 +24,8 @@ Direction = Literal["above", "below", "same"]
 
 
 def _distinct(levels: tuple[Level, ...]) -> tuple[Level, ...]:
-    seen: set[Level] = set()
-    for level in levels:
-        if level in seen:
-            raise ValueError(f"level {level!r} stands twice")
-        seen.add(level)
+    for level in (level for at, level in enumerate(levels) if level in levels[:at]):
+        raise ValueError(f"level {level!r} stands twice")
     return levels
 
 
@@ -58,7 +55,7 @@ def says(*keys: str, not_: str = "") -> dict[str, Any]:
     }
 
 
-def refuse_keys_of_the_design(keys: Iterable[str]) -> None:
+def refuse_keys_of_the_design(keys: Keys) -> Keys:
     """Persons are the study's own to choose.
 
     Raises:
@@ -67,14 +64,10 @@ def refuse_keys_of_the_design(keys: Iterable[str]) -> None:
     for key in keys:
         if key in SET_BY_DESIGN:
             raise ValueError(f"{key!r} is set by the study; change {SET_BY_DESIGN[key]!r} instead")
-
-
-def _spared(keys: Keys) -> Keys:
-    refuse_keys_of_the_design(keys)
     return keys
 
 
-SPARES_THE_DESIGN = AfterValidator(_spared)  # no key that the study sets itself
+SPARES_THE_DESIGN = AfterValidator(refuse_keys_of_the_design)  # no key that the study sets itself
 ScenarioChanges = Annotated[Changes, SPARES_THE_DESIGN]
 
 
@@ -258,7 +251,9 @@ class Tuning(Config):
     """
 
     key: str
-    levels: Annotated[tuple[Annotated[float, Field(gt=0)], ...], Field(min_length=2)]
+    levels: Annotated[
+        tuple[Annotated[float, Field(gt=0)], ...], Field(min_length=2), AfterValidator(_distinct)
+    ]
     by: Annotated[tuple[str, ...], Field(min_length=1)]
     at: dict[str, Level] = Field(default_factory=dict)
     part: str
@@ -266,12 +261,6 @@ class Tuning(Config):
     persons: Count = 8
     replications: Count = 2
     seed: Seed
-
-    @field_validator("levels")
-    @classmethod
-    def _tried_once(cls, value: tuple[float, ...]) -> tuple[float, ...]:
-        _distinct(value)
-        return value
 
 
 class RobustnessRule(Config):

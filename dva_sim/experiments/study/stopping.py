@@ -10,18 +10,16 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dva_sim.experiments.study.cell_grid import StudyJob
 from dva_sim.experiments.study.factor_levels import factors_in_rows
 from dva_sim.experiments.study.parts import Contrast, Level, StopRule
 from dva_sim.experiments.study.study import Study
-from dva_sim.statistics import band, mean_interval
+from dva_sim.statistics import Floats, band, mean_interval
 
 _BATCH_IN_BUDGET = 2  # persons, where a budget alone ends a study
 
 Row = Mapping[str, Any]
-Floats = NDArray[np.float64]
 _Run = tuple[int, int]  # person, trial
 
 
@@ -84,9 +82,11 @@ def _of_contrast(study: Study, asked: Contrast, rows: Iterable[Row]) -> Floats:
     """Of the paired difference at each level of `over`, all at once; the reference cancels."""
     sides: tuple[dict[Any, float], dict[Any, float]] = ({}, {})
     fixed = _place(study, asked)
-    keys = [name for name in _factors(study) if name != asked.factor]
+    ranges = study.design.ranges if study.design is not None else ()
+    keys = [name for name in (*study.factors, *ranges) if name != asked.factor]
     for row in rows:
-        if row["part"] != asked.part or row["is_reference"] or not _is_at(row, fixed):
+        is_there = row["part"] == asked.part and not row["is_reference"]
+        if not is_there or any(row.get(factor) != level for factor, level in fixed.items()):
             continue
         for side, level in zip(sides, asked.contrast, strict=True):
             if row[asked.factor] == level:
@@ -113,20 +113,11 @@ def _means(first: dict[Any, float], second: dict[Any, float], at: int | None) ->
     return means
 
 
-def _factors(study: Study) -> list[str]:
-    """All columns that say which cell a run is of."""
-    return [*study.factors, *(study.design.ranges if study.design is not None else ())]
-
-
 def _place(study: Study, asked: Contrast) -> dict[str, Level]:
     """The panel that the contrast speaks of: the levels it is within, else the first."""
     names = {asked.factor, asked.over, *factors_in_rows(study)}
     free = {f: levels[0] for f, levels in study.factors.items() if f not in names}
     return free | dict(asked.within)
-
-
-def _is_at(row: Row, place: Mapping[str, Level]) -> bool:
-    return all(row.get(factor) == level for factor, level in place.items())
 
 
 def _number(value: Any) -> float:

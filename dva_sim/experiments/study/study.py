@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, PrivateAttr, field_validator
+from pydantic import Field, PrivateAttr, ValidationInfo, field_validator
 
 from dva_sim.experiments.study.designs import ROWS, Design, Row
 from dva_sim.experiments.study.parts import (
@@ -33,37 +32,6 @@ from dva_sim.kernel.errors import ConfigError
 Version = Literal["quick", "full"]
 VERSIONS: tuple[Version, ...] = ("quick", "full")
 SIZES: dict[Version, str] = {"quick": "small", "full": "larger"}
-
-
-@dataclass(frozen=True)
-class Variant:
-    """Which variant of a study is meant.
-
-    Attributes:
-        version: The small or the larger version; None for the study as its file says.
-        pilot: Only so many persons.
-    """
-
-    version: Version | None = None
-    pilot: int | None = None
-
-    @classmethod
-    def of(cls, *, quick: bool, full: bool, pilot: int | None) -> Variant:
-        """The variant that the options `--quick`, `--full` and `--pilot` ask for.
-
-        Raises:
-            ConfigError: both versions are asked for.
-        """
-        if quick and full:
-            raise ConfigError("--quick and --full are two versions of a study; give one of them")
-        return cls("quick" if quick else "full" if full else None, pilot)
-
-    def folder(self, name: str) -> Path:
-        """Where results go if nobody says: each variant has its own folder."""
-        marks = [self.version or "", "pilot" if self.pilot is not None else ""]
-        return Path("results") / "-".join([Path(name).stem, *filter(None, marks)])
-
-
 FOLDER = "experiments"
 
 
@@ -143,18 +111,15 @@ class Study(Config):
     _status: Status = PrivateAttr(default_factory=Status)
     _usual: dict[str, Any] = PrivateAttr(default_factory=dict)
 
-    @field_validator("parts")
+    @field_validator("parts", "comparisons")
     @classmethod
-    def _leaves_room_for_repeats(cls, value: dict[str, StudyPart]) -> dict[str, StudyPart]:
-        if REPEATS in value:
-            raise ValueError(f"a part cannot be called {REPEATS!r}: the repeats are")
-        return value
-
-    @field_validator("comparisons")
-    @classmethod
-    def _leaves_room_for_the_answer(cls, value: dict[str, Contrast]) -> dict[str, Contrast]:
-        if ANSWER in value:
-            raise ValueError(f"a comparison cannot be called {ANSWER!r}: the declared contrast is")
+    def _leaves_room(cls, value: dict[str, Any], info: ValidationInfo) -> dict[str, Any]:
+        """The repeats are called as if they were a part, the answer as if it were a comparison."""
+        of_parts = ("a part", REPEATS, "the repeats are")
+        of_comparisons = ("a comparison", ANSWER, "the declared contrast is")
+        what, taken, by = of_parts if info.field_name == "parts" else of_comparisons
+        if taken in value:
+            raise ValueError(f"{what} cannot be called {taken!r}: {by}")
         return value
 
     @property

@@ -6,8 +6,8 @@ import hashlib
 import json
 import math
 from collections.abc import Iterable, Mapping
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 from dva_sim.experiments.study import validation
 from dva_sim.experiments.study.parts import Level, Levels, Tuning
@@ -17,6 +17,11 @@ from dva_sim.kernel.config import Config, load_yaml, validate
 from dva_sim.kernel.errors import ConfigError
 
 FOLDER = "tuned"  # beside the study
+# What a study asks for, and the study that tunes its values does not.
+_LEFT = (
+    *("predictions", "design", "answer", "comparisons", "hypotheses"),
+    *("tuning", "robustness", "stop", "budget_s", "record"),
+)
 
 
 class ChosenValue(Config):
@@ -71,9 +76,8 @@ class TuningBasis(Config):
 
     def unlike(self, other: TuningBasis) -> list[str]:
         """Which of them are others."""
-        return [
-            name for name in TuningBasis.model_fields if getattr(self, name) != getattr(other, name)
-        ]
+        ours, theirs = self.model_dump(), other.model_dump()
+        return [name for name in ours if ours[name] != theirs[name]]
 
 
 class TunedValues(Config):
@@ -149,14 +153,15 @@ def load_tuned(study: Study) -> TunedValues:
 def save_tuned(study: Study, tuned: TunedValues) -> Path:
     """Write the tuned values beside the study; the same bytes for the same values."""
     data = tuned.model_dump(mode="json")
+    flow = partial(json.dumps, ensure_ascii=False)  # which is YAML, too
     lines = [
         f"# Written by `dva-sim tune {tuned.study}`; what it says is not to be edited.",
-        *(f"{key}: {_flow(data[key])}" for key in ("study", "made_with", "basis")),
+        *(f"{key}: {flow(data[key])}" for key in ("study", "made_with", "basis")),
         "tuning:",
-        *(f"  {key}: {_flow(value)}" for key, value in data["tuning"].items()),
+        *(f"  {key}: {flow(value)}" for key, value in data["tuning"].items()),
     ]
     for key in ("chosen", "seen"):
-        lines += [f"{key}:", *(f"  - {_flow(item)}" for item in data[key])]
+        lines += [f"{key}:", *(f"  - {flow(item)}" for item in data[key])]
     path = file_of(study)
     path.parent.mkdir(exist_ok=True)
     path.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
@@ -167,11 +172,6 @@ def _hash_of(files: Iterable[Path]) -> str:
     """64 bits over names and values; what describes a file, or comments on it, is none of them."""
     data = [[path.name, {**load_yaml(path).data, "description": ""}] for path in files]
     return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()[:16]
-
-
-def _flow(data: Any) -> str:
-    """JSON is YAML, too."""
-    return json.dumps(data, ensure_ascii=False)
 
 
 def _how_to_make(name: str) -> str:
@@ -189,24 +189,16 @@ def tuning_study(study: Study) -> Study:
     factors |= {name: study.factors[name] for name in rule.by}
     factors[rule.key] = rule.levels
     part = study.parts[rule.part]
+    usual = {key: Study.model_fields[key] for key in _LEFT}
     trials = study.model_copy(
         update={
+            **{key: field.get_default(call_default_factory=True) for key, field in usual.items()},
             "question": f"Which {rule.key} for each {', '.join(rule.by)}?",
-            "predictions": (),
             "seed": rule.seed,
             "persons": rule.persons,
             "replications": rule.replications,
             "factors": factors,
-            "design": None,
             "parts": {rule.part: part.model_copy(update={"reference": None, "replications": None})},
-            "answer": None,
-            "comparisons": {},
-            "hypotheses": {},
-            "tuning": None,
-            "robustness": None,
-            "stop": None,
-            "budget_s": None,
-            "record": None,
         }
     )
     for problem, _ in validation.of_size(trials):

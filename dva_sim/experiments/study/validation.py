@@ -147,17 +147,12 @@ def _faults_of_tuning(study: Study) -> Iterator[Problem]:
     if tuning is None:
         return
     if tuning.seed == study.seed:
-        yield (
-            "tuning needs a random seed of its own, for other persons than the study's",
-            ("tuning", "seed"),
-        )
-    if tuning.part not in study.parts:
-        told = hint(tuning.part, study.parts, "parts")
-        yield f"tuning.part {tuning.part!r} is not a part; {told}", ("tuning", "part")
+        problem = "tuning needs a random seed of its own, for other persons than the study's"
+        yield problem, ("tuning", "seed")
+    yield from _fault_of_part(study, ("tuning", "part"), tuning.part)
     for name in tuning.by:
         yield from _fault_of_level(study, ("tuning", "by"), name, ())
-    for name, level in tuning.at.items():
-        yield from _fault_of_level(study, ("tuning", "at", name), name, (level,))
+    yield from _faults_of_places(study, ("tuning", "at"), tuning.at)
 
 
 def of_claims(study: Study) -> Iterator[Problem]:
@@ -203,17 +198,14 @@ def of_answer(study: Study) -> Iterator[Problem]:
 
 
 def _faults_of_contrast(study: Study, asked: Contrast, path: KeyPath) -> Iterator[Problem]:
-    if asked.part not in study.parts:
-        name, told = ".".join(map(str, (*path, "part"))), hint(asked.part, study.parts, "parts")
-        yield f"{name} {asked.part!r} is not a part; {told}", (*path, "part")
+    yield from _fault_of_part(study, (*path, "part"), asked.part)
     yield from _fault_of_level(study, (*path, "factor"), asked.factor, ())
     if asked.factor in study.factors:
         yield from _fault_of_level(study, (*path, "contrast"), asked.factor, asked.contrast)
     ranges = study.design.ranges if study.design is not None else {}
     if asked.over is not None and asked.over not in ranges:
         yield from _fault_of_level(study, (*path, "over"), asked.over, ())
-    for name, level in asked.within.items():
-        yield from _fault_of_level(study, (*path, "within", name), name, (level,))
+    yield from _faults_of_places(study, (*path, "within"), asked.within)
     if asked.contrast[0] == asked.contrast[1]:
         yield "contrast compares a level with itself", (*path, "contrast")
     if asked.over is None or path != (ANSWER,):
@@ -230,13 +222,10 @@ def _fault_of_place(study: Study, asked: Contrast, path: KeyPath) -> Iterator[Pr
 
 def _faults_of_hypothesis(study: Study, name: str) -> Iterator[Problem]:
     hypothesis, path = study.hypotheses[name], ("hypotheses", name)
-    asked = study.contrasts.get(hypothesis.comparison)
-    if asked is None:
-        told = hint(hypothesis.comparison, study.contrasts, "there are")
-        yield f"{hypothesis.comparison!r} is not a comparison; {told}", (*path, "comparison")
+    yield from _fault_of_comparison(study, (*path, "comparison"), hypothesis.comparison)
+    if (asked := study.contrasts.get(hypothesis.comparison)) is None:
         return
-    for factor, level in hypothesis.at.items():
-        yield from _fault_of_level(study, (*path, "at", factor), factor, (level,))
+    yield from _faults_of_places(study, (*path, "at"), hypothesis.at)
     if asked.factor in hypothesis.at:
         yield f"{asked.factor!r} is what is compared", (*path, "at", asked.factor)
 
@@ -246,12 +235,10 @@ def of_stop(study: Study) -> Iterator[Problem]:
     stop = study.stop
     if stop is None:
         return
-    if stop.comparison is not None and stop.comparison not in study.contrasts:
-        told = hint(stop.comparison, study.contrasts, "there are")
-        yield f"{stop.comparison!r} is not a comparison; {told}", ("stop", "comparison")
-    if stop.part is not None and stop.part not in study.parts:
-        told = hint(stop.part, study.parts, "parts")
-        yield f"stop.part {stop.part!r} is not a part; {told}", ("stop", "part")
+    if stop.comparison is not None:
+        yield from _fault_of_comparison(study, ("stop", "comparison"), stop.comparison)
+    if stop.part is not None:
+        yield from _fault_of_part(study, ("stop", "part"), stop.part)
     if stop.most_persons < study.persons:
         problem = f"most_persons should be at least the first batch, persons: {study.persons}"
         yield problem, ("stop", "most_persons")
@@ -262,8 +249,7 @@ def _faults_of_prediction(study: Study, prediction: Prediction, path: KeyPath) -
     factor = prediction.factor or study.answer.factor
     contrast = prediction.contrast or ()
     yield from _fault_of_level(study, (*path, "contrast"), factor, contrast)
-    for name, level in prediction.at.items():
-        yield from _fault_of_level(study, (*path, "at", name), name, (level,))
+    yield from _faults_of_places(study, (*path, "at"), prediction.at)
     if contrast and contrast[0] == contrast[1]:
         yield "contrast compares a level with itself", (*path, "contrast")
     if prediction.direction == "same" and study.answer.smallest is None:
@@ -285,6 +271,24 @@ def of_robustness(study: Study) -> Iterator[Problem]:
     yield from _fault_of_level(study, (REPEATS, "at"), over, robustness.at or ())
     if robustness.strategies and STRATEGY in study.factors:
         yield f"{STRATEGY!r} is a factor already", (REPEATS, "strategies")
+
+
+def _fault_of_part(study: Study, path: KeyPath, part: str) -> Iterator[Problem]:
+    if part not in study.parts:
+        name = ".".join(map(str, path))
+        yield f"{name} {part!r} is not a part; {hint(part, study.parts, 'parts')}", path
+
+
+def _fault_of_comparison(study: Study, path: KeyPath, name: str) -> Iterator[Problem]:
+    if name not in study.contrasts:
+        yield f"{name!r} is not a comparison; {hint(name, study.contrasts, 'there are')}", path
+
+
+def _faults_of_places(
+    study: Study, path: KeyPath, places: Mapping[str, Level]
+) -> Iterator[Problem]:
+    for name, level in places.items():
+        yield from _fault_of_level(study, (*path, name), name, (level,))
 
 
 def _fault_of_level(

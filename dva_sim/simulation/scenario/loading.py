@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dva_sim.kernel import key_changes, resources
+from dva_sim.kernel import config_overrides, resources
 from dva_sim.kernel.config import Document, Fail, KeyPath, load_yaml
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import unknown
@@ -157,7 +157,7 @@ def build(
     Raises:
         ConfigError: an unknown key, a wrong type, a value out of range, a missing profile.
     """
-    return key_changes.build(Scenario, source, changes, _complete, locate_files)
+    return config_overrides.build(Scenario, source, changes, _complete, locate_files)
 
 
 def _complete(scenario: Scenario, error: Fail) -> Scenario:

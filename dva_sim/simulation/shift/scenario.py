@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
-from dva_sim.kernel import key_changes
+from dva_sim.kernel import config_overrides
 from dva_sim.kernel.config import Config, Document, Fail, Key, KeyPath
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import unknown
@@ -397,7 +397,7 @@ def build(
     Raises:
         ConfigError: an unknown key or name, a wrong type, a value out of range.
     """
-    return key_changes.build(TimedScenario, source, changes, check_names, locate_files)
+    return config_overrides.build(TimedScenario, source, changes, check_names, locate_files)
 
 
 def limit_of(value: float | None) -> float:

@@ -16,7 +16,7 @@ from pydantic import Field, model_validator
 
 from dva_sim.agents.tilt.accelerometer import load_part
 from dva_sim.agents.tilt.filters import load_filter
-from dva_sim.kernel import key_changes
+from dva_sim.kernel import config_overrides
 from dva_sim.kernel.config import Config, Document, Fail, Key, KeyPath
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.link import LinkConfig
@@ -447,7 +447,7 @@ def build(
     Raises:
         ConfigError: an unknown key or name, a wrong type, a value out of range.
     """
-    return key_changes.build(TaskScenario, source, changes, _complete)
+    return config_overrides.build(TaskScenario, source, changes, _complete)
 
 
 def _complete(scenario: TaskScenario, error: Fail) -> TaskScenario:

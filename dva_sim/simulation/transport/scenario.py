@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from dva_sim.kernel import key_changes
+from dva_sim.kernel import config_overrides
 from dva_sim.kernel.config import Config, Document, Fail, Key
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.measure import names_of
@@ -93,7 +93,7 @@ def build(
     Raises:
         ConfigError: an unknown key or name, a wrong type, a value out of range.
     """
-    return key_changes.build(TransportScenario, source, changes, _complete)
+    return config_overrides.build(TransportScenario, source, changes, _complete)
 
 
 def _complete(scenario: TransportScenario, error: Fail) -> TransportScenario:

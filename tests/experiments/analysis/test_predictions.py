@@ -1,8 +1,8 @@
 import pytest
 import synthetic_study
 
-from dva_sim.experiments.analysis.layout import view_of
 from dva_sim.experiments.analysis.predictions import judge_all, verdict_of
+from dva_sim.experiments.analysis.study_view import view_of
 from dva_sim.statistics import Interval
 
 

@@ -3,8 +3,8 @@ from types import SimpleNamespace
 import pytest
 import synthetic_study
 
-from dva_sim.experiments.analysis.layout import finding_of, view_of
 from dva_sim.experiments.analysis.robustness import robustness_of, sentences
+from dva_sim.experiments.analysis.study_view import finding_of, view_of
 from dva_sim.experiments.report.figures.contrast import RepeatsFigure
 from dva_sim.experiments.report.figures.style import styled
 

@@ -8,7 +8,8 @@ from matplotlib.figure import Figure
 
 from dva_sim.experiments.analysis.answer import Finding
 from dva_sim.experiments.analysis.predictions import Cadence
-from dva_sim.experiments.analysis.run_grid import Factor, RunGrid, StudyView
+from dva_sim.experiments.analysis.run_grid import Factor, RunGrid
+from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.figures.budget import DelayBudget
 from dva_sim.experiments.report.figures.contrast import AnswerFigure
 from dva_sim.experiments.report.figures.effect import CommandRate, Differences, _band

@@ -3,8 +3,8 @@
 import numpy as np
 import synthetic_study
 
-from dva_sim.experiments.analysis.layout import finding_of, layout_of, points_of, view_of
 from dva_sim.experiments.analysis.run_grid import RunGrid
+from dva_sim.experiments.analysis.study_view import finding_of, layout_of, points_of, view_of
 from dva_sim.experiments.report.cell_table import cell_table
 
 ANSWER = {

@@ -3,7 +3,7 @@
 import pytest
 from small_study import study_in
 
-from dva_sim.experiments.results.data_dictionary import describe
+from dva_sim.experiments.results.results import describe
 from dva_sim.experiments.results.tables import design_row
 from dva_sim.experiments.study import cell_grid
 from dva_sim.experiments.study.parts import DESIGN

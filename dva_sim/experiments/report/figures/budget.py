@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dva_sim.experiments.analysis.run_grid import Factor, Floats, Setting, StudyView, nan_mean
+from dva_sim.experiments.analysis.run_grid import Factor, Floats, Setting, nan_mean
+from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.figures.palette import (
     INK,
     PAPER,

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from dva_sim.experiments.analysis.answer import Finding, condition
 from dva_sim.experiments.analysis.robustness import Repeat, RepeatedAnswer, RepeatedStop
-from dva_sim.experiments.analysis.run_grid import Factor, Floats, StudyView, present
+from dva_sim.experiments.analysis.run_grid import Factor, Floats, present
+from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.figures.palette import FAINT, INK, ONE, PAPER, SOFT, colours
 from dva_sim.experiments.report.figures.report_figure import ReportFigure
 from dva_sim.experiments.report.figures.style import (

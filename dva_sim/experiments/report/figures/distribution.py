@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.experiments.analysis.run_grid import Floats, StudyView, present
+from dva_sim.experiments.analysis.run_grid import Floats, present
+from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.figures.palette import INK, PAPER, SOFT, Look, legend, looks
 from dva_sim.experiments.report.figures.report_figure import ReportFigure
 from dva_sim.experiments.report.figures.style import (

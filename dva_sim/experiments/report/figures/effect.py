@@ -17,11 +17,11 @@ from dva_sim.experiments.analysis.run_grid import (
     Factor,
     Floats,
     Setting,
-    StudyView,
     nan_mean,
     person_means,
     present,
 )
+from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.figures.palette import (
     FAINT,
     INK,

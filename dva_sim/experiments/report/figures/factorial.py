@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dva_sim.experiments.analysis.run_grid import MOST_PANELS, Factor, Floats, Setting, StudyView
+from dva_sim.experiments.analysis.run_grid import Factor, Floats, Setting
+from dva_sim.experiments.analysis.study_view import MOST_PANELS, StudyView
 from dva_sim.experiments.report.figures.palette import DIVERGING, INK, PAPER, SOFT
 from dva_sim.experiments.report.figures.report_figure import ReportFigure
 from dva_sim.experiments.report.figures.style import (

@@ -13,14 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dva_sim.experiments.analysis.competing_risks import NOTHING, Endings
-from dva_sim.experiments.analysis.run_grid import (
-    Floats,
-    Setting,
-    StudyView,
-    Table,
-    as_floats,
-    codes_of,
-)
+from dva_sim.experiments.analysis.run_grid import Floats, Setting, Table, as_floats, codes_of
+from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.figures.budget import Stacks, stack
 from dva_sim.experiments.report.figures.palette import FATES, PAPER, Look, box, key, legend, looks
 from dva_sim.experiments.report.figures.report_figure import ReportFigure

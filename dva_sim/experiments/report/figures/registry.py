@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from dva_sim.experiments.analysis.run_grid import StudyView
+from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.figures import (
     budget,
     contrast,

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, ClassVar
 
-from dva_sim.experiments.analysis.run_grid import StudyView
+from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.figures.style import Drawn, Numbers, finish
 
 if TYPE_CHECKING:

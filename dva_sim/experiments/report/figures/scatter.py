@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from dva_sim.experiments.analysis.layout import layout_of
-from dva_sim.experiments.analysis.run_grid import Floats, RunGrid, Setting, StudyView, nan_mean
+from dva_sim.experiments.analysis.run_grid import Floats, RunGrid, Setting, nan_mean
+from dva_sim.experiments.analysis.study_view import StudyView, layout_of
 from dva_sim.experiments.report.figures.palette import INK, ONE, PAPER, SOFT, Look, legend, looks
 from dva_sim.experiments.report.figures.report_figure import ReportFigure
 from dva_sim.experiments.report.figures.style import (

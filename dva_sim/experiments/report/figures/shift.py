@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dva_sim.experiments.analysis.run_grid import Factor, StudyView
+from dva_sim.experiments.analysis.run_grid import Factor
 from dva_sim.experiments.analysis.shift_effects import BEST, FLOOR, Shifts, pooled
+from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.figures.palette import (
     FAINT,
     FATES,

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dva_sim.experiments.analysis.kept_episodes import KeptEpisode, agents_of, instants, way_of
-from dva_sim.experiments.analysis.run_grid import Floats, StudyView, Table, as_floats, codes_of
+from dva_sim.experiments.analysis.run_grid import Floats, Table, as_floats, codes_of
+from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.figures.palette import (
     HAZARD,
     INK,

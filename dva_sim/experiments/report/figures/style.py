@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from dva_sim.experiments.analysis.run_grid import Factor, Floats, Setting, StudyView
+from dva_sim.experiments.analysis.run_grid import Factor, Floats, Setting
+from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.figures.palette import FAINT, INK, SOFT
 from dva_sim.experiments.study.parts import Level
 from dva_sim.kernel.units import ending_of, unit_of

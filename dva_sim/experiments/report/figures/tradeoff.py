@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dva_sim.experiments.analysis.run_grid import Floats, Setting, StudyView, person_means, present
+from dva_sim.experiments.analysis.run_grid import Floats, Setting, person_means, present
+from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.figures.palette import legend, looks
 from dva_sim.experiments.report.figures.report_figure import ReportFigure
 from dva_sim.experiments.report.figures.style import (

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
 
-from dva_sim.experiments.analysis.run_grid import Floats, StudyView, nan_mean, person_means
+from dva_sim.experiments.analysis.run_grid import Floats, nan_mean, person_means
+from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.figures.palette import INK, Look, legend, looks
 from dva_sim.experiments.report.figures.report_figure import ReportFigure
 from dva_sim.experiments.report.figures.style import (

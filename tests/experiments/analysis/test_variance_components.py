@@ -1,6 +1,7 @@
 import synthetic_study
 
-from dva_sim.experiments.analysis.run_grid import Factor, RunGrid, StudyView
+from dva_sim.experiments.analysis.run_grid import Factor, RunGrid
+from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.answer_table import spread_table
 
 

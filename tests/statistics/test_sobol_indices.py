@@ -79,7 +79,7 @@ def test_sobols_g_function_has_its_known_indices():
 def test_the_interval_is_that_of_blocks_drawn_anew_written_out():
     points = saltelli(16, 11)
     blocks = points.reshape(16, 5, 3)
-    drawn = [np.repeat(blocks, own, axis=0) for own in draws(16, 1, 100).astype(int)]
+    drawn = [np.repeat(blocks, own, axis=0) for own in draws(16, 100).astype(int)]
     rows = [block.reshape(-1, 3) for block in drawn]
     first = [indices(own, ishigami(own), resamples=2)[0].first.mean for own in rows]
     found = indices(points, ishigami(points), resamples=100)[0].first

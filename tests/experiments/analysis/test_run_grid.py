@@ -3,14 +3,8 @@ import itertools
 import numpy as np
 import pytest
 
-from dva_sim.experiments.analysis.run_grid import (
-    Factor,
-    RunGrid,
-    StudyView,
-    as_floats,
-    codes_of,
-    person_means,
-)
+from dva_sim.experiments.analysis.run_grid import Factor, RunGrid, as_floats, codes_of, person_means
+from dva_sim.experiments.analysis.study_view import StudyView
 
 PATTERN = Factor("pattern", ("req-rep", "latest-wins"))
 DELAY = Factor("link.delay_s", (0, 0.5))

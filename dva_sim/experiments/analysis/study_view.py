@@ -1,32 +1,140 @@
-"""How a report reads a study: which runs, which contrast, and what was found."""
+"""How a reader looks at a study: which runs, which contrast, along what, and what was found."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dva_sim.experiments.analysis.answer import Finding, Missed
 from dva_sim.experiments.analysis.run_grid import (
     Factor,
     Floats,
     RunGrid,
-    StudyView,
+    Setting,
     Table,
     as_floats,
     person_means,
     plain_level,
     present,
 )
+from dva_sim.experiments.results.tables import DESIGN_COLUMNS
 from dva_sim.experiments.study.parts import POINT, TUNING, Level
 from dva_sim.kernel.units import unit_of
 from dva_sim.simulation.labels import brief, measure_called
 from dva_sim.statistics import Interval, band
 
+MOST_PANELS = 4
 ROW = "row"  # name of the factor whose levels are the rows of a list
-_KEYS = {"part", "cell", "config", "is_reference", "person", "trial", "seed"}
+
+
+@dataclass(frozen=True)
+class StudyView:
+    """How a reader looks at a part: what runs along x, what is a line, what is a panel.
+
+    Attributes:
+        part: The runs.
+        measure: Column the question is about.
+        line: Factor with a line for each level, or None.
+        over: Factor along x, or None.
+        contrast: The two levels of `line` compared, the first minus the second; or None.
+        within: The panel that the answer speaks of.
+        smallest_effect: Smallest difference declared to matter, in the measure's unit.
+        outside: Whether each cell `(levels of factor 1, ...)` is an extrapolation, beyond the
+            delays at which people were watched; None where nothing is known of that.
+        possible: The least and the greatest value that the measure can take at all.
+        averages_points: Whether the trials are points in ranges, over which means are taken.
+    """
+
+    part: RunGrid
+    measure: str
+    line: Factor | None
+    over: Factor | None
+    contrast: tuple[Level, Level] | None
+    within: Setting
+    smallest_effect: float | None = None
+    outside: NDArray[np.bool_] | None = None
+    possible: tuple[float, float] = (-math.inf, math.inf)
+    averages_points: bool = False
+
+    @property
+    def lines(self) -> tuple[Level, ...]:
+        """Levels of the line factor; a single None where there is none."""
+        return self.line.levels if self.line else (None,)
+
+    @property
+    def stops(self) -> tuple[Level, ...]:
+        """Levels along x; a single None where there is none."""
+        return self.over.levels if self.over else (None,)
+
+    @property
+    def panels(self) -> list[Setting]:
+        """Settings of all other factors, the last fastest; of each, the answer's level first.
+
+        Settings that the design leaves out are no panels.
+        """
+        names = [f.name for f in (self.line, self.over) if f]
+        every = list(self.part.settings(but=names))
+        order = sorted(every, key=lambda panel: [self._is_aside(*item) for item in panel.items()])
+        return [panel for panel in order if self.part.where(self.part.ran, panel).any()] or order
+
+    @property
+    def shown(self) -> list[Setting]:
+        """The panels that a figure has room for."""
+        return self.panels[:MOST_PANELS]
+
+    def _is_aside(self, factor: str, level: Level) -> bool:
+        return level != self.within.get(factor, level)
+
+    @property
+    def widest(self) -> float:
+        """The greatest difference between two values that the measure can take."""
+        return self.possible[1] - self.possible[0]
+
+    def setting(self, panel: Setting, line: Level) -> Setting:
+        """The levels that a line of a panel stands for."""
+        return dict(panel) | ({self.line.name: line} if self.line else {})
+
+    def along_x(self) -> dict[str, Any]:
+        """The levels along x under their factor's name; nothing where there is no such factor."""
+        return {self.over.name: self.over.levels} if self.over else {}
+
+    def at_stop(self, stop: int) -> Setting:
+        """The level along x of one stop."""
+        return {self.over.name: self.over.levels[stop]} if self.over else {}
+
+    def curve(self, grid: Floats, panel: Setting, line: Level) -> Floats:
+        """Values along x as `(stops, persons, trials)`."""
+        values = self.part.where(grid, self.setting(panel, line))
+        return values if self.over else values[np.newaxis]
+
+    @property
+    def values(self) -> Floats:
+        """The measure as it is judged: in excess of the reference wherever there is one."""
+        if self.part.has_reference(self.measure):
+            return self.part.excess(self.measure)
+        return self.part.grid(self.measure)
+
+    def stops_outside(self, panel: Setting, lines: Sequence[Level] | None = None) -> list[int]:
+        """The stops of a panel at which at least one line, of some or all, is an extrapolation."""
+        if self.outside is None:
+            return []
+        some = self.lines if lines is None else lines
+        marks = np.array([self._marks(panel, line) for line in some]).any(axis=0)
+        return [int(stop) for stop in np.flatnonzero(marks)]
+
+    def _marks(self, panel: Setting, line: Level) -> NDArray[np.bool_]:
+        outside = np.asarray(self.outside, dtype=float)
+        return np.atleast_1d(self.part.where(outside, self.setting(panel, line)) > 0)
+
+    def difference(self, panel: Setting, first: Level, second: Level) -> Floats:
+        """First minus second, paired by person and trial, as person means `(persons, stops)`."""
+        grid = self.values
+        return person_means(self.curve(grid, panel, first) - self.curve(grid, panel, second))
 
 
 def factors_of(study: Mapping[str, Any]) -> list[Factor]:
@@ -65,7 +173,7 @@ def points_of(study: Mapping[str, Any], runs: Table) -> list[str]:
     if POINT not in study.get("factors", {}) or POINT not in runs:
         return []
     design = list(runs)[: list(runs).index("is_reference")]
-    names = [n for n in design if n not in _KEYS and n not in study["factors"]]
+    names = [n for n in design if n not in DESIGN_COLUMNS and n not in study["factors"]]
     return [n for n in names if np.isfinite(as_floats(runs[n])).any()]
 
 
@@ -134,12 +242,11 @@ def keys_of(study: Mapping[str, Any]) -> list[Factor]:
             for level in levels:
                 for key, value in named[level].items():
                     keys.setdefault(key, []).append(value)
-    return [Factor(key, _distinct(levels)) for key, levels in keys.items()]
-
-
-def _distinct(levels: Sequence[Any]) -> tuple[Any, ...]:
-    """Each level once; a treatment may set a whole block, such as a law."""
-    return tuple(level for i, level in enumerate(levels) if level not in levels[:i])
+    # Each level once; a treatment may set a whole block, such as a law, which has no hash.
+    return [
+        Factor(key, tuple(level for i, level in enumerate(levels) if level not in levels[:i]))
+        for key, levels in keys.items()
+    ]
 
 
 def view_of(study: Mapping[str, Any], runs: Table) -> StudyView | None:
@@ -154,12 +261,12 @@ def view_of(study: Mapping[str, Any], runs: Table) -> StudyView | None:
     part = RunGrid(table, name, factors) if name else None
     if part is None or not len(part):
         return None
-    over = _factor(part, declared.get("over"))
-    line = _factor(part, declared.get("factor"))
+    known = {f.name: f for f in part.factors}
+    over, line = known.get(declared.get("over", "")), known.get(declared.get("factor", ""))
     if over is None and not (line and "over" in declared):
         over = _longest_numeric([f for f in part.factors if f is not line])
-    line = line or _other(part.factors, over)
-    within = {k: v for k, v in (declared.get("within") or {}).items() if _factor(part, k)}
+    line = line or next((f for f in part.factors if f is not over), None)
+    within = {k: v for k, v in (declared.get("within") or {}).items() if k in known}
     measure = declared.get("measure") or _first_measure(part)
     return StudyView(
         part=part,
@@ -197,7 +304,8 @@ def finding_of(view: StudyView) -> Finding | None:
         missed=_missed(view),
         horizon=_horizon(view),
         widest=view.widest,
-        all_confirmed=_all_confirmed(view),
+        all_confirmed=view.part.has("confirmed")
+        and bool((present(view.part.grid("confirmed")) == 1).all()),
         everywhere="on average over the ranges" if view.averages_points else "",
         part=view.part.name,
     )
@@ -228,17 +336,9 @@ def _missed(view: StudyView) -> tuple[Missed, ...]:
     """Runs without confirmation at the last stop, for every line."""
     if not view.part.has("confirmed"):
         return ()
-    grid = view.part.grid("confirmed")
-    found = []
-    for level in view.lines:
-        seen = present(view.curve(grid, view.panels[0], level)[-1])
-        found.append(Missed(level, int((seen < 1).sum()), len(seen)))
-    return tuple(found)
-
-
-def _all_confirmed(view: StudyView) -> bool:
-    """Whether no run of any cell ended without a confirmation."""
-    return view.part.has("confirmed") and bool((present(view.part.grid("confirmed")) == 1).all())
+    grid, panel = view.part.grid("confirmed"), view.panels[0]
+    seen = [(level, present(view.curve(grid, panel, level)[-1])) for level in view.lines]
+    return tuple(Missed(level, int((runs < 1).sum()), len(runs)) for level, runs in seen)
 
 
 def _horizon(view: StudyView) -> float | None:
@@ -250,23 +350,14 @@ def _horizon(view: StudyView) -> float | None:
     return float(counted[0]) if len(counted) == 1 else None
 
 
-def _factor(part: RunGrid, name: str | None) -> Factor | None:
-    return next((f for f in part.factors if f.name == name), None)
-
-
 def _longest_numeric(factors: Sequence[Factor]) -> Factor | None:
     numeric = [f for f in factors if f.is_numeric and len(f.levels) > 1]
     return max(numeric, key=lambda f: len(f.levels), default=None) or next(iter(factors), None)
 
 
-def _other(factors: Sequence[Factor], over: Factor | None) -> Factor | None:
-    return next((f for f in factors if f is not over), None)
-
-
 def _first_measure(part: RunGrid) -> str:
-    names = [c for c in part.treated if c not in _KEYS and part.has(c)]
-    factors = {f.name for f in part.factors}
-    measures = [c for c in names if c not in factors]
+    known = {*DESIGN_COLUMNS, *(f.name for f in part.factors)}
+    measures = [c for c in part.treated if c not in known and part.has(c)]
     times = (name for name in measures if measure_called(name).awaits)
     return next(times, next(iter(measures), "seed"))
 

@@ -52,29 +52,20 @@ def build(
             It has a place if the file is at fault, and the keys if changes of it are.
     """
 
+    document = source if isinstance(source, Document) else None
+    fail = (lambda problem, _: ConfigError(problem)) if document is None else document.error
+
     def make(some: Mapping[str, Any]) -> M:
-        return _built(model, source, some, complete, locate)
+        data = copy.deepcopy(dict(document.data if document else source))  # type: ignore[arg-type]
+        for key, value in some.items():
+            set_key(data, key, value)
+        locate(data, [document.file.parent] if document else [])
+        return complete(validate(model, data, fail), fail)
 
     try:
         return make(changes or {})
     except ConfigError as error:
         raise blame(error, changes or {}, make, source) from None
-
-
-def _built(
-    model: type[M],
-    source: Document | Mapping[str, Any],
-    changes: Mapping[str, Any],
-    complete: Callable[[M, Fail], M],
-    locate: Callable[[dict[str, Any], Sequence[Path]], object],
-) -> M:
-    document = source if isinstance(source, Document) else None
-    data = copy.deepcopy(dict(document.data if document else source))  # type: ignore[arg-type]
-    for key, value in changes.items():
-        set_key(data, key, value)
-    error = (lambda problem, _: ConfigError(problem)) if document is None else document.error
-    locate(data, [document.file.parent] if document else [])
-    return complete(validate(model, data, error), error)
 
 
 def blame(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from dva_sim.experiments.analysis.conditions import conditions, timeout_remark
-from dva_sim.experiments.analysis.layout import keys_of
+from dva_sim.experiments.analysis.study_view import keys_of
 
 SCENARIO = {
     "command": {"timeout_s": 9.0},

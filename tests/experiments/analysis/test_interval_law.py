@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from dva_sim.statistics import IntervalLaw, band, law_of, mean_interval
+from dva_sim.experiments.analysis.sample_size import IntervalLaw, law_of
+from dva_sim.statistics import band, mean_interval
 
 PILOT = np.array([-1.5, 0.5, 1.0])  # variance 1.75
 SKEWED = np.array([0.2, 0.4, 0.5, 0.9, 1.1, 1.4, 2.0, 9.5])

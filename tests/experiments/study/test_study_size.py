@@ -8,7 +8,7 @@ from small_study import REPEATED, STUDY, study_in, write_study
 from dva_sim.cli import study_runs
 from dva_sim.experiments.execution import dry_run
 from dva_sim.experiments.execution.dry_run import DryRun
-from dva_sim.experiments.execution.run_request import RunRequest
+from dva_sim.experiments.execution.runner import RunRequest
 from dva_sim.experiments.study import cell_grid
 from dva_sim.experiments.study.factor_levels import runs_of
 from dva_sim.experiments.study.study_file import load_study

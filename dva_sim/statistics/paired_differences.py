@@ -1,0 +1,167 @@
+"""What differs between two treatments of the same persons: how much, and beyond which doubt.
+
+Means over persons with their interval; whether a difference lies beyond a bound or within a margin;
+whether there is any, by the test that assumes nothing but that labels could be swapped. Of several
+tests of one family the chance of any false alarm is kept.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dva_sim.statistics.bands import band, chance_above
+from dva_sim.statistics.persons import LEVEL, Floats, Interval, person_means
+
+PERMUTATIONS = 10_000
+_MOST_EXACT = 14  # persons: 2 ** 14 sign flips are about as many as are drawn otherwise
+_SAME = 1e-12  # sums this close, relative to their size, differ by rounding only
+
+
+def mean_interval(values: ArrayLike, person: ArrayLike, level: float = LEVEL) -> Interval:
+    """The mean over persons, each counting the same.
+
+    It is what a band gives for one level alone.
+
+    Args:
+        values: One value per run `(n,)`, nan where missing.
+        person: Whose run it was `(n,)`.
+        level: Confidence level.
+    """
+    means = person_means(values, person)[1]
+    found = band(means[:, np.newaxis], level)
+    low, high = float(found.pointwise_low[0]), float(found.pointwise_high[0])
+    return Interval(float(found.mean[0]), low, high, len(means))
+
+
+def paired_difference(
+    a: ArrayLike, b: ArrayLike, person: ArrayLike, level: float = LEVEL
+) -> Interval:
+    """The mean over persons of `a - b`, run by run.
+
+    Args:
+        a: One treatment `(n,)`.
+        b: The other `(n,)`, row by row the same person and trial.
+        person: Whose run it was `(n,)`.
+        level: Confidence level.
+    """
+    return mean_interval(_minus(a, b), person, level)
+
+
+def one_sided_test(
+    a: ArrayLike, b: ArrayLike, person: ArrayLike, bound: float, side: Literal["above", "below"]
+) -> float:
+    """The p-value of the mean of `a - b` being above, or below, a bound.
+
+    By the same resampling as the interval of the difference, so that the two agree: p is
+    below 0.025 where the interval of 95 % lies beyond the bound.
+
+    Args:
+        a: One treatment `(n,)`, nan where missing.
+        b: The other `(n,)`, row by row the same person and trial.
+        person: Whose run it was `(n,)`.
+        bound: In the measure's unit.
+        side: On which side of it the difference is claimed to lie.
+
+    Returns:
+        Nan with fewer than two persons.
+    """
+    off = person_means(_minus(a, b) - bound, person)[1]
+    return chance_above(off if side == "above" else -off)
+
+
+def equivalence(a: ArrayLike, b: ArrayLike, person: ArrayLike, margin: float) -> float:
+    """The p-value of two one-sided tests that the mean of `a - b` lies within a margin.
+
+    Failing to find a difference is no evidence that there is none: here the burden of proof is
+    on sameness. It is below 0.05 where the interval of 90 % lies within the margin.
+
+    Args:
+        a: One treatment `(n,)`, nan where missing.
+        b: The other `(n,)`, row by row the same person and trial.
+        person: Whose run it was `(n,)`.
+        margin: Largest difference that does not matter, either way; in the measure's unit.
+
+    Returns:
+        The larger of the two; nan with fewer than two persons.
+
+    References:
+        Schuirmann, J. Pharmacokinet. Biopharm. 15 (1987) 657-680.
+    """
+    above = one_sided_test(a, b, person, -margin, "above")
+    return float(np.maximum(above, one_sided_test(a, b, person, margin, "below")))
+
+
+def permutation_test(a: ArrayLike, b: ArrayLike, person: ArrayLike) -> float:
+    """Swap the labels of the treatments, person by person, and see how rare the outcome is.
+
+    If the treatments did the same to a person, his difference could as well have had the other
+    sign. All trials of a person flip together. With up to 14 persons every combination of signs
+    is tried; else a random sample, with the outcome itself counted among it so that p is
+    never zero and never too small. With fewer than 6 persons p cannot be below 0.05.
+    Whether a difference is beyond some bound is for `one_sided_test`.
+
+    Args:
+        a: One treatment `(n,)`, nan where missing.
+        b: The other `(n,)`, row by row the same person and trial.
+        person: Whose run it was `(n,)`.
+
+    Returns:
+        Chance of a difference at least as large, either way, if the labels were swapped by luck;
+        nan without persons.
+
+    References:
+        Fisher, The Design of Experiments (1935), section 21; Phipson & Smyth, Stat. Appl. Genet.
+        Mol. Biol. 9 (2010) 39.
+    """
+    off = person_means(_minus(a, b), person)[1]
+    if not len(off):
+        return math.nan
+    is_exact = len(off) <= _MOST_EXACT
+    signs = _all_signs(len(off)) if is_exact else _random_signs(len(off))
+    extreme = abs(signs @ off) >= abs(float(off.sum())) - _SAME * float(abs(off).sum())
+    return float(extreme.mean() if is_exact else (extreme.sum() + 1) / (PERMUTATIONS + 1))
+
+
+def _minus(a: ArrayLike, b: ArrayLike) -> Floats:
+    return np.subtract(a, b, dtype=float)
+
+
+def _all_signs(n: int) -> Floats:
+    bits = np.arange(2**n)[:, np.newaxis] >> np.arange(n) & 1
+    return (1 - 2 * bits).astype(np.float64)
+
+
+def _random_signs(n: int) -> Floats:
+    rng = np.random.Generator(np.random.PCG64(1))
+    return (1 - 2 * rng.integers(0, 2, (PERMUTATIONS, n))).astype(np.float64)
+
+
+def holm(p_values: ArrayLike, family: ArrayLike | None = None) -> Floats:
+    """P-values adjusted for their number by Holm's step-down procedure.
+
+    A test is significant at a level, together with all others of its family, where its
+    adjusted value is not above that level.
+
+    Args:
+        p_values: Of each test `(m,)`; nan where a test could not be made, which counts not.
+        family: Which declared family each test is of `(m,)`; all of one if left out.
+
+    Returns:
+        Adjusted p-values `(m,)`, at most 1; nan stays nan.
+
+    References:
+        Holm, Scand. J. Stat. 6 (1979) 65-70.
+    """
+    values = np.asarray(p_values, dtype=float)
+    families = np.zeros(len(values)) if family is None else np.asarray(family)
+    adjusted = np.full(len(values), np.nan)
+    for name in np.unique(families):
+        ours = np.flatnonzero((families == name) & ~np.isnan(values))
+        ours = ours[np.argsort(values[ours], kind="stable")]
+        stepped = np.arange(len(ours), 0, -1) * values[ours]
+        adjusted[ours] = np.minimum(1.0, np.maximum.accumulate(stepped))
+    return adjusted
