@@ -5,15 +5,16 @@
 
 from __future__ import annotations
 
-import inspect
 import re
 import shutil
 import sys
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any, Final
 
+from dva_sim.cli.shipped import Registry, registry
 from dva_sim.kernel import resources
 from dva_sim.kernel.config import parse_scalar
 from dva_sim.kernel.errors import ConfigError
@@ -21,11 +22,11 @@ from dva_sim.kernel.plugins import Plugins
 from dva_sim.kernel.suggestions import hint
 from dva_sim.testing.kinds import TRIALS, plural
 
-_CHECKED = {trial.load_plugins().kind: trial.kind for trial in TRIALS.values()}
-KINDS: Final[dict[str, Plugins[Any]]] = {
-    plural(plugins.kind): plugins for plugins in (trial.load_plugins() for trial in TRIALS.values())
-}
-"""Kinds of plug-ins by what several are called."""
+
+def kinds_of_plugins() -> dict[str, tuple[str, Plugins[Any]]]:
+    """Kinds of plug-ins by what several are called, each with the word for trying one."""
+    loaded = [(word, trial.load_plugins()) for word, trial in TRIALS.items()]
+    return {plural(plugins.kind): (word, plugins) for word, plugins in loaded}
 
 
 def plugins_as_json() -> dict[str, Any]:
@@ -43,25 +44,25 @@ def plugins_as_json() -> dict[str, Any]:
             ],
             "files": [str(path) for path in plugins.files()],
         }
-        for several, plugins in KINDS.items()
+        for several, (_, plugins) in kinds_of_plugins().items()
     }
 
 
 def plugin_lines() -> Iterator[str]:
     """The same for people."""
-    for number, (several, plugins) in enumerate(KINDS.items()):
+    for number, (several, (word, plugins)) in enumerate(kinds_of_plugins().items()):
         yield f"{chr(10) if number else ''}{several}"
-        for title, told in _facts(plugins):
+        for title, told in _facts(word, plugins):
             yield f"  {title:<13} {told}"
 
 
-def _facts(plugins: Plugins[Any]) -> Iterator[tuple[str, str]]:
+def _facts(word: str, plugins: Plugins[Any]) -> Iterator[tuple[str, str]]:
     yield "key", _key(plugins)
     yield "a file", f"{plugins.key}: {_named(plugins)}, looked for beside the configuration, here, "
     yield "", f"and in {plugins.folder}"
     yield "entry points", f"{plugins.group}, for installed packages"
     yield "class", f"derived from {plugins.public}, with {plugins.needs}"
-    yield "try it", f"dva-sim check {_CHECKED[plugins.kind]} mine.py:Mine"
+    yield "try it", f"dva-sim check {word} mine.py:Mine"
     yield "shipped", ", ".join(sorted(plugins.shipped.keys() - plugins.hidden))
     told = [f"{entry.name} ({_package(entry)})" for entry in plugins.installed()]
     yield "installed", ", ".join(told) or "none"
@@ -119,7 +120,13 @@ class NamedThing:
 
 def kinds() -> list[str]:
     """What can be listed, in the order in which it is."""
-    return [*FILES, *KINDS]
+    return [*FILES, *_registries()]
+
+
+def _registries() -> dict[str, Registry]:
+    """Kinds of plug-ins by what several are called."""
+    found = (registry(trial.plugins) for trial in TRIALS.values())
+    return {each.several: each for each in found}
 
 
 def everything(kind: str | None = None) -> dict[str, list[NamedThing]]:
@@ -132,7 +139,7 @@ def everything(kind: str | None = None) -> dict[str, list[NamedThing]]:
         ConfigError: there is no such kind.
     """
     makers: dict[str, Any] = {name: _files(name, folder) for name, folder in FILES.items()}
-    makers |= {several: _classes(plugins) for several, plugins in KINDS.items()}
+    makers |= {several: _classes(there) for several, there in _registries().items()}
     if kind is not None and kind not in makers:
         raise ConfigError(f"there is no list of {kind!r}; {hint(kind, makers, 'there are')}")
     return {name: list(made) for name, made in makers.items() if kind in (None, name)}
@@ -175,15 +182,11 @@ def _described(path: Path) -> str:
     return _first(" ".join(str(next(iter(found.values()), "")).split())) if found else ""
 
 
-def _classes(plugins: Plugins[Any]) -> Iterator[NamedThing]:
-    offered = {entry.name: f"of {entry.value}" for entry in plugins.installed()}
-    for name in plugins.known():
-        yield NamedThing(name, _documented(plugins.shipped, name) or offered.get(name, ""))
-
-
-def _documented(shipped: Mapping[str, Any], name: str) -> str:
-    text = inspect.getdoc(shipped[name]) if name in shipped else None
-    return _first(" ".join((text or "").partition("\n\n")[0].split()))
+def _classes(there: Registry) -> Iterator[NamedThing]:
+    told = {entry.name: f"of {entry.value}" for entry in entry_points(group=there.group)}
+    for name, text in there.shipped.items():
+        told[name] = _first(" ".join(text.partition("\n\n")[0].split())) or told.get(name, "")
+    return (NamedThing(name, description) for name, description in sorted(told.items()))
 
 
 def _first(text: str) -> str:

@@ -80,6 +80,8 @@ class Model(Generic[S]):
         teller: What tells one run in the terminal, as `module:function` of a `Played` run and a
             console.
         still: What draws one run, likewise; empty if there is nothing to see.
+        page: What reports of its studies say otherwise than of drives, as `module:class` derived
+            from `ModelPage`; only ours have one, since a results folder loads no user's code.
     """
 
     name = ""
@@ -88,6 +90,7 @@ class Model(Generic[S]):
     is_recorded = False
     teller = "dva_sim.cli.stories:tell_any"
     still = ""
+    page = ""
 
     def simulate(self, scenario: S, seed: int) -> Any:
         """Run a scenario; what is left of the run, to be measured."""
@@ -224,6 +227,7 @@ class _Timed(Model[TimedScenario]):
         "responders": of_shift.RESPONDER_COLUMNS,
     }
     teller = "dva_sim.cli.stories:tell_shift"
+    page = "dva_sim.experiments.report.shift_page:ShiftPage"
 
     def measures(self, scenario: TimedScenario | None = None) -> tuple[str, ...]:
         return super().measures() if scenario is None else of_shift.measures_of(scenario)
@@ -278,6 +282,7 @@ class _Transports(_Operated[TransportScenario]):
         "flows": of_transport.FLOW_COLUMNS,
     }
     teller = "dva_sim.cli.stories:tell_session"
+    page = "dva_sim.experiments.report.transport_page:TransportPage"
 
     def build(
         self, source: Document | Mapping[str, Any], changes: Mapping[str, Any]

@@ -52,6 +52,7 @@ from dva_sim.experiments.report.figures.style import (
 )
 from dva_sim.experiments.study.parts import Level
 from dva_sim.kernel.wording import capital
+from dva_sim.network.patterns import PATTERNS
 from dva_sim.simulation.labels import factor_name, level_name, measure_name
 from dva_sim.statistics import Band, band
 
@@ -76,7 +77,8 @@ def cadences(view: StudyView, scenario: Mapping[str, Any]) -> CadenceOf:
 
     def cadence_of(panel: Setting) -> Cadence | None:
         along_delay = view.over is not None and view.over.name == "link.delay_s"
-        return lookup(tuple(panel.items())) if along_delay and "req-rep" in view.lines else None
+        waits = any(level in PATTERNS and PATTERNS[str(level)].in_step for level in view.lines)
+        return lookup(tuple(panel.items())) if along_delay and waits else None
 
     return cadence_of
 
