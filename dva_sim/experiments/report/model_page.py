@@ -94,4 +94,4 @@ def correlated(correlation: float | None) -> str:
     """How alike the two sides of a contrast are, as a remark; nothing where it is not known."""
     if correlation is None:
         return ""
-    return f" The two sides of the contrast correlate with {correlation:.2f} at the last level."
+    return f"The two sides of the contrast correlate with {correlation:.2f} at the last level."

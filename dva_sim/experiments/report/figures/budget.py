@@ -30,6 +30,7 @@ from dva_sim.experiments.report.figures.style import (
     tick_names,
     wrapped,
 )
+from dva_sim.experiments.report.prose import caption
 from dva_sim.experiments.study.parts import Level
 from dva_sim.kernel.wording import capital
 from dva_sim.simulation.labels import brief
@@ -185,12 +186,7 @@ class DelayBudget(ReportFigure):
             told = view.along_x() | means | {_MEASURED: measured}
             numbers.add(view.setting(panel, level), told)
         stacks.close()
-        caption = (
-            "From what the camera saw to the effect of the command it led to, stage by stage; "
-            "means over the time that commands were in force. Hatched stages: a value waits to be "
-            "replaced by the next. Diamond: the same delay measured as a whole."
-        )
-        return self.finish(stacks.figure, caption, numbers)
+        return self.finish(stacks.figure, caption("delay_budget"), numbers)
 
 
 def _driven(view: StudyView, stage: str) -> StudyView:

@@ -25,6 +25,7 @@ from dva_sim.experiments.report.figures.style import (
     with_unit,
     wrapped,
 )
+from dva_sim.experiments.report.prose import caption
 from dva_sim.experiments.study.parts import STRATEGY
 from dva_sim.kernel.wording import capital, number
 from dva_sim.simulation.labels import factor_name, level_name, measure_name
@@ -88,8 +89,8 @@ class AnswerFigure(ReportFigure):
         title = f"{capital(first)} minus {second}: {measure_name(finding.measure)}"
         within = condition(finding, inside=True).removesuffix(", ")
         title = f"{title}, {within}" if within else title
-        caption, numbers = _caption(finding, grey), _table(finding)
-        return self.finish(figure, caption, numbers, title=title, reads=(cut,))
+        words = caption("answer", finding=finding, first=first, grey=grey)
+        return self.finish(figure, words, _table(finding), title=title, reads=(cut,))
 
 
 def _names(f: Finding) -> tuple[str, str]:
@@ -143,18 +144,6 @@ def _values(ax: Axes, f: Finding) -> None:
             )
 
 
-def _caption(f: Finding, grey: bool) -> str:
-    over = "the 95 % band, which holds for all levels at once" if len(f.levels) > 1 else "95 %"
-    cluster = f.cluster if f.persons == 1 else f"{f.cluster}s"
-    first, _ = _names(f)
-    more = "takes longer" if f.unit == "s" else "is larger"
-    words = (
-        f"Above zero {first} {more}. Mark: mean of {f.persons} {cluster}, filled where it differs "
-        f"from zero. Bar: {over}."
-    )
-    return f"{words}{' Grey: too small to matter.' * grey}"
-
-
 def _table(f: Finding) -> Numbers:
     numbers = Numbers()
     along = {f.over: f.levels} if f.over else {}
@@ -195,16 +184,10 @@ class RepeatsFigure(ReportFigure):
             ax.set_xlabel(axis_label(view.measure, f"{first} minus {second}"))
             ax.grid(axis="x")
             ax.grid(axis="y", visible=False)
-        caption = (
-            "Each row: the difference under one model of the persons, with its own 95 % interval. "
-            "Diamonds have the usual parameters, dots another set. Line and blue band: the study's "
-            "own result; black: its own model again, which does not count. Grey: declared too "
-            "small to matter. Repeats have fewer persons, so their intervals are wider."
-        )
-        if any(repeat.is_beyond for stop in stops for repeat in stop.repeats):
-            caption += " Hollow: extrapolated."
+        is_beyond = any(repeat.is_beyond for stop in stops for repeat in stop.repeats)
+        words = caption("robustness", is_beyond=is_beyond)
         title = f"The contrast in {measure_name(view.measure)} under other models of the persons"
-        return self.finish(figure, caption, _numbers(view, robustness), title=title)
+        return self.finish(figure, words, _numbers(view, robustness), title=title)
 
 
 def _numbers(view: StudyView, robustness: RepeatedAnswer) -> Numbers:

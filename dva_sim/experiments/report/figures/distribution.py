@@ -23,6 +23,7 @@ from dva_sim.experiments.report.figures.style import (
     stops_axis,
     wrapped,
 )
+from dva_sim.experiments.report.prose import caption
 from dva_sim.kernel.wording import capital
 from dva_sim.simulation.labels import measure_name
 
@@ -71,12 +72,9 @@ class Distributions(ReportFigure):
             ax.set_ylabel(axis_label(view.measure, wrapped(measure_name(view.measure), 24)))
         _spread(axes[0][0], present(raw))
         legend(figure, view.line)
-        caption = (
-            "Each mark is one run; bar, the median; box, the middle half. Columns stand in the "
-            f"order of the key.{_hollow_words(confirmed)}"
-        )
+        words = caption("distributions", has_missed=bool((confirmed == 0).any()))
         title = f"{capital(measure_name(view.measure))} of all {len(view.part):,} runs"
-        return self.finish(figure, caption, numbers, title=title, reads=(hatch_words(view),))
+        return self.finish(figure, words, numbers, title=title, reads=(hatch_words(view),))
 
 
 def _columns(view: StudyView, values: Floats, ok: NDArray[np.bool_]) -> dict[str, Any]:
@@ -89,12 +87,6 @@ def _columns(view: StudyView, values: Floats, ok: NDArray[np.bool_]) -> dict[str
         view.measure: values[there],
     }
     return told | ({"confirmed": ok[there]} if view.part.has("confirmed") else {})
-
-
-def _hollow_words(confirmed: Floats) -> str:
-    if not (confirmed == 0).any():
-        return ""
-    return " Hollow ones were not confirmed and count with all the time they were given."
 
 
 def _dots(

@@ -50,6 +50,7 @@ from dva_sim.experiments.report.figures.style import (
     with_unit,
     wrapped,
 )
+from dva_sim.experiments.report.prose import caption
 from dva_sim.experiments.study.parts import Level
 from dva_sim.kernel.wording import capital
 from dva_sim.network.patterns import PATTERNS
@@ -111,13 +112,18 @@ class Differences(ReportFigure):
         for ax, panel in zip(axes, view.shown, strict=True):
             ax.axhline(0, color=INK, lw=0.8, zorder=1)
             mark_boundary(ax, view.over, cadence_of(panel), text=True)
-        zoomed = _zoom_on_small(axes, view.smallest_effect)
+        zoomed = view.smallest_effect is not None and _zoom_on_small(axes, view.smallest_effect)
         _name(view, others, figure, axes, ends)
         title = f"Difference against {name} in {_what(view)}"
-        boundary = _boundary_words(view, cadence_of)
-        caption = f"Above zero, {name} has the lower value.{zoomed}{boundary}"
+        words = caption(
+            "differences",
+            baseline=name,
+            zoomed=zoomed,
+            is_marked=view.smallest_effect is not None,
+            has_boundary=_has_boundary(view, cadence_of),
+        )
         reads = (_intervals_words(view), hatch_words(view), cut)
-        return self.finish(figure, caption, numbers, title=title, reads=reads)
+        return self.finish(figure, words, numbers, title=title, reads=reads)
 
 
 class Levels(ReportFigure):
@@ -144,14 +150,10 @@ class Levels(ReportFigure):
         limits = (-view.widest, view.widest) if _in_excess(view) else view.possible
         figure, axes, ends, cut, numbers = _curves(view, view.lines, curve, label, limits)
         _name(view, view.lines, figure, axes, ends)
-        excess = "Zero is the reference run. " if _in_excess(view) else ""
-        caption = (
-            f"Mean over persons. {excess}Two intervals may overlap although the difference, which "
-            "is taken within persons, is clear."
-        )
+        words = caption("levels", in_excess=_in_excess(view))
         reads = (_intervals_words(view), hatch_words(view), cut)
         title = f"{what} under each {factor_name(view.line.name)}" if view.line else what
-        return self.finish(figure, caption, numbers, title=title, reads=reads)
+        return self.finish(figure, words, numbers, title=title, reads=reads)
 
 
 def mark_boundary(ax: Axes, over: Factor | None, cadence: Cadence | None, text: bool) -> None:
@@ -226,16 +228,13 @@ def _columns(measure: str, bands: Band) -> dict[str, Floats]:
     return {with_unit(name, measure): values for name, values in edges.items()}
 
 
-def _zoom_on_small(axes: list[Axes], smallest: float | None) -> str:
-    """Give small differences room, and mark those declared too small to matter."""
-    if smallest is None:
-        return ""
+def _zoom_on_small(axes: list[Axes], smallest: float) -> bool:
+    """Mark differences declared too small to matter; give them room, where they have none."""
     for ax in axes:
         ax.axhspan(-smallest, smallest, color=FAINT, alpha=0.5, lw=0, zorder=0)
-    words = " Grey: declared too small to matter."
     bottom, top = axes[0].get_ylim()
     if max(-bottom, top) < 10 * smallest:
-        return words
+        return False
     bottom, top = (_WIDER * end if abs(end) > smallest else end for end in (bottom, top))
     digits = (1, 2, 5) if max(-bottom, top) < 100 * smallest else (1,)
     steps = [k * 10.0**n for n in range(-3, 7) for k in digits if smallest <= k * 10.0**n]
@@ -245,7 +244,7 @@ def _zoom_on_small(axes: list[Axes], smallest: float | None) -> str:
     axes[0].set_ylim(bottom, top)
     axes[0].yaxis.set_major_formatter("{x:g}")
     axes[0].minorticks_off()
-    return f"{words} Axis: linear near zero, logarithmic beyond."
+    return True
 
 
 def _side_by_side(view: StudyView, lines: tuple[Level, ...]) -> list[tuple[Level, float]]:
@@ -304,16 +303,10 @@ def _what(view: StudyView) -> str:
     return f"{'excess ' if _in_excess(view) else ''}{measure_name(view.measure)}"
 
 
-def _boundary_words(view: StudyView, cadence_of: CadenceOf) -> str:
-    """Explain the dashed line, if any panel has one."""
-    cadences = [cadence_of(panel) for panel in view.shown]
-    over = view.over
-    if not any(c and over and place_of(over, c.boundary_s) is not None for c in cadences):
-        return ""
-    return (
-        " Dashed: from there on (2 d + P = T: round trip and processing fill the wanted period) "
-        "REQ/REP can no longer send as often as wanted."
-    )
+def _has_boundary(view: StudyView, cadence_of: CadenceOf) -> bool:
+    """Whether any panel has the dashed line of `mark_boundary`."""
+    cadences, over = [cadence_of(panel) for panel in view.shown], view.over
+    return any(c and over and place_of(over, c.boundary_s) is not None for c in cadences)
 
 
 _ROOM = 1.08  # above the highest mark
@@ -345,11 +338,7 @@ class CommandAge(ReportFigure):
         log_axis(axes[0])
         label_panels(axes, view, axis_label("age_s", wrapped("Command age at application", 22)))
         legend(figure, view.line)
-        caption = (
-            "From the making of a command to its effect at the motors: mark, the median; thick, "
-            "the middle half; thin, 5 to 95 % (averages over runs). The axis is logarithmic."
-        )
-        return self.finish(figure, caption, numbers)
+        return self.finish(figure, caption("command_age"), numbers)
 
 
 class CommandRate(ReportFigure):
@@ -388,13 +377,9 @@ class CommandRate(ReportFigure):
             name_lines(axes, every, view.line)
         else:
             legend(figure, view.line)
-        caption = "Mean over runs, without commands that came too old or were overtaken."
-        if any(cadence_of(panel) for panel in view.shown):
-            caption += (
-                " Dashed: what REQ/REP allows by arithmetic, min(1/T, 1/(2 d + P)), with wanted "
-                "period T, one-way delay d and processing time P."
-            )
-        return self.finish(figure, caption, numbers)
+        has_cadence = any(cadence_of(panel) for panel in view.shown)
+        words = caption("command_rate", has_cadence=has_cadence)
+        return self.finish(figure, words, numbers)
 
 
 def _cell_means(values: Floats) -> Floats:

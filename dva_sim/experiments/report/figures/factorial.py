@@ -24,6 +24,7 @@ from dva_sim.experiments.report.figures.style import (
     stops_axis,
     with_unit,
 )
+from dva_sim.experiments.report.prose import caption
 from dva_sim.experiments.study.parts import Level
 from dva_sim.kernel.wording import capital, number
 from dva_sim.simulation.labels import factor_name, level_name, measure_name
@@ -68,8 +69,9 @@ class FactorialEffects(ReportFigure):
         ax.grid(axis="y", visible=False)
         ax.set_ylim(rows + 0.2, -0.8)
         ax.set_xlabel(axis_label(view.measure, f"Change of the {measure_name(view.measure)}"))
+        words = caption("factorial_effects", left_out=len(found) - len(shown))
         title = f"Main effects and two-way interactions on the {measure_name(view.measure)}"
-        return self.finish(figure, _caption(found, shown), _numbers(view, found), title=title)
+        return self.finish(figure, words, _numbers(view, found), title=title)
 
 
 def _effects(view: StudyView, factors: Sequence[Factor]) -> tuple[Effect, ...]:
@@ -141,16 +143,6 @@ def _plain(word: str) -> Level:
 
     level: Level = ast.literal_eval(word)
     return level
-
-
-def _caption(found: Sequence[Effect], shown: Sequence[Effect]) -> str:
-    left_out = len(found) - len(shown)
-    rest = f" {left_out} smaller interactions are in the figure's CSV only." if left_out else ""
-    return (
-        "Dots: what a step from the first level to another changes on average (main effect). "
-        "Diamonds: how much more it changes if the second step is taken too (interaction). "
-        f"Filled: differs from zero. Bars: 95 % band of all effects at once.{rest}"
-    )
 
 
 def _numbers(view: StudyView, found: Sequence[Effect]) -> Numbers:
@@ -226,22 +218,9 @@ class HeatMap(ReportFigure):
         bar = figure.colorbar(image, ax=axes, pad=0.02)
         bar.set_label(axis_label(view.measure, f"{first}\nminus {other}"))
         title = f"{capital(first)} minus {other} in {measure_name(view.measure)}, over two factors"
-        numbers = _heat_numbers(view, fields)
-        return self.finish(figure, _heat_caption(first, other, has_zero), numbers, title=title)
-
-
-def _heat_caption(first: str, second: str, has_zero: bool) -> str:
-    line = (
-        "Thick line: where the mean difference is zero, by straight lines between levels; dashed, "
-        "where the edges of the band are, so that between the dashed lines nothing can be told."
-        if has_zero
-        else "The mean difference is zero nowhere between these levels, so there is no line."
-    )
-    return (
-        f"In each field the mean difference, paired by person and trial. {_ABOVE}: {first} lies "
-        f"above {second}, {_BELOW}: below, by the 95 % band that covers all fields of a panel at "
-        f"once; without a mark it does not differ from zero. {line}"
-    )
+        marks = {"above": _ABOVE, "below": _BELOW}
+        words = caption("heat_map", first=first, second=other, has_zero=has_zero, **marks)
+        return self.finish(figure, words, _heat_numbers(view, fields), title=title)
 
 
 def _fields(view: StudyView) -> list[EffectField]:

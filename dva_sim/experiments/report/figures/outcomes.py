@@ -33,6 +33,7 @@ from dva_sim.experiments.report.figures.style import (
     stops_axis,
     wrapped,
 )
+from dva_sim.experiments.report.prose import caption
 from dva_sim.experiments.study.parts import Level
 from dva_sim.kernel.wording import capital
 from dva_sim.simulation.labels import brief, level_name
@@ -87,13 +88,8 @@ class EndingsInTime(ReportFigure):
         for ax in axes[-1]:
             ax.set_xlabel("Since the report [s]")
         key(figure, [box(FATES[way]) for way in endings.ways], [_named(w) for w in endings.ways])
-        place = f" with {brief(view.panels[0])}" if view.panels[0] else ""
-        caption = (
-            f"Share of the events of part {view.part.name}{place} that had ended in each way by "
-            "each moment (cumulative incidence, Aalen-Johansen), where not all were confirmed. The "
-            "shares at the right edge stand in the table, with intervals."
-        )
-        return self.finish(figure, caption, numbers)
+        words = caption("endings", part=view.part.name, place=brief(view.panels[0]))
+        return self.finish(figure, words, numbers)
 
 
 def _lines(endings: Endings, view: StudyView) -> tuple[Level, ...]:
@@ -251,7 +247,7 @@ class StoryTimes(ReportFigure):
         if not met:
             return None
         figure, axes = panels(len(shown), len(met), 2.4, sharex=True, sharey=True)
-        look = looks(view.line)
+        look, fate = looks(view.line), events.one_fate() or ""
         for row, panel in zip(axes, shown, strict=True):
             for ax, (title, (kind, column)) in zip(row, met.items(), strict=True):
                 for level, offset in dodge(view.lines):
@@ -265,12 +261,9 @@ class StoryTimes(ReportFigure):
         axes[0][0].set_ylim(bottom=0)
         outer_labels(axes, shown, "Since detection [s]")
         legend(figure, view.line)
-        caption = (
-            "Mark, the median; bar, the middle half, of the events that were reached or "
-            f"confirmed{_what_else_came(events)}."
-        )
+        words = caption("story_times", events=len(events), fate=_NAMES.get(fate, fate))
         title = f"Part {events.part}: response, by who responded"
-        return self.finish(figure, caption, numbers, title=title)
+        return self.finish(figure, words, numbers, title=title)
 
 
 class StoryOutcomes(ReportFigure):
@@ -301,19 +294,9 @@ class StoryOutcomes(ReportFigure):
         stacks.axes[0].set_xlim(0, 1)
         stacks.axes[0].set_xticks([0, 0.5, 1])
         stacks.axes[0].xaxis.set_major_formatter(lambda share, _: f"{100 * share:.0f} %")
-        caption = (
-            f"All {len(events):,} events of part {events.part}: each has one of these outcomes."
-        )
+        words = caption("story_outcomes", events=len(events), part=events.part)
         title = f"Part {events.part}: what became of the events"
-        return self.finish(stacks.figure, caption, numbers, title=title)
-
-
-def _what_else_came(events: Events) -> str:
-    """What became of all events, or where that is to be seen."""
-    if (fate := events.one_fate()) is not None:
-        name = _NAMES.get(fate, fate)
-        return f"; all {len(events):,} were {name}" if len(events) > 1 else f"; it was {name}"
-    return ": a fast median may hide misses, which the next figure shows"
+        return self.finish(stacks.figure, words, numbers, title=title)
 
 
 def _quartiles(ax: Axes, offset: float, times: list[Floats], look: Look) -> None:

@@ -20,6 +20,7 @@ from dva_sim.experiments.report.figures.style import (
     with_unit,
     wrapped,
 )
+from dva_sim.experiments.report.prose import caption
 from dva_sim.experiments.study.parts import POINT, Level
 from dva_sim.kernel.wording import capital
 from dva_sim.simulation.labels import factor_name, level_name, measure_name, setting
@@ -141,16 +142,7 @@ class Scatter(ReportFigure):
             told = dict(zip(names, where, strict=True)) | {with_unit("mean", view.measure): y}
             numbers.add(panel | {"of": cloud.name}, {POINT: range(len(y))} | told)
         title = f"{capital(_what(view, clouds))} against each factor{_place(panel)}"
-        return self.finish(figure, _SCATTER, numbers, title=title)
-
-
-_SCATTER = (
-    "Each small mark is a point of the ranges, the mean over all persons and trials there; all "
-    "other factors vary too, which is most of the scatter. Line: means of equally many points in "
-    "order of the factor; shaded, the 95 % interval of each by the scatter of its points, for "
-    "these persons. A slope is seen where the factor matters on average; what it does only "
-    "together with another is not."
-)
+        return self.finish(figure, caption("scatter"), numbers, title=title)
 
 
 def _what(view: StudyView, clouds: list[Cloud]) -> str:
@@ -239,15 +231,7 @@ class Sobol(ReportFigure):
         title = (
             f"Which factors the {_what(view, clouds)} varies with: Sobol' indices{_place(panel)}"
         )
-        return self.finish(figure, _SOBOL, numbers, title=title)
-
-
-_SOBOL = (
-    "Dot: first-order index, the share of the variance over the ranges that would go if the factor "
-    "alone were fixed. Ring: total index, the share that would stay if all others were fixed; what "
-    "it has more than the dot are interactions. Bars: 95 % intervals over points and persons. "
-    "Estimates from few points may lie below 0 or above 1."
-)
+        return self.finish(figure, caption("sobol"), numbers, title=title)
 
 
 def _sobol(cloud: Cloud, names: list[str], where: Floats) -> tuple[SobolIndex, ...]:

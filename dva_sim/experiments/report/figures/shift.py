@@ -22,6 +22,7 @@ from dva_sim.experiments.report.figures.palette import (
 )
 from dva_sim.experiments.report.figures.report_figure import ReportFigure
 from dva_sim.experiments.report.figures.style import Drawn, Numbers, panels, with_unit
+from dva_sim.experiments.report.prose import caption
 from dva_sim.experiments.report.shift_page import ShiftPage
 from dva_sim.experiments.study.parts import Level
 from dva_sim.kernel.wording import capital
@@ -72,17 +73,8 @@ class Trade(ShiftFigure):
             return None
         label = "Exposure of people in finding out what it is [s per event]"
         figure = _scatter(shifts, "exposure_look_s", label)
-        title = "The trade: how soon somebody is there, against how long people stand in danger"
-        caption = (
-            "Down and to the left is better; the line joins the policies that no other beats on "
-            f"both. Response is the mean of min(time, {shifts.follow:g} s) over all events. "
-            "Exposure is guards' time within the danger radius on the way to look, looking and "
-            f"leaving; containing comes on top and costs about {_act(shifts):.0f} s per event "
-            f"whoever was sent. {_bars_words(shifts)}"
-        )
-        return self.finish(
-            figure, caption, _scatter_numbers(shifts, "exposure_look_s"), title=title
-        )
+        words = caption("trade", shifts=shifts, act=_act(shifts))
+        return self.finish(figure, words, _scatter_numbers(shifts, "exposure_look_s"))
 
 
 class Stages(ShiftFigure):
@@ -95,15 +87,8 @@ class Stages(ShiftFigure):
     def drawn(self, shifts: Shifts) -> Drawn | None:
         """Draw it."""
         figure = _scatter(shifts, "containment_mean_s", "Restricted mean time to containment [s]")
-        title = "Looking first or containing first: response against containment"
-        caption = (
-            "Down and to the left is better; the line joins the policies that no other beats on "
-            f"both. Both are means of min(time, {shifts.follow:g} s) from the report: of all "
-            "events until somebody is on scene, and of the true ones until a person has dealt with "
-            f"them. The same guards do both. {_bars_words(shifts)}"
-        )
         numbers = _scatter_numbers(shifts, "containment_mean_s")
-        return self.finish(figure, caption, numbers, title=title)
+        return self.finish(figure, caption("stages", shifts=shifts), numbers)
 
 
 def _scatter(shifts: Shifts, column: str, label: str) -> Figure:
@@ -154,13 +139,6 @@ def _scatter_numbers(shifts: Shifts, column: str) -> Numbers:
         at_stop: dict[str, Any] = {name: values[:, stop] for name, values in told.items()}
         numbers.add({"at": title}, at_stop | {"dispatch.policy": shifts.policies})
     return numbers
-
-
-def _bars_words(shifts: Shifts) -> str:
-    return (
-        f"Bars: 95 % interval of the difference against {shifts.baseline}, paired by shift, for "
-        "all policies and loads at once. The axes differ from panel to panel."
-    )
 
 
 def _act(shifts: Shifts) -> float:
@@ -219,12 +197,7 @@ class FatesOfEvents(ShiftFigure):
         for ax in axes[-1]:
             ax.set_xlabel("Time since the report [s]")
         key(figure, [box(FATES[fate]) for fate in _FATES], [_NAMES.get(f, f) for f in _FATES])
-        caption = (
-            "Cumulative incidence of each outcome (Aalen-Johansen), stacked: at every moment the "
-            "shares add up to one. All events, true and false, each followed for "
-            f"{shifts.follow:g} s."
-        )
-        return self.finish(figure, caption, numbers)
+        return self.finish(figure, caption("fates", follow=shifts.follow), numbers)
 
 
 def chosen_policies(shifts: Shifts) -> list[str]:
@@ -280,29 +253,11 @@ class WayToBest(ShiftFigure):
             _policy_axis(ax, names, capital(shifts.titles[stop]))
         target = "the oracle" if shifts.target == BEST else "a fresh unit at every base"
         axes[len(axes) // 2].set_xlabel(f"Share of the way from {FLOOR} to {target} [%]")
+        is_oracle = shifts.target == BEST
+        beats = np.zeros(1) if is_oracle else 100 * shifts.means("beats_bound_share")
+        words = caption("way", is_oracle=is_oracle, low=np.nanmin(beats), high=np.nanmax(beats))
         title = f"{self.title}: 0 is {FLOOR}, 100 {target}"
-        return self.finish(figure, _way_words(shifts), numbers, title=title)
-
-
-def _way_words(shifts: Shifts) -> str:
-    words = (
-        f"(random - policy) / (random - {'oracle' if shifts.target == BEST else 'bound'}) of the "
-        "restricted mean response, paired by shift; the 95 % intervals hold for all policies of a "
-        "panel at once. "
-    )
-    if shifts.target == BEST:
-        return words + (
-            "The oracle knows all alarms before they come and follows the plan with the least sum "
-            "of response times; nobody can be beyond it."
-        )
-    beats = shifts.means("beats_bound_share")
-    return words + (
-        "The bound is the response of the best unit for each event if it stood idle at its base or "
-        "a station: no queue, no limit of operators, the event's own luck. It is none for who is "
-        "out already and needs no time to get ready: "
-        f"{100 * np.nanmin(beats):.0f} to {100 * np.nanmax(beats):.0f} % of events were answered "
-        "sooner."
-    )
+        return self.finish(figure, words, numbers, title=title)
 
 
 class Percentiles(ShiftFigure):
@@ -345,17 +300,8 @@ class Percentiles(ShiftFigure):
         axes[len(axes) // 2].set_xlabel(
             "Time to response by 50 % (filled), 90 % and 95 % of all events [s]"
         )
-        never = (
-            f" An arrow, or a bar up to {shifts.follow:g} s: perhaps not reached."
-            if missing
-            else ""
-        )
-        caption = (
-            "Over all events of the cohort, those that nobody ever reached counting as infinitely "
-            f"late.{never} Broad bars: 95 % interval of each percentile alone, shifts drawn anew. "
-            "The axes differ from panel to panel."
-        )
-        return self.finish(figure, caption, numbers)
+        words = caption("percentiles", follow=shifts.follow, missing=missing)
+        return self.finish(figure, words, numbers)
 
 
 class Burden(ShiftFigure):
@@ -395,15 +341,9 @@ class Burden(ShiftFigure):
             _policy_axis(ax, names, text)
             if column.startswith("use"):
                 ax.set_xlim(0, 1.02)
-        title = "How busy people are, and how evenly work and service are spread"
-        caption = (
-            f"Small to large: {', '.join(shifts.titles)}. Means over shifts. Use: share of the "
-            "measured time with an order. Evenness: Jain's index of the guards' busy time, 1 if "
-            "all work the same. On the right, the restricted mean response in the worst zone over "
-            f"that in the best, of zones with at least {measures.FEWEST_IN_ZONE} events in the "
-            "shift: chance alone lifts it above 1, under every policy."
-        )
-        return self.finish(figure, caption, numbers, title=title)
+        fewest = measures.FEWEST_IN_ZONE
+        words = caption("burden", loads=shifts.titles, fewest=fewest)
+        return self.finish(figure, words, numbers)
 
 
 def _height(rows: int) -> float:

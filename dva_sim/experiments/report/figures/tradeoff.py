@@ -18,6 +18,7 @@ from dva_sim.experiments.report.figures.style import (
     panel_title,
     with_unit,
 )
+from dva_sim.experiments.report.prose import caption
 from dva_sim.experiments.study.parts import Level
 from dva_sim.simulation.labels import factor_name, level_name, measure_name
 from dva_sim.statistics import Band, band
@@ -73,21 +74,11 @@ class TradeOff(ReportFigure):
         figure.supylabel(axis_label(columns[1]), fontsize="medium")
         legend(figure, view.line)
         title = f"The trade-off: {measure_name(columns[1])} against {measure_name(columns[0])}"
-        return self.finish(figure, _caption(view), numbers, title=title)
+        along = factor_name(view.over.name) if has_lines(view) and view.over is not None else ""
+        return self.finish(figure, caption("tradeoff", along=along), numbers, title=title)
 
 
 _EDGES = {"mean": "mean", "low": "pointwise_low", "high": "pointwise_high"}
-
-
-def _caption(view: StudyView) -> str:
-    along = ""
-    if has_lines(view) and view.over is not None:
-        along = f", from one {factor_name(view.over.name)} to the next"
-    return (
-        f"Down and to the left is better. Each mark is a configuration, the mean over "
-        f"persons{along}; crosses are 95 % intervals of each mean alone. Times in danger are "
-        "summed over all people."
-    )
 
 
 def _columns(view: StudyView) -> tuple[str, str] | None:

@@ -18,6 +18,7 @@ from dva_sim.experiments.report.figures.style import (
     stops_axis,
     with_unit,
 )
+from dva_sim.experiments.report.prose import caption
 from dva_sim.kernel.units import ending_of
 
 if TYPE_CHECKING:
@@ -57,25 +58,12 @@ FELT = (
     ShownMeasure("delay_felt_s", "Delay as the person takes it [s]", is_log=True),
 )
 
-_BROUGHT_CAPTION = (
-    "Mean over persons; bars, where they are longer than the mark, the middle 90 % of persons, who "
-    "meet competitors of different luck. A round trip lasts from a command until the first picture "
-    "taken after it was applied has arrived. The age in force is that of the newest command that "
-    "the robot has, over time. A drive that was not done counts with its horizon."
-)
-_TAKEN_CAPTION = (
-    "With all headers and what is sent again. A dashed line at 1 is an equal share. Jain's index "
-    "is 1 if session and TCP flows have the same rate; a session that wants less than its share "
-    "lowers it without taking anything from anybody. Bars as above."
-)
-
 
 class _Measures(ReportFigure):
     """A panel for each of some measures that the runs have."""
 
     pages = ("transport",)
     shown: ClassVar[tuple[ShownMeasure, ...]]
-    caption: ClassVar[str]
 
     def draw(self, view: StudyView, reading: Reading) -> Drawn | None:
         """Draw it."""
@@ -92,7 +80,7 @@ class _Measures(ReportFigure):
         for ax in axes[: len(there) - 2]:
             ax.set_xlabel("")
         legend(figure, view.line)
-        return self.finish(figure, self.caption, _numbers(view, there))
+        return self.finish(figure, caption(self.name), _numbers(view, there))
 
 
 class Brought(_Measures):
@@ -101,7 +89,6 @@ class Brought(_Measures):
     name = "brought"
     title = "What each transport brings, and how one drives with it"
     shown = FELT + BROUGHT
-    caption = _BROUGHT_CAPTION
 
 
 class Taken(_Measures):
@@ -110,7 +97,6 @@ class Taken(_Measures):
     name = "taken"
     title = "What each transport takes, and what it leaves to TCP"
     shown = TAKEN
-    caption = _TAKEN_CAPTION
 
 
 def _numbers(view: StudyView, shown: Sequence[ShownMeasure]) -> Numbers:
