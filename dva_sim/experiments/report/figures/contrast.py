@@ -13,18 +13,9 @@ from numpy.typing import NDArray
 from dva_sim.experiments.analysis.answer import Finding, condition
 from dva_sim.experiments.analysis.robustness import Repeat, RepeatedAnswer, RepeatedStop
 from dva_sim.experiments.analysis.run_grid import Factor, Floats, StudyView, present
+from dva_sim.experiments.report.figures import style
 from dva_sim.experiments.report.figures.palette import FAINT, INK, ONE, PAPER, SOFT, colours
 from dva_sim.experiments.report.figures.report_figure import ReportFigure
-from dva_sim.experiments.report.figures.style import (
-    Drawn,
-    Numbers,
-    axis_label,
-    fit_to,
-    panels,
-    stops_axis,
-    with_unit,
-    wrapped,
-)
 from dva_sim.experiments.report.prose import caption
 from dva_sim.experiments.study.parts import STRATEGY
 from dva_sim.kernel.wording import capital, number
@@ -49,13 +40,13 @@ class AnswerFigure(ReportFigure):
     name = "answer"
     title = "The declared contrast"
 
-    def draw(self, view: StudyView, reading: Reading) -> Drawn | None:
+    def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
         """Draw it."""
         if view.contrast is None or reading.told is None:
             return None
         return self.contrast(reading.told, view.difference(view.panels[0], *view.contrast))
 
-    def contrast(self, finding: Finding, differences: Floats) -> Drawn | None:
+    def contrast(self, finding: Finding, differences: Floats) -> style.Drawn | None:
         """The difference alone; None where no interval can be given.
 
         Args:
@@ -69,23 +60,23 @@ class AnswerFigure(ReportFigure):
         with rc_context({"font.size": _FONT}):
             return self._drawn(finding, differences)
 
-    def _drawn(self, finding: Finding, differences: Floats) -> Drawn:
+    def _drawn(self, finding: Finding, differences: Floats) -> style.Drawn:
         from matplotlib.figure import Figure
 
         figure = Figure(figsize=_SIZE, dpi=150, layout="constrained")
         ax = figure.add_subplot()
         over = Factor(finding.over, finding.levels) if finding.over else None
         _marks(ax, finding, over)
-        stops_axis(ax, over)
+        style.stops_axis(ax, over)
         left, right = ax.get_xlim()
         room = _ROOM * (right - left)
         ax.set_xlim(left - room, right + room)
-        cut = fit_to(ax, present(np.append(differences, 0.0)))
+        cut = style.fit_to(ax, present(np.append(differences, 0.0)))
         grey = _too_small(ax, finding)
         _values(ax, finding)
         first, second = _names(finding)
         unit = f" [{finding.unit}]" if finding.unit else ""
-        ax.set_ylabel(wrapped(f"{capital(first)} minus {second}{unit}", 34))
+        ax.set_ylabel(style.wrapped(f"{capital(first)} minus {second}{unit}", 34))
         title = f"{capital(first)} minus {second}: {measure_name(finding.measure)}"
         within = condition(finding, inside=True).removesuffix(", ")
         title = f"{title}, {within}" if within else title
@@ -144,11 +135,11 @@ def _values(ax: Axes, f: Finding) -> None:
             )
 
 
-def _table(f: Finding) -> Numbers:
-    numbers = Numbers()
+def _table(f: Finding) -> style.Numbers:
+    numbers = style.Numbers()
     along = {f.over: f.levels} if f.over else {}
     ends = {"mean": f.mean, "band_low": f.low, "band_high": f.high}
-    columns: dict[str, Any] = {with_unit(n, f.measure): values for n, values in ends.items()}
+    columns: dict[str, Any] = {style.with_unit(n, f.measure): values for n, values in ends.items()}
     numbers.add({}, along | columns)
     return numbers
 
@@ -164,7 +155,7 @@ class RepeatsFigure(ReportFigure):
     title = "The contrast under other models of the persons"
     pages = ("driving",)
 
-    def draw(self, view: StudyView, reading: Reading) -> Drawn | None:
+    def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
         """Draw it."""
         robustness = reading.robustness
         if robustness is None:
@@ -173,7 +164,7 @@ class RepeatsFigure(ReportFigure):
         if not stops or view.contrast is None or view.line is None:
             return None
         rows = max(len(stop.repeats) for stop in stops) + _GAP * (len(robustness.strategies) + 1)
-        figure, (axes,) = panels(1, len(stops), max(2.4, _ROW * rows + 0.9), sharey=True)
+        figure, (axes,) = style.panels(1, len(stops), max(2.4, _ROW * rows + 0.9), sharey=True)
         first, second = (level_name(view.line.name, level) for level in view.contrast)
         for ax, stop in zip(axes, stops, strict=True):
             _own(ax, stop)
@@ -181,7 +172,7 @@ class RepeatsFigure(ReportFigure):
             ax.set_title(
                 f"{factor_name(robustness.over)} {level_name(robustness.over, stop.level)}"
             )
-            ax.set_xlabel(axis_label(view.measure, f"{first} minus {second}"))
+            ax.set_xlabel(style.axis_label(view.measure, f"{first} minus {second}"))
             ax.grid(axis="x")
             ax.grid(axis="y", visible=False)
         is_beyond = any(repeat.is_beyond for stop in stops for repeat in stop.repeats)
@@ -190,13 +181,13 @@ class RepeatsFigure(ReportFigure):
         return self.finish(figure, words, _numbers(view, robustness), title=title)
 
 
-def _numbers(view: StudyView, robustness: RepeatedAnswer) -> Numbers:
+def _numbers(view: StudyView, robustness: RepeatedAnswer) -> style.Numbers:
     """Every repeat, as drawn."""
-    numbers = Numbers()
+    numbers = style.Numbers()
     for stop in robustness.stops:
         for repeat in stop.repeats:
             edges = {"mean": repeat.mean, "low": repeat.low, "high": repeat.high}
-            told = {with_unit(name, view.measure): value for name, value in edges.items()}
+            told = {style.with_unit(name, view.measure): value for name, value in edges.items()}
             who = {"strategy": repeat.strategy, "parameters": repeat.parameters}
             flags = {"is_own": repeat.is_own, "is_extrapolated": repeat.is_beyond}
             numbers.row({robustness.over: stop.level}, **who, **told, **flags)

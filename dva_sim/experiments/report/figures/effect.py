@@ -22,6 +22,7 @@ from dva_sim.experiments.analysis.run_grid import (
     person_means,
     present,
 )
+from dva_sim.experiments.report.figures import style
 from dva_sim.experiments.report.figures.palette import (
     FAINT,
     INK,
@@ -34,22 +35,6 @@ from dva_sim.experiments.report.figures.palette import (
     name_lines,
 )
 from dva_sim.experiments.report.figures.report_figure import ReportFigure
-from dva_sim.experiments.report.figures.style import (
-    Drawn,
-    Numbers,
-    axis_label,
-    dodge,
-    fit_to,
-    has_lines,
-    hatch_stops,
-    hatch_words,
-    label_panels,
-    log_axis,
-    panel_grid,
-    place_of,
-    with_unit,
-    wrapped,
-)
 from dva_sim.experiments.report.prose import caption
 from dva_sim.experiments.study.parts import Level
 from dva_sim.kernel.wording import capital
@@ -92,7 +77,7 @@ class Differences(ReportFigure):
     pages = ("driving", "transport")
     has_panels = True
 
-    def draw(self, view: StudyView, reading: Reading) -> Drawn | None:
+    def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
         """Draw it."""
         cadence_of = cadences(view, reading.scenario_of(view.part.name))
         if view.contrast is None or view.line is None:
@@ -104,7 +89,7 @@ class Differences(ReportFigure):
             return view.difference(panel, level, baseline)
 
         name = level_name(view.line.name, baseline)
-        label = axis_label(view.measure, f"Difference against\n{name}")
+        label = style.axis_label(view.measure, f"Difference against\n{name}")
         limit = view.widest
         figure, axes, ends, cut, numbers = _curves(
             view, others, curve, label, (-limit, limit), home=0.0
@@ -122,7 +107,7 @@ class Differences(ReportFigure):
             is_marked=view.smallest_effect is not None,
             has_boundary=_has_boundary(view, cadence_of),
         )
-        reads = (_intervals_words(view), hatch_words(view), cut)
+        reads = (_intervals_words(view), style.hatch_words(view), cut)
         return self.finish(figure, words, numbers, title=title, reads=reads)
 
 
@@ -138,7 +123,7 @@ class Levels(ReportFigure):
         """Also, something must vary."""
         return super().applies(view, reading) and bool(view.line or view.over)
 
-    def draw(self, view: StudyView, reading: Reading) -> Drawn | None:
+    def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
         """Draw it."""
         grid = view.values
 
@@ -146,12 +131,12 @@ class Levels(ReportFigure):
             return person_means(view.curve(grid, panel, level))
 
         what = capital(_what(view))
-        label = axis_label(view.measure, wrapped(what))
+        label = style.axis_label(view.measure, style.wrapped(what))
         limits = (-view.widest, view.widest) if _in_excess(view) else view.possible
         figure, axes, ends, cut, numbers = _curves(view, view.lines, curve, label, limits)
         _name(view, view.lines, figure, axes, ends)
         words = caption("levels", in_excess=_in_excess(view))
-        reads = (_intervals_words(view), hatch_words(view), cut)
+        reads = (_intervals_words(view), style.hatch_words(view), cut)
         title = f"{what} under each {factor_name(view.line.name)}" if view.line else what
         return self.finish(figure, words, numbers, title=title, reads=reads)
 
@@ -160,7 +145,7 @@ def mark_boundary(ax: Axes, over: Factor | None, cadence: Cadence | None, text: 
     """The delay from which request/reply must fall behind the wanted rate."""
     if over is None or cadence is None:
         return
-    place = place_of(over, cadence.boundary_s)
+    place = style.place_of(over, cadence.boundary_s)
     if place is None:
         return
     ax.axvline(place, color=SOFT, lw=1, ls=(0, (4, 2)), zorder=1)
@@ -184,7 +169,7 @@ def _curves(
     ylabel: str,
     limits: tuple[float, float],
     home: float = math.nan,
-) -> tuple[Figure, list[Axes], list[Ends], str, Numbers]:
+) -> tuple[Figure, list[Axes], list[Ends], str, style.Numbers]:
     """A panel for each setting, in it a line with its band for each level, and where it ends.
 
     Args:
@@ -199,9 +184,9 @@ def _curves(
         The figure, its axes, the end of each line, what a caption must say of cut bands, and the
         numbers drawn.
     """
-    figure, axes = panel_grid(view, 3.4)
-    look, every, seen, numbers = looks(view.line), [], [np.array([home])], Numbers()
-    draw = _band if has_lines(view) else _points
+    figure, axes = style.panel_grid(view, 3.4)
+    look, every, seen, numbers = looks(view.line), [], [np.array([home])], style.Numbers()
+    draw = _band if style.has_lines(view) else _points
     for ax, panel in zip(axes, view.shown, strict=True):
         ends: Ends = {}
         for level, shift in _side_by_side(view, lines):
@@ -210,10 +195,10 @@ def _curves(
             seen.append(matrix.ravel())
             ends[level] = draw(ax, bands, look[level], shift, limits)
             numbers.add(view.setting(panel, level), view.along_x() | _columns(view.measure, bands))
-        hatch_stops(ax, view.stops_outside(panel))
+        style.hatch_stops(ax, view.stops_outside(panel))
         every.append(ends)
-    label_panels(axes, view, ylabel)
-    return figure, axes, every, fit_to(axes[0], present(np.concatenate(seen))), numbers
+    style.label_panels(axes, view, ylabel)
+    return figure, axes, every, style.fit_to(axes[0], present(np.concatenate(seen))), numbers
 
 
 def _columns(measure: str, bands: Band) -> dict[str, Floats]:
@@ -225,7 +210,7 @@ def _columns(measure: str, bands: Band) -> dict[str, Floats]:
         "low": bands.pointwise_low,
         "high": bands.pointwise_high,
     }
-    return {with_unit(name, measure): values for name, values in edges.items()}
+    return {style.with_unit(name, measure): values for name, values in edges.items()}
 
 
 def _zoom_on_small(axes: list[Axes], smallest: float) -> bool:
@@ -249,13 +234,13 @@ def _zoom_on_small(axes: list[Axes], smallest: float) -> bool:
 
 def _side_by_side(view: StudyView, lines: tuple[Level, ...]) -> list[tuple[Level, float]]:
     """Each level's place beside its stop; close together where a line goes on to the next."""
-    if not has_lines(view):
-        return dodge(lines)
+    if not style.has_lines(view):
+        return style.dodge(lines)
     return [(level, _STEP * (i - (len(lines) - 1) / 2)) for i, level in enumerate(lines)]
 
 
 def _intervals_words(view: StudyView) -> str:
-    if has_lines(view):
+    if style.has_lines(view):
         return "Shaded: the 95 % band of a line. Bars: the 95 % interval of each level alone."
     return (
         "Thin bars: the 95 % band of all places of a mark. Thick bars: the interval of each alone."
@@ -266,7 +251,7 @@ def _name(
     view: StudyView, lines: tuple[Level, ...], figure: Figure, axes: list[Axes], ends: list[Ends]
 ) -> None:
     """Lines are named at their ends, marks in a key."""
-    if has_lines(view):
+    if style.has_lines(view):
         name_lines(axes, ends, view.line)
     elif view.line is not None:
         legend(figure, view.line, lines)
@@ -306,7 +291,7 @@ def _what(view: StudyView) -> str:
 def _has_boundary(view: StudyView, cadence_of: CadenceOf) -> bool:
     """Whether any panel has the dashed line of `mark_boundary`."""
     cadences, over = [cadence_of(panel) for panel in view.shown], view.over
-    return any(c and over and place_of(over, c.boundary_s) is not None for c in cadences)
+    return any(c and over and style.place_of(over, c.boundary_s) is not None for c in cadences)
 
 
 _ROOM = 1.08  # above the highest mark
@@ -321,22 +306,24 @@ class CommandAge(ReportFigure):
     pages = ("driving",)
     has_panels = True
 
-    def draw(self, view: StudyView, reading: Reading) -> Drawn | None:
+    def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
         """Draw it."""
         columns = [f"command_age_{q}_s" for q in _QUANTILES]
         if not all(view.part.has(column) for column in columns):
             return None
-        figure, axes = panel_grid(view, 3.0)
+        figure, axes = style.panel_grid(view, 3.0)
         look = looks(view.line)
-        grids, numbers = [view.part.grid(column) for column in columns], Numbers()
+        grids, numbers = [view.part.grid(column) for column in columns], style.Numbers()
         for ax, panel in zip(axes, view.shown, strict=True):
-            for level, offset in dodge(view.lines):
+            for level, offset in style.dodge(view.lines):
                 ages = [_cell_means(view.curve(grid, panel, level)) for grid in grids]
                 _ranges(ax, [stop + offset for stop in range(len(view.stops))], ages, look[level])
                 told = dict(zip(columns, ages, strict=True))
                 numbers.add(view.setting(panel, level), view.along_x() | told)
-        log_axis(axes[0])
-        label_panels(axes, view, axis_label("age_s", wrapped("Command age at application", 22)))
+        style.log_axis(axes[0])
+        style.label_panels(
+            axes, view, style.axis_label("age_s", style.wrapped("Command age at application", 22))
+        )
         legend(figure, view.line)
         return self.finish(figure, caption("command_age"), numbers)
 
@@ -350,17 +337,17 @@ class CommandRate(ReportFigure):
     columns = ("command_rate_hz",)
     has_panels = True
 
-    def draw(self, view: StudyView, reading: Reading) -> Drawn | None:
+    def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
         """Draw it."""
         cadence_of = cadences(view, reading.scenario_of(view.part.name))
-        figure, axes = panel_grid(view, 3.0)
-        look, every, numbers = looks(view.line), [], Numbers()
+        figure, axes = style.panel_grid(view, 3.0)
+        look, every, numbers = looks(view.line), [], style.Numbers()
         grid = view.part.grid("command_rate_hz")
         for ax, panel in zip(axes, view.shown, strict=True):
             ends: Ends = {}
-            for i, (level, place) in enumerate(dodge(view.lines)):
+            for i, (level, place) in enumerate(style.dodge(view.lines)):
                 means = _cell_means(view.curve(grid, panel, level))
-                if has_lines(view):  # larger marks below, where lines lie on each other
+                if style.has_lines(view):  # larger marks below, where lines lie on each other
                     _line(ax, means, look[level], 4 + 2.5 * (len(view.lines) - 1 - i))
                 else:
                     x = np.arange(len(means)) + place
@@ -372,8 +359,8 @@ class CommandRate(ReportFigure):
             every.append(ends)
         tops = [ax.dataLim.y1 for ax in axes if np.isfinite(ax.dataLim.y1)]  # a panel may be empty
         axes[0].set_ylim(0, _ROOM * max(tops, default=1.0))
-        label_panels(axes, view, axis_label("command_rate_hz"))
-        if has_lines(view):
+        style.label_panels(axes, view, style.axis_label("command_rate_hz"))
+        if style.has_lines(view):
             name_lines(axes, every, view.line)
         else:
             legend(figure, view.line)

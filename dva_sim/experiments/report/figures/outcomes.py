@@ -21,18 +21,10 @@ from dva_sim.experiments.analysis.run_grid import (
     as_floats,
     codes_of,
 )
+from dva_sim.experiments.report.figures import style
 from dva_sim.experiments.report.figures.budget import Stacks, stack
 from dva_sim.experiments.report.figures.palette import FATES, PAPER, Look, box, key, legend, looks
 from dva_sim.experiments.report.figures.report_figure import ReportFigure
-from dva_sim.experiments.report.figures.style import (
-    Drawn,
-    Numbers,
-    dodge,
-    outer_labels,
-    panels,
-    stops_axis,
-    wrapped,
-)
 from dva_sim.experiments.report.prose import caption
 from dva_sim.experiments.study.parts import Level
 from dva_sim.kernel.wording import capital
@@ -57,7 +49,7 @@ class EndingsInTime(ReportFigure):
     pages = ("driving",)
     tables = ("runs", "events")
 
-    def draw(self, view: StudyView, reading: Reading) -> Drawn | None:
+    def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
         """Draw it."""
         endings = reading.endings
         if endings is None:
@@ -68,8 +60,8 @@ class EndingsInTime(ReportFigure):
         ]
         if not stops:
             return None
-        figure, axes = panels(len(lines), len(stops), 1.9, sharex=True, sharey=True)
-        times, numbers = np.linspace(0.0, endings.horizon, _POINTS), Numbers()
+        figure, axes = style.panels(len(lines), len(stops), 1.9, sharex=True, sharey=True)
+        times, numbers = np.linspace(0.0, endings.horizon, _POINTS), style.Numbers()
         for row, line in zip(axes, lines, strict=True):
             for ax, stop in zip(row, stops, strict=True):
                 mask = endings.under(line, stop)
@@ -80,11 +72,12 @@ class EndingsInTime(ReportFigure):
                     numbers.add(where, {"t_s": times} | shares)
                 ax.grid(False)
             name = level_name(view.line.name, line) if view.line else ""
-            row[0].set_ylabel(f"{wrapped(name, 24)}\nshare of events".strip())
+            words = style.wrapped(name, 24)
+            row[0].set_ylabel(f"{words}\nshare of events".strip())
         axes[0][0].set(xlim=(0, endings.horizon), ylim=(0, 1))
         axes[0][0].yaxis.set_major_formatter(lambda y, _: f"{100 * y:.0f} %")
         for ax, stop in zip(axes[0], stops, strict=True):
-            ax.set_title(wrapped(capital(brief(_stop(view, stop))), _TITLE // len(stops)))
+            ax.set_title(style.wrapped(capital(brief(_stop(view, stop))), _TITLE // len(stops)))
         for ax in axes[-1]:
             ax.set_xlabel("Since the report [s]")
         key(figure, [box(FATES[way]) for way in endings.ways], [_named(w) for w in endings.ways])
@@ -238,28 +231,28 @@ class StoryTimes(ReportFigure):
     tables = ("runs", "events")
     has_panels = True
 
-    def draw(self, view: StudyView, reading: Reading) -> Drawn | None:
+    def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
         """Draw it."""
         events = _events(view, reading)
         if events is None:
             return None
-        shown, met, numbers = view.shown, events.kinds_of_times(), Numbers()
+        shown, met, numbers = view.shown, events.kinds_of_times(), style.Numbers()
         if not met:
             return None
-        figure, axes = panels(len(shown), len(met), 2.4, sharex=True, sharey=True)
+        figure, axes = style.panels(len(shown), len(met), 2.4, sharex=True, sharey=True)
         look, fate = looks(view.line), events.one_fate() or ""
         for row, panel in zip(axes, shown, strict=True):
             for ax, (title, (kind, column)) in zip(row, met.items(), strict=True):
-                for level, offset in dodge(view.lines):
+                for level, offset in style.dodge(view.lines):
                     masks = [events.by(kind) & events.under(panel, level, v) for v in view.stops]
                     times = [events.times(column, mask) for mask in masks]
                     _quartiles(ax, offset, times, look[level])
                     where = view.setting(panel, level) | {"responder_kind": kind, "time": column}
                     numbers.add(where, view.along_x() | _quantiles(times))
-                stops_axis(ax, view.over)
+                style.stops_axis(ax, view.over)
                 ax.set_title(title if row is axes[0] else "")
         axes[0][0].set_ylim(bottom=0)
-        outer_labels(axes, shown, "Since detection [s]")
+        style.outer_labels(axes, shown, "Since detection [s]")
         legend(figure, view.line)
         words = caption("story_times", events=len(events), fate=_NAMES.get(fate, fate))
         title = f"Part {events.part}: response, by who responded"
@@ -275,7 +268,7 @@ class StoryOutcomes(ReportFigure):
     tables = ("runs", "events")
     has_panels = True
 
-    def draw(self, view: StudyView, reading: Reading) -> Drawn | None:
+    def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
         """Draw it."""
         events = _events(view, reading)
         if events is None:
@@ -284,7 +277,7 @@ class StoryOutcomes(ReportFigure):
             return None
         met = events.shares(np.ones(len(events), dtype=bool))
         parts = {_NAMES.get(fate, fate): box(FATES[fate]) for fate in _FATES if met[fate]}
-        stacks, numbers = Stacks(view, "Share of events", parts), Numbers()
+        stacks, numbers = Stacks(view, "Share of events", parts), style.Numbers()
         for ax, panel, level in stacks.panels():
             shares = [events.shares(events.under(panel, level, v)) for v in view.stops]
             told = {fate: np.array([share[fate] for share in shares]) for fate in _FATES}

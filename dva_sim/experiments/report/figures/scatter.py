@@ -9,17 +9,9 @@ import numpy as np
 
 from dva_sim.experiments.analysis.layout import layout_of
 from dva_sim.experiments.analysis.run_grid import Floats, RunGrid, Setting, StudyView, nan_mean
+from dva_sim.experiments.report.figures import style
 from dva_sim.experiments.report.figures.palette import INK, ONE, PAPER, SOFT, Look, legend, looks
 from dva_sim.experiments.report.figures.report_figure import ReportFigure
-from dva_sim.experiments.report.figures.style import (
-    Drawn,
-    Numbers,
-    axis_label,
-    log_axis,
-    panels,
-    with_unit,
-    wrapped,
-)
 from dva_sim.experiments.report.prose import caption
 from dva_sim.experiments.study.parts import POINT, Level
 from dva_sim.kernel.wording import capital
@@ -113,33 +105,33 @@ class Scatter(ReportFigure):
         """Only for designs of points in ranges."""
         return super().applies(view, reading) and bool(reading.points)
 
-    def draw(self, view: StudyView, reading: Reading) -> Drawn | None:
+    def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
         """Draw it."""
         clouds, names, where, panel = points_of(view, reading)
         ranges = (reading.study.get("design") or {}).get("ranges") or {}
         columns = min(_ABREAST, len(names))
         rows = -(-len(names) // columns)
-        figure, grid = panels(rows, columns, 2.7, sharey=True)
+        figure, grid = style.panels(rows, columns, 2.7, sharey=True)
         axes = [ax for row in grid for ax in row]
         means = [nan_mean(c.values.reshape(len(c.values), -1), axis=1) for c in clouds]
         for ax, name, x in zip(axes, names, where, strict=False):
             for cloud, y in zip(clouds, means, strict=True):
                 _dots(ax, x, y, _look(view, cloud))
-            ax.set_xlabel(wrapped(capital(head_of(name)), 30))
+            ax.set_xlabel(style.wrapped(capital(head_of(name)), 30))
             if (ranges.get(name) or {}).get("scale") == "log":
-                log_axis(ax, "x")
+                style.log_axis(ax, "x")
             if len(clouds) == 1 and clouds[0].level is None and view.contrast is not None:
                 ax.axhline(0, color=INK, lw=0.8, zorder=1)
         for ax in axes[len(names) :]:
             ax.set_visible(False)
         label = clouds[0].name if view.contrast is not None else measure_name(view.measure)
         for row in grid:
-            row[0].set_ylabel(axis_label(view.measure, wrapped(label, 26)))
+            row[0].set_ylabel(style.axis_label(view.measure, style.wrapped(label, 26)))
         if view.contrast is None:
             legend(figure, view.line)
-        numbers = Numbers()
+        numbers = style.Numbers()
         for cloud, y in zip(clouds, means, strict=True):
-            told = dict(zip(names, where, strict=True)) | {with_unit("mean", view.measure): y}
+            told = dict(zip(names, where, strict=True)) | {style.with_unit("mean", view.measure): y}
             numbers.add(panel | {"of": cloud.name}, {POINT: range(len(y))} | told)
         title = f"{capital(_what(view, clouds))} against each factor{_place(panel)}"
         return self.finish(figure, caption("scatter"), numbers, title=title)
@@ -204,12 +196,12 @@ class Sobol(ReportFigure):
         is_sample = bool((reading.study.get("design") or {}).get("saltelli"))
         return super().applies(view, reading) and is_sample and bool(reading.points)
 
-    def draw(self, view: StudyView, reading: Reading) -> Drawn | None:
+    def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
         """Draw it."""
         clouds, names, where, panel = points_of(view, reading)
         height = 1.2 + 0.42 * len(names)
-        figure, (axes,) = panels(1, len(clouds), height, sharey=True, sharex=True)
-        numbers = Numbers()
+        figure, (axes,) = style.panels(1, len(clouds), height, sharey=True, sharex=True)
+        numbers = style.Numbers()
         for ax, cloud in zip(axes, clouds, strict=True):
             found = _sobol(cloud, names, where)
             for row, index in enumerate(found):

@@ -8,16 +8,9 @@ from typing import TYPE_CHECKING, ClassVar, NamedTuple
 import numpy as np
 
 from dva_sim.experiments.analysis.run_grid import Floats, StudyView, nan_mean, person_means
+from dva_sim.experiments.report.figures import style
 from dva_sim.experiments.report.figures.palette import INK, Look, legend, looks
 from dva_sim.experiments.report.figures.report_figure import ReportFigure
-from dva_sim.experiments.report.figures.style import (
-    Drawn,
-    Numbers,
-    log_axis,
-    panels,
-    stops_axis,
-    with_unit,
-)
 from dva_sim.experiments.report.prose import caption
 from dva_sim.kernel.units import ending_of
 
@@ -65,13 +58,13 @@ class _Measures(ReportFigure):
     pages = ("transport",)
     shown: ClassVar[tuple[ShownMeasure, ...]]
 
-    def draw(self, view: StudyView, reading: Reading) -> Drawn | None:
+    def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
         """Draw it."""
         there = [each for each in self.shown if view.part.has(each.column)]
         if not there:
             return None
         rows = (len(there) + 1) // 2
-        figure, grid = panels(rows, 2, 2.3)
+        figure, grid = style.panels(rows, 2, 2.3)
         axes = [ax for row in grid for ax in row]
         for ax, each in zip(axes, there, strict=False):
             _panel(ax, view, each)
@@ -99,9 +92,9 @@ class Taken(_Measures):
     shown = TAKEN
 
 
-def _numbers(view: StudyView, shown: Sequence[ShownMeasure]) -> Numbers:
+def _numbers(view: StudyView, shown: Sequence[ShownMeasure]) -> style.Numbers:
     """Means over persons and the middle 90 % of them, in the units of the table of runs."""
-    numbers, panel = Numbers(), view.panels[0]
+    numbers, panel = style.Numbers(), view.panels[0]
     grids = {each.column: view.part.grid(each.column) for each in shown}
     for level in view.lines:
         curves = {name: view.curve(grid, panel, level) for name, grid in grids.items()}
@@ -111,7 +104,7 @@ def _numbers(view: StudyView, shown: Sequence[ShownMeasure]) -> Numbers:
             stem = name.removesuffix(f"_{ending_of(name)}")
             told[name] = nan_mean(persons, axis=0)
             for end, values in zip(("low", "high"), _middle(persons), strict=True):
-                told[with_unit(f"{stem}_{end}", name)] = values
+                told[style.with_unit(f"{stem}_{end}", name)] = values
         numbers.add(view.setting(panel, level), view.along_x() | told)
     return numbers
 
@@ -123,9 +116,9 @@ def _panel(ax: Axes, view: StudyView, shown: ShownMeasure) -> None:
         place = WIDTH * ((index + 0.5) / count - 0.5)
         _marks(ax, place, values, look)
     ax.set_title(shown.title, fontweight="normal")
-    stops_axis(ax, view.over)
+    style.stops_axis(ax, view.over)
     if shown.is_log:
-        log_axis(ax)
+        style.log_axis(ax)
     else:
         ax.set_ylim(bottom=0)
     if shown.column.startswith(("share_of_fair", "jain")):
