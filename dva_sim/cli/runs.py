@@ -60,14 +60,14 @@ def episode(
         dva-sim episode evacuation --strip fire.png  # several moments in one figure
         dva-sim episode fire-drill --record drill.mcap  # for `dva-sim replay` and viewers
     """
-    from dva_sim.cli import episodes
+    from dva_sim.cli import stories
     from dva_sim.experiments.report.episode import EpisodeRequest
     from dva_sim.recordings.pictures import Wanted
     from dva_sim.testing.file_kinds import mistakes_of
 
     pictures, changes = Wanted(video, still, strip, at, panels, camera, inset), set_ or []
     with loudness(quiet, verbose), mistakes_of(scenario, changes, seed):
-        episodes.episode(EpisodeRequest(scenario, seed, changes, side_by_side, pictures, record))
+        stories.episode(EpisodeRequest(scenario, seed, changes, side_by_side, pictures, record))
 
 
 def replay(
@@ -91,11 +91,11 @@ def replay(
         dva-sim replay drill.mcap --strip drill.png  # several moments in one figure
         dva-sim replay drill.mcap --ros2 bag  # for the tools of ROS 2
     """
-    from dva_sim.cli import episodes
+    from dva_sim.cli import stories
     from dva_sim.recordings.pictures import Wanted
 
     with loudness(quiet, verbose):
-        episodes.replay(file, Wanted(video, still, strip, at, panels, camera, inset), ros2)
+        stories.replay(file, Wanted(video, still, strip, at, panels, camera, inset), ros2)
 
 
 def live(

@@ -1,9 +1,12 @@
-"""What came of one run, told in a terminal: of each model its story, a table and a few lines."""
+"""`dva-sim episode` and `replay`: a run played or read, drawn, kept, and told in a terminal.
+
+Of each model there is a story, a table, and a few lines of what came of it.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +16,19 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
+from dva_sim.cli.console import console, warn
 from dva_sim.cli.verbosity import is_verbose, lines_of, tell_measures
-from dva_sim.experiments.report.episode import Played
+from dva_sim.experiments.report.episode import (
+    EpisodeRequest,
+    Played,
+    doubts,
+    open_recording,
+    write_replay,
+)
 from dva_sim.experiments.report.figures.trial import name_and_unit
 from dva_sim.kernel.measure import Measure
 from dva_sim.kernel.plugins import resolved
+from dva_sim.recordings.pictures import Wanted
 from dva_sim.recordings.pictures.moments import story
 from dva_sim.simulation.full import Playback, Recording
 from dva_sim.simulation.full.measures import RUN_COLUMNS
@@ -70,8 +81,6 @@ def _columns(run: Played) -> Sequence[Measure]:
 
 
 # --- a full run ----------------------------------------------------------------------
-
-
 def tell_story(playback: Playback, console: Console) -> None:
     """What happened, in order."""
     scenario = playback.scenario
@@ -162,8 +171,6 @@ def _fared(row: Row, people: list[dict[str, Any]]) -> str:
 
 
 # --- a shift -------------------------------------------------------------------------
-
-
 def tell_shift(run: Played, console: Console) -> None:
     """A shift: its first events, and what it took to deal with all."""
     scenario, recording = run.scenario, run.kept
@@ -237,8 +244,6 @@ def _seconds(value: float) -> str:
 
 
 # --- a session on a congested link ---------------------------------------------------
-
-
 def tell_session(run: Played, console: Console) -> None:
     """A session on a congested link: each flow, and what the drive came to."""
     scenario, row = run.scenario, run.tables["runs"][0]
@@ -292,8 +297,6 @@ def _ms(seconds: float) -> str:
 
 
 # --- a task --------------------------------------------------------------------------
-
-
 def tell_task(run: Played, console: Console) -> None:
     """A block of trials: the first ones, and all in a few words."""
     scenario, trials, row = run.scenario, run.tables["trials"], run.tables["runs"][0]
@@ -348,3 +351,46 @@ def _task_lines(row: Row) -> list[str]:
         parts.append(f"{row['throughput_bps']:.2f} bit/s")
     parts.append(f"{row['waits']:.1f} waits in each")
     return parts
+
+
+def episode(request: EpisodeRequest, where: Console = console) -> None:
+    """Play what is asked for, tell it, and write its files.
+
+    Raises:
+        ConfigError: it cannot be played, drawn or kept.
+    """
+    asked = request.scenarios()
+    warn(doubts(asked), where)
+    runs = []
+    for scenario in asked:
+        runs.append(request.play(scenario))
+        tell(runs[-1], where)
+    if len(runs) > 1:
+        tell_side_by_side([run.kept for run in runs if isinstance(run.kept, Recording)], where)
+    _say_written(request.write(runs), request.pictures, where)
+
+
+def replay(file: Path, pictures: Wanted, ros2: Path | None, where: Console = console) -> None:
+    """Tell the story of a recording, and draw or export what is asked for.
+
+    Raises:
+        ConfigError: not a recording, or what is asked for is not in it.
+    """
+    opened = open_recording(file, pictures)
+    run = opened.playback
+    tell_story(run, where)
+    if opened.tables is not None:
+        tell_outcome(opened.tables, f"simulated by dva-sim {opened.about['version']}", where)
+    if not opened.is_whole:
+        there = f"{run.duration:.0f} of {opened.lasted:.0f} s are there"
+        where.print(f"[yellow]{file} was cut short: {there}[/yellow]", soft_wrap=True)
+    _say_written(write_replay(opened, pictures, ros2), pictures, where)
+
+
+def _say_written(files: Iterable[str], pictures: Wanted, where: Console) -> None:
+    """Write files, and say where they are."""
+    if pictures.any:
+        with where.status("Drawing ..."):
+            files = list(files)
+    for line in files:
+        where.print(line, soft_wrap=True)

@@ -34,19 +34,18 @@ from dva_sim.experiments.report.blocks import (
 )
 from dva_sim.experiments.report.cell_table import CellTable
 from dva_sim.experiments.report.figures.registry import draw_all
-from dva_sim.experiments.report.figures.report_figure import ReportFigure
-from dva_sim.experiments.report.figures.style import Drawn
+from dva_sim.experiments.report.figures.style import Drawn, ReportFigure
 from dva_sim.experiments.report.glossary import Marker, terms_in
 from dva_sim.experiments.report.hypothesis_tables import (
     comparison_table,
     hypothesis_table,
+    plan_table,
     registration_table,
 )
 from dva_sim.experiments.report.method import remarks
 from dva_sim.experiments.report.outcome_table import in_a_line
 from dva_sim.experiments.report.outcome_table import sentences as sentences_of_endings
 from dva_sim.experiments.report.outcome_table import table as endings_table
-from dva_sim.experiments.report.sample_size_table import plan_table
 from dva_sim.experiments.report.summary import Reading
 from dva_sim.experiments.report.tuning_table import tuned_table
 from dva_sim.experiments.results.manifest import status_of

@@ -45,8 +45,8 @@ from dva_sim.experiments.analysis.run_grid import (
 )
 from dva_sim.experiments.analysis.sample_size import SizePlan, plans
 from dva_sim.experiments.report.cell_table import CellTable, cell_table
+from dva_sim.experiments.report.hypothesis_tables import few_that_weigh
 from dva_sim.experiments.report.model_page import ModelPage, page_of
-from dva_sim.experiments.report.sample_size_table import few_that_weigh
 from dva_sim.experiments.report.tuning_table import tuning_warning
 from dva_sim.experiments.results.manifest import status_of
 from dva_sim.experiments.results.results import Results

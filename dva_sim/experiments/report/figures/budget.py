@@ -22,7 +22,6 @@ from dva_sim.experiments.report.figures.palette import (
     key,
     key_height,
 )
-from dva_sim.experiments.report.figures.report_figure import ReportFigure
 from dva_sim.experiments.report.prose import caption
 from dva_sim.experiments.study.parts import Level
 from dva_sim.kernel.wording import capital
@@ -91,8 +90,7 @@ class Stacks:
         for index, (ax, panel, level) in enumerate(self.panels()):
             words = capital(brief(view.setting(panel, level)))
             ax.set_title(style.wrapped(words, _TITLE // columns), fontsize=8.5)
-            ax.grid(True, axis="x")
-            ax.grid(False, axis="y")
+            style.lying(ax)
             place = index % count
             _along_y(ax, view.over, is_first=place % columns == 0)
             is_lowest = index >= len(self.axes) - count and place + columns >= count
@@ -156,7 +154,7 @@ _NAMES = {
 _MEASURED = "loop_delay_measured_s"
 
 
-class DelayBudget(ReportFigure):
+class DelayBudget(style.ReportFigure):
     """The delay from a picture to its effect, as the sum it is and as it was measured."""
 
     name = "delay_budget"

@@ -5,7 +5,7 @@ The contrast under other models of the persons: every repeat with its interval.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,6 @@ from dva_sim.experiments.analysis.robustness import Repeat, RepeatedAnswer, Repe
 from dva_sim.experiments.analysis.run_grid import Factor, Floats, StudyView, present
 from dva_sim.experiments.report.figures import style
 from dva_sim.experiments.report.figures.palette import FAINT, INK, ONE, PAPER, SOFT, colours
-from dva_sim.experiments.report.figures.report_figure import ReportFigure
 from dva_sim.experiments.report.prose import caption
 from dva_sim.experiments.study.parts import STRATEGY
 from dva_sim.kernel.wording import capital, number
@@ -34,7 +33,7 @@ _ROOM = 0.05  # of the width, for the figures beside the outer marks
 _LEAST_SHARE = 0.02  # of the height, below which what is too small to matter is not drawn
 
 
-class AnswerFigure(ReportFigure):
+class AnswerFigure(style.ReportFigure):
     """The difference that answers the question."""
 
     name = "answer"
@@ -138,9 +137,8 @@ def _values(ax: Axes, f: Finding) -> None:
 def _table(f: Finding) -> style.Numbers:
     numbers = style.Numbers()
     along = {f.over: f.levels} if f.over else {}
-    ends = {"mean": f.mean, "band_low": f.low, "band_high": f.high}
-    columns: dict[str, Any] = {style.with_unit(n, f.measure): values for n, values in ends.items()}
-    numbers.add({}, along | columns)
+    band = {"mean": f.mean, "band_low": f.low, "band_high": f.high}
+    numbers.add({}, along | style.in_units(f.measure, **band))
     return numbers
 
 
@@ -148,7 +146,7 @@ _ROW = 0.14  # height of a repeat [in]
 _GAP = 1.5  # rows between two strategies
 
 
-class RepeatsFigure(ReportFigure):
+class RepeatsFigure(style.ReportFigure):
     """Effect and interval of every repeat, by strategy, sorted; the study's own as a band."""
 
     name = "robustness"
@@ -173,8 +171,7 @@ class RepeatsFigure(ReportFigure):
                 f"{factor_name(robustness.over)} {level_name(robustness.over, stop.level)}"
             )
             ax.set_xlabel(style.axis_label(view.measure, f"{first} minus {second}"))
-            ax.grid(axis="x")
-            ax.grid(axis="y", visible=False)
+            style.lying(ax)
         is_beyond = any(repeat.is_beyond for stop in stops for repeat in stop.repeats)
         words = caption("robustness", is_beyond=is_beyond)
         title = f"The contrast in {measure_name(view.measure)} under other models of the persons"
@@ -187,7 +184,7 @@ def _numbers(view: StudyView, robustness: RepeatedAnswer) -> style.Numbers:
     for stop in robustness.stops:
         for repeat in stop.repeats:
             edges = {"mean": repeat.mean, "low": repeat.low, "high": repeat.high}
-            told = {style.with_unit(name, view.measure): value for name, value in edges.items()}
+            told = style.in_units(view.measure, **edges)
             who = {"strategy": repeat.strategy, "parameters": repeat.parameters}
             flags = {"is_own": repeat.is_own, "is_extrapolated": repeat.is_beyond}
             numbers.row({robustness.over: stop.level}, **who, **told, **flags)

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from dva_sim.experiments.analysis.run_grid import Floats, StudyView, present
 from dva_sim.experiments.report.figures import style
 from dva_sim.experiments.report.figures.palette import INK, PAPER, SOFT, Look, legend, looks
-from dva_sim.experiments.report.figures.report_figure import ReportFigure
 from dva_sim.experiments.report.prose import caption
 from dva_sim.kernel.wording import capital
 from dva_sim.simulation.labels import measure_name
@@ -25,7 +24,7 @@ _CROWD = 60  # runs of a cell from which on dots must be small
 _GOLDEN = 0.6180339887498949
 
 
-class Distributions(ReportFigure):
+class Distributions(style.ReportFigure):
     """Every run as a dot, with median and middle half."""
 
     name = "distributions"

@@ -34,7 +34,6 @@ from dva_sim.experiments.report.figures.palette import (
     looks,
     name_lines,
 )
-from dva_sim.experiments.report.figures.report_figure import ReportFigure
 from dva_sim.experiments.report.prose import caption
 from dva_sim.experiments.study.parts import Level
 from dva_sim.kernel.wording import capital
@@ -69,7 +68,7 @@ def cadences(view: StudyView, scenario: Mapping[str, Any]) -> CadenceOf:
     return cadence_of
 
 
-class Differences(ReportFigure):
+class Differences(style.ReportFigure):
     """Each level minus the baseline, paired, with the band that covers all stops at once."""
 
     name = "differences"
@@ -111,7 +110,7 @@ class Differences(ReportFigure):
         return self.finish(figure, words, numbers, title=title, reads=reads)
 
 
-class Levels(ReportFigure):
+class Levels(style.ReportFigure):
     """The measure itself along x, a line for each level."""
 
     name = "levels"
@@ -203,14 +202,14 @@ def _curves(
 
 def _columns(measure: str, bands: Band) -> dict[str, Floats]:
     """A band as columns: mean, simultaneous and pointwise 95 % limits."""
-    edges = {
-        "mean": bands.mean,
-        "band_low": bands.low,
-        "band_high": bands.high,
-        "low": bands.pointwise_low,
-        "high": bands.pointwise_high,
-    }
-    return {style.with_unit(name, measure): values for name, values in edges.items()}
+    return style.in_units(
+        measure,
+        mean=bands.mean,
+        band_low=bands.low,
+        band_high=bands.high,
+        low=bands.pointwise_low,
+        high=bands.pointwise_high,
+    )
 
 
 def _zoom_on_small(axes: list[Axes], smallest: float) -> bool:
@@ -298,7 +297,7 @@ _ROOM = 1.08  # above the highest mark
 _QUANTILES = ("p05", "p25", "p50", "p75", "p95")
 
 
-class CommandAge(ReportFigure):
+class CommandAge(style.ReportFigure):
     """How old a command is when it takes effect, as quantile ranges."""
 
     name = "command_age"
@@ -328,7 +327,7 @@ class CommandAge(ReportFigure):
         return self.finish(figure, caption("command_age"), numbers)
 
 
-class CommandRate(ReportFigure):
+class CommandRate(style.ReportFigure):
     """Commands applied per second, beside what arithmetic allows request/reply."""
 
     name = "command_rate"

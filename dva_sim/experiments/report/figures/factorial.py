@@ -14,7 +14,6 @@ import numpy as np
 from dva_sim.experiments.analysis.run_grid import MOST_PANELS, Factor, Floats, Setting, StudyView
 from dva_sim.experiments.report.figures import style
 from dva_sim.experiments.report.figures.palette import DIVERGING, INK, PAPER, SOFT
-from dva_sim.experiments.report.figures.report_figure import ReportFigure
 from dva_sim.experiments.report.prose import caption
 from dva_sim.experiments.study.parts import Level
 from dva_sim.kernel.wording import capital, number
@@ -33,7 +32,7 @@ _ROW = 0.21  # height of each [in]
 _ARROW = "→"
 
 
-class FactorialEffects(ReportFigure):
+class FactorialEffects(style.ReportFigure):
     """Main effects and two-way interactions of a full factorial, with simultaneous intervals."""
 
     name = "factorial_effects"
@@ -56,8 +55,7 @@ class FactorialEffects(ReportFigure):
         figure, ((ax,),) = style.panels(1, 1, 1.0 + _ROW * (len(shown) + 1))
         rows = _rows(ax, shown)
         ax.axvline(0, color=INK, lw=0.8, zorder=1)
-        ax.grid(axis="x")
-        ax.grid(axis="y", visible=False)
+        style.lying(ax)
         ax.set_ylim(rows + 0.2, -0.8)
         ax.set_xlabel(style.axis_label(view.measure, f"Change of the {measure_name(view.measure)}"))
         words = caption("factorial_effects", left_out=len(found) - len(shown))
@@ -141,7 +139,7 @@ def _numbers(view: StudyView, found: Sequence[Effect]) -> style.Numbers:
     for effect in found:
         interval = effect.interval
         edges = {"mean": interval.mean, "low": interval.low, "high": interval.high}
-        told = {style.with_unit(name, view.measure): value for name, value in edges.items()}
+        told = style.in_units(view.measure, **edges)
         words = {
             "factors": " x ".join(effect.factors),
             "from": " x ".join(str(_plain(word)) for word in effect.baselines),
@@ -176,7 +174,7 @@ class EffectField:
     high: Floats
 
 
-class HeatMap(ReportFigure):
+class HeatMap(style.ReportFigure):
     """The declared contrast over two factors; None where there is no second one worth it."""
 
     name = "heat_map"
@@ -305,9 +303,8 @@ def _heat_numbers(view: StudyView, fields: Sequence[EffectField]) -> style.Numbe
     numbers = style.Numbers()
     for field in fields:
         edges = {"mean": field.mean, "band_low": field.low, "band_high": field.high}
+        columns = style.in_units(view.measure, **edges)
         for row, level in enumerate(field.second.levels):
-            told = {
-                style.with_unit(name, view.measure): values[row] for name, values in edges.items()
-            }
+            told = {name: values[row] for name, values in columns.items()}
             numbers.add(field.panel | {field.second.name: level}, view.along_x() | told)
     return numbers

@@ -24,12 +24,11 @@ from dva_sim.experiments.analysis.run_grid import (
 from dva_sim.experiments.report.figures import style
 from dva_sim.experiments.report.figures.budget import Stacks, stack
 from dva_sim.experiments.report.figures.palette import FATES, PAPER, Look, box, key, legend, looks
-from dva_sim.experiments.report.figures.report_figure import ReportFigure
 from dva_sim.experiments.report.prose import caption
 from dva_sim.experiments.study.parts import Level
 from dva_sim.kernel.wording import capital
 from dva_sim.simulation.labels import brief, level_name
-from dva_sim.statistics import CUT, incidence
+from dva_sim.statistics import CUT, Incidence, incidence
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -41,7 +40,7 @@ _MOST_STOPS, _MOST_LINES, _POINTS = 4, 3, 241
 _TITLE = 70  # characters that the width holds
 
 
-class EndingsInTime(ReportFigure):
+class EndingsInTime(style.ReportFigure):
     """Cumulative incidence of each way, stacked; None where all went right."""
 
     name = "endings"
@@ -67,8 +66,8 @@ class EndingsInTime(ReportFigure):
                 mask = endings.under(line, stop)
                 if mask.any():
                     shares = _shares(endings, mask, times)
-                    _stack(ax, shares, times)
-                    where = view.setting(view.panels[0], line) | _stop(view, stop)
+                    stack_in_time(ax, shares, times)
+                    where = view.setting(view.panels[0], line) | style.stop_of(view, stop)
                     numbers.add(where, {"t_s": times} | shares)
                 ax.grid(False)
             name = level_name(view.line.name, line) if view.line else ""
@@ -77,7 +76,9 @@ class EndingsInTime(ReportFigure):
         axes[0][0].set(xlim=(0, endings.horizon), ylim=(0, 1))
         axes[0][0].yaxis.set_major_formatter(lambda y, _: f"{100 * y:.0f} %")
         for ax, stop in zip(axes[0], stops, strict=True):
-            ax.set_title(style.wrapped(capital(brief(_stop(view, stop))), _TITLE // len(stops)))
+            ax.set_title(
+                style.wrapped(capital(brief(style.stop_of(view, stop))), _TITLE // len(stops))
+            )
         for ax in axes[-1]:
             ax.set_xlabel("Since the report [s]")
         key(figure, [box(FATES[way]) for way in endings.ways], [_named(w) for w in endings.ways])
@@ -96,21 +97,22 @@ def _all_right(endings: Endings, lines: Sequence[Level], stops: Sequence[Level])
     return all(bool(endings.is_right[endings.under(*place)].all()) for place in places)
 
 
-def _stop(view: StudyView, stop: Level) -> Setting:
-    return {view.over.name: stop} if view.over else {}
-
-
 def _shares(endings: Endings, mask: NDArray[np.bool_], times: Floats) -> dict[str, Floats]:
     """Cumulative incidence of each way at some times, and the share to which nothing happened."""
     ways = endings.ways[:-1]
     codes = {way: number for number, way in enumerate(ways, 1)}
     causes = np.array([codes.get(way, CUT) for way in endings.way[mask]], dtype=np.intp)
-    curve = incidence(endings.time[mask], causes, len(ways))
-    shares = {way: curve.at(times, code) for way, code in codes.items()}
-    return shares | {NOTHING: 1.0 - sum(shares.values(), np.zeros_like(times))}
+    return shares_of(incidence(endings.time[mask], causes, len(ways)), ways, NOTHING, times)
 
 
-def _stack(ax: Axes, shares: dict[str, Floats], times: Floats) -> None:
+def shares_of(curve: Incidence, ways: Sequence[str], rest: str, times: Floats) -> dict[str, Floats]:
+    """Cumulative incidence of each way at some times `(n,)`, and what is left to none of them."""
+    shares = {way: curve.at(times, code) for code, way in enumerate(ways, 1)}
+    return shares | {rest: 1.0 - sum(shares.values(), np.zeros_like(times))}
+
+
+def stack_in_time(ax: Axes, shares: dict[str, Floats], times: Floats) -> None:
+    """Shares that add up to one, one above the other."""
     floor = np.zeros_like(times)
     for way, share in shares.items():
         fill, top = FATES[way], floor + share
@@ -169,9 +171,7 @@ class Events:
 
     def under(self, panel: Setting, line: Level, stop: Level) -> NDArray[np.bool_]:
         """Which events happened under these levels `(n,)`."""
-        view = self._view
-        wanted = dict(panel)
-        wanted |= {f.name: v for f, v in ((view.line, line), (view.over, stop)) if f}
+        wanted = self._view.setting(panel, line) | style.stop_of(self._view, stop)
         mask = np.ones(len(self), dtype=bool)
         for name, (factor, codes) in self._codes.items():
             mask &= codes == factor.levels.index(wanted[name])
@@ -222,7 +222,7 @@ def _events(view: StudyView, reading: Reading) -> Events | None:
     return events if events else None
 
 
-class StoryTimes(ReportFigure):
+class StoryTimes(style.ReportFigure):
     """Times of the events that were reached, guards and robots apart; of those who came."""
 
     name = "story_times"
@@ -259,7 +259,7 @@ class StoryTimes(ReportFigure):
         return self.finish(figure, words, numbers, title=title)
 
 
-class StoryOutcomes(ReportFigure):
+class StoryOutcomes(style.ReportFigure):
     """What became of every event, as shares that add up to one; None if all met one fate."""
 
     name = "story_outcomes"

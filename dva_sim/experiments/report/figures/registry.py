@@ -21,8 +21,7 @@ from dva_sim.experiments.report.figures import (
     tradeoff,
     transport,
 )
-from dva_sim.experiments.report.figures.report_figure import ReportFigure
-from dva_sim.experiments.report.figures.style import Drawn, styled
+from dva_sim.experiments.report.figures.style import Drawn, ReportFigure, styled
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.plugins import FAILURES, Plugins, said
 from dva_sim.kernel.wording import listing

@@ -11,7 +11,6 @@ from dva_sim.experiments.analysis.layout import layout_of
 from dva_sim.experiments.analysis.run_grid import Floats, RunGrid, Setting, StudyView, nan_mean
 from dva_sim.experiments.report.figures import style
 from dva_sim.experiments.report.figures.palette import INK, ONE, PAPER, SOFT, Look, legend, looks
-from dva_sim.experiments.report.figures.report_figure import ReportFigure
 from dva_sim.experiments.report.prose import caption
 from dva_sim.experiments.study.parts import POINT, Level
 from dva_sim.kernel.wording import capital
@@ -94,7 +93,7 @@ def _clouds(view: StudyView, part: RunGrid, panel: Setting) -> list[Cloud]:
     return [Cloud(name, at(level), level) for name, level in zip(names, view.lines, strict=True)]
 
 
-class Scatter(ReportFigure):
+class Scatter(style.ReportFigure):
     """A panel for each factor: a dot for each point, the mean over all its runs."""
 
     name = "scatter"
@@ -109,12 +108,10 @@ class Scatter(ReportFigure):
         """Draw it."""
         clouds, names, where, panel = points_of(view, reading)
         ranges = (reading.study.get("design") or {}).get("ranges") or {}
-        columns = min(_ABREAST, len(names))
-        rows = -(-len(names) // columns)
-        figure, grid = style.panels(rows, columns, 2.7, sharey=True)
-        axes = [ax for row in grid for ax in row]
+        abreast = min(_ABREAST, len(names))
+        figure, grid, axes = style.places(len(names), abreast, 2.7, sharey=True)
         means = [nan_mean(c.values.reshape(len(c.values), -1), axis=1) for c in clouds]
-        for ax, name, x in zip(axes, names, where, strict=False):
+        for ax, name, x in zip(axes, names, where, strict=True):
             for cloud, y in zip(clouds, means, strict=True):
                 _dots(ax, x, y, _look(view, cloud))
             ax.set_xlabel(style.wrapped(capital(head_of(name)), 30))
@@ -122,8 +119,6 @@ class Scatter(ReportFigure):
                 style.log_axis(ax, "x")
             if len(clouds) == 1 and clouds[0].level is None and view.contrast is not None:
                 ax.axhline(0, color=INK, lw=0.8, zorder=1)
-        for ax in axes[len(names) :]:
-            ax.set_visible(False)
         label = clouds[0].name if view.contrast is not None else measure_name(view.measure)
         for row in grid:
             row[0].set_ylabel(style.axis_label(view.measure, style.wrapped(label, 26)))
@@ -184,7 +179,7 @@ def trend(x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 # --- Sobol's indices -------------------------------------------------------------------------
-class Sobol(ReportFigure):
+class Sobol(style.ReportFigure):
     """A panel for each cloud: how much of the variance over the ranges is each factor's."""
 
     name = "sobol"
@@ -216,8 +211,7 @@ class Sobol(ReportFigure):
             ax.axvline(0, color=INK, lw=0.8)
             ax.set_title(cloud.name)
             ax.set_xlabel("Share of the variance")
-            ax.grid(axis="x")
-            ax.grid(axis="y", visible=False)
+            style.lying(ax)
         axes[0].set_yticks(range(len(names)), [capital(factor_name(name)) for name in names])
         axes[0].set_ylim(len(names) - 0.5, -0.5)
         title = (

@@ -9,6 +9,7 @@ import numpy as np
 
 from dva_sim.experiments.analysis.run_grid import Factor, StudyView
 from dva_sim.experiments.analysis.shift_effects import BEST, FLOOR, Shifts, pooled
+from dva_sim.experiments.report.figures.outcomes import shares_of, stack_in_time
 from dva_sim.experiments.report.figures.palette import (
     FAINT,
     FATES,
@@ -20,8 +21,7 @@ from dva_sim.experiments.report.figures.palette import (
     key,
     looks,
 )
-from dva_sim.experiments.report.figures.report_figure import ReportFigure
-from dva_sim.experiments.report.figures.style import Drawn, Numbers, panels, with_unit
+from dva_sim.experiments.report.figures.style import Drawn, Numbers, ReportFigure, panels, with_unit
 from dva_sim.experiments.report.prose import caption
 from dva_sim.experiments.report.shift_page import ShiftPage
 from dva_sim.experiments.study.parts import Level
@@ -184,8 +184,8 @@ class FatesOfEvents(ShiftFigure):
             for policy, ax in zip(chosen, row, strict=True):
                 events = dict(shifts.events_of(policy, stop))
                 if len(events["event_id"]):
-                    shares = _shares(measures.fates(events), times)
-                    _stack(ax, shares, times)
+                    shares = shares_of(measures.fates(events), measures.FATES, "open", times)
+                    stack_in_time(ax, {fate: shares[fate] for fate in _FATES}, times)
                     where = {"at": shifts.titles[stop], "dispatch.policy": policy}
                     numbers.add(where, {"t_s": times} | shares)
                 ax.set_xlim(0, shifts.follow)
@@ -206,21 +206,6 @@ def chosen_policies(shifts: Shifts) -> list[str]:
     quickest = [shifts.policies[i] for i in np.argsort(response, kind="stable")]
     wanted = [FLOOR, *reversed([str(c) for c in shifts.view.contrast or ()]), *quickest]
     return list(dict.fromkeys(p for p in wanted if p in shifts.policies))[:4]
-
-
-def _shares(curve: Any, times: Any) -> dict[str, Any]:
-    """Cumulative incidence of each outcome at these times, and what is still open."""
-    shares = {fate: curve.at(times, 1 + i) for i, fate in enumerate(measures.FATES)}
-    return shares | {"open": 1.0 - sum(shares.values())}
-
-
-def _stack(ax: Axes, shares: dict[str, Any], times: Any) -> None:
-    bottom = np.zeros_like(times)
-    for fate in _FATES:
-        colour, hatch = FATES[fate]
-        top = bottom + shares[fate]
-        ax.fill_between(times, bottom, top, facecolor=colour, hatch=hatch, edgecolor=PAPER, lw=0)
-        bottom = top
 
 
 # --- one line per policy ---------------------------------------------------------------------

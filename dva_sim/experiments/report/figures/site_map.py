@@ -24,8 +24,16 @@ from dva_sim.experiments.report.figures.palette import (
     key,
     look_of,
 )
-from dva_sim.experiments.report.figures.report_figure import ReportFigure
-from dva_sim.experiments.report.figures.style import ASIDE, WIDTH, Drawn, Numbers, panels, wrapped
+from dva_sim.experiments.report.figures.style import (
+    ASIDE,
+    WIDTH,
+    Drawn,
+    Numbers,
+    ReportFigure,
+    panels,
+    stop_of,
+    wrapped,
+)
 from dva_sim.experiments.report.prose import caption
 from dva_sim.experiments.study.parts import POINT, Level
 from dva_sim.kernel.errors import DvaSimError
@@ -78,7 +86,7 @@ class Trajectories(ReportFigure):
                     ax.plot(*way.T, color=SOFT, lw=1.3, ls=(0, (3, 2)), zorder=8)
                 for way in ways.under(level, stop):
                     _way(ax, way, paint[level])
-                    where = view.setting(view.panels[0], level) | _at(view, stop)
+                    where = view.setting(view.panels[0], level) | stop_of(view, stop)
                     numbers.add(where, {"x_m": way[:, 0], "y_m": way[:, 1]})
                 ax.set_title(wrapped(_heading(view, level, stop), _TITLE // abreast), fontsize=8.5)
                 ax.label_outer()
@@ -91,10 +99,6 @@ class Trajectories(ReportFigure):
         return self.finish(figure, words, numbers, title=f"Ways taken{within}")
 
 
-def _at(view: StudyView, stop: Level) -> dict[str, Level]:
-    return {view.over.name: stop} if view.over else {}
-
-
 class DrivenWays:
     """Tracks of one person and trial, picked by what they were driven under."""
 
@@ -103,7 +107,6 @@ class DrivenWays:
         rows = {key: np.asarray(values) for key, values in tracks.items()}
         here = (rows["part"] == view.part.name) & np.isfinite(rows["x_m"].astype(float))
         self._part = _first_trial({key: values[here] for key, values in rows.items()})
-        self._factors = view.part.factors
 
     def __bool__(self) -> bool:
         return len(self._part["x_m"]) > 0
@@ -120,10 +123,9 @@ class DrivenWays:
     def under(self, line: Level, stop: Level) -> list[Floats]:
         """Ways under one line and stop, in the panel the answer speaks of."""
         view = self._view
-        wanted = dict(view.panels[0])
-        wanted |= {f.name: v for f, v in ((view.line, line), (view.over, stop)) if f}
+        wanted = view.setting(view.panels[0], line) | stop_of(view, stop)
         mask = ~self._part["is_reference"].astype(bool)
-        for factor in self._factors:
+        for factor in view.part.factors:
             mask &= codes_of(self._part, factor) == factor.levels.index(wanted[factor.name])
         return self._moved(mask)
 

@@ -9,7 +9,6 @@ import numpy as np
 from dva_sim.experiments.analysis.run_grid import Floats, Setting, StudyView, person_means, present
 from dva_sim.experiments.report.figures import style
 from dva_sim.experiments.report.figures.palette import legend, looks
-from dva_sim.experiments.report.figures.report_figure import ReportFigure
 from dva_sim.experiments.report.prose import caption
 from dva_sim.experiments.study.parts import Level
 from dva_sim.simulation.labels import factor_name, level_name, measure_name
@@ -28,7 +27,7 @@ EXPOSURES = ("exposure_look_s", "exposure_s", "person_exposure_s")
 RESPONSES = ("response_mean_s", "confirmation_mean_s", "response_s", "drive_time_s")
 
 
-class TradeOff(ReportFigure):
+class TradeOff(style.ReportFigure):
     """Response over exposure, a line for each level of the compared factor through its stops."""
 
     name = "tradeoff"

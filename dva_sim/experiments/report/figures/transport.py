@@ -10,7 +10,6 @@ import numpy as np
 from dva_sim.experiments.analysis.run_grid import Floats, StudyView, nan_mean, person_means
 from dva_sim.experiments.report.figures import style
 from dva_sim.experiments.report.figures.palette import INK, Look, legend, looks
-from dva_sim.experiments.report.figures.report_figure import ReportFigure
 from dva_sim.experiments.report.prose import caption
 from dva_sim.kernel.units import ending_of
 
@@ -52,7 +51,7 @@ FELT = (
 )
 
 
-class _Measures(ReportFigure):
+class _Measures(style.ReportFigure):
     """A panel for each of some measures that the runs have."""
 
     pages = ("transport",)
@@ -63,13 +62,9 @@ class _Measures(ReportFigure):
         there = [each for each in self.shown if view.part.has(each.column)]
         if not there:
             return None
-        rows = (len(there) + 1) // 2
-        figure, grid = style.panels(rows, 2, 2.3)
-        axes = [ax for row in grid for ax in row]
-        for ax, each in zip(axes, there, strict=False):
+        figure, _, axes = style.places(len(there), 2, 2.3)
+        for ax, each in zip(axes, there, strict=True):
             _panel(ax, view, each)
-        for ax in axes[len(there) :]:
-            ax.set_visible(False)
         for ax in axes[: len(there) - 2]:
             ax.set_xlabel("")
         legend(figure, view.line)
