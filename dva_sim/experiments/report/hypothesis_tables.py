@@ -24,6 +24,7 @@ from dva_sim.experiments.analysis.hypothesis_tests import (
 from dva_sim.experiments.analysis.run_grid import Floats, Setting, StudyView, Table
 from dva_sim.experiments.analysis.sample_size import POWERS, Count, SizePlan
 from dva_sim.experiments.report.cell_table import CellTable
+from dva_sim.experiments.report.prose import note
 from dva_sim.experiments.study.hashing import fingerprint_of_judges
 from dva_sim.experiments.study.parts import POINT
 from dva_sim.kernel.units import unit_of
@@ -56,11 +57,7 @@ def hypothesis_table(tested: Sequence[Tested]) -> CellTable:
         ]
         for t in tested
     ]
-    note = (
-        "A claim held if p by Holm is below 5 %, and did not hold if p of the opposite is; else it "
-        "is open, which is no evidence either way. Each interval is of its row alone."
-    )
-    return CellTable("", heads, len(heads), rows, note=note)
+    return CellTable("", heads, len(heads), rows, note=note("hypotheses"))
 
 
 def comparison_table(found: Judgement) -> CellTable:
@@ -84,24 +81,11 @@ def comparison_table(found: Judgement) -> CellTable:
     ]
     families = Counter(c.contrast.family for c in compared)
     families.update(t.contrast.family for t in found.tested)
-    counted = "; ".join(f"{name}: {count}" for name, count in families.items())
-    note = (
-        "Each interval is of its row alone; p is of the two-sided permutation test, by Holm for "
-        f"all tests of its family together (tests in each family: {counted}). Standard deviations "
-        "are those of persons under the two levels, on average. Levels of factors that a "
-        "comparison does not name are averaged."
-        f"{_too_few(compared)}"
-    )
-    return CellTable("", heads, len(heads), rows, note=note)
-
-
-def _too_few(compared: Sequence[Compared]) -> str:
-    """Whether even one test cannot come out, whatever the runs."""
     persons = max((c.difference.n_persons for c in compared if c.difference), default=0)
-    least = 2.0 ** (1 - persons)
-    if not persons or least <= 1 - LEVEL:
-        return ""
-    return f" With {persons} persons p cannot be below {least:.2g}: this test needs six."
+    least = 2.0 ** (1 - persons) if persons else 0.0  # whatever the runs
+    facts = {"families": list(families.items()), "persons": persons}
+    told = note("comparisons", **facts, least_p=least if least > 1 - LEVEL else None)
+    return CellTable("", heads, len(heads), rows, note=told)
 
 
 def _sides(compared: Compared) -> str:
@@ -314,10 +298,4 @@ def _persons(count: float) -> str:
 def _assumes(found: Sequence[SizePlan], cluster: str) -> str:
     counts = sorted({plan.known_from for plan in found})
     known = str(counts[0]) if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
-    return (
-        f"Power: the chance that a study of that size shows it. All by one law: the interval shown "
-        f"here, narrowed by more {cluster}s with as many runs of each (noncentral t). In brackets, "
-        f"what else would fit (95 %), since the spread is known from {known} {cluster}s only. A "
-        "difference found in few of them is often too large: rather count on the smallest that "
-        "matters."
-    )
+    return note("sample_size", cluster=cluster, known=known)

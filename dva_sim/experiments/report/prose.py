@@ -1,4 +1,4 @@
-"""Sentences of a report from templates that read as text: captions, and how numbers were made."""
+"""Sentences of a report from templates that read as text: captions, notes, how it was made."""
 
 from __future__ import annotations
 
@@ -15,6 +15,11 @@ if TYPE_CHECKING:
 def caption(name: str, **facts: Any) -> str:
     """What the macro of a name in `captions.txt.j2` says of some facts."""
     return _in_a_line(str(getattr(_template("captions").module, name)(**facts)))
+
+
+def note(name: str, **facts: Any) -> str:
+    """What the macro of a name in `notes.txt.j2` says of some facts."""
+    return _in_a_line(str(getattr(_template("notes").module, name)(**facts)))
 
 
 def paragraphs(name: str, **facts: Any) -> list[str]:
