@@ -139,7 +139,7 @@ def everything(kind: str | None = None) -> dict[str, list[NamedThing]]:
         ConfigError: there is no such kind.
     """
     makers: dict[str, Any] = {name: _files(name, folder) for name, folder in FILES.items()}
-    makers |= {several: _classes(there) for several, there in _registries().items()}
+    makers |= {several: _plugins_of(there) for several, there in _registries().items()}
     if kind is not None and kind not in makers:
         raise ConfigError(f"there is no list of {kind!r}; {hint(kind, makers, 'there are')}")
     return {name: list(made) for name, made in makers.items() if kind in (None, name)}
@@ -182,7 +182,7 @@ def _described(path: Path) -> str:
     return _first(" ".join(str(next(iter(found.values()), "")).split())) if found else ""
 
 
-def _classes(there: Registry) -> Iterator[NamedThing]:
+def _plugins_of(there: Registry) -> Iterator[NamedThing]:
     told = {entry.name: f"of {entry.value}" for entry in entry_points(group=there.group)}
     for name, text in there.shipped.items():
         told[name] = _first(" ".join(text.partition("\n\n")[0].split())) or told.get(name, "")
