@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -50,22 +49,14 @@ if TYPE_CHECKING:
 
 _WIDER = 1.2  # of a logarithmic axis, lest marks lie on its edges
 _STEP = 0.12  # between the bars of two lines, in stops
-CadenceOf = Callable[[Setting], Cadence | None]
 
 
-def cadences(view: StudyView, scenario: Mapping[str, Any]) -> CadenceOf:
-    """The cadence of each panel, where lock-step and delay are among the factors."""
-
-    @cache
-    def lookup(panel: tuple[tuple[str, Level], ...]) -> Cadence | None:
-        return cadence(scenario, dict(panel))
-
-    def cadence_of(panel: Setting) -> Cadence | None:
-        along_delay = view.over is not None and view.over.name == "link.delay_s"
-        waits = any(level in PATTERNS and PATTERNS[str(level)].in_step for level in view.lines)
-        return lookup(tuple(panel.items())) if along_delay and waits else None
-
-    return cadence_of
+def cadences(view: StudyView, scenario: Mapping[str, Any]) -> list[Cadence | None]:
+    """Of each panel shown; where a delay and a pattern that waits are among the factors."""
+    waits = any(level in PATTERNS and PATTERNS[str(level)].in_step for level in view.lines)
+    if view.over is None or view.over.name != "link.delay_s" or not waits:
+        return [None for _ in view.shown]
+    return [cadence(scenario, panel) for panel in view.shown]
 
 
 class Differences(style.ReportFigure):
@@ -78,9 +69,9 @@ class Differences(style.ReportFigure):
 
     def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
         """Draw it."""
-        cadence_of = cadences(view, reading.scenario_of(view.part.name))
         if view.contrast is None or view.line is None:
             return None
+        there = cadences(view, reading.scenario_of(view.part.name))
         baseline = view.contrast[1]
         others = tuple(level for level in view.lines if level != baseline)
 
@@ -93,9 +84,9 @@ class Differences(style.ReportFigure):
         figure, axes, ends, cut, numbers = _curves(
             view, others, curve, label, (-limit, limit), home=0.0
         )
-        for ax, panel in zip(axes, view.shown, strict=True):
+        for ax, found in zip(axes, there, strict=True):
             ax.axhline(0, color=INK, lw=0.8, zorder=1)
-            mark_boundary(ax, view.over, cadence_of(panel), text=True)
+            mark_boundary(ax, view.over, found, text=True)
         zoomed = view.smallest_effect is not None and _zoom_on_small(axes, view.smallest_effect)
         _name(view, others, figure, axes, ends)
         title = f"Difference against {name} in {_what(view)}"
@@ -104,7 +95,7 @@ class Differences(style.ReportFigure):
             baseline=name,
             zoomed=zoomed,
             is_marked=view.smallest_effect is not None,
-            has_boundary=_has_boundary(view, cadence_of),
+            has_boundary=any(_boundary(view.over, found) is not None for found in there),
         )
         reads = (_intervals_words(view), style.hatch_words(view), cut)
         return self.finish(figure, words, numbers, title=title, reads=reads)
@@ -140,12 +131,15 @@ class Levels(style.ReportFigure):
         return self.finish(figure, words, numbers, title=title, reads=reads)
 
 
+def _boundary(over: Factor | None, cadence: Cadence | None) -> float | None:
+    """Where along x the wanted rate becomes too high; None if it is not among the levels."""
+    return style.place_of(over, cadence.boundary_s) if over and cadence else None
+
+
 def mark_boundary(ax: Axes, over: Factor | None, cadence: Cadence | None, text: bool) -> None:
     """The delay from which request/reply must fall behind the wanted rate."""
-    if over is None or cadence is None:
-        return
-    place = style.place_of(over, cadence.boundary_s)
-    if place is None:
+    place = _boundary(over, cadence)
+    if place is None or over is None or cadence is None:
         return
     ax.axvline(place, color=SOFT, lw=1, ls=(0, (4, 2)), zorder=1)
     if text:
@@ -287,12 +281,6 @@ def _what(view: StudyView) -> str:
     return f"{'excess ' if _in_excess(view) else ''}{measure_name(view.measure)}"
 
 
-def _has_boundary(view: StudyView, cadence_of: CadenceOf) -> bool:
-    """Whether any panel has the dashed line of `mark_boundary`."""
-    cadences, over = [cadence_of(panel) for panel in view.shown], view.over
-    return any(c and over and style.place_of(over, c.boundary_s) is not None for c in cadences)
-
-
 _ROOM = 1.08  # above the highest mark
 _QUANTILES = ("p05", "p25", "p50", "p75", "p95")
 
@@ -338,11 +326,11 @@ class CommandRate(style.ReportFigure):
 
     def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
         """Draw it."""
-        cadence_of = cadences(view, reading.scenario_of(view.part.name))
+        there = cadences(view, reading.scenario_of(view.part.name))
         figure, axes = style.panel_grid(view, 3.0)
         look, every, numbers = looks(view.line), [], style.Numbers()
         grid = view.part.grid("command_rate_hz")
-        for ax, panel in zip(axes, view.shown, strict=True):
+        for ax, panel, found in zip(axes, view.shown, there, strict=True):
             ends: Ends = {}
             for i, (level, place) in enumerate(style.dodge(view.lines)):
                 means = _cell_means(view.curve(grid, panel, level))
@@ -354,7 +342,7 @@ class CommandRate(style.ReportFigure):
                 ends[level] = float(means[-1])
                 told = view.along_x() | {"command_rate_hz": means}
                 numbers.add(view.setting(panel, level), told)
-            _closed_form(ax, view, cadence_of(panel))
+            _closed_form(ax, view, found)
             every.append(ends)
         tops = [ax.dataLim.y1 for ax in axes if np.isfinite(ax.dataLim.y1)]  # a panel may be empty
         axes[0].set_ylim(0, _ROOM * max(tops, default=1.0))
@@ -363,8 +351,7 @@ class CommandRate(style.ReportFigure):
             name_lines(axes, every, view.line)
         else:
             legend(figure, view.line)
-        has_cadence = any(cadence_of(panel) for panel in view.shown)
-        words = caption("command_rate", has_cadence=has_cadence)
+        words = caption("command_rate", has_cadence=any(there))
         return self.finish(figure, words, numbers)
 
 
