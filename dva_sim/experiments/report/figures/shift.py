@@ -21,7 +21,13 @@ from dva_sim.experiments.report.figures.palette import (
     key,
     looks,
 )
-from dva_sim.experiments.report.figures.style import Drawn, Numbers, ReportFigure, panels, with_unit
+from dva_sim.experiments.report.figures.style import (
+    Drawn,
+    Numbers,
+    ReportFigure,
+    panels,
+    with_limits,
+)
 from dva_sim.experiments.report.prose import caption
 from dva_sim.experiments.report.shift_page import ShiftPage
 from dva_sim.experiments.study.parts import Level
@@ -124,17 +130,10 @@ def _scatter(shifts: Shifts, column: str, label: str) -> Figure:
 
 def _scatter_numbers(shifts: Shifts, column: str) -> Numbers:
     """Means, and ends of bars: the interval of the difference against the baseline."""
-    numbers = Numbers()
-    told: dict[str, Any] = {}
+    numbers, told = Numbers(), dict[str, Any]()
     for name in ("response_mean_s", column):
-        means, halves, stem = (
-            shifts.means(name),
-            _half_widths(shifts, name),
-            name.removesuffix("_s"),
-        )
-        told[name] = means
-        told[with_unit(f"{stem}_low", name)] = means - halves
-        told[with_unit(f"{stem}_high", name)] = means + halves
+        means, half = shifts.means(name), _half_widths(shifts, name)
+        told |= with_limits(name, means, means - half, means + half)
     for stop, title in enumerate(shifts.titles):
         at_stop: dict[str, Any] = {name: values[:, stop] for name, values in told.items()}
         numbers.add({"at": title}, at_stop | {"dispatch.policy": shifts.policies})
@@ -223,11 +222,7 @@ class WayToBest(ShiftFigure):
         figure, (axes,) = panels(1, len(shifts.stops), _height(len(names)), sharey=True)
         for stop, ax in enumerate(axes):
             found = shifts.progress(stop)
-            told: dict[str, Any] = {
-                "share": found.mean,
-                "share_low": found.low,
-                "share_high": found.high,
-            }
+            told = with_limits("share", found.mean, found.low, found.high)
             numbers.add({"at": shifts.titles[stop]}, told | {"dispatch.policy": names})
             for row, policy in enumerate(names):
                 colour, mark = look[policy]
@@ -264,11 +259,7 @@ class Percentiles(ShiftFigure):
                 colour = look[policy].colour
                 value, low, high = pooled(shifts.events_of(policy, stop), _QUANTILES, shifts.follow)
                 where = {"at": shifts.titles[stop], "dispatch.policy": policy}
-                told: dict[str, Any] = {
-                    "response_s": value,
-                    "response_low_s": low,
-                    "response_high_s": high,
-                }
+                told = with_limits("response_s", value, low, high)
                 shown = {"quantile": _QUANTILES, "drawn_until_s": [shifts.follow] * len(_QUANTILES)}
                 numbers.add(where, told | shown)
                 inside = [np.minimum(x, shifts.follow) for x in (value, low, high)]

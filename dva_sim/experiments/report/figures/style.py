@@ -74,6 +74,12 @@ def in_units(measure: str, **columns: Any) -> dict[str, Any]:
     return {with_unit(word, measure): values for word, values in columns.items()}
 
 
+def with_limits(column: str, middle: Any, low: Any, high: Any) -> dict[str, Any]:
+    """A column with its limits: `response_s`, `response_low_s` and `response_high_s`."""
+    stem = column.removesuffix(f"_{ending_of(column)}")
+    return {column: middle} | in_units(column, **{f"{stem}_low": low, f"{stem}_high": high})
+
+
 def _text(value: Any) -> str:
     if value is None or isinstance(value, str):
         return value or ""

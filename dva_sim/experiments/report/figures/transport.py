@@ -11,7 +11,6 @@ from dva_sim.experiments.analysis.run_grid import Floats, StudyView, nan_mean, p
 from dva_sim.experiments.report.figures import style
 from dva_sim.experiments.report.figures.palette import INK, Look, legend, looks
 from dva_sim.experiments.report.prose import caption
-from dva_sim.kernel.units import ending_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -96,10 +95,7 @@ def _numbers(view: StudyView, shown: Sequence[ShownMeasure]) -> style.Numbers:
         told: dict[str, Floats] = {}
         for name, curve in curves.items():
             persons = person_means(curve)
-            stem = name.removesuffix(f"_{ending_of(name)}")
-            told[name] = nan_mean(persons, axis=0)
-            for end, values in zip(("low", "high"), _middle(persons), strict=True):
-                told[style.with_unit(f"{stem}_{end}", name)] = values
+            told |= style.with_limits(name, nan_mean(persons, axis=0), *_middle(persons))
         numbers.add(view.setting(panel, level), view.along_x() | told)
     return numbers
 
