@@ -28,7 +28,7 @@ from dva_sim.kernel.suggestions import hint
 from dva_sim.testing.kinds import TRIALS, plural
 
 
-class Registry(NamedTuple):
+class ShippedNames(NamedTuple):
     """A kind of plug-ins.
 
     Attributes:
@@ -42,7 +42,7 @@ class Registry(NamedTuple):
     shipped: dict[str, str]
 
 
-def registry(place: str) -> Registry:
+def registry(place: str) -> ShippedNames:
     """The registry at `module:NAME`."""
     module, _, name = place.partition(":")
     module, call = _found(module, ast.Name(name))
@@ -54,7 +54,7 @@ def registry(place: str) -> Registry:
         for name, kind in _classes(*_found(module, given["shipped"]))
         if name not in hidden
     }
-    return Registry(plural(given["kind"].value), given["group"].value, shipped)
+    return ShippedNames(plural(given["kind"].value), given["group"].value, shipped)
 
 
 def _classes(module: str, shipped: Any) -> Iterator[tuple[str, ast.ClassDef]]:
@@ -202,7 +202,7 @@ def kinds() -> list[str]:
     return [*FILES, *_registries()]
 
 
-def _registries() -> dict[str, Registry]:
+def _registries() -> dict[str, ShippedNames]:
     """Kinds of plug-ins by what several are called."""
     found = (registry(trial.plugins) for trial in TRIALS.values())
     return {each.several: each for each in found}
@@ -261,7 +261,7 @@ def _described(path: Path) -> str:
     return _first(" ".join(str(next(iter(found.values()), "")).split())) if found else ""
 
 
-def _plugins_of(there: Registry) -> Iterator[NamedThing]:
+def _plugins_of(there: ShippedNames) -> Iterator[NamedThing]:
     told = {entry.name: f"of {entry.value}" for entry in entry_points(group=there.group)}
     for name, text in there.shipped.items():
         told[name] = _first(" ".join(text.partition("\n\n")[0].split())) or told.get(name, "")

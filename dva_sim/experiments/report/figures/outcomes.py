@@ -6,6 +6,7 @@ The whole story: who responded, how soon, and what became of every event.
 from __future__ import annotations
 
 import itertools
+from abc import abstractmethod
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -214,28 +215,33 @@ def story_part(table: Table, view: StudyView) -> str | None:
     return next(iter(others or parts), None)
 
 
-def _events(view: StudyView, reading: Reading) -> Events | None:
-    """Those of the story; None where there are none."""
-    table = reading.table("events")
-    part = story_part(table, view)
-    events = Events(table, part, view) if part is not None else None
-    return events if events else None
+class _Story(style.ReportFigure):
+    """Of the events of the part that tells a story."""
 
-
-class StoryTimes(style.ReportFigure):
-    """Times of the events that were reached, guards and robots apart; of those who came."""
-
-    name = "story_times"
-    title = "Response, by who responded"
     pages = ("driving",)
     tables = ("runs", "events")
     has_panels = True
 
     def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
+        """Draw it, where there are events."""
+        table = reading.table("events")
+        part = story_part(table, view)
+        events = Events(table, part, view) if part is not None else None
+        return self.drawn(view, events) if events else None
+
+    @abstractmethod
+    def drawn(self, view: StudyView, events: Events) -> style.Drawn | None:
+        """The figure; None where there is nothing to be seen."""
+
+
+class StoryTimes(_Story):
+    """Times of the events that were reached, guards and robots apart; of those who came."""
+
+    name = "story_times"
+    title = "Response, by who responded"
+
+    def drawn(self, view: StudyView, events: Events) -> style.Drawn | None:
         """Draw it."""
-        events = _events(view, reading)
-        if events is None:
-            return None
         shown, met, numbers = view.shown, events.kinds_of_times(), style.Numbers()
         if not met:
             return None
@@ -259,20 +265,14 @@ class StoryTimes(style.ReportFigure):
         return self.finish(figure, words, numbers, title=title)
 
 
-class StoryOutcomes(style.ReportFigure):
+class StoryOutcomes(_Story):
     """What became of every event, as shares that add up to one; None if all met one fate."""
 
     name = "story_outcomes"
     title = "What became of the events"
-    pages = ("driving",)
-    tables = ("runs", "events")
-    has_panels = True
 
-    def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
+    def drawn(self, view: StudyView, events: Events) -> style.Drawn | None:
         """Draw it."""
-        events = _events(view, reading)
-        if events is None:
-            return None
         if events.one_fate() is not None:
             return None
         met = events.shares(np.ones(len(events), dtype=bool))
